@@ -1,0 +1,228 @@
+# farlight. `make help` lists the targets.
+#
+# config=debug|release|sanitize|fuzz chooses the flags and the folder below build/.
+# Sources are found by folder: a new .c file needs no line here.
+
+config ?= release
+B := build/$(config)
+VERSION := 0.1.0
+PREFIX ?= /usr/local
+DESTDIR ?=
+PKG_CONFIG ?= pkg-config
+# Make's own defaults are cc and g++; what the user says wins.
+ifeq ($(origin CC),default)
+CC := gcc
+endif
+
+WARN := -Wall -Wextra -Werror -Wconversion -Wshadow
+WARN_C := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
+CPPFLAGS_ALL := -D_GNU_SOURCE -DFARLIGHT_VERSION='"$(VERSION)"' -I.
+CFLAGS_ALL := -std=c17 -fno-common -fvisibility=hidden -pthread -MMD -MP
+CXXFLAGS_ALL := -std=c++17 -fvisibility=hidden -pthread -MMD -MP
+LDFLAGS_ALL := -pthread
+
+ifeq ($(config),debug)
+OPT := -O0 -g3 -DFARLIGHT_DEBUG
+else ifeq ($(config),release)
+OPT := -O2 -g -fno-math-errno -fno-trapping-math
+else ifeq ($(config),sanitize)
+OPT := -O1 -g -DFARLIGHT_DEBUG -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
+LDFLAGS_ALL += -fsanitize=address,undefined
+else ifeq ($(config),fuzz)
+CC := clang
+CXX := clang++
+OPT := -O1 -g -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined -fno-omit-frame-pointer
+LDFLAGS_ALL += -fsanitize=address,undefined
+else
+$(error config=$(config) is not one of debug, release, sanitize, fuzz)
+endif
+
+# Linked libraries, by program.
+SERVER_PKGS := epoxy egl libzstd libsodium libxxhash libturbojpeg inih cglm
+CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
+IMPORT_PKGS := OpenImageIO tinygltf tinyobjloader libsodium libseccomp
+EXPORT_PKGS := OpenImageIO libseccomp
+TEST_PKGS := cmocka
+# pkg-config is only asked when something is built.
+pkg_cflags = $(shell $(PKG_CONFIG) --cflags $(1) 2>/dev/null)
+pkg_libs = $(shell $(PKG_CONFIG) --libs $(1) 2>/dev/null)
+
+# ---- sources ---------------------------------------------------------------------------------------
+PROTOCOL_SRC := $(filter-out protocol/docgen.c,$(wildcard protocol/*.c))
+SERVER_SRC := $(filter-out server/main.c,$(wildcard server/*.c server/*/*.c))
+LIB_SRC := $(wildcard client/lib/*.c)
+CLI_SRC := $(wildcard client/cli/*.c)
+IMPORT_C := $(wildcard client/import/*.c)
+IMPORT_CXX := $(wildcard client/import/*.cpp)
+EXPORT_C := $(wildcard client/output/*.c)
+EXPORT_CXX := $(wildcard client/output/*.cpp)
+SHADERS := $(sort $(patsubst shaders/%,%,$(wildcard shaders/*/*.h shaders/*/*.glsl shaders/*/*.comp shaders/*/*.vert \
+           shaders/*/*.geom shaders/*/*.frag shaders/*.comp)))
+
+obj = $(patsubst %.c,$(B)/%.o,$(patsubst %.cpp,$(B)/%.opp,$(1)))
+PROTOCOL_OBJ := $(call obj,$(PROTOCOL_SRC))
+SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o
+LIB_OBJ := $(call obj,$(LIB_SRC))
+CLI_OBJ := $(call obj,$(CLI_SRC))
+# Helper programs share the importer's sandbox and the protocol.
+IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX))
+EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/client/import/sandbox.o
+
+PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export
+
+.PHONY: all
+all: $(PROGRAMS) $(B)/protocol.md
+
+$(B)/server/%.o: INCLUDES = -Iserver -Ishaders $(SERVER_CFLAGS)
+$(B)/shader_sources.o: INCLUDES = -Iserver
+$(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
+$(B)/client/import/%.opp $(B)/client/import/%.o: INCLUDES = -Iclient $(IMPORT_CFLAGS)
+$(B)/client/output/%.opp $(B)/client/output/%.o: INCLUDES = -Iclient $(EXPORT_CFLAGS)
+$(B)/tests/%.o: INCLUDES = -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS) $(TEST_CFLAGS)
+SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS)))$(SERVER_CFLAGS)
+CLIENT_CFLAGS = $(eval CLIENT_CFLAGS := $(call pkg_cflags,$(CLIENT_PKGS)))$(CLIENT_CFLAGS)
+TEST_CFLAGS = $(eval TEST_CFLAGS := $(call pkg_cflags,$(TEST_PKGS)))$(TEST_CFLAGS)
+# Others' C++ headers are system headers: our warnings are for our own files.
+IMPORT_CFLAGS = $(eval IMPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(IMPORT_PKGS))))$(IMPORT_CFLAGS)
+EXPORT_CFLAGS = $(eval EXPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(EXPORT_PKGS))))$(EXPORT_CFLAGS)
+
+$(B)/%.o: %.c
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+$(B)/%.opp: %.cpp
+	@mkdir -p $(@D)
+	$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
+
+$(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefile
+	@mkdir -p $(@D)
+	shaders/embed.sh $(CURDIR)/shaders $(SHADERS) >$@.new && mv $@.new $@
+$(B)/shader_sources.o: $(B)/shader_sources.c
+	$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) -c $< -o $@
+
+# ---- programs --------------------------------------------------------------------------------------
+SERVER_LIBS = $(call pkg_libs,$(SERVER_PKGS)) -lm
+CLIENT_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
+IMPORT_LIBS = $(call pkg_libs,$(IMPORT_PKGS)) -lm
+EXPORT_LIBS = $(call pkg_libs,$(EXPORT_PKGS)) -lm
+
+$(B)/farlightd: $(B)/server/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ)
+	$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(SERVER_LIBS) -o $@
+$(B)/farlight: $(CLI_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
+	$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(CLIENT_LIBS) -o $@
+$(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ)
+	$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) -o $@
+$(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ)
+	$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
+$(B)/protocol-docgen: $(B)/protocol/docgen.o $(PROTOCOL_OBJ)
+	$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
+$(B)/protocol.md: $(B)/protocol-docgen
+	$< >$@.new && mv $@.new $@
+
+# ---- tests -----------------------------------------------------------------------------------------
+# A unit or accuracy test is one file with a main(); it may use everything but the programs' main().
+UNIT_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accuracy/test_*.c))
+TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) -lm
+$(UNIT_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+BENCHES := $(patsubst %.c,$(B)/%,$(wildcard tests/bench/bench_*.c))
+$(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+
+# The yardstick of the benchmark; the only thing that links Embree.
+$(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(SERVER_OBJ)
+	$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(SERVER_LIBS) -lembree3 -o $@
+
+# The generator of the bundled scenes.
+TOOLS_OBJ := $(B)/tests/tools/make_scenes.o $(B)/tests/tools/glb.o $(B)/tests/tools/shape.o
+$(B)/tests/tools/make_scenes: $(TOOLS_OBJ)
+	$(CC) $(OPT) $(LDFLAGS_ALL) $^ -lm -o $@
+
+# ---- what people call ------------------------------------------------------------------------------
+BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
+    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libtinygltf-dev \
+    libtinyobjloader-dev libegl1 libgl1-mesa-dri
+TEST_PACKAGES := libcmocka-dev libembree-dev python3
+
+.PHONY: tests build-packages test-packages test demo bench check-headers lint format install uninstall clean help
+tests: $(UNIT_TESTS) $(BENCHES) $(B)/tests/tools/make_scenes
+
+build-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
+test-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES)
+
+JOBS ?= $(shell nproc)
+# A second make, because packages that were just installed change what pkg-config says.
+test: test-packages
+	$(MAKE) -j$(JOBS) all tests
+	python3 tests/tools/run_tests.py $(B) $(TESTS)
+demo: build-packages
+	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
+	tests/tools/demo.sh $(B) out
+bench: test-packages
+	$(MAKE) -j$(JOBS) all tests $(B)/tests/bench/embree_build
+	python3 tests/bench/bench.py $(B)
+
+check-headers:
+	@tests/tools/check_headers.sh $(CC) -I. -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS)
+lint:
+	python3 tests/tools/check_includes.py
+	$(MAKE) -s check-headers
+	clang-format --dry-run -Werror $(wildcard server/*.[ch] server/*/*.[ch] protocol/*.[ch] client/*/*.[ch] \
+	    client/*/*.cpp tests/*/*.[ch])
+	$(MAKE) CC=clang CXX=clang++ config=debug B=build/clang all tests
+
+install: all
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man8 \
+	    $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)/etc/farlight
+	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
+	install -m 644 man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
+	install -m 644 man/*.8 $(DESTDIR)$(PREFIX)/share/man/man8
+	install -m 644 README.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
+	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight
+uninstall:
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/bin/,$(notdir $(PROGRAMS)))
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man1/,$(notdir $(wildcard man/*.1)))
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man8/,$(notdir $(wildcard man/*.8)))
+	rm -rf $(DESTDIR)$(PREFIX)/share/doc/farlight
+
+clean:
+	rm -rf build out
+
+help:
+	@echo 'make demo       install what is missing, build, render the bundled scenes into out/'
+	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
+	@echo 'make bench      measure, in the terms of the README'
+	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz]'
+	@echo 'make fuzz       run every fuzzer   [config=fuzz FUZZ_SECONDS=20]'
+	@echo 'make lint       include rules, headers alone, format, clang with warnings as errors'
+	@echo 'make install    [PREFIX=/usr/local DESTDIR=]'
+
+-include $(shell find build -name '*.d' 2>/dev/null)
+.SECONDARY:
+
+# ---- fuzz ----
+# make config=fuzz fuzz FUZZ_SECONDS=20: every fuzzer in turn, from valid inputs made of the table. What they find
+# stays in build/fuzz/found; their corpus lives in build/fuzz/corpus and grows from run to run.
+FUZZ_SECONDS ?= 20
+FUZZERS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_SEED := $(B)/tests/fuzz/seed
+$(FUZZ_SEED): %: %.o $(PROTOCOL_OBJ)
+	$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
+$(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
+	$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ -o $@
+.PHONY: fuzz $(addprefix run-fuzz-,$(FUZZERS))
+ifeq ($(config),fuzz)
+fuzz: $(addprefix run-fuzz-,$(FUZZERS))
+else
+fuzz:
+	$(MAKE) config=fuzz fuzz
+endif
+$(addprefix run-fuzz-,$(FUZZERS)): run-fuzz-%: $(B)/tests/fuzz/fuzz_% $(FUZZ_SEED)
+	@mkdir -p $(B)/corpus/$* $(B)/found
+	$(FUZZ_SEED) $(B)/seed
+	$< -max_total_time=$(FUZZ_SECONDS) -max_len=8192 -timeout=5 -rss_limit_mb=1024 -use_value_profile=1 \
+		-print_final_stats=1 -dict=$(B)/seed/protocol.dict -artifact_prefix=$(B)/found/$*- $(B)/corpus/$* $(B)/seed/$* \
+		>$(B)/found/$*.log 2>&1 || { tail -n 60 $(B)/found/$*.log; exit 1; }
+	@grep -E '^stat::(number|average|new)|DONE' $(B)/found/$*.log
+# ---- fuzz ----

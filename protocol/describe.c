@@ -1,0 +1,268 @@
+/* SPDX-License-Identifier: MIT */
+#include "protocol/describe.h"
+
+#include <string.h>
+
+#define LENGTH(array) (sizeof(array) / sizeof(array)[0])
+
+/* clang-format off */
+/* ---- enums ---- */
+#define ENUMERATION(NAME, name, doc) static const struct value_desc values_##name[] = {
+#define VALUE(NAME, VALUE_NAME, number, text, doc) {#VALUE_NAME, number, text, doc},
+#define ENUMERATION_END(NAME, name) };
+#include "protocol/messages.def"
+
+const struct enum_desc protocol_enums[] = {
+#define ENUMERATION(NAME, name, doc) {#name, doc, values_##name, LENGTH(values_##name)},
+#include "protocol/messages.def"
+};
+const size_t protocol_enum_count = LENGTH(protocol_enums);
+
+enum enum_index {
+#define ENUMERATION(NAME, name, doc) enum_index_##name,
+#include "protocol/messages.def"
+};
+
+/* ---- sizes on the wire ---- */
+#define RECORD(name, doc) enum { wire_fixed_record_##name = 0
+#define RECORD_END(name) };
+#define MESSAGE(NAME, name, number, from, doc) enum { wire_fixed_message_##name = 0
+#define MESSAGE_END(NAME, name) };
+#define INT(type, field, min, max, doc) + sizeof(PROTOCOL_INT_##type)
+#define ENUM(enum_name, field, doc) + 4
+#define REAL(field, min, max, doc) + 4
+#define REALS(field, count, min, max, doc) + 4 * (count)
+#define BYTES(field, count, doc) + (count)
+#include "protocol/messages.def"
+
+#define RECORD(name, doc) enum { wire_counted_record_##name = 0
+#define RECORD_END(name) };
+#define MESSAGE(NAME, name, number, from, doc) enum { wire_counted_message_##name = 0
+#define MESSAGE_END(NAME, name) };
+#define STRING(field, max, doc) + 4
+#define ARRAY(record, field, max, doc) + 4
+#define BULK(field, max, doc) + 4
+#include "protocol/messages.def"
+
+#define RECORD(name, doc) enum { has_bulk_record_##name = 0
+#define RECORD_END(name) };
+#define MESSAGE(NAME, name, number, from, doc) enum { has_bulk_message_##name = 0
+#define MESSAGE_END(NAME, name) };
+#define BULK(field, max, doc) + 1
+#include "protocol/messages.def"
+
+/* ---- fields: described by functions, because only in one can `owner` be another type each time ---- */
+#define RECORD(name, record_doc)                                                                                  \
+    static const struct struct_desc *describe_record_##name(void)                                                 \
+    {                                                                                                             \
+        typedef struct record_##name owner;                                                                       \
+        static const char owner_name[] = #name;                                                                   \
+        static const char owner_doc[] = record_doc;                                                               \
+        enum { fixed = wire_fixed_record_##name, counted = wire_counted_record_##name };                          \
+        static const struct field_desc fields[] = {
+#define MESSAGE(NAME, name, number, from, message_doc)                                                            \
+    static const struct struct_desc *describe_message_##name(void)                                                \
+    {                                                                                                             \
+        typedef struct message_##name owner;                                                                      \
+        static const char owner_name[] = #name;                                                                   \
+        static const char owner_doc[] = message_doc;                                                              \
+        enum { fixed = wire_fixed_message_##name, counted = wire_counted_message_##name };                        \
+        static const struct field_desc fields[] = {
+#define FIELDS_END                                                                                                \
+            {.name = NULL},                                                                                       \
+        };                                                                                                        \
+        static const struct struct_desc desc = {                                                                  \
+            owner_name, owner_doc, fields, sizeof(owner), fixed, fixed + counted,                                 \
+        };                                                                                                        \
+        return &desc;                                                                                             \
+    }
+#define RECORD_END(name) FIELDS_END
+#define MESSAGE_END(NAME, name) FIELDS_END
+#define INT(type, field, min_value, max_value, field_doc)                                                         \
+    {.name = #field, .doc = field_doc, .kind = FIELD_INT, .width_bytes = sizeof(PROTOCOL_INT_##type), .count = 1, \
+     .offset = offsetof(owner, field), .min = min_value##ULL, .max = max_value##ULL},
+#define ENUM(enum_name, field, field_doc)                                                                         \
+    {.name = #field, .doc = field_doc, .kind = FIELD_ENUM, .width_bytes = 4, .count = 1,                          \
+     .offset = offsetof(owner, field), .enumeration = &protocol_enums[enum_index_##enum_name]},
+#define REAL(field, min_value, max_value, field_doc)                                                              \
+    {.name = #field, .doc = field_doc, .kind = FIELD_REAL, .width_bytes = 4, .count = 1,                          \
+     .offset = offsetof(owner, field), .real_min = (float)(min_value), .real_max = (float)(max_value)},
+#define REALS(field, number, min_value, max_value, field_doc)                                                     \
+    {.name = #field, .doc = field_doc, .kind = FIELD_REAL, .width_bytes = 4, .count = number,                     \
+     .offset = offsetof(owner, field), .real_min = (float)(min_value), .real_max = (float)(max_value)},
+#define BYTES(field, number, field_doc)                                                                           \
+    {.name = #field, .doc = field_doc, .kind = FIELD_BYTES, .width_bytes = 1, .count = number,                    \
+     .offset = offsetof(owner, field)},
+#define STRING(field, max_bytes, field_doc)                                                                       \
+    {.name = #field, .doc = field_doc, .kind = FIELD_STRING, .offset = offsetof(owner, field), .max = max_bytes},
+#define ARRAY(record_name, field, max_count, field_doc)                                                           \
+    {.name = #field, .doc = field_doc, .kind = FIELD_ARRAY, .offset = offsetof(owner, field),                     \
+     .count_offset = offsetof(owner, field##_count), .max = max_count, .record = describe_record_##record_name},
+#define BULK(field, max_bytes, field_doc)                                                                         \
+    {.name = #field, .doc = field_doc, .kind = FIELD_BULK, .offset = offsetof(owner, field),                      \
+     .count_offset = offsetof(owner, field##_bytes), .max = max_bytes},
+#include "protocol/messages.def"
+
+/* ---- tables of all ---- */
+const struct struct_desc *(*const protocol_records[])(void) = {
+#define RECORD(name, doc) describe_record_##name,
+#include "protocol/messages.def"
+};
+const size_t protocol_record_count = LENGTH(protocol_records);
+
+/* The shortest payload of a type is that of the oldest peer: no fixed fields at all. */
+const struct message_desc protocol_messages[] = {
+#define MESSAGE(NAME, name, number, from, doc)                                                                    \
+    {{number, #name, MESSAGE_FROM_##from, 2 + wire_counted_message_##name,                                        \
+      has_bulk_message_##name ? CODEC_BULK_PAYLOAD_MAX_BYTES : CODEC_CONTROL_PAYLOAD_MAX_BYTES,                   \
+      has_bulk_message_##name != 0},                                                                              \
+     #NAME, doc, describe_message_##name},
+#include "protocol/messages.def"
+};
+/* clang-format on */
+const size_t protocol_message_count = LENGTH(protocol_messages);
+
+_Static_assert(sizeof(enum protocol_error_code) == 4, "the codec stores enums as u32");
+_Static_assert(sizeof(float) == 4, "the codec stores reals as IEEE 754 single");
+
+enum message_index {
+#define MESSAGE(NAME, name, number, from, doc) message_index_##name,
+#include "protocol/messages.def"
+};
+
+const struct message_desc *message_describe(uint32_t type)
+{
+    switch (type) {
+#define MESSAGE(NAME, name, number, from, doc)                                                                    \
+    case number:                                                                                                  \
+        return &protocol_messages[message_index_##name];
+#include "protocol/messages.def"
+    default:
+        return NULL;
+    }
+}
+
+const struct message_info *message_lookup(uint32_t type)
+{
+    const struct message_desc *desc = message_describe(type);
+    return desc != NULL ? &desc->info : NULL;
+}
+
+bool field_is_counted(const struct field_desc *field)
+{
+    return field->kind == FIELD_STRING || field->kind == FIELD_ARRAY || field->kind == FIELD_BULK;
+}
+
+const char *enum_desc_text(const struct enum_desc *desc, uint32_t number)
+{
+    for (size_t i = 0; i < desc->value_count; i++) {
+        if (desc->values[i].number == number) {
+            return desc->values[i].text;
+        }
+    }
+    return NULL;
+}
+
+void field_default(const struct field_desc *field, void *place)
+{
+    uint64_t value = field->min; /* unsigned: the minimum is 0 or above it */
+    float real = field->real_min > 0.0f ? field->real_min : 0.0f;
+    const char *empty = "";
+    switch (field->kind) {
+    case FIELD_INT:
+        field_store_int(field, place, value);
+        break;
+    case FIELD_REAL:
+        for (uint32_t i = 0; i < field->count; i++) {
+            memcpy((char *)place + 4 * i, &real, 4);
+        }
+        break;
+    case FIELD_STRING:
+        memcpy(place, &empty, sizeof empty);
+        break;
+    case FIELD_ENUM:
+    case FIELD_BYTES:
+    case FIELD_ARRAY:
+    case FIELD_BULK:
+        break; /* zero already */
+    }
+}
+
+uint64_t field_load_int(const struct field_desc *field, const void *place)
+{
+    uint8_t v8;
+    uint16_t v16;
+    uint32_t v32;
+    uint64_t v64;
+    switch (field->width_bytes) {
+    case 1:
+        memcpy(&v8, place, 1);
+        return v8;
+    case 2:
+        memcpy(&v16, place, 2);
+        return v16;
+    case 4:
+        memcpy(&v32, place, 4);
+        return v32;
+    default:
+        memcpy(&v64, place, 8);
+        return v64;
+    }
+}
+
+void field_store_int(const struct field_desc *field, void *place, uint64_t value)
+{
+    uint8_t v8 = (uint8_t)value;
+    uint16_t v16 = (uint16_t)value;
+    uint32_t v32 = (uint32_t)value;
+    switch (field->width_bytes) {
+    case 1:
+        memcpy(place, &v8, 1);
+        break;
+    case 2:
+        memcpy(place, &v16, 2);
+        break;
+    case 4:
+        memcpy(place, &v32, 4);
+        break;
+    default:
+        memcpy(place, &value, 8);
+        break;
+    }
+}
+
+void struct_defaults(const struct struct_desc *desc, void *body)
+{
+    memset(body, 0, desc->size_bytes);
+    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+        field_default(field, (char *)body + field->offset);
+    }
+}
+
+bool utf8_valid(const uint8_t *bytes, size_t count)
+{
+    size_t i = 0;
+    while (i < count) {
+        uint8_t first = bytes[i++];
+        if (first >= 0x01 && first <= 0x7f) {
+            continue;
+        }
+        /* Table 3-7 of the Unicode standard: the second byte's range excludes over-long forms and surrogates. */
+        size_t more = first >= 0xf0 ? 3 : first >= 0xe0 ? 2 : 1;
+        uint8_t low = first == 0xe0 ? 0xa0 : first == 0xf0 ? 0x90 : 0x80;
+        uint8_t high = first == 0xed ? 0x9f : first == 0xf4 ? 0x8f : 0xbf;
+        if (first < 0xc2 || first > 0xf4 || more > count - i) {
+            return false;
+        }
+        if (bytes[i] < low || bytes[i] > high) {
+            return false;
+        }
+        for (size_t k = 1; k < more; k++) {
+            if (bytes[i + k] < 0x80 || bytes[i + k] > 0xbf) {
+                return false;
+            }
+        }
+        i += more;
+    }
+    return true;
+}

@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: MIT */
+/* messages.def as constant data, for code that treats all messages alike: codec, printer, document, tests,
+ * fuzzers. */
+#ifndef FARLIGHT_PROTOCOL_DESCRIBE_H
+#define FARLIGHT_PROTOCOL_DESCRIBE_H
+
+#include "protocol/framing.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct value_desc {
+    const char *name; /* "BVH" */
+    uint32_t number;
+    const char *text; /* "bvh" */
+    const char *doc;
+};
+
+struct enum_desc {
+    const char *name; /* "tracer" */
+    const char *doc;
+    const struct value_desc *values; /* ascending numbers */
+    size_t value_count;
+};
+
+enum field_kind {
+    FIELD_INT,    /* width_bytes 1, 2, 4, 8; min, max */
+    FIELD_ENUM,   /* enumeration */
+    FIELD_REAL,   /* `count` floats (1: REAL, else REALS); real_min, real_max */
+    FIELD_BYTES,  /* `count` bytes */
+    FIELD_STRING, /* `max` bytes; counted from here on */
+    FIELD_ARRAY,  /* `max` records of `record` */
+    FIELD_BULK,   /* `max` bytes */
+};
+
+struct field_desc {
+    const char *name;
+    const char *doc;
+    enum field_kind kind;
+    uint32_t width_bytes; /* in memory and on the wire, of one element of a fixed field */
+    uint32_t count;       /* elements of a fixed field */
+    size_t offset;        /* of the field in its struct */
+    size_t count_offset;  /* of <field>_count or <field>_bytes */
+    uint64_t min, max;
+    float real_min, real_max;
+    const struct enum_desc *enumeration;
+    const struct struct_desc *(*record)(void);
+};
+
+/* A record, or the fields of a message. */
+struct struct_desc {
+    const char *name;
+    const char *doc;
+    const struct field_desc *fields; /* fixed ones first; one with name NULL ends them */
+    size_t size_bytes;               /* of the struct in memory */
+    uint32_t wire_fixed_bytes;       /* fixed fields */
+    uint32_t wire_min_bytes;         /* and 4 for each counted one */
+};
+
+struct message_desc {
+    struct message_info info;
+    const char *constant; /* "SET_NODE" */
+    const char *doc;
+    const struct struct_desc *(*body)(void);
+};
+
+extern const struct enum_desc protocol_enums[];
+extern const size_t protocol_enum_count;
+extern const struct struct_desc *(*const protocol_records[])(void);
+extern const size_t protocol_record_count;
+extern const struct message_desc protocol_messages[]; /* in the order of the table */
+extern const size_t protocol_message_count;
+
+const struct message_desc *message_describe(uint32_t type); /* NULL: unknown */
+bool field_is_counted(const struct field_desc *field);
+/* The text of an enum's value; NULL: not in it. */
+const char *enum_desc_text(const struct enum_desc *desc, uint32_t number);
+
+/* Where the fields of a message's struct begin: at its member of the union. */
+#define MESSAGE_BODY_OFFSET offsetof(struct message, ok)
+
+/* The value of an INT or ENUM field in memory. */
+uint64_t field_load_int(const struct field_desc *field, const void *place);
+void field_store_int(const struct field_desc *field, void *place, uint64_t value);
+/* `place` must be zeroed. */
+void field_default(const struct field_desc *field, void *place);
+/* Every fixed field 0, or its minimum where that is above 0; the counted ones empty, strings "". */
+void struct_defaults(const struct struct_desc *desc, void *body);
+
+/* UTF-8 without NUL, over-long forms, surrogates and numbers above U+10FFFF. */
+bool utf8_valid(const uint8_t *bytes, size_t count);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

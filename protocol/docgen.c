@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: MIT */
+/* Prints the document of the wire format, in Markdown, from the table. */
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "protocol/describe.h"
+#include "protocol/handshake.h"
+
+static void print_rules(void)
+{
+    printf("# The wire format of farlight, version %u\n\n"
+           "Written from `protocol/messages.def`; do not edit.\n\n"
+           "All numbers are little-endian. A connection begins with the handshake; after it both sides send\n"
+           "messages. Lengths are metres, angles radians unless a field says degrees, colours linear Rec. 709,\n"
+           "times nanoseconds. Matrices are 3x4 row-major (rows x, y, z; the fourth column is the translation).\n"
+           "Identifiers are chosen by the client, unique per scene and kind, and never 0.\n\n",
+           HANDSHAKE_VERSION_MAX);
+}
+
+static void print_handshake(void)
+{
+    printf("## Handshake\n\n"
+           "Its layout never changes. The client speaks first, at most %u bytes:\n\n"
+           "| offset | type | field |\n| ---: | --- | --- |\n"
+           "| 0 | 4 bytes | `FARL` |\n"
+           "| 4 | u16 | version_min, at least 1 |\n"
+           "| 6 | u16 | version_max, not below version_min |\n"
+           "| 8 | u64 | capabilities that the client understands |\n"
+           "| 16 | 16 bytes | nonce |\n"
+           "| 32 | u8, bytes | name: at most %u bytes of UTF-8 after their number |\n"
+           "| | | zeros up to a multiple of 8 |\n\n",
+           HANDSHAKE_HELLO_MAX_BYTES, HANDSHAKE_NAME_MAX_BYTES);
+    printf("The reply, at most %u bytes:\n\n"
+           "| offset | type | field |\n| ---: | --- | --- |\n"
+           "| 0 | 4 bytes | `FARL` |\n"
+           "| 4 | u16 | version chosen; 0: none in common, the connection ends |\n"
+           "| 6 | u16 | limits_bytes, at most 256 |\n"
+           "| 8 | u64 | capabilities that both understand |\n"
+           "| 16 | 16 bytes | nonce |\n"
+           "| 32 | 16 bytes | session token |\n"
+           "| 48 | limits_bytes | limits, see below |\n"
+           "| | u8, bytes | name of the daemon: at most %u bytes |\n"
+           "| | u8, bytes | text: why there is no version in common; at most %u bytes |\n"
+           "| | | zeros up to a multiple of 8 |\n\n",
+           HANDSHAKE_REPLY_MAX_BYTES, HANDSHAKE_NAME_MAX_BYTES, HANDSHAKE_TEXT_MAX_BYTES);
+    printf(
+        "The limits in force at the daemon, packed: u64 queued output bytes, scene memory bytes; u32 handshake\n"
+        "ms, control payload bytes, bulk chunk bytes, requests in flight, scenes per client, views per client,\n"
+        "nodes, texture edge, width, height, samples, idle seconds. What is missing is 0 (not told), what is\n"
+        "more is skipped.\n\n");
+}
+
+static void print_framing(void)
+{
+    printf("## Messages in the stream\n\n"
+           "| offset | type | field |\n| ---: | --- | --- |\n"
+           "| 0 | u32 | payload_bytes, without the padding |\n"
+           "| 4 | u16 | type; the top bit marks what a peer that does not know it skips |\n"
+           "| 6 | u16 | flags, 0 |\n"
+           "| 8 | u32 | request: chosen by whoever asks, repeated by the answer; 0: none |\n"
+           "| 12 | u32 | channel |\n"
+           "| %u | | payload, then zeros up to a multiple of 8 |\n\n",
+           FRAMING_HEADER_BYTES);
+    printf("A payload has at most %u bytes, one with bulk data at most %u. An unknown type without the top bit,\n"
+           "other flags, a size outside the type's range and a message that the peer may not send end the\n"
+           "connection.\n\n",
+           CODEC_CONTROL_PAYLOAD_MAX_BYTES, CODEC_BULK_PAYLOAD_MAX_BYTES);
+    printf("## Payload\n\n"
+           "`u16 struct_bytes` (the size of the fixed fields that follow), the fixed fields, packed, then the\n"
+           "counted fields, all in the order of the tables below.\n\n"
+           "- Fixed: u8 u16 u32 u64, f32 (never NaN or infinite), enums as u32, byte arrays.\n"
+           "- string: u32 bytes, then UTF-8 without NUL. No terminator.\n"
+           "- array: u32 count, then the records, each its fixed fields and then its counted ones.\n"
+           "- bulk: u32 bytes, zeros up to a multiple of 8 from the start of the payload, the bytes.\n");
+    printf("- A shorter fixed part, cut between two fields, comes from an older peer: the rest has the value 0,\n"
+           "  or the field's minimum where that is above 0. A longer one comes from a newer peer: the rest is\n"
+           "  skipped.\n"
+           "- All counted fields are present. Bytes after the last one are an error.\n\n");
+}
+
+static void print_enum(const struct enum_desc *desc)
+{
+    printf("### %s\n\n%s\n\n| number | text | meaning |\n| ---: | --- | --- |\n", desc->name, desc->doc);
+    for (size_t i = 0; i < desc->value_count; i++) {
+        printf("| %" PRIu32 " | `%s` | %s |\n", desc->values[i].number, desc->values[i].text, desc->values[i].doc);
+    }
+    printf("\n");
+}
+
+static void print_int_range(const struct field_desc *field)
+{
+    uint64_t type_max = field->width_bytes == 8 ? UINT64_MAX : (UINT64_C(1) << (8 * field->width_bytes)) - 1;
+    if (field->min == 0 && field->max == type_max) {
+        printf("any");
+    } else {
+        printf("%" PRIu64 " .. %" PRIu64, field->min, field->max);
+    }
+}
+
+static void print_field_row(const struct field_desc *field, size_t offset)
+{
+    if (field_is_counted(field)) {
+        printf("| | `%s` | ", field->name);
+    } else {
+        printf("| %zu | `%s` | ", offset, field->name);
+    }
+    switch (field->kind) {
+    case FIELD_INT:
+        printf("u%" PRIu32 " | ", 8 * field->width_bytes);
+        print_int_range(field);
+        break;
+    case FIELD_ENUM:
+        printf("enum %s | listed", field->enumeration->name);
+        break;
+    case FIELD_REAL:
+        printf(field->count > 1 ? "f32 x %" PRIu32 " | " : "f32 | ", field->count);
+        printf("%g .. %g", (double)field->real_min, (double)field->real_max);
+        break;
+    case FIELD_BYTES:
+        printf("%" PRIu32 " bytes | any", field->count);
+        break;
+    case FIELD_STRING:
+        printf("string | at most %" PRIu64 " bytes", field->max);
+        break;
+    case FIELD_ARRAY:
+        printf("array of %s | at most %" PRIu64, field->record()->name, field->max);
+        break;
+    case FIELD_BULK:
+        printf("bulk | at most %" PRIu64 " bytes", field->max);
+        break;
+    }
+    printf(" | %s |\n", field->doc);
+}
+
+static void print_fields(const struct struct_desc *desc, size_t offset)
+{
+    if (desc->fields->name == NULL) {
+        printf("No fields.\n\n");
+        return;
+    }
+    printf("| offset | field | type | allowed | meaning |\n| ---: | --- | --- | --- | --- |\n");
+    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+        print_field_row(field, offset);
+        offset += (size_t)field->width_bytes * field->count;
+    }
+    printf("\n");
+}
+
+static const char *sender(uint32_t from)
+{
+    switch (from) {
+    case MESSAGE_FROM_CLIENT:
+        return "client to server";
+    case MESSAGE_FROM_SERVER:
+        return "server to client";
+    case MESSAGE_FROM_BOTH:
+        return "both ways";
+    default:
+        return "between a client and its helper programs";
+    }
+}
+
+static void print_message(const struct message_desc *desc)
+{
+    const struct struct_desc *body = desc->body();
+    printf("### 0x%04x %s\n\n%s.\n\n", desc->info.type, desc->info.name, desc->doc);
+    printf("From: %s. Fixed part %" PRIu32 " bytes, payload %" PRIu32 " .. %" PRIu32 " bytes.%s\n\n",
+           sender(desc->info.from), body->wire_fixed_bytes, desc->info.payload_min_bytes,
+           desc->info.payload_max_bytes,
+           (desc->info.type & MESSAGE_TYPE_IGNORABLE) != 0 ? " May be ignored by who does not know it." : "");
+    print_fields(body, 2);
+}
+
+int main(void)
+{
+    print_rules();
+    print_handshake();
+    print_framing();
+    printf("## Enumerations\n\n");
+    for (size_t i = 0; i < protocol_enum_count; i++) {
+        print_enum(&protocol_enums[i]);
+    }
+    printf("## Records\n\nOffsets are from the start of the record.\n\n");
+    for (size_t i = 0; i < protocol_record_count; i++) {
+        const struct struct_desc *record = protocol_records[i]();
+        printf("### %s\n\n%s. At least %" PRIu32 " bytes.\n\n", record->name, record->doc, record->wire_min_bytes);
+        print_fields(record, 0);
+    }
+    printf("## Messages\n\nOffsets are from the start of the payload.\n\n");
+    for (size_t i = 0; i < protocol_message_count; i++) {
+        print_message(&protocol_messages[i]);
+    }
+    return ferror(stdout) || fflush(stdout) != 0 ? 1 : 0;
+}

@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: MIT */
+/* The first bytes of a connection. Their layout never changes, whatever the version. Sans-I/O. Little-endian.
+ *
+ * Client, at most 256 bytes:
+ *    0  "FARL"
+ *    4  u16 version_min, u16 version_max    1 <= min <= max
+ *    8  u64 capabilities                    bits that the client understands
+ *   16  nonce, 16 bytes
+ *   32  u8 name_bytes (at most 64), name in UTF-8
+ *       zeros up to a multiple of 8
+ * Reply, at most 640 bytes:
+ *    0  "FARL"
+ *    4  u16 version                         0: none in common; `text` says which ones there are
+ *    6  u16 limits_bytes                    size of the limits; at most 256
+ *    8  u64 capabilities                    bits that both understand
+ *   16  nonce, 16 bytes
+ *   32  session token, 16 bytes
+ *   48  limits, in the order of struct handshake_limits, packed; what is missing is 0, what is more is skipped
+ *       u8 name_bytes (at most 64), name; u8 text_bytes, text (empty unless version is 0)
+ *       zeros up to a multiple of 8 */
+#ifndef FARLIGHT_PROTOCOL_HANDSHAKE_H
+#define FARLIGHT_PROTOCOL_HANDSHAKE_H
+
+#include "protocol/decode_error.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define HANDSHAKE_VERSION_MIN 1u
+#define HANDSHAKE_VERSION_MAX 1u
+#define HANDSHAKE_HELLO_MAX_BYTES 256u
+#define HANDSHAKE_REPLY_MAX_BYTES 640u
+#define HANDSHAKE_NAME_MAX_BYTES 64u
+#define HANDSHAKE_TEXT_MAX_BYTES 255u
+#define HANDSHAKE_NONCE_BYTES 16u
+#define HANDSHAKE_TOKEN_BYTES 16u
+
+struct handshake_hello {
+    uint16_t version_min;
+    uint16_t version_max;
+    uint64_t capabilities;
+    uint8_t nonce[HANDSHAKE_NONCE_BYTES];
+    char name[HANDSHAKE_NAME_MAX_BYTES + 1];
+};
+
+/* Limits in force at the daemon; 0: not told. In wire order. */
+struct handshake_limits {
+    uint64_t queued_output_bytes;
+    uint64_t scene_memory_bytes;
+    uint32_t handshake_ms;
+    uint32_t control_payload_max_bytes;
+    uint32_t bulk_chunk_max_bytes;
+    uint32_t requests_in_flight;
+    uint32_t scenes_per_client;
+    uint32_t views_per_client;
+    uint32_t nodes_max;
+    uint32_t texture_edge_max;
+    uint32_t width_max;
+    uint32_t height_max;
+    uint32_t samples_max;
+    uint32_t idle_seconds;
+};
+
+struct handshake_reply {
+    uint16_t version;
+    uint64_t capabilities;
+    uint8_t nonce[HANDSHAKE_NONCE_BYTES];
+    uint8_t session_token[HANDSHAKE_TOKEN_BYTES];
+    struct handshake_limits limits;
+    char name[HANDSHAKE_NAME_MAX_BYTES + 1]; /* of the daemon */
+    char text[HANDSHAKE_TEXT_MAX_BYTES + 1]; /* for people; why not */
+};
+
+enum handshake_result {
+    HANDSHAKE_CONSUMED,  /* *consumed_bytes bytes were the handshake; messages follow */
+    HANDSHAKE_NEED_MORE, /* so far it is the beginning of one */
+    HANDSHAKE_FATAL,     /* *error says why: code PROTOCOL */
+};
+
+/* Bytes written, a multiple of 8; 0 if a field is not allowed (name too long or no UTF-8, versions in disorder).
+ */
+size_t handshake_hello_encode(uint8_t out[HANDSHAKE_HELLO_MAX_BYTES], const struct handshake_hello *hello);
+size_t handshake_reply_encode(uint8_t out[HANDSHAKE_REPLY_MAX_BYTES], const struct handshake_reply *reply);
+
+/* Parse as soon as bytes come: a wrong first byte is refused at once. *out is zeroed unless consumed. */
+enum handshake_result handshake_hello_parse(struct handshake_hello *out, const uint8_t *bytes, size_t count,
+                                            size_t *consumed_bytes, struct decode_error *error);
+enum handshake_result handshake_reply_parse(struct handshake_reply *out, const uint8_t *bytes, size_t count,
+                                            size_t *consumed_bytes, struct decode_error *error);
+
+/* The greatest version that both speak. 0: none; *error (may be NULL) gets code VERSION and a text for the reply.
+ */
+uint16_t handshake_choose_version(const struct handshake_hello *hello, struct decode_error *error);
+/* Client: is the version of the reply one that was offered? False: *error (may be NULL) has code VERSION, with the
+ * daemon's own text where it gave one, or PROTOCOL for a version outside the offer. */
+bool handshake_reply_accept(const struct handshake_hello *hello, const struct handshake_reply *reply,
+                            struct decode_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

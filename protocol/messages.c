@@ -1,0 +1,84 @@
+/* SPDX-License-Identifier: MIT */
+#include "protocol/messages.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "protocol/describe.h"
+
+static const struct enum_desc *find_enum(const char *name)
+{
+    for (size_t i = 0; i < protocol_enum_count; i++) {
+        if (strcmp(protocol_enums[i].name, name) == 0) {
+            return &protocol_enums[i];
+        }
+    }
+    return NULL;
+}
+
+static const char *value_text(const char *enum_name, uint32_t number)
+{
+    const struct enum_desc *desc = find_enum(enum_name);
+    const char *text = desc != NULL ? enum_desc_text(desc, number) : NULL;
+    return text != NULL ? text : "?";
+}
+
+static const struct value_desc *find_value(const char *enum_name, const char *text)
+{
+    const struct enum_desc *desc = find_enum(enum_name);
+    for (size_t i = 0; desc != NULL && text != NULL && i < desc->value_count; i++) {
+        if (strcmp(desc->values[i].text, text) == 0) {
+            return &desc->values[i];
+        }
+    }
+    return NULL;
+}
+
+#define ENUMERATION(NAME, name, doc)                                                                              \
+    const char *protocol_##name##_text(enum protocol_##name value)                                                \
+    {                                                                                                             \
+        return value_text(#name, (uint32_t)value);                                                                \
+    }                                                                                                             \
+    bool protocol_##name##_parse(const char *text, enum protocol_##name *out)                                     \
+    {                                                                                                             \
+        const struct value_desc *value = find_value(#name, text);                                                 \
+        if (value != NULL) {                                                                                      \
+            *out = (enum protocol_##name)value->number;                                                           \
+        }                                                                                                         \
+        return value != NULL;                                                                                     \
+    }
+#include "protocol/messages.def"
+
+const char *protocol_enum_list(const char *enum_name, char *out, size_t out_bytes)
+{
+    const struct enum_desc *desc = find_enum(enum_name);
+    size_t used = 0;
+    if (out_bytes == 0) {
+        return out;
+    }
+    out[0] = '\0';
+    for (size_t i = 0; desc != NULL && i < desc->value_count; i++) {
+        int written = snprintf(out + used, out_bytes - used, "%s%s", i == 0 ? "" : ", ", desc->values[i].text);
+        if (written < 0 || (size_t)written >= out_bytes - used) {
+            break; /* cut off, NUL-terminated */
+        }
+        used += (size_t)written;
+    }
+    return out;
+}
+
+void message_init(struct message *message, enum message_type type)
+{
+    const struct message_desc *desc = message_describe(type);
+    memset(message, 0, sizeof *message);
+    message->type = type;
+    if (desc != NULL) {
+        struct_defaults(desc->body(), (char *)message + MESSAGE_BODY_OFFSET);
+    }
+}
+
+const char *message_type_text(uint32_t type)
+{
+    const struct message_info *info = message_lookup(type);
+    return info != NULL ? info->name : "unknown";
+}

@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: MIT */
+/* Structs and enums of every message, expanded from messages.def.
+ *
+ *   enum protocol_<name>, PROTOCOL_<NAME>_<VALUE>, PROTOCOL_<NAME>_COUNT, protocol_<name>_text(), _parse()
+ *   struct record_<name>, struct message_<name>, MESSAGE_<NAME>, struct message
+ *
+ * Memory: a message owns nothing. Decoded strings and arrays live in the caller's scratch (codec.h), bulk
+ * data is a view into the payload; both must outlive the message. Strings are never NULL after decoding;
+ * a NULL string is encoded as the empty one. All-zero is a struct with every field 0, empty or first value;
+ * message_init() also raises fields whose minimum is above 0. */
+#ifndef FARLIGHT_PROTOCOL_MESSAGES_H
+#define FARLIGHT_PROTOCOL_MESSAGES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* clang-format off */
+/* ---- enums: values are listed in ascending order from 0, so COUNT is also one past the greatest ---- */
+#define ENUMERATION(NAME, name, doc) enum protocol_##name {
+#define VALUE(NAME, VALUE_NAME, number, text, doc) PROTOCOL_##NAME##_##VALUE_NAME = (number),
+#define ENUMERATION_END(NAME, name) PROTOCOL_##NAME##_COUNT };
+#include "protocol/messages.def"
+
+/* ---- fields ---- */
+#define PROTOCOL_INT_u8 uint8_t
+#define PROTOCOL_INT_u16 uint16_t
+#define PROTOCOL_INT_u32 uint32_t
+#define PROTOCOL_INT_u64 uint64_t
+
+#define RECORD(name, doc) struct record_##name {
+#define RECORD_END(name) };
+#define INT(type, field, min, max, doc) PROTOCOL_INT_##type field;
+#define ENUM(enum_name, field, doc) enum protocol_##enum_name field;
+#define REAL(field, min, max, doc) float field;
+#define REALS(field, count, min, max, doc) float field[count];
+#define BYTES(field, count, doc) uint8_t field[count];
+#define STRING(field, max, doc) const char *field;
+#define ARRAY(record, field, max, doc)                                                                           \
+    struct record_##record *field;                                                                               \
+    uint32_t field##_count;
+#define BULK(field, max, doc)                                                                                    \
+    const uint8_t *field;                                                                                        \
+    uint32_t field##_bytes;
+#define MESSAGE(NAME, name, number, from, doc) struct message_##name {
+#define MESSAGE_END(NAME, name) };
+#include "protocol/messages.def"
+
+/* clang-format on */
+
+/* ---- all of them ---- */
+enum message_type {
+#define MESSAGE(NAME, name, number, from, doc) MESSAGE_##NAME = (number),
+#include "protocol/messages.def"
+};
+
+/* The top bit of a type: a peer that does not know it skips the message. */
+#define MESSAGE_TYPE_IGNORABLE 0x8000u
+
+struct message {
+    enum message_type type; /* says which member is meant: MESSAGE_RENDER -> render */
+    union {
+#define MESSAGE(NAME, name, number, from, doc) struct message_##name name;
+#include "protocol/messages.def"
+    };
+};
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* All fields 0, empty ("") or first value; those whose minimum is above 0 get it. Unknown type: all zero. */
+void message_init(struct message *message, enum message_type type);
+
+/* "set_node"; "unknown" for a type that is not in the table. */
+const char *message_type_text(uint32_t type);
+
+/* Per enum: the value's text ("bvh"; "?" outside the enum), and back (false: no such text; *out untouched). */
+#define ENUMERATION(NAME, name, doc)                                                                              \
+    const char *protocol_##name##_text(enum protocol_##name value);                                               \
+    bool protocol_##name##_parse(const char *text, enum protocol_##name *out);
+#include "protocol/messages.def"
+
+/* For help texts and error messages: "bvh, naive" for the enum called "tracer". Writes at most out_bytes with
+ * the NUL, cut off if too long; empty for an unknown enum. Returns out. */
+const char *protocol_enum_list(const char *enum_name, char *out, size_t out_bytes);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

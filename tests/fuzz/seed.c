@@ -1,0 +1,156 @@
+/* SPDX-License-Identifier: MIT */
+/* Writes what the fuzzers start from: seed FOLDER makes FOLDER/protocol.dict out of the table, and valid inputs in
+ * FOLDER/codec, FOLDER/framing and FOLDER/handshake. */
+#include <errno.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+
+#include "protocol/handshake.h"
+#include "tests/unit/protocol_cases.h"
+
+static struct case_maker maker;
+static struct plain_bytes plain;
+
+static bool make_folder(const char *path)
+{
+    if (mkdir(path, 0777) != 0 && errno != EEXIST) {
+        perror(path);
+        return false;
+    }
+    return true;
+}
+
+static bool write_file(const char *folder, const char *what, const char *name, int number, const void *bytes,
+                       size_t count)
+{
+    char path[4096];
+    snprintf(path, sizeof path, "%s/%s", folder, what);
+    if (!make_folder(path)) {
+        return false;
+    }
+    snprintf(path, sizeof path, "%s/%s/%s-%d", folder, what, name, number);
+    FILE *file = fopen(path, "wb");
+    bool ok = file != NULL && fwrite(bytes, 1, count, file) == count;
+    ok = (file == NULL || fclose(file) == 0) && ok;
+    if (!ok) {
+        perror(path);
+    }
+    return ok;
+}
+
+static void word(FILE *file, uint64_t value, size_t bytes)
+{
+    fputc('"', file);
+    for (size_t i = 0; i < bytes; i++) {
+        fprintf(file, "\\x%02x", (unsigned)(value >> (8 * i)) & 0xff);
+    }
+    fputs("\"\n", file);
+}
+
+static void words_of_struct(FILE *file, const struct struct_desc *desc)
+{
+    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+        uint32_t least, greatest;
+        switch (field->kind) {
+        case FIELD_INT:
+            word(file, field->min, field->width_bytes);
+            word(file, field->max, field->width_bytes);
+            break;
+        case FIELD_ENUM:
+            word(file, field->enumeration->values[field->enumeration->value_count - 1].number, 4);
+            break;
+        case FIELD_REAL:
+            memcpy(&least, &field->real_min, 4);
+            memcpy(&greatest, &field->real_max, 4);
+            word(file, least, 4);
+            word(file, greatest, 4);
+            break;
+        case FIELD_STRING:
+        case FIELD_ARRAY:
+        case FIELD_BULK:
+            word(file, field->max, 4);
+            break;
+        case FIELD_BYTES:
+            break;
+        }
+    }
+    word(file, desc->wire_fixed_bytes, 2);
+}
+
+static bool write_dictionary(const char *folder)
+{
+    char path[4096];
+    snprintf(path, sizeof path, "%s/protocol.dict", folder);
+    FILE *file = fopen(path, "w");
+    if (file == NULL) {
+        perror(path);
+        return false;
+    }
+    fputs("\"FARL\"\n\"\\x00\\x00\\xc0\\x7f\"\n\"\\x00\\x00\\x80\\x7f\"\n\"\\xed\\xa0\\x80\"\n", file);
+    for (size_t i = 0; i < protocol_record_count; i++) {
+        words_of_struct(file, protocol_records[i]());
+    }
+    for (size_t i = 0; i < protocol_message_count; i++) {
+        fprintf(file, "# %s\n", protocol_messages[i].info.name);
+        word(file, protocol_messages[i].info.type, 2);
+        words_of_struct(file, protocol_messages[i].body());
+    }
+    return fclose(file) == 0;
+}
+
+static bool write_messages(const char *folder)
+{
+    static uint8_t framed[FRAMING_MESSAGE_MAX_BYTES + 2];
+    struct message message;
+    struct writer writer;
+    for (size_t i = 0; i < protocol_message_count; i++) {
+        const char *name = protocol_messages[i].info.name;
+        for (enum case_mode mode = CASE_LEAST; mode < CASE_MODE_COUNT; mode++) {
+            case_make(&maker, &message, &protocol_messages[i], mode, 21);
+            plain_encode(&plain, &message);
+            uint8_t *input = malloc(plain.count + 2);
+            if (input == NULL) {
+                return false;
+            }
+            input[0] = (uint8_t)i;
+            input[1] = (uint8_t)(i >> 8);
+            memcpy(input + 2, plain.data, plain.count);
+            bool ok = write_file(folder, "codec", name, (int)mode, input, plain.count + 2);
+            free(input);
+            writer_init(&writer, framed, sizeof framed);
+            writer_put_u8(&writer, 7);
+            writer_put_u8(&writer, 12);
+            if (!message_write(&writer, 1, 2, &message)) {
+                fprintf(stderr, "%s: %s\n", writer.error.field, writer.error.text);
+                return false;
+            }
+            if (!ok || !write_file(folder, "framing", name, (int)mode, framed, writer.used_bytes)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static bool write_handshakes(const char *folder)
+{
+    uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
+    struct handshake_hello hello = {.version_min = 1, .version_max = 2, .name = "a client"};
+    struct handshake_reply reply = {.version = 1, .name = "farlightd"};
+    struct handshake_reply refusal = {.version = 0, .name = "farlightd", .text = "none in common"};
+    return write_file(folder, "handshake", "hello", 0, bytes, handshake_hello_encode(bytes, &hello)) &&
+           write_file(folder, "handshake", "reply", 0, bytes, handshake_reply_encode(bytes, &reply)) &&
+           write_file(folder, "handshake", "reply", 1, bytes, handshake_reply_encode(bytes, &refusal));
+}
+
+int main(int argument_count, char **arguments)
+{
+    if (argument_count != 2) {
+        fprintf(stderr, "usage: %s FOLDER\n", arguments[0]);
+        return 2;
+    }
+    bool ok = make_folder(arguments[1]) && write_dictionary(arguments[1]) && write_messages(arguments[1]) &&
+              write_handshakes(arguments[1]);
+    return ok ? 0 : 1;
+}

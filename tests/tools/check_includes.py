@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Who may include whom: the architecture's rules as a table, held against the sources.
+
+Exit status 1 and a line for each include that no rule allows. Run from the root of the project.
+"""
+import pathlib
+import re
+import sys
+
+# Folder -> folders of the project that it may include from (itself is always allowed).
+MAY_INCLUDE = {
+    "protocol": set(),
+    "server/base": set(),
+    "server/scene": {"server/base"},
+    "server/gpu": {"server/base"},
+    "server/trace": {"server/base", "server/gpu", "server/scene", "shaders/shared"},
+    "server/render": {"server/base", "server/gpu", "server/scene", "server/trace", "shaders/shared"},
+    "server/encode": {"server/base"},
+    "server/job": {"server/base", "server/gpu", "server/scene", "server/trace", "server/render", "server/encode"},
+    "server/net": {"server/base", "protocol"},
+    "server/session": {"server/base", "server/net", "server/scene", "server/job", "server/encode", "server/render",
+                       "protocol", "server"},
+    "server": {"server/base", "server/net", "server/session", "server/job", "server/gpu", "server/scene",
+               "server/encode", "protocol"},
+    "client/lib": {"protocol"},
+    "client/cli": {"client/lib", "protocol"},
+    "client/import": {"protocol"},
+    "client/output": {"protocol", "client/import"},  # the sandbox is shared
+    "shaders/shared": set(),
+}
+# System headers that only some folders may use.
+RESTRICTED = [
+    (re.compile(r"^(epoxy|GL|EGL)/"), {"server/gpu", "server/trace", "server/render"}),
+    (re.compile(r"^embree"), {"server/trace"}),
+    (re.compile(r"^(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h"),
+     {"server/base", "server/net", "client/lib", "client/import", "client/output", "client/cli"}),
+    (re.compile(r"^OpenImageIO/"), {"client/import", "client/output"}),
+    (re.compile(r"^(tiny_gltf|tiny_obj_loader)"), {"client/import"}),
+    (re.compile(r"^(turbojpeg|zstd)\.h"), {"server/encode", "client/lib"}),
+]
+ROOTS = ("", "server", "shaders", "client")  # as the compiler's -I
+INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"([^"]+)"|<([^>]+)>)')
+
+
+def owner(path):
+    """The folder whose rules hold for a file, the longest that is in the table."""
+    folder = path.parent.as_posix()
+    while folder and folder not in MAY_INCLUDE:
+        folder = folder.rpartition("/")[0]
+    return folder
+
+
+def resolve(including, name):
+    for base in (including.parent, *map(pathlib.Path, ROOTS)):
+        if (base / name).is_file():
+            return pathlib.Path((base / name).resolve().relative_to(pathlib.Path.cwd()))
+    return None
+
+
+def check(path, report):
+    here = owner(path)
+    own_header_expected = path.suffix == ".c" and path.with_suffix(".h").is_file()
+    first = True
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        match = INCLUDE.match(line)
+        if not match:
+            continue
+        quoted, system = match.groups()
+        if first and own_header_expected and resolve(path, quoted or "") != path.with_suffix(".h"):
+            report(path, number, "the first include is not the file's own header")
+        first = False
+        if quoted:
+            target = resolve(path, quoted)
+            if target is None:
+                report(path, number, f"no such header in the project: {quoted}")
+            elif owner(target) != here and owner(target) not in MAY_INCLUDE[here]:
+                report(path, number, f"{here} may not include {owner(target)} ({quoted})")
+        for pattern, allowed in RESTRICTED:
+            if system and pattern.match(system) and here not in allowed:
+                report(path, number, f"<{system}> belongs to {', '.join(sorted(allowed))}")
+
+
+SHADER_INCLUDE_OK = re.compile(r"^(shared|common)/")
+
+
+def check_shader(path, report):
+    text = path.read_text()
+    tracer = path.parent.name
+    for number, line in enumerate(text.splitlines(), 1):
+        match = INCLUDE.match(line)
+        if match and match.group(1):
+            name = match.group(1)
+            if not (pathlib.Path("shaders") / name).is_file():
+                report(path, number, f"no such shader file: {name}")
+            elif not SHADER_INCLUDE_OK.match(name) and not name.startswith(tracer + "/") and path.parent.name != "shaders":
+                report(path, number, f"{tracer} may include shared/, common/ and itself, not {name}")
+    has_main = re.search(r"^\s*void\s+main\s*\(", text, re.M) is not None
+    if has_main != (path.suffix in {".comp", ".vert", ".geom", ".frag"}):
+        report(path, 1, "main() stands in files with a stage suffix, and only there")
+
+
+def main():
+    faults = []
+
+    def report(path, number, text):
+        faults.append(f"{path}:{number}: {text}")
+
+    files = 0
+    for root in ("protocol", "server", "client"):
+        for path in sorted(pathlib.Path(root).rglob("*")):
+            if path.suffix in {".c", ".h", ".cpp"}:
+                check(path, report)
+                files += 1
+    for path in sorted(pathlib.Path("shaders").rglob("*")):
+        if path.suffix in {".glsl", ".comp", ".vert", ".geom", ".frag"}:
+            check_shader(path, report)
+            files += 1
+        elif path.suffix == ".h":
+            check(path, report)
+            files += 1
+    for fault in faults:
+        print(fault)
+    print(f"include rules: {files} files, {len(faults)} faults")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,48 @@
+#!/bin/sh
+# SPDX-License-Identifier: MIT
+# Starts a daemon on a private socket, renders a bundled scene and a short orbit through it, and stops it.
+# Usage: demo.sh BUILD_FOLDER OUT_FOLDER
+set -eu
+bin=$1
+out=$2
+mkdir -p "$out/orbit"
+private=$(mktemp -d)
+daemon=
+finish() {
+    status=$?
+    trap - EXIT INT TERM
+    if [ -n "$daemon" ]; then
+        kill "$daemon" 2>/dev/null || true
+        wait "$daemon" 2>/dev/null || true
+    fi
+    rm -rf "$private"
+    exit "$status"
+}
+trap finish EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
+
+"$bin/tests/tools/make_scenes" "$private/scenes"
+"$bin/farlightd" --listen "unix:$private/farlight.sock" >"$private/ready" 2>"$private/log" &
+daemon=$!
+tries=0
+until grep -q READY "$private/ready"; do
+    if ! kill -0 "$daemon" 2>/dev/null || [ $((tries += 1)) -gt 300 ]; then
+        echo "the daemon did not start:" >&2
+        cat "$private/log" >&2
+        exit 1
+    fi
+    sleep 0.1
+done
+
+server="unix:$private/farlight.sock"
+scene=$private/scenes/teapot.glb
+echo "--- $out/demo.png, from a bundled scene, with the time of every stage"
+"$bin/farlight" render "$scene" --server "$server" --size 960x540 --samples 4 --timings -o "$out/demo.png"
+echo "--- $out/demo.exr, linear; the same scene again, so that no bulk data moves"
+"$bin/farlight" render "$scene" --server "$server" --size 960x540 --samples 4 --timings -o "$out/demo.exr"
+echo "--- $out/orbit/, 24 frames once around a sphereflake"
+"$bin/farlight" animate "$private/scenes/sphereflake-3.nff" --server "$server" --size 480x270 --orbit \
+    --frames 1-24 --fps 24 -o "$out/orbit/%04d.png"
+echo "--- the daemon, afterwards"
+"$bin/farlight" stats --server "$server"
