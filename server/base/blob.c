@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: MIT */
+#include "base/blob.h"
+
+#include <pthread.h>
+#include <sodium.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+
+/* From here on memory comes from mmap, which grows without copying (mremap moves pages, not bytes). */
+#define MAPPED_BYTES_MIN ((size_t)256 << 10)
+#define ALIGNMENT_BYTES ((size_t)64)
+#define PAGE_ROUND_BYTES ((size_t)4096)
+
+static bool is_mapped(const struct blob *blob)
+{
+    return blob->size_bytes >= MAPPED_BYTES_MIN;
+}
+
+struct blob *blob_create_empty(size_t size_bytes)
+{
+    if (size_bytes > SIZE_MAX / 2)
+        return NULL;
+    struct blob *blob = calloc(1, sizeof *blob);
+    if (!blob)
+        return NULL;
+    atomic_init(&blob->references, 1);
+    blob->size_bytes = size_bytes;
+    return blob;
+}
+
+static bool map_at_least(struct blob *blob, size_t needed_bytes)
+{
+    /* Doubling keeps the number of calls small; the end is known, so nothing beyond it is asked for. */
+    size_t capacity_bytes = blob->capacity_bytes * 2;
+    if (capacity_bytes < needed_bytes)
+        capacity_bytes = needed_bytes;
+    if (capacity_bytes < MAPPED_BYTES_MIN)
+        capacity_bytes = MAPPED_BYTES_MIN;
+    if (capacity_bytes > blob->size_bytes)
+        capacity_bytes = blob->size_bytes;
+    capacity_bytes = (capacity_bytes + PAGE_ROUND_BYTES - 1) & ~(PAGE_ROUND_BYTES - 1);
+    void *data = blob->data
+                     ? mremap(blob->data, blob->capacity_bytes, capacity_bytes, MREMAP_MAYMOVE)
+                     : mmap(NULL, capacity_bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (data == MAP_FAILED)
+        return false;
+    blob->data = data;
+    blob->capacity_bytes = capacity_bytes;
+    return true;
+}
+
+bool blob_reserve(struct blob *blob, size_t needed_bytes)
+{
+    if (needed_bytes > blob->size_bytes)
+        return false;
+    if (blob->data && needed_bytes <= blob->capacity_bytes)
+        return true;
+    if (is_mapped(blob))
+        return map_at_least(blob, needed_bytes);
+    size_t capacity_bytes = (blob->size_bytes + ALIGNMENT_BYTES - 1) & ~(ALIGNMENT_BYTES - 1);
+    if (!capacity_bytes)
+        capacity_bytes = ALIGNMENT_BYTES;
+    blob->data = aligned_alloc(ALIGNMENT_BYTES, capacity_bytes);
+    if (!blob->data)
+        return false;
+    blob->capacity_bytes = capacity_bytes;
+    return true;
+}
+
+struct blob *blob_create(size_t size_bytes)
+{
+    struct blob *blob = blob_create_empty(size_bytes);
+    if (blob && !blob_reserve(blob, size_bytes)) {
+        blob_unref(blob);
+        return NULL;
+    }
+    return blob;
+}
+
+struct blob *blob_ref(struct blob *blob)
+{
+    if (blob)
+        atomic_fetch_add_explicit(&blob->references, 1, memory_order_relaxed);
+    return blob;
+}
+
+void blob_unref(struct blob *blob)
+{
+    if (!blob || atomic_fetch_sub_explicit(&blob->references, 1, memory_order_acq_rel) != 1)
+        return;
+    if (!is_mapped(blob))
+        free(blob->data);
+    else if (blob->data)
+        munmap(blob->data, blob->capacity_bytes);
+    free(blob);
+}
+
+static void start_sodium(void)
+{
+    /* Picks the fast implementation for this processor; hashing works without it. */
+    int result = sodium_init();
+    (void)result;
+}
+
+void blob_hash_chunk(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *data, size_t size_bytes)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, start_sodium);
+    crypto_generichash(hash, BLOB_HASH_BYTES, data, size_bytes, NULL, 0);
+}
+
+void blob_hash_chunks(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *chunk_hashes, size_t chunk_count)
+{
+    blob_hash_chunk(hash, chunk_hashes, chunk_count * BLOB_HASH_BYTES);
+}
+
+void blob_hash(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *data, size_t size_bytes)
+{
+    crypto_generichash_state state;
+    crypto_generichash_init(&state, NULL, 0, BLOB_HASH_BYTES);
+    while (size_bytes) {
+        size_t chunk_bytes = size_bytes < BLOB_CHUNK_BYTES ? size_bytes : BLOB_CHUNK_BYTES;
+        uint8_t chunk_hash[BLOB_HASH_BYTES];
+        blob_hash_chunk(chunk_hash, data, chunk_bytes);
+        crypto_generichash_update(&state, chunk_hash, sizeof chunk_hash);
+        data += chunk_bytes;
+        size_bytes -= chunk_bytes;
+    }
+    crypto_generichash_final(&state, hash, BLOB_HASH_BYTES);
+}

@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: MIT */
+#include "base/hashmap.h"
+
+#include <stdlib.h>
+
+struct hashmap_slot {
+    uint64_t key;
+    void *value;
+};
+
+#define CAPACITY_MIN ((size_t)16)
+#define CAPACITY_MAX ((size_t)1 << 32)
+
+void hashmap_init(struct hashmap *map)
+{
+    *map = (struct hashmap){0};
+}
+
+void hashmap_finish(struct hashmap *map)
+{
+    free(map->slots);
+    free(map->index);
+    *map = (struct hashmap){0};
+}
+
+/* Finaliser of splitmix64: identifiers are chosen by clients, mostly 1, 2, 3, .., and must spread. */
+static size_t home_of(const struct hashmap *map, uint64_t key)
+{
+    key = (key ^ (key >> 30)) * 0xbf58476d1ce4e5b9u;
+    key = (key ^ (key >> 27)) * 0x94d049bb133111ebu;
+    return (size_t)(key ^ (key >> 31)) & (map->capacity - 1);
+}
+
+/* Place in the index of a key, or the free place where it would go. */
+static size_t find(const struct hashmap *map, uint64_t key)
+{
+    size_t place = home_of(map, key);
+    while (map->index[place] && map->slots[map->index[place] - 1].key != key)
+        place = (place + 1) & (map->capacity - 1);
+    return place;
+}
+
+void *hashmap_get(const struct hashmap *map, uint64_t key)
+{
+    if (!map->count)
+        return NULL;
+    uint32_t position = map->index[find(map, key)];
+    return position ? map->slots[position - 1].value : NULL;
+}
+
+static bool grow(struct hashmap *map)
+{
+    size_t capacity = map->capacity ? map->capacity * 2 : CAPACITY_MIN;
+    if (capacity > CAPACITY_MAX)
+        return false;
+    uint32_t *index = calloc(capacity, sizeof *index);
+    if (!index)
+        return false;
+    struct hashmap_slot *slots = realloc(map->slots, capacity / 2 * sizeof *slots);
+    if (!slots) {
+        free(index);
+        return false;
+    }
+    free(map->index);
+    map->slots = slots;
+    map->index = index;
+    map->capacity = capacity;
+    for (size_t i = 0; i < map->count; i++)
+        index[find(map, slots[i].key)] = (uint32_t)(i + 1);
+    return true;
+}
+
+bool hashmap_put(struct hashmap *map, uint64_t key, void *value)
+{
+    if (map->capacity) {
+        uint32_t position = map->index[find(map, key)];
+        if (position) {
+            map->slots[position - 1].value = value;
+            return true;
+        }
+    }
+    if (map->count == map->capacity / 2 && !grow(map))
+        return false;
+    map->slots[map->count] = (struct hashmap_slot){key, value};
+    map->index[find(map, key)] = (uint32_t)++map->count;
+    return true;
+}
+
+/* Frees a place of the index and moves later ones of its run back, so that no search stops short. */
+static void free_place(struct hashmap *map, size_t place)
+{
+    size_t mask = map->capacity - 1;
+    size_t next = (place + 1) & mask;
+    while (map->index[next]) {
+        size_t home = home_of(map, map->slots[map->index[next] - 1].key);
+        if (((next - home) & mask) >= ((next - place) & mask)) {
+            map->index[place] = map->index[next];
+            place = next;
+        }
+        next = (next + 1) & mask;
+    }
+    map->index[place] = 0;
+}
+
+void *hashmap_remove(struct hashmap *map, uint64_t key)
+{
+    if (!map->count)
+        return NULL;
+    size_t place = find(map, key);
+    uint32_t position = map->index[place];
+    if (!position)
+        return NULL;
+    void *value = map->slots[position - 1].value;
+    free_place(map, place);
+    /* The last pair fills the gap. */
+    size_t last = map->count - 1;
+    if (position - 1 != last) {
+        map->index[find(map, map->slots[last].key)] = position;
+        map->slots[position - 1] = map->slots[last];
+    }
+    map->count--;
+    return value;
+}
+
+bool hashmap_next(const struct hashmap *map, size_t *cursor, uint64_t *key, void **value)
+{
+    if (*cursor >= map->count)
+        return false;
+    const struct hashmap_slot *slot = &map->slots[(*cursor)++];
+    if (key)
+        *key = slot->key;
+    if (value)
+        *value = slot->value;
+    return true;
+}

@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: MIT */
+#include "base/log.h"
+
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+/* Longer lines are cut: a line must leave in one write to stay whole beside other threads' lines. */
+#define LINE_BYTES_MAX 1024
+
+static atomic_int current_level = LOG_INFO;
+
+void log_set_level(enum log_level level)
+{
+    atomic_store_explicit(&current_level, (int)level, memory_order_relaxed);
+}
+
+bool log_enabled(enum log_level level)
+{
+    return (int)level <= atomic_load_explicit(&current_level, memory_order_relaxed);
+}
+
+const char *log_level_name(enum log_level level)
+{
+    static const char *const names[LOG_LEVEL_COUNT] = {"error", "warning", "info", "debug"};
+    return (unsigned)level < LOG_LEVEL_COUNT ? names[level] : "unknown";
+}
+
+/* Text from outside may be in the line: nothing in it may move the terminal's cursor or fake a line. */
+static void make_harmless(char *text, size_t bytes)
+{
+    for (size_t i = 0; i < bytes; i++) {
+        if ((unsigned char)text[i] < 0x20 || text[i] == 0x7f)
+            text[i] = '?';
+    }
+}
+
+void log_write(enum log_level level, const char *module, const char *format, ...)
+{
+    if (!log_enabled(level))
+        return;
+    char line[LINE_BYTES_MAX];
+    int head = snprintf(line, sizeof line - 1, "%s %s: ", log_level_name(level), module);
+    size_t used = head < 0 ? 0 : (size_t)head;
+    if (used > sizeof line - 2)
+        used = sizeof line - 2;
+    va_list arguments;
+    va_start(arguments, format);
+    int tail = vsnprintf(line + used, sizeof line - 1 - used, format, arguments);
+    va_end(arguments);
+    if (tail > 0)
+        used += strlen(line + used);
+    make_harmless(line, used);
+    line[used++] = '\n';
+    /* There is nobody left to tell when standard error fails. */
+    ssize_t written = write(STDERR_FILENO, line, used);
+    (void)written;
+}

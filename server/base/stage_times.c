@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: MIT */
+#include "base/stage_times.h"
+
+#include "base/clock.h"
+
+void stage_times_begin(struct stage_times *times)
+{
+    times->origin_ns = clock_now_ns();
+    times->count = 0;
+}
+
+static struct stage_span *last_of(struct stage_times *times, enum stage_id stage, enum stage_clock clock)
+{
+    for (uint32_t i = times->count; i-- > 0;) {
+        if (times->spans[i].stage == stage && times->spans[i].clock == clock)
+            return &times->spans[i];
+    }
+    return NULL;
+}
+
+void stage_times_add(struct stage_times *times, enum stage_id stage, enum stage_clock clock, uint32_t wave,
+                     uint64_t start_ns, uint64_t duration_ns)
+{
+    if (!times)
+        return;
+    if (times->count == STAGE_SPANS_MAX) {
+        /* A stage that has no span yet takes the place of nothing: its time is lost, but such a stage cannot
+         * occur, as all but trace and shade are reported once a frame and those two early. */
+        struct stage_span *last = last_of(times, stage, clock);
+        if (last)
+            last->duration_ns += duration_ns;
+        return;
+    }
+    /* What began before the frame was taken up (the edits it waited for) starts at its origin. */
+    uint64_t since_origin_ns = start_ns > times->origin_ns ? start_ns - times->origin_ns : 0;
+    times->spans[times->count++] = (struct stage_span){
+        .stage = stage,
+        .clock = clock,
+        .wave = wave,
+        .start_ns = since_origin_ns,
+        .duration_ns = duration_ns,
+    };
+}
+
+uint64_t stage_times_sum_ns(const struct stage_times *times, enum stage_id stage, enum stage_clock clock)
+{
+    uint64_t sum_ns = 0;
+    for (uint32_t i = 0; i < times->count; i++) {
+        if (times->spans[i].stage == stage && times->spans[i].clock == clock)
+            sum_ns += times->spans[i].duration_ns;
+    }
+    return sum_ns;
+}
+
+const char *stage_name(enum stage_id stage)
+{
+    static const char *const names[STAGE_COUNT] = {
+        [STAGE_APPLY] = "apply",     [STAGE_BUILD] = "build",       [STAGE_UPLOAD] = "upload",
+        [STAGE_PRIMARY] = "primary", [STAGE_TRACE] = "trace",       [STAGE_SHADE] = "shade",
+        [STAGE_RESOLVE] = "resolve", [STAGE_READBACK] = "readback", [STAGE_ENCODE] = "encode",
+        [STAGE_QUEUE] = "queue",     [STAGE_SEND] = "send",         [STAGE_FRAME] = "frame",
+    };
+    return (unsigned)stage < STAGE_COUNT ? names[stage] : "unknown";
+}

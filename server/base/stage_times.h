@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: MIT */
+/* Where a frame's time goes. Every stage of the way of the data reports here. */
+#ifndef FARLIGHT_BASE_STAGE_TIMES_H
+#define FARLIGHT_BASE_STAGE_TIMES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* Same numbers as the protocol's enum stage (session asserts it). */
+enum stage_id {
+    STAGE_APPLY,
+    STAGE_BUILD,
+    STAGE_UPLOAD,
+    STAGE_PRIMARY,
+    STAGE_TRACE,
+    STAGE_SHADE,
+    STAGE_RESOLVE,
+    STAGE_READBACK,
+    STAGE_ENCODE,
+    STAGE_QUEUE,
+    STAGE_SEND,
+    STAGE_FRAME,
+    STAGE_COUNT
+};
+
+enum stage_clock { STAGE_CPU, STAGE_GPU };
+
+struct stage_span {
+    enum stage_id stage;
+    enum stage_clock clock;
+    uint32_t wave;        /* of trace and shade: number of the wave in its frame */
+    uint64_t start_ns;    /* since `origin_ns` */
+    uint64_t duration_ns;
+};
+
+/* 512 spans reach the wire; spans beyond are added to the last of the same stage and clock. */
+#define STAGE_SPANS_MAX 512
+
+struct stage_times {
+    uint64_t origin_ns; /* clock_now_ns() when the frame was taken up */
+    uint32_t count;
+    struct stage_span spans[STAGE_SPANS_MAX];
+};
+
+void stage_times_begin(struct stage_times *times); /* empties it, sets the origin to now */
+/* `start_ns` by clock_now_ns(). `times` may be NULL: nothing happens. */
+void stage_times_add(struct stage_times *times, enum stage_id stage, enum stage_clock clock, uint32_t wave,
+                     uint64_t start_ns, uint64_t duration_ns);
+uint64_t stage_times_sum_ns(const struct stage_times *times, enum stage_id stage, enum stage_clock clock);
+const char *stage_name(enum stage_id stage);
+
+#endif
