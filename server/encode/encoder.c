@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: MIT */
+#include "encode/encoder.h"
+
+#include <stdlib.h>
+
+/* The protocol's number is the index; this is the only caller of the implementations. */
+static const struct encoder_impl *const impls[ENCODING_COUNT] = {
+    [ENCODING_RAW] = &encoder_raw_impl,
+    [ENCODING_ZSTD] = &encoder_zstd_impl,
+    [ENCODING_JPEG] = &encoder_jpeg_impl,
+};
+
+static bool is_known(enum encoding encoding)
+{
+    return (unsigned)encoding < ENCODING_COUNT;
+}
+
+bool encoder_supports(enum encoding encoding, uint32_t bytes_per_pixel)
+{
+    struct picture probe = {.width = 1, .height = 1, .bytes_per_pixel = bytes_per_pixel};
+    bool is_pixel_size = bytes_per_pixel == 4 || bytes_per_pixel == 8 || bytes_per_pixel == 16;
+    return is_known(encoding) && is_pixel_size && impls[encoding]->bound(&probe) != 0;
+}
+
+bool encoder_encode(enum encoding encoding, const struct picture *picture, unsigned quality, uint8_t **out,
+                    size_t *out_bytes, struct error *error)
+{
+    *out = NULL;
+    *out_bytes = 0;
+    if (!is_known(encoding))
+        return error_set(error, ERROR_UNSUPPORTED, "encoding", "encoding number %u is not known",
+                         (unsigned)encoding);
+    const struct encoder_impl *impl = impls[encoding];
+    size_t capacity = picture->width && picture->height ? impl->bound(picture) : 0;
+    if (!capacity)
+        return error_set(error, ERROR_UNSUPPORTED, "encoding", "%s cannot carry %ux%u pixels of %u bytes",
+                         impl->name, picture->width, picture->height, picture->bytes_per_pixel);
+    uint8_t *bytes = malloc(capacity);
+    if (!bytes)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no %zu bytes to encode a frame into", capacity);
+    size_t used = impl->encode(picture, quality, bytes, capacity, error);
+    if (!used) {
+        free(bytes);
+        /* An implementation that fails says why; this one only wins where it did not. */
+        return error_set(error, ERROR_INTERNAL, "encoding", "%s gave no bytes", impl->name);
+    }
+    /* A compressed frame is usually far below its bound, and it may wait in a queue for a while. */
+    uint8_t *trimmed = used < capacity / 2 ? realloc(bytes, used) : NULL;
+    *out = trimmed ? trimmed : bytes;
+    *out_bytes = used;
+    return true;
+}

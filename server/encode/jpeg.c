@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: MIT */
+/* Baseline JPEG through libjpeg-turbo. Alpha is dropped. */
+#include "encode/encoder.h"
+
+#include <limits.h>
+#include <turbojpeg.h>
+
+/* From here on a person asks for fine detail, which halved chroma blurs. */
+#define QUALITY_FULL_CHROMA 90
+/* The format's own limit for an edge. */
+#define EDGE_MAX 65500
+
+static int subsampling(unsigned quality)
+{
+    return quality >= QUALITY_FULL_CHROMA ? TJSAMP_444 : TJSAMP_420;
+}
+
+static size_t jpeg_bound(const struct picture *picture)
+{
+    if (picture->bytes_per_pixel != 4 || picture->width > EDGE_MAX || picture->height > EDGE_MAX)
+        return 0;
+    /* The greater of the two, whatever the quality will be. */
+    unsigned long bound = tjBufSize((int)picture->width, (int)picture->height, TJSAMP_444);
+    return bound == ULONG_MAX ? 0 : bound;
+}
+
+static size_t jpeg_encode(const struct picture *picture, unsigned quality, uint8_t *out, size_t capacity,
+                          struct error *error)
+{
+    int width = (int)picture->width, height = (int)picture->height;
+    int clamped = quality < 1 ? 1 : quality > 100 ? 100 : (int)quality;
+    int chroma = subsampling((unsigned)clamped);
+    if (capacity < tjBufSize(width, height, chroma)) {
+        error_set(error, ERROR_INTERNAL, "encoding", "%zu bytes are too few for a JPEG of %dx%d", capacity, width,
+                  height);
+        return 0;
+    }
+    tjhandle handle = tjInitCompress();
+    if (!handle) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "libjpeg-turbo: %s", tjGetErrorStr2(NULL));
+        return 0;
+    }
+    unsigned long used = capacity;
+    int failed = tjCompress2(handle, picture->pixels, width, 0, height, TJPF_RGBX, &out, &used, chroma, clamped,
+                             TJFLAG_NOREALLOC);
+    if (failed) {
+        error_set(error, ERROR_INTERNAL, "encoding", "libjpeg-turbo: %s", tjGetErrorStr2(handle));
+        used = 0;
+    }
+    tjDestroy(handle);
+    return used;
+}
+
+const struct encoder_impl encoder_jpeg_impl = {.name = "jpeg", .bound = jpeg_bound, .encode = jpeg_encode};

@@ -1,0 +1,264 @@
+/* SPDX-License-Identifier: MIT */
+/* A transaction: everything that can fail is done on a draft, then the scene is changed in steps that cannot. */
+#include "scene/draft.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define NODES_MAX_DEFAULT (4u << 20)
+
+const void *draft_find(const struct draft *draft, enum scene_object_kind kind, uint32_t id)
+{
+    const struct scene_edit *edit = hashmap_get(&draft->last[kind], id);
+    if (edit)
+        return edit->kind == EDIT_SET ? &edit->set : NULL;
+    return hashmap_get(&draft->scene->objects[kind], id);
+}
+
+bool draft_counts(const struct draft *draft, const struct scene_edit *edit)
+{
+    if (edit->kind == EDIT_SET_ENVIRONMENT)
+        return draft->last_environment == edit;
+    return hashmap_get(&draft->last[edit->object], edit_object_id(edit)) == edit;
+}
+
+struct edit_place draft_place(const struct draft *draft, const struct scene_edit *edit)
+{
+    return (struct edit_place){(size_t)(edit - draft->edits), edit, draft->error};
+}
+
+/* ---- checks ------------------------------------------------------------------------------------- */
+
+static bool content_check(struct scene_edit *edit, const struct edit_place *place)
+{
+    switch (edit->object) {
+    case SCENE_MESH:
+        return mesh_check(&edit->set.mesh, place);
+    case SCENE_SPHERES:
+        return spheres_check(&edit->set.spheres, place);
+    case SCENE_TEXTURE:
+        return texture_check(&edit->set.texture, place);
+    case SCENE_LIGHT:
+        return light_check(&edit->set.light, place);
+    case SCENE_CAMERA:
+        return camera_check(&edit->set.camera, place);
+    case SCENE_DISC:
+        return disc_check(&edit->set.disc, place);
+    case SCENE_NODE:
+    case SCENE_MATERIAL:
+    case SCENE_OBJECT_KIND_COUNT:
+        break;
+    }
+    return true;
+}
+
+/* Looks at one edit alone and makes it the last of its object. */
+static bool take_edit(struct draft *draft, struct scene_edit *edit)
+{
+    struct edit_place place = draft_place(draft, edit);
+    if (edit->kind == EDIT_SET_ENVIRONMENT) {
+        draft->last_environment = edit;
+        return environment_check(&edit->set.environment, &place);
+    }
+    if ((unsigned)edit->object >= SCENE_OBJECT_KIND_COUNT)
+        return edit_error(&place, ERROR_INVALID, ".kind", "%u is no kind of object", (unsigned)edit->object);
+    uint32_t id = edit_object_id(edit);
+    if (!id)
+        return edit_error(&place, ERROR_INVALID, "", "0 is no identifier: it means none");
+    if (edit->kind == EDIT_REMOVE && !draft_find(draft, edit->object, id))
+        return edit_error(&place, ERROR_UNKNOWN_ID, "", "there is no %s %u to remove",
+                          object_kind_name(edit->object), id);
+    if (edit->kind == EDIT_SET && !content_check(edit, &place))
+        return false;
+    return hashmap_put(&draft->last[edit->object], id, edit) ||
+           error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory for a table of %zu edits",
+                     draft->edit_count);
+}
+
+/* Host memory after the transaction, and nodes. */
+static bool limits_check(struct draft *draft, uint64_t *host_bytes)
+{
+    const struct scene *scene = draft->scene;
+    uint64_t bytes = scene->host_bytes;
+    uint64_t nodes = scene->objects[SCENE_NODE].count - draft->fallen_count;
+    for (int k = 0; k < SCENE_OBJECT_KIND_COUNT; k++) {
+        enum scene_object_kind kind = (enum scene_object_kind)k;
+        size_t cursor = 0;
+        uint64_t id;
+        void *value;
+        while (hashmap_next(&draft->last[kind], &cursor, &id, &value)) {
+            const struct scene_edit *edit = value;
+            const void *now = hashmap_get(&scene->objects[kind], id);
+            bool stays = edit->kind == EDIT_SET;
+            bytes += stays ? object_bytes(kind, &edit->set) : 0;
+            bytes -= now ? object_bytes(kind, now) : 0;
+            if (kind == SCENE_NODE)
+                nodes = nodes + stays - (now != NULL);
+        }
+    }
+    for (size_t i = 0; i < draft->fallen_count; i++)
+        bytes -= object_bytes(SCENE_NODE, scene_node(scene, draft->fallen[i]));
+    if (draft->last_environment)
+        bytes +=
+            environment_bytes(&draft->last_environment->set.environment) - environment_bytes(&scene->environment);
+    *host_bytes = bytes;
+    uint64_t nodes_max = scene->limits.nodes ? scene->limits.nodes : NODES_MAX_DEFAULT;
+    if (nodes > nodes_max && nodes > scene->objects[SCENE_NODE].count) {
+        error_set(draft->error, ERROR_LIMIT, "edits", "the scene would have %llu nodes; %llu are allowed",
+                  (unsigned long long)nodes, (unsigned long long)nodes_max);
+        return error_remedy(draft->error,
+                            "remove nodes, or raise the limit of nodes in the daemon's configuration");
+    }
+    if (scene->limits.host_bytes && bytes > scene->limits.host_bytes && bytes > scene->host_bytes) {
+        error_set(draft->error, ERROR_LIMIT, "edits",
+                  "the scene would take %.1f MiB of the host's memory; %.1f MiB are allowed",
+                  (double)bytes / 0x1p20, (double)scene->limits.host_bytes / 0x1p20);
+        return error_remedy(draft->error,
+                            "remove objects, or raise the limit of scene memory in the daemon's configuration");
+    }
+    return true;
+}
+
+/* ---- application -------------------------------------------------------------------------------- */
+
+/* Puts an empty object of revision 0 into the scene for each that does not exist yet. */
+static bool make_room(struct draft *draft)
+{
+    for (size_t i = 0; i < draft->edit_count; i++) {
+        const struct scene_edit *edit = &draft->edits[i];
+        if (edit->kind != EDIT_SET || !draft_counts(draft, edit))
+            continue;
+        struct hashmap *map = &draft->scene->objects[edit->object];
+        uint32_t id = edit_object_id(edit);
+        if (hashmap_get(map, id))
+            continue;
+        struct scene_object *object = calloc(1, object_struct_bytes(edit->object));
+        if (!object || !hashmap_put(map, id, object)) {
+            free(object);
+            return error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory for %s %u",
+                             object_kind_name(edit->object), id);
+        }
+    }
+    return true;
+}
+
+static void give_room_back(struct draft *draft)
+{
+    for (size_t i = 0; i < draft->edit_count; i++) {
+        const struct scene_edit *edit = &draft->edits[i];
+        if (edit->kind != EDIT_SET || !draft_counts(draft, edit))
+            continue;
+        struct hashmap *map = &draft->scene->objects[edit->object];
+        struct scene_object *object = hashmap_get(map, edit_object_id(edit));
+        if (object && !object->revision)
+            free(hashmap_remove(map, edit_object_id(edit)));
+    }
+}
+
+/* Notes that a node of that kind appears, moves or goes. What moves with it is not known when others hang
+ * below: then everything may have. */
+static void touch_node(struct scene *scene, const struct scene_node *node)
+{
+    bool alone = node->child_count == 0;
+    if (!alone || node->kind == NODE_MESH || node->kind == NODE_SPHERES)
+        scene->instances_revision = scene->revision;
+    if (!alone || node->kind == NODE_LIGHT)
+        scene->lights_revision = scene->revision;
+}
+
+static void touch_kind(struct scene *scene, enum scene_object_kind kind)
+{
+    if (kind == SCENE_MESH || kind == SCENE_SPHERES || kind == SCENE_DISC)
+        scene->geometry_revision = scene->revision;
+    else if (kind == SCENE_MATERIAL || kind == SCENE_TEXTURE)
+        scene->shading_revision = scene->revision;
+    else if (kind == SCENE_LIGHT)
+        scene->lights_revision = scene->revision;
+}
+
+static void count_child(struct scene *scene, uint32_t parent, int change)
+{
+    struct scene_node *node = parent ? hashmap_get(&scene->objects[SCENE_NODE], parent) : NULL;
+    if (node)
+        node->child_count += (uint32_t)change;
+}
+
+static void apply_set(struct scene *scene, struct scene_edit *edit)
+{
+    struct scene_object *object = hashmap_get(&scene->objects[edit->object], edit_object_id(edit));
+    if (edit->object == SCENE_NODE) {
+        struct scene_node *node = (struct scene_node *)object, *next = &edit->set.node;
+        next->child_count = node->child_count;
+        if (object->revision) {
+            count_child(scene, node->parent, -1);
+            touch_node(scene, node);
+        }
+        count_child(scene, next->parent, +1);
+        touch_node(scene, next);
+    }
+    object_release(edit->object, object);
+    memcpy(object, &edit->set, object_struct_bytes(edit->object));
+    object->revision = scene->revision;
+    touch_kind(scene, edit->object);
+    /* The scene owns the blobs and ranges now. */
+    memset(&edit->set, 0, sizeof edit->set);
+}
+
+static void apply_remove(struct scene *scene, enum scene_object_kind kind, uint32_t id)
+{
+    struct scene_object *object = hashmap_remove(&scene->objects[kind], id);
+    if (!object)
+        return; /* made and removed by the same transaction */
+    if (kind == SCENE_NODE) {
+        const struct scene_node *node = (const struct scene_node *)object;
+        touch_node(scene, node);
+        count_child(scene, node->parent, -1);
+    }
+    touch_kind(scene, kind);
+    object_release(kind, object);
+    free(object);
+}
+
+static void apply(struct draft *draft, uint64_t host_bytes)
+{
+    struct scene *scene = draft->scene;
+    scene->revision++;
+    scene->host_bytes = host_bytes;
+    for (size_t i = 0; i < draft->edit_count; i++) {
+        struct scene_edit *edit = &draft->edits[i];
+        if (!draft_counts(draft, edit))
+            continue;
+        if (edit->kind == EDIT_SET) {
+            apply_set(scene, edit);
+        } else if (edit->kind == EDIT_REMOVE) {
+            apply_remove(scene, edit->object, edit->id);
+        } else {
+            blob_unref(scene->environment.texels);
+            scene->environment = edit->set.environment;
+            scene->environment.revision = scene->lights_revision = scene->revision;
+            memset(&edit->set, 0, sizeof edit->set);
+        }
+    }
+    for (size_t i = 0; i < draft->fallen_count; i++)
+        apply_remove(scene, SCENE_NODE, draft->fallen[i]);
+}
+
+bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_count, struct error *error)
+{
+    struct draft draft = {.scene = scene, .edits = edits, .edit_count = edit_count, .error = error};
+    uint64_t host_bytes = 0;
+    bool sound = true;
+    for (size_t i = 0; sound && i < edit_count; i++)
+        sound = take_edit(&draft, &edits[i]);
+    sound = sound && structure_check(&draft) && references_check(&draft) && limits_check(&draft, &host_bytes);
+    if (sound && !make_room(&draft)) {
+        give_room_back(&draft);
+        sound = false;
+    }
+    if (sound)
+        apply(&draft, host_bytes);
+    for (int kind = 0; kind < SCENE_OBJECT_KIND_COUNT; kind++)
+        hashmap_finish(&draft.last[kind]);
+    free(draft.fallen);
+    return sound;
+}

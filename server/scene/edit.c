@@ -1,0 +1,168 @@
+/* SPDX-License-Identifier: MIT */
+#include "scene/edit.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+const char *object_kind_name(enum scene_object_kind kind)
+{
+    static const char *const names[SCENE_OBJECT_KIND_COUNT] = {
+        [SCENE_NODE] = "node",         [SCENE_MESH] = "mesh",       [SCENE_SPHERES] = "spheres",
+        [SCENE_MATERIAL] = "material", [SCENE_TEXTURE] = "texture", [SCENE_LIGHT] = "light",
+        [SCENE_CAMERA] = "camera",     [SCENE_DISC] = "disc",
+    };
+    return (unsigned)kind < SCENE_OBJECT_KIND_COUNT ? names[kind] : "object";
+}
+
+uint32_t edit_object_id(const struct scene_edit *edit)
+{
+    if (edit->kind == EDIT_SET_ENVIRONMENT)
+        return 0;
+    /* All objects begin with a scene_object, so any member of the union shows it. */
+    return edit->kind == EDIT_REMOVE ? edit->id : edit->set.node.base.id;
+}
+
+bool edit_error(const struct edit_place *place, enum error_kind kind, const char *path, const char *format, ...)
+{
+    char field[sizeof place->error->field], text[sizeof place->error->text];
+    if (place->edit->kind == EDIT_SET_ENVIRONMENT)
+        snprintf(field, sizeof field, "edits[%zu] (environment)%s", place->index, path);
+    else
+        snprintf(field, sizeof field, "edits[%zu] (%s %u)%s", place->index, object_kind_name(place->edit->object),
+                 edit_object_id(place->edit), path);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    return error_set(place->error, kind, field, "%s", text);
+}
+
+bool array_size_check(const struct blob *blob, uint64_t count, uint64_t element_bytes, const char *path,
+                      const struct edit_place *place)
+{
+    uint64_t needed;
+    if (__builtin_mul_overflow(count, element_bytes, &needed) || blob->size_bytes != needed)
+        return edit_error(place, ERROR_INVALID, path,
+                          "the array has %zu bytes, but %llu elements of %llu bytes are declared",
+                          blob->size_bytes, (unsigned long long)count, (unsigned long long)element_bytes);
+    return true;
+}
+
+/* A block has a constant length and no exit inside, so that the compiler does several numbers at a time. */
+#define FLOAT_BLOCK 1024
+
+static bool block_is_fine(const float *values, float greatest)
+{
+    unsigned bad = 0;
+    for (size_t i = 0; i < FLOAT_BLOCK; i++)
+        bad |= (unsigned)!(fabsf(values[i]) <= greatest); /* true for a NaN too */
+    return !bad;
+}
+
+size_t first_bad_float(const float *values, size_t count, float greatest)
+{
+    size_t i = 0;
+    while (count - i >= FLOAT_BLOCK && block_is_fine(values + i, greatest))
+        i += FLOAT_BLOCK;
+    while (i < count && fabsf(values[i]) <= greatest)
+        i++;
+    return i;
+}
+
+bool ranges_check(const struct material_range *ranges, uint32_t range_count, uint32_t primitive_count,
+                  const struct edit_place *place)
+{
+    uint32_t done = 0; /* primitives before this one are taken */
+    for (uint32_t i = 0; i < range_count; i++) {
+        char path[64];
+        if (ranges[i].first < done) {
+            snprintf(path, sizeof path, ".ranges[%u].first", i);
+            edit_error(place, ERROR_INVALID, path, "%u lies before %u, where the range before it ends",
+                       ranges[i].first, done);
+            return error_remedy(place->error, "sort the ranges by their first primitive and let none overlap");
+        }
+        if (ranges[i].first > primitive_count || ranges[i].count > primitive_count - ranges[i].first) {
+            snprintf(path, sizeof path, ".ranges[%u].count", i);
+            return edit_error(place, ERROR_INVALID, path, "%u from %u reaches beyond the %u primitives",
+                              ranges[i].count, ranges[i].first, primitive_count);
+        }
+        done = ranges[i].first + ranges[i].count;
+    }
+    return true;
+}
+
+size_t object_struct_bytes(enum scene_object_kind kind)
+{
+    static const size_t sizes[SCENE_OBJECT_KIND_COUNT] = {
+        [SCENE_NODE] = sizeof(struct scene_node),       [SCENE_MESH] = sizeof(struct scene_mesh),
+        [SCENE_SPHERES] = sizeof(struct scene_spheres), [SCENE_MATERIAL] = sizeof(struct scene_material),
+        [SCENE_TEXTURE] = sizeof(struct scene_texture), [SCENE_LIGHT] = sizeof(struct scene_light),
+        [SCENE_CAMERA] = sizeof(struct scene_camera),   [SCENE_DISC] = sizeof(struct scene_disc),
+    };
+    return sizes[kind];
+}
+
+static uint64_t blob_bytes(const struct blob *blob)
+{
+    return blob ? blob->size_bytes : 0;
+}
+
+uint64_t object_bytes(enum scene_object_kind kind, const void *object)
+{
+    /* Its slot in the table, at the table's usual load. */
+    const uint64_t slot_bytes = 32;
+    uint64_t bytes = object_struct_bytes(kind) + slot_bytes;
+    if (kind == SCENE_MESH) {
+        const struct scene_mesh *mesh = object;
+        for (int i = 0; i < MESH_ARRAY_COUNT; i++)
+            bytes += blob_bytes(mesh->arrays[i]);
+        bytes += mesh->range_count * sizeof *mesh->ranges;
+    } else if (kind == SCENE_SPHERES) {
+        const struct scene_spheres *spheres = object;
+        bytes += blob_bytes(spheres->centres_radii) + spheres->range_count * sizeof *spheres->ranges;
+    } else if (kind == SCENE_TEXTURE) {
+        bytes += blob_bytes(((const struct scene_texture *)object)->texels);
+    }
+    return bytes;
+}
+
+uint64_t environment_bytes(const struct scene_environment *environment)
+{
+    return blob_bytes(environment->texels);
+}
+
+void object_release(enum scene_object_kind kind, void *object)
+{
+    if (kind == SCENE_MESH) {
+        struct scene_mesh *mesh = object;
+        for (int i = 0; i < MESH_ARRAY_COUNT; i++) {
+            blob_unref(mesh->arrays[i]);
+            mesh->arrays[i] = NULL;
+        }
+        free(mesh->ranges);
+        mesh->ranges = NULL;
+        mesh->range_count = 0;
+    } else if (kind == SCENE_SPHERES) {
+        struct scene_spheres *spheres = object;
+        blob_unref(spheres->centres_radii);
+        free(spheres->ranges);
+        spheres->centres_radii = NULL;
+        spheres->ranges = NULL;
+        spheres->range_count = 0;
+    } else if (kind == SCENE_TEXTURE) {
+        struct scene_texture *texture = object;
+        blob_unref(texture->texels);
+        texture->texels = NULL;
+    }
+}
+
+void scene_edit_finish(struct scene_edit *edit)
+{
+    if (edit->kind == EDIT_SET)
+        object_release(edit->object, &edit->set);
+    else if (edit->kind == EDIT_SET_ENVIRONMENT)
+        blob_unref(edit->set.environment.texels);
+    *edit = (struct scene_edit){.kind = EDIT_REMOVE};
+}

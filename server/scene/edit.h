@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT */
+/* Checks of one edit by itself, and how their errors name it. Private to scene/. */
+#ifndef FARLIGHT_SCENE_EDIT_H
+#define FARLIGHT_SCENE_EDIT_H
+
+#include "scene/scene.h"
+
+/* Which edit an error is about: "edits[17] (mesh 3)". */
+struct edit_place {
+    size_t index;
+    const struct scene_edit *edit;
+    struct error *error;
+};
+
+const char *object_kind_name(enum scene_object_kind kind);
+/* Identifier of what the edit sets or removes; 0 for the environment. */
+uint32_t edit_object_id(const struct scene_edit *edit);
+/* `path` is what follows the edit: ".ranges[2].material", or "" for all of it. Returns false. */
+bool edit_error(const struct edit_place *place, enum error_kind kind, const char *path, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+
+/* Each looks at one object alone, no references; bounds are filled in. */
+bool mesh_check(struct scene_mesh *mesh, const struct edit_place *place);
+bool spheres_check(struct scene_spheres *spheres, const struct edit_place *place);
+bool texture_check(const struct scene_texture *texture, const struct edit_place *place);
+bool light_check(const struct scene_light *light, const struct edit_place *place);
+bool camera_check(const struct scene_camera *camera, const struct edit_place *place);
+bool disc_check(const struct scene_disc *disc, const struct edit_place *place);
+bool environment_check(const struct scene_environment *environment, const struct edit_place *place);
+
+/* Pieces that several of them use. */
+#define COORDINATE_MAX 1e18f /* beyond it, squares leave the range of floats */
+bool ranges_check(const struct material_range *ranges, uint32_t range_count, uint32_t primitive_count,
+                  const struct edit_place *place);
+/* The blob holds `count` elements of `element_bytes`, neither more nor less. */
+bool array_size_check(const struct blob *blob, uint64_t count, uint64_t element_bytes, const char *path,
+                      const struct edit_place *place);
+/* Position of the first float that is not finite or beyond `greatest`; `count` if there is none. */
+size_t first_bad_float(const float *values, size_t count, float greatest);
+
+/* Host memory that an object counts for. */
+uint64_t object_bytes(enum scene_object_kind kind, const void *object);
+uint64_t environment_bytes(const struct scene_environment *environment);
+/* Size of the struct of a kind. */
+size_t object_struct_bytes(enum scene_object_kind kind);
+/* Releases blobs and ranges of an object and forgets them, not the struct. */
+void object_release(enum scene_object_kind kind, void *object);
+
+#endif

@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: MIT */
+/* Checks of lights, cameras, and of what is made of texels. Single numbers have been checked where they were
+ * decoded; here is what depends on more than one of them. */
+#include "scene/edit.h"
+
+bool light_check(const struct scene_light *light, const struct edit_place *place)
+{
+    if (light->kind == LIGHT_SPOT && !(light->outer_cone >= light->inner_cone && light->outer_cone > 0.0f))
+        return edit_error(place, ERROR_INVALID, ".outer_cone",
+                          "%g must be above 0 and not less than the inner cone, which is %g",
+                          (double)light->outer_cone, (double)light->inner_cone);
+    if (light->kind == LIGHT_RECTANGLE && !(light->size[0] > 0.0f && light->size[1] > 0.0f))
+        return edit_error(place, ERROR_INVALID, ".size", "a rectangle of %g x %g has no area",
+                          (double)light->size[0], (double)light->size[1]);
+    if (light->kind == LIGHT_SPHERE && !(light->size[0] > 0.0f))
+        return edit_error(place, ERROR_INVALID, ".size", "the radius %g is not above 0", (double)light->size[0]);
+    return true;
+}
+
+bool camera_check(const struct scene_camera *camera, const struct edit_place *place)
+{
+    if (camera->fov_y > 0.0f || camera->height > 0.0f)
+        return true;
+    edit_error(place, ERROR_INVALID, ".height", "an orthographic camera shows a height above 0");
+    return error_remedy(place->error, "set fov_y for a perspective camera or height for an orthographic one");
+}
+
+bool texture_check(const struct scene_texture *texture, const struct edit_place *place)
+{
+    const char *path = ".arrays[0] (texels)";
+    if (!texture->width || !texture->height)
+        return edit_error(place, ERROR_INVALID, texture->width ? ".height" : ".width",
+                          "a texture has at least one texel");
+    if (!texture->texels)
+        return edit_error(place, ERROR_INVALID, path, "a texture needs this array");
+    return array_size_check(texture->texels, (uint64_t)texture->width * texture->height, 4, path, place);
+}
+
+bool environment_check(const struct scene_environment *environment, const struct edit_place *place)
+{
+    const char *path = ".arrays[0] (texels)";
+    if (!environment->texels) {
+        if (environment->width || environment->height)
+            return edit_error(place, ERROR_INVALID, path, "an image of %ux%u texels needs this array",
+                              environment->width, environment->height);
+        return true;
+    }
+    if (!environment->width || !environment->height)
+        return edit_error(place, ERROR_INVALID, environment->width ? ".height" : ".width",
+                          "an image has at least one texel");
+    uint64_t texels = (uint64_t)environment->width * environment->height;
+    if (!array_size_check(environment->texels, texels, 8, path, place))
+        return false;
+    const uint16_t *halves = (const uint16_t *)(const void *)environment->texels->data;
+    const uint16_t exponent = 0x7c00; /* all ones: infinity or NaN */
+    for (uint64_t i = 0; i < texels * 4; i++) {
+        /* The fourth half of a texel is not used. */
+        if ((halves[i] & exponent) == exponent && i % 4 != 3)
+            return edit_error(place, ERROR_INVALID, path, "texel %llu of row %llu is not finite",
+                              (unsigned long long)(i / 4 % environment->width),
+                              (unsigned long long)(i / 4 / environment->width));
+    }
+    return true;
+}

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: MIT */
+#include "scene/scene.h"
+
+#include "scene/edit.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+struct scene *scene_create(const char *name, const struct scene_limits *limits)
+{
+    struct scene *scene = calloc(1, sizeof *scene);
+    if (!scene)
+        return NULL;
+    snprintf(scene->name, sizeof scene->name, "%s", name ? name : "");
+    if (limits)
+        scene->limits = *limits;
+    return scene;
+}
+
+void scene_destroy(struct scene *scene)
+{
+    if (!scene)
+        return;
+    for (int kind = 0; kind < SCENE_OBJECT_KIND_COUNT; kind++) {
+        size_t cursor = 0;
+        void *object;
+        while (hashmap_next(&scene->objects[kind], &cursor, NULL, &object)) {
+            object_release((enum scene_object_kind)kind, object);
+            free(object);
+        }
+        hashmap_finish(&scene->objects[kind]);
+    }
+    blob_unref(scene->environment.texels);
+    free(scene);
+}
+
+const struct scene_node *scene_node(const struct scene *scene, uint32_t id)
+{
+    return hashmap_get(&scene->objects[SCENE_NODE], id);
+}
+
+const struct scene_mesh *scene_mesh(const struct scene *scene, uint32_t id)
+{
+    return hashmap_get(&scene->objects[SCENE_MESH], id);
+}
+
+const struct scene_spheres *scene_spheres(const struct scene *scene, uint32_t id)
+{
+    return hashmap_get(&scene->objects[SCENE_SPHERES], id);
+}
+
+const struct scene_material *scene_material(const struct scene *scene, uint32_t id)
+{
+    return hashmap_get(&scene->objects[SCENE_MATERIAL], id);
+}
+
+const struct scene_texture *scene_texture(const struct scene *scene, uint32_t id)
+{
+    return hashmap_get(&scene->objects[SCENE_TEXTURE], id);
+}
+
+const struct scene_light *scene_light(const struct scene *scene, uint32_t id)
+{
+    return hashmap_get(&scene->objects[SCENE_LIGHT], id);
+}
+
+const struct scene_camera *scene_camera(const struct scene *scene, uint32_t id)
+{
+    return hashmap_get(&scene->objects[SCENE_CAMERA], id);
+}

@@ -1,0 +1,228 @@
+/* SPDX-License-Identifier: MIT */
+/* The scene as the clients describe it: revisioned, edited in transactions. Knows neither GL nor the
+ * protocol. Not thread-safe: a scene belongs to the thread that owns GL. */
+#ifndef FARLIGHT_SCENE_SCENE_H
+#define FARLIGHT_SCENE_SCENE_H
+
+#include "base/blob.h"
+#include "base/error.h"
+#include "base/hashmap.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define SCENE_NAME_MAX 128
+#define SCENE_DEPTH_MAX 256 /* of the node hierarchy */
+
+/* The enums have the protocol's numbers (session asserts it). */
+enum scene_object_kind {
+    SCENE_NODE,
+    SCENE_MESH,
+    SCENE_SPHERES,
+    SCENE_MATERIAL,
+    SCENE_TEXTURE,
+    SCENE_LIGHT,
+    SCENE_CAMERA,
+    SCENE_DISC,
+    SCENE_OBJECT_KIND_COUNT
+};
+enum scene_node_kind { NODE_GROUP, NODE_MESH, NODE_SPHERES, NODE_LIGHT, NODE_CAMERA };
+enum scene_alpha_mode { ALPHA_OPAQUE, ALPHA_MASK, ALPHA_BLEND };
+enum scene_texture_format { TEXTURE_RGBA8_SRGB, TEXTURE_RGBA8_LINEAR };
+enum scene_wrap { WRAP_REPEAT, WRAP_CLAMP, WRAP_MIRROR };
+enum scene_light_kind { LIGHT_POINT, LIGHT_SPOT, LIGHT_DIRECTIONAL, LIGHT_RECTANGLE, LIGHT_SPHERE };
+/* Positions in a mesh's `arrays`, and in a material's `textures`. */
+enum mesh_array {
+    MESH_POSITIONS,   /* 3 f32 a vertex */
+    MESH_INDICES,     /* 3 u32 a triangle */
+    MESH_NORMALS,     /* 3 f32 */
+    MESH_TANGENTS,    /* 4 f32, the last is the handedness */
+    MESH_TEXCOORDS_0, /* 2 f32 */
+    MESH_TEXCOORDS_1,
+    MESH_COLOURS, /* 4 u8, linear */
+    MESH_ARRAY_COUNT
+};
+enum material_texture {
+    MATERIAL_BASE_COLOUR,
+    MATERIAL_NORMAL,
+    MATERIAL_METALLIC_ROUGHNESS,
+    MATERIAL_OCCLUSION,
+    MATERIAL_EMISSION,
+    MATERIAL_TRANSMISSION,
+    MATERIAL_BUMP,
+    MATERIAL_TEXTURE_COUNT
+};
+
+struct material_range {
+    uint32_t first, count; /* triangles or spheres */
+    uint32_t material;     /* 0: the default material */
+};
+
+/* Every object begins with these; `revision` is that of the transaction that last changed it. */
+struct scene_object {
+    uint32_t id;
+    uint64_t revision;
+    char name[SCENE_NAME_MAX + 1];
+};
+
+struct scene_node {
+    struct scene_object base;
+    uint32_t parent; /* 0: the root */
+    enum scene_node_kind kind;
+    uint32_t object; /* mesh, spheres, light, camera */
+    bool hidden;
+    float parent_from_node[12]; /* 3x4 row-major */
+    uint32_t child_count;       /* kept by the scene: how many nodes hang directly below */
+};
+
+struct scene_mesh {
+    struct scene_object base;
+    uint32_t vertex_count, triangle_count;
+    struct blob *arrays[MESH_ARRAY_COUNT]; /* NULL: missing. Checked: sizes fit the counts, indices are in range,
+                                              positions finite */
+    struct material_range *ranges;
+    uint32_t range_count;
+    float lower[3], upper[3]; /* bounds in object space */
+};
+
+struct scene_spheres {
+    struct scene_object base;
+    uint32_t sphere_count;
+    struct blob *centres_radii; /* 4 f32 a sphere; checked: finite, radius > 0 */
+    struct material_range *ranges;
+    uint32_t range_count;
+    float lower[3], upper[3];
+};
+
+struct texture_use {
+    uint32_t texture; /* 0: none */
+    uint32_t texcoord_set;
+    float uv_transform[6]; /* rows (a b c), (d e f) */
+    float strength;
+};
+
+struct scene_material {
+    struct scene_object base;
+    enum scene_alpha_mode alpha_mode;
+    bool double_sided, unlit;
+    float base_colour[4], emission[3];
+    float metallic, roughness, transmission, ior, alpha_cutoff;
+    struct texture_use textures[MATERIAL_TEXTURE_COUNT];
+};
+
+struct scene_texture {
+    struct scene_object base;
+    uint32_t width, height;
+    enum scene_texture_format format;
+    enum scene_wrap wrap_u, wrap_v;
+    bool nearest;
+    struct blob *texels; /* width x height x 4 bytes, rows from the top */
+};
+
+struct scene_light {
+    struct scene_object base;
+    enum scene_light_kind kind;
+    float colour[3];
+    float range;                  /* metres, 0: unlimited */
+    float inner_cone, outer_cone; /* radians, half angles */
+    float size[2];                /* rectangle: width, height; sphere: radius */
+};
+
+struct scene_camera {
+    struct scene_object base;
+    float fov_y;  /* radians; 0: orthographic */
+    float height; /* metres, orthographic */
+    float near;   /* metres */
+};
+
+struct scene_disc {
+    struct scene_object base;
+    uint32_t material;
+    float centre_world[3], normal_world[3], radius;
+};
+
+struct scene_environment {
+    uint64_t revision;
+    float colour[3];
+    float rotation; /* radians, about +y */
+    uint32_t width, height;
+    struct blob *texels; /* 4 half floats a texel; NULL: constant colour */
+};
+
+/* What a transaction does, one edit a time. Pointers inside (blobs, ranges) pass to the scene with a
+ * successful commit and stay with the edit otherwise; scene_edit_finish releases either way. */
+enum scene_edit_kind { EDIT_SET, EDIT_REMOVE, EDIT_SET_ENVIRONMENT };
+
+struct scene_edit {
+    enum scene_edit_kind kind;
+    enum scene_object_kind object; /* for set and remove */
+    uint32_t id;                   /* for remove */
+    union {
+        struct scene_node node;
+        struct scene_mesh mesh;
+        struct scene_spheres spheres;
+        struct scene_material material;
+        struct scene_texture texture;
+        struct scene_light light;
+        struct scene_camera camera;
+        struct scene_disc disc;
+        struct scene_environment environment;
+    } set;
+};
+void scene_edit_finish(struct scene_edit *edit);
+
+struct scene_limits {
+    uint64_t host_bytes; /* blobs and tables of this scene; 0: no limit */
+    uint32_t nodes;      /* 0: 4 Mi */
+};
+
+struct scene {
+    char name[SCENE_NAME_MAX + 1];
+    uint64_t revision;                               /* of the last transaction; 0: empty */
+    struct hashmap objects[SCENE_OBJECT_KIND_COUNT]; /* struct scene_node * and so on, by id */
+    struct scene_environment environment;
+    struct scene_limits limits;
+    uint64_t host_bytes; /* blobs that objects hold, counted per object, and tables */
+    /* Revision at which anything of a sort last changed, for those who keep copies. */
+    uint64_t geometry_revision;  /* meshes, spheres, discs: their shape */
+    uint64_t instances_revision; /* nodes: which, where, hidden */
+    uint64_t shading_revision;   /* materials, textures */
+    uint64_t lights_revision;    /* lights, environment, nodes that show lights */
+};
+
+struct scene *scene_create(const char *name, const struct scene_limits *limits); /* NULL: out of memory */
+void scene_destroy(struct scene *scene);                                         /* accepts NULL */
+
+/* Applies all edits, or none and sets *error, whose field names the edit: "edits[17] (mesh 3).ranges[2].material".
+ * Checked: identifiers, references, array sizes, index ranges, finite positions, cycles, depth, limits. Edits are
+ * looked at together: the last edit of an object counts, and an edit may refer to what a later one makes. A
+ * removed node takes all along that hangs below it after the other edits. */
+bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_count, struct error *error);
+
+/* Objects by identifier, NULL if there is none. */
+const struct scene_node *scene_node(const struct scene *scene, uint32_t id);
+const struct scene_mesh *scene_mesh(const struct scene *scene, uint32_t id);
+const struct scene_spheres *scene_spheres(const struct scene *scene, uint32_t id);
+const struct scene_material *scene_material(const struct scene *scene, uint32_t id);
+const struct scene_texture *scene_texture(const struct scene *scene, uint32_t id);
+const struct scene_light *scene_light(const struct scene *scene, uint32_t id);
+const struct scene_camera *scene_camera(const struct scene *scene, uint32_t id);
+
+/* The hierarchy, flattened: every visible node with its transform. */
+struct scene_instance {
+    const struct scene_node *node;
+    float world_from_object[12];
+    float object_from_world[12]; /* zero where `singular` */
+    bool singular;               /* the transform flattens: geometry there is skipped */
+};
+/* Instances of one kind in the order of node ids; an array to free(). False: out of memory. */
+bool scene_flatten(const struct scene *scene, enum scene_node_kind kind, struct scene_instance **instances,
+                   size_t *count);
+/* World transform of one node (hidden or not); false if there is no such node. */
+bool scene_world_from_node(const struct scene *scene, uint32_t node, float world_from_node[12]);
+/* Bounds in world space of everything visible, discs left out unless there is nothing else;
+ * false: nothing there. */
+bool scene_bounds(const struct scene *scene, float lower[3], float upper[3]);
+
+#endif

@@ -1,0 +1,173 @@
+/* SPDX-License-Identifier: MIT */
+/* Checks of the node hierarchy as it would be after a transaction. */
+#include "scene/draft.h"
+
+#include <stdlib.h>
+
+/* State of a node in the walk; above these, its depth plus FIRST_DEPTH. */
+enum { UNKNOWN, ON_CHAIN, FALLEN, ABOVE_ROOTS, FIRST_DEPTH };
+
+struct walk {
+    struct draft *draft;
+    struct hierarchy hierarchy;
+    uint16_t *state;
+    uint32_t chain[SCENE_DEPTH_MAX]; /* nodes from where the walk began, upwards */
+    size_t length;
+};
+
+static struct scene_edit *node_edit(const struct draft *draft, uint32_t id)
+{
+    return hashmap_get(&draft->last[SCENE_NODE], id);
+}
+
+/* Whether nodes appear, disappear or change their parent; if not, the hierarchy is as sound as it was. */
+static bool is_restructured(const struct draft *draft)
+{
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    while (hashmap_next(&draft->last[SCENE_NODE], &cursor, &id, &value)) {
+        const struct scene_edit *edit = value;
+        const struct scene_node *now = scene_node(draft->scene, (uint32_t)id);
+        if (edit->kind == EDIT_REMOVE || !now || now->parent != edit->set.node.parent)
+            return true;
+    }
+    return false;
+}
+
+static bool collect(struct walk *walk)
+{
+    const struct draft *draft = walk->draft;
+    const struct hashmap *now = &draft->scene->objects[SCENE_NODE], *edited = &draft->last[SCENE_NODE];
+    const struct scene_node **nodes = malloc((now->count + edited->count) * sizeof *nodes);
+    if (!nodes)
+        return false;
+    size_t count = 0, cursor = 0;
+    uint64_t id;
+    void *value;
+    while (hashmap_next(now, &cursor, &id, &value)) {
+        if (!node_edit(draft, (uint32_t)id))
+            nodes[count++] = value;
+    }
+    cursor = 0;
+    while (hashmap_next(edited, &cursor, NULL, &value)) {
+        const struct scene_edit *edit = value;
+        if (edit->kind == EDIT_SET)
+            nodes[count++] = &edit->set.node;
+    }
+    walk->state = calloc(count ? count : 1, sizeof *walk->state);
+    return hierarchy_init(&walk->hierarchy, nodes, count) && walk->state;
+}
+
+/* An error about the chain in hand. The hierarchy was sound before, so an edit in it or above is at fault: the one
+ * nearest to where the walk began is named. */
+static bool chain_error(struct walk *walk, const char *what)
+{
+    uint32_t position = walk->chain[0];
+    for (size_t steps = 0; steps <= 2 * SCENE_DEPTH_MAX && position != HIERARCHY_NONE; steps++) {
+        const struct scene_node *node = walk->hierarchy.nodes[position];
+        const struct scene_edit *edit = node_edit(walk->draft, node->base.id);
+        if (edit) {
+            struct edit_place place = draft_place(walk->draft, edit);
+            return edit_error(&place, ERROR_INVALID, ".parent", "with node %u as its parent, %s", node->parent,
+                              what);
+        }
+        position = walk->hierarchy.parents[position];
+    }
+    return error_set(walk->draft->error, ERROR_INTERNAL, "edits", "%s", what);
+}
+
+static bool missing_parent(struct walk *walk, const struct scene_node *node)
+{
+    const struct scene_edit *edit = node_edit(walk->draft, node->base.id);
+    if (!edit)
+        return true; /* untouched below a removed node: it goes along */
+    struct edit_place place = draft_place(walk->draft, edit);
+    if (!node_edit(walk->draft, node->parent))
+        edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "there is no node %u", node->parent);
+    else
+        edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u is removed by the same transaction",
+                   node->parent);
+    return error_remedy(walk->draft->error, "make the parent in the same transaction, or use 0 for the root");
+}
+
+static bool fallen_parent(struct walk *walk, const struct scene_node *node)
+{
+    const struct scene_edit *edit = node_edit(walk->draft, node->base.id);
+    if (!edit)
+        return true;
+    struct edit_place place = draft_place(walk->draft, edit);
+    edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u is removed along with one above it", node->parent);
+    return error_remedy(walk->draft->error, "give it a parent that remains");
+}
+
+/* Goes up from a node to one whose state is known, or to a root, then gives states down the chain. */
+static bool resolve(struct walk *walk, uint32_t start)
+{
+    const struct hierarchy *hierarchy = &walk->hierarchy;
+    uint32_t above = start;
+    walk->length = 0;
+    while (above != HIERARCHY_NONE && walk->state[above] == UNKNOWN) {
+        if (walk->length == SCENE_DEPTH_MAX)
+            return chain_error(walk, "the hierarchy is more than 256 levels deep");
+        walk->state[above] = ON_CHAIN;
+        walk->chain[walk->length++] = above;
+        above = hierarchy->parents[above];
+    }
+    if (above != HIERARCHY_NONE && walk->state[above] == ON_CHAIN)
+        return chain_error(walk, "it would be above itself");
+    uint16_t state = above == HIERARCHY_NONE ? ABOVE_ROOTS : walk->state[above];
+    for (size_t i = walk->length; i-- > 0;) {
+        uint32_t position = walk->chain[i];
+        const struct scene_node *node = hierarchy->nodes[position];
+        if (state == FALLEN) {
+            if (hierarchy->parents[position] != HIERARCHY_NONE && !fallen_parent(walk, node))
+                return false;
+        }
+        if (node->parent && hierarchy->parents[position] == HIERARCHY_NONE) {
+            if (!missing_parent(walk, node))
+                return false;
+            state = FALLEN;
+        } else if (state != FALLEN) {
+            state++;
+        }
+        if (state >= FIRST_DEPTH + SCENE_DEPTH_MAX)
+            return chain_error(walk, "the hierarchy is more than 256 levels deep");
+        walk->state[position] = state;
+    }
+    return true;
+}
+
+static bool note_fallen(struct walk *walk)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < walk->hierarchy.count; i++)
+        count += walk->state[i] == FALLEN;
+    if (!count)
+        return true;
+    struct draft *draft = walk->draft;
+    draft->fallen = malloc(count * sizeof *draft->fallen);
+    if (!draft->fallen)
+        return error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory for a list of %zu nodes", count);
+    for (size_t i = 0; i < walk->hierarchy.count; i++) {
+        if (walk->state[i] == FALLEN)
+            draft->fallen[draft->fallen_count++] = walk->hierarchy.nodes[i]->base.id;
+    }
+    return true;
+}
+
+bool structure_check(struct draft *draft)
+{
+    if (!is_restructured(draft))
+        return true;
+    struct walk walk = {.draft = draft};
+    bool sound = collect(&walk);
+    if (!sound)
+        error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory to look at the hierarchy");
+    for (uint32_t i = 0; sound && i < walk.hierarchy.count; i++)
+        sound = resolve(&walk, i);
+    sound = sound && note_fallen(&walk);
+    hierarchy_finish(&walk.hierarchy);
+    free(walk.state);
+    return sound;
+}
