@@ -1,0 +1,160 @@
+/* SPDX-License-Identifier: MIT */
+#include "gpu/buffer.h"
+
+#include "gpu/registry.h"
+
+#include <epoxy/gl.h>
+
+#define STORAGE_FLAGS (GL_DYNAMIC_STORAGE_BIT | GL_MAP_WRITE_BIT)
+/* Small buffers start at one page. */
+#define CAPACITY_MIN_BYTES 4096
+
+static void release(struct gpu_device *device, struct gpu_buffer *buffer)
+{
+    gpu_object_destroy(device->registry, GPU_TEXTURE_BUFFER, buffer->texture);
+    gpu_object_destroy(device->registry, GPU_BUFFER, buffer->name);
+    gpu_memory_give(device, buffer->capacity_bytes);
+    *buffer = (struct gpu_buffer){0};
+}
+
+static size_t grown_capacity(size_t old_bytes, size_t size_bytes)
+{
+    /* A first allocation is exact: most buffers are filled once. One that grows will grow again. */
+    size_t capacity = old_bytes ? size_bytes + size_bytes / 2 : size_bytes;
+    if (capacity < size_bytes)
+        capacity = size_bytes;
+    if (capacity < CAPACITY_MIN_BYTES)
+        return CAPACITY_MIN_BYTES;
+    return capacity > SIZE_MAX - 255 ? capacity : (capacity + 255) & ~(size_t)255;
+}
+
+static bool allocate(struct gpu_device *device, struct gpu_buffer *buffer, size_t capacity, struct error *error)
+{
+    if (capacity > PTRDIFF_MAX)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "a buffer of %zu bytes", capacity);
+    if (!gpu_memory_take(device, capacity, "a buffer", error))
+        return false;
+    buffer->capacity_bytes = capacity;
+    buffer->name = gpu_object_create(device->registry, GPU_BUFFER);
+    if (!buffer->name) {
+        release(device, buffer);
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more buffer names");
+    }
+    /* What stands here from before is not this allocation's fault, but must not hide it either. */
+    GLenum before = glGetError();
+    glNamedBufferStorage(buffer->name, (GLsizeiptr)capacity, NULL, STORAGE_FLAGS);
+    if (glGetError() != GL_NO_ERROR) {
+        release(device, buffer);
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a buffer of %zu bytes",
+                         capacity);
+    }
+    if (before != GL_NO_ERROR)
+        return error_set(error, ERROR_INTERNAL, NULL, "GL error 0x%04x before a buffer was made", before);
+    return true;
+}
+
+bool gpu_buffer_reserve(struct gpu_device *device, struct gpu_buffer *buffer, size_t size_bytes,
+                        struct error *error)
+{
+    if (size_bytes > buffer->capacity_bytes) {
+        size_t old_bytes = buffer->capacity_bytes;
+        release(device, buffer);
+        if (!allocate(device, buffer, grown_capacity(old_bytes, size_bytes), error))
+            return false;
+    } else if (size_bytes != buffer->size_bytes) {
+        /* The texture over it spans what is in use; the next bind makes it anew. */
+        gpu_object_destroy(device->registry, GPU_TEXTURE_BUFFER, buffer->texture);
+        buffer->texture = 0;
+    }
+    buffer->size_bytes = size_bytes;
+    return true;
+}
+
+bool gpu_buffer_upload(struct gpu_device *device, struct gpu_buffer *buffer, const void *data, size_t size_bytes,
+                       struct error *error)
+{
+    if (!gpu_buffer_reserve(device, buffer, size_bytes, error))
+        return false;
+    if (data && size_bytes)
+        glNamedBufferSubData(buffer->name, 0, (GLsizeiptr)size_bytes, data);
+    return true;
+}
+
+void *gpu_buffer_map(struct gpu_device *device, struct gpu_buffer *buffer, size_t size_bytes, struct error *error)
+{
+    if (!gpu_buffer_reserve(device, buffer, size_bytes ? size_bytes : 1, error))
+        return NULL;
+    void *data = glMapNamedBufferRange(buffer->name, 0, (GLsizeiptr)buffer->size_bytes,
+                                       GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT);
+    if (!data)
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver does not map a buffer of %zu bytes", size_bytes);
+    return data;
+}
+
+void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer)
+{
+    (void)device;
+    glUnmapNamedBuffer(buffer->name);
+}
+
+void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes, const void *data,
+                      size_t size_bytes)
+{
+    (void)device;
+    if (size_bytes)
+        glNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
+}
+
+void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
+                     size_t size_bytes)
+{
+    (void)device;
+    if (!size_bytes)
+        return;
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    glGetNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
+}
+
+void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint32_t value)
+{
+    (void)device;
+    if (buffer->name)
+        glClearNamedBufferData(buffer->name, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &value);
+}
+
+void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer)
+{
+    if (buffer->name)
+        release(device, buffer);
+    *buffer = (struct gpu_buffer){0};
+}
+
+static unsigned name_or_empty(const struct gpu_buffer *buffer)
+{
+    return buffer->name && buffer->size_bytes ? buffer->name : gpu_device_current()->empty_buffer;
+}
+
+void gpu_buffer_bind_storage(const struct gpu_buffer *buffer, unsigned binding)
+{
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, name_or_empty(buffer));
+}
+
+void gpu_buffer_bind_uniform(const struct gpu_buffer *buffer, unsigned binding)
+{
+    glBindBufferBase(GL_UNIFORM_BUFFER, binding, name_or_empty(buffer));
+}
+
+void gpu_buffer_bind_texels(struct gpu_device *device, struct gpu_buffer *buffer, unsigned unit,
+                            unsigned texel_format)
+{
+    if (!buffer->texture || buffer->texel_format != texel_format) {
+        gpu_object_destroy(device->registry, GPU_TEXTURE_BUFFER, buffer->texture);
+        buffer->texture = gpu_object_create(device->registry, GPU_TEXTURE_BUFFER);
+        buffer->texel_format = texel_format;
+        if (buffer->name && buffer->size_bytes)
+            glTextureBufferRange(buffer->texture, texel_format, buffer->name, 0, (GLsizeiptr)buffer->size_bytes);
+        else
+            glTextureBufferRange(buffer->texture, texel_format, device->empty_buffer, 0, 16);
+    }
+    glBindTextureUnit(unit, buffer->texture);
+}

@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+/* Buffers and the texel buffers over them. */
+#ifndef FARLIGHT_GPU_BUFFER_H
+#define FARLIGHT_GPU_BUFFER_H
+
+#include "base/error.h"
+#include "gpu/device.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* All-zero is the valid empty buffer. */
+struct gpu_buffer {
+    unsigned name;       /* GL buffer, 0: none yet */
+    unsigned texture;    /* GL buffer texture over it, 0: none */
+    unsigned texel_format; /* GL_RGBA32F .. of that texture */
+    size_t size_bytes;   /* in use */
+    size_t capacity_bytes;
+};
+
+/* Makes room for at least size_bytes (growth is geometric; contents are lost when it grows).
+ * Memory is counted in the device; fails with ERROR_OUT_OF_MEMORY before the driver would. */
+bool gpu_buffer_reserve(struct gpu_device *device, struct gpu_buffer *buffer, size_t size_bytes,
+                        struct error *error);
+/* Reserve, then write all. `data` NULL: left undefined. */
+bool gpu_buffer_upload(struct gpu_device *device, struct gpu_buffer *buffer, const void *data, size_t size_bytes,
+                       struct error *error);
+void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes, const void *data,
+                      size_t size_bytes);
+/* Reserve, then all of it as memory to be written to, each byte once and in order where that is easy (it may be
+ * write-combined). NULL and *error if there is none. unmap before the GPU uses it. */
+void *gpu_buffer_map(struct gpu_device *device, struct gpu_buffer *buffer, size_t size_bytes, struct error *error);
+void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer);
+void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
+                     size_t size_bytes); /* waits for the GPU */
+void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint32_t value); /* every u32 */
+void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer); /* leaves it empty */
+
+/* SSBO; an empty one is bound as a few zeros. */
+void gpu_buffer_bind_storage(const struct gpu_buffer *buffer, unsigned binding);
+void gpu_buffer_bind_uniform(const struct gpu_buffer *buffer, unsigned binding); /* UBO */
+/* As a samplerBuffer / usamplerBuffer of `texel_format` (GL_RGBA32F, GL_RGBA32UI, GL_RG32UI, GL_R32UI,
+ * GL_RGBA8 ..) on a texture unit. An empty buffer is bound as one of a single zero texel. */
+void gpu_buffer_bind_texels(struct gpu_device *device, struct gpu_buffer *buffer, unsigned unit,
+                            unsigned texel_format);
+
+#endif

@@ -1,0 +1,261 @@
+/* SPDX-License-Identifier: MIT */
+#include "gpu/device.h"
+
+#include "base/log.h"
+#include "gpu/debug.h"
+#include "gpu/egl.h"
+#include "gpu/program_cache.h"
+#include "gpu/registry.h"
+
+#include <epoxy/gl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* glGetError keeps one flag for each of a few kinds; after a loss it may report one for ever. */
+#define GL_ERRORS_READ_MAX 8
+#define EMPTY_BUFFER_BYTES 256
+
+static _Thread_local struct gpu_device *current_device;
+
+struct gpu_device *gpu_device_current(void)
+{
+    return current_device;
+}
+
+static void missing_function(void)
+{
+}
+
+/* epoxy's own handler ends the process; a driver without a function must be an error message. */
+static void (*on_missing_function(const char *name))(void)
+{
+    log_write(LOG_ERROR, "gpu", "the driver has no %s", name);
+    return missing_function;
+}
+
+static void copy_string(char *to, size_t size, GLenum name)
+{
+    const GLubyte *text = glGetString(name);
+    snprintf(to, size, "%s", text ? (const char *)text : "");
+}
+
+static bool sounds_like_software(const char *renderer)
+{
+    static const char *const names[] = {"llvmpipe", "softpipe", "swrast", "SWR"};
+    for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++)
+        if (strstr(renderer, names[i]))
+            return true;
+    return false;
+}
+
+/* The context is current. */
+static void ask_info(struct gpu_device_info *info, const struct gpu_egl_place *place)
+{
+    *info = (struct gpu_device_info){.index = place->index};
+    copy_string(info->name, sizeof(info->name), GL_RENDERER);
+    copy_string(info->vendor, sizeof(info->vendor), GL_VENDOR);
+    copy_string(info->version, sizeof(info->version), GL_VERSION);
+    memcpy(info->drm_path, place->drm_path, sizeof(info->drm_path));
+    info->software = place->software || sounds_like_software(info->name);
+}
+
+static uint64_t get_integer(GLenum name)
+{
+    GLint64 value = 0;
+    glGetInteger64v(name, &value);
+    return value < 0 ? 0 : (uint64_t)value;
+}
+
+static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool debug)
+{
+    GLint groups = 0;
+    glGetIntegeri_v(GL_MAX_COMPUTE_WORK_GROUP_COUNT, 0, &groups);
+    *facts = (struct gpu_facts){
+        .software = software,
+        .robust = robust,
+        .debug_output = debug,
+        .has_program_binary = get_integer(GL_NUM_PROGRAM_BINARY_FORMATS) > 0,
+        .texture_buffer_texels_max = get_integer(GL_MAX_TEXTURE_BUFFER_SIZE),
+        .storage_block_bytes_max = get_integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE),
+        .work_groups_max = groups > 0 ? (uint32_t)groups : 65535,
+        .texture_size_max = (uint32_t)get_integer(GL_MAX_TEXTURE_SIZE),
+    };
+    if (epoxy_has_gl_extension("GL_NVX_gpu_memory_info"))
+        facts->memory_bytes = get_integer(GL_GPU_MEMORY_INFO_TOTAL_AVAILABLE_MEMORY_NVX) * 1024;
+}
+
+size_t gpu_device_list(struct gpu_device_info *list, size_t max)
+{
+    struct gpu_egl_place places[GPU_EGL_PLACES_MAX];
+    size_t place_count = gpu_egl_places(places, GPU_EGL_PLACES_MAX);
+    size_t count = 0;
+    epoxy_set_resolver_failure_handler(on_missing_function);
+    for (size_t i = 0; i < place_count && count < max; i++) {
+        struct gpu_egl egl;
+        if (!gpu_egl_open(&egl, &places[i], false, NULL))
+            continue;
+        ask_info(&list[count++], &places[i]);
+        gpu_egl_close(&egl);
+    }
+    return count;
+}
+
+/* Opens the first place that fits the options: the one that was named; else hardware before software. */
+static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const struct gpu_options *options,
+                       bool debug, struct error *error)
+{
+    struct gpu_egl_place places[GPU_EGL_PLACES_MAX];
+    size_t count = gpu_egl_places(places, GPU_EGL_PLACES_MAX);
+    struct error last = {0};
+    bool by_index = options->index >= 0 && !options->software;
+    for (int software = by_index ? 0 : options->software; software < 2; software++) {
+        for (size_t i = 0; i < count; i++) {
+            bool fits = by_index ? places[i].index == options->index : places[i].software == software;
+            /* Of Mesa's surfaceless platform it is not known before it is open; it is tried last. */
+            if (!by_index && !places[i].device)
+                fits = software == 1;
+            if (!fits)
+                continue;
+            last = (struct error){0};
+            if (gpu_egl_open(egl, &places[i], debug, &last)) {
+                *chosen = places[i];
+                return true;
+            }
+            log_write(LOG_DEBUG, "gpu", "%s", last.text);
+        }
+    }
+    if (last.kind != ERROR_NONE)
+        error_set(error, last.kind, "device", "%s", last.text);
+    else if (by_index)
+        error_set(error, ERROR_UNSUPPORTED, "device", "there is no device %d; EGL knows %zu", options->index,
+                  count);
+    else
+        error_set(error, ERROR_UNSUPPORTED, "device", "EGL knows no %sdevice",
+                  options->software ? "software " : "");
+    return error_remedy(error, "farlightd --list-devices shows what there is; Mesa's software renderer is in the "
+                               "packages libegl-mesa0 and libgl1-mesa-dri");
+}
+
+/* What every pass may count on. */
+static bool create_defaults(struct gpu_device *device, struct error *error)
+{
+    static const unsigned char zeros[EMPTY_BUFFER_BYTES];
+    unsigned vertex_array = gpu_object_create(device->registry, GPU_VERTEX_ARRAY);
+    device->empty_buffer = gpu_object_create(device->registry, GPU_BUFFER);
+    if (!vertex_array || !device->empty_buffer)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "device", "no memory for the first objects");
+    glBindVertexArray(vertex_array);
+    glNamedBufferStorage(device->empty_buffer, sizeof(zeros), zeros, 0);
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    return gpu_check(device, "gpu_device_create", error);
+}
+
+struct gpu_device *gpu_device_create(const struct gpu_options *options, struct error *error)
+{
+#ifdef FARLIGHT_DEBUG
+    bool debug = true;
+#else
+    bool debug = options->debug;
+#endif
+    struct gpu_egl_place place;
+    epoxy_set_resolver_failure_handler(on_missing_function);
+    struct gpu_device *device = calloc(1, sizeof(*device));
+    if (device)
+        device->egl = calloc(1, sizeof(*device->egl));
+    if (!device || !device->egl) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "device", "no memory for a device");
+        goto fail;
+    }
+    if (!open_place(device->egl, &place, options, debug, error))
+        goto fail;
+    current_device = device;
+    device->registry = gpu_registry_create();
+    device->programs = gpu_program_cache_create();
+    if (!device->registry || !device->programs) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "device", "no memory for a device");
+        goto fail;
+    }
+    ask_info(&device->info, &place);
+    if (options->software && !device->info.software) {
+        error_set(error, ERROR_UNSUPPORTED, "device", "there is no software device, only %s", device->info.name);
+        goto fail;
+    }
+    ask_facts(&device->facts, device->info.software, device->egl->robust, debug);
+    device->memory_limit_bytes = device->facts.memory_bytes;
+    if (debug)
+        gpu_debug_start();
+    if (!create_defaults(device, error))
+        goto fail;
+    return device;
+fail:
+    gpu_device_destroy(device);
+    return NULL;
+}
+
+void gpu_device_destroy(struct gpu_device *device)
+{
+    if (!device)
+        return;
+    if (device->registry)
+        gpu_registry_destroy_all(device->registry);
+    gpu_program_cache_destroy(device->programs);
+    gpu_registry_destroy(device->registry);
+    if (device->egl)
+        gpu_egl_close(device->egl);
+    free(device->egl);
+    if (current_device == device)
+        current_device = NULL;
+    free(device);
+}
+
+static const char *gl_error_name(GLenum code)
+{
+    switch (code) {
+    case GL_INVALID_ENUM:
+        return "GL_INVALID_ENUM";
+    case GL_INVALID_VALUE:
+        return "GL_INVALID_VALUE";
+    case GL_INVALID_OPERATION:
+        return "GL_INVALID_OPERATION";
+    case GL_INVALID_FRAMEBUFFER_OPERATION:
+        return "GL_INVALID_FRAMEBUFFER_OPERATION";
+    case GL_OUT_OF_MEMORY:
+        return "GL_OUT_OF_MEMORY";
+    default:
+        return "an unknown error";
+    }
+}
+
+bool gpu_check(struct gpu_device *device, const char *what, struct error *error)
+{
+    if (device->facts.robust && glGetGraphicsResetStatus() != GL_NO_ERROR)
+        return error_set(error, ERROR_DEVICE_LOST, NULL, "%s: the GL context was lost", what);
+    GLenum first = glGetError();
+    if (first == GL_NO_ERROR)
+        return true;
+    GLenum next = first;
+    for (int i = 1; i < GL_ERRORS_READ_MAX && next != GL_NO_ERROR; i++)
+        next = glGetError();
+    if (first == GL_CONTEXT_LOST)
+        return error_set(error, ERROR_DEVICE_LOST, NULL, "%s: the GL context was lost", what);
+    enum error_kind kind = first == GL_OUT_OF_MEMORY ? ERROR_OUT_OF_MEMORY : ERROR_INTERNAL;
+    return error_set(error, kind, NULL, "%s: %s (0x%04x)", what, gl_error_name(first), first);
+}
+
+bool gpu_memory_take(struct gpu_device *device, uint64_t size_bytes, const char *what, struct error *error)
+{
+    uint64_t limit = device->memory_limit_bytes;
+    if (limit && (device->memory_used_bytes > limit || size_bytes > limit - device->memory_used_bytes))
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "%s of %llu bytes; %llu of %llu bytes are in use", what,
+                         (unsigned long long)size_bytes, (unsigned long long)device->memory_used_bytes,
+                         (unsigned long long)limit);
+    device->memory_used_bytes += size_bytes;
+    return true;
+}
+
+void gpu_memory_give(struct gpu_device *device, uint64_t size_bytes)
+{
+    device->memory_used_bytes -= size_bytes <= device->memory_used_bytes ? size_bytes : device->memory_used_bytes;
+}

@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: MIT */
+/* EGL without a window system, and one OpenGL 4.5 core context. Everything in gpu/, trace/ and render/
+ * runs on the one thread that made the device current. */
+#ifndef FARLIGHT_GPU_DEVICE_H
+#define FARLIGHT_GPU_DEVICE_H
+
+#include "base/error.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct gpu_device_info {
+    int index;          /* what --device takes */
+    bool software;
+    char name[128];     /* GL_RENDERER */
+    char vendor[64];
+    char version[128];  /* GL_VERSION */
+    char drm_path[64];  /* "" if the driver tells none */
+};
+
+/* Facts asked once. */
+struct gpu_facts {
+    bool software;              /* llvmpipe and the like: SSBO loads are gathers, dispatches are synchronous */
+    bool robust;                /* context tells of its loss */
+    bool debug_output;
+    bool has_program_binary;
+    uint64_t texture_buffer_texels_max;
+    uint64_t storage_block_bytes_max;
+    uint32_t work_groups_max;   /* on x; more is a GL error */
+    uint32_t texture_size_max;  /* texels along an edge of a 2D texture */
+    uint64_t memory_bytes;      /* device memory, 0: the driver does not tell */
+};
+
+struct gpu_device {
+    struct gpu_device_info info;
+    struct gpu_facts facts;
+    struct gpu_egl *egl;           /* private to device.c */
+    struct gpu_registry *registry; /* every GL object that lives, see registry.h */
+    struct gpu_program_cache *programs; /* private to program.c */
+    unsigned empty_buffer;         /* 256 zero bytes: what an empty buffer is bound as */
+    uint64_t memory_used_bytes;    /* sum of buffers and textures made through gpu/ */
+    uint64_t memory_limit_bytes;   /* 0: none; facts.memory_bytes at first */
+};
+
+struct gpu_options {
+    int index;          /* of gpu_device_list; -1: first hardware, else software */
+    bool software;      /* insist on software */
+    bool debug;         /* debug context, messages to the log */
+};
+
+/* Devices that give an OpenGL 4.5 core context; each is opened for a moment to be asked its name.
+ * Returns the number, at most `max`. */
+size_t gpu_device_list(struct gpu_device_info *list, size_t max);
+/* Makes a context and makes it current on this thread, with an empty vertex array bound (a pass that pulls its
+ * vertices draws at once). NULL and *error when there is none. */
+struct gpu_device *gpu_device_create(const struct gpu_options *options, struct error *error);
+void gpu_device_destroy(struct gpu_device *device); /* accepts NULL; on the same thread */
+/* ERROR_DEVICE_LOST if the context was lost, ERROR_INTERNAL with the GL error if there is one (a bounded
+ * number is read), else true. `what` names the caller. Cheap enough for once a pass. */
+bool gpu_check(struct gpu_device *device, const char *what, struct error *error);
+
+/* The device that is current on this thread, NULL: none. */
+struct gpu_device *gpu_device_current(void);
+/* Counts memory before it is asked of the driver: ERROR_OUT_OF_MEMORY if the limit would be passed. */
+bool gpu_memory_take(struct gpu_device *device, uint64_t size_bytes, const char *what, struct error *error);
+void gpu_memory_give(struct gpu_device *device, uint64_t size_bytes);
+
+/* GL debug group for the scope of a pass; shows in driver messages and frame debuggers. */
+void gpu_push_group(struct gpu_device *device, const char *name);
+void gpu_pop_group(struct gpu_device *device);
+
+#endif

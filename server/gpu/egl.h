@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+/* EGL displays with no window system. */
+#ifndef FARLIGHT_GPU_EGL_H
+#define FARLIGHT_GPU_EGL_H
+
+#include "base/error.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#define GPU_EGL_PLACES_MAX 32
+
+/* Where a display can be had from. */
+struct gpu_egl_place {
+    int index;       /* in the order of EGL; stable while the machine's devices stay */
+    void *device;    /* EGLDeviceEXT; NULL: Mesa's surfaceless platform */
+    bool software;   /* the driver says so; of the surfaceless platform it is not known */
+    char drm_path[64];
+};
+
+struct gpu_egl {
+    void *display; /* EGLDisplay */
+    void *context; /* EGLContext */
+    bool robust;
+};
+
+size_t gpu_egl_places(struct gpu_egl_place *places, size_t max);
+/* Opens a display, makes an OpenGL 4.5 core context and makes it current. On failure nothing is left. */
+bool gpu_egl_open(struct gpu_egl *egl, const struct gpu_egl_place *place, bool debug, struct error *error);
+/* Leaves neither context nor display. */
+void gpu_egl_close(struct gpu_egl *egl);
+
+#endif

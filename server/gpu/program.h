@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: MIT */
+/* Shader programs from the sources in shaders/, which are compiled into the binary.
+ *
+ * `#include "common/math.glsl"` is resolved from the root of shaders/, each file once per program, with
+ * #line so that the driver's messages name file and line. A `#version 450 core` line and the defines are put in
+ * front. Programs are cached by (files, defines) for the life of the device, and their binaries on the disk below
+ * $XDG_CACHE_HOME/farlight (or ~/.cache/farlight) where the driver has binaries and the folder can be written.
+ *
+ * `#include NAME` takes the path from the define of that name, whose value is then a path in double quotes; such
+ * a define is not seen by GLSL. A file that is included again is skipped, so no `#include` may stand in a branch
+ * of #if that is sometimes off. */
+#ifndef FARLIGHT_GPU_PROGRAM_H
+#define FARLIGHT_GPU_PROGRAM_H
+
+#include "base/error.h"
+#include "gpu/device.h"
+
+struct gpu_define {
+    const char *name, *value;
+};
+
+struct gpu_program_source {
+    const char *compute;                       /* "render/resolve.comp"; or: */
+    const char *vertex, *geometry, *fragment;  /* geometry may be NULL; fragment NULL: depth only */
+    const struct gpu_define *defines;          /* ends with {0} ; may be NULL */
+};
+
+struct gpu_program {
+    unsigned name;         /* GL program */
+    uint32_t group_size;   /* compute: local_size_x * y * z */
+};
+
+/* The cached program, or compiles it. The device owns it. NULL and *error with the compiler's log. */
+const struct gpu_program *gpu_program_get(struct gpu_device *device, const struct gpu_program_source *source,
+                                          struct error *error);
+
+/* Uniforms by name; unknown names are ignored by GL, as optimised-out ones are. */
+void gpu_uniform_uint(const struct gpu_program *program, const char *name, uint32_t value);
+void gpu_uniform_int(const struct gpu_program *program, const char *name, int32_t value);
+void gpu_uniform_float(const struct gpu_program *program, const char *name, float value);
+void gpu_uniform_vec(const struct gpu_program *program, const char *name, unsigned components, const float *value);
+/* vec4 name[row_count] */
+void gpu_uniform_rows(const struct gpu_program *program, const char *name, const float *rows, unsigned row_count);
+
+/* Dispatches ceil(items / local size) groups on x, then glMemoryBarrier(GL_ALL_BARRIER_BITS). More than
+ * facts.work_groups_max groups are spread over y; the shader finds its item with
+ * `item_index()` of common/dispatch.glsl. */
+void gpu_dispatch(struct gpu_device *device, const struct gpu_program *program, uint64_t items);
+
+#endif

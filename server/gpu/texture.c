@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: MIT */
+#include "gpu/texture.h"
+
+#include "gpu/registry.h"
+
+#include <epoxy/gl.h>
+
+struct format_row {
+    GLenum format;
+    unsigned texel_bytes;
+    GLint filter; /* integer textures are incomplete with any other than nearest */
+};
+
+static const struct format_row format_rows[] = {
+    {GL_R8, 1, GL_LINEAR},
+    {GL_RG8, 2, GL_LINEAR},
+    {GL_RGBA8, 4, GL_LINEAR},
+    {GL_SRGB8_ALPHA8, 4, GL_LINEAR},
+    {GL_RGB10_A2, 4, GL_LINEAR},
+    {GL_R16F, 2, GL_LINEAR},
+    {GL_RG16F, 4, GL_LINEAR},
+    {GL_RGBA16F, 8, GL_LINEAR},
+    {GL_R32F, 4, GL_NEAREST},
+    {GL_RG32F, 8, GL_NEAREST},
+    {GL_RGBA32F, 16, GL_NEAREST},
+    {GL_R32UI, 4, GL_NEAREST},
+    {GL_RG32UI, 8, GL_NEAREST},
+    {GL_RGBA32UI, 16, GL_NEAREST},
+    {GL_R32I, 4, GL_NEAREST},
+    {GL_RGBA16UI, 8, GL_NEAREST},
+    {GL_RGBA8UI, 4, GL_NEAREST},
+    {GL_DEPTH_COMPONENT24, 4, GL_NEAREST},
+    {GL_DEPTH_COMPONENT32F, 4, GL_NEAREST},
+};
+
+static const struct format_row *find_format(GLenum format)
+{
+    for (size_t i = 0; i < sizeof(format_rows) / sizeof(format_rows[0]); i++)
+        if (format_rows[i].format == format)
+            return &format_rows[i];
+    return NULL;
+}
+
+bool gpu_texture_reserve(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
+                         uint32_t width, uint32_t height, struct error *error)
+{
+    if (texture->name && texture->internal_format == internal_format && texture->width == width &&
+        texture->height == height)
+        return true;
+    gpu_texture_finish(device, texture);
+    const struct format_row *row = find_format(internal_format);
+    if (!row)
+        return error_set(error, ERROR_INTERNAL, NULL, "texture format 0x%04x is not in the table",
+                         internal_format);
+    if (width == 0 || height == 0 || width > device->facts.texture_size_max ||
+        height > device->facts.texture_size_max)
+        return error_set(error, ERROR_LIMIT, NULL, "a texture of %ux%u; this device has at most %ux%u", width,
+                         height, device->facts.texture_size_max, device->facts.texture_size_max);
+    uint64_t size_bytes = (uint64_t)width * height * row->texel_bytes;
+    if (!gpu_memory_take(device, size_bytes, "a texture", error))
+        return false;
+    texture->size_bytes = size_bytes;
+    texture->name = gpu_object_create(device->registry, GPU_TEXTURE_2D);
+    if (texture->name) {
+        (void)glGetError(); /* an older error would be taken for this call's */
+        glTextureStorage2D(texture->name, 1, internal_format, (GLsizei)width, (GLsizei)height);
+    }
+    if (!texture->name || glGetError() != GL_NO_ERROR) {
+        gpu_texture_finish(device, texture);
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a texture of %ux%u", width,
+                         height);
+    }
+    glTextureParameteri(texture->name, GL_TEXTURE_MIN_FILTER, row->filter);
+    glTextureParameteri(texture->name, GL_TEXTURE_MAG_FILTER, row->filter);
+    glTextureParameteri(texture->name, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTextureParameteri(texture->name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    texture->internal_format = internal_format;
+    texture->width = width;
+    texture->height = height;
+    return true;
+}
+
+void gpu_texture_write(struct gpu_texture *texture, unsigned format, unsigned type, const void *texels)
+{
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    glTextureSubImage2D(texture->name, 0, 0, 0, (GLsizei)texture->width, (GLsizei)texture->height, format, type,
+                        texels);
+}
+
+void gpu_texture_finish(struct gpu_device *device, struct gpu_texture *texture)
+{
+    gpu_object_destroy(device->registry, GPU_TEXTURE_2D, texture->name);
+    gpu_memory_give(device, texture->size_bytes);
+    *texture = (struct gpu_texture){0};
+}
+
+void gpu_texture_bind(const struct gpu_texture *texture, unsigned unit)
+{
+    glBindTextureUnit(unit, texture->name);
+}
+
+bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
+                            const struct gpu_texture *colours, unsigned colour_count,
+                            const struct gpu_texture *depth, struct error *error)
+{
+    GLenum attachments[8];
+    if (colour_count > sizeof(attachments) / sizeof(attachments[0]))
+        return error_set(error, ERROR_INTERNAL, NULL, "a framebuffer with %u colours", colour_count);
+    framebuffer->name = gpu_object_create(device->registry, GPU_FRAMEBUFFER);
+    if (!framebuffer->name)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more framebuffer names");
+    for (unsigned i = 0; i < colour_count; i++) {
+        attachments[i] = GL_COLOR_ATTACHMENT0 + i;
+        glNamedFramebufferTexture(framebuffer->name, attachments[i], colours[i].name, 0);
+    }
+    if (depth)
+        glNamedFramebufferTexture(framebuffer->name, GL_DEPTH_ATTACHMENT, depth->name, 0);
+    glNamedFramebufferDrawBuffers(framebuffer->name, (GLsizei)colour_count, attachments);
+    GLenum status = glCheckNamedFramebufferStatus(framebuffer->name, GL_DRAW_FRAMEBUFFER);
+    if (status == GL_FRAMEBUFFER_COMPLETE)
+        return true;
+    gpu_framebuffer_finish(device, framebuffer);
+    return error_set(error, ERROR_INTERNAL, NULL, "framebuffer is not complete: 0x%04x", status);
+}
+
+void gpu_framebuffer_finish(struct gpu_device *device, struct gpu_framebuffer *framebuffer)
+{
+    gpu_object_destroy(device->registry, GPU_FRAMEBUFFER, framebuffer->name);
+    framebuffer->name = 0;
+}

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT */
+/* 2D textures and framebuffers. */
+#ifndef FARLIGHT_GPU_TEXTURE_H
+#define FARLIGHT_GPU_TEXTURE_H
+
+#include "base/error.h"
+#include "gpu/device.h"
+
+#include <stdint.h>
+
+/* All-zero is the valid empty texture. */
+struct gpu_texture {
+    unsigned name;
+    unsigned internal_format; /* GL_RGBA16F .. */
+    uint32_t width, height;
+    uint64_t size_bytes;
+};
+
+/* (Re)makes it where size or format differ. */
+bool gpu_texture_reserve(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
+                         uint32_t width, uint32_t height, struct error *error);
+void gpu_texture_write(struct gpu_texture *texture, unsigned format, unsigned type, const void *texels);
+void gpu_texture_finish(struct gpu_device *device, struct gpu_texture *texture);
+void gpu_texture_bind(const struct gpu_texture *texture, unsigned unit);
+
+struct gpu_framebuffer {
+    unsigned name;
+};
+bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
+                            const struct gpu_texture *colours, unsigned colour_count,
+                            const struct gpu_texture *depth, struct error *error);
+void gpu_framebuffer_finish(struct gpu_device *device, struct gpu_framebuffer *framebuffer);
+
+#endif

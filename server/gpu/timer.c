@@ -1,0 +1,129 @@
+/* SPDX-License-Identifier: MIT */
+#include "gpu/timer.h"
+
+#include "base/clock.h"
+#include "gpu/registry.h"
+
+#include <epoxy/gl.h>
+#include <stdlib.h>
+
+/* A frame of eight waves with four lights takes about a hundred spans. */
+#define RING_SPANS 256
+
+struct span {
+    enum stage_id stage;
+    uint32_t wave;
+    uint64_t cpu_start_ns, cpu_duration_ns;
+    unsigned queries[2]; /* begin, end; 0: the CPU alone measured it */
+};
+
+struct gpu_timer {
+    struct gpu_device *device;
+    struct span *spans; /* since the last collect */
+    size_t span_count, span_capacity;
+    unsigned queries[RING_SPANS][2];
+    bool open;
+};
+
+struct gpu_timer *gpu_timer_create(struct gpu_device *device)
+{
+    struct gpu_timer *timer = calloc(1, sizeof(*timer));
+    if (!timer)
+        return NULL;
+    timer->device = device;
+    for (size_t i = 0; i < RING_SPANS; i++)
+        for (size_t end = 0; end < 2; end++)
+            timer->queries[i][end] = gpu_object_create(device->registry, GPU_TIMESTAMP_QUERY);
+    return timer;
+}
+
+void gpu_timer_destroy(struct gpu_timer *timer)
+{
+    if (!timer)
+        return;
+    for (size_t i = 0; i < RING_SPANS; i++)
+        for (size_t end = 0; end < 2; end++)
+            gpu_object_destroy(timer->device->registry, GPU_TIMESTAMP_QUERY, timer->queries[i][end]);
+    free(timer->spans);
+    free(timer);
+}
+
+static struct span *add_span(struct gpu_timer *timer)
+{
+    if (timer->span_count == timer->span_capacity) {
+        size_t capacity = timer->span_capacity ? timer->span_capacity * 2 : 64;
+        struct span *spans = realloc(timer->spans, capacity * sizeof(*spans));
+        if (!spans)
+            return NULL;
+        timer->spans = spans;
+        timer->span_capacity = capacity;
+    }
+    struct span *span = &timer->spans[timer->span_count];
+    *span = (struct span){0};
+    if (timer->span_count < RING_SPANS && timer->queries[timer->span_count][1]) {
+        span->queries[0] = timer->queries[timer->span_count][0];
+        span->queries[1] = timer->queries[timer->span_count][1];
+    }
+    timer->span_count++;
+    return span;
+}
+
+void gpu_timer_begin(struct gpu_timer *timer, enum stage_id stage, uint32_t wave)
+{
+    if (timer->open)
+        gpu_timer_end(timer);
+    struct span *span = add_span(timer);
+    if (!span)
+        return;
+    timer->open = true;
+    span->stage = stage;
+    span->wave = wave;
+    span->cpu_start_ns = clock_now_ns();
+    if (span->queries[0])
+        glQueryCounter(span->queries[0], GL_TIMESTAMP);
+}
+
+void gpu_timer_end(struct gpu_timer *timer)
+{
+    if (!timer->open)
+        return;
+    timer->open = false;
+    struct span *span = &timer->spans[timer->span_count - 1];
+    if (span->queries[1])
+        glQueryCounter(span->queries[1], GL_TIMESTAMP);
+    span->cpu_duration_ns = clock_now_ns() - span->cpu_start_ns;
+}
+
+/* False: the query has no result, as after the loss of the context. */
+static bool query_time(unsigned query, uint64_t *time_ns)
+{
+    GLint available = 0;
+    GLuint64 value = 0;
+    glGetQueryObjectiv(query, GL_QUERY_RESULT_AVAILABLE, &available);
+    if (!available)
+        return false;
+    glGetQueryObjectui64v(query, GL_QUERY_RESULT, &value);
+    *time_ns = value;
+    return value != 0;
+}
+
+void gpu_timer_collect(struct gpu_timer *timer, struct stage_times *times)
+{
+    if (timer->open)
+        gpu_timer_end(timer);
+    glFinish();
+    /* What the GPU's clock shows now, so that its times can be told in ours. */
+    GLint64 gpu_now_ns = 0;
+    glGetInteger64v(GL_TIMESTAMP, &gpu_now_ns);
+    uint64_t cpu_from_gpu_ns = clock_now_ns() - (uint64_t)gpu_now_ns; /* wraps, and wraps back */
+    for (size_t i = 0; i < timer->span_count; i++) {
+        const struct span *span = &timer->spans[i];
+        uint64_t begin_ns, end_ns;
+        stage_times_add(times, span->stage, STAGE_CPU, span->wave, span->cpu_start_ns, span->cpu_duration_ns);
+        if (span->queries[1] && query_time(span->queries[0], &begin_ns) && query_time(span->queries[1], &end_ns) &&
+            end_ns >= begin_ns)
+            stage_times_add(times, span->stage, STAGE_GPU, span->wave, begin_ns + cpu_from_gpu_ns,
+                            end_ns - begin_ns);
+    }
+    timer->span_count = 0;
+}

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: MIT */
+/* GPU time of the passes of a frame: pairs of timestamp queries, read once at the end of the frame. */
+#ifndef FARLIGHT_GPU_TIMER_H
+#define FARLIGHT_GPU_TIMER_H
+
+#include "base/stage_times.h"
+#include "gpu/device.h"
+
+struct gpu_timer;
+
+struct gpu_timer *gpu_timer_create(struct gpu_device *device); /* NULL: out of memory */
+void gpu_timer_destroy(struct gpu_timer *timer);               /* accepts NULL */
+/* Spans may not nest. Those beyond the ring's size are measured on the CPU alone. Each span is also
+ * measured with the CPU clock, and both reach the stage times. */
+void gpu_timer_begin(struct gpu_timer *timer, enum stage_id stage, uint32_t wave);
+void gpu_timer_end(struct gpu_timer *timer);
+/* Waits for the GPU, adds every span since the last collect to `times` (may be NULL). A query without a
+ * result is left out, never reported as 0. */
+void gpu_timer_collect(struct gpu_timer *timer, struct stage_times *times);
+
+#endif
