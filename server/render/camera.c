@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: MIT */
+#include "render/camera.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Reversed floating-point depth keeps its precision however small the near distance is, so this only has to be
+ * small enough never to cut anything: a share of the scene's diagonal. */
+#define NEAR_OF_DIAGONAL 1e-5f
+#define AUTO_FOV_Y 0.7f   /* radians; about 40 degrees, a portrait lens */
+#define AUTO_MARGIN 1.06f /* of the distance at which the bounds touch the picture's edge */
+
+static double dot3(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross3(double out[3], const double a[3], const double b[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static bool normalise3(double v[3])
+{
+    double length = sqrt(dot3(v, v));
+    if (!(length > 1e-30) || !isfinite(length))
+        return false;
+    for (int i = 0; i < 3; i++)
+        v[i] /= length;
+    return true;
+}
+
+bool frame_camera_look_at(struct frame_camera *camera, const float eye[3], const float look_at[3],
+                          const float up[3], float fov_y)
+{
+    double back[3], right[3], above[3], up_unit[3];
+    for (int i = 0; i < 3; i++) {
+        back[i] = (double)eye[i] - (double)look_at[i];
+        up_unit[i] = (double)up[i];
+    }
+    if (!normalise3(back) || !normalise3(up_unit))
+        return false;
+    cross3(right, up_unit, back);
+    if (dot3(right, right) < 1e-12 || !normalise3(right)) /* up points along the view */
+        return false;
+    cross3(above, back, right);
+    *camera = (struct frame_camera){.fov_y = fov_y};
+    for (int row = 0; row < 3; row++) {
+        camera->world_from_view[row * 4 + 0] = (float)right[row];
+        camera->world_from_view[row * 4 + 1] = (float)above[row];
+        camera->world_from_view[row * 4 + 2] = (float)back[row];
+        camera->world_from_view[row * 4 + 3] = eye[row];
+    }
+    return true;
+}
+
+void frame_camera_auto(struct frame_camera *camera, const float lower[3], const float upper[3], float aspect)
+{
+    double back[3] = {0.45, 0.35, 1.0}, right[3], above[3], centre[3], half[3];
+    const double up[3] = {0.0, 1.0, 0.0};
+    normalise3(back);
+    cross3(right, up, back);
+    normalise3(right);
+    cross3(above, back, right);
+    double tan_y = tan((double)AUTO_FOV_Y / 2.0), tan_x = tan_y * (double)aspect, distance = 0.0;
+    for (int i = 0; i < 3; i++) {
+        centre[i] = ((double)lower[i] + (double)upper[i]) / 2.0;
+        half[i] = ((double)upper[i] - (double)lower[i]) / 2.0;
+    }
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3];
+        for (int i = 0; i < 3; i++)
+            p[i] = (corner >> i & 1) ? half[i] : -half[i];
+        double towards = dot3(p, back);
+        distance = fmax(distance, towards + fabs(dot3(p, right)) / tan_x);
+        distance = fmax(distance, towards + fabs(dot3(p, above)) / tan_y);
+    }
+    distance = distance > 0.0 && isfinite(distance) ? distance * (double)AUTO_MARGIN : 1.0;
+    float eye[3], look_at[3];
+    const float up_world[3] = {0.0f, 1.0f, 0.0f};
+    for (int i = 0; i < 3; i++) {
+        look_at[i] = (float)centre[i];
+        eye[i] = (float)(centre[i] + back[i] * distance);
+    }
+    if (!frame_camera_look_at(camera, eye, look_at, up_world, AUTO_FOV_Y)) { /* bounds at the end of the floats */
+        *camera = (struct frame_camera){.fov_y = AUTO_FOV_Y};
+        camera->world_from_view[0] = camera->world_from_view[5] = camera->world_from_view[10] = 1.0f;
+    }
+}
+
+static float distance_along_view(const struct frame_camera *camera, const float point[3])
+{
+    const float *m = camera->world_from_view;
+    return -((point[0] - m[3]) * m[2] + (point[1] - m[7]) * m[6] + (point[2] - m[11]) * m[10]);
+}
+
+/* Farther along the view than anything in the scene. */
+static float far_distance(const struct frame_camera *camera, const struct scene_gpu *scene, float near)
+{
+    float far = near + 1.0f;
+    for (int corner = 0; corner < 8 && scene->instance_count > 0; corner++) {
+        float point[3];
+        for (int i = 0; i < 3; i++)
+            point[i] = (corner >> i & 1) ? scene->upper_world[i] : scene->lower_world[i];
+        far = fmaxf(far, distance_along_view(camera, point));
+    }
+    for (uint32_t i = 0; i < scene->disc_count; i++) {
+        const struct disc *disc = &scene->discs[i];
+        far = fmaxf(far, distance_along_view(camera, disc->centre_radius) + disc->centre_radius[3]);
+    }
+    return far * 1.001f;
+}
+
+void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_request *request,
+                          const struct scene_gpu *scene)
+{
+    const struct frame_camera *camera = &request->camera;
+    bool orthographic = camera->fov_y == 0.0f;
+    float aspect = (float)request->width / (float)request->height;
+    float half_height = orthographic ? camera->ortho_height / 2.0f : tanf(camera->fov_y / 2.0f);
+    float near = camera->near;
+    if (near <= 0.0f)
+        near = orthographic ? 0.0f
+                            : fmaxf(scene->diagonal > 0.0f ? scene->diagonal * NEAR_OF_DIAGONAL : 1e-4f, 1e-6f);
+    memcpy(uniforms->world_from_view, camera->world_from_view, sizeof(camera->world_from_view));
+    uniforms->extent_near[0] = half_height * aspect;
+    uniforms->extent_near[1] = half_height;
+    uniforms->extent_near[2] = near;
+    uniforms->extent_near[3] = orthographic ? 1.0f : 0.0f;
+    uniforms->jitter_pixel[2] = far_distance(camera, scene, near);
+    uniforms->width = request->width;
+    uniforms->height = request->height;
+    uniforms->tiles_across = (request->width + 7) / 8;
+}
+
+/* The R2 lattice (see shaders/common/rng.glsl) in 32-bit fixed point, shifted by the seed. */
+void camera_jitter(float jitter_pixel[2], uint64_t seed, uint32_t index, uint32_t samples)
+{
+    jitter_pixel[0] = jitter_pixel[1] = 0.5f;
+    if (samples <= 1)
+        return;
+    uint64_t shift = (seed + 1) * 0x9e3779b97f4a7c15u;
+    uint32_t x = (uint32_t)(shift >> 32) + index * 3242174889u;
+    uint32_t y = (uint32_t)shift + index * 2447445413u;
+    jitter_pixel[0] = (float)(x >> 8) * 0x1p-24f;
+    jitter_pixel[1] = (float)(y >> 8) * 0x1p-24f;
+}

@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: MIT */
+#include "render/context.h"
+
+#include "shared/hit.h"
+#include "shared/path.h"
+#include "shared/ray.h"
+#include "shared/wave.h"
+
+#include <epoxy/gl.h>
+
+/* A little below what the timer's ring holds: spans beyond it would lose their GPU time. */
+#define SPANS_MAX 240
+
+void context_span_begin(struct render_context *context, enum stage_id stage)
+{
+    gpu_timer_begin(context->timer, stage, context->wave_number);
+    context->span_count++;
+}
+
+void context_span_end(struct render_context *context)
+{
+    gpu_timer_end(context->timer);
+    if (context->span_count >= SPANS_MAX)
+        context_collect(context);
+}
+
+/* A frame of many slices and samples has more spans than a record holds; what is of one stage, clock and wave
+ * becomes one, which begins where the first of them did. */
+static void add_span(struct stage_times *times, uint64_t origin_ns, const struct stage_span *span)
+{
+    for (uint32_t i = 0; i < times->count; i++) {
+        struct stage_span *own = &times->spans[i];
+        if (own->stage == span->stage && own->clock == span->clock && own->wave == span->wave) {
+            own->duration_ns += span->duration_ns;
+            return;
+        }
+    }
+    stage_times_add(times, span->stage, span->clock, span->wave, origin_ns + span->start_ns, span->duration_ns);
+}
+
+void context_collect(struct render_context *context)
+{
+    struct stage_times *spans = &context->collected;
+    spans->origin_ns = context->times.origin_ns;
+    spans->count = 0;
+    gpu_timer_collect(context->timer, spans);
+    for (uint32_t i = 0; i < spans->count; i++)
+        add_span(&context->times, spans->origin_ns, &spans->spans[i]);
+    context->span_count = 0;
+}
+
+const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error)
+{
+    const struct gpu_program *program =
+        gpu_program_get(context->device, &(struct gpu_program_source){.compute = compute}, error);
+    if (program)
+        glUseProgram(program->name);
+    return program;
+}
+
+void context_bind(struct render_context *context)
+{
+    scene_gpu_bind(context->scene);
+    environment_bind(&context->environment);
+    gpu_buffer_bind_uniform(&context->uniform_buffer, UNIFORM_FRAME);
+}
+
+bool context_upload_uniforms(struct render_context *context, struct error *error)
+{
+    return gpu_buffer_upload(context->device, &context->uniform_buffer, &context->uniforms,
+                             sizeof(context->uniforms), error);
+}
+
+bool context_reserve(struct render_context *context, uint32_t slice_slots, struct error *error)
+{
+    struct gpu_device *device = context->device;
+    size_t capacity = context->wave_capacity;
+    size_t blocks = (capacity + COMPACT_BLOCK - 1) / COMPACT_BLOCK;
+    return gpu_buffer_reserve(device, &context->rays, capacity * sizeof(struct ray), error) &&
+           gpu_buffer_reserve(device, &context->paths, capacity * sizeof(struct path), error) &&
+           gpu_buffer_reserve(device, &context->hits, capacity * sizeof(struct hit), error) &&
+           gpu_buffer_reserve(device, &context->hit_list, capacity * sizeof(uint), error) &&
+           gpu_buffer_reserve(device, &context->hit_places, capacity * sizeof(uint), error) &&
+           gpu_buffer_reserve(device, &context->block_offsets, blocks * 2 * sizeof(uint), error) &&
+           gpu_buffer_reserve(device, &context->wave_state, sizeof(struct wave_state), error) &&
+           gpu_buffer_reserve(device, &context->slice_pixels, slice_slots * sizeof(vec4), error);
+}
+
+uint64_t context_device_bytes(const struct render_context *context)
+{
+    return context->rays.capacity_bytes + context->paths.capacity_bytes + context->hits.capacity_bytes +
+           context->hit_list.capacity_bytes + context->hit_places.capacity_bytes +
+           context->block_offsets.capacity_bytes + context->wave_state.capacity_bytes +
+           context->slice_pixels.capacity_bytes;
+}
+
+void context_finish(struct render_context *context)
+{
+    struct gpu_device *device = context->device;
+    gpu_buffer_finish(device, &context->rays);
+    gpu_buffer_finish(device, &context->paths);
+    gpu_buffer_finish(device, &context->hits);
+    gpu_buffer_finish(device, &context->hit_list);
+    gpu_buffer_finish(device, &context->hit_places);
+    gpu_buffer_finish(device, &context->block_offsets);
+    gpu_buffer_finish(device, &context->wave_state);
+    gpu_buffer_finish(device, &context->slice_pixels);
+    gpu_buffer_finish(device, &context->uniform_buffer);
+    environment_finish(&context->environment, device);
+}

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: MIT */
+/* What the passes of one frame share, and the buffers of the wave in hand. */
+#ifndef FARLIGHT_RENDER_CONTEXT_H
+#define FARLIGHT_RENDER_CONTEXT_H
+
+#include "gpu/buffer.h"
+#include "gpu/program.h"
+#include "gpu/timer.h"
+#include "render/environment.h"
+#include "render/features.h"
+#include "render/frame.h"
+#include "shared/frame.h"
+#include "trace/scene_gpu.h"
+#include "trace/tracer.h"
+
+/* Some pixels of one sample: slots of shared/frame.h's order, all in one band. */
+struct slice {
+    uint32_t first_slot, slot_count;
+};
+
+struct render_context {
+    struct gpu_device *device;
+    struct scene_gpu *scene;
+    struct tracer *tracer;
+    struct gpu_timer *timer;
+    struct frame_request request;
+    struct stage_times times;
+    struct stage_times collected; /* only inside context_collect */
+    struct environment environment;
+    struct scene_features features;
+    struct frame_uniforms uniforms;
+    struct gpu_buffer uniform_buffer;
+    uint32_t wave_capacity; /* rays that the buffers below hold */
+    /* The wave in hand: ray, path and, once traced, hit of each. */
+    struct gpu_buffer rays, paths, hits;
+    struct slice slice; /* in hand */
+    uint32_t ray_count, wave_number;
+    struct gpu_buffer hit_list, hit_places; /* of those paths that hit something, see compact.h */
+    uint32_t hit_count;
+    struct gpu_buffer block_offsets, wave_state; /* of the compaction */
+    struct gpu_buffer slice_pixels;              /* vec4 a pixel of the slice: radiance so far, coverage */
+    uint64_t shadow_rays, secondary_rays;        /* of the slice in hand */
+    uint32_t span_count;                         /* since the timer was collected */
+};
+
+/* Spans of this frame; the ring is emptied before it is full. */
+void context_span_begin(struct render_context *context, enum stage_id stage);
+void context_span_end(struct render_context *context);
+void context_collect(struct render_context *context);
+/* A compute program of shaders/render with no defines, in use. */
+const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error);
+/* The scene, the lights and the frame's uniforms at their places. */
+void context_bind(struct render_context *context);
+bool context_upload_uniforms(struct render_context *context, struct error *error);
+uint64_t context_device_bytes(const struct render_context *context);
+bool context_reserve(struct render_context *context, uint32_t slice_slots, struct error *error);
+void context_finish(struct render_context *context);
+
+#endif

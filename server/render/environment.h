@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: MIT */
+/* The light from infinitely far away, and the light of a scene that has none.
+ *
+ * A diffuse surface sees the environment as irradiance: order-2 spherical harmonics (Ramamoorthi and Hanrahan
+ * 2001), integrated on the CPU when the environment changes. A scene without a light and with a black
+ * environment is lit by the default of shared/sky.h. */
+#ifndef FARLIGHT_RENDER_ENVIRONMENT_H
+#define FARLIGHT_RENDER_ENVIRONMENT_H
+
+#include "gpu/buffer.h"
+#include "shared/frame.h"
+#include "shared/light.h"
+#include "trace/scene_gpu.h"
+
+struct environment {
+    bool known;             /* the rest is of `revision` */
+    uint64_t revision;      /* of the scene's environment */
+    uint32_t kind;          /* ENVIRONMENT_* */
+    float irradiance[9][3]; /* of the environment itself; the colour that multiplies an image included */
+    bool default_light;
+    struct gpu_buffer default_lights; /* one struct light */
+};
+
+bool environment_update(struct environment *environment, struct gpu_device *device, const struct scene *scene,
+                        const struct scene_gpu *gpu, struct error *error);
+void environment_fill_uniforms(const struct environment *environment, struct frame_uniforms *uniforms,
+                               const struct scene_gpu *gpu);
+/* Binds the default light where the scene has none; after scene_gpu_bind. */
+void environment_bind(const struct environment *environment);
+void environment_finish(struct environment *environment, struct gpu_device *device);
+
+#endif

@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: MIT */
+/* What a scene makes use of. Software GL runs both sides of every branch of a shader, so what is not there is left
+ * out by defines when the shader is compiled. */
+#ifndef FARLIGHT_RENDER_FEATURES_H
+#define FARLIGHT_RENDER_FEATURES_H
+
+#include "scene/scene.h"
+
+#include <stdbool.h>
+
+struct scene_features {
+    bool textures;    /* some material has a texture */
+    bool bump;        /* one of them is a bump map */
+    bool area_lights; /* some light is a rectangle or a sphere */
+};
+
+struct scene_features scene_features_of(const struct scene *scene);
+
+#endif

@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: MIT */
+/* One frame, in order: update, primary, waves, resolve, readback. */
+#ifndef FARLIGHT_RENDER_FRAME_H
+#define FARLIGHT_RENDER_FRAME_H
+
+#include "base/error.h"
+#include "base/stage_times.h"
+#include "gpu/device.h"
+#include "scene/scene.h"
+#include "trace/tracer.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum frame_format { FRAME_RGBA8, FRAME_RGBA16F, FRAME_RGBA32F }; /* protocol's numbers, here to FRAME_RASTER */
+enum frame_tone_map { TONE_NEUTRAL, TONE_ACES, TONE_NONE };
+enum frame_primary { PRIMARY_RASTER, PRIMARY_TRACE };
+enum frame_integrator { INTEGRATOR_WHITTED };
+
+struct frame_camera {
+    float world_from_view[12]; /* rigid; looks along -z, y up */
+    float fov_y;               /* radians, of the whole picture's height; 0: orthographic */
+    float ortho_height;
+    float near; /* metres; 0: chosen from the scene */
+};
+
+struct frame_request {
+    uint32_t width, height;
+    uint32_t samples, depth;
+    uint64_t seed;
+    struct frame_camera camera;
+    unsigned tracer; /* protocol's number */
+    struct tracer_options tracer_options;
+    enum frame_integrator integrator;
+    enum frame_primary primary;
+    enum frame_tone_map tone_map;
+    enum frame_format format;
+    float exposure_stops;
+};
+
+struct frame_result {
+    uint8_t *pixels; /* owned; free() */
+    size_t size_bytes;
+    uint32_t width, height;
+    enum frame_format format;
+    uint64_t revision;
+    uint64_t primary_rays, shadow_rays, secondary_rays, splits;
+    uint64_t uploaded_bytes, structure_bytes;
+    struct stage_times times;
+};
+void frame_result_finish(struct frame_result *result);
+
+/* What a scene keeps on the device between frames: its copy, and each tracer that was asked for. */
+struct frame_renderer;
+
+struct frame_renderer *frame_renderer_create(struct gpu_device *device, struct error *error);
+void frame_renderer_destroy(struct frame_renderer *renderer); /* accepts NULL */
+
+/* A frame in slices, so that others get their turn and a cancel is served: begin, then step until it is done
+ * (or abandon). Between the two the scene must not be edited. A step takes a few milliseconds where the
+ * device allows. `result` is filled by the last step. */
+bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct frame_request *request,
+                 struct error *error);
+enum frame_progress { FRAME_FAILED, FRAME_MORE, FRAME_DONE };
+enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_result *result, struct error *error);
+void frame_abandon(struct frame_renderer *renderer);
+
+uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer);
+/* How many pixels a slice has and how many rays a wave may have; 0: chosen for the device. A wave that becomes
+ * larger than that splits its slice, which costs time and never changes the picture. From the next frame on. */
+void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice_pixels, uint32_t wave_rays);
+
+/* A camera that sees all of the bounds, from the front right above, as `--camera auto` does. */
+void frame_camera_auto(struct frame_camera *camera, const float lower[3], const float upper[3], float aspect);
+/* From eye, target and up; false if they do not span a view. */
+bool frame_camera_look_at(struct frame_camera *camera, const float eye[3], const float look_at[3],
+                          const float up[3], float fov_y);
+
+#endif

@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: MIT */
+#include "render/picture.h"
+
+#include "shared/path.h"
+
+#include <stdlib.h>
+
+/* Slots of a band: 64 MiB of sums, half of what software GL takes as one storage block. */
+#define BAND_SLOTS_MAX (1u << 22)
+
+static void free_bands(struct picture *picture, struct gpu_device *device)
+{
+    for (uint32_t i = 0; i < picture->band_count; i++)
+        gpu_buffer_finish(device, &picture->bands[i]);
+    free(picture->bands);
+    picture->bands = NULL;
+    picture->band_count = 0;
+}
+
+uint32_t picture_band_first_row(const struct picture *picture, uint32_t band)
+{
+    return band * picture->band_rows;
+}
+
+uint32_t picture_band_row_count(const struct picture *picture, uint32_t band)
+{
+    uint32_t first = picture_band_first_row(picture, band), left = picture->height - first;
+    return left < picture->band_rows ? left : picture->band_rows;
+}
+
+static uint32_t band_slots(const struct picture *picture)
+{
+    return picture->tiles_across * 8 * picture->band_rows;
+}
+
+uint32_t picture_slot_count(const struct picture *picture)
+{
+    return picture->tiles_across * ((picture->height + 7) / 8) * 64;
+}
+
+uint32_t picture_band_end(const struct picture *picture, uint32_t slot)
+{
+    uint64_t end = (uint64_t)(slot / band_slots(picture) + 1) * band_slots(picture);
+    uint32_t all = picture_slot_count(picture);
+    return end < all ? (uint32_t)end : all;
+}
+
+static bool make_bands(struct picture *picture, struct gpu_device *device, struct error *error)
+{
+    uint32_t row_slots = picture->tiles_across * 8;
+    picture->band_rows = BAND_SLOTS_MAX / row_slots & ~7u;
+    if (picture->band_rows == 0)
+        picture->band_rows = 8;
+    uint32_t padded_rows = (picture->height + 7) & ~7u;
+    if (picture->band_rows > padded_rows)
+        picture->band_rows = padded_rows;
+    uint32_t count = (padded_rows + picture->band_rows - 1) / picture->band_rows;
+    picture->bands = calloc(count, sizeof(*picture->bands));
+    if (!picture->bands)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the picture");
+    picture->band_count = count;
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t rows = (picture_band_row_count(picture, i) + 7) & ~7u;
+        if (!gpu_buffer_reserve(device, &picture->bands[i], (size_t)rows * row_slots * sizeof(vec4), error))
+            return false;
+    }
+    return true;
+}
+
+bool picture_begin(struct picture *picture, struct render_context *context, struct error *error)
+{
+    const struct frame_request *request = &context->request;
+    picture_drop_pixels(picture);
+    if (!picture->bands || picture->width != request->width || picture->height != request->height) {
+        free_bands(picture, context->device);
+        picture->width = request->width;
+        picture->height = request->height;
+        picture->tiles_across = (request->width + 7) / 8;
+        if (!make_bands(picture, context->device, error)) {
+            free_bands(picture, context->device);
+            return false;
+        }
+    }
+    for (uint32_t i = 0; i < picture->band_count; i++)
+        gpu_buffer_clear(context->device, &picture->bands[i], 0);
+    return true;
+}
+
+bool picture_accumulate(struct picture *picture, struct render_context *context, struct error *error)
+{
+    const struct gpu_program *program = context_use(context, "render/accumulate.comp", error);
+    if (!program)
+        return false;
+    uint32_t band = context->slice.first_slot / band_slots(picture);
+    gpu_buffer_bind_storage(&picture->bands[band], BIND_ACCUMULATION);
+    gpu_buffer_bind_storage(&context->slice_pixels, BIND_SLICE_PIXELS);
+    gpu_uniform_uint(program, "first_slot", context->slice.first_slot - band * band_slots(picture));
+    gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
+    context_span_begin(context, STAGE_SHADE);
+    gpu_dispatch(context->device, program, context->slice.slot_count);
+    context_span_end(context);
+    return true;
+}
+
+void picture_drop_pixels(struct picture *picture)
+{
+    free(picture->pixels);
+    picture->pixels = NULL;
+    picture->size_bytes = 0;
+}
+
+void picture_finish(struct picture *picture, struct gpu_device *device)
+{
+    picture_drop_pixels(picture);
+    free_bands(picture, device);
+    gpu_buffer_finish(device, &picture->resolved);
+    *picture = (struct picture){0};
+}

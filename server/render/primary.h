@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: MIT */
+/* What the eye sees first: rays of a slice's pixels and, where they are rasterised, their hits. */
+#ifndef FARLIGHT_RENDER_PRIMARY_H
+#define FARLIGHT_RENDER_PRIMARY_H
+
+#include "gpu/texture.h"
+#include "render/context.h"
+
+/* The visibility buffer: which primitive of which instance each pixel of one sample sees. */
+struct primary {
+    struct gpu_texture visible; /* RG32UI: instance + 1 (0: nothing), primitive; row 0 is the uppermost */
+    struct gpu_texture depth;   /* reversed, 32-bit float */
+    struct gpu_framebuffer framebuffer;
+};
+
+/* Makes the buffer fit the request's size. */
+bool primary_reserve(struct primary *primary, struct render_context *context, struct error *error);
+/* Draws the whole picture for the sample that the uniforms describe. */
+bool primary_rasterise(struct primary *primary, struct render_context *context, struct error *error);
+/* Rays, paths and black pixels of context->slice; also its hits, from the visibility buffer, or, where `primary`
+ * is NULL, from the tracer. */
+bool primary_slice(const struct primary *primary, struct render_context *context, struct error *error);
+void primary_finish(struct primary *primary, struct gpu_device *device);
+
+#endif

@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: MIT */
+/* From the sum of samples to pixels: mean, exposure and, for 8 bits, tone map and sRGB. */
+#include "render/picture.h"
+
+#include "shared/path.h"
+
+#include <math.h>
+
+size_t picture_pixel_bytes(enum frame_format format)
+{
+    switch (format) {
+    case FRAME_RGBA8:
+        return 4;
+    case FRAME_RGBA16F:
+        return 8;
+    case FRAME_RGBA32F:
+        return 16;
+    }
+    return 0;
+}
+
+bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t band,
+                          struct error *error)
+{
+    const struct frame_request *request = &context->request;
+    uint32_t pixel_count = picture_band_row_count(picture, band) * picture->width;
+    if (!gpu_buffer_reserve(context->device, &picture->resolved,
+                            pixel_count * picture_pixel_bytes(request->format), error))
+        return false;
+    context_span_begin(context, STAGE_RESOLVE);
+    context_bind(context);
+    const struct gpu_program *program = context_use(context, "render/resolve.comp", error);
+    if (program) {
+        float coverage_scale = 1.0f / (float)request->samples;
+        gpu_buffer_bind_storage(&picture->bands[band], BIND_ACCUMULATION);
+        gpu_buffer_bind_storage(&picture->resolved, BIND_RESOLVED);
+        gpu_uniform_uint(program, "pixel_count", pixel_count);
+        gpu_uniform_uint(program, "format_number", request->format);
+        gpu_uniform_uint(program, "tone_map_kind", request->tone_map);
+        gpu_uniform_float(program, "scale", exp2f(request->exposure_stops) * coverage_scale);
+        gpu_uniform_float(program, "coverage_scale", coverage_scale);
+        gpu_dispatch(context->device, program, pixel_count);
+    }
+    context_span_end(context);
+    return program && gpu_check(context->device, "resolving", error);
+}

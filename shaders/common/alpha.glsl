@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// Surfaces that are not all there: what a tracer asks about a candidate before it counts.
+// Compiled to constants where the scene has no such material (HAS_CUTOUT, HAS_TRANSLUCENT not defined).
+#include "common/surface.glsl"
+
+uint material_index_of(candidate found)
+{
+    if (found.instance_index == HIT_NO_PRIMITIVE)
+        return discs[found.primitive].material;
+#ifdef HAS_SPHERES
+    if (geometries[instances[found.instance_index].geometry].kind == GEOMETRY_SPHERES)
+        return texelFetch(sphere_materials, int(found.primitive)).x;
+#endif
+    return texelFetch(triangles, int(found.primitive)).w & HIT_MATERIAL_MASK;
+}
+
+// What alpha and tint depend on, of any kind of primitive.
+struct surface_point {
+    vec4 uv01;
+    vec4 colour;
+};
+
+surface_point point_of(candidate found, vec3 origin_world, vec3 direction_world)
+{
+    if (found.instance_index == HIT_NO_PRIMITIVE)
+        return surface_point(disc_texcoords(discs[found.primitive],
+                                            origin_world + found.distance * direction_world),
+                             vec4(1.0));
+    instance i = instances[found.instance_index];
+#ifdef HAS_SPHERES
+    if (geometries[i.geometry].kind == GEOMETRY_SPHERES) {
+        vec4 sphere = texelFetch(spheres, int(found.primitive));
+        vec3 position_object = affine_point(i.object_from_world, origin_world) +
+                               found.distance * affine_vector(i.object_from_world, direction_world);
+        return surface_point(sphere_texcoords(normalize(position_object - sphere.xyz)), vec4(1.0));
+    }
+#endif
+    uint flags = geometries[i.geometry].flags;
+    uvec4 triangle = texelFetch(triangles, int(found.primitive));
+    vec3 weights = triangle_weights(found.barycentrics);
+    return surface_point(triangle_texcoords(triangle, flags, weights), triangle_colour(triangle, flags, weights));
+}
+
+vec4 base_colour_at(material m, surface_point point)
+{
+    vec4 colour = m.base_colour * point.colour;
+    if (m.texture_base_colour != 0u)
+        colour *= sample_slot(m.texture_base_colour, point.uv01, 0.0);
+    return colour;
+}
+
+// Alpha mode mask: is the surface cut away here?
+bool is_cut_out(candidate found, vec3 origin_world, vec3 direction_world)
+{
+#ifdef HAS_CUTOUT
+    material m = materials[material_index_of(found)];
+    if ((m.flags & MATERIAL_ALPHA_MASK) == 0u)
+        return false;
+    return base_colour_at(m, point_of(found, origin_world, direction_world)).a < m.alpha_cutoff;
+#else
+    return false;
+#endif
+}
+
+// What of a shadow ray's light passes the surface: 0 where it is opaque, 1 where it is cut away; the base
+// colour tints what is transmitted, and what alpha blending leaves open passes as it is.
+vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world)
+{
+#if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
+    material m = materials[material_index_of(found)];
+    bool is_mask = (m.flags & MATERIAL_ALPHA_MASK) != 0u;
+    bool is_blend = (m.flags & MATERIAL_ALPHA_BLEND) != 0u;
+    if (!is_mask && !is_blend && m.transmission == 0.0)
+        return vec3(0.0);
+    surface_point point = point_of(found, origin_world, direction_world);
+    vec4 colour = base_colour_at(m, point);
+    if (is_mask && colour.a < m.alpha_cutoff)
+        return vec3(1.0);
+    float transmission = m.transmission * (1.0 - m.metallic);
+    if (transmission > 0.0 && m.texture_transmission != 0u)
+        transmission *= sample_slot(m.texture_transmission, point.uv01, 0.0).r;
+    vec3 through = transmission * clamp(colour.rgb, 0.0, 1.0);
+    return is_blend ? mix(vec3(1.0), through, clamp(colour.a, 0.0, 1.0)) : through;
+#else
+    return vec3(0.0);
+#endif
+}

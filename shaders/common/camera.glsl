@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// The frame's camera and the order of its pixels (shared/frame.h).
+
+#include "shared/frame.h"
+
+layout(std140, binding = UNIFORM_FRAME) uniform frame_block
+{
+    frame_uniforms frame;
+};
+
+// Pixel of a slot: x to the right, y down. May lie outside the picture at its right and lower edges.
+uvec2 pixel_of_slot(uint slot)
+{
+    uint tile = slot >> 6, m = slot & 63u;
+    uvec2 in_tile = uvec2((m & 1u) | (m >> 1 & 2u) | (m >> 2 & 4u), (m >> 1 & 1u) | (m >> 2 & 2u) | (m >> 3 & 4u));
+    return uvec2(tile % frame.tiles_across, tile / frame.tiles_across) * 8u + in_tile;
+}
+
+uint slot_of_pixel(uvec2 pixel)
+{
+    uvec2 tile = pixel >> 3, p = pixel & 7u;
+    uint m = (p.x & 1u) | (p.y & 1u) << 1 | (p.x & 2u) << 1 | (p.y & 2u) << 2 | (p.x & 4u) << 2 | (p.y & 4u) << 3;
+    return (tile.y * frame.tiles_across + tile.x) << 6 | m;
+}
+
+vec3 world_from_view_vector(vec3 v)
+{
+    return vec3(dot(frame.world_from_view[0].xyz, v), dot(frame.world_from_view[1].xyz, v),
+                dot(frame.world_from_view[2].xyz, v));
+}
+
+vec3 eye_world()
+{
+    return vec3(frame.world_from_view[0].w, frame.world_from_view[1].w, frame.world_from_view[2].w);
+}
+
+vec3 view_from_world_point(vec3 p)
+{
+    vec3 d = p - eye_world();
+    return d.x * vec3(frame.world_from_view[0].x, frame.world_from_view[0].y, frame.world_from_view[0].z) +
+           d.y * vec3(frame.world_from_view[1].x, frame.world_from_view[1].y, frame.world_from_view[1].z) +
+           d.z * vec3(frame.world_from_view[2].x, frame.world_from_view[2].y, frame.world_from_view[2].z);
+}
+
+// The ray through a pixel at this sample's place in it; unit direction, t_min at the near plane.
+void camera_ray(uvec2 pixel, out vec3 origin, out vec3 direction, out float t_min)
+{
+    vec2 place = (vec2(pixel) + frame.jitter_pixel.xy) / vec2(frame.width, frame.height) * 2.0 - 1.0;
+    place *= vec2(frame.extent_near.x, -frame.extent_near.y);
+    if (frame.extent_near.w != 0.0) {
+        origin = eye_world() + world_from_view_vector(vec3(place, 0.0));
+        direction = world_from_view_vector(vec3(0.0, 0.0, -1.0));
+        t_min = frame.extent_near.z;
+    } else {
+        vec3 towards = vec3(place, -1.0);
+        float stretch = length(towards);
+        origin = eye_world();
+        direction = world_from_view_vector(towards / stretch);
+        t_min = frame.extent_near.z * stretch;
+    }
+}
+
+// Clip coordinates of a point so that a pixel's centre shows what camera_ray() sees through it. Row 0 of the
+// target is the picture's uppermost. Depth is reversed: 1 at the near plane; 0 infinitely far away, or, in an
+// orthographic view, at the far distance in jitter_pixel.z.
+vec4 clip_from_world_point(vec3 p)
+{
+    vec3 v = view_from_world_point(p);
+    vec2 shift = (1.0 - 2.0 * frame.jitter_pixel.xy) / vec2(frame.width, frame.height);
+    vec2 scaled = v.xy / vec2(frame.extent_near.x, -frame.extent_near.y);
+    float near = frame.extent_near.z;
+    if (frame.extent_near.w != 0.0) {
+        float far = frame.jitter_pixel.z;
+        return vec4(scaled + shift, (far + v.z) / (far - near), 1.0);
+    }
+    return vec4(scaled - shift * v.z, near, -v.z);
+}
+
+// Ray cone of a primary ray: width at the origin and growth per length. Many samples share a pixel.
+vec2 camera_cone()
+{
+    float step = 2.0 * frame.extent_near.y / float(frame.height) * frame.jitter_pixel.w;
+    return frame.extent_near.w != 0.0 ? vec2(step, 0.0) : vec2(0.0, step);
+}

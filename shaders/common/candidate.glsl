@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// What every exact traverse.glsl does with a primitive that its structure leads to.
+#include "common/alpha.glsl"
+#include "common/intersect.glsl"
+
+// A ray on its way through a structure. World space; `t_max` shrinks to the closest hit so far.
+struct trace_ray {
+    vec3 origin;
+    vec3 direction;
+    float t_min;
+    float t_max;
+};
+
+// The same ray in an instance's space: the direction is not made unit, so distances stay those of the world.
+struct object_ray {
+    vec3 origin;
+    vec3 direction;
+};
+
+object_ray object_from_world_ray(trace_ray r, uint instance_index)
+{
+    vec4 rows[3] = instances[instance_index].object_from_world;
+    return object_ray(affine_point(rows, r.origin), affine_vector(rows, r.direction));
+}
+
+candidate candidate_none(float t_max)
+{
+    return candidate(t_max, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE, vec2(0.0));
+}
+
+// Closest hit: takes the candidate if it is nearer than the best and there.
+void offer_closest(trace_ray r, candidate found, inout candidate best)
+{
+    if (found.distance > r.t_min && found.distance < best.distance &&
+        !is_cut_out(found, r.origin, r.direction))
+        best = found;
+}
+
+// Any hit: true when nothing of the light is left and the ray is done. A surface counts once for each time that
+// the ray crosses it, so no primitive may be offered twice to one ray.
+bool offer_any(trace_ray r, candidate found, inout vec3 transmittance)
+{
+    if (!(found.distance > r.t_min && found.distance < r.t_max))
+        return false;
+    transmittance *= transmittance_of(found, r.origin, r.direction);
+    return greatest(transmittance) < 0.5 / 255.0; // what the 8-bit answer rounds to black
+}
+
+// The triangle or sphere against the ray in the instance's space `o`.
+void visit_triangle_closest(trace_ray r, object_ray o, uint primitive, uint instance_index, inout candidate best)
+{
+    uvec4 triangle = texelFetch(triangles, int(primitive));
+    candidate found = candidate(0.0, primitive, instance_index, vec2(0.0));
+    if (intersect_triangle(o.direction, texelFetch(positions, int(triangle.x)).xyz - o.origin,
+                           texelFetch(positions, int(triangle.y)).xyz - o.origin,
+                           texelFetch(positions, int(triangle.z)).xyz - o.origin, found.distance,
+                           found.barycentrics))
+        offer_closest(r, found, best);
+}
+
+bool visit_triangle_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 transmittance)
+{
+    uvec4 triangle = texelFetch(triangles, int(primitive));
+    candidate found = candidate(0.0, primitive, instance_index, vec2(0.0));
+    return intersect_triangle(o.direction, texelFetch(positions, int(triangle.x)).xyz - o.origin,
+                              texelFetch(positions, int(triangle.y)).xyz - o.origin,
+                              texelFetch(positions, int(triangle.z)).xyz - o.origin, found.distance,
+                              found.barycentrics) &&
+           offer_any(r, found, transmittance);
+}
+
+void visit_sphere_closest(trace_ray r, object_ray o, uint primitive, uint instance_index, inout candidate best)
+{
+    vec4 sphere = texelFetch(spheres, int(primitive));
+    vec2 distances;
+    if (!intersect_sphere(o.origin, o.direction, sphere.xyz, sphere.w, distances))
+        return;
+    for (int side = 0; side < 2; side++) {
+        float distance = side == 0 ? distances.x : distances.y;
+        offer_closest(r, candidate(distance, primitive, instance_index, vec2(0.0)), best);
+    }
+}
+
+bool visit_sphere_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 transmittance)
+{
+    vec4 sphere = texelFetch(spheres, int(primitive));
+    vec2 distances;
+    if (!intersect_sphere(o.origin, o.direction, sphere.xyz, sphere.w, distances))
+        return false;
+    for (int side = 0; side < 2; side++) {
+        float distance = side == 0 ? distances.x : distances.y;
+        if (offer_any(r, candidate(distance, primitive, instance_index, vec2(0.0)), transmittance))
+            return true;
+    }
+    return false;
+}

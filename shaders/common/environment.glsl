@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// What lies infinitely far away, as the frame's uniforms describe it.
+// Defines: HAS_ENVIRONMENT_IMAGE its kind is ENVIRONMENT_IMAGE.
+
+#include "shared/bindings.h"
+#include "shared/sky.h"
+#include "common/camera.glsl"
+#include "common/math.glsl"
+
+// The default sky of a scene without any light; server/render/environment.c integrates the same.
+vec3 environment_sky(float up)
+{
+    if (up < 0.0)
+        return mix(vec3(SKY_HORIZON), vec3(SKY_GROUND), min(-up * SKY_GROUND_SLOPE, 1.0));
+    return mix(vec3(SKY_HORIZON), vec3(SKY_ZENITH), up);
+}
+
+#ifdef HAS_ENVIRONMENT_IMAGE
+// Equirectangular, rows from +y down, the middle column is -z; turned by w of the colour about +y. Filtered here,
+// as the columns wrap and the rows do not, whatever the texture's own state is.
+layout(binding = UNIT_ENVIRONMENT) uniform sampler2D environment_image;
+
+vec3 environment_image_radiance(vec3 direction)
+{
+    float c = cos(frame.environment_colour.w), s = sin(frame.environment_colour.w);
+    vec3 d = vec3(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z);
+    ivec2 size = textureSize(environment_image, 0);
+    vec2 place = vec2(atan(d.x, -d.z) / (TWO_PI) + 0.5, acos(clamp(d.y, -1.0, 1.0)) / PI);
+    vec2 texel = place * vec2(size) - 0.5;
+    ivec2 lower = ivec2(floor(texel));
+    vec2 f = texel - vec2(lower);
+    int x0 = (lower.x + size.x) % size.x, x1 = (lower.x + 1) % size.x;
+    int y0 = clamp(lower.y, 0, size.y - 1), y1 = clamp(lower.y + 1, 0, size.y - 1);
+    vec3 upper_row = mix(texelFetch(environment_image, ivec2(x0, y0), 0).rgb,
+                         texelFetch(environment_image, ivec2(x1, y0), 0).rgb, f.x);
+    vec3 lower_row = mix(texelFetch(environment_image, ivec2(x0, y1), 0).rgb,
+                         texelFetch(environment_image, ivec2(x1, y1), 0).rgb, f.x);
+    return mix(upper_row, lower_row, f.y);
+}
+
+#endif
+
+vec3 environment_radiance(vec3 direction)
+{
+#ifdef HAS_ENVIRONMENT_IMAGE
+    return environment_image_radiance(direction) * frame.environment_colour.rgb;
+#endif
+    if (frame.environment_kind == ENVIRONMENT_SKY)
+        return environment_sky(direction.y);
+    return frame.environment_kind == ENVIRONMENT_CONSTANT ? frame.environment_colour.rgb : vec3(0.0);
+}
+
+// Irradiance / pi on a surface that looks along n: what a white Lambert surface sends out. Ramamoorthi and
+// Hanrahan. An Efficient Representation for Irradiance Environment Maps. 2001; the constants of their
+// equation 13 are folded into the coefficients.
+vec3 environment_irradiance(vec3 n)
+{
+    vec3 sum = frame.irradiance[0].rgb + frame.irradiance[1].rgb * n.y + frame.irradiance[2].rgb * n.z +
+               frame.irradiance[3].rgb * n.x + frame.irradiance[4].rgb * (n.x * n.y) +
+               frame.irradiance[5].rgb * (n.y * n.z) + frame.irradiance[6].rgb * (3.0 * n.z * n.z - 1.0) +
+               frame.irradiance[7].rgb * (n.x * n.z) + frame.irradiance[8].rgb * (n.x * n.x - n.y * n.y);
+    return max(sum, vec3(0.0)); // order 2 rings below zero opposite to a small bright sun
+}

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// Lights seen from a point. Units as in the protocol: intensity, irradiance or radiance by kind.
+// Defines: HAS_AREA_LIGHTS some light is a rectangle or a sphere.
+
+#include "shared/bindings.h"
+#include "shared/light.h"
+#include "common/math.glsl"
+
+layout(std430, binding = BIND_LIGHTS) readonly buffer lights_block
+{
+    light lights[];
+};
+
+struct light_sample {
+    vec3 direction;  // unit, towards the light
+    float distance_; // to the point that was chosen on it
+    vec3 irradiance; // of a surface that faces it, if nothing lies between; 0: it does not shine here
+};
+
+// KHR_lights_punctual: inverse square, brought to 0 at the range.
+float light_falloff(float distance_, float range)
+{
+    float window = 1.0;
+    if (range > 0.0) {
+        float ratio = distance_ / range;
+        window = clamp(1.0 - ratio * ratio * ratio * ratio, 0.0, 1.0);
+    }
+    return window / max(distance_ * distance_, 1e-12); // at the light itself: very bright, but finite
+}
+
+// KHR_lights_punctual's smooth cone.
+float light_cone(light l, vec3 direction)
+{
+    float scale = 1.0 / max(0.001, l.half_u_inner.w - l.half_v_outer.w);
+    float x = clamp((dot(l.direction_range.xyz, -direction) - l.half_v_outer.w) * scale, 0.0, 1.0);
+    return x * x;
+}
+
+#ifdef HAS_AREA_LIGHTS
+light_sample light_sample_rectangle(light l, vec3 position, vec2 u)
+{
+    vec3 half_u = l.half_u_inner.xyz, half_v = l.half_v_outer.xyz;
+    vec3 to_light = l.position_kind.xyz + (2.0 * u.x - 1.0) * half_u + (2.0 * u.y - 1.0) * half_v - position;
+    float distance_ = length(to_light);
+    vec3 direction = to_light / max(distance_, 1e-12);
+    float area = 4.0 * length(cross(half_u, half_v));
+    float facing = max(dot(l.direction_range.xyz, -direction), 0.0); // shines from one side
+    return light_sample(direction, distance_,
+                        l.colour.rgb * (facing * area / max(distance_ * distance_, 1e-12)));
+}
+
+// Uniform in the cone of directions that meet the sphere (Pharr, Jakob, Humphreys. Physically Based Rendering.
+// 6.2.4). From inside it there is no such cone, and it gives no light.
+light_sample light_sample_sphere(light l, vec3 position, vec2 u)
+{
+    vec3 to_centre = l.position_kind.xyz - position;
+    float centre_distance = length(to_centre), radius = l.colour.w;
+    if (centre_distance <= radius || radius <= 0.0)
+        return light_sample(vec3(0.0, 1.0, 0.0), 0.0, vec3(0.0));
+    vec3 axis = to_centre / centre_distance;
+    float sin2_max = radius * radius / (centre_distance * centre_distance);
+    float one_minus_cos_max = sin2_max / (1.0 + sqrt(1.0 - sin2_max)); // without cancellation for far spheres
+    float one_minus_cos = u.x * one_minus_cos_max;
+    float sin2 = one_minus_cos * (2.0 - one_minus_cos);
+    float sin_ = sqrt(max(sin2, 0.0)), phi = TWO_PI * u.y;
+    vec3 s, t;
+    tangent_frame(axis, s, t);
+    vec3 direction = normalize(axis * (1.0 - one_minus_cos) + (s * cos(phi) + t * sin(phi)) * sin_);
+    float reach = centre_distance * (1.0 - one_minus_cos) -
+                  sqrt(max(radius * radius - centre_distance * centre_distance * sin2, 0.0));
+    return light_sample(direction, reach, l.colour.rgb * (TWO_PI * one_minus_cos_max));
+}
+
+#endif
+
+// `u`: two numbers in [0, 1) that choose the point of a light that has an extent.
+light_sample light_sample_at(uint index, vec3 position, vec2 u)
+{
+    light l = lights[index];
+    int kind = int(l.position_kind.w);
+    if (kind == LIGHT_KIND_DIRECTIONAL)
+        return light_sample(-l.direction_range.xyz, 1e30, l.colour.rgb);
+#ifdef HAS_AREA_LIGHTS
+    if (kind == LIGHT_KIND_RECTANGLE)
+        return light_sample_rectangle(l, position, u);
+    if (kind == LIGHT_KIND_SPHERE)
+        return light_sample_sphere(l, position, u);
+#endif
+    vec3 to_light = l.position_kind.xyz - position;
+    float distance_ = length(to_light);
+    vec3 direction = to_light / max(distance_, 1e-12);
+    vec3 irradiance = l.colour.rgb * light_falloff(distance_, l.direction_range.w);
+    if (kind == LIGHT_KIND_SPOT)
+        irradiance *= light_cone(l, direction);
+    return light_sample(direction, distance_, irradiance);
+}

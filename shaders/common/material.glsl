@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: MIT
+// From a hit to what its surface is made of: textures, normal and bump maps applied.
+//
+// A back face of an opaque material is shaded as if it were two-sided, double_sided or not: a model with a hole
+// in it would surprise more than one whose inside is visible. Only glass tells its sides apart.
+//
+// Software GL runs both sides of every branch, so what the scene does not have is left out by defines, and all
+// textures of a material are sampled in one place, in a loop.
+//
+// Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPHERES.
+
+#include "shared/hit.h"
+#include "common/surface.glsl"
+
+struct surface {
+    vec3 position;
+    vec3 geometric; // unit normals, world space, on the viewer's side
+    vec3 normal;    // shading; may lean away from the viewer
+    vec3 base;
+    float alpha;    // share of the ray that the surface takes; 1 unless it is blended
+    vec3 emission;
+    float metallic, roughness, transmission, ior, occlusion;
+    bool unlit;
+    bool inside;    // seen from behind
+};
+
+#ifdef HAS_BUMP
+// How fast the position runs along the texture coordinates of a slot, world space, around a hit.
+bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 along_v)
+{
+    along_u = along_v = vec3(0.0);
+    if (h.primitive == HIT_NO_PRIMITIVE)
+        return false;
+    if (h.instance == HIT_NO_PRIMITIVE) {
+        disc d = discs[h.primitive];
+        vec3 tangent, bitangent;
+        tangent_frame(d.normal.xyz, tangent, bitangent);
+        along_u = 2.0 * d.centre_radius.w * tangent; // texture coordinates run 0..1 across the disc
+        along_v = -2.0 * d.centre_radius.w * bitangent;
+        return true;
+    }
+    instance i = instances[h.instance];
+    if (geometries[i.geometry].kind == GEOMETRY_SPHERES) {
+        float radius = texelFetch(spheres, int(h.primitive)).w;
+        float phi = (h.u0 - 0.5) * TWO_PI, theta = h.v0 * PI;
+        along_u = affine_vector(i.world_from_object, vec3(cos(phi), 0.0, -sin(phi)) * (TWO_PI * radius * sin(theta)));
+        along_v = affine_vector(i.world_from_object, vec3(cos(theta) * sin(phi), -sin(theta), cos(theta) * cos(phi)) *
+                                                         (PI * radius));
+        return true;
+    }
+    uvec4 triangle = texelFetch(triangles, int(h.primitive));
+    vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
+    vec3 e1 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.y)).xyz - p0);
+    vec3 e2 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.z)).xyz - p0);
+    vec2 t0 = slot_texcoords(slot, texelFetch(texcoords, int(triangle.x)));
+    vec2 d1 = slot_texcoords(slot, texelFetch(texcoords, int(triangle.y))) - t0;
+    vec2 d2 = slot_texcoords(slot, texelFetch(texcoords, int(triangle.z))) - t0;
+    float area = d1.x * d2.y - d1.y * d2.x;
+    if (area == 0.0)
+        return false;
+    along_u = (e1 * d2.y - e2 * d1.y) / area;
+    along_v = (e2 * d1.x - e1 * d2.x) / area;
+    return true;
+}
+
+// Blinn. Simulation of Wrinkled Surfaces. 1978, in the form of Mikkelsen. Bump Mapping Unparametrized Surfaces on
+// the GPU. 2010: the slope of the height along the surface tilts the normal. The height's derivatives are
+// differences over one texel.
+vec3 bump_normal(hit h, uint slot_index, vec3 normal, vec4 uv01)
+{
+    texture_slot slot = texture_slots[slot_index];
+    vec3 along_u, along_v;
+    if (!surface_derivatives(h, slot, along_u, along_v))
+        return normal;
+    uint image = slot.texture & 0x7fffffffu;
+    vec2 uv = slot_texcoords(slot, uv01);
+    vec2 texel = 1.0 / vec2(textures[image].width, textures[image].height);
+    float height_u = 0.0, height_v = 0.0;
+    for (int i = 0; i < 4; i++) { // -u, +u, -v, +v
+        float side = (i & 1) != 0 ? 0.5 : -0.5;
+        vec2 step = i < 2 ? vec2(side * texel.x, 0.0) : vec2(0.0, side * texel.y);
+        float height = sample_level(textures[image], 0, uv + step).r * 2.0 * side;
+        height_u += i < 2 ? height : 0.0;
+        height_v += i < 2 ? 0.0 : height;
+    }
+    vec3 across_u = cross(along_v, normal), across_v = cross(normal, along_u);
+    float determinant_ = dot(along_u, across_u);
+    vec3 slope = sign(determinant_) * slot.strength *
+                 (height_u / texel.x * across_u + height_v / texel.y * across_v);
+    vec3 tilted = abs(determinant_) * normal - slope;
+    float squared = dot(tilted, tilted);
+    return squared > 0.0 ? tilted * inversesqrt(squared) : normal;
+}
+
+#endif
+
+#ifdef HAS_TEXTURES
+vec3 mapped_normal(hit h, vec3 normal, vec3 texel, float strength)
+{
+    texel = texel * 2.0 - 1.0;
+    texel.xy *= strength;
+    vec4 tangent = unpack_tangent(h.tangent);
+    vec3 along = tangent.xyz - dot(tangent.xyz, normal) * normal;
+    float squared = dot(along, along);
+    if (squared < 1e-8)
+        return normal;
+    along *= inversesqrt(squared);
+    vec3 mapped = along * texel.x + cross(normal, along) * (tangent.w * texel.y) + normal * texel.z;
+    squared = dot(mapped, mapped);
+    return squared > 1e-8 ? mapped * inversesqrt(squared) : normal;
+}
+
+bool is_textured(material m)
+{
+    return (m.texture_base_colour | m.texture_normal | m.texture_metallic_roughness | m.texture_occlusion |
+            m.texture_emission | m.texture_transmission) != 0u;
+}
+
+// The width of a ray in texture coordinates where it hits; 0 where that is not known. A slanted surface is seen
+// under an ellipse; the mean of its axes blurs less than the longer one and flickers less than the shorter.
+float footprint_of(hit h, material m, vec3 geometric, vec3 direction, float width)
+{
+    if (!is_textured(m) || h.primitive == HIT_NO_PRIMITIVE || h.instance == HIT_NO_PRIMITIVE ||
+        geometries[instances[h.instance].geometry].kind == GEOMETRY_SPHERES)
+        return 0.0;
+    float slant = max(abs(dot(geometric, direction)), 0.01);
+    return width * inversesqrt(slant) * texcoords_per_metre(h.instance, h.primitive);
+}
+
+// Of the two nearest levels the nearer one: half the work of blending them.
+vec4 sample_use(texture_slot slot, vec4 uv01, float footprint_uv)
+{
+    texture_info info = textures[slot.texture & 0x7fffffffu];
+    float level = footprint_uv > 0.0 ? slot_level(slot, footprint_uv) : 0.0;
+    int last = int(info.flags >> TEXTURE_LEVELS_SHIFT) - 1;
+    return sample_level(info, clamp(int(level + 0.5), 0, last), slot_texcoords(slot, uv01));
+}
+
+// Puts the inputs that come from textures in their place; normal maps included.
+void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 uv01, float footprint_uv)
+{
+    const int BASE_COLOUR = 0, NORMAL = 1, METALLIC_ROUGHNESS = 2, OCCLUSION = 3, EMISSION = 4, TRANSMISSION = 5;
+    uint uses[6] = uint[6](m.texture_base_colour, m.texture_normal, m.texture_metallic_roughness, m.texture_occlusion,
+                           m.texture_emission, m.texture_transmission);
+    for (int i = 0; i < 6; i++) {
+        if (uses[i] == 0u)
+            continue;
+        texture_slot slot = texture_slots[uses[i]];
+        vec4 texel = sample_use(slot, uv01, footprint_uv);
+        if (i == BASE_COLOUR) {
+            colour *= texel;
+        } else if (i == NORMAL) {
+            if ((h.material & HIT_HAS_TANGENT) != 0u)
+                s.normal = mapped_normal(h, s.normal, texel.xyz, slot.strength);
+        } else if (i == METALLIC_ROUGHNESS) {
+            s.metallic *= texel.b;
+            s.roughness *= texel.g;
+        } else if (i == OCCLUSION) {
+            s.occlusion = mix(1.0, texel.r, slot.strength);
+        } else if (i == EMISSION) {
+            s.emission *= texel.rgb;
+        } else {
+            s.transmission *= texel.r;
+        }
+    }
+}
+#endif
+
+// `width`: of the ray's cone at the hit.
+surface surface_at(hit h, vec3 origin, vec3 direction, float width)
+{
+    material m = materials[h.material & HIT_MATERIAL_MASK];
+    vec4 uv01 = vec4(h.u0, h.v0, h.u1, h.v1);
+    surface s;
+    s.position = origin + h.distance * direction;
+    s.geometric = unpack_unit(h.normal_geometric);
+    s.normal = unpack_unit(h.normal_shading);
+    s.inside = (h.material & HIT_BACK_FACE) != 0u;
+    s.unlit = (m.flags & MATERIAL_UNLIT) != 0u;
+    s.emission = m.emission_ior.rgb;
+    s.ior = m.emission_ior.w;
+    s.metallic = m.metallic;
+    s.roughness = m.roughness;
+    s.transmission = m.transmission;
+    s.occlusion = 1.0;
+    vec4 colour = m.base_colour * unpackUnorm4x8(h.colour);
+#ifdef HAS_TEXTURES
+    apply_textures(s, colour, h, m, uv01, footprint_of(h, m, s.geometric, direction, width));
+#endif
+    s.base = clamp(colour.rgb, vec3(0.0), vec3(1.0));
+    s.alpha = (m.flags & MATERIAL_ALPHA_BLEND) != 0u ? clamp(colour.a, 0.0, 1.0) : 1.0;
+#ifdef HAS_BUMP
+    if (m.texture_bump != 0u)
+        s.normal = bump_normal(h, m.texture_bump, s.normal, uv01);
+#endif
+    if (s.inside) {
+        s.geometric = -s.geometric;
+        s.normal = -s.normal;
+    }
+    return s;
+}

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+// From a primitive and a place on it to struct hit. Every exact tracer and the rasterised primary use it, so
+// that all see one surface.
+#include "shared/hit.h"
+#include "common/math.glsl"
+#include "common/geometry.glsl"
+#include "common/texture.glsl"
+
+// What is known of a ray before it is decided that it hits.
+struct candidate {
+    float distance;     // in lengths of the direction
+    uint primitive;     // scene-wide triangle or sphere, or disc; HIT_NO_PRIMITIVE: nothing yet
+    uint instance_index; // HIT_NO_PRIMITIVE: a disc
+    vec2 barycentrics;  // triangles: of the second and third vertex
+};
+
+vec3 triangle_weights(vec2 barycentrics)
+{
+    return vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
+}
+
+vec4 triangle_texcoords(uvec4 triangle, uint flags, vec3 weights)
+{
+    if ((flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
+        return vec4(0.0);
+    return texelFetch(texcoords, int(triangle.x)) * weights.x +
+           texelFetch(texcoords, int(triangle.y)) * weights.y +
+           texelFetch(texcoords, int(triangle.z)) * weights.z;
+}
+
+vec4 triangle_colour(uvec4 triangle, uint flags, vec3 weights)
+{
+    if ((flags & GEOMETRY_HAS_COLOURS) == 0u)
+        return vec4(1.0);
+    return texelFetch(colours, int(triangle.x)) * weights.x +
+           texelFetch(colours, int(triangle.y)) * weights.y +
+           texelFetch(colours, int(triangle.z)) * weights.z;
+}
+
+// Seen from the front (+z) with y up, u grows to the right and v downwards, as an image is stored.
+vec4 sphere_texcoords(vec3 normal_object)
+{
+    float u = 0.5 + atan(normal_object.x, normal_object.z) / TWO_PI;
+    float v = acos(clamp(normal_object.y, -1.0, 1.0)) / PI;
+    return vec4(u, v, u, v);
+}
+
+// 0..1 across the disc.
+vec4 disc_texcoords(disc d, vec3 position_world)
+{
+    vec3 tangent, bitangent;
+    tangent_frame(d.normal.xyz, tangent, bitangent);
+    vec3 from_centre = (position_world - d.centre_radius.xyz) / d.centre_radius.w;
+    vec2 uv = 0.5 + 0.5 * vec2(dot(from_centre, tangent), -dot(from_centre, bitangent));
+    return vec4(uv, uv);
+}
+
+// Where a triangle's texture runs: tangent along u and the handedness of the frame, for meshes that bring no
+// tangents. v grows downwards in an image while a normal map's green points up, hence the sign.
+bool texture_tangent(uvec4 triangle, uint slot_index, vec3 normal_object, out vec4 tangent_object)
+{
+    bool second = (texture_slots[slot_index].texture & 0x80000000u) != 0u;
+    vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
+    vec3 e1 = texelFetch(positions, int(triangle.y)).xyz - p0;
+    vec3 e2 = texelFetch(positions, int(triangle.z)).xyz - p0;
+    vec4 t0 = texelFetch(texcoords, int(triangle.x));
+    vec4 t1 = texelFetch(texcoords, int(triangle.y)) - t0;
+    vec4 t2 = texelFetch(texcoords, int(triangle.z)) - t0;
+    vec2 d1 = second ? t1.zw : t1.xy;
+    vec2 d2 = second ? t2.zw : t2.xy;
+    float area = d1.x * d2.y - d1.y * d2.x;
+    tangent_object = vec4(0.0);
+    if (area == 0.0)
+        return false;
+    vec3 along_u = (e1 * d2.y - e2 * d1.y) / area;
+    vec3 along_v = (e2 * d1.x - e1 * d2.x) / area;
+    along_u -= normal_object * dot(normal_object, along_u);
+    if (dot(along_u, along_u) == 0.0)
+        return false;
+    tangent_object = vec4(along_u, dot(cross(normal_object, along_u), along_v) > 0.0 ? -1.0 : 1.0);
+    return true;
+}
+
+bool triangle_tangent(uvec4 triangle, uint flags, vec3 weights, vec3 normal_object, out vec4 tangent_object)
+{
+    if ((flags & GEOMETRY_HAS_TANGENTS) != 0u) {
+        vec3 sum = unpack_unit(texelFetch(tangents, int(triangle.x)).x) * weights.x +
+                   unpack_unit(texelFetch(tangents, int(triangle.y)).x) * weights.y +
+                   unpack_unit(texelFetch(tangents, int(triangle.z)).x) * weights.z;
+        float handedness = texelFetch(normals, int(triangle.x)).w;
+        tangent_object = vec4(sum, handedness);
+        return handedness != 0.0 && dot(sum, sum) > 0.0;
+    }
+    tangent_object = vec4(0.0);
+    material m = materials[triangle.w & HIT_MATERIAL_MASK];
+    uint slot_index = m.texture_normal != 0u ? m.texture_normal : m.texture_bump;
+    if (slot_index == 0u || (flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
+        return false;
+    return texture_tangent(triangle, slot_index, normal_object, tangent_object);
+}
+
+// The interpolated normal, mirrored at the surface where it points to the wrong side of it: a normal that is
+// turned round becomes its opposite, one that is only a little beyond the horizon moves only a little.
+vec3 same_hemisphere(vec3 shading, vec3 geometric)
+{
+    float cosine = dot(shading, geometric);
+    return cosine < 0.0 ? shading - 2.0 * cosine * geometric : shading;
+}
+
+hit finish_hit(uint material_index, float distance, vec3 direction_world, vec3 geometric, vec3 shading, vec4 uv01,
+               vec4 tangent_world, vec4 colour)
+{
+    hit h;
+    h.distance = distance;
+    h.material = material_index & HIT_MATERIAL_MASK;
+    if (dot(direction_world, geometric) > 0.0)
+        h.material |= HIT_BACK_FACE;
+    h.primitive = HIT_NO_PRIMITIVE;
+    h.instance = HIT_NO_PRIMITIVE;
+    h.u0 = uv01.x;
+    h.v0 = uv01.y;
+    h.u1 = uv01.z;
+    h.v1 = uv01.w;
+    h.normal_geometric = pack_unit(geometric);
+    h.normal_shading = pack_unit(same_hemisphere(shading, geometric));
+    h.tangent = 0u;
+    if (dot(tangent_world.xyz, tangent_world.xyz) > 0.0) {
+        h.tangent = pack_tangent(normalize(tangent_world.xyz), tangent_world.w);
+        h.material |= HIT_HAS_TANGENT;
+    }
+    h.colour = packUnorm4x8(colour);
+    return h;
+}
+
+hit surface_triangle(uint instance_index, uint primitive, vec2 barycentrics, float distance, vec3 direction_world)
+{
+    instance i = instances[instance_index];
+    uint flags = geometries[i.geometry].flags;
+    uvec4 triangle = texelFetch(triangles, int(primitive));
+    vec3 weights = triangle_weights(barycentrics);
+    vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
+    vec3 p1 = texelFetch(positions, int(triangle.y)).xyz;
+    vec3 p2 = texelFetch(positions, int(triangle.z)).xyz;
+    vec3 normal_object = normalize(cross(p1 - p0, p2 - p0));
+    vec3 geometric = normalize(affine_covector(i.object_from_world, normal_object));
+    vec3 shading = geometric;
+    if ((flags & GEOMETRY_HAS_NORMALS) != 0u) {
+        vec3 sum = texelFetch(normals, int(triangle.x)).xyz * weights.x +
+                   texelFetch(normals, int(triangle.y)).xyz * weights.y +
+                   texelFetch(normals, int(triangle.z)).xyz * weights.z;
+        vec3 interpolated = affine_covector(i.object_from_world, sum);
+        float squared = dot(interpolated, interpolated);
+        if (squared > 0.0) // opposite normals cancel each other
+            shading = interpolated * inversesqrt(squared);
+    }
+    vec4 tangent;
+    if (triangle_tangent(triangle, flags, weights, normal_object, tangent)) {
+        tangent.xyz = affine_vector(i.world_from_object, tangent.xyz);
+        if ((i.flags & INSTANCE_MIRRORED) != 0u)
+            tangent.w = -tangent.w;
+    }
+    hit h = finish_hit(triangle.w, distance, direction_world, geometric, shading,
+                       triangle_texcoords(triangle, flags, weights), tangent,
+                       triangle_colour(triangle, flags, weights));
+    h.primitive = primitive;
+    h.instance = instance_index;
+    return h;
+}
+
+hit surface_sphere(uint instance_index, uint primitive, float distance, vec3 origin_world, vec3 direction_world)
+{
+    instance i = instances[instance_index];
+    vec4 sphere = texelFetch(spheres, int(primitive));
+    vec3 position_object = affine_point(i.object_from_world, origin_world) +
+                           distance * affine_vector(i.object_from_world, direction_world);
+    vec3 normal_object = normalize(position_object - sphere.xyz);
+    vec3 geometric = normalize(affine_covector(i.object_from_world, normal_object));
+    vec4 tangent = vec4(affine_vector(i.world_from_object, vec3(normal_object.z, 0.0, -normal_object.x)),
+                        (i.flags & INSTANCE_MIRRORED) != 0u ? -1.0 : 1.0);
+    hit h = finish_hit(texelFetch(sphere_materials, int(primitive)).x, distance, direction_world, geometric,
+                       geometric, sphere_texcoords(normal_object), tangent, vec4(1.0));
+    h.primitive = primitive;
+    h.instance = instance_index;
+    return h;
+}
+
+hit surface_disc(uint disc_index, float distance, vec3 origin_world, vec3 direction_world)
+{
+    disc d = discs[disc_index];
+    vec3 tangent, bitangent;
+    tangent_frame(d.normal.xyz, tangent, bitangent);
+    hit h = finish_hit(d.material, distance, direction_world, d.normal.xyz, d.normal.xyz,
+                       disc_texcoords(d, origin_world + distance * direction_world), vec4(tangent, 1.0),
+                       vec4(1.0));
+    h.primitive = disc_index;
+    return h;
+}
+
+hit surface_miss()
+{
+    return hit(-1.0, 0u, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE, 0.0, 0.0, 0.0, 0.0, 0u, 0u, 0u, 0u);
+}
+
+hit surface_of(candidate found, vec3 origin_world, vec3 direction_world)
+{
+    if (found.primitive == HIT_NO_PRIMITIVE)
+        return surface_miss();
+    if (found.instance_index == HIT_NO_PRIMITIVE)
+        return surface_disc(found.primitive, found.distance, origin_world, direction_world);
+#ifdef HAS_SPHERES
+    if (geometries[instances[found.instance_index].geometry].kind == GEOMETRY_SPHERES)
+        return surface_sphere(found.instance_index, found.primitive, found.distance, origin_world,
+                              direction_world);
+#endif
+    return surface_triangle(found.instance_index, found.primitive, found.barycentrics, found.distance,
+                            direction_world);
+}
+
+// How far texture coordinates of set 0 run per metre of a triangle: for the level of detail of a footprint.
+float texcoords_per_metre(uint instance_index, uint primitive)
+{
+    instance i = instances[instance_index];
+    uvec4 triangle = texelFetch(triangles, int(primitive));
+    if ((geometries[i.geometry].flags & GEOMETRY_HAS_TEXCOORDS_0) == 0u)
+        return 0.0;
+    vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
+    vec3 e1 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.y)).xyz - p0);
+    vec3 e2 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.z)).xyz - p0);
+    vec2 t0 = texelFetch(texcoords, int(triangle.x)).xy;
+    vec2 d1 = texelFetch(texcoords, int(triangle.y)).xy - t0;
+    vec2 d2 = texelFetch(texcoords, int(triangle.z)).xy - t0;
+    float area = length(cross(e1, e2));
+    return area > 0.0 ? sqrt(abs(d1.x * d2.y - d1.y * d2.x) / area) : 0.0;
+}

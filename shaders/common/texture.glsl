@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+// Materials, and textures from the one texel buffer that holds them all. Layouts: shared/material.h.
+#include "shared/bindings.h"
+#include "shared/material.h"
+
+layout(binding = UNIT_TEXELS) uniform samplerBuffer texels; // RGBA8 unorm, as stored
+
+layout(std430, binding = BIND_MATERIALS) readonly buffer material_block { material materials[]; };
+layout(std430, binding = BIND_TEXTURE_SLOTS) readonly buffer texture_slot_block { texture_slot texture_slots[]; };
+layout(std430, binding = BIND_TEXTURES) readonly buffer texture_block { texture_info textures[]; };
+
+// IEC 61966-2-1.
+vec3 linear_from_srgb(vec3 c)
+{
+    return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, lessThanEqual(c, vec3(0.04045)));
+}
+
+int wrap_texel(int i, int size, uint mode)
+{
+    if (mode == 1u) // clamp
+        return clamp(i, 0, size - 1);
+    int period = mode == 2u ? 2 * size : size; // mirror, repeat
+    i = i >= 0 ? i % period : period - 1 - (-1 - i) % period; // % of a negative number is undefined
+    return i < size ? i : period - 1 - i;
+}
+
+// One level of a texture: its first texel and its size.
+struct texture_level {
+    int first_texel;
+    ivec2 size;
+};
+
+texture_level find_level(texture_info info, int level)
+{
+    texture_level found = texture_level(int(info.first_texel), ivec2(info.width, info.height));
+    for (int i = 0; i < level; i++) {
+        found.first_texel += found.size.x * found.size.y;
+        found.size = max(found.size >> 1, ivec2(1));
+    }
+    return found;
+}
+
+vec4 fetch_texel(texture_info info, texture_level level, ivec2 at)
+{
+    int x = wrap_texel(at.x, level.size.x, (info.flags >> TEXTURE_WRAP_U_SHIFT) & 3u);
+    int y = wrap_texel(at.y, level.size.y, (info.flags >> TEXTURE_WRAP_V_SHIFT) & 3u);
+    vec4 texel = texelFetch(texels, level.first_texel + y * level.size.x + x);
+    if ((info.flags & TEXTURE_SRGB) != 0u)
+        texel.rgb = linear_from_srgb(texel.rgb);
+    return texel;
+}
+
+// The loops here have counts that the compiler cannot know: unrolled and put in wherever a texture is sampled,
+// the fetches made a software GL's compiler take seconds.
+vec4 sample_level(texture_info info, int level_number, vec2 uv)
+{
+    texture_level level = find_level(info, level_number);
+    bool nearest = (info.flags & TEXTURE_NEAREST) != 0u;
+    // 1e6 repeats and more have no texels left to tell apart in a float, and must not overflow an int.
+    vec2 at = clamp(uv, vec2(-1e6), vec2(1e6)) * vec2(level.size);
+    at = clamp(at, vec2(-1e9), vec2(1e9)) - (nearest ? 0.0 : 0.5);
+    ivec2 corner = ivec2(floor(at));
+    vec2 weight = nearest ? vec2(0.0) : at - floor(at);
+    vec4 sum = vec4(0.0);
+    int tap_count = nearest ? 1 : 4;
+    for (int tap = 0; tap < tap_count; tap++) {
+        ivec2 step = ivec2(tap & 1, tap >> 1);
+        vec2 share = mix(1.0 - weight, weight, vec2(step));
+        sum += share.x * share.y * fetch_texel(info, level, corner + step);
+    }
+    return sum;
+}
+
+// `level_of_detail`: 0 or less is the full size, each 1 more halves it; between levels the two are blended.
+vec4 sample_texture(uint texture_index, vec2 uv, float level_of_detail)
+{
+    texture_info info = textures[texture_index];
+    float last = float(info.flags >> TEXTURE_LEVELS_SHIFT) - 1.0;
+    float level = clamp(level_of_detail, 0.0, last);
+    if ((info.flags & TEXTURE_NEAREST) != 0u)
+        level = floor(level);
+    float coarser = fract(level);
+    int level_count = coarser > 0.0 ? 2 : 1;
+    vec4 sum = vec4(0.0);
+    for (int i = 0; i < level_count; i++)
+        sum += (i == 0 ? 1.0 - coarser : coarser) * sample_level(info, int(level) + i, uv);
+    return sum;
+}
+
+// Texture coordinates that a slot sees. `uv01` holds both sets.
+vec2 slot_texcoords(texture_slot slot, vec4 uv01)
+{
+    vec2 uv = (slot.texture & 0x80000000u) != 0u ? uv01.zw : uv01.xy;
+    return vec2(dot(slot.uv_matrix.xy, uv) + slot.offset_u, dot(slot.uv_matrix.zw, uv) + slot.offset_v);
+}
+
+// Level at which a texel is as wide as the footprint, given in texture coordinates before the slot's matrix.
+float slot_level(texture_slot slot, float footprint_uv)
+{
+    texture_info info = textures[slot.texture & 0x7fffffffu];
+    float scale = sqrt(abs(determinant(mat2(slot.uv_matrix.xy, slot.uv_matrix.zw))));
+    float texels_wide = footprint_uv * scale * sqrt(float(info.width) * float(info.height));
+    return texels_wide > 1.0 ? log2(texels_wide) : 0.0;
+}
+
+// A material's input: `slot_index` is one of its texture_* fields and not 0.
+// `footprint_uv`: how wide the ray is there, in texture coordinates; 0: as fine as the texture is.
+vec4 sample_slot(uint slot_index, vec4 uv01, float footprint_uv)
+{
+    texture_slot slot = texture_slots[slot_index];
+    float level = footprint_uv > 0.0 ? slot_level(slot, footprint_uv) : 0.0;
+    return sample_texture(slot.texture & 0x7fffffffu, slot_texcoords(slot, uv01), level);
+}

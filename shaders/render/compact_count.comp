@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// First of three passes that give children their places: how many children and shadow rays each block of
+// COMPACT_BLOCK hits has. One invocation a block: no shared memory, which is slow on software GL.
+
+#include "shared/path.h"
+#include "common/dispatch.glsl"
+
+layout(local_size_x = 64) in;
+
+uniform uint hit_count;
+
+layout(std430, binding = BIND_CHILD_COUNTS) readonly buffer count_block { uint child_counts[]; };
+layout(std430, binding = BIND_BLOCK_OFFSETS) writeonly buffer offset_block { uvec2 block_offsets[]; };
+
+void main()
+{
+    uint block = item_index(), first = block * COMPACT_BLOCK;
+    if (first >= hit_count)
+        return;
+    uvec2 sum = uvec2(0u);
+    for (uint k = first; k < min(first + COMPACT_BLOCK, hit_count); k++)
+        sum += uvec2(child_counts[k] & 3u, child_counts[k] >> 2);
+    block_offsets[block] = sum;
+}

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// Third: the children go to their places as rays and paths of the next wave, in the order of their parents. The
+// host has made sure that there is room.
+
+#include "shared/path.h"
+#include "shared/ray.h"
+#include "common/dispatch.glsl"
+
+layout(local_size_x = 64) in;
+
+uniform uint hit_count;
+
+layout(std430, binding = BIND_CHILD_COUNTS) readonly buffer count_block { uint child_counts[]; };
+layout(std430, binding = BIND_BLOCK_OFFSETS) readonly buffer offset_block { uvec2 block_offsets[]; };
+layout(std430, binding = BIND_CHILDREN) readonly buffer child_block { child children[]; };
+layout(std430, binding = BIND_RAYS) writeonly buffer ray_block { ray rays[]; };
+layout(std430, binding = BIND_PATHS) writeonly buffer path_block { path paths[]; };
+
+void main()
+{
+    uint j = item_index();
+    if (j >= hit_count)
+        return;
+    uint count = child_counts[j] & 3u;
+    if (count == 0u)
+        return;
+    uint block = j / COMPACT_BLOCK, place = block_offsets[block].x;
+    for (uint before = block * COMPACT_BLOCK; before < j; before++)
+        place += child_counts[before] & 3u;
+    for (uint i = 0u; i < count; i++) {
+        child c = children[j * CHILDREN_MAX + i];
+        rays[place + i] = ray(c.origin_t_min, c.direction_t_max);
+        paths[place + i] =
+            path(c.weight_r, c.weight_g, c.weight_b, c.pixel, c.cone_width, c.cone_spread, c.flags, 0u);
+    }
+}

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// Adds a wave's radiance and the light that its shadow rays let through to the pixels of the slice. The paths of a
+// pixel lie side by side; the first of them adds for all, in their order, so no two invocations share a pixel and
+// the sum is the same to the bit every time.
+
+#include "shared/path.h"
+#include "common/dispatch.glsl"
+
+layout(local_size_x = 64) in;
+
+uniform uint ray_count, hit_count;
+uniform uint batch_lights;
+uniform uint first_batch; // 1: the radiance itself comes along
+
+layout(std430, binding = BIND_PATHS) readonly buffer path_block { path paths[]; };
+layout(std430, binding = BIND_HIT_PLACES) readonly buffer place_block { uint hit_places[]; };
+layout(std430, binding = BIND_RADIANCE) readonly buffer radiance_block { vec4 radiance[]; };
+layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uint visibility[]; };
+layout(std430, binding = BIND_LIGHT_SAMPLES) readonly buffer sample_block { vec4 light_samples[]; };
+layout(std430, binding = BIND_SLICE_PIXELS) buffer pixel_block { vec4 slice_pixels[]; };
+
+// The greatest radiance that reaches a pixel: half floats hold 65504, and what is brighter is white at any exposure
+// of a scene lit for the eye. Also what is not a number must not spread.
+const float RADIANCE_MAX = 1e9;
+
+vec4 finite(vec4 v)
+{
+    return mix(clamp(v, vec4(0.0), vec4(RADIANCE_MAX)), vec4(0.0), isnan(v));
+}
+
+vec3 lights_of(uint k)
+{
+    vec3 sum = vec3(0.0);
+    uint j = hit_places[k];
+    if (j == HIT_PLACE_NONE)
+        return sum;
+    for (uint i = 0u; i < batch_lights; i++) {
+        uint place = i * hit_count + j;
+        uint through = visibility[place] & 0xffffffu;
+        if (through != 0u)
+            sum += light_samples[place].rgb * unpackUnorm4x8(through).rgb;
+    }
+    return sum;
+}
+
+void main()
+{
+    uint k = item_index();
+    if (k >= ray_count)
+        return;
+    uint pixel = paths[k].pixel;
+    if (k > 0u && paths[k - 1u].pixel == pixel)
+        return;
+    vec4 sum = slice_pixels[pixel];
+    for (; k < ray_count && paths[k].pixel == pixel; k++) {
+        vec4 arriving = vec4(lights_of(k), 0.0);
+        if (first_batch != 0u)
+            arriving += radiance[k];
+        sum += finite(arriving);
+    }
+    slice_pixels[pixel] = sum;
+}

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// How many paths of each block of COMPACT_BLOCK hit something. First of three passes (then compact_scan.comp and
+// hit_list.comp) that list the hits, so that shading runs on those alone: software GL would run all of it for a
+// path that left the scene too.
+
+#include "shared/hit.h"
+#include "shared/path.h"
+#include "common/dispatch.glsl"
+
+layout(local_size_x = 64) in;
+
+uniform uint ray_count;
+
+layout(std430, binding = BIND_HITS) readonly buffer hit_block { hit hits[]; };
+layout(std430, binding = BIND_BLOCK_OFFSETS) writeonly buffer offset_block { uvec2 block_offsets[]; };
+
+void main()
+{
+    uint block = item_index(), first = block * COMPACT_BLOCK;
+    if (first >= ray_count)
+        return;
+    uint count = 0u;
+    for (uint k = first; k < min(first + COMPACT_BLOCK, ray_count); k++)
+        count += hits[k].distance >= 0.0 ? 1u : 0u;
+    block_offsets[block] = uvec2(count, 0u);
+}

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// What the paths that left the scene bring home: the environment.
+// Defines: those of common/environment.glsl.
+
+#include "shared/path.h"
+#include "shared/ray.h"
+#include "common/dispatch.glsl"
+#include "common/environment.glsl"
+
+layout(local_size_x = 64) in;
+
+uniform uint ray_count;
+
+layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
+layout(std430, binding = BIND_PATHS) readonly buffer path_block { path paths[]; };
+layout(std430, binding = BIND_HIT_PLACES) readonly buffer place_block { uint hit_places[]; };
+layout(std430, binding = BIND_RADIANCE) writeonly buffer radiance_block { vec4 radiance[]; };
+
+void main()
+{
+    uint k = item_index();
+    if (k >= ray_count || hit_places[k] != HIT_PLACE_NONE)
+        return;
+    path p = paths[k];
+    bool seen = (p.flags & PATH_STRAIGHT) != 0u && frame.environment_kind != ENVIRONMENT_NONE;
+    // Pixels beyond the picture's edge have no weight.
+    radiance[k] = vec4(vec3(p.weight_r, p.weight_g, p.weight_b) * environment_radiance(rays[k].direction_t_max.xyz),
+                       seen ? p.weight_r : 0.0);
+}

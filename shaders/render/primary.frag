@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// Which primitive a pixel sees: its instance + 1 and its scene-wide number. PRIMITIVE_KIND as in primary.vert;
+// HAS_CUTOUT: it may have holes.
+
+#include "shared/path.h"
+#include "common/camera.glsl"
+#include "render/primary_hit.glsl"
+
+uniform uint instance_index;
+uniform uint first_primitive;
+
+layout(location = 0) out uvec2 visible;
+
+#if PRIMITIVE_KIND == 1
+// As clip_from_world_point() has it.
+float depth_of(float distance_, vec3 direction)
+{
+    vec3 axis = world_from_view_vector(vec3(0.0, 0.0, -1.0));
+    float along = distance_ * dot(direction, axis), near = frame.extent_near.z;
+    if (frame.extent_near.w != 0.0)
+        return (frame.jitter_pixel.z - along) / (frame.jitter_pixel.z - near);
+    return near / along;
+}
+#endif
+
+void main()
+{
+    vec3 origin, direction;
+    float t_min;
+    camera_ray(uvec2(gl_FragCoord.xy), origin, direction, t_min);
+#if PRIMITIVE_KIND == 0
+    uint primitive = first_primitive + uint(gl_PrimitiveID);
+#ifdef HAS_CUTOUT
+    if (is_cut_out(candidate_triangle(instance_index, primitive, origin, direction), origin, direction))
+        discard;
+#endif
+    visible = uvec2(instance_index + 1u, primitive);
+#elif PRIMITIVE_KIND == 1
+    uint primitive = first_primitive + uint(gl_PrimitiveID) / 12u;
+    candidate found = candidate_sphere(instance_index, primitive, origin, direction, t_min);
+    if (found.distance < 0.0)
+        discard;
+    gl_FragDepth = depth_of(found.distance, direction);
+    visible = uvec2(instance_index + 1u, primitive);
+#else
+    uint primitive = first_primitive + uint(gl_PrimitiveID) / 2u;
+    candidate found = candidate_disc(primitive, origin, direction);
+    vec3 from_centre = origin + found.distance * direction - discs[primitive].centre_radius.xyz;
+    float radius = discs[primitive].centre_radius.w;
+    if (dot(from_centre, from_centre) > radius * radius || is_cut_out(found, origin, direction))
+        discard;
+    visible = uvec2(VISIBLE_DISC, primitive);
+#endif
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// Fills the hits of a slice whose primitives the rasteriser found (primary.comp has noted them).
+// Defines: those of render/primary_hit.glsl.
+
+#include "shared/path.h"
+#include "shared/ray.h"
+#include "shared/hit.h"
+#include "common/dispatch.glsl"
+#include "render/primary_hit.glsl"
+
+layout(local_size_x = 64) in;
+
+uniform uint hit_count;
+
+layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
+layout(std430, binding = BIND_HITS) buffer hit_block { hit hits[]; };
+layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
+
+void main()
+{
+    uint j = item_index();
+    if (j >= hit_count)
+        return;
+    uint k = hit_list[j], instance_index = hits[k].instance, primitive = hits[k].primitive;
+    vec3 origin = rays[k].origin_t_min.xyz, direction = rays[k].direction_t_max.xyz;
+    candidate found;
+    if (instance_index == HIT_NO_PRIMITIVE)
+        found = candidate_disc(primitive, origin, direction);
+#ifdef HAS_SPHERES
+    else if (geometries[instances[instance_index].geometry].kind == GEOMETRY_SPHERES)
+        found = candidate_sphere(instance_index, primitive, origin, direction, rays[k].origin_t_min.w);
+#endif
+    else
+        found = candidate_triangle(instance_index, primitive, origin, direction);
+    // Two compilations of one test may round apart at a rim: a hit stays a hit.
+    found.distance = max(found.distance, rays[k].origin_t_min.w);
+    hits[k] = surface_of(found, origin, direction);
+}

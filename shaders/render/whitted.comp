@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: MIT
+// What each hit of a wave sends towards the eye, and the rays that it asks for.
+//
+//   radiance    emission, and a constant ambient term in Whitted's sense: the environment's irradiance, not
+//               shadowed but for the occlusion texture
+//   shadow rays one to every light, with the light that arrives if nothing is in the way (Lambert + GGX)
+//   children    straight on (alpha blending), mirrored, refracted
+//
+// A dielectric reflects by Fresnel's equations, a metal by Schlick's approximation. A rough surface has no one
+// mirror direction, and one ray cannot blur: as the roughness grows, its mirror ray is faded out and what it
+// carried is replaced by the irradiance about that direction, and Fresnel's rise at grazing angles is faded out
+// too. What is reflected, refracted and scattered never adds up to more than what arrives.
+//
+// Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl.
+//
+// Lights beyond the first batch come in further passes with first_light > 0, which make shadow rays alone.
+
+#include "shared/path.h"
+#include "shared/ray.h"
+#include "common/dispatch.glsl"
+#include "common/brdf.glsl"
+#include "common/environment.glsl"
+#include "common/light.glsl"
+#include "common/material.glsl"
+#include "common/rng.glsl"
+
+layout(local_size_x = 64) in;
+
+uniform uint hit_count;
+uniform uint first_slot; // of the slice
+uniform uint first_light, batch_lights;
+uniform uint wave_number;
+uniform uint last_wave;  // 1: no children
+
+layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
+layout(std430, binding = BIND_HITS) readonly buffer hit_block { hit hits[]; };
+layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
+layout(std430, binding = BIND_PATHS) readonly buffer path_block { path paths[]; };
+layout(std430, binding = BIND_RADIANCE) writeonly buffer radiance_block { vec4 radiance[]; };
+layout(std430, binding = BIND_CHILDREN) writeonly buffer child_block { child children[]; };
+layout(std430, binding = BIND_CHILD_COUNTS) buffer count_block { uint child_counts[]; };
+layout(std430, binding = BIND_SHADOW_RAYS) writeonly buffer shadow_block { ray shadow_rays[]; };
+layout(std430, binding = BIND_LIGHT_SAMPLES) writeonly buffer sample_block { vec4 light_samples[]; };
+
+// A path that carries less than this to its pixel ends: a third of a step of an 8-bit picture.
+const float WEIGHT_MIN = 1.0 / 1024.0;
+// Roughness at which the mirror ray begins to fade and at which it is gone.
+const float MIRROR_ROUGHNESS_SHARP = 0.1, MIRROR_ROUGHNESS_GONE = 0.5;
+// Rays start this share of their place's coordinates (and of the way to it) off the surface: some hundred times
+// what rounding may be off.
+const float OFFSET = 1.0 / 65536.0;
+const float FAR = 1e30;
+
+// How a surface splits what arrives along the view.
+struct split {
+    vec3 mirror;      // Fresnel reflectance
+    vec3 scattered;   // Lambert's albedo times what is not mirrored
+    vec3 refracted;
+    float mirror_ray; // share of `mirror` that the mirror ray carries; the rest is blurred
+};
+
+split split_light(surface s, float NoV)
+{
+    float through = s.transmission * (1.0 - s.metallic);
+    bool leaves = s.inside && s.transmission > 0.0;
+    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
+    float smooth_dielectric = fresnel_dielectric(NoV, leaves ? 1.0 / s.ior : s.ior);
+    // Total reflection is no matter of roughness, and glass is refracted sharply anyhow.
+    float dielectric = mix(smooth_dielectric, min(f0, smooth_dielectric), s.roughness * (1.0 - s.transmission));
+    vec3 metal = mix(fresnel_schlick(s.base, NoV), s.base, s.roughness);
+    split result;
+    result.mirror = mix(vec3(dielectric), metal, s.metallic);
+    vec3 rest = s.base * ((1.0 - dielectric) * (1.0 - s.metallic));
+    result.scattered = rest * (1.0 - s.transmission);
+    // Glass is tinted once, where light enters it.
+    result.refracted = leaves ? vec3((1.0 - dielectric) * through) : rest * s.transmission;
+    result.mirror_ray = leaves ? 1.0 : 1.0 - smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
+    return result;
+}
+
+// The mirrored direction; about the geometric normal where the shading normal would send it into the surface.
+vec3 mirror_direction(surface s, vec3 direction)
+{
+    vec3 mirrored = reflect(direction, s.normal);
+    return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
+}
+
+uint child_count = 0u;
+
+void add_child(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
+{
+    uint bounces = (parent.flags & PATH_BOUNCES_MASK) + (straight ? 0u : 1u);
+    // not >=: what is not a number ends here as well
+    if (!(greatest(weight) >= WEIGHT_MIN) || last_wave != 0u || bounces > frame.depth)
+        return;
+    float offset = OFFSET * max(greatest(abs(s.position)), distance_);
+    vec3 side = dot(direction, s.geometric) > 0.0 ? s.geometric : -s.geometric;
+    child c;
+    c.origin_t_min = vec4(s.position + offset * side, 0.0);
+    c.direction_t_max = vec4(direction, FAR);
+    c.weight_r = weight.r;
+    c.weight_g = weight.g;
+    c.weight_b = weight.b;
+    c.pixel = parent.pixel;
+    c.cone_width = parent.cone_width + parent.cone_spread * distance_;
+    c.cone_spread = parent.cone_spread;
+    c.flags = bounces | (straight ? parent.flags & PATH_STRAIGHT : 0u);
+    c.pad = 0u;
+    children[j * CHILDREN_MAX + child_count] = c;
+    child_count++;
+}
+
+// Light of one lamp that the surface sends along the view, unshadowed; Cook and Torrance 1981 with GGX.
+vec3 reflected_light(surface s, vec3 view, float NoV, light_sample lamp)
+{
+    float NoL = dot(s.normal, lamp.direction);
+    if (NoL <= 0.0 || dot(s.geometric, lamp.direction) <= 0.0)
+        return vec3(0.0);
+    vec3 half_way = normalize(view + lamp.direction);
+    float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), VoH = clamp(dot(view, half_way), 0.0, 1.0);
+    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
+    vec3 dielectric = fresnel_schlick(vec3(f0), VoH);
+    vec3 mirror = mix(dielectric, fresnel_schlick(s.base, VoH), s.metallic);
+    vec3 scattered = s.base * (1.0 - dielectric) * ((1.0 - s.metallic) * (1.0 - s.transmission));
+    float alpha = square(max(s.roughness, ROUGHNESS_MIN_LIGHT));
+    vec3 specular = mirror * (D_GGX(NoH, alpha) * V_SmithGGXCorrelated(NoV, NoL, alpha));
+    return (scattered * INVERSE_PI + specular) * lamp.irradiance * NoL;
+}
+
+void no_shadow_ray(uint place)
+{
+    shadow_rays[place] = ray(vec4(0.0), vec4(0.0, 0.0, 1.0, -1.0));
+    light_samples[place] = vec4(0.0); // a dead ray meets nothing, and so lets everything through
+}
+
+// Returns how many of the batch's shadow rays are alive.
+uint ask_for_lights(uint j, path parent, surface s, vec3 view, float NoV, vec3 weight, float distance_)
+{
+    uvec2 pixel = pixel_of_slot(first_slot + parent.pixel);
+    float offset = OFFSET * max(greatest(abs(s.position)), distance_);
+    vec3 origin = s.position + offset * s.geometric;
+    uint alive = 0u;
+    for (uint i = 0u; i < batch_lights; i++) {
+        uint place = i * hit_count + j, index = first_light + i;
+        vec2 u = vec2(0.5);
+#ifdef HAS_AREA_LIGHTS
+        u = random_pair(pixel.y * frame.width + pixel.x, wave_number << 16 ^ index, frame.seed, frame.sample_index);
+#endif
+        light_sample lamp = light_sample_at(index, origin, u);
+        vec3 arriving = weight * reflected_light(s, view, NoV, lamp);
+        if (!(greatest(arriving) > 0.0)) {
+            no_shadow_ray(place);
+            continue;
+        }
+        // Short of the lamp, as a model may have a surface just there.
+        shadow_rays[place] = ray(vec4(origin, 0.0), vec4(lamp.direction, lamp.distance_ * (1.0 - 4.0 * OFFSET)));
+        light_samples[place] = vec4(arriving, 0.0);
+        alive++;
+    }
+    return alive;
+}
+
+void no_lights(uint j)
+{
+    for (uint i = 0u; i < batch_lights; i++)
+        no_shadow_ray(i * hit_count + j);
+}
+
+vec3 shade(uint j, path p, surface s, ray r, float distance_, vec3 weight, float NoV)
+{
+    vec3 direction = r.direction_t_max.xyz;
+    if (s.unlit)
+        return weight * s.base;
+    split parts = split_light(s, NoV);
+    vec3 mirrored = mirror_direction(s, direction);
+    add_child(j, p, s, distance_, mirrored, weight * parts.mirror * parts.mirror_ray, false);
+    vec3 bent = refract(direction, s.normal, s.inside ? s.ior : 1.0 / s.ior);
+    if (dot(bent, s.geometric) < 0.0) // not so where it is totally reflected
+        add_child(j, p, s, distance_, bent, weight * parts.refracted, false);
+    vec3 ambient = parts.scattered * environment_irradiance(s.normal) +
+                   parts.mirror * (1.0 - parts.mirror_ray) * environment_irradiance(mirrored);
+    return weight * (s.emission + s.occlusion * ambient);
+}
+
+void main()
+{
+    uint j = item_index();
+    if (j >= hit_count)
+        return;
+    uint k = hit_list[j];
+    path p = paths[k];
+    vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
+    ray r = rays[k];
+    hit h = hits[k];
+    bool first = first_light == 0u;
+    surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, p.cone_width + p.cone_spread * h.distance);
+    vec3 view = -r.direction_t_max.xyz;
+    float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
+    if (first) {
+        float seen = (p.flags & PATH_STRAIGHT) != 0u ? p.weight_r * s.alpha : 0.0;
+        if (s.alpha < 1.0)
+            add_child(j, p, s, h.distance, r.direction_t_max.xyz, weight * (1.0 - s.alpha), true);
+        radiance[k] = vec4(shade(j, p, s, r, h.distance, weight * s.alpha, NoV), seen);
+    }
+    uint shadows = 0u;
+    if (s.unlit || s.alpha <= 0.0 || (s.inside && s.transmission > 0.0))
+        no_lights(j);
+    else
+        shadows = ask_for_lights(j, p, s, view, NoV, weight * s.alpha, h.distance);
+    child_counts[j] = (first ? child_count : child_counts[j]) + (shadows << 2);
+}

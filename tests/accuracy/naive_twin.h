@@ -1,0 +1,383 @@
+/* SPDX-License-Identifier: MIT */
+/* The naive tracer a second time, in C and in double, from the scene and not from its copy on the device.
+ * As simple as can be: what it says is what the tracers are compared with. Small scenes only. */
+#ifndef FARLIGHT_TESTS_NAIVE_TWIN_H
+#define FARLIGHT_TESTS_NAIVE_TWIN_H
+
+#include "scene/scene.h"
+#include "shared/ray.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define TWIN_PI 3.14159265358979323846
+
+struct twin_hit {
+    double distance; /* < 0: a miss */
+    double normal_geometric[3], normal_shading[3];
+    double uv[2];
+    double colour[4];  /* of the vertices */
+    uint32_t material; /* id; 0: the default */
+    uint32_t node;     /* 0: a disc */
+    bool back_face;
+};
+
+/* One surface that the ray's line crosses. */
+struct twin_crossing {
+    struct twin_hit hit;
+    double alpha; /* of base colour, texture and vertices */
+    double transmittance[3];
+    bool cut_out;
+};
+
+struct twin {
+    const struct scene *scene;
+    struct scene_instance *instances[2]; /* of meshes, of spheres */
+    size_t instance_counts[2];
+};
+
+/* What a walk over everything gathers. */
+struct twin_walk {
+    const struct twin *twin;
+    double origin[3], direction[3], t_min, t_max;
+    struct twin_hit closest;
+    double second_distance; /* of what is there behind (or just before) the closest */
+    double transmittance[3];
+    /* Some test was so close (to an edge, to the ray's ends, to the cutoff) that a float may decide it the other
+     * way. */
+    bool close_call;
+};
+
+static inline void twin_init(struct twin *twin, const struct scene *scene)
+{
+    twin->scene = scene;
+    if (!scene_flatten(scene, NODE_MESH, &twin->instances[0], &twin->instance_counts[0]) ||
+        !scene_flatten(scene, NODE_SPHERES, &twin->instances[1], &twin->instance_counts[1]))
+        exit(1);
+}
+
+static inline void twin_finish(struct twin *twin)
+{
+    free(twin->instances[0]);
+    free(twin->instances[1]);
+}
+
+static inline double twin_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline void twin_cross(double out[3], const double a[3], const double b[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static inline void twin_normalize(double v[3])
+{
+    double length = sqrt(twin_dot(v, v));
+    for (int k = 0; k < 3; k++)
+        v[k] /= length;
+}
+
+static inline void twin_transform(double out[3], const float m[12], const double v[3], double w)
+{
+    for (int row = 0; row < 3; row++)
+        out[row] = m[4 * row] * v[0] + m[4 * row + 1] * v[1] + m[4 * row + 2] * v[2] + m[4 * row + 3] * w;
+}
+
+/* Normals go by the transposed inverse. */
+static inline void twin_normal_to_world(double normal[3], const float object_from_world[12])
+{
+    double out[3];
+    for (int k = 0; k < 3; k++)
+        out[k] = object_from_world[k] * normal[0] + object_from_world[4 + k] * normal[1] +
+                 object_from_world[8 + k] * normal[2];
+    twin_normalize(out);
+    memcpy(normal, out, sizeof(out));
+}
+
+static inline int twin_wrap(long i, int size, enum scene_wrap wrap)
+{
+    if (wrap == WRAP_CLAMP)
+        return i < 0 ? 0 : i >= size ? size - 1 : (int)i;
+    long period = wrap == WRAP_MIRROR ? 2 * size : size;
+    i = ((i % period) + period) % period;
+    return (int)(i < size ? i : period - 1 - i);
+}
+
+static inline void twin_texel(const struct scene_texture *texture, long x, long y, double out[4])
+{
+    size_t column = (size_t)twin_wrap(x, (int)texture->width, texture->wrap_u);
+    size_t row = (size_t)twin_wrap(y, (int)texture->height, texture->wrap_v);
+    const uint8_t *texel = texture->texels->data + 4 * (row * texture->width + column);
+    for (int k = 0; k < 4; k++) {
+        double c = texel[k] / 255.0;
+        if (texture->format == TEXTURE_RGBA8_SRGB && k < 3)
+            c = c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4);
+        out[k] = c;
+    }
+}
+
+static inline bool twin_sample(const struct scene *scene, const struct texture_use *use, const double uv[2],
+                               double out[4])
+{
+    const struct scene_texture *texture = use->texture ? scene_texture(scene, use->texture) : NULL;
+    if (!texture)
+        return false;
+    const float *m = use->uv_transform;
+    double x = (m[0] * uv[0] + m[1] * uv[1] + m[2]) * texture->width - 0.5;
+    double y = (m[3] * uv[0] + m[4] * uv[1] + m[5]) * texture->height - 0.5;
+    double wx = x - floor(x), wy = y - floor(y);
+    memset(out, 0, 4 * sizeof(*out));
+    for (int corner = 0; corner < 4; corner++) {
+        double texel[4];
+        double weight = (corner & 1 ? wx : 1 - wx) * (corner & 2 ? wy : 1 - wy);
+        twin_texel(texture, (long)floor(x) + (corner & 1), (long)floor(y) + (corner >> 1), texel);
+        for (int k = 0; k < 4; k++)
+            out[k] += weight * texel[k];
+    }
+    return true;
+}
+
+/* Alpha, tint and cutout of a surface, from its material. */
+static inline void twin_material(struct twin_walk *walk, struct twin_crossing *crossing)
+{
+    const struct scene *scene = walk->twin->scene;
+    const struct scene_material *material = scene_material(scene, crossing->hit.material);
+    memset(crossing->transmittance, 0, sizeof(crossing->transmittance));
+    crossing->cut_out = false;
+    if (!material)
+        return;
+    double colour[4], texel[4];
+    for (int k = 0; k < 4; k++)
+        colour[k] = material->base_colour[k] * crossing->hit.colour[k];
+    if (twin_sample(scene, &material->textures[MATERIAL_BASE_COLOUR], crossing->hit.uv, texel))
+        for (int k = 0; k < 4; k++)
+            colour[k] *= texel[k];
+    crossing->alpha = colour[3];
+    if (material->alpha_mode == ALPHA_MASK) {
+        crossing->cut_out = colour[3] < material->alpha_cutoff;
+        walk->close_call |= fabs(colour[3] - material->alpha_cutoff) < 1e-3;
+    }
+    double transmission = material->transmission * (1 - material->metallic);
+    if (twin_sample(scene, &material->textures[MATERIAL_TRANSMISSION], crossing->hit.uv, texel))
+        transmission *= texel[0];
+    for (int k = 0; k < 3; k++) {
+        double through = transmission * colour[k];
+        crossing->transmittance[k] =
+            material->alpha_mode == ALPHA_BLEND ? 1 - colour[3] + colour[3] * through : through;
+        if (crossing->cut_out)
+            crossing->transmittance[k] = 1;
+    }
+}
+
+static inline void twin_cross_surface(struct twin_walk *walk, struct twin_crossing *crossing)
+{
+    struct twin_hit *hit = &crossing->hit;
+    /* Around the ray's ends a float may fall on either side. */
+    walk->close_call |= fabs(hit->distance - walk->t_min) < 1e-4 * (1 + fabs(walk->t_min));
+    walk->close_call |= fabs(hit->distance - walk->t_max) < 1e-4 * (1 + fabs(walk->t_max));
+    if (!(hit->distance > walk->t_min && hit->distance < walk->t_max))
+        return;
+    twin_material(walk, crossing);
+    for (int k = 0; k < 3; k++)
+        walk->transmittance[k] *= crossing->transmittance[k];
+    if (crossing->cut_out)
+        return;
+    hit->back_face = twin_dot(walk->direction, hit->normal_geometric) > 0;
+    if (walk->closest.distance < 0 || hit->distance < walk->closest.distance) {
+        if (walk->closest.distance >= 0)
+            walk->second_distance = walk->closest.distance;
+        walk->closest = *hit;
+    } else if (hit->distance < walk->second_distance) {
+        walk->second_distance = hit->distance;
+    }
+}
+
+static inline uint32_t twin_range_material(const struct material_range *ranges, uint32_t count, uint32_t primitive)
+{
+    for (uint32_t i = 0; i < count; i++)
+        if (primitive >= ranges[i].first && primitive - ranges[i].first < ranges[i].count)
+            return ranges[i].material;
+    return 0;
+}
+
+static inline void twin_vertex(const struct scene_mesh *mesh, enum mesh_array array, uint32_t vertex,
+                               int components, double *out)
+{
+    const float *data = (const float *)(const void *)mesh->arrays[array]->data;
+    for (int k = 0; k < components; k++)
+        out[k] = (double)data[(size_t)vertex * (size_t)components + (size_t)k];
+}
+
+/* Attributes of a point in a triangle. */
+static inline void twin_attributes(const struct scene_mesh *mesh, const uint32_t index[3], const double weight[3],
+                                   const float object_from_world[12], struct twin_hit *hit)
+{
+    memcpy(hit->normal_shading, hit->normal_geometric, sizeof(hit->normal_shading));
+    for (int k = 0; k < 4; k++)
+        hit->colour[k] = mesh->arrays[MESH_COLOURS] ? 0 : 1;
+    if (mesh->arrays[MESH_NORMALS]) {
+        double normal[3] = {0}, one[3];
+        for (int v = 0; v < 3; v++) {
+            twin_vertex(mesh, MESH_NORMALS, index[v], 3, one);
+            for (int k = 0; k < 3; k++)
+                normal[k] += weight[v] * one[k];
+        }
+        twin_normal_to_world(normal, object_from_world);
+        double cosine = twin_dot(normal, hit->normal_geometric);
+        for (int k = 0; k < 3; k++)
+            hit->normal_shading[k] = normal[k] - (cosine < 0 ? 2 * cosine * hit->normal_geometric[k] : 0);
+    }
+    for (int v = 0; v < 3; v++) {
+        double one[2] = {0};
+        if (mesh->arrays[MESH_TEXCOORDS_0])
+            twin_vertex(mesh, MESH_TEXCOORDS_0, index[v], 2, one);
+        for (int k = 0; k < 2; k++)
+            hit->uv[k] += weight[v] * one[k];
+        for (int k = 0; k < 4 && mesh->arrays[MESH_COLOURS]; k++)
+            hit->colour[k] +=
+                weight[v] * mesh->arrays[MESH_COLOURS]->data[4 * (size_t)index[v] + (size_t)k] / 255.0;
+    }
+}
+
+static inline void twin_triangle(struct twin_walk *walk, const struct scene_instance *instance,
+                                 const struct scene_mesh *mesh, uint32_t primitive)
+{
+    const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
+    uint32_t index[3] = {indices[3 * (size_t)primitive], indices[3 * (size_t)primitive + 1],
+                         indices[3 * (size_t)primitive + 2]};
+    double corner[3][3], corner_world[3][3], e1[3], e2[3], from[3], p[3], q[3];
+    for (int v = 0; v < 3; v++) {
+        twin_vertex(mesh, MESH_POSITIONS, index[v], 3, corner[v]);
+        twin_transform(corner_world[v], instance->world_from_object, corner[v], 1);
+    }
+    /* In world space, and by another method than the shaders': Moeller and Trumbore's. */
+    for (int k = 0; k < 3; k++) {
+        e1[k] = corner_world[1][k] - corner_world[0][k];
+        e2[k] = corner_world[2][k] - corner_world[0][k];
+        from[k] = walk->origin[k] - corner_world[0][k];
+    }
+    twin_cross(p, walk->direction, e2);
+    twin_cross(q, from, e1);
+    double determinant = twin_dot(e1, p);
+    if (determinant == 0)
+        return;
+    double u = twin_dot(from, p) / determinant, v = twin_dot(walk->direction, q) / determinant;
+    double inside = fmin(fmin(u, v), 1 - u - v);
+    double slope =
+        fabs(determinant) / sqrt(twin_dot(e1, e1) * twin_dot(e2, e2) * twin_dot(walk->direction, walk->direction));
+    double distance = twin_dot(e2, q) / determinant;
+    /* Nearly on edge, everything is a close call. */
+    walk->close_call |= fabs(inside) < 1e-4 || (slope < 1e-3 && inside > -1);
+    if (inside < 0)
+        return;
+    struct twin_crossing crossing = {.hit = {.distance = distance, .node = instance->node->base.id}};
+    double a[3], b[3];
+    for (int k = 0; k < 3; k++) {
+        a[k] = corner[1][k] - corner[0][k];
+        b[k] = corner[2][k] - corner[0][k];
+    }
+    twin_cross(crossing.hit.normal_geometric, a, b);
+    twin_normal_to_world(crossing.hit.normal_geometric, instance->object_from_world);
+    twin_attributes(mesh, index, (const double[3]){1 - u - v, u, v}, instance->object_from_world, &crossing.hit);
+    crossing.hit.material = twin_range_material(mesh->ranges, mesh->range_count, primitive);
+    twin_cross_surface(walk, &crossing);
+}
+
+static inline void twin_sphere(struct twin_walk *walk, const struct scene_instance *instance,
+                               const struct scene_spheres *set, uint32_t primitive)
+{
+    const float *sphere = (const float *)(const void *)set->centres_radii->data + 4 * (size_t)primitive;
+    double origin[3], direction[3], from[3];
+    twin_transform(origin, instance->object_from_world, walk->origin, 1);
+    twin_transform(direction, instance->object_from_world, walk->direction, 0);
+    for (int k = 0; k < 3; k++)
+        from[k] = origin[k] - sphere[k];
+    double a = twin_dot(direction, direction), b = twin_dot(from, direction);
+    double c = twin_dot(from, from) - (double)sphere[3] * sphere[3];
+    double discriminant = b * b - a * c;
+    walk->close_call |= fabs(discriminant) < 1e-3 * a * sphere[3] * sphere[3];
+    if (discriminant < 0)
+        return;
+    for (int side = -1; side <= 1; side += 2) {
+        struct twin_crossing crossing = {.hit = {.node = instance->node->base.id, .colour = {1, 1, 1, 1}}};
+        struct twin_hit *hit = &crossing.hit;
+        hit->distance = (-b + side * sqrt(discriminant)) / a;
+        for (int k = 0; k < 3; k++)
+            hit->normal_geometric[k] = (from[k] + hit->distance * direction[k]) / sphere[3];
+        hit->uv[0] = 0.5 + atan2(hit->normal_geometric[0], hit->normal_geometric[2]) / (2 * TWIN_PI);
+        hit->uv[1] = acos(fmax(-1, fmin(1, hit->normal_geometric[1]))) / TWIN_PI;
+        twin_normal_to_world(hit->normal_geometric, instance->object_from_world);
+        memcpy(hit->normal_shading, hit->normal_geometric, sizeof(hit->normal_shading));
+        hit->material = twin_range_material(set->ranges, set->range_count, primitive);
+        twin_cross_surface(walk, &crossing);
+    }
+}
+
+static inline void twin_discs(struct twin_walk *walk)
+{
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    while (hashmap_next(&walk->twin->scene->objects[SCENE_DISC], &cursor, &id, &value)) {
+        const struct scene_disc *disc = value;
+        struct twin_crossing crossing = {.hit = {.material = disc->material, .colour = {1, 1, 1, 1}}};
+        double slope = 0, height = 0, squared = 0;
+        for (int k = 0; k < 3; k++) {
+            crossing.hit.normal_geometric[k] = crossing.hit.normal_shading[k] = disc->normal_world[k];
+            slope += disc->normal_world[k] * walk->direction[k];
+            height += disc->normal_world[k] * (disc->centre_world[k] - walk->origin[k]);
+        }
+        crossing.hit.distance = height / slope;
+        for (int k = 0; k < 3; k++) {
+            double d = walk->origin[k] + crossing.hit.distance * walk->direction[k] - disc->centre_world[k];
+            squared += d * d;
+        }
+        double radius = sqrt(squared) / disc->radius;
+        walk->close_call |= fabs(radius - 1) < 1e-3;
+        if (slope != 0 && radius <= 1)
+            twin_cross_surface(walk, &crossing);
+    }
+}
+
+/* All that lies on the ray. A dead ray (t_max <= t_min) finds nothing. */
+static inline void twin_trace(struct twin_walk *walk, const struct twin *twin, const struct ray *ray)
+{
+    *walk = (struct twin_walk){.twin = twin,
+                               .t_min = ray->origin_t_min[3],
+                               .t_max = ray->direction_t_max[3],
+                               .closest = {.distance = -1},
+                               .second_distance = INFINITY,
+                               .transmittance = {1, 1, 1}};
+    for (int k = 0; k < 3; k++) {
+        walk->origin[k] = ray->origin_t_min[k];
+        walk->direction[k] = ray->direction_t_max[k];
+    }
+    if (walk->t_max <= walk->t_min)
+        return;
+    for (int kind = 0; kind < 2; kind++) {
+        for (size_t i = 0; i < twin->instance_counts[kind]; i++) {
+            const struct scene_instance *instance = &twin->instances[kind][i];
+            const struct scene_mesh *mesh = kind == 0 ? scene_mesh(twin->scene, instance->node->object) : NULL;
+            const struct scene_spheres *set =
+                kind == 1 ? scene_spheres(twin->scene, instance->node->object) : NULL;
+            if (instance->singular)
+                continue;
+            for (uint32_t p = 0; mesh && p < mesh->triangle_count; p++)
+                twin_triangle(walk, instance, mesh, p);
+            for (uint32_t p = 0; set && p < set->sphere_count; p++)
+                twin_sphere(walk, instance, set, p);
+        }
+    }
+    twin_discs(walk);
+    /* Two surfaces in one place: either may win. */
+    if (walk->closest.distance >= 0)
+        walk->close_call |= walk->second_distance - walk->closest.distance < 1e-4 * (1 + walk->closest.distance);
+}
+
+#endif

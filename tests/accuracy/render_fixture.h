@@ -1,0 +1,245 @@
+/* SPDX-License-Identifier: MIT */
+/* Small scenes and pictures of them, for the tests of the renderer. */
+#ifndef FARLIGHT_TESTS_RENDER_FIXTURE_H
+#define FARLIGHT_TESTS_RENDER_FIXTURE_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "base/blob.h"
+#include "gpu/device.h"
+#include "render/frame.h"
+#include "scene/scene.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define FIXTURE_EDITS_MAX 128
+#define TRACER_NAIVE 1 /* the protocol's number */
+
+/* Objects get the numbers 1, 2, .. in the order in which they are added. */
+struct fixture {
+    struct gpu_device *device;
+    struct frame_renderer *renderer;
+    struct scene *scene;
+    struct scene_edit edits[FIXTURE_EDITS_MAX];
+    size_t edit_count;
+    uint32_t next_id;
+    struct frame_request request; /* 32x32, one sample, naive, raster, linear floats; from (0,0,5) to the origin */
+};
+
+static inline struct scene_edit *fixture_edit(struct fixture *fixture, enum scene_object_kind object)
+{
+    assert_true(fixture->edit_count < FIXTURE_EDITS_MAX);
+    struct scene_edit *edit = &fixture->edits[fixture->edit_count++];
+    *edit = (struct scene_edit){.kind = EDIT_SET, .object = object};
+    return edit;
+}
+
+static inline struct blob *fixture_blob(const void *data, size_t size_bytes)
+{
+    struct blob *blob = blob_create(size_bytes);
+    assert_non_null(blob);
+    memcpy(blob->data, data, size_bytes);
+    return blob;
+}
+
+static inline void fixture_look(struct fixture *fixture, float x, float y, float z, float fov_y)
+{
+    const float eye[3] = {x, y, z}, target[3] = {0.0f, 0.0f, 0.0f};
+    const float up[3] = {0.0f, x == 0.0f && z == 0.0f ? 0.0f : 1.0f, x == 0.0f && z == 0.0f ? -1.0f : 0.0f};
+    assert_true(frame_camera_look_at(&fixture->request.camera, eye, target, up, fov_y));
+}
+
+static inline int fixture_setup(void **state)
+{
+    struct fixture *fixture = calloc(1, sizeof(*fixture));
+    struct error error = {0};
+    assert_non_null(fixture);
+    fixture->device = gpu_device_create(&(struct gpu_options){.index = -1, .debug = true}, &error);
+    if (!fixture->device) {
+        print_message("no device: %s\n", error.text);
+        return -1;
+    }
+    fixture->renderer = frame_renderer_create(fixture->device, &error);
+    assert_non_null(fixture->renderer);
+    *state = fixture;
+    return 0;
+}
+
+static inline int fixture_teardown(void **state)
+{
+    struct fixture *fixture = *state;
+    scene_destroy(fixture->scene);
+    frame_renderer_destroy(fixture->renderer);
+    gpu_device_destroy(fixture->device);
+    free(fixture);
+    return 0;
+}
+
+/* An empty scene and the default request; before each test. */
+static inline int fixture_clear(void **state)
+{
+    struct fixture *fixture = *state;
+    struct error error = {0};
+    scene_destroy(fixture->scene);
+    frame_renderer_destroy(fixture->renderer); /* what it keeps belongs to one scene */
+    fixture->renderer = frame_renderer_create(fixture->device, &error);
+    fixture->scene = scene_create("test", &(struct scene_limits){1u << 30, 100000});
+    assert_non_null(fixture->renderer);
+    assert_non_null(fixture->scene);
+    fixture->edit_count = 0;
+    fixture->next_id = 1;
+    fixture->request = (struct frame_request){
+        .width = 32, .height = 32, .samples = 1, .depth = 4, .tracer = TRACER_NAIVE, .format = FRAME_RGBA32F};
+    fixture_look(fixture, 0.0f, 0.0f, 5.0f, 0.6f);
+    return 0;
+}
+
+static inline uint32_t fixture_node(struct fixture *fixture, enum scene_node_kind kind, uint32_t object,
+                                    const float parent_from_node[12])
+{
+    static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    struct scene_node *node = &fixture_edit(fixture, SCENE_NODE)->set.node;
+    node->base.id = fixture->next_id++;
+    node->kind = kind;
+    node->object = object;
+    memcpy(node->parent_from_node, parent_from_node ? parent_from_node : identity, sizeof(identity));
+    return node->base.id;
+}
+
+/* White, Lambert and nothing else (an index of refraction of 1 reflects nothing); change the rest yourself. */
+static inline struct scene_material *fixture_material(struct fixture *fixture)
+{
+    struct scene_material *material = &fixture_edit(fixture, SCENE_MATERIAL)->set.material;
+    material->base.id = fixture->next_id++;
+    for (int i = 0; i < 4; i++)
+        material->base_colour[i] = 1.0f;
+    material->roughness = 1.0f;
+    material->ior = 1.0f;
+    material->alpha_cutoff = 0.5f;
+    return material;
+}
+
+static inline void fixture_sphere(struct fixture *fixture, float x, float y, float z, float radius,
+                                  uint32_t material)
+{
+    const float centre_radius[4] = {x, y, z, radius};
+    struct scene_spheres *spheres = &fixture_edit(fixture, SCENE_SPHERES)->set.spheres;
+    spheres->base.id = fixture->next_id++;
+    spheres->sphere_count = 1;
+    spheres->centres_radii = fixture_blob(centre_radius, sizeof(centre_radius));
+    spheres->ranges = calloc(1, sizeof(*spheres->ranges));
+    assert_non_null(spheres->ranges);
+    *spheres->ranges = (struct material_range){0, 1, material};
+    spheres->range_count = 1;
+    fixture_node(fixture, NODE_SPHERES, spheres->base.id, NULL);
+}
+
+/* A square in the plane z = 0 of its node, looking along +z; texture coordinates as an image stands on it. */
+static inline struct scene_mesh *fixture_square(struct fixture *fixture, float half, uint32_t material,
+                                                const float parent_from_node[12])
+{
+    const float positions[12] = {-half, -half, 0, half, -half, 0, half, half, 0, -half, half, 0};
+    const float texcoords[8] = {0, 1, 1, 1, 1, 0, 0, 0};
+    const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    struct scene_mesh *mesh = &fixture_edit(fixture, SCENE_MESH)->set.mesh;
+    mesh->base.id = fixture->next_id++;
+    mesh->vertex_count = 4;
+    mesh->triangle_count = 2;
+    mesh->arrays[MESH_POSITIONS] = fixture_blob(positions, sizeof(positions));
+    mesh->arrays[MESH_INDICES] = fixture_blob(indices, sizeof(indices));
+    mesh->arrays[MESH_TEXCOORDS_0] = fixture_blob(texcoords, sizeof(texcoords));
+    mesh->ranges = calloc(1, sizeof(*mesh->ranges));
+    assert_non_null(mesh->ranges);
+    *mesh->ranges = (struct material_range){0, 2, material};
+    mesh->range_count = 1;
+    fixture_node(fixture, NODE_MESH, mesh->base.id, parent_from_node);
+    return mesh;
+}
+
+static inline struct scene_light *fixture_light(struct fixture *fixture, enum scene_light_kind kind, float x,
+                                                float y, float z, float power)
+{
+    /* along -z of the node, as lights shine */
+    const float parent_from_node[12] = {1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z};
+    struct scene_light *light = &fixture_edit(fixture, SCENE_LIGHT)->set.light;
+    light->base.id = fixture->next_id++;
+    light->kind = kind;
+    light->colour[0] = light->colour[1] = light->colour[2] = power;
+    light->outer_cone = 0.5f;
+    light->size[0] = light->size[1] = 0.5f;
+    fixture_node(fixture, NODE_LIGHT, light->base.id, parent_from_node);
+    return light;
+}
+
+static inline void fixture_environment(struct fixture *fixture, float r, float g, float b)
+{
+    struct scene_edit *edit = fixture_edit(fixture, SCENE_NODE);
+    edit->kind = EDIT_SET_ENVIRONMENT;
+    edit->set.environment.colour[0] = r;
+    edit->set.environment.colour[1] = g;
+    edit->set.environment.colour[2] = b;
+}
+
+static inline void fixture_commit(struct fixture *fixture)
+{
+    struct error error = {0};
+    if (!scene_commit(fixture->scene, fixture->edits, fixture->edit_count, &error))
+        fail_msg("commit: %s: %s", error.field, error.text);
+    fixture->edit_count = 0;
+}
+
+/* Commits what waits and renders the request. */
+static inline struct frame_result fixture_render(struct fixture *fixture)
+{
+    struct error error = {0};
+    struct frame_result result = {0};
+    if (fixture->edit_count > 0)
+        fixture_commit(fixture);
+    if (!frame_begin(fixture->renderer, fixture->scene, &fixture->request, &error))
+        fail_msg("frame_begin: %s: %s", error.field, error.text);
+    enum frame_progress progress;
+    do {
+        progress = frame_step(fixture->renderer, &result, &error);
+    } while (progress == FRAME_MORE);
+    if (progress != FRAME_DONE)
+        fail_msg("frame_step: %s: %s", error.field, error.text);
+    return result;
+}
+
+static inline const float *fixture_pixel(const struct frame_result *result, uint32_t x, uint32_t y)
+{
+    return (const float *)(const void *)result->pixels + ((size_t)y * result->width + x) * 4;
+}
+
+#define assert_near(value, expected, tolerance)                                                                   \
+    do {                                                                                                          \
+        double value_ = (double)(value), expected_ = (double)(expected);                                          \
+        if (!(fabs(value_ - expected_) <= (double)(tolerance)))                                                   \
+            fail_msg("%s is %.9g, expected %.9g within %g", #value, value_, expected_, (double)(tolerance));      \
+    } while (0)
+
+/* Writes an RGBA8 picture as a PPM where FARLIGHT_TEST_PICTURES names a folder; for the eye. */
+static inline void fixture_keep(const struct frame_result *result, const char *name)
+{
+    const char *folder = getenv("FARLIGHT_TEST_PICTURES");
+    char path[512];
+    if (!folder || result->format != FRAME_RGBA8)
+        return;
+    snprintf(path, sizeof(path), "%s/%s.ppm", folder, name);
+    FILE *file = fopen(path, "wb");
+    if (!file)
+        return;
+    fprintf(file, "P6\n%u %u\n255\n", result->width, result->height);
+    for (size_t i = 0; i < result->size_bytes; i += 4)
+        fwrite(result->pixels + i, 1, 3, file);
+    fclose(file);
+}
+
+#endif

@@ -1,0 +1,146 @@
+/* SPDX-License-Identifier: MIT */
+/* Shading against what can be computed by hand. */
+#include "render_fixture.h"
+
+#define PI 3.14159265358979
+
+static void point_light_falls_with_the_inverse_square_and_the_cosine(void **state)
+{
+    struct fixture *fixture = *state;
+    const float height = 2.0f, power = 7.0f;
+    fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, height, power);
+    struct frame_result result = fixture_render(fixture);
+    double half = tan(0.3) * 5.0;
+    for (uint32_t x = 0; x < 32; x += 5) {
+        double place_x = ((x + 0.5) / 32 * 2 - 1) * half, place_y = (1 - (16 + 0.5) / 32 * 2) * half;
+        double squared = place_x * place_x + place_y * place_y + height * height;
+        double expected = power / squared * (height / sqrt(squared)) / PI;
+        assert_near(fixture_pixel(&result, x, 16)[0], expected, expected * 1e-3);
+    }
+    frame_result_finish(&result);
+}
+
+static void a_light_beyond_its_range_is_dark(void **state)
+{
+    struct fixture *fixture = *state;
+    fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
+    struct scene_light *light = fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 2.0f, 7.0f);
+    light->range = 1.5f;
+    struct frame_result result = fixture_render(fixture);
+    assert_near(fixture_pixel(&result, 16, 16)[1], 0.0, 0.0);
+    frame_result_finish(&result);
+}
+
+static void directional_light_gives_irradiance_over_pi(void **state)
+{
+    struct fixture *fixture = *state;
+    struct scene_material *material = fixture_material(fixture);
+    material->base_colour[0] = 0.5f;
+    fixture_square(fixture, 10.0f, material->base.id, NULL);
+    fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 3.0f);
+    struct frame_result result = fixture_render(fixture);
+    assert_near(fixture_pixel(&result, 7, 20)[0], 0.5 * 3.0 / PI, 2e-4);
+    assert_near(fixture_pixel(&result, 7, 20)[1], 3.0 / PI, 2e-4);
+    assert_near(fixture_pixel(&result, 7, 20)[3], 1.0, 0.0);
+    frame_result_finish(&result);
+}
+
+static void spot_light_ends_at_its_outer_cone(void **state)
+{
+    struct fixture *fixture = *state;
+    fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
+    struct scene_light *light = fixture_light(fixture, LIGHT_SPOT, 0.0f, 0.0f, 2.0f, 4.0f);
+    light->inner_cone = 0.2f;
+    light->outer_cone = 0.4f;
+    struct frame_result result = fixture_render(fixture);
+    double middle = (0.5 / 16) * tan(0.3) * 5.0, squared = 2 * middle * middle + 4.0;
+    assert_near(fixture_pixel(&result, 16, 16)[0], 4.0 / squared * (2.0 / sqrt(squared)) / PI, 1e-3);
+    /* 1.45 from the axis at the picture's edge: an angle of 0.63 */
+    assert_near(fixture_pixel(&result, 0, 16)[0], 0.0, 0.0);
+    frame_result_finish(&result);
+}
+
+/* The form factor of a point to a parallel rectangle above its corner, four times. */
+static double irradiance_under_square(double half, double height)
+{
+    double a = half / height;
+    double s = a / sqrt(1 + a * a);
+    return 4.0 * s * atan(s);
+}
+
+static void rectangle_light_converges_to_its_form_factor(void **state)
+{
+    struct fixture *fixture = *state;
+    fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
+    struct scene_light *light = fixture_light(fixture, LIGHT_RECTANGLE, 0.0f, 0.0f, 1.5f, 2.0f);
+    light->size[0] = light->size[1] = 1.0f;
+    fixture->request.samples = 256;
+    fixture->request.width = fixture->request.height = 8;
+    fixture->request.camera.fov_y = 0.02f;
+    struct frame_result result = fixture_render(fixture);
+    double expected = 2.0 * irradiance_under_square(0.5, 1.5) / PI;
+    for (uint32_t x = 0; x < 8; x++)
+        assert_near(fixture_pixel(&result, x, 4)[0], expected, expected * 0.01);
+    frame_result_finish(&result);
+}
+
+static void sphere_light_shines_like_its_solid_angle(void **state)
+{
+    struct fixture *fixture = *state;
+    fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
+    struct scene_light *light = fixture_light(fixture, LIGHT_SPHERE, 0.0f, 0.0f, 1.5f, 2.0f);
+    light->size[0] = 0.75f;
+    fixture->request.samples = 256;
+    fixture->request.width = fixture->request.height = 8;
+    fixture->request.camera.fov_y = 0.02f;
+    struct frame_result result = fixture_render(fixture);
+    double expected = 2.0 * PI * 0.25 / PI; /* radiance times pi sin^2 of the half angle */
+    for (uint32_t x = 0; x < 8; x++)
+        assert_near(fixture_pixel(&result, x, 4)[0], expected, expected * 0.01);
+    frame_result_finish(&result);
+}
+
+static void a_sphere_between_light_and_plane_casts_a_shadow(void **state)
+{
+    struct fixture *fixture = *state;
+    uint32_t material = fixture_material(fixture)->base.id;
+    fixture_square(fixture, 10.0f, material, NULL);
+    fixture_sphere(fixture, 3.0f, 0.0f, 2.0f, 0.5f, material);
+    const float towards_light[3] = {3.0f, 0.0f, 4.0f};
+    fixture_light(fixture, LIGHT_POINT, towards_light[0] * 2, towards_light[1], towards_light[2], 20.0f);
+    /* from (6, 0, 4) through (3, 0, 2) to the origin */
+    struct frame_result result = fixture_render(fixture);
+    assert_near(fixture_pixel(&result, 16, 16)[0], 0.0, 0.0);
+    assert_true(fixture_pixel(&result, 16, 1)[0] > 0.01f);
+    frame_result_finish(&result);
+}
+
+static void many_lights_are_shaded_in_batches(void **state)
+{
+    struct fixture *fixture = *state;
+    fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
+    for (int i = 0; i < 23; i++)
+        fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 0.25f);
+    frame_renderer_set_capacity(fixture->renderer, 1024, 1024); /* two lights a batch */
+    struct frame_result result = fixture_render(fixture);
+    assert_near(fixture_pixel(&result, 9, 9)[2], 23 * 0.25 / PI, 1e-3);
+    assert_int_equal(result.shadow_rays, 23 * 32 * 32);
+    frame_result_finish(&result);
+}
+
+int main(void)
+{
+#define TEST(name) cmocka_unit_test_setup(name, fixture_clear)
+    const struct CMUnitTest tests[] = {
+        TEST(point_light_falls_with_the_inverse_square_and_the_cosine),
+        TEST(a_light_beyond_its_range_is_dark),
+        TEST(directional_light_gives_irradiance_over_pi),
+        TEST(spot_light_ends_at_its_outer_cone),
+        TEST(rectangle_light_converges_to_its_form_factor),
+        TEST(sphere_light_shines_like_its_solid_angle),
+        TEST(a_sphere_between_light_and_plane_casts_a_shadow),
+        TEST(many_lights_are_shaded_in_batches),
+    };
+    return cmocka_run_group_tests(tests, fixture_setup, fixture_teardown);
+}
