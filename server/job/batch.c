@@ -1,0 +1,293 @@
+/* SPDX-License-Identifier: MIT */
+/* Batch jobs: every frame of a range, in order, each in slices. */
+#include "job/engine_private.h"
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "job/animation.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Tracer numbers are an enum of the protocol, which grows; this is far above it. */
+#define TRACER_NUMBERS 64
+
+/* ---- start -------------------------------------------------------------------------------------- */
+
+static bool tracer_check(unsigned number, struct error *error)
+{
+    if (tracer_impl_by_number(number))
+        return true;
+    char list[128] = "";
+    size_t used = 0;
+    for (unsigned i = 0; i < TRACER_NUMBERS && used < sizeof list; i++) {
+        const struct tracer_impl *impl = tracer_impl_by_number(i);
+        if (impl)
+            used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", used ? ", " : "", impl->name);
+    }
+    error_set(error, ERROR_UNSUPPORTED, "render.tracer", "this build has no tracer number %u", number);
+    return error_remedy(error, "available: %s", list);
+}
+
+static uint32_t bytes_per_pixel(enum frame_format format)
+{
+    return format == FRAME_RGBA8 ? 4 : format == FRAME_RGBA16F ? 8 : 16;
+}
+
+static bool spec_check(const struct engine_job *spec, const struct scene *scene, struct error *error)
+{
+    if (spec->last_frame < spec->first_frame)
+        return error_set(error, ERROR_INVALID, "render.last_frame", "%u lies before the first frame, %u",
+                         spec->last_frame, spec->first_frame);
+    if (!spec->frame_step)
+        return error_set(error, ERROR_INVALID, "render.frame_step", "0 would render the first frame for ever");
+    if (!spec->frame.width || !spec->frame.height)
+        return error_set(error, ERROR_INVALID, spec->frame.width ? "render.height" : "render.width",
+                         "a picture has at least one pixel");
+    if (!spec->frame.samples)
+        return error_set(error, ERROR_INVALID, "render.samples", "a pixel has at least one sample");
+    if (!encoder_supports(spec->encoding, bytes_per_pixel(spec->frame.format))) {
+        error_set(error, ERROR_UNSUPPORTED, "render.encoding", "encoding %u cannot carry pixels of %u bytes",
+                  (unsigned)spec->encoding, bytes_per_pixel(spec->frame.format));
+        return error_remedy(error, "use the pixel format rgba8, or the encoding zstd or raw");
+    }
+    return tracer_check(spec->frame.tracer, error) && animation_check(spec, scene, error);
+}
+
+static bool jobs_reserve(struct engine *engine)
+{
+    if (engine->job_count < engine->job_capacity)
+        return true;
+    size_t capacity = engine->job_capacity ? engine->job_capacity * 2 : 16;
+    struct job **jobs = realloc(engine->jobs, capacity * sizeof *jobs);
+    if (!jobs)
+        return false;
+    engine->jobs = jobs;
+    engine->job_capacity = capacity;
+    return true;
+}
+
+bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_command *command,
+               struct error *error)
+{
+    if (!spec_check(&command->job, scene->scene, error))
+        return false;
+    struct job *job = calloc(1, sizeof *job);
+    struct job_output *output = job_output_create(&(struct job_output_options){
+        .events = engine->events,
+        .client = command->client,
+        .request = command->request,
+        .window = engine->options.frames_in_flight,
+        .credit = command->job.credit,
+    });
+    if (!job || !output || !jobs_reserve(engine)) {
+        free(job);
+        job_output_unref(output);
+        return error_set(error, ERROR_OUT_OF_MEMORY, "render", "no memory for a job");
+    }
+    job->client = command->client;
+    job->request = command->request;
+    job->spec = command->job;
+    command->job.keys = NULL;
+    job->scene = scene;
+    job->output = output;
+    job->next_frame = job->spec.first_frame;
+    engine->jobs[engine->job_count++] = job;
+    return true;
+}
+
+struct job *job_find(struct engine *engine, uint64_t client, uint32_t request)
+{
+    for (size_t i = 0; i < engine->job_count; i++) {
+        struct job *job = engine->jobs[i];
+        /* The number of a job that has been answered may be in use again already. */
+        if (job->client == client && job->request == request && !job_output_is_closed(job->output))
+            return job;
+    }
+    return NULL;
+}
+
+/* ---- end ---------------------------------------------------------------------------------------- */
+
+static void abandon_frame(struct engine *engine, struct job *job)
+{
+    if (!job->rendering)
+        return;
+    engine->backend->abandon(job->scene->renderer);
+    job->rendering = false;
+    job->scene->frame_of = NULL;
+}
+
+/* The output may outlive the job, with frames that are still encoded or not taken. */
+static void job_remove(struct engine *engine, struct job *job)
+{
+    abandon_frame(engine, job);
+    size_t i = 0;
+    while (engine->jobs[i] != job)
+        i++;
+    memmove(&engine->jobs[i], &engine->jobs[i + 1], (--engine->job_count - i) * sizeof(struct job *));
+    job_output_unref(job->output);
+    free(job->spec.keys);
+    free(job);
+}
+
+void job_abort(struct engine *engine, struct job *job, struct engine_event *final)
+{
+    job_output_close(job->output, final);
+    job_remove(engine, job);
+}
+
+void jobs_reap(struct engine *engine)
+{
+    for (size_t i = engine->job_count; i-- > 0;) {
+        struct job *job = engine->jobs[i];
+        if (!job_output_is_closed(job->output))
+            continue;
+        struct engine_scene *scene = job->scene;
+        job_remove(engine, job);
+        engine_run_waiting(engine, scene);
+        /* What waited may have ended other jobs: the list is as long as it is now. */
+        i = i < engine->job_count ? i : engine->job_count;
+    }
+}
+
+/* The last frame has been rendered, or no more can be; the answer comes after what is on its way. */
+static void job_finish(struct job *job, const struct error *error)
+{
+    job->next_frame = (uint64_t)job->spec.last_frame + 1;
+    struct engine_event *final = event_create(error ? ENGINE_FAILED : ENGINE_DONE, job->client, job->request);
+    if (!final) {
+        log_write(LOG_ERROR, "engine", "no memory for an event; a job ends without an answer");
+        job_output_close(job->output, NULL);
+        return;
+    }
+    if (error)
+        final->error = *error;
+    job_output_finish(job->output, final);
+}
+
+/* ---- frames ------------------------------------------------------------------------------------- */
+
+bool job_is_ready(const struct job *job)
+{
+    if (job_output_is_closed(job->output))
+        return false;
+    if (job->rendering)
+        return true;
+    return job->next_frame <= job->spec.last_frame && !job->scene->frame_of && job_output_has_room(job->output);
+}
+
+/* Whether the frame is worth another try; if not, the job has failed. */
+static void frame_failed(struct engine *engine, struct job *job, const struct error *error)
+{
+    abandon_frame(engine, job);
+    if (error->kind == ERROR_DEVICE_LOST && engine->device) {
+        /* The frame is rendered again, from the scene that is held in memory. */
+        engine_drop_device(engine);
+        struct error rebuild_error = {0};
+        if (!engine_need_device(engine, &rebuild_error))
+            job_finish(job, &rebuild_error);
+        /* No frame is in progress any more, in no scene. */
+        for (size_t i = 0; i < engine->job_count; i++)
+            engine_run_waiting(engine, engine->jobs[i]->scene);
+        return;
+    }
+    if (error->kind == ERROR_OUT_OF_MEMORY && !job->evicted && engine_evict_idle(engine, job->scene)) {
+        job->evicted = true;
+        log_write(LOG_INFO, "engine", "idle scenes gave up their device memory for another");
+        return;
+    }
+    job_finish(job, error);
+}
+
+static bool frame_take_up(struct engine *engine, struct job *job, struct error *error)
+{
+    struct engine_scene *scene = job->scene;
+    uint32_t frame = (uint32_t)job->next_frame;
+    job->begin_ns = clock_now_ns();
+    job->frame = job->spec.frame;
+    job->time_s = (float)animation_time_s(&job->spec, frame);
+    if (!animation_camera(&job->spec, scene->scene, frame, &job->frame.camera, error))
+        return false;
+    if (!engine_need_device(engine, error))
+        return false;
+    if (!scene->renderer)
+        scene->renderer = engine->backend->renderer_create(engine->device, error);
+    if (!scene->renderer || !engine->backend->begin(scene->renderer, scene->scene, &job->frame, error))
+        return false;
+    job->rendering = true;
+    scene->frame_of = job;
+    return true;
+}
+
+static void account(struct engine *engine, struct job *job, struct frame_result *result)
+{
+    struct engine_scene *scene = job->scene;
+    if (scene->apply_ns)
+        stage_times_add(&result->times, STAGE_APPLY, STAGE_CPU, 0, scene->apply_start_ns, scene->apply_ns);
+    scene->apply_ns = 0;
+    if (!stage_times_sum_ns(&result->times, STAGE_FRAME, STAGE_CPU))
+        stage_times_add(&result->times, STAGE_FRAME, STAGE_CPU, 0, job->begin_ns, clock_now_ns() - job->begin_ns);
+    stage_totals_add_times(&engine->totals, &result->times);
+    engine->frames++;
+    engine->rays += result->primary_rays + result->shadow_rays + result->secondary_rays;
+}
+
+static void frame_done(struct engine *engine, struct job *job, struct engine_frame *frame)
+{
+    job->rendering = false;
+    job->evicted = false;
+    job->scene->frame_of = NULL;
+    account(engine, job, &frame->result);
+    frame->frame = (uint32_t)job->next_frame;
+    frame->request = job->frame;
+    frame->encoding = job->spec.encoding;
+    frame->time_s = job->time_s;
+    job->next_frame += job->spec.frame_step;
+    uint64_t position = job_output_reserve(job->output);
+    if (!encode_pool_submit(engine->pool, job->output, position, frame, job->spec.quality)) {
+        struct error error = {0};
+        error_set(&error, ERROR_OUT_OF_MEMORY, "render", "a frame could not be passed on to be encoded");
+        struct engine_event *event = event_create(ENGINE_FAILED, job->client, job->request);
+        if (event)
+            event->error = error;
+        job_output_close(job->output, event);
+        return;
+    }
+    if (job->next_frame > job->spec.last_frame)
+        job_finish(job, NULL);
+}
+
+static void frame_go_on(struct engine *engine, struct job *job)
+{
+    struct error error = {0};
+    struct engine_frame *frame = calloc(1, sizeof *frame);
+    if (!frame) {
+        error_set(&error, ERROR_OUT_OF_MEMORY, "render", "no memory for a frame");
+        frame_failed(engine, job, &error);
+        return;
+    }
+    enum frame_progress progress = engine->backend->step(job->scene->renderer, &frame->result, &error);
+    if (progress == FRAME_DONE) {
+        frame_done(engine, job, frame);
+        return;
+    }
+    engine_frame_destroy(frame);
+    if (progress == FRAME_FAILED)
+        frame_failed(engine, job, &error);
+}
+
+void job_step(struct engine *engine, struct job *job)
+{
+    struct engine_scene *scene = job->scene;
+    job->served = scene->client->served = scene->used = ++engine->slices;
+    if (job->rendering) {
+        frame_go_on(engine, job);
+    } else {
+        struct error error = {0};
+        if (!frame_take_up(engine, job, &error))
+            frame_failed(engine, job, &error);
+    }
+    engine_run_waiting(engine, scene);
+}

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: MIT */
+/* The device of the engine: opened at the start, lost, made anew, and shared by scenes that do not all fit. */
+#include "job/engine_private.h"
+
+#include "base/clock.h"
+#include "base/log.h"
+
+/* Share of the device's memory that is used if nothing is configured. */
+#define DEVICE_SHARE_PERCENT 70
+
+bool engine_open_device(struct engine *engine, struct error *error)
+{
+    engine->device = engine->backend->device_create(&engine->options.gpu, error);
+    if (!engine->device)
+        return false;
+    engine->device_bytes_limit = engine->options.device_bytes_limit;
+    if (!engine->device_bytes_limit)
+        engine->device_bytes_limit = engine->device->facts.memory_bytes / 100 * DEVICE_SHARE_PERCENT;
+    engine->device->memory_limit_bytes = engine->device_bytes_limit;
+    return true;
+}
+
+/* Calls a function for every scene of every client. */
+static void for_each_scene(struct engine *engine, void (*visit)(struct engine_scene *scene, void *context),
+                           void *context)
+{
+    size_t client_cursor = 0;
+    void *client;
+    while (hashmap_next(&engine->clients, &client_cursor, NULL, &client)) {
+        size_t scene_cursor = 0;
+        void *scene;
+        while (hashmap_next(&((struct engine_client *)client)->scenes, &scene_cursor, NULL, &scene))
+            visit(scene, context);
+    }
+}
+
+static void drop_renderer(struct engine_scene *scene, void *context)
+{
+    const struct engine *engine = context;
+    engine->backend->renderer_destroy(scene->renderer);
+    scene->renderer = NULL;
+    scene->frame_of = NULL;
+}
+
+void engine_drop_device(struct engine *engine)
+{
+    /* Frames in progress are taken up again from their beginning. */
+    for (size_t i = 0; i < engine->job_count; i++)
+        engine->jobs[i]->rendering = false;
+    for_each_scene(engine, drop_renderer, engine);
+    engine->backend->device_destroy(engine->device);
+    engine->device = NULL;
+}
+
+bool engine_need_device(struct engine *engine, struct error *error)
+{
+    if (engine->device)
+        return true;
+    uint64_t now_ns = clock_now_ns();
+    uint64_t *oldest_ns = &engine->rebuilds_ns[engine->rebuilds % DEVICE_REBUILDS_MAX];
+    if (engine->rebuilds >= DEVICE_REBUILDS_MAX && now_ns - *oldest_ns < DEVICE_REBUILDS_WINDOW_NS) {
+        error_set(error, ERROR_DEVICE_LOST, "device", "the GPU was lost %d times within 5 minutes",
+                  DEVICE_REBUILDS_MAX);
+        error->retryable = true;
+        error->retry_after_ms = (uint32_t)((*oldest_ns + DEVICE_REBUILDS_WINDOW_NS - now_ns) / 1000000u) + 1;
+        return error_remedy(error, "try a smaller picture or scene, or another device");
+    }
+    *oldest_ns = now_ns;
+    engine->rebuilds++;
+    log_write(LOG_WARNING, "engine", "the GPU was lost; making it anew");
+    struct error reason = {0};
+    if (engine_open_device(engine, &reason))
+        return true;
+    error_set(error, ERROR_DEVICE_LOST, "device", "the GPU was lost and could not be made anew: %.400s",
+              reason.text);
+    error->retryable = true;
+    return false;
+}
+
+struct eviction {
+    struct engine *engine;
+    const struct engine_scene *keep;
+    bool found;
+};
+
+static void evict(struct engine_scene *scene, void *context)
+{
+    struct eviction *eviction = context;
+    if (scene == eviction->keep || scene->frame_of || !scene->renderer)
+        return;
+    drop_renderer(scene, eviction->engine);
+    eviction->found = true;
+}
+
+bool engine_evict_idle(struct engine *engine, const struct engine_scene *keep)
+{
+    struct eviction eviction = {.engine = engine, .keep = keep};
+    for_each_scene(engine, evict, &eviction);
+    return eviction.found;
+}
+
+uint64_t engine_device_bytes(const struct engine *engine)
+{
+    return engine->device ? engine->device->memory_used_bytes : 0;
+}

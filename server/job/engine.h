@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: MIT */
+/* The thread that owns GL and the pool that encodes, seen from outside: commands in, events out.
+ *
+ * The network thread submits commands and takes events; both go through bounded queues. Everything
+ * in a command passes to the engine when it was accepted, everything in an event to who takes it.
+ * Clients, scenes, requests and channels are the numbers that the network side chose. */
+#ifndef FARLIGHT_JOB_ENGINE_H
+#define FARLIGHT_JOB_ENGINE_H
+
+#include "base/error.h"
+#include "base/stage_times.h"
+#include "encode/encoder.h"
+#include "gpu/device.h"
+#include "render/frame.h"
+#include "scene/scene.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct engine;
+struct engine_backend;
+
+struct engine_options {
+    struct gpu_options gpu;
+    unsigned encode_threads;   /* 0: one per core, at most 4 */
+    size_t queue_capacity;     /* commands and events; 0: 1024 */
+    uint32_t frames_in_flight; /* per job, rendered but not taken; 0: 3 */
+    struct scene_limits scene_limits;
+    uint64_t device_bytes_limit;          /* 0: 70 % of what the device has, or no limit if it does not tell */
+    const struct engine_backend *backend; /* NULL: the GPU; for tests */
+};
+
+/* Camera of a job over time; enums have the protocol's numbers. */
+enum camera_path { CAMERA_AUTO, CAMERA_NODE, CAMERA_KEYS, CAMERA_ORBIT };
+struct camera_key {
+    float time_s;
+    float eye_world[3], look_at_world[3], up_world[3];
+    float fov_y;
+};
+
+struct engine_job {
+    uint32_t scene; /* that of the command, which is the one that counts */
+    uint32_t first_frame, last_frame, frame_step;
+    float frames_per_second;
+    uint32_t time_origin_frame;
+    struct frame_request frame; /* camera is filled per frame */
+    enum encoding encoding;
+    unsigned quality;
+    enum camera_path path;
+    uint32_t camera_node;
+    float orbit_turn, orbit_seconds;
+    struct camera_key *keys; /* owned */
+    uint32_t key_count;
+    /* Frames that may be handed out so far, absolute. Beyond it, frames are rendered as far as frames_in_flight
+     * goes, and kept. */
+    uint64_t credit;
+};
+
+enum engine_command_kind {
+    ENGINE_SCENE_OPEN,
+    ENGINE_SCENE_CLOSE, /* its jobs fail with ERROR_CANCELLED just before the answer */
+    ENGINE_COMMIT,      /* waits for the frame of the scene that is in progress, what follows for that scene too */
+    /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, before which come the frames that were
+     * finished and have credit. */
+    ENGINE_JOB_START,
+    ENGINE_JOB_CREDIT, /* no answer */
+    ENGINE_JOB_CANCEL, /* answered by ENGINE_DONE; the job's own request fails with ERROR_CANCELLED just before */
+    ENGINE_STATS,
+    ENGINE_CLIENT_GONE, /* forgets its scenes and jobs; no answer, and no event for that client comes after
+                           ENGINE_CLIENT_FORGOTTEN */
+};
+
+struct engine_command {
+    enum engine_command_kind kind;
+    uint64_t client;
+    uint32_t request;
+    uint32_t scene;
+    char name[SCENE_NAME_MAX + 1]; /* scene_open */
+    struct scene_edit *edits;      /* commit; malloc'ed array */
+    size_t edit_count;
+    struct engine_job job;
+    uint32_t target_request; /* job_cancel, job_credit: the job's request */
+    uint64_t credit;
+};
+void engine_command_destroy(struct engine_command *command); /* frees it with all it holds; accepts NULL */
+
+struct engine_scene_stat {
+    uint64_t client;
+    uint32_t scene;
+    char name[SCENE_NAME_MAX + 1];
+    uint64_t revision, triangles, spheres, host_bytes, device_bytes;
+    uint32_t nodes, instances;
+};
+struct engine_stats {
+    struct gpu_device_info device;
+    uint64_t device_bytes, device_limit_bytes, host_bytes, frames, rays;
+    uint32_t jobs;
+    struct engine_scene_stat *scenes; /* owned */
+    uint32_t scene_count;
+    struct {
+        uint64_t count, total_ns, greatest_ns;
+    } stages[STAGE_COUNT][2]; /* by stage and clock */
+};
+
+enum engine_event_kind { ENGINE_DONE, ENGINE_FAILED, ENGINE_FRAME, ENGINE_STATS_READY, ENGINE_CLIENT_FORGOTTEN };
+
+struct engine_frame {
+    uint32_t frame;               /* number in the job's range */
+    struct frame_request request; /* what it was rendered with, camera included */
+    struct frame_result result;   /* pixels are gone, the rest is there; times include encode */
+    enum encoding encoding;
+    uint8_t *bytes; /* owned, malloc'ed */
+    size_t size_bytes;
+    uint64_t digest; /* XXH3-64 of the pixels before encoding */
+    float time_s;
+    uint64_t encoded_ns; /* clock_now_ns() when it was ready to be sent */
+};
+
+struct engine_event {
+    enum engine_event_kind kind;
+    uint64_t client;
+    uint32_t request;
+    uint64_t revision;  /* done, for a commit */
+    struct error error; /* failed */
+    struct engine_frame *frame;
+    struct engine_stats *stats;
+    struct job_output *output; /* private to job/ */
+};
+void engine_event_destroy(struct engine_event *event); /* accepts NULL */
+
+/* Starts the threads; the device is opened before it returns, so that a missing GPU is an error here. */
+struct engine *engine_create(const struct engine_options *options, struct error *error);
+/* Stops after the slice in hand; what waits is dropped. Accepts NULL. */
+void engine_destroy(struct engine *engine);
+const struct gpu_device_info *engine_device(const struct engine *engine);
+/* False with ERROR_BUSY (retryable) when the queue is full; the command then still belongs to the caller. */
+bool engine_submit(struct engine *engine, struct engine_command *command, struct error *error);
+int engine_event_fd(const struct engine *engine);              /* readable while events wait */
+struct engine_event *engine_next_event(struct engine *engine); /* NULL: none waits */
+/* Adds send and queue time of a frame to the totals, once the network side knows them. */
+void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_ns);
+
+#endif

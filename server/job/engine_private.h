@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: MIT */
+/* The state behind engine.h. Private to job/; all of it belongs to the thread that owns GL but where it says so.
+ */
+#ifndef FARLIGHT_JOB_ENGINE_PRIVATE_H
+#define FARLIGHT_JOB_ENGINE_PRIVATE_H
+
+#include "base/hashmap.h"
+#include "base/queue.h"
+#include "job/backend.h"
+#include "job/encode_pool.h"
+#include "job/engine.h"
+#include "job/output.h"
+#include "job/totals.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+#define DEVICE_REBUILDS_MAX 3
+#define DEVICE_REBUILDS_WINDOW_NS (300 * 1000000000ull)
+
+struct engine_client {
+    uint64_t client;
+    struct hashmap scenes; /* struct engine_scene *, by the client's number */
+    uint64_t served;       /* number of the slice that it had last */
+};
+
+struct engine_scene {
+    struct engine_client *client;
+    uint32_t id;
+    struct scene *scene;
+    struct frame_renderer *renderer; /* NULL until the first frame, and after the device was lost */
+    struct job *frame_of;            /* whose frame is in progress; NULL: none */
+    struct engine_command **waiting; /* owned: commands for after that frame, in order */
+    size_t waiting_count;
+    uint64_t apply_start_ns, apply_ns; /* of the commits since the last frame */
+    uint64_t used;                     /* number of the slice that used it last */
+};
+
+struct job {
+    uint64_t client;
+    uint32_t request;
+    struct engine_job spec; /* its keys are owned */
+    struct engine_scene *scene;
+    struct job_output *output;
+    uint64_t next_frame; /* number in the range; beyond its end: all rendered */
+    uint64_t served;
+    /* of the frame in progress */
+    bool rendering;
+    bool evicted; /* others gave way once already for its memory */
+    struct frame_request frame;
+    float time_s;
+    uint64_t begin_ns;
+};
+
+struct engine {
+    struct engine_options options;
+    const struct engine_backend *backend;
+    struct gpu_device_info device_info; /* constant after the start; any thread */
+    struct queue *commands, *events;    /* any thread */
+    atomic_bool stop, nudged;           /* any thread */
+    struct stage_totals totals;         /* any thread */
+    struct encode_pool *pool;
+    pthread_t thread;
+    bool has_thread;
+
+    /* What the start came to, for engine_create. */
+    pthread_mutex_t start_lock;
+    pthread_cond_t start_changed;
+    enum { START_PENDING, START_DONE, START_FAILED } start;
+    struct error start_error;
+
+    struct gpu_device *device; /* NULL while it is lost */
+    uint64_t device_bytes_limit;
+    uint64_t rebuilds_ns[DEVICE_REBUILDS_MAX]; /* when it was made anew, a ring */
+    unsigned rebuilds;
+    struct hashmap clients; /* struct engine_client *, by number */
+    struct job **jobs;      /* owned, in the order of their start */
+    size_t job_count, job_capacity;
+    uint64_t slices;
+    uint64_t frames, rays;
+};
+
+/* engine.c */
+void engine_post(struct engine *engine, struct engine_event *event); /* NULL: logged as lost */
+void engine_post_done(struct engine *engine, uint64_t client, uint32_t request, uint64_t revision);
+void engine_post_failed(struct engine *engine, uint64_t client, uint32_t request, const struct error *error);
+void engine_nudge(struct engine *engine); /* any thread: there may be something to do */
+
+/* commands.c: carries a command out, or keeps it until its scene's frame is done. Takes it over. */
+void engine_handle(struct engine *engine, struct engine_command *command);
+/* Carries out what waited for a scene, as far as no frame is in progress. */
+void engine_run_waiting(struct engine *engine, struct engine_scene *scene);
+void engine_forget_client(struct engine *engine, struct engine_client *client);
+
+/* batch.c: jobs. */
+bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_command *command,
+               struct error *error); /* takes the keys over on success */
+/* A job that is not answered yet; NULL: there is none. */
+struct job *job_find(struct engine *engine, uint64_t client, uint32_t request);
+bool job_is_ready(const struct job *job);
+/* One slice: takes up a frame, or goes on with it. */
+void job_step(struct engine *engine, struct job *job);
+/* Ends it now; nothing comes after `final` (may be NULL). Does not run what waits for its scene. */
+void job_abort(struct engine *engine, struct job *job, struct engine_event *final);
+/* Lets go of jobs whose last event is out. */
+void jobs_reap(struct engine *engine);
+
+/* device.c: the device and what scenes keep on it. */
+bool engine_open_device(struct engine *engine, struct error *error);
+/* The device, made anew where it was lost and that is still allowed. */
+bool engine_need_device(struct engine *engine, struct error *error);
+/* Lets go of everything on the device and of the device. */
+void engine_drop_device(struct engine *engine);
+/* Lets go of what scenes without a frame in progress keep on the device, but for `keep`. False: nothing was there.
+ */
+bool engine_evict_idle(struct engine *engine, const struct engine_scene *keep);
+uint64_t engine_device_bytes(const struct engine *engine);
+
+/* stats.c */
+struct engine_stats *engine_stats_collect(const struct engine *engine); /* NULL: out of memory */
+
+#endif

@@ -1,0 +1,321 @@
+/* SPDX-License-Identifier: MIT */
+/* An engine with a renderer that the test controls, and how to talk to it. */
+#ifndef FARLIGHT_TESTS_ENGINE_FAKE_H
+#define FARLIGHT_TESTS_ENGINE_FAKE_H
+
+#include "job/backend.h"
+#include "job/engine.h"
+
+#include <poll.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+/* ---- a renderer that renders nothing ------------------------------------------------------------ */
+
+/* Steps that a frame takes are its samples; a frame of depth 7 goes on until the gate is opened. */
+#define GATED_DEPTH 7
+#define STEPS_MAX 4096
+
+struct frame_renderer {
+    const struct scene *scene;
+    struct frame_request request;
+    uint32_t steps_left;
+    bool busy;
+    struct stage_times times;
+};
+
+static struct {
+    atomic_bool gate_open;
+    atomic_int devices_made, devices, renderers, frames_begun, frames_done, frames_abandoned;
+    atomic_int fail_steps;      /* the next steps that fail */
+    atomic_int fail_kind;       /* enum error_kind */
+    atomic_int fail_from_frame; /* frames from this number on fail; 0: none */
+    atomic_bool no_device;
+    atomic_int step_count;
+    uint64_t step_seeds[STEPS_MAX]; /* whose step it was: the request's seed */
+} fake;
+
+static inline struct gpu_device *fake_device_create(const struct gpu_options *options, struct error *error)
+{
+    (void)options;
+    if (atomic_load(&fake.no_device)) {
+        error_set(error, ERROR_UNSUPPORTED, "device", "there is none");
+        return NULL;
+    }
+    struct gpu_device *device = calloc(1, sizeof *device);
+    assert_non_null(device);
+    strcpy(device->info.name, "fake");
+    device->facts.memory_bytes = 1000;
+    atomic_fetch_add(&fake.devices_made, 1);
+    atomic_fetch_add(&fake.devices, 1);
+    return device;
+}
+
+static inline void fake_device_destroy(struct gpu_device *device)
+{
+    if (device)
+        atomic_fetch_sub(&fake.devices, 1);
+    free(device);
+}
+
+static inline struct frame_renderer *fake_renderer_create(struct gpu_device *device, struct error *error)
+{
+    (void)error;
+    assert_non_null(device);
+    atomic_fetch_add(&fake.renderers, 1);
+    return calloc(1, sizeof(struct frame_renderer));
+}
+
+static inline void fake_renderer_destroy(struct frame_renderer *renderer)
+{
+    if (renderer)
+        atomic_fetch_sub(&fake.renderers, 1);
+    free(renderer);
+}
+
+static inline bool fake_begin(struct frame_renderer *renderer, const struct scene *scene,
+                              const struct frame_request *request, struct error *error)
+{
+    if (renderer->busy)
+        return error_set(error, ERROR_INTERNAL, "fake", "a frame is in progress already");
+    renderer->busy = true;
+    renderer->scene = scene;
+    renderer->request = *request;
+    renderer->steps_left = request->samples;
+    stage_times_begin(&renderer->times);
+    atomic_fetch_add(&fake.frames_begun, 1);
+    return true;
+}
+
+static inline enum frame_progress fake_step(struct frame_renderer *renderer, struct frame_result *result,
+                                            struct error *error)
+{
+    int step = atomic_fetch_add(&fake.step_count, 1);
+    if (step < STEPS_MAX)
+        fake.step_seeds[step] = renderer->request.seed;
+    int fail_from = atomic_load(&fake.fail_from_frame);
+    if (atomic_load(&fake.fail_steps) > 0 || (fail_from && atomic_load(&fake.frames_begun) >= fail_from)) {
+        atomic_fetch_sub(&fake.fail_steps, 1);
+        error_set(error, (enum error_kind)atomic_load(&fake.fail_kind), "fake", "as the test wants");
+        return FRAME_FAILED;
+    }
+    if (renderer->request.depth == GATED_DEPTH && !atomic_load(&fake.gate_open)) {
+        usleep(500);
+        return FRAME_MORE;
+    }
+    if (--renderer->steps_left > 0)
+        return FRAME_MORE;
+    *result = (struct frame_result){
+        .width = renderer->request.width,
+        .height = renderer->request.height,
+        .size_bytes = (size_t)renderer->request.width * renderer->request.height * 4,
+        .format = renderer->request.format,
+        .revision = renderer->scene->revision,
+        .primary_rays = 10,
+        .shadow_rays = 5,
+        .secondary_rays = 1,
+        .times = renderer->times,
+    };
+    result->pixels = malloc(result->size_bytes);
+    assert_non_null(result->pixels);
+    memset(result->pixels, atomic_fetch_add(&fake.frames_done, 1), result->size_bytes);
+    renderer->busy = false;
+    return FRAME_DONE;
+}
+
+static inline void fake_abandon(struct frame_renderer *renderer)
+{
+    renderer->busy = false;
+    atomic_fetch_add(&fake.frames_abandoned, 1);
+}
+
+static inline uint64_t fake_device_bytes(const struct frame_renderer *renderer)
+{
+    (void)renderer;
+    return 77;
+}
+
+static const struct engine_backend fake_backend = {
+    .device_create = fake_device_create,
+    .device_destroy = fake_device_destroy,
+    .renderer_create = fake_renderer_create,
+    .renderer_destroy = fake_renderer_destroy,
+    .begin = fake_begin,
+    .step = fake_step,
+    .abandon = fake_abandon,
+    .device_bytes = fake_device_bytes,
+};
+
+/* ---- talking to the engine ---------------------------------------------------------------------- */
+
+static inline struct engine *start(struct engine_options options)
+{
+    atomic_store(&fake.gate_open, false);
+    atomic_store(&fake.fail_steps, 0);
+    atomic_store(&fake.fail_from_frame, 0);
+    atomic_store(&fake.no_device, false);
+    atomic_store(&fake.step_count, 0);
+    atomic_store(&fake.devices_made, 0);
+    atomic_store(&fake.frames_begun, 0);
+    atomic_store(&fake.frames_done, 0);
+    atomic_store(&fake.frames_abandoned, 0);
+    options.backend = &fake_backend;
+    struct error error = {0};
+    struct engine *engine = engine_create(&options, &error);
+    if (!engine)
+        fail_msg("%s: %s", error.field, error.text);
+    return engine;
+}
+
+static inline void stop(struct engine *engine)
+{
+    engine_destroy(engine);
+    assert_int_equal(atomic_load(&fake.devices), 0);
+    assert_int_equal(atomic_load(&fake.renderers), 0);
+}
+
+static inline struct engine_command *command(enum engine_command_kind kind, uint64_t client, uint32_t request)
+{
+    struct engine_command *made = calloc(1, sizeof *made);
+    assert_non_null(made);
+    made->kind = kind;
+    made->client = client;
+    made->request = request;
+    made->scene = 1;
+    return made;
+}
+
+static inline void submit(struct engine *engine, struct engine_command *made)
+{
+    struct error error = {0};
+    if (!engine_submit(engine, made, &error))
+        fail_msg("%s", error.text);
+}
+
+/* NULL: none came in that time. */
+static inline struct engine_event *event_within(struct engine *engine, int ms)
+{
+    struct pollfd poll_fd = {.fd = engine_event_fd(engine), .events = POLLIN};
+    poll(&poll_fd, 1, ms);
+    return engine_next_event(engine);
+}
+
+static inline struct engine_event *expect_event(struct engine *engine, enum engine_event_kind kind,
+                                                uint64_t client, uint32_t request)
+{
+    struct engine_event *event = event_within(engine, 10000);
+    if (!event)
+        fail_msg("no event; expected kind %d for request %u", kind, request);
+    if (event->kind != kind || event->client != client || event->request != request)
+        fail_msg("event kind %d for client %d, request %u; expected %d, %d, %u (%s: %s)", event->kind,
+                 (int)event->client, event->request, kind, (int)client, request, event->error.field,
+                 event->error.text);
+    return event;
+}
+
+static inline uint64_t expect_done(struct engine *engine, uint64_t client, uint32_t request)
+{
+    struct engine_event *event = expect_event(engine, ENGINE_DONE, client, request);
+    uint64_t revision = event->revision;
+    engine_event_destroy(event);
+    return revision;
+}
+
+static inline void expect_failed(struct engine *engine, uint64_t client, uint32_t request, enum error_kind kind,
+                                 const char *field)
+{
+    struct engine_event *event = expect_event(engine, ENGINE_FAILED, client, request);
+    if (event->error.kind != kind)
+        fail_msg("error kind %d (%s), expected %d", event->error.kind, event->error.text, kind);
+    assert_string_equal(event->error.field, field);
+    engine_event_destroy(event);
+}
+
+static inline struct engine_event *expect_frame(struct engine *engine, uint64_t client, uint32_t request,
+                                                uint32_t frame)
+{
+    struct engine_event *event = expect_event(engine, ENGINE_FRAME, client, request);
+    if (event->frame->frame != frame)
+        fail_msg("frame %u, expected %u", event->frame->frame, frame);
+    return event;
+}
+
+static inline void take_frame(struct engine *engine, uint64_t client, uint32_t request, uint32_t frame)
+{
+    engine_event_destroy(expect_frame(engine, client, request, frame));
+}
+
+static inline void expect_silence(struct engine *engine)
+{
+    struct engine_event *event = event_within(engine, 60);
+    if (event)
+        fail_msg("event kind %d for client %d, request %u; expected none", event->kind, (int)event->client,
+                 event->request);
+}
+
+static inline void wait_until(const atomic_int *counter, int value)
+{
+    for (int i = 0; i < 10000 && atomic_load(counter) < value; i++)
+        usleep(1000);
+    assert_true(atomic_load(counter) >= value);
+}
+
+static inline void open_scene(struct engine *engine, uint64_t client, uint32_t scene)
+{
+    struct engine_command *made = command(ENGINE_SCENE_OPEN, client, 1000 + scene);
+    made->scene = scene;
+    submit(engine, made);
+    assert_int_equal(expect_done(engine, client, 1000 + scene), 0);
+}
+
+/* A transaction that makes one group node. */
+static inline void submit_commit(struct engine *engine, uint64_t client, uint32_t request, uint32_t scene)
+{
+    struct engine_command *made = command(ENGINE_COMMIT, client, request);
+    made->scene = scene;
+    made->edits = calloc(1, sizeof *made->edits);
+    assert_non_null(made->edits);
+    made->edit_count = 1;
+    made->edits[0].set.node.base.id = 1;
+    made->edits[0].set.node.parent_from_node[0] = 1;
+    submit(engine, made);
+}
+
+static inline struct engine_command *render(uint64_t client, uint32_t request, uint32_t first, uint32_t last)
+{
+    struct engine_command *made = command(ENGINE_JOB_START, client, request);
+    made->job = (struct engine_job){
+        .first_frame = first,
+        .last_frame = last,
+        .frame_step = 1,
+        .frames_per_second = 24,
+        .frame = {.width = 4, .height = 3, .samples = 1, .tracer = 0},
+        .encoding = ENCODING_RAW,
+        .quality = 3,
+        .credit = 1000,
+    };
+    return made;
+}
+
+static inline struct engine_command *gated(struct engine_command *made)
+{
+    made->job.frame.depth = GATED_DEPTH;
+    return made;
+}
+
+static inline void submit_target(struct engine *engine, enum engine_command_kind kind, uint64_t client,
+                                 uint32_t request, uint32_t target, uint64_t credit)
+{
+    struct engine_command *made = command(kind, client, request);
+    made->target_request = target;
+    made->credit = credit;
+    submit(engine, made);
+}
+
+#endif

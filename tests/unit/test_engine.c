@@ -1,0 +1,318 @@
+/* SPDX-License-Identifier: MIT */
+/* The engine with a renderer that the tests control: order, credit, edits, cancel, clients that go. */
+#include "engine_fake.h"
+
+#include "base/clock.h"
+
+#include <xxhash.h>
+
+/* ---- frames ------------------------------------------------------------------------------------- */
+
+static void frames_come_in_order_with_what_they_cost(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){.encode_threads = 4});
+    open_scene(engine, 1, 1);
+    submit_commit(engine, 1, 2, 1);
+    assert_int_equal(expect_done(engine, 1, 2), 1);
+    struct engine_command *made = render(1, 3, 10, 100);
+    made->job.frame_step = 3;
+    made->job.time_origin_frame = 10;
+    submit(engine, made);
+    for (uint32_t frame = 10; frame <= 100; frame += 3) {
+        struct engine_event *event = expect_frame(engine, 1, 3, frame);
+        const struct engine_frame *got = event->frame;
+        assert_int_equal(got->size_bytes, 4 * 3 * 4);
+        assert_int_equal(got->bytes[0], (frame - 10) / 3);
+        assert_true(got->digest == XXH3_64bits(got->bytes, got->size_bytes));
+        assert_int_equal(got->result.revision, 1);
+        assert_null(got->result.pixels);
+        assert_true(got->time_s == (float)((frame - 10) / 24.0));
+        assert_true(got->encoded_ns <= clock_now_ns());
+        assert_true(stage_times_sum_ns(&got->result.times, STAGE_FRAME, STAGE_CPU) > 0);
+        assert_true(stage_times_sum_ns(&got->result.times, STAGE_ENCODE, STAGE_CPU) > 0);
+        /* The commit is reported once. */
+        assert_int_equal(stage_times_sum_ns(&got->result.times, STAGE_APPLY, STAGE_CPU) > 0, frame == 10);
+        engine_event_destroy(event);
+    }
+    expect_done(engine, 1, 3);
+    expect_silence(engine);
+    stop(engine);
+}
+
+static void no_frame_goes_out_beyond_its_credit(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){.frames_in_flight = 3});
+    open_scene(engine, 1, 1);
+    struct engine_command *made = render(1, 2, 0, 9);
+    made->job.credit = 2;
+    submit(engine, made);
+    take_frame(engine, 1, 2, 0);
+    take_frame(engine, 1, 2, 1);
+    expect_silence(engine);
+    /* Ahead of the credit, as many as may be in flight are rendered, and not one more. */
+    assert_int_equal(atomic_load(&fake.frames_begun), 5);
+    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 4);
+    take_frame(engine, 1, 2, 2);
+    take_frame(engine, 1, 2, 3);
+    expect_silence(engine);
+    assert_int_equal(atomic_load(&fake.frames_begun), 7);
+    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 3); /* absolute: less than before changes nothing */
+    expect_silence(engine);
+    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 100);
+    for (uint32_t frame = 4; frame <= 9; frame++)
+        take_frame(engine, 1, 2, frame);
+    expect_done(engine, 1, 2);
+    stop(engine);
+}
+
+static void frames_that_nobody_takes_stop_the_rendering(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){.frames_in_flight = 2});
+    open_scene(engine, 1, 1);
+    submit(engine, render(1, 2, 0, 9));
+    wait_until(&fake.frames_done, 2);
+    usleep(50000);
+    assert_int_equal(atomic_load(&fake.frames_begun), 2);
+    for (uint32_t frame = 0; frame <= 9; frame++)
+        take_frame(engine, 1, 2, frame);
+    expect_done(engine, 1, 2);
+    stop(engine);
+}
+
+static void jobs_of_two_clients_take_turns_by_slices(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    open_scene(engine, 2, 1);
+    for (uint64_t client = 1; client <= 2; client++) {
+        struct engine_command *made = gated(render(client, 5, 0, 0));
+        made->job.frame.samples = 40;
+        made->job.frame.seed = client;
+        submit(engine, made);
+    }
+    wait_until(&fake.frames_begun, 2);
+    atomic_store(&fake.step_count, 0);
+    atomic_store(&fake.gate_open, true);
+    for (int i = 0; i < 2; i++)
+        engine_event_destroy(event_within(engine, 10000));
+    for (int i = 2; i < 60; i++) {
+        if (fake.step_seeds[i] == fake.step_seeds[i - 1])
+            fail_msg("client %d had slices %d and %d", (int)fake.step_seeds[i], i - 1, i);
+    }
+    stop(engine);
+}
+
+/* ---- edits -------------------------------------------------------------------------------------- */
+
+static void edits_wait_for_the_frame_in_hand_and_others_do_not(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    open_scene(engine, 1, 2);
+    submit_commit(engine, 1, 3, 1);
+    expect_done(engine, 1, 3);
+    submit(engine, gated(render(1, 4, 0, 1)));
+    wait_until(&fake.frames_begun, 1);
+    submit_commit(engine, 1, 5, 1);
+    submit_commit(engine, 1, 6, 2);
+    assert_int_equal(expect_done(engine, 1, 6), 1); /* another scene */
+    expect_silence(engine);
+    atomic_store(&fake.gate_open, true);
+    bool applied = false;
+    uint32_t frames = 0;
+    while (!applied || frames < 2) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        if (event->kind == ENGINE_FRAME) {
+            /* The frame in hand shows what it began with, the next one the edit. */
+            assert_int_equal(event->frame->result.revision, frames + 1);
+            frames++;
+        } else {
+            assert_int_equal(event->kind, ENGINE_DONE);
+            if (event->request == 5) {
+                assert_int_equal(event->revision, 2);
+                applied = true;
+            }
+        }
+        engine_event_destroy(event);
+    }
+    expect_done(engine, 1, 4);
+    stop(engine);
+}
+
+static void what_waits_for_a_frame_keeps_its_order_and_can_be_cancelled(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    submit(engine, gated(render(1, 4, 0, 0)));
+    wait_until(&fake.frames_begun, 1);
+    submit_commit(engine, 1, 5, 1);
+    submit(engine, render(1, 6, 0, 0)); /* must show the commit */
+    submit(engine, render(1, 7, 0, 0));
+    submit_target(engine, ENGINE_JOB_CANCEL, 1, 8, 7, 0);
+    expect_failed(engine, 1, 7, ERROR_CANCELLED, "");
+    expect_done(engine, 1, 8);
+    atomic_store(&fake.gate_open, true);
+    unsigned answered = 0;
+    while (answered != 7) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        if (event->kind == ENGINE_FRAME)
+            assert_int_equal(event->frame->result.revision, event->request == 6);
+        else
+            answered |= 1u << (event->request - 4);
+        engine_event_destroy(event);
+    }
+    stop(engine);
+}
+
+static void a_refused_commit_names_its_field(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    struct engine_command *made = command(ENGINE_COMMIT, 1, 2);
+    made->edits = calloc(1, sizeof *made->edits);
+    made->edit_count = 1;
+    made->edits[0].set.node.base.id = 3;
+    made->edits[0].set.node.parent = 9;
+    submit(engine, made);
+    expect_failed(engine, 1, 2, ERROR_UNKNOWN_ID, "edits[0] (node 3).parent");
+    submit_commit(engine, 1, 3, 77);
+    expect_failed(engine, 1, 3, ERROR_UNKNOWN_ID, "edit_begin.scene");
+    stop(engine);
+}
+
+/* ---- ends --------------------------------------------------------------------------------------- */
+
+static void a_cancel_is_answered_once_after_its_job(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    submit(engine, gated(render(1, 2, 0, 9)));
+    wait_until(&fake.frames_begun, 1);
+    submit_target(engine, ENGINE_JOB_CANCEL, 1, 3, 2, 0);
+    submit_target(engine, ENGINE_JOB_CANCEL, 1, 4, 2, 0);
+    expect_failed(engine, 1, 2, ERROR_CANCELLED, "");
+    expect_done(engine, 1, 3);
+    expect_done(engine, 1, 4); /* there is nothing left to cancel */
+    expect_silence(engine);
+    assert_int_equal(atomic_load(&fake.frames_abandoned), 1);
+    /* The scene is free for others. */
+    submit(engine, render(1, 5, 0, 0));
+    take_frame(engine, 1, 5, 0);
+    expect_done(engine, 1, 5);
+    submit_target(engine, ENGINE_JOB_CANCEL, 1, 6, 5, 0);
+    expect_done(engine, 1, 6);
+    stop(engine);
+}
+
+static void a_cancelled_job_that_lacks_credit_ends_too(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    struct engine_command *made = render(1, 2, 0, 2);
+    made->job.credit = 0;
+    submit(engine, made);
+    wait_until(&fake.frames_done, 3);
+    expect_silence(engine);
+    submit_target(engine, ENGINE_JOB_CANCEL, 1, 3, 2, 0);
+    expect_failed(engine, 1, 2, ERROR_CANCELLED, "");
+    expect_done(engine, 1, 3);
+    stop(engine);
+}
+
+static void a_client_that_goes_is_forgotten_and_others_go_on(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    open_scene(engine, 2, 1);
+    submit(engine, gated(render(1, 2, 0, 9)));
+    submit(engine, gated(render(2, 2, 0, 0)));
+    wait_until(&fake.frames_begun, 2);
+    submit_commit(engine, 1, 3, 1); /* waits for the frame, and is never answered */
+    submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));
+    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 1, 0));
+    assert_int_equal(atomic_load(&fake.renderers), 1);
+    expect_silence(engine);
+    atomic_store(&fake.gate_open, true);
+    take_frame(engine, 2, 2, 0);
+    expect_done(engine, 2, 2);
+    submit(engine, command(ENGINE_CLIENT_GONE, 9, 0)); /* was never seen */
+    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 9, 0));
+    stop(engine);
+}
+
+static void closing_a_scene_ends_its_jobs_first(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    submit(engine, gated(render(1, 2, 0, 9)));
+    wait_until(&fake.frames_begun, 1);
+    submit_commit(engine, 1, 3, 1);
+    submit(engine, command(ENGINE_SCENE_CLOSE, 1, 4));
+    expect_failed(engine, 1, 2, ERROR_CANCELLED, "");
+    assert_int_equal(expect_done(engine, 1, 3), 1);
+    expect_done(engine, 1, 4);
+    submit(engine, command(ENGINE_SCENE_CLOSE, 1, 5));
+    expect_failed(engine, 1, 5, ERROR_UNKNOWN_ID, "scene_close.scene");
+    open_scene(engine, 1, 1); /* the number is free again */
+    stop(engine);
+}
+
+static void a_frame_that_fails_comes_after_those_before_it(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){.encode_threads = 3});
+    open_scene(engine, 1, 1);
+    atomic_store(&fake.fail_kind, ERROR_INTERNAL);
+    atomic_store(&fake.fail_from_frame, 4);
+    submit(engine, render(1, 2, 0, 9));
+    for (uint32_t frame = 0; frame < 3; frame++)
+        take_frame(engine, 1, 2, frame);
+    expect_failed(engine, 1, 2, ERROR_INTERNAL, "fake");
+    expect_silence(engine);
+    stop(engine);
+}
+
+static void an_engine_stops_with_work_in_hand(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){.queue_capacity = 2});
+    open_scene(engine, 1, 1);
+    submit(engine, render(1, 2, 0, 1000));
+    submit(engine, command(ENGINE_STATS, 1, 3));
+    usleep(20000);
+    submit_commit(engine, 1, 4, 1);
+    stop(engine);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(frames_come_in_order_with_what_they_cost),
+        cmocka_unit_test(no_frame_goes_out_beyond_its_credit),
+        cmocka_unit_test(frames_that_nobody_takes_stop_the_rendering),
+        cmocka_unit_test(jobs_of_two_clients_take_turns_by_slices),
+        cmocka_unit_test(edits_wait_for_the_frame_in_hand_and_others_do_not),
+        cmocka_unit_test(what_waits_for_a_frame_keeps_its_order_and_can_be_cancelled),
+        cmocka_unit_test(a_refused_commit_names_its_field),
+        cmocka_unit_test(a_cancel_is_answered_once_after_its_job),
+        cmocka_unit_test(a_cancelled_job_that_lacks_credit_ends_too),
+        cmocka_unit_test(a_client_that_goes_is_forgotten_and_others_go_on),
+        cmocka_unit_test(closing_a_scene_ends_its_jobs_first),
+        cmocka_unit_test(a_frame_that_fails_comes_after_those_before_it),
+        cmocka_unit_test(an_engine_stops_with_work_in_hand),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

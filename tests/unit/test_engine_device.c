@@ -1,0 +1,186 @@
+/* SPDX-License-Identifier: MIT */
+/* The engine with the real renderer: frames of clients that take turns are those that each would get alone. */
+#include "job/engine.h"
+
+#include <poll.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define FRAMES 4
+
+static struct engine *engine;
+
+static int start(void **state)
+{
+    (void)state;
+    struct error error = {0};
+    engine = engine_create(&(struct engine_options){.gpu = {.index = -1}}, &error);
+    if (!engine)
+        print_message("skipped: %s\n", error.text);
+    return 0;
+}
+
+static int stop(void **state)
+{
+    (void)state;
+    engine_destroy(engine);
+    return 0;
+}
+
+static void submit(struct engine_command made)
+{
+    struct engine_command *command = malloc(sizeof *command);
+    assert_non_null(command);
+    *command = made;
+    struct error error = {0};
+    if (!engine_submit(engine, command, &error))
+        fail_msg("%s", error.text);
+}
+
+static struct engine_event *next_event(void)
+{
+    struct pollfd poll_fd = {.fd = engine_event_fd(engine), .events = POLLIN};
+    poll(&poll_fd, 1, 60000);
+    struct engine_event *event = engine_next_event(engine);
+    assert_non_null(event);
+    if (event->kind == ENGINE_FAILED)
+        fail_msg("%s: %s", event->error.field, event->error.text);
+    return event;
+}
+
+static void expect_done(void)
+{
+    struct engine_event *event = next_event();
+    assert_int_equal(event->kind, ENGINE_DONE);
+    engine_event_destroy(event);
+}
+
+/* A scene of one sphere above a square, both emitting, so that they are seen without a light. */
+static void make_scene(uint64_t client, float radius)
+{
+    submit((struct engine_command){.kind = ENGINE_SCENE_OPEN, .client = client, .request = 1, .scene = 1});
+    expect_done();
+    static const float square[12] = {-1, 0, -1, 1, 0, -1, 1, 0, 1, -1, 0, 1},
+                       identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    static const uint32_t indices[6] = {0, 2, 1, 0, 3, 2};
+    struct scene_edit *edits = calloc(5, sizeof *edits);
+    assert_non_null(edits);
+    for (int i = 0; i < 5; i++)
+        edits[i].object = i < 2 ? SCENE_NODE : i == 2 ? SCENE_MESH : i == 3 ? SCENE_SPHERES : SCENE_MATERIAL;
+    for (int i = 0; i < 2; i++) {
+        struct scene_node *node = &edits[i].set.node;
+        *node = (struct scene_node){.base.id = (uint32_t)i + 1, .kind = i ? NODE_SPHERES : NODE_MESH, .object = 1};
+        memcpy(node->parent_from_node, identity, sizeof identity);
+    }
+    struct scene_mesh *mesh = &edits[2].set.mesh;
+    *mesh = (struct scene_mesh){.base.id = 1, .vertex_count = 4, .triangle_count = 2};
+    mesh->arrays[MESH_POSITIONS] = blob_create(sizeof square);
+    memcpy(mesh->arrays[MESH_POSITIONS]->data, square, sizeof square);
+    mesh->arrays[MESH_INDICES] = blob_create(sizeof indices);
+    memcpy(mesh->arrays[MESH_INDICES]->data, indices, sizeof indices);
+    struct scene_spheres *spheres = &edits[3].set.spheres;
+    *spheres = (struct scene_spheres){.base.id = 1, .sphere_count = 1, .range_count = 1};
+    spheres->centres_radii = blob_create(16);
+    memcpy(spheres->centres_radii->data, (const float[]){0, radius, 0, radius}, 16);
+    spheres->ranges = calloc(1, sizeof *spheres->ranges);
+    *spheres->ranges = (struct material_range){0, 1, 1};
+    edits[4].set.material = (struct scene_material){
+        .base.id = 1, .base_colour = {1, 1, 1, 1}, .emission = {0.2f, 0.9f, 0.4f}, .roughness = 1, .ior = 1.5f};
+    submit((struct engine_command){
+        .kind = ENGINE_COMMIT, .client = client, .request = 2, .scene = 1, .edits = edits, .edit_count = 5});
+    expect_done();
+}
+
+static void submit_job(uint64_t client, uint32_t request)
+{
+    submit((struct engine_command){
+        .kind = ENGINE_JOB_START,
+        .client = client,
+        .request = request,
+        .scene = 1,
+        .job =
+            {
+                .last_frame = FRAMES - 1,
+                .frame_step = 1,
+                .frames_per_second = 1,
+                .frame = {.width = 300, .height = 300, .samples = 2, .depth = 2, .seed = 5},
+                .encoding = ENCODING_ZSTD,
+                .quality = 3,
+                .path = CAMERA_ORBIT,
+                .orbit_turn = 1,
+                .orbit_seconds = 1,
+                .credit = FRAMES,
+            },
+    });
+}
+
+/* Collects the digests of all frames of both clients until each has its last answer. */
+static void collect(uint64_t digests[2][FRAMES], unsigned jobs)
+{
+    unsigned next[2] = {0};
+    while (jobs) {
+        struct engine_event *event = next_event();
+        if (event->kind == ENGINE_FRAME) {
+            unsigned *frame = &next[event->client - 1];
+            assert_int_equal(event->frame->frame, *frame);
+            assert_true(stage_times_sum_ns(&event->frame->result.times, STAGE_FRAME, STAGE_CPU) > 0);
+            assert_int_equal(event->frame->result.revision, 1);
+            digests[event->client - 1][(*frame)++] = event->frame->digest;
+        } else {
+            assert_int_equal(event->kind, ENGINE_DONE);
+            assert_int_equal(next[event->client - 1], FRAMES);
+            jobs--;
+        }
+        engine_event_destroy(event);
+    }
+}
+
+static void clients_that_take_turns_get_the_frames_they_would_get_alone(void **state)
+{
+    (void)state;
+    if (!engine)
+        skip();
+    uint64_t alone[2][FRAMES], together[2][FRAMES];
+    make_scene(1, 0.5f);
+    make_scene(2, 0.8f);
+    submit_job(1, 3);
+    collect(alone, 1);
+    submit_job(2, 3);
+    collect(alone, 1);
+    submit_job(1, 4);
+    submit_job(2, 4);
+    collect(together, 2);
+    assert_memory_equal(alone, together, sizeof alone);
+    /* They are pictures of something: each frame and each scene has its own. */
+    for (int i = 0; i < FRAMES; i++) {
+        assert_true(alone[0][i] != alone[1][i]);
+        assert_true(i == 0 || alone[0][i] != alone[0][i - 1]);
+    }
+    for (uint64_t client = 1; client <= 2; client++) {
+        submit((struct engine_command){.kind = ENGINE_CLIENT_GONE, .client = client});
+        struct engine_event *event = next_event();
+        assert_int_equal(event->kind, ENGINE_CLIENT_FORGOTTEN);
+        engine_event_destroy(event);
+    }
+    submit((struct engine_command){.kind = ENGINE_STATS, .client = 9, .request = 1});
+    struct engine_event *event = next_event();
+    assert_int_equal(event->kind, ENGINE_STATS_READY);
+    assert_int_equal(event->stats->frames, 4 * FRAMES);
+    assert_int_equal(event->stats->scene_count, 0);
+    print_message("device: %s, %llu bytes in use after all scenes are gone\n", event->stats->device.name,
+                  (unsigned long long)event->stats->device_bytes);
+    assert_in_range(event->stats->device_bytes, 0, 1 << 16);
+    engine_event_destroy(event);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(clients_that_take_turns_get_the_frames_they_would_get_alone),
+    };
+    return cmocka_run_group_tests(tests, start, stop);
+}

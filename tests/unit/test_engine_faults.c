@@ -1,0 +1,223 @@
+/* SPDX-License-Identifier: MIT */
+/* The engine when something is wrong: jobs that cannot be, lost devices, too little memory, full queues. */
+#include "engine_fake.h"
+
+/* ---- jobs that cannot be ------------------------------------------------------------------------ */
+
+static void jobs_that_cannot_be_are_refused_with_their_field(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    struct engine_command *made = render(1, 2, 0, 0);
+    made->job.frame.tracer = 63;
+    submit(engine, made);
+    struct engine_event *event = expect_event(engine, ENGINE_FAILED, 1, 2);
+    assert_int_equal(event->error.kind, ERROR_UNSUPPORTED);
+    assert_string_equal(event->error.field, "render.tracer");
+    assert_non_null(strstr(event->error.remedy, "naive"));
+    engine_event_destroy(event);
+    made = render(1, 3, 5, 4);
+    submit(engine, made);
+    expect_failed(engine, 1, 3, ERROR_INVALID, "render.last_frame");
+    made = render(1, 4, 0, 0);
+    made->job.encoding = ENCODING_JPEG;
+    made->job.frame.format = FRAME_RGBA16F;
+    submit(engine, made);
+    expect_failed(engine, 1, 4, ERROR_UNSUPPORTED, "render.encoding");
+    made = render(1, 5, 0, 0);
+    made->job.path = CAMERA_NODE;
+    made->job.camera_node = 8;
+    submit(engine, made);
+    expect_failed(engine, 1, 5, ERROR_UNKNOWN_ID, "render.camera_node");
+    made = render(1, 6, 0, 0);
+    made->job.path = CAMERA_KEYS;
+    submit(engine, made);
+    expect_failed(engine, 1, 6, ERROR_INVALID, "render.keys");
+    made = render(1, 7, 0, 0);
+    made->scene = 4;
+    submit(engine, made);
+    expect_failed(engine, 1, 7, ERROR_UNKNOWN_ID, "render.scene");
+    made = render(1, 8, 0, 0);
+    made->job.frame_step = 0;
+    submit(engine, made);
+    expect_failed(engine, 1, 8, ERROR_INVALID, "render.frame_step");
+    stop(engine);
+}
+
+/* ---- the device --------------------------------------------------------------------------------- */
+
+static void a_lost_device_is_made_anew_and_the_frame_rendered_again(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
+    atomic_store(&fake.fail_steps, 2);
+    submit(engine, render(1, 2, 0, 2));
+    for (uint32_t frame = 0; frame <= 2; frame++)
+        take_frame(engine, 1, 2, frame);
+    expect_done(engine, 1, 2);
+    assert_int_equal(atomic_load(&fake.devices_made), 3);
+    assert_int_equal(atomic_load(&fake.devices), 1);
+    stop(engine);
+}
+
+static void a_device_that_is_lost_again_and_again_ends_the_job(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
+    atomic_store(&fake.fail_steps, 1000);
+    submit(engine, render(1, 2, 0, 2));
+    struct engine_event *event = expect_event(engine, ENGINE_FAILED, 1, 2);
+    assert_int_equal(event->error.kind, ERROR_DEVICE_LOST);
+    assert_true(event->error.retryable);
+    engine_event_destroy(event);
+    assert_int_equal(atomic_load(&fake.devices_made), 4);
+    submit(engine, command(ENGINE_STATS, 1, 3)); /* the engine itself lives */
+    engine_event_destroy(expect_event(engine, ENGINE_STATS_READY, 1, 3));
+    stop(engine);
+}
+
+static void edits_that_waited_for_a_lost_frame_are_applied(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    open_scene(engine, 1, 2);
+    submit(engine, gated(render(1, 2, 0, 0)));
+    struct engine_command *other = gated(render(1, 3, 0, 0));
+    other->scene = 2;
+    submit(engine, other);
+    wait_until(&fake.frames_begun, 2);
+    submit_commit(engine, 1, 4, 1);
+    submit_commit(engine, 1, 5, 2);
+    expect_silence(engine);
+    atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
+    atomic_store(&fake.fail_steps, 1);
+    uint32_t first = 0;
+    for (int i = 0; i < 2; i++) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        assert_int_equal(event->kind, ENGINE_DONE);
+        assert_true(event->request == 4 || event->request == 5);
+        assert_true(event->request != first);
+        first = event->request;
+        engine_event_destroy(event);
+    }
+    stop(engine);
+}
+
+static void idle_scenes_give_way_when_device_memory_runs_out(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    open_scene(engine, 2, 1);
+    submit(engine, render(1, 2, 0, 0));
+    take_frame(engine, 1, 2, 0);
+    expect_done(engine, 1, 2);
+    atomic_store(&fake.fail_kind, ERROR_OUT_OF_MEMORY);
+    atomic_store(&fake.fail_steps, 1);
+    submit(engine, render(2, 2, 0, 0));
+    take_frame(engine, 2, 2, 0);
+    expect_done(engine, 2, 2);
+    assert_int_equal(atomic_load(&fake.renderers), 1);
+    /* Nobody else is there to give way. */
+    submit(engine, command(ENGINE_SCENE_CLOSE, 1, 9));
+    expect_done(engine, 1, 9);
+    atomic_store(&fake.fail_steps, 1);
+    submit(engine, render(2, 3, 0, 0));
+    expect_failed(engine, 2, 3, ERROR_OUT_OF_MEMORY, "fake");
+    stop(engine);
+}
+
+static void without_a_device_there_is_no_engine(void **state)
+{
+    (void)state;
+    atomic_store(&fake.no_device, true);
+    struct error error = {0};
+    assert_null(engine_create(&(struct engine_options){.backend = &fake_backend}, &error));
+    assert_int_equal(error.kind, ERROR_UNSUPPORTED);
+    assert_string_equal(error.text, "there is none");
+}
+
+/* ---- queues and stats --------------------------------------------------------------------------- */
+
+static void a_full_queue_is_told_and_nothing_is_lost(void **state)
+{
+    (void)state;
+    /* Both queues fill up: nobody takes events while commands come in. */
+    struct engine *engine = start((struct engine_options){.queue_capacity = 4});
+    uint32_t accepted = 0;
+    for (uint32_t i = 0; i < 1000; i++) {
+        struct engine_command *made = command(ENGINE_STATS, 1, accepted + 1);
+        struct error error = {0};
+        if (engine_submit(engine, made, &error)) {
+            accepted++;
+            continue;
+        }
+        engine_command_destroy(made);
+        assert_int_equal(error.kind, ERROR_BUSY);
+        assert_true(error.retryable);
+        if (i > 500)
+            usleep(100);
+    }
+    assert_true(accepted >= 8 && accepted < 20);
+    for (uint32_t i = 1; i <= accepted; i++)
+        engine_event_destroy(expect_event(engine, ENGINE_STATS_READY, 1, i));
+    stop(engine);
+}
+
+static void stats_add_up(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    assert_string_equal(engine_device(engine)->name, "fake");
+    open_scene(engine, 1, 1);
+    open_scene(engine, 1, 2);
+    submit_commit(engine, 1, 2, 2);
+    expect_done(engine, 1, 2);
+    submit(engine, render(1, 3, 0, 3));
+    for (uint32_t frame = 0; frame <= 3; frame++)
+        take_frame(engine, 1, 3, frame);
+    expect_done(engine, 1, 3);
+    engine_report_sent(engine, 5, 7);
+    engine_report_sent(engine, 50, 70);
+    submit(engine, command(ENGINE_STATS, 1, 4));
+    struct engine_event *event = expect_event(engine, ENGINE_STATS_READY, 1, 4);
+    const struct engine_stats *stats = event->stats;
+    assert_int_equal(stats->frames, 4);
+    assert_int_equal(stats->rays, 4 * 16);
+    assert_int_equal(stats->jobs, 0);
+    assert_int_equal(stats->device_limit_bytes, 700);
+    assert_int_equal(stats->scene_count, 2);
+    assert_int_equal(stats->scenes[0].device_bytes, 77);
+    assert_int_equal(stats->scenes[1].nodes, 1);
+    assert_int_equal(stats->scenes[1].revision, 1);
+    assert_true(stats->host_bytes > 0);
+    assert_int_equal(stats->stages[STAGE_ENCODE][STAGE_CPU].count, 4);
+    assert_int_equal(stats->stages[STAGE_FRAME][STAGE_CPU].count, 4);
+    assert_int_equal(stats->stages[STAGE_SEND][STAGE_CPU].count, 2);
+    assert_int_equal(stats->stages[STAGE_SEND][STAGE_CPU].total_ns, 77);
+    assert_int_equal(stats->stages[STAGE_QUEUE][STAGE_CPU].greatest_ns, 50);
+    engine_event_destroy(event);
+    stop(engine);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(jobs_that_cannot_be_are_refused_with_their_field),
+        cmocka_unit_test(a_lost_device_is_made_anew_and_the_frame_rendered_again),
+        cmocka_unit_test(a_device_that_is_lost_again_and_again_ends_the_job),
+        cmocka_unit_test(edits_that_waited_for_a_lost_frame_are_applied),
+        cmocka_unit_test(idle_scenes_give_way_when_device_memory_runs_out),
+        cmocka_unit_test(without_a_device_there_is_no_engine),
+        cmocka_unit_test(a_full_queue_is_told_and_nothing_is_lost),
+        cmocka_unit_test(stats_add_up),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
