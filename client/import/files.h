@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: MIT */
+/* Reads the model file and what it refers to. What a model names is opened beneath the model's own folder and nowhere
+ * else, must be a regular file, and is read whole into memory. */
+#ifndef FARLIGHT_IMPORT_FILES_H
+#define FARLIGHT_IMPORT_FILES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define FILES_BYTES_MAX (2ULL << 30) /* of one file */
+#define FILES_TOTAL_MAX (4ULL << 30) /* of all files of a model */
+#define FILES_REASON_BYTES 256
+
+struct files {
+    int folder;      /* descriptor of the model's folder */
+    int model;       /* descriptor of the model file */
+    int environment; /* likewise, -1: none */
+    uint64_t read_bytes, read_ns;
+};
+
+/* Opens folder and files by the paths that the user gave (either may be NULL); to be called before the sandbox is
+ * entered. False: `reason` names the file and says why. */
+bool files_open(struct files *files, const char *model_path, const char *environment_path,
+                char reason[FILES_REASON_BYTES]);
+void files_finish(struct files *files);
+
+/* Folder part of a path, malloc'd: "." if it has none. NULL: out of memory. */
+char *files_folder_of(const char *path);
+
+/* Each returns malloc'd bytes with a NUL behind them that is not counted, or NULL with the reason. */
+unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t *size_bytes,
+                                     char reason[FILES_REASON_BYTES]);
+/* `name` is relative to the model's folder; '\' also separates folders if there is no file of that very name. */
+unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes, char reason[FILES_REASON_BYTES]);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

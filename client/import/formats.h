@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: MIT */
+/* The readers of the formats: bytes of the model file to edits of the scene. Each returns false, with the scene
+ * failed, if the model cannot be used; what can merely not be shown becomes a note. None throws, none reads a file
+ * but through `files`, and every index, count and number of the input is checked before it is used. */
+#ifndef FARLIGHT_IMPORT_FORMATS_H
+#define FARLIGHT_IMPORT_FORMATS_H
+
+#include "files.h"
+#include "import.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* glTF 2.0, JSON or binary. `bytes` has a NUL behind it, as files.h promises. */
+bool gltf_import(struct import_scene *scene, struct files *files, const unsigned char *bytes, size_t size_bytes);
+/* Wavefront OBJ with its MTL files. */
+bool obj_import(struct import_scene *scene, struct files *files, const unsigned char *bytes, size_t size_bytes);
+/* Neutral File Format of the Standard Procedural Databases. */
+bool nff_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes);
+
+/* Equirectangular image, HDR or EXR, as the scene's environment. */
+bool environment_import(struct import_scene *scene, const char *file, const unsigned char *bytes, size_t size_bytes);
+
+/* One image to decode. */
+struct texture_job {
+    const unsigned char *bytes; /* the encoded file; not owned */
+    size_t size_bytes;
+    bool srgb; /* texels are wanted sRGB-encoded: matters for float images only, which are linear */
+    /* Result. */
+    unsigned char *texels; /* malloc'd, 4 bytes each, rows from the top; NULL: `reason` says why */
+    uint32_t width, height;
+    bool has_alpha;
+    char reason[200];
+};
+/* Decodes all, with two threads if there are several. Never fails as a whole. */
+void texture_decode(struct texture_job *jobs, size_t count);
+/* What stands for an image that cannot be had: 2x2 texels, magenta and black. NULL: out of memory. */
+unsigned char *texture_marker(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,286 @@
+/* SPDX-License-Identifier: MIT */
+/* Meshes and sphere sets of the growing scene: checked as the server will check them. */
+#include "model.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void import_mesh_finish(struct import_mesh *mesh)
+{
+    free(mesh->positions);
+    free(mesh->indices);
+    free(mesh->normals);
+    free(mesh->tangents);
+    free(mesh->texcoords[0]);
+    free(mesh->texcoords[1]);
+    free(mesh->colours);
+    free(mesh->ranges);
+    memset(mesh, 0, sizeof *mesh);
+}
+
+static bool all_finite(const float *values, size_t count)
+{
+    /* x * 0 is 0 for finite x and NaN for the others; a sum of zeros stays 0. */
+    float sum = 0;
+
+    for (size_t i = 0; i < count; i++)
+        sum += values[i] * 0.0f;
+    return sum == 0;
+}
+
+/* What is not finite and only shades becomes 0. */
+static void mend(struct import_scene *scene, const char *where, float *values, size_t count, const char *what)
+{
+    if (!values || all_finite(values, count))
+        return;
+    for (size_t i = 0; i < count; i++)
+        if (!isfinite(values[i]))
+            values[i] = 0;
+    import_note(scene, PROTOCOL_SEVERITY_WARNING, where, "%s that are NaN or infinite were set to 0", what);
+}
+
+static bool ranges_valid(const struct record_material_range *ranges, uint32_t count, uint32_t primitives)
+{
+    uint64_t end = 0;
+
+    for (uint32_t i = 0; i < count; i++) {
+        if (ranges[i].first < end)
+            return false;
+        end = (uint64_t)ranges[i].first + ranges[i].count;
+        if (end > primitives)
+            return false;
+    }
+    return count <= IMPORT_RANGES_MAX;
+}
+
+/* Neighbours of one material become one range; empty ones go. */
+static uint32_t ranges_merge(struct record_material_range *ranges, uint32_t count)
+{
+    uint32_t kept = 0;
+
+    for (uint32_t i = 0; i < count; i++) {
+        struct record_material_range *last = kept > 0 ? &ranges[kept - 1] : NULL;
+
+        if (ranges[i].count == 0)
+            continue;
+        if (last && last->material == ranges[i].material && last->first + last->count == ranges[i].first)
+            last->count += ranges[i].count;
+        else
+            ranges[kept++] = ranges[i];
+    }
+    return kept;
+}
+
+static bool triangle_whole(const struct import_mesh *mesh, uint32_t triangle)
+{
+    const uint32_t *corners = mesh->indices + (size_t)triangle * 3;
+    bool whole = true;
+
+    for (int c = 0; c < 3; c++)
+        whole = whole && all_finite(mesh->positions + (size_t)corners[c] * 3, 3);
+    return whole;
+}
+
+/* Moves the whole triangles of from .. to - 1 forwards, to number `kept` and on; returns what follows them. */
+static uint32_t keep_whole(struct import_mesh *mesh, uint32_t from, uint32_t to, uint32_t kept)
+{
+    for (uint32_t t = from; t < to; t++)
+        if (triangle_whole(mesh, t))
+            memmove(mesh->indices + (size_t)kept++ * 3, mesh->indices + (size_t)t * 3, 12);
+    return kept;
+}
+
+/* Triangles with a corner that is NaN or infinite go; such corners become 0, so that nobody stumbles over them. */
+static void drop_broken(struct import_scene *scene, const char *where, struct import_mesh *mesh)
+{
+    uint32_t at = 0, kept = 0;
+
+    for (uint32_t i = 0; i < mesh->range_count; i++) {
+        struct record_material_range *range = &mesh->ranges[i];
+        uint32_t first = keep_whole(mesh, at, range->first, kept);
+
+        at = range->first + range->count;
+        kept = keep_whole(mesh, range->first, at, first);
+        range->first = first;
+        range->count = kept - first;
+    }
+    kept = keep_whole(mesh, at, mesh->triangle_count, kept);
+    import_note(scene, PROTOCOL_SEVERITY_WARNING, where,
+                "%u of %u triangles have corners that are NaN or infinite and were left out",
+                mesh->triangle_count - kept, mesh->triangle_count);
+    mesh->triangle_count = kept;
+    for (size_t i = 0; i < (size_t)mesh->vertex_count * 3; i++)
+        if (!isfinite(mesh->positions[i]))
+            mesh->positions[i] = 0;
+}
+
+static void add_face_normals(const struct import_mesh *mesh, const unsigned char *bad, double *sums)
+{
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        const uint32_t *corners = mesh->indices + (size_t)t * 3;
+        double edges[2][3], normal[3];
+
+        if (!bad[corners[0]] && !bad[corners[1]] && !bad[corners[2]])
+            continue;
+        for (int e = 0; e < 2; e++)
+            for (int c = 0; c < 3; c++)
+                edges[e][c] = (double)mesh->positions[(size_t)corners[e + 1] * 3 + (size_t)c] -
+                              (double)mesh->positions[(size_t)corners[0] * 3 + (size_t)c];
+        for (int c = 0; c < 3; c++)
+            normal[c] = edges[0][(c + 1) % 3] * edges[1][(c + 2) % 3] - edges[0][(c + 2) % 3] * edges[1][(c + 1) % 3];
+        for (int k = 0; k < 3; k++)
+            for (int c = 0; bad[corners[k]] && c < 3; c++)
+                sums[(size_t)corners[k] * 3 + (size_t)c] += normal[c];
+    }
+}
+
+static bool normal_usable(const float *normal)
+{
+    return all_finite(normal, 3) && normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2] > 1e-12f;
+}
+
+/* Normals that are missing, zero or not finite are made from the triangles around the vertex. */
+static bool mend_normals(struct import_scene *scene, const char *where, struct import_mesh *mesh)
+{
+    size_t count = mesh->vertex_count, broken = 0;
+    unsigned char *bad;
+    double *sums;
+
+    for (size_t v = 0; v < count; v++)
+        broken += !normal_usable(mesh->normals + v * 3);
+    if (broken == 0)
+        return true;
+    bad = calloc(count, 1);
+    sums = calloc(count * 3, sizeof *sums);
+    if (!bad || !sums) {
+        free(bad);
+        free(sums);
+        return import_fail(scene, NULL, "out of memory");
+    }
+    for (size_t v = 0; v < count; v++)
+        bad[v] = !normal_usable(mesh->normals + v * 3);
+    add_face_normals(mesh, bad, sums);
+    for (size_t v = 0; v < count; v++) {
+        const double *sum = sums + v * 3;
+        double length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+
+        for (size_t c = 0; bad[v] && c < 3; c++)
+            mesh->normals[v * 3 + c] = length > 0 ? (float)(sum[c] / length) : c == 2 ? 1.0f : 0.0f;
+    }
+    free(bad);
+    free(sums);
+    import_note(scene, PROTOCOL_SEVERITY_INFO, where, "%zu normals are missing or unusable and were made from the faces",
+                broken);
+    return true;
+}
+
+static bool mesh_valid(struct import_scene *scene, struct import_mesh *mesh)
+{
+    const char *where = mesh->where ? mesh->where : mesh->name;
+    size_t index_count = (size_t)mesh->triangle_count * 3;
+    uint32_t greatest = 0;
+
+    if (scene->failed)
+        return false;
+    if (!mesh->positions || !mesh->indices || mesh->vertex_count == 0 || mesh->triangle_count == 0)
+        return import_fail(scene, where, "a mesh without vertices or triangles");
+    for (size_t i = 0; i < index_count; i++)
+        greatest = mesh->indices[i] > greatest ? mesh->indices[i] : greatest;
+    if (greatest >= mesh->vertex_count)
+        return import_fail(scene, where, "index %u is beyond the %u vertices", greatest, mesh->vertex_count);
+    mesh->range_count = ranges_merge(mesh->ranges, mesh->range_count);
+    if (mesh->range_count > IMPORT_RANGES_MAX)
+        return import_fail(scene, where, "more than %d changes of material in one mesh", IMPORT_RANGES_MAX);
+    if (!ranges_valid(mesh->ranges, mesh->range_count, mesh->triangle_count))
+        return import_fail(scene, where, "material ranges overlap or exceed the triangles");
+    if (!all_finite(mesh->positions, (size_t)mesh->vertex_count * 3)) {
+        drop_broken(scene, where, mesh);
+        mesh->range_count = ranges_merge(mesh->ranges, mesh->range_count);
+        if (mesh->triangle_count == 0)
+            return import_fail(scene, where, "every triangle has corners that are NaN or infinite");
+    }
+    return !mesh->normals || mend_normals(scene, where, mesh);
+}
+
+static uint32_t add_array(struct import_scene *scene, void *bytes, uint64_t count, size_t element_bytes)
+{
+    return import_add_blob(scene, bytes, count * element_bytes);
+}
+
+uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
+{
+    const char *where = mesh->where ? mesh->where : mesh->name;
+    uint64_t vertices = mesh->vertex_count;
+    struct import_edit *edit;
+    uint32_t count = 0;
+
+    if (!mesh_valid(scene, mesh)) {
+        import_mesh_finish(mesh);
+        return 0;
+    }
+    mend(scene, where, mesh->tangents, (size_t)vertices * 4, "tangents");
+    mend(scene, where, mesh->texcoords[0], (size_t)vertices * 2, "texture coordinates");
+    mend(scene, where, mesh->texcoords[1], (size_t)vertices * 2, "texture coordinates");
+    edit = import_append(scene, MESSAGE_SET_MESH);
+    if (!edit) {
+        import_mesh_finish(mesh);
+        return 0;
+    }
+    edit->message.set_mesh.vertex_count = mesh->vertex_count;
+    edit->message.set_mesh.triangle_count = mesh->triangle_count;
+    edit->message.set_mesh.name = import_copy_name(scene, mesh->name);
+    edit->message.set_mesh.ranges = mesh->ranges;
+    edit->message.set_mesh.ranges_count = mesh->range_count;
+    edit->blobs[0] = add_array(scene, mesh->positions, vertices, 12);
+    edit->blobs[1] = add_array(scene, mesh->indices, mesh->triangle_count, 12);
+    edit->blobs[2] = add_array(scene, mesh->normals, vertices, 12);
+    edit->blobs[3] = add_array(scene, mesh->tangents, vertices, 16);
+    edit->blobs[4] = add_array(scene, mesh->texcoords[0], vertices, 8);
+    edit->blobs[5] = add_array(scene, mesh->texcoords[1], vertices, 8);
+    edit->blobs[6] = add_array(scene, mesh->colours, vertices, 4);
+    for (uint32_t i = 0; i < 7; i++)
+        if (edit->blobs[i] != 0)
+            count = i + 1;
+    edit->message.set_mesh.arrays_count = count;
+    memset(mesh, 0, sizeof *mesh);
+    return edit->message.set_mesh.mesh = import_next_id(scene, PROTOCOL_OBJECT_KIND_MESH);
+}
+
+static bool spheres_valid(struct import_scene *scene, const char *name, const float *spheres, uint32_t count,
+                          const struct record_material_range *ranges, uint32_t range_count)
+{
+    if (scene->failed)
+        return false;
+    if (!spheres || count == 0)
+        return import_fail(scene, name, "a sphere set without spheres");
+    for (size_t i = 0; i < count; i++)
+        if (!all_finite(spheres + i * 4, 4) || !(spheres[i * 4 + 3] > 0))
+            return import_fail(scene, name, "sphere %zu is not finite or has no radius", i);
+    if (!ranges_valid(ranges, range_count, count))
+        return import_fail(scene, name, "material ranges overlap, exceed the spheres or are more than %d",
+                           IMPORT_RANGES_MAX);
+    return true;
+}
+
+uint32_t import_add_spheres(struct import_scene *scene, const char *name, float *spheres, uint32_t count,
+                            struct record_material_range *ranges, uint32_t range_count)
+{
+    struct import_edit *edit = NULL;
+
+    range_count = ranges_merge(ranges, range_count);
+    if (spheres_valid(scene, name, spheres, count, ranges, range_count))
+        edit = import_append(scene, MESSAGE_SET_SPHERES);
+    if (!edit) {
+        free(spheres);
+        free(ranges);
+        return 0;
+    }
+    edit->message.set_spheres.sphere_count = count;
+    edit->message.set_spheres.name = import_copy_name(scene, name);
+    edit->message.set_spheres.ranges = ranges;
+    edit->message.set_spheres.ranges_count = range_count;
+    edit->message.set_spheres.arrays_count = 1;
+    edit->blobs[0] = add_array(scene, spheres, count, 16);
+    return edit->message.set_spheres.spheres = import_next_id(scene, PROTOCOL_OBJECT_KIND_SPHERES);
+}

@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: MIT
+// All primitives of a glTF mesh become one mesh of ours: vertices behind each other, one range of triangles per
+// primitive, so that instances and materials stay what they are.
+#include "gltf.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+namespace gltf
+{
+namespace
+{
+constexpr uint64_t vertices_max = 1u << 29, triangles_max = 1u << 29;
+
+struct vertex_attributes {
+    int position = -1, normal = -1, tangent = -1, colour = -1;
+    int texcoord[2] = {-1, -1};
+};
+
+// Vertices of one primitive; several primitives with the same accessors share them.
+struct vertex_lot {
+    const tinygltf::Primitive *primitive;
+    vertex_attributes attributes;
+    uint32_t first, count;
+};
+
+struct builder {
+    reader &r;
+    std::string where;
+    const tinygltf::Mesh &source;
+    int skin;
+    const std::vector<double> &weights;
+    import_mesh mesh = {};
+    std::vector<vertex_lot> lots = {};
+    std::vector<uint32_t> indices = {};
+    std::vector<record_material_range> ranges = {};
+
+    ~builder()
+    {
+        import_mesh_finish(&mesh);
+    }
+};
+
+template <typename type> type *allocate(builder &b, uint64_t count)
+{
+    void *memory = calloc(count > 0 ? size_t(count) : 1, sizeof(type));
+    if (!memory)
+        fail(b.r, b.where, "out of memory");
+    return static_cast<type *>(memory);
+}
+
+int attribute(const std::map<std::string, int> &attributes, const char *name)
+{
+    const auto found = attributes.find(name);
+    return found == attributes.end() ? -1 : found->second;
+}
+
+vertex_attributes attributes_of(const tinygltf::Primitive &primitive)
+{
+    vertex_attributes a;
+    a.position = attribute(primitive.attributes, "POSITION");
+    a.normal = attribute(primitive.attributes, "NORMAL");
+    a.tangent = attribute(primitive.attributes, "TANGENT");
+    a.colour = attribute(primitive.attributes, "COLOR_0");
+    a.texcoord[0] = attribute(primitive.attributes, "TEXCOORD_0");
+    a.texcoord[1] = attribute(primitive.attributes, "TEXCOORD_1");
+    return a;
+}
+
+void check_counts(builder &b, const tinygltf::Primitive &primitive, size_t vertices, const std::string &where)
+{
+    static const char *const vectors3[] = {"POSITION", "NORMAL"};
+    for (const char *name : vectors3)
+        if (attribute(primitive.attributes, name) >= 0)
+            accessor_count(b.r, attribute(primitive.attributes, name), TINYGLTF_TYPE_VEC3, where + "." + name);
+    for (const auto &entry : primitive.attributes) {
+        const size_t count = accessor_count(b.r, entry.second, 0, where + "." + entry.first);
+        if (count != vertices)
+            fail(b.r, where, "%.40s has %zu elements, POSITION has %zu", entry.first.c_str(), count, vertices);
+    }
+    for (const auto &target : primitive.targets)
+        for (const auto &entry : target)
+            if (accessor_count(b.r, entry.second, 0, where + ".targets") != vertices)
+                fail(b.r, where, "a morph target has another count than the %zu vertices", vertices);
+}
+
+uint32_t lot_of(builder &b, const tinygltf::Primitive &primitive, const std::string &where)
+{
+    for (size_t i = 0; i < b.lots.size(); i++)
+        if (b.lots[i].primitive->attributes == primitive.attributes && b.lots[i].primitive->targets == primitive.targets)
+            return uint32_t(i);
+    const vertex_attributes a = attributes_of(primitive);
+    const size_t count = accessor_count(b.r, a.position, TINYGLTF_TYPE_VEC3, where + ".POSITION");
+    check_counts(b, primitive, count, where);
+    const uint64_t first = b.lots.empty() ? 0 : uint64_t(b.lots.back().first) + b.lots.back().count;
+    if (first + count > vertices_max)
+        fail(b.r, b.where, "more than %llu vertices", static_cast<unsigned long long>(vertices_max));
+    b.lots.push_back({&primitive, a, uint32_t(first), uint32_t(count)});
+    return uint32_t(b.lots.size() - 1);
+}
+
+// ---- triangles
+
+void add_triangle(builder &b, uint32_t first, uint32_t x, uint32_t y, uint32_t z)
+{
+    b.indices.push_back(first + x);
+    b.indices.push_back(first + y);
+    b.indices.push_back(first + z);
+}
+
+std::vector<uint32_t> corners_of(builder &b, const tinygltf::Primitive &primitive, const vertex_lot &lot,
+                                 const std::string &where)
+{
+    std::vector<uint32_t> corners;
+
+    if (primitive.indices < 0) {
+        corners.resize(lot.count);
+        for (uint32_t i = 0; i < lot.count; i++)
+            corners[i] = i;
+        return corners;
+    }
+    corners = read_integers(b.r, primitive.indices, 1, where + ".indices");
+    for (size_t i = 0; i < corners.size(); i++)
+        if (corners[i] >= lot.count)
+            fail(b.r, where, "index %u (number %zu) is beyond the %u vertices", corners[i], i, lot.count);
+    return corners;
+}
+
+void add_triangles(builder &b, const tinygltf::Primitive &primitive, const vertex_lot &lot, const std::string &where)
+{
+    const std::vector<uint32_t> corners = corners_of(b, primitive, lot, where);
+    const size_t count = corners.size();
+
+    if (primitive.mode == TINYGLTF_MODE_TRIANGLES) {
+        if (count % 3 != 0)
+            import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
+                        "corners that make no whole triangle were left out");
+        b.indices.reserve(b.indices.size() + count);
+        for (size_t i = 0; i + 3 <= count; i += 3)
+            add_triangle(b, lot.first, corners[i], corners[i + 1], corners[i + 2]);
+        return;
+    }
+    for (size_t i = 2; i < count; i++) {
+        if (primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN) // glTF's order: (i + 1, i + 2, 0)
+            add_triangle(b, lot.first, corners[i - 1], corners[i], corners[0]);
+        else if (i % 2 == 0)
+            add_triangle(b, lot.first, corners[i - 2], corners[i - 1], corners[i]);
+        else // every other triangle of a strip is turned
+            add_triangle(b, lot.first, corners[i - 2], corners[i], corners[i - 1]);
+    }
+}
+
+void add_primitive(builder &b, const tinygltf::Primitive &primitive, size_t number)
+{
+    const std::string where = b.where + "." + place("primitives", number);
+    record_material_range range = {};
+
+    if (primitive.mode < TINYGLTF_MODE_POINTS || primitive.mode > TINYGLTF_MODE_TRIANGLE_FAN)
+        fail(b.r, where, "mode %d is unknown", primitive.mode);
+    if (primitive.mode < TINYGLTF_MODE_TRIANGLES) {
+        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(), "points and lines cannot be shown");
+        return;
+    }
+    if (attribute(primitive.attributes, "POSITION") < 0) {
+        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(), "a primitive without positions is left out");
+        return;
+    }
+    if (primitive.material >= 0 && size_t(primitive.material) >= b.r.material_ids.size())
+        fail(b.r, where, "material %d does not exist", primitive.material);
+    const uint32_t lot = lot_of(b, primitive, where);
+    range.first = uint32_t(b.indices.size() / 3);
+    add_triangles(b, primitive, b.lots[lot], where);
+    if (b.indices.size() / 3 > triangles_max)
+        fail(b.r, b.where, "more than %llu triangles", static_cast<unsigned long long>(triangles_max));
+    range.count = uint32_t(b.indices.size() / 3) - range.first;
+    range.material = primitive.material >= 0 ? b.r.material_ids[size_t(primitive.material)] : 0;
+    if (range.count > 0)
+        b.ranges.push_back(range);
+}
+
+// ---- vertices
+
+void read_colours(builder &b, const vertex_lot &lot, const std::string &where)
+{
+    const bool has_alpha = accessor_components(b.r, lot.attributes.colour, where) == 4;
+    std::vector<float> colours(size_t(lot.count) * 4);
+    uint8_t *out = b.mesh.colours + size_t(lot.first) * 4;
+
+    read_floats(b.r, lot.attributes.colour, 4, 1, colours.data(), where);
+    for (size_t i = 0; i < colours.size(); i++) {
+        const float value = i % 4 == 3 && !has_alpha ? 1 : colours[i];
+        out[i] = uint8_t(std::lround(std::min(std::max(value, 0.0f), 1.0f) * 255));
+    }
+}
+
+// Adds weight times the target's displacements.
+void apply_target(builder &b, const vertex_lot &lot, size_t target, const char *name, float weight, float *out,
+                  size_t out_stride)
+{
+    const int accessor = attribute(lot.primitive->targets[target], name);
+    if (accessor < 0 || !out)
+        return;
+    std::vector<float> offsets(size_t(lot.count) * 3);
+    read_floats(b.r, accessor, 3, 0, offsets.data(), b.where + ".targets." + name);
+    out += size_t(lot.first) * out_stride;
+    for (size_t v = 0; v < lot.count; v++)
+        for (size_t c = 0; c < 3; c++)
+            out[v * out_stride + c] += weight * offsets[v * 3 + c];
+}
+
+void apply_targets(builder &b, const vertex_lot &lot)
+{
+    for (size_t target = 0; target < lot.primitive->targets.size(); target++) {
+        const double weight = target < b.weights.size() ? b.weights[target] : 0;
+        if (weight == 0 || !std::isfinite(weight))
+            continue;
+        apply_target(b, lot, target, "POSITION", float(weight), b.mesh.positions, 3);
+        apply_target(b, lot, target, "NORMAL", float(weight), b.mesh.normals, 3);
+        apply_target(b, lot, target, "TANGENT", float(weight), b.mesh.tangents, 4);
+    }
+    if (!lot.primitive->targets.empty())
+        import_note(b.r.scene, PROTOCOL_SEVERITY_INFO, b.where.c_str(), "morph targets stand at their default weights");
+}
+
+void read_lot(builder &b, const vertex_lot &lot)
+{
+    const vertex_attributes &a = lot.attributes;
+    const size_t first = lot.first;
+
+    read_floats(b.r, a.position, 3, 0, b.mesh.positions + first * 3, b.where + ".POSITION");
+    if (a.normal >= 0)
+        read_floats(b.r, a.normal, 3, 0, b.mesh.normals + first * 3, b.where + ".NORMAL");
+    if (a.tangent >= 0)
+        read_floats(b.r, a.tangent, 4, 1, b.mesh.tangents + first * 4, b.where + ".TANGENT");
+    for (size_t set = 0; set < 2; set++)
+        if (a.texcoord[set] >= 0)
+            read_floats(b.r, a.texcoord[set], 2, 0, b.mesh.texcoords[set] + first * 2, b.where + ".TEXCOORD");
+    if (a.colour >= 0)
+        read_colours(b, lot, b.where + ".COLOR_0");
+    else if (b.mesh.colours)
+        memset(b.mesh.colours + first * 4, 255, size_t(lot.count) * 4);
+    apply_targets(b, lot);
+    if (b.skin >= 0)
+        apply_skin(b.r, *lot.primitive, b.skin,
+                   {b.mesh.positions + first * 3, a.normal >= 0 ? b.mesh.normals + first * 3 : nullptr,
+                    a.tangent >= 0 ? b.mesh.tangents + first * 4 : nullptr, lot.count},
+                   b.where);
+}
+
+bool any(const builder &b, int vertex_attributes::*member)
+{
+    return std::any_of(b.lots.begin(), b.lots.end(),
+                       [&](const vertex_lot &lot) { return lot.attributes.*member >= 0; });
+}
+
+void read_vertices(builder &b)
+{
+    const uint64_t count = uint64_t(b.lots.back().first) + b.lots.back().count;
+
+    b.mesh.vertex_count = uint32_t(count);
+    b.mesh.positions = allocate<float>(b, count * 3);
+    if (any(b, &vertex_attributes::normal))
+        b.mesh.normals = allocate<float>(b, count * 3); // zeros are made good when the mesh is added
+    if (b.mesh.normals && any(b, &vertex_attributes::tangent))
+        b.mesh.tangents = allocate<float>(b, count * 4);
+    else
+        for (vertex_lot &lot : b.lots)
+            lot.attributes.tangent = -1; // glTF: without normals, tangents are to be ignored
+    for (size_t set = 0; set < 2; set++)
+        if (std::any_of(b.lots.begin(), b.lots.end(),
+                        [&](const vertex_lot &lot) { return lot.attributes.texcoord[set] >= 0; }))
+            b.mesh.texcoords[set] = allocate<float>(b, count * 2);
+    if (any(b, &vertex_attributes::colour))
+        b.mesh.colours = allocate<uint8_t>(b, count * 4);
+    for (const vertex_lot &lot : b.lots)
+        read_lot(b, lot);
+}
+
+template <typename type> type *copy_of(builder &b, const std::vector<type> &from)
+{
+    type *copy = allocate<type>(b, from.size());
+    if (!from.empty())
+        memcpy(copy, from.data(), from.size() * sizeof(type));
+    return copy;
+}
+
+uint32_t build(builder &b)
+{
+    if (b.skin >= 0 && size_t(b.skin) >= b.r.model.skins.size())
+        fail(b.r, b.where, "skin %d does not exist", b.skin);
+    for (size_t i = 0; i < b.source.primitives.size(); i++)
+        add_primitive(b, b.source.primitives[i], i);
+    if (b.indices.empty())
+        return 0;
+    read_vertices(b);
+    b.mesh.name = b.source.name.c_str();
+    b.mesh.where = b.where.c_str();
+    b.mesh.triangle_count = uint32_t(b.indices.size() / 3);
+    b.mesh.indices = copy_of(b, b.indices);
+    b.mesh.range_count = uint32_t(b.ranges.size());
+    b.mesh.ranges = copy_of(b, b.ranges);
+    const uint32_t id = import_add_mesh(b.r.scene, &b.mesh);
+    if (b.r.scene->failed)
+        throw failed();
+    return id;
+}
+} // namespace
+
+uint32_t mesh_id(reader &r, int mesh, int skin, int node)
+{
+    if (size_t(mesh) >= r.model.meshes.size())
+        fail(r, "nodes", "mesh %d does not exist; there are %zu", mesh, r.model.meshes.size());
+    const auto key = std::make_tuple(mesh, skin, node);
+    const auto found = r.mesh_ids.find(key);
+    if (found != r.mesh_ids.end())
+        return found->second;
+    const tinygltf::Mesh &source = r.model.meshes[size_t(mesh)];
+    builder b = {r, place("meshes", size_t(mesh)), source, skin,
+                 node >= 0 ? r.model.nodes[size_t(node)].weights : source.weights};
+    return r.mesh_ids[key] = build(b);
+}
+} // namespace gltf

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: MIT
+// The hierarchy: transforms, and what hangs at a node. Nothing here descends by calling itself.
+#include "gltf.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gltf
+{
+namespace
+{
+// One less than the server's limit, since a node with a mesh and a camera needs one below it.
+constexpr int depth_max = 255;
+
+using matrix = std::array<double, 16>;
+
+matrix identity()
+{
+    matrix m = {};
+    m[0] = m[5] = m[10] = m[15] = 1;
+    return m;
+}
+
+matrix from_parts(const std::vector<double> &t, const std::vector<double> &q, const std::vector<double> &s)
+{
+    matrix m = identity();
+
+    if (q.size() == 4) {
+        const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        if (length > 0) {
+            const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
+            m[0] = 1 - 2 * (y * y + z * z), m[4] = 2 * (x * y - z * w), m[8] = 2 * (x * z + y * w);
+            m[1] = 2 * (x * y + z * w), m[5] = 1 - 2 * (x * x + z * z), m[9] = 2 * (y * z - x * w);
+            m[2] = 2 * (x * z - y * w), m[6] = 2 * (y * z + x * w), m[10] = 1 - 2 * (x * x + y * y);
+        }
+    }
+    for (size_t column = 0; column < 3 && s.size() == 3; column++)
+        for (size_t row = 0; row < 3; row++)
+            m[column * 4 + row] *= s[column];
+    for (size_t row = 0; row < 3 && t.size() == 3; row++)
+        m[12 + row] = t[row];
+    return m;
+}
+
+void to_rows(const matrix &m, float out[12])
+{
+    for (size_t row = 0; row < 3; row++)
+        for (size_t column = 0; column < 4; column++)
+            out[row * 4 + column] = float(m[column * 4 + row]);
+}
+
+std::string name_of(const reader &r, const tinygltf::Node &node)
+{
+    if (!node.name.empty())
+        return node.name;
+    if (node.mesh >= 0 && size_t(node.mesh) < r.model.meshes.size())
+        return r.model.meshes[size_t(node.mesh)].name;
+    if (node.camera >= 0 && size_t(node.camera) < r.model.cameras.size())
+        return r.model.cameras[size_t(node.camera)].name;
+    return "";
+}
+
+// Candela become watts per steradian and lux watts per square metre number by number: the renderer works in one
+// unit throughout, and files are made to look right at exposure 0, not to be photometric.
+uint32_t light_id(reader &r, int index, const std::string &where)
+{
+    if (index < 0 || size_t(index) >= r.model.lights.size())
+        fail(r, where, "light %d does not exist", index);
+    const tinygltf::Light &light = r.model.lights[size_t(index)];
+    const std::string here = place("KHR_lights_punctual.lights", size_t(index));
+    message_set_light set = {};
+
+    for (size_t c = 0; c < 3; c++)
+        set.colour[c] =
+            limited(r, here, "the light's colour",
+                    (light.color.size() == 3 ? light.color[c] : 1.0) * light.intensity, 0, 1e12);
+    set.range = limited(r, here, "the light's range", light.range, 0, 1e12);
+    set.name = light.name.c_str();
+    if (light.type == "directional") {
+        set.kind = PROTOCOL_LIGHT_KIND_DIRECTIONAL;
+    } else if (light.type == "point") {
+        set.kind = PROTOCOL_LIGHT_KIND_POINT;
+    } else if (light.type == "spot") {
+        set.kind = PROTOCOL_LIGHT_KIND_SPOT;
+        set.outer_cone = limited(r, here, "the outer cone", light.spot.outerConeAngle, 0, 1.5707);
+        set.inner_cone = limited(r, here, "the inner cone", light.spot.innerConeAngle, 0, double(set.outer_cone));
+    } else {
+        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, here.c_str(), "a light of unknown type '%.32s' is left out",
+                    light.type.c_str());
+        return 0;
+    }
+    return import_add_light(r.scene, &set);
+}
+
+uint32_t camera_id(reader &r, int index, const std::string &where)
+{
+    if (size_t(index) >= r.model.cameras.size())
+        fail(r, where, "camera %d does not exist", index);
+    const tinygltf::Camera &camera = r.model.cameras[size_t(index)];
+    const std::string here = place("cameras", size_t(index));
+    message_set_camera set = {};
+
+    set.name = camera.name.c_str();
+    if (camera.type == "perspective") {
+        if (!(camera.perspective.yfov > 0))
+            fail(r, here, "a field of view of %g", camera.perspective.yfov);
+        set.fov_y = limited(r, here, "the field of view", camera.perspective.yfov, 0.001, 3.1);
+        set.near = limited(r, here, "the near distance", camera.perspective.znear, 0, 1e12);
+    } else if (camera.type == "orthographic") {
+        set.height = limited(r, here, "the orthographic height", 2 * std::fabs(camera.orthographic.ymag), 0, 1e12);
+        set.near = limited(r, here, "the near distance", std::max(0.0, camera.orthographic.znear), 0, 1e12);
+    } else {
+        fail(r, here, "a camera of unknown type '%.32s'", camera.type.c_str());
+    }
+    return import_add_camera(r.scene, &set);
+}
+
+struct attachment {
+    protocol_node_kind kind;
+    uint32_t object;
+    const char *suffix;
+};
+
+std::vector<attachment> attachments_of(reader &r, size_t index)
+{
+    const tinygltf::Node &node = r.model.nodes[index];
+    const std::string where = place("nodes", index);
+    std::vector<attachment> found;
+
+    if (node.mesh >= 0 && node.skin < 0) {
+        const uint32_t mesh = mesh_id(r, node.mesh, -1, node.weights.empty() ? -1 : int(index));
+        if (mesh != 0)
+            found.push_back({PROTOCOL_NODE_KIND_MESH, mesh, " mesh"});
+    }
+    if (node.camera >= 0)
+        found.push_back({PROTOCOL_NODE_KIND_CAMERA, camera_id(r, node.camera, where), " camera"});
+    if (const tinygltf::Value *lights = extension(node.extensions, "KHR_lights_punctual")) {
+        const uint32_t light = light_id(r, int(number(*lights, "light", -1)), where);
+        if (light != 0)
+            found.push_back({PROTOCOL_NODE_KIND_LIGHT, light, " light"});
+    }
+    return found;
+}
+
+uint32_t add_node(reader &r, uint32_t parent, const matrix &m, protocol_node_kind kind, uint32_t object,
+                  const std::string &name)
+{
+    message_set_node set = {};
+
+    set.parent = parent;
+    set.kind = kind;
+    set.object = object;
+    set.name = name.c_str();
+    to_rows(m, set.parent_from_node);
+    return import_add_node(r.scene, &set);
+}
+
+// A node may hold a mesh, a camera and a light at once; ours hold one thing, so the others hang below it.
+uint32_t add_one(reader &r, size_t index, uint32_t parent)
+{
+    const tinygltf::Node &node = r.model.nodes[index];
+    const std::string name = name_of(r, node);
+    const std::vector<attachment> found = attachments_of(r, index);
+    const bool single = found.size() == 1;
+    const uint32_t id =
+        add_node(r, parent, node_matrix(r, index), single ? found[0].kind : PROTOCOL_NODE_KIND_GROUP,
+                 single ? found[0].object : 0, name);
+
+    for (size_t i = 0; i < found.size() && !single; i++)
+        add_node(r, id, identity(), found[i].kind, found[i].object, name + found[i].suffix);
+    // A skin places its mesh by the joints alone: what the node and its ancestors do to it does not count.
+    if (node.mesh >= 0 && node.skin >= 0) {
+        const uint32_t mesh = mesh_id(r, node.mesh, node.skin, node.weights.empty() ? -1 : int(index));
+        if (mesh != 0)
+            add_node(r, 0, identity(), PROTOCOL_NODE_KIND_MESH, mesh, name + " (skinned)");
+    }
+    if (r.scene->failed)
+        throw failed();
+    return id;
+}
+
+std::vector<int> roots_of(reader &r)
+{
+    const tinygltf::Model &model = r.model;
+    std::vector<int> roots;
+
+    if (model.scenes.empty()) {
+        for (size_t i = 0; i < r.parents.size(); i++)
+            if (r.parents[i] < 0)
+                roots.push_back(int(i));
+        if (!roots.empty())
+            import_note(r.scene, PROTOCOL_SEVERITY_INFO, "", "the file has no scene: every node is shown");
+        return roots;
+    }
+    const int scene = model.defaultScene < 0 ? 0 : model.defaultScene;
+    if (size_t(scene) >= model.scenes.size())
+        fail(r, "scene", "scene %d does not exist; there are %zu", scene, model.scenes.size());
+    if (model.scenes.size() > 1)
+        import_note(r.scene, PROTOCOL_SEVERITY_INFO, "", "scene %d of the file's %zu is shown", scene,
+                    model.scenes.size());
+    std::set<int> seen;
+    for (int root : model.scenes[size_t(scene)].nodes) {
+        if (root < 0 || size_t(root) >= model.nodes.size())
+            fail(r, place("scenes", size_t(scene)), "node %d does not exist", root);
+        if (r.parents[size_t(root)] >= 0)
+            fail(r, place("scenes", size_t(scene)), "node %d is no root: it is a child of node %d", root,
+                 r.parents[size_t(root)]);
+        if (!seen.insert(root).second)
+            fail(r, place("scenes", size_t(scene)), "node %d is listed twice", root);
+        roots.push_back(root);
+    }
+    return roots;
+}
+
+struct pending {
+    int node;
+    uint32_t parent;
+    int depth;
+};
+
+void use_materials(reader &r, const tinygltf::Node &node, std::set<int> &used)
+{
+    if (node.mesh < 0 || size_t(node.mesh) >= r.model.meshes.size())
+        return;
+    for (const tinygltf::Primitive &primitive : r.model.meshes[size_t(node.mesh)].primitives)
+        if (primitive.material >= 0)
+            used.insert(primitive.material);
+}
+
+// Calls `visit(node, parent's result)` for all nodes below the roots, parents first.
+template <typename visitor> void walk(reader &r, const std::vector<int> &roots, visitor visit)
+{
+    std::vector<pending> open;
+
+    for (size_t i = roots.size(); i-- > 0;)
+        open.push_back({roots[i], 0, 1});
+    while (!open.empty()) {
+        const pending at = open.back();
+        open.pop_back();
+        if (at.depth > depth_max)
+            fail(r, place("nodes", size_t(at.node)), "nodes are nested more than %d deep", depth_max);
+        const uint32_t id = visit(size_t(at.node), at.parent);
+        const std::vector<int> &children = r.model.nodes[size_t(at.node)].children;
+        for (size_t i = children.size(); i-- > 0;)
+            open.push_back({children[i], id, at.depth + 1});
+    }
+}
+} // namespace
+
+std::array<double, 16> node_matrix(reader &r, size_t index)
+{
+    const tinygltf::Node &node = r.model.nodes[index];
+    matrix m = identity();
+
+    if (node.matrix.size() == 16)
+        std::copy(node.matrix.begin(), node.matrix.end(), m.begin());
+    else if (!node.matrix.empty())
+        fail(r, place("nodes", index), "a matrix of %zu numbers", node.matrix.size());
+    else
+        m = from_parts(node.translation, node.rotation, node.scale);
+    for (double value : m)
+        if (!std::isfinite(value) || std::fabs(value) > 1e12)
+            fail(r, place("nodes", index), "a transform that is not finite or beyond 1e12");
+    return m;
+}
+
+void check_hierarchy(reader &r)
+{
+    const std::vector<tinygltf::Node> &nodes = r.model.nodes;
+
+    r.parents.assign(nodes.size(), -1);
+    for (size_t i = 0; i < nodes.size(); i++) {
+        for (int child : nodes[i].children) {
+            if (child < 0 || size_t(child) >= nodes.size())
+                fail(r, place("nodes", i), "child %d does not exist; there are %zu nodes", child, nodes.size());
+            if (r.parents[size_t(child)] >= 0)
+                fail(r, place("nodes", size_t(child)), "the node is a child of node %d and of node %zu",
+                     r.parents[size_t(child)], i);
+            r.parents[size_t(child)] = int(i);
+        }
+    }
+    // With one parent at most, a cycle is a chain upwards that meets itself: 1 on the way, 2 known to end.
+    std::vector<char> state(nodes.size(), 0);
+    for (size_t i = 0; i < nodes.size(); i++) {
+        int at = int(i);
+        for (; at >= 0 && state[size_t(at)] == 0; at = r.parents[size_t(at)])
+            state[size_t(at)] = 1;
+        if (at >= 0 && state[size_t(at)] == 1)
+            fail(r, place("nodes", size_t(at)), "the node is its own ancestor");
+        for (at = int(i); at >= 0 && state[size_t(at)] == 1; at = r.parents[size_t(at)])
+            state[size_t(at)] = 2;
+    }
+}
+
+void add_scene(reader &r)
+{
+    const std::vector<int> roots = roots_of(r);
+    std::set<int> used;
+
+    walk(r, roots, [&](size_t node, uint32_t) {
+        use_materials(r, r.model.nodes[node], used);
+        return 0u;
+    });
+    add_materials(r, used);
+    walk(r, roots, [&](size_t node, uint32_t parent) { return add_one(r, node, parent); });
+}
+
+void add_clips(reader &r)
+{
+    for (const tinygltf::Animation &animation : r.model.animations) {
+        double duration = 0;
+        for (const tinygltf::AnimationSampler &sampler : animation.samplers)
+            if (sampler.input >= 0 && size_t(sampler.input) < r.model.accessors.size())
+                for (double end : r.model.accessors[size_t(sampler.input)].maxValues)
+                    duration = std::max(duration, end);
+        const size_t channels = std::min<size_t>(animation.channels.size(), UINT32_MAX);
+        import_add_clip(r.scene, animation.name.c_str(), uint32_t(channels), duration);
+    }
+    if (!r.model.animations.empty())
+        import_note(r.scene, PROTOCOL_SEVERITY_INFO, "", "%zu animation clips are listed but not played",
+                    r.model.animations.size());
+}
+} // namespace gltf

@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: MIT */
+/* What a model file becomes: a growing list of edits (the protocol's own messages) and the bytes that they
+ * name. The format readers (gltf.cpp, obj.cpp, nff.c) add to it, send.c speaks it.
+ *
+ * Everything that is added is checked here once more, whatever the reader promised: counts, indices, finite
+ * numbers, ranges of the protocol. The first failure is kept in the scene; later calls do nothing more.
+ * Not thread-safe. C and C++; no function throws. */
+#ifndef FARLIGHT_IMPORT_IMPORT_H
+#define FARLIGHT_IMPORT_IMPORT_H
+
+#include "protocol/messages.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define IMPORT_NOTES_MAX 200
+#define IMPORT_NAME_MAX 128
+#define IMPORT_RANGES_MAX 4096 /* of one SET_MESH or SET_SPHERES */
+#define IMPORT_ARRAYS_MAX 8
+/* Sum of all blobs: keeps a small file that asks for much from filling the memory of three programs. */
+#define IMPORT_BYTES_MAX (6ULL << 30)
+
+/* Bytes that edits refer to, by number: 1 + position, 0 is none. */
+struct import_blob {
+    unsigned char *bytes; /* malloc'd, owned */
+    uint64_t size_bytes;
+    uint8_t hash[32];
+    uint32_t same_as; /* after import_hash(): position of the first blob with the same hash, maybe itself */
+};
+
+struct import_edit {
+    struct message message;           /* a SET_..; its arrays of blob_ref are filled in when it is sent */
+    uint32_t blobs[IMPORT_ARRAYS_MAX]; /* numbers */
+};
+
+struct import_notice {
+    enum protocol_severity severity;
+    uint32_t count;
+    char where[257];
+    char text[481];
+};
+
+struct import_clip {
+    char name[IMPORT_NAME_MAX + 1];
+    uint32_t channels;
+    float duration_s;
+};
+
+struct import_scene {
+    struct import_edit *edits;
+    size_t edit_count, edit_capacity;
+    struct import_blob *blobs;
+    size_t blob_count, blob_capacity;
+    struct import_clip *clips;
+    size_t clip_count, clip_capacity;
+    struct import_notice notes[IMPORT_NOTES_MAX];
+    size_t note_count;
+    uint32_t notes_lost; /* distinct ones beyond IMPORT_NOTES_MAX, about */
+    uint32_t last_id[PROTOCOL_OBJECT_KIND_COUNT];
+    uint64_t blob_bytes;
+    char file[257]; /* the model's, as people named it; goes into `where` */
+    bool failed;
+    struct import_notice failure;
+};
+
+void import_scene_init(struct import_scene *scene, const char *file);
+void import_scene_finish(struct import_scene *scene);
+
+/* Gives up: keeps the first message. `where` names the place in the file ("mesh 3") or a file; NULL: the model file
+ * as a whole. Returns false. */
+bool import_fail(struct import_scene *scene, const char *where, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+/* Something a person should know. The same text again only counts. */
+void import_note(struct import_scene *scene, enum protocol_severity severity, const char *where,
+                 const char *format, ...) __attribute__((format(printf, 4, 5)));
+
+/* Takes `bytes` (malloc'd) whether it succeeds or not. Returns the blob's number; 0: failed, or `bytes` is NULL. */
+uint32_t import_add_blob(struct import_scene *scene, void *bytes, uint64_t size_bytes);
+
+/* Each returns the new object's identifier, 0 if the scene has failed. Identifiers in the message are ignored; names
+ * are copied, cut to the protocol's length and mended to UTF-8. Numbers that the protocol does not allow fail. */
+uint32_t import_add_node(struct import_scene *scene, const struct message_set_node *node);
+uint32_t import_add_material(struct import_scene *scene, const struct message_set_material *material);
+uint32_t import_add_light(struct import_scene *scene, const struct message_set_light *light);
+uint32_t import_add_camera(struct import_scene *scene, const struct message_set_camera *camera);
+uint32_t import_add_texture(struct import_scene *scene, const struct message_set_texture *texture, uint32_t texels);
+void import_set_environment(struct import_scene *scene, const struct message_set_environment *environment,
+                            uint32_t texels);
+void import_add_clip(struct import_scene *scene, const char *name, uint32_t channels, double duration_s);
+
+/* Arrays are malloc'd and taken whether it succeeds or not; those but positions and indices may be NULL. */
+struct import_mesh {
+    const char *name;
+    const char *where; /* for messages; may be NULL */
+    uint32_t vertex_count, triangle_count;
+    float *positions;   /* 3 a vertex */
+    uint32_t *indices;  /* 3 a triangle */
+    float *normals;     /* 3 */
+    float *tangents;    /* 4 */
+    float *texcoords[2]; /* 2 */
+    uint8_t *colours;   /* 4, linear */
+    struct record_material_range *ranges;
+    uint32_t range_count;
+};
+uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh);
+void import_mesh_finish(struct import_mesh *mesh); /* for one that was not added */
+
+/* `spheres` (4 floats each) and `ranges` are taken. */
+uint32_t import_add_spheres(struct import_scene *scene, const char *name, float *spheres, uint32_t count,
+                            struct record_material_range *ranges, uint32_t range_count);
+
+/* 3x4 row-major. */
+void import_identity(float parent_from_node[12]);
+/* A material with the defaults of glTF, opaque white; textures are missing. */
+void import_material_default(struct message_set_material *material);
+void import_texture_use_default(struct record_texture_use *use, uint32_t texture);
+
+/* Fills the hashes, with two threads where there is much, and `same_as`. False: failed. */
+bool import_hash(struct import_scene *scene);
+
+uint64_t import_now_ns(void); /* monotonic */
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

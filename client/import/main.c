@@ -1,0 +1,229 @@
+/* SPDX-License-Identifier: MIT */
+/* farlight-import: turns a model file into the protocol's messages and speaks them over a socket that the program
+ * that started it has connected already. A program of its own so that nothing else links the libraries that read
+ * hostile files, and so that it can give up its rights before it does. */
+#include "files.h"
+#include "formats.h"
+#include "import.h"
+#include "sandbox.h"
+#include "send.h"
+
+#include <argp.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#define EXIT_USAGE 2
+#define CPU_SECONDS_MAX 300
+
+const char *argp_program_version = "farlight-import " FARLIGHT_VERSION;
+
+struct options {
+    int socket;
+    uint32_t scene;
+    const char *environment;
+    bool no_model;
+    const char *model;
+};
+
+enum { OPTION_FD = 256, OPTION_SCENE, OPTION_ENVIRONMENT, OPTION_NO_MODEL };
+
+static const struct argp_option option_rows[] = {
+    {"fd", OPTION_FD, "N", 0, "connected stream socket to speak over (required)", 0},
+    {"scene", OPTION_SCENE, "ID", 0, "scene that the edits are for (default 1)", 0},
+    {"environment", OPTION_ENVIRONMENT, "FILE", 0, "light from all around: equirectangular image, HDR or EXR", 0},
+    {"no-model", OPTION_NO_MODEL, NULL, 0, "send the environment only; MODEL is not needed", 0},
+    {0}};
+
+static uint32_t parse_number(struct argp_state *state, const char *name, const char *text, uint32_t least)
+{
+    char *end;
+    unsigned long value;
+
+    errno = 0;
+    value = strtoul(text, &end, 10);
+    if (errno != 0 || end == text || *end != '\0' || text[0] == '-' || value < least || value > INT32_MAX)
+        argp_error(state, "--%s: '%s' is not a whole number from %u", name, text, least);
+    return (uint32_t)value;
+}
+
+static error_t parse_option(int key, char *argument, struct argp_state *state)
+{
+    struct options *options = state->input;
+
+    switch (key) {
+    case OPTION_FD:
+        options->socket = (int)parse_number(state, "fd", argument, 0);
+        return 0;
+    case OPTION_SCENE:
+        options->scene = parse_number(state, "scene", argument, 1);
+        return 0;
+    case OPTION_ENVIRONMENT:
+        options->environment = argument;
+        return 0;
+    case OPTION_NO_MODEL:
+        options->no_model = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (options->model)
+            argp_error(state, "one MODEL only, not '%s' as well", argument);
+        options->model = argument;
+        return 0;
+    case ARGP_KEY_END:
+        if (options->socket < 0)
+            argp_error(state, "--fd is missing: this program is started by the client");
+        if (options->no_model)
+            options->model = NULL;
+        else if (!options->model)
+            argp_error(state, "MODEL is missing");
+        if (!options->model && !options->environment)
+            argp_error(state, "neither MODEL nor --environment");
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const char *file_part(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+
+    return slash && slash[1] ? slash + 1 : path;
+}
+
+/* The libraries talk to standard error on their own; what is worth knowing goes over the socket as a note. The
+ * sanitizers' reports must stay to be seen. */
+static void silence_libraries(void)
+{
+#if !defined(__SANITIZE_ADDRESS__)
+    if (!freopen("/dev/null", "w", stderr))
+        fclose(stderr);
+#endif
+}
+
+static bool enter_sandbox(struct import_scene *scene, const struct options *options)
+{
+    char *folder = options->model ? files_folder_of(options->model) : NULL;
+    const char *const folders[] = {folder};
+    struct sandbox_options sandbox = {
+        .read_folders = folders, .read_folder_count = 1, .cpu_seconds = CPU_SECONDS_MAX};
+    char reason[256];
+    bool entered = sandbox_enter(&sandbox, reason, sizeof reason);
+
+    free(folder);
+    if (!entered)
+        return import_fail(scene, NULL, "the sandbox cannot be entered: %s", reason);
+    if (reason[0])
+        import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "%s", reason);
+    return true;
+}
+
+static bool has_ending(const char *path, const char *ending)
+{
+    size_t path_length = strlen(path), length = strlen(ending);
+
+    return path_length > length && strcasecmp(path + path_length - length, ending) == 0;
+}
+
+static bool parse_model(struct import_scene *scene, struct files *files, const char *path, const unsigned char *bytes,
+                        size_t size_bytes)
+{
+    const char *name = file_part(path);
+    const char *dot = strrchr(name, '.');
+
+    if (size_bytes == 0)
+        return import_fail(scene, NULL, "the file is empty");
+    if (has_ending(name, ".gltf") || has_ending(name, ".glb") || (size_bytes >= 4 && memcmp(bytes, "glTF", 4) == 0))
+        return gltf_import(scene, files, bytes, size_bytes);
+    if (has_ending(name, ".obj"))
+        return obj_import(scene, files, bytes, size_bytes);
+    if (has_ending(name, ".nff"))
+        return nff_import(scene, bytes, size_bytes);
+    return import_fail(scene, NULL, "unknown format %s; known are .gltf, .glb, .obj and .nff", dot ? dot : "(no ending)");
+}
+
+static bool import_all(struct import_scene *scene, struct files *files, struct sender *sender,
+                       const struct options *options)
+{
+    unsigned char *bytes = NULL;
+    size_t size_bytes = 0;
+    char reason[FILES_REASON_BYTES] = "";
+    bool imported = true;
+
+    if (options->model) {
+        bytes = files_read_descriptor(files, files->model, &size_bytes, reason);
+        if (!bytes)
+            return import_fail(scene, NULL, "%s", reason);
+        imported = sender_progress(sender, size_bytes, 0, "parsing") &&
+                   parse_model(scene, files, options->model, bytes, size_bytes);
+        free(bytes);
+        if (imported && scene->edit_count == 0)
+            import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "there is nothing in it that can be shown");
+    }
+    if (imported && options->environment) {
+        bytes = files_read_descriptor(files, files->environment, &size_bytes, reason);
+        if (!bytes)
+            return import_fail(scene, file_part(options->environment), "%s", reason);
+        imported = environment_import(scene, file_part(options->environment), bytes, size_bytes);
+        free(bytes);
+    }
+    return imported && !scene->failed;
+}
+
+static bool run(struct import_scene *scene, struct sender *sender, const struct options *options, uint64_t start_ns)
+{
+    struct message_import_done done = {0};
+    struct files files;
+    char reason[FILES_REASON_BYTES];
+    uint64_t parsed_ns, begin_ns;
+    bool imported;
+
+    if (!files_open(&files, options->model, options->environment, reason)) {
+        const char *at_fault = options->model && files.folder < 0 ? options->model : options->environment;
+
+        files_finish(&files);
+        return import_fail(scene, file_part(at_fault), "cannot be opened: %s", reason);
+    }
+    begin_ns = import_now_ns();
+    silence_libraries();
+    imported = enter_sandbox(scene, options) && import_all(scene, &files, sender, options);
+    parsed_ns = import_now_ns();
+    files_finish(&files);
+    if (!imported || !sender_notes(sender) || !sender_progress(sender, 0, scene->blob_bytes, "hashing"))
+        return false;
+    begin_ns += files.read_ns;
+    done.read_bytes = files.read_bytes;
+    done.read_ns = files.read_ns;
+    done.parse_ns = parsed_ns > begin_ns ? parsed_ns - begin_ns : 0;
+    if (!import_hash(scene))
+        return false;
+    done.hash_ns = import_now_ns() - parsed_ns;
+    if (!sender_blobs(sender) || !sender_edits(sender, options->scene))
+        return false;
+    done.total_ns = import_now_ns() - start_ns;
+    return sender_done(sender, &done);
+}
+
+int main(int argc, char **argv)
+{
+    static const struct argp argp = {option_rows, parse_option, "MODEL",
+                                     "Turns MODEL (glTF 2.0, GLB, OBJ, NFF) into messages of farlight's protocol.", NULL,
+                                     NULL, NULL};
+    static struct import_scene scene; /* the table of notes is too large for the stack of a careful program */
+    uint64_t start_ns = import_now_ns();
+    struct options options = {.socket = -1, .scene = 1};
+    struct sender sender;
+    bool done;
+
+    argp_err_exit_status = EXIT_USAGE;
+    argp_parse(&argp, argc, argv, 0, NULL, &options);
+    import_scene_init(&scene, file_part(options.model ? options.model : options.environment));
+    done = sender_init(&sender, options.socket, &scene) && run(&scene, &sender, &options, start_ns);
+    if (!done)
+        sender_failure(&sender);
+    sender_finish(&sender);
+    import_scene_finish(&scene);
+    return done ? EXIT_SUCCESS : EXIT_FAILURE;
+}

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// The parts of the OBJ reader.
+#ifndef FARLIGHT_IMPORT_OBJ_HPP
+#define FARLIGHT_IMPORT_OBJ_HPP
+
+#include "formats.h"
+#include "grouping.h"
+
+#include <tiny_obj_loader.h>
+
+#include <istream>
+#include <map>
+#include <streambuf>
+#include <string>
+#include <vector>
+
+namespace obj
+{
+struct reader {
+    import_scene *scene;
+    struct files *files;
+};
+
+// Bytes as a stream that knows where it is.
+class memory_stream : public std::streambuf
+{
+  public:
+    memory_stream(const char *begin, size_t size_bytes)
+    {
+        char *from = const_cast<char *>(begin);
+        setg(from, from, from + size_bytes);
+    }
+    // "line 17": the line that was read last.
+    std::string place() const;
+};
+
+// ---- obj_text.cpp: what is done to the text before tinyobjloader sees it
+struct prepared {
+    const char *original;
+    size_t original_bytes;
+    std::string mended; // not empty: to be read instead
+    const char *begin() const
+    {
+        return mended.empty() ? original : mended.data();
+    }
+    size_t size_bytes() const
+    {
+        return mended.empty() ? original_bytes : mended.size();
+    }
+    std::vector<uint8_t> colours; // 4 a vertex, linear; empty: the file has none
+    std::vector<std::string> libraries; // whole arguments of mtllib: names with spaces
+    bool has_points_or_lines;
+};
+// UTF-16 becomes UTF-8, continued lines become one; numbers that are none are reported with their line.
+prepared prepare(reader &r, const unsigned char *bytes, size_t size_bytes);
+
+// ---- obj_material.cpp
+class material_reader : public tinyobj::MaterialReader
+{
+  public:
+    material_reader(reader &from, const std::vector<std::string> &whole_names) : r(from), libraries(whole_names)
+    {
+    }
+    bool operator()(const std::string &name, std::vector<tinyobj::material_t> *materials,
+                    std::map<std::string, int> *numbers, std::string *warning, std::string *error) override;
+
+  private:
+    reader &r;
+    const std::vector<std::string> &libraries;
+};
+// Identifiers by position in `names`; 0 for those that no file defines.
+std::vector<uint32_t> add_materials(reader &r, const std::vector<tinyobj::material_t> &materials,
+                                    const std::vector<std::string> &names);
+} // namespace obj
+
+#endif

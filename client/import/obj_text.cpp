@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+#include "obj.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+namespace obj
+{
+namespace
+{
+bool is_blank(char c)
+{
+    return c == ' ' || c == '\t';
+}
+
+void append_utf8(std::string &out, uint32_t code)
+{
+    if (code < 0x80) {
+        out += char(code);
+    } else if (code < 0x800) {
+        out += char(0xc0 | (code >> 6));
+        out += char(0x80 | (code & 0x3f));
+    } else {
+        out += char(0xe0 | (code >> 12)); // those beyond 0xffff come as two surrogates and make two odd characters:
+        out += char(0x80 | ((code >> 6) & 0x3f)); // they can only stand in names
+        out += char(0x80 | (code & 0x3f));
+    }
+}
+
+std::string from_utf16(const unsigned char *bytes, size_t size_bytes, bool big_endian)
+{
+    std::string out;
+    out.reserve(size_bytes / 2);
+    for (size_t i = 2; i + 1 < size_bytes; i += 2)
+        append_utf8(out, big_endian ? uint32_t(bytes[i]) << 8 | bytes[i + 1] : uint32_t(bytes[i + 1]) << 8 | bytes[i]);
+    return out;
+}
+
+// A backslash at the end of a line continues it.
+void join_lines(std::string &text)
+{
+    for (size_t at = text.find('\\'); at != std::string::npos; at = text.find('\\', at + 1)) {
+        const size_t end = text.find_first_not_of(" \t\r", at + 1);
+        if (end != std::string::npos && text[end] == '\n')
+            std::fill(text.begin() + std::ptrdiff_t(at), text.begin() + std::ptrdiff_t(end) + 1, ' ');
+    }
+}
+
+bool has_continued_line(const char *begin, const char *end)
+{
+    while ((begin = static_cast<const char *>(memchr(begin, '\\', size_t(end - begin)))) != nullptr) {
+        const char *next = begin + 1;
+        while (next < end && (is_blank(*next) || *next == '\r'))
+            next++;
+        if (next < end && *next == '\n')
+            return true;
+        begin++;
+    }
+    return false;
+}
+
+struct scan {
+    reader &r;
+    prepared &out;
+    size_t line = 0;
+    size_t vertices = 0;
+    bool seen_points_or_lines = false;
+};
+
+// Up to six numbers of a `v` line. tinyobjloader takes what is no number for 0, which is not for us to show.
+bool scan_vertex(scan &s, const char *at, const char *end)
+{
+    double values[6] = {0, 0, 0, 1, 1, 1};
+    const char *starts[6];
+    size_t count = 0;
+
+    while (at < end && count < 6) {
+        while (at < end && is_blank(*at))
+            at++;
+        if (at == end)
+            break;
+        starts[count] = at;
+        for (; at < end && !is_blank(*at); at++) {
+            const char c = *at;
+            if (c >= '0' && c <= '9')
+                continue;
+            if (c != '.' && c != '-' && c != '+' && c != 'e' && c != 'E') {
+                // The file has a NUL behind its last byte, so strtod() ends.
+                const double value = strtod(starts[count], nullptr);
+                const std::string place = "line " + std::to_string(s.line), token(starts[count], std::find_if(at, end, is_blank));
+                if (!std::isfinite(value))
+                    return import_fail(s.r.scene, place.c_str(), "'%.20s' is not a finite number", token.c_str());
+                if (count < 3)
+                    import_note(s.r.scene, PROTOCOL_SEVERITY_WARNING, place.c_str(),
+                                "a coordinate that is no number was read as far as it went");
+            }
+        }
+        count++;
+    }
+    s.vertices++;
+    if (count < 6 && s.out.colours.empty())
+        return true;
+    for (size_t i = 3; i < count && count == 6; i++)
+        values[i] = strtod(starts[i], nullptr);
+    s.out.colours.resize((s.vertices - 1) * 4, 255); // of vertices before the first coloured one
+    for (size_t i = 3; i < 6; i++)
+        s.out.colours.push_back(uint8_t(std::lround(std::min(std::max(values[i], 0.0), 1.0) * 255)));
+    s.out.colours.push_back(255);
+    return true;
+}
+
+bool scan_line(scan &s, const char *at, const char *end)
+{
+    while (at < end && is_blank(*at))
+        at++;
+    if (end - at < 2)
+        return true;
+    if (at[0] == 'v' && is_blank(at[1]))
+        return scan_vertex(s, at + 2, end);
+    if ((at[0] == 'p' || at[0] == 'l') && is_blank(at[1]))
+        s.seen_points_or_lines = true;
+    if (end - at > 7 && memcmp(at, "mtllib", 6) == 0 && is_blank(at[6])) {
+        const char *from = at + 7, *to = end;
+        while (from < to && is_blank(*from))
+            from++;
+        while (to > from && is_blank(to[-1]))
+            to--;
+        if (from < to)
+            s.out.libraries.push_back(std::string(from, to));
+    }
+    return true;
+}
+
+bool scan_lines(scan &s, const char *at, const char *end)
+{
+    while (at < end) {
+        const char *stop = static_cast<const char *>(memchr(at, '\n', size_t(end - at)));
+        const char *next = stop ? stop + 1 : end;
+        if (!stop)
+            stop = end;
+        s.line++;
+        // A lone carriage return ends a line, too.
+        for (const char *part = at; part < stop;) {
+            const char *part_end = static_cast<const char *>(memchr(part, '\r', size_t(stop - part)));
+            if (!part_end)
+                part_end = stop;
+            if (!scan_line(s, part, part_end))
+                return false;
+            part = part_end + 1;
+        }
+        at = next;
+    }
+    return true;
+}
+} // namespace
+
+std::string memory_stream::place() const
+{
+    const std::ptrdiff_t lines = std::count(eback(), gptr(), '\n');
+    return "line " + std::to_string(std::max<std::ptrdiff_t>(lines, 1));
+}
+
+prepared prepare(reader &r, const unsigned char *bytes, size_t size_bytes)
+{
+    prepared out = {reinterpret_cast<const char *>(bytes), size_bytes, {}, {}, {}, false};
+
+    if (size_bytes >= 2 && ((bytes[0] == 0xfe && bytes[1] == 0xff) || (bytes[0] == 0xff && bytes[1] == 0xfe)))
+        out.mended = from_utf16(bytes, size_bytes, bytes[0] == 0xfe);
+    else if (size_bytes >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0)
+        out.mended.assign(out.original + 3, size_bytes - 3);
+    if (has_continued_line(out.begin(), out.begin() + out.size_bytes())) {
+        if (out.mended.empty())
+            out.mended.assign(out.original, size_bytes);
+        join_lines(out.mended);
+    }
+    scan s = {r, out, 0, 0, false};
+    scan_lines(s, out.begin(), out.begin() + out.size_bytes());
+    out.has_points_or_lines = s.seen_points_or_lines;
+    return out;
+}
+} // namespace obj

@@ -1,0 +1,233 @@
+/* SPDX-License-Identifier: MIT */
+#include "sandbox.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <linux/landlock.h>
+#include <seccomp.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+/* Not in the headers of every supported distribution. */
+#ifndef LANDLOCK_ACCESS_FS_TRUNCATE
+#define LANDLOCK_ACCESS_FS_TRUNCATE (1ULL << 14)
+#endif
+#ifndef LANDLOCK_ACCESS_FS_IOCTL_DEV
+#define LANDLOCK_ACCESS_FS_IOCTL_DEV (1ULL << 15)
+#endif
+/* The sanitizers map terabytes of shadow memory and trace themselves when they look for leaks. */
+#if defined(__SANITIZE_ADDRESS__)
+#define SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define SANITIZED 1
+#endif
+#endif
+#ifndef SANITIZED
+#define SANITIZED 0
+#endif
+
+#define DEFAULT_ADDRESS_SPACE_BYTES (8ULL << 30)
+
+static bool set_limit(int resource, uint64_t value)
+{
+    struct rlimit limit;
+
+    if (getrlimit((__rlimit_resource_t)resource, &limit) != 0)
+        return false;
+    if (limit.rlim_max != RLIM_INFINITY && limit.rlim_max < value)
+        value = limit.rlim_max; /* somebody set a tighter one */
+    limit.rlim_cur = limit.rlim_max = (rlim_t)value;
+    return setrlimit((__rlimit_resource_t)resource, &limit) == 0;
+}
+
+static bool set_limits(const struct sandbox_options *options)
+{
+    uint64_t address_space = options->address_space_bytes;
+
+    if (address_space == 0)
+        address_space = DEFAULT_ADDRESS_SPACE_BYTES;
+    if (!SANITIZED && !set_limit(RLIMIT_AS, address_space))
+        return false;
+    if (options->cpu_seconds != 0 && !set_limit(RLIMIT_CPU, options->cpu_seconds))
+        return false;
+    signal(SIGXFSZ, SIG_IGN); /* writing beyond the limit then fails instead of killing */
+    return set_limit(RLIMIT_CORE, 0) && set_limit(RLIMIT_FSIZE, options->file_bytes);
+}
+
+/* ---- Landlock ---- */
+
+static uint64_t rights_of_abi(long abi)
+{
+    uint64_t rights = (LANDLOCK_ACCESS_FS_MAKE_SYM << 1) - 1; /* ABI 1: execute .. make_sym */
+
+    if (abi >= 2)
+        rights |= LANDLOCK_ACCESS_FS_REFER;
+    if (abi >= 3)
+        rights |= LANDLOCK_ACCESS_FS_TRUNCATE;
+    if (abi >= 5)
+        rights |= LANDLOCK_ACCESS_FS_IOCTL_DEV;
+    return rights;
+}
+
+/* A folder that is not there gives no rights and is no fault: opening files in it will say so. */
+static bool allow_folder(int ruleset, const char *folder, uint64_t rights)
+{
+    struct landlock_path_beneath_attr rule = {.allowed_access = rights};
+    bool allowed;
+
+    rule.parent_fd = open(folder, O_PATH | O_CLOEXEC | O_DIRECTORY);
+    if (rule.parent_fd < 0)
+        return true;
+    allowed = syscall(SYS_landlock_add_rule, ruleset, LANDLOCK_RULE_PATH_BENEATH, &rule, 0) == 0;
+    close(rule.parent_fd);
+    return allowed;
+}
+
+static bool allow_folders(int ruleset, const struct sandbox_options *options, uint64_t handled)
+{
+    /* What the dynamic linker, the C library and the image readers' plug-in search may still open. */
+    static const char *const system_folders[] = {"/usr/lib", "/usr/lib64", "/lib", "/lib64", "/sys/devices/system/cpu"};
+    const uint64_t read_rights = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
+    uint64_t write_rights =
+        read_rights | LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_MAKE_REG | LANDLOCK_ACCESS_FS_TRUNCATE;
+
+    if (options->allow_rename)
+        write_rights |= LANDLOCK_ACCESS_FS_REMOVE_FILE;
+    write_rights &= handled;
+    for (size_t i = 0; i < sizeof system_folders / sizeof system_folders[0]; i++)
+        if (!allow_folder(ruleset, system_folders[i], read_rights))
+            return false;
+    for (size_t i = 0; i < options->read_folder_count; i++)
+        if (options->read_folders[i] && !allow_folder(ruleset, options->read_folders[i], read_rights))
+            return false;
+    for (size_t i = 0; i < options->write_folder_count; i++)
+        if (options->write_folders[i] && !allow_folder(ruleset, options->write_folders[i], write_rights))
+            return false;
+    return true;
+}
+
+/* -1: the kernel has no Landlock; 0: failed; 1: in force */
+static int enter_landlock(const struct sandbox_options *options)
+{
+    struct landlock_ruleset_attr attributes = {0};
+    long abi = syscall(SYS_landlock_create_ruleset, NULL, 0, LANDLOCK_CREATE_RULESET_VERSION);
+    int ruleset;
+    bool entered;
+
+    if (abi < 1)
+        return -1;
+    attributes.handled_access_fs = rights_of_abi(abi);
+    ruleset = (int)syscall(SYS_landlock_create_ruleset, &attributes, sizeof attributes, 0);
+    if (ruleset < 0)
+        return 0;
+    entered = allow_folders(ruleset, options, attributes.handled_access_fs) &&
+              syscall(SYS_landlock_restrict_self, ruleset, 0) == 0;
+    close(ruleset);
+    return entered ? 1 : 0;
+}
+
+/* ---- seccomp ---- */
+
+static const char *const allowed_calls[] = {
+    /* memory, threads, time */
+    "brk", "mmap", "munmap", "mremap", "mprotect", "madvise", "clone", "clone3", "futex", "set_robust_list", "rseq",
+    "set_tid_address", "sched_yield", "sched_getaffinity", "getcpu", "clock_gettime",
+    "clock_getres", "gettimeofday", "time", "nanosleep", "clock_nanosleep", "restart_syscall", "arch_prctl",
+    "membarrier",
+    /* descriptors */
+    "read", "readv", "pread64", "write", "writev", "pwrite64", "close", "lseek", "fstat", "newfstatat", "stat", "lstat",
+    "statx", "open", "openat", "openat2", "access", "faccessat", "faccessat2", "readlink", "readlinkat", "getdents64",
+    "dup", "poll", "ppoll", "sendto", "sendmsg", "recvfrom", "recvmsg", "shutdown", "fadvise64", "getcwd", "statfs",
+    "fstatfs", "select", "pselect6",
+    /* the process itself */
+    "exit", "exit_group", "rt_sigaction", "rt_sigprocmask", "rt_sigreturn", "sigaltstack", "getpid", "gettid", "tgkill",
+    "getuid", "geteuid", "getgid", "getegid", "getppid", "getrandom", "sysinfo", "uname", "getrusage", "times",
+    "getrlimit"};
+static const char *const write_calls[] = {"fsync", "fdatasync", "ftruncate", "fallocate", "fchmod", "umask"};
+static const char *const rename_calls[] = {"rename", "renameat", "renameat2", "unlink", "unlinkat", "linkat"};
+
+static bool allow_calls(scmp_filter_ctx filter, const char *const *names, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        int number = seccomp_syscall_resolve_name(names[i]);
+
+        /* Not every architecture and libseccomp knows every name. */
+        if (number != __NR_SCMP_ERROR && number >= 0 && seccomp_rule_add(filter, SCMP_ACT_ALLOW, number, 0) != 0)
+            return false;
+    }
+    return true;
+}
+
+static bool allow_with_argument(scmp_filter_ctx filter, int number, unsigned argument, uint64_t value)
+{
+    const struct scmp_arg_cmp is_value = {.arg = argument, .op = SCMP_CMP_EQ, .datum_a = value, .datum_b = 0};
+
+    return seccomp_rule_add_array(filter, SCMP_ACT_ALLOW, number, 1, &is_value) == 0;
+}
+
+/* fcntl and ioctl only for what a reader of files asks, so that no descriptor can be made to do more. */
+static bool allow_arguments(scmp_filter_ctx filter)
+{
+    static const unsigned fcntl_commands[] = {F_GETFD, F_SETFD, F_GETFL, F_SETFL, F_DUPFD_CLOEXEC};
+    static const unsigned long ioctl_requests[] = {TCGETS, FIONREAD};
+
+    for (size_t i = 0; i < sizeof fcntl_commands / sizeof fcntl_commands[0]; i++)
+        if (!allow_with_argument(filter, SCMP_SYS(fcntl), 1, fcntl_commands[i]))
+            return false;
+    for (size_t i = 0; i < sizeof ioctl_requests / sizeof ioctl_requests[0]; i++)
+        if (!allow_with_argument(filter, SCMP_SYS(ioctl), 1, ioctl_requests[i]))
+            return false;
+    /* Limits may be asked for but not changed. */
+    return allow_with_argument(filter, SCMP_SYS(prlimit64), 2, 0);
+}
+
+/* Other calls fail with EPERM instead of ending the process: a library that asks for something odd then
+ * takes its own way out, and the import ends with a message. */
+static bool enter_seccomp(const struct sandbox_options *options)
+{
+    scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ERRNO(EPERM));
+    bool entered;
+
+    if (!filter)
+        return false;
+    entered = allow_calls(filter, allowed_calls, sizeof allowed_calls / sizeof allowed_calls[0]) &&
+              allow_arguments(filter);
+    if (entered && options->write_folder_count > 0)
+        entered = allow_calls(filter, write_calls, sizeof write_calls / sizeof write_calls[0]);
+    if (entered && options->allow_rename)
+        entered = allow_calls(filter, rename_calls, sizeof rename_calls / sizeof rename_calls[0]);
+    entered = entered && seccomp_load(filter) == 0;
+    seccomp_release(filter);
+    return entered;
+}
+
+bool sandbox_enter(const struct sandbox_options *options, char *reason, size_t reason_bytes)
+{
+    int landlock;
+
+    if (reason_bytes > 0)
+        reason[0] = '\0';
+    if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 || !set_limits(options)) {
+        snprintf(reason, reason_bytes, "cannot set resource limits: %s", strerror(errno));
+        return false;
+    }
+    landlock = enter_landlock(options);
+    if (landlock == 0) {
+        snprintf(reason, reason_bytes, "Landlock refused the rules: %s", strerror(errno));
+        return false;
+    }
+    if (!SANITIZED && !enter_seccomp(options)) {
+        snprintf(reason, reason_bytes, "the system call filter could not be loaded");
+        return false;
+    }
+    if (landlock < 0)
+        snprintf(reason, reason_bytes, "this kernel has no Landlock: reading is not confined to the model's folder");
+    return true;
+}

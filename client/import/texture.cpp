@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: MIT
+// Images through OpenImageIO: the reader is named by the first bytes and not guessed by the library, it reads from
+// memory, and what the header claims is checked before a pixel is asked for.
+#include "formats.h"
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace
+{
+constexpr int edge_max = 16384;
+constexpr uint64_t image_bytes_max = 1ull << 30;
+constexpr size_t texel_bytes = 4;
+constexpr float half_max = 65504.0f;
+
+struct signature {
+    const char *reader;
+    size_t offset, length;
+    const char *bytes;
+};
+// Targa has no signature: it is what remains, and its header is checked for plausibility.
+const signature signatures[] = {
+    {"png", 0, 8, "\x89PNG\r\n\x1a\n"}, {"jpeg", 0, 3, "\xff\xd8\xff"},  {"openexr", 0, 4, "\x76\x2f\x31\x01"},
+    {"hdr", 0, 10, "#?RADIANCE"},       {"hdr", 0, 6, "#?RGBE"},         {"tiff", 0, 4, "II*\0"},
+    {"tiff", 0, 4, "MM\0*"},            {"webp", 8, 4, "WEBP"},          {"bmp", 0, 2, "BM"},
+    {"gif", 0, 6, "GIF87a"},            {"gif", 0, 6, "GIF89a"},
+};
+
+bool looks_like_targa(const unsigned char *bytes, size_t size_bytes)
+{
+    if (size_bytes < 18 || bytes[1] > 1)
+        return false;
+    const int type = bytes[2], depth = bytes[16];
+    return (type == 1 || type == 2 || type == 3 || type == 9 || type == 10 || type == 11) &&
+           (depth == 8 || depth == 15 || depth == 16 || depth == 24 || depth == 32);
+}
+
+const char *reader_of(const unsigned char *bytes, size_t size_bytes)
+{
+    for (const signature &candidate : signatures)
+        if (size_bytes >= candidate.offset + candidate.length &&
+            memcmp(bytes + candidate.offset, candidate.bytes, candidate.length) == 0)
+            return candidate.reader;
+    return looks_like_targa(bytes, size_bytes) ? "targa" : nullptr;
+}
+
+// One opened image whose header has been found reasonable.
+struct opened_image {
+    OIIO::Filesystem::IOMemReader memory;
+    std::unique_ptr<OIIO::ImageInput> input;
+    OIIO::ImageSpec spec;
+
+    opened_image(const unsigned char *bytes, size_t size_bytes)
+        : memory(const_cast<unsigned char *>(bytes), size_bytes)
+    {
+    }
+    bool open(const char *reader, std::string &reason);
+};
+
+bool spec_reasonable(const OIIO::ImageSpec &spec, std::string &reason)
+{
+    if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.deep) {
+        reason = "is not a flat image";
+        return false;
+    }
+    if (spec.width > edge_max || spec.height > edge_max) {
+        reason = "is " + std::to_string(spec.width) + " x " + std::to_string(spec.height) + " texels, more than " +
+                 std::to_string(edge_max) + " in one direction";
+        return false;
+    }
+    if (spec.nchannels < 1 || spec.nchannels > 64) {
+        reason = "has " + std::to_string(spec.nchannels) + " channels";
+        return false;
+    }
+    const uint64_t texels = uint64_t(spec.width) * uint64_t(spec.height);
+    if (texels * uint64_t(std::max(spec.nchannels, 4)) * 4 > image_bytes_max) {
+        reason = "would take more than 1 GiB";
+        return false;
+    }
+    return true;
+}
+
+bool opened_image::open(const char *reader, std::string &reason)
+{
+    input = OIIO::ImageInput::create(reader);
+    if (!input) {
+        reason = std::string("this build of OpenImageIO has no reader for ") + reader;
+        OIIO::geterror();
+        return false;
+    }
+    if (!input->supports("ioproxy") || !input->set_ioproxy(&memory)) {
+        reason = std::string("this build of OpenImageIO cannot read ") + reader + " from memory";
+        return false;
+    }
+    OIIO::ImageSpec hints;
+    hints.attribute("oiio:UnassociatedAlpha", 1); // else colours come multiplied by alpha
+    hints.attribute("oiio:reorient", 0);
+    if (!input->open(std::string("image.") + reader, spec, hints)) {
+        reason = input->geterror();
+        if (reason.empty())
+            reason = std::string("is no valid ") + reader + " image";
+        return false;
+    }
+    return spec_reasonable(spec, reason);
+}
+
+uint8_t byte_of(float value)
+{
+    return uint8_t(std::lround(std::min(std::max(value, 0.0f), 1.0f) * 255.0f)); // NaN becomes 0: max(NaN, 0) is 0
+}
+
+// IEC 61966-2-1.
+float srgb_encode(float linear)
+{
+    return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
+}
+
+// One to four channels to four, in place at the end of the same buffer would save memory; clarity was worth more.
+void expand(const uint8_t *from, unsigned char *to, size_t texels, int channels)
+{
+    for (size_t i = 0; i < texels; i++, from += channels, to += texel_bytes) {
+        to[0] = from[0];
+        to[1] = from[channels >= 3 ? 1 : 0];
+        to[2] = from[channels >= 3 ? 2 : 0];
+        to[3] = channels == 2 ? from[1] : channels >= 4 ? from[3] : 255;
+    }
+}
+
+bool decode_bytes(opened_image &image, texture_job &job, size_t texels, std::string &reason)
+{
+    const int channels = image.spec.nchannels;
+    std::vector<uint8_t> pixels;
+    uint8_t *target = job.texels;
+
+    if (channels != 4) {
+        pixels.resize(texels * size_t(channels));
+        target = pixels.data();
+    }
+    if (!image.input->read_image(0, 0, 0, channels, OIIO::TypeDesc::UINT8, target)) {
+        reason = image.input->geterror();
+        return false;
+    }
+    if (channels != 4)
+        expand(pixels.data(), job.texels, texels, channels);
+    return true;
+}
+
+bool decode_floats(opened_image &image, texture_job &job, size_t texels, std::string &reason)
+{
+    const int channels = std::min(image.spec.nchannels, 4);
+    std::vector<float> pixels(texels * size_t(channels));
+
+    if (!image.input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, pixels.data())) {
+        reason = image.input->geterror();
+        return false;
+    }
+    for (size_t i = 0; i < texels; i++) {
+        const float *from = &pixels[i * size_t(channels)];
+        unsigned char *to = job.texels + i * texel_bytes;
+        for (int c = 0; c < 3; c++) {
+            const float value = from[channels >= 3 ? c : 0];
+            to[c] = byte_of(job.srgb ? srgb_encode(std::max(0.0f, value)) : value);
+        }
+        to[3] = channels == 4 ? byte_of(from[3]) : channels == 2 ? byte_of(from[1]) : 255;
+    }
+    return true;
+}
+
+bool decode(texture_job &job, std::string &reason)
+{
+    const char *reader = reader_of(job.bytes, job.size_bytes);
+    if (!reader) {
+        reason = "is no image of a known format";
+        return false;
+    }
+    opened_image image(job.bytes, job.size_bytes);
+    if (!image.open(reader, reason))
+        return false;
+    const size_t texels = size_t(image.spec.width) * size_t(image.spec.height);
+    job.texels = static_cast<unsigned char *>(calloc(texels, texel_bytes));
+    if (!job.texels) {
+        reason = "out of memory";
+        return false;
+    }
+    job.width = uint32_t(image.spec.width);
+    job.height = uint32_t(image.spec.height);
+    job.has_alpha = image.spec.nchannels == 2 || image.spec.nchannels == 4;
+    return image.spec.format.is_floating_point() ? decode_floats(image, job, texels, reason)
+                                                 : decode_bytes(image, job, texels, reason);
+}
+
+void decode_one(texture_job &job) noexcept
+{
+    bool decoded = false;
+    std::string reason;
+
+    try {
+        decoded = decode(job, reason);
+        // A library's message may have several lines and end in one.
+        std::replace(reason.begin(), reason.end(), '\n', ' ');
+        while (!reason.empty() && reason.back() == ' ')
+            reason.pop_back();
+        if (!decoded && reason.empty())
+            reason = "cannot be decoded";
+        snprintf(job.reason, sizeof job.reason, "%s", reason.c_str());
+    } catch (const std::exception &exception) {
+        snprintf(job.reason, sizeof job.reason, "cannot be decoded: %s", exception.what());
+    } catch (...) {
+        snprintf(job.reason, sizeof job.reason, "cannot be decoded");
+    }
+    if (!decoded) {
+        free(job.texels);
+        job.texels = nullptr;
+        job.width = job.height = 0;
+    }
+}
+
+void decode_next(texture_job *jobs, size_t count, std::atomic<size_t> &next) noexcept
+{
+    for (size_t i; (i = next.fetch_add(1)) < count;)
+        decode_one(jobs[i]);
+}
+
+// IEEE 754 binary16, rounded to nearest even; finite, non-negative, at most half_max.
+uint16_t half_of(float value)
+{
+    if (!(value > 0))
+        return 0; // NaN, too
+    value = std::min(value, half_max);
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    if (bits < 0x38800000u) // below 2^-14: a denormal half, a multiple of 2^-24
+        return uint16_t(std::nearbyint(value * 16777216.0f));
+    bits += 0xfffu + ((bits >> 13) & 1u);
+    return uint16_t(std::min((bits - 0x38000000u) >> 13, 0x7bffu));
+}
+
+bool environment_decode(import_scene *scene, const char *file, const unsigned char *bytes, size_t size_bytes)
+{
+    const char *reader = reader_of(bytes, size_bytes);
+    std::string reason;
+
+    if (!reader)
+        return import_fail(scene, file, "the environment is no image of a known format");
+    opened_image image(bytes, size_bytes);
+    if (!image.open(reader, reason))
+        return import_fail(scene, file, "the environment cannot be read: %s", reason.c_str());
+    const int channels = std::min(image.spec.nchannels, 3);
+    const size_t texels = size_t(image.spec.width) * size_t(image.spec.height);
+    std::vector<float> pixels(texels * size_t(channels));
+    if (!image.input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, pixels.data()))
+        return import_fail(scene, file, "the environment cannot be read: %s", image.input->geterror().c_str());
+    uint16_t *halves = static_cast<uint16_t *>(calloc(texels, 4 * sizeof(uint16_t)));
+    if (!halves)
+        return import_fail(scene, file, "out of memory");
+    for (size_t i = 0; i < texels; i++)
+        for (size_t c = 0; c < 3; c++)
+            halves[i * 4 + c] = half_of(pixels[i * size_t(channels) + (channels == 3 ? c : 0)]);
+    if (image.spec.width != 2 * image.spec.height)
+        import_note(scene, PROTOCOL_SEVERITY_INFO, file, "is %d x %d; an equirectangular image is twice as wide as high",
+                    image.spec.width, image.spec.height);
+    message_set_environment environment = {};
+    environment.colour[0] = environment.colour[1] = environment.colour[2] = 1;
+    environment.width = uint32_t(image.spec.width);
+    environment.height = uint32_t(image.spec.height);
+    const uint32_t blob = import_add_blob(scene, halves, texels * 8);
+    import_set_environment(scene, &environment, blob);
+    return !scene->failed;
+}
+} // namespace
+
+extern "C" void texture_decode(struct texture_job *jobs, size_t count)
+{
+    std::atomic<size_t> next{0};
+    std::thread helper;
+
+    OIIO::attribute("threads", 1); // ours are enough
+    if (count > 1) {
+        try {
+            helper = std::thread(decode_next, jobs, count, std::ref(next));
+        } catch (...) {
+            // No thread to be had: this one does it all.
+        }
+    }
+    decode_next(jobs, count, next);
+    if (helper.joinable())
+        helper.join();
+}
+
+extern "C" unsigned char *texture_marker(void)
+{
+    static const unsigned char texels[16] = {255, 0, 255, 255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 0, 255, 255};
+    unsigned char *copy = static_cast<unsigned char *>(malloc(sizeof texels));
+
+    if (copy)
+        memcpy(copy, texels, sizeof texels);
+    return copy;
+}
+
+extern "C" bool environment_import(struct import_scene *scene, const char *file, const unsigned char *bytes,
+                                   size_t size_bytes)
+{
+    try {
+        OIIO::attribute("threads", 1);
+        return environment_decode(scene, file, bytes, size_bytes);
+    } catch (const std::exception &exception) {
+        return import_fail(scene, file, "the environment cannot be read: %s", exception.what());
+    } catch (...) {
+        return import_fail(scene, file, "the environment cannot be read");
+    }
+}
