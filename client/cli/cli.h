@@ -1,0 +1,114 @@
+/* SPDX-License-Identifier: MIT */
+/* What the subcommands of `farlight` share. */
+#ifndef FARLIGHT_CLIENT_CLI_CLI_H
+#define FARLIGHT_CLIENT_CLI_CLI_H
+
+#include "lib/farlight.h"
+
+#include <argp.h>
+
+/* Exit statuses; 128 + signal besides. */
+enum cli_status { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2, CLI_TRY_AGAIN = 75 };
+
+/* Subcommands: argv[0] is "farlight NAME". They return the exit status. */
+int cli_render(int argc, char **argv);
+int cli_animate(int argc, char **argv);
+int cli_info(int argc, char **argv);
+int cli_stats(int argc, char **argv);
+int cli_ping(int argc, char **argv);
+int cli_bridge(int argc, char **argv);
+
+/* ---- talk.c: what goes to standard error ---- */
+
+/* "farlight: FIELD: TEXT (REMEDY)"; returns the exit status that belongs to the error. */
+int cli_report(const struct fl_error *error);
+/* A note about a model: warnings always, plain information only if `chatty`. */
+void cli_note(const struct fl_note *note, bool chatty);
+bool cli_is_terminal(int fd); /* one that can move its cursor */
+
+/* ---- interrupt.c ---- */
+
+/* Ctrl-C, SIGTERM and SIGHUP make the descriptor readable instead of ending the program; a second one ends it. */
+bool cli_interrupt_begin(struct fl_error *error);
+int cli_interrupt_fd(void);
+int cli_interrupt_signal(void); /* which one came; 0: none */
+
+/* ---- image_path.c: where pictures go ---- */
+
+enum cli_image { CLI_IMAGE_UNKNOWN, CLI_IMAGE_PNG, CLI_IMAGE_JPEG, CLI_IMAGE_EXR, CLI_IMAGE_HDR };
+
+/* By name ("png", ..) or by a path's ending; letter case does not matter. */
+enum cli_image cli_image_by_name(const char *name);
+enum cli_image cli_image_by_path(const char *path);
+const char *cli_image_name(enum cli_image image);
+/* Whether a file can be made at `path`, without making it. `folder` gets its folder. */
+bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error);
+/* Whether `path` is a file that can be read. */
+bool cli_check_input(const char *path, struct fl_error *error);
+/* A folder in $TMPDIR for a file that goes on to standard output. */
+bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *error);
+bool cli_copy_to_stdout(const char *path, struct fl_error *error);
+
+/* ---- progress.c: how far it is, on standard error ---- */
+
+struct cli_progress {
+    bool silent, bar; /* a bar is drawn over and over on one line */
+    bool drawn;
+    uint64_t begin_ns, shown_ns, first_ns;
+    uint32_t total;
+};
+
+void cli_progress_begin(struct cli_progress *progress, bool silent);
+void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes, const char *what);
+/* From the first call on frames are counted. */
+void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total);
+/* Removes the bar, so that something else can be written. */
+void cli_progress_clear(struct cli_progress *progress);
+/* The last bar of what is done stays; any other is removed. */
+void cli_progress_end(struct cli_progress *progress, bool done);
+
+/* ---- job_options.c: what render and animate have in common ---- */
+
+enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
+
+struct cli_job {
+    const char *model, *server, *environment, *output, *camera, *keys_file;
+    enum cli_image image;
+    bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
+    bool float_pixels, half_pixels, has_encoding, has_quality, quiet, is_orbit;
+    unsigned file_quality; /* of JPEG files; 0: default */
+    enum cli_timings_form timings;
+    struct record_camera_key key;
+    struct fl_job_options options;
+    struct fl_error error; /* of what was typed */
+};
+
+/* A child parser; its input is a struct cli_job. */
+extern const struct argp cli_job_argp;
+/* Defaults, then FARLIGHT_*; before the command line is read. */
+bool cli_job_begin(struct cli_job *job);
+/* Sets the job's error and returns EINVAL. */
+error_t cli_usage(struct cli_job *job, const char *field, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+/* After the command line: what depends on several options. `is_series`: output is a pattern. */
+bool cli_job_complete(struct cli_job *job, bool is_series);
+
+/* ---- timings.c ---- */
+
+struct cli_client_times {
+    uint64_t total_ns, start_ns, export_ns;
+    const struct fl_import_stats *import;
+};
+struct cli_timings;
+
+struct cli_timings *cli_timings_create(enum cli_timings_form form, bool to_stderr);
+void cli_timings_frame(struct cli_timings *timings, const struct fl_frame *frame);
+void cli_timings_end(struct cli_timings *timings, const struct cli_client_times *times);
+void cli_timings_destroy(struct cli_timings *timings);
+
+/* ---- session.c: from a model to image files ---- */
+
+/* Renders the job's frames into `job->output`: a path, "-", or a pattern if `is_series`. */
+int cli_run_job(struct cli_job *job, bool is_series);
+
+#endif

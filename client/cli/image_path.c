@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/cli.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum cli_image cli_image_by_name(const char *name)
+{
+    static const struct {
+        const char *name;
+        enum cli_image image;
+    } known[] = {{"png", CLI_IMAGE_PNG},
+                 {"jpg", CLI_IMAGE_JPEG},
+                 {"jpeg", CLI_IMAGE_JPEG},
+                 {"exr", CLI_IMAGE_EXR},
+                 {"hdr", CLI_IMAGE_HDR}};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        if (strcasecmp(known[i].name, name) == 0)
+            return known[i].image;
+    return CLI_IMAGE_UNKNOWN;
+}
+
+enum cli_image cli_image_by_path(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    const char *dot = strrchr(path, '.');
+    if (dot == NULL || (slash != NULL && dot < slash))
+        return CLI_IMAGE_UNKNOWN;
+    return cli_image_by_name(dot + 1);
+}
+
+const char *cli_image_name(enum cli_image image)
+{
+    static const char *const names[] = {"", "png", "jpeg", "exr", "hdr"};
+    return names[image];
+}
+
+/* Rights, read-only file systems, quotas: only an attempt tells. */
+static bool try_folder(const char *path, const char *folder, struct fl_error *error)
+{
+    char probe[4200];
+    const int length = snprintf(probe, sizeof probe, "%s/.farlight-XXXXXX", folder);
+    const int fd = length > 0 && (size_t)length < sizeof probe ? mkostemp(probe, O_CLOEXEC) : -1;
+    if (fd < 0)
+        return fl_error_set(error, FL_ERROR_FILE, path, "its folder cannot be written: %s", strerror(errno));
+    close(fd);
+    unlink(probe);
+    return true;
+}
+
+bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error)
+{
+    const char *slash = strrchr(path, '/');
+    const size_t length = slash == NULL ? 1 : slash == path ? 1 : (size_t)(slash - path);
+    if (length >= folder_bytes)
+        return fl_error_set(error, FL_ERROR_FILE, "", "the path of the image is too long");
+    memcpy(folder, slash == NULL ? "." : path, length);
+    folder[length] = '\0';
+    struct stat status;
+    if (stat(folder, &status) < 0) {
+        fl_error_set(error, FL_ERROR_FILE, path, "its folder cannot be used: %s", strerror(errno));
+        return errno == ENOENT ? fl_error_remedy(error, "make it with 'mkdir -p %.200s'", folder) : false;
+    }
+    if (!S_ISDIR(status.st_mode))
+        return fl_error_set(error, FL_ERROR_FILE, path, "'%s' is no folder", folder);
+    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode))
+        return fl_error_set(error, FL_ERROR_FILE, path, "exists and is no ordinary file");
+    return try_folder(path, folder, error);
+}
+
+bool cli_check_input(const char *path, struct fl_error *error)
+{
+    struct stat status;
+    if (stat(path, &status) < 0 || access(path, R_OK) < 0)
+        return fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %s", strerror(errno));
+    if (!S_ISREG(status.st_mode))
+        return fl_error_set(error, FL_ERROR_FILE, path, "is not a file");
+    return true;
+}
+
+bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *error)
+{
+    const char *parent = getenv("TMPDIR");
+    if (parent == NULL || parent[0] == '\0')
+        parent = P_tmpdir;
+    const int length = snprintf(folder, folder_bytes, "%s/farlight-XXXXXX", parent);
+    if (length < 0 || (size_t)length >= folder_bytes || mkdtemp(folder) == NULL)
+        return fl_error_set(error, FL_ERROR_FILE, parent, "no temporary folder can be made: %s", strerror(errno));
+    return true;
+}
+
+bool cli_copy_to_stdout(const char *path, struct fl_error *error)
+{
+    static char piece[65536];
+    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0)
+        return fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %s", strerror(errno));
+    ssize_t got = 0;
+    bool good = true;
+    while (good && (got = read(fd, piece, sizeof piece)) > 0) {
+        for (ssize_t put = 0; good && put < got;) {
+            const ssize_t wrote = write(STDOUT_FILENO, piece + put, (size_t)(got - put));
+            if (wrote >= 0)
+                put += wrote;
+            else if (errno != EINTR)
+                good = fl_error_set(error, FL_ERROR_FILE, "standard output", "cannot be written: %s", strerror(errno));
+        }
+    }
+    if (good && got < 0)
+        good = fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %s", strerror(errno));
+    close(fd);
+    return good;
+}

@@ -1,0 +1,161 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/cli.h"
+
+#include <inttypes.h>
+#include <jansson.h>
+#include <stdio.h>
+
+#define KEY_JSON 0x400
+
+struct info_options {
+    const char *model, *environment;
+    bool json;
+    struct cli_job job; /* holds the error of what was typed */
+};
+
+static const struct argp_option options[] = {
+    {"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0},
+    {"environment", 'e', "FILE", 0, "Look at this environment image as well", 0},
+    {0}};
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct info_options *wanted = state->input;
+    switch (key) {
+    case KEY_JSON:
+        wanted->json = true;
+        return 0;
+    case 'e':
+        wanted->environment = value;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (wanted->model != NULL)
+            return cli_usage(&wanted->job, value, "only one model at a time");
+        wanted->model = value;
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static json_t *string(const char *text)
+{
+    json_t *made = json_string(text); /* NULL where it is not UTF-8: cut names may not be */
+    return made != NULL ? made : json_string("");
+}
+
+static json_t *lists(const struct fl_model_info *info)
+{
+    json_t *cameras = json_array(), *clips = json_array(), *notes = json_array();
+    for (size_t i = 0; i < info->camera_count; i++)
+        json_array_append_new(cameras, json_pack("{s:I,s:o}", "index", (json_int_t)i, "name", string(info->cameras[i].name)));
+    for (size_t i = 0; i < info->clip_count; i++)
+        json_array_append_new(clips, json_pack("{s:o,s:I,s:f}", "name", string(info->clips[i].name), "channels",
+                                               (json_int_t)info->clips[i].channels, "duration_s",
+                                               (double)info->clips[i].duration_s));
+    for (size_t i = 0; i < info->note_count; i++)
+        json_array_append_new(notes, json_pack("{s:s,s:o,s:o}", "severity",
+                                               protocol_severity_text(info->notes[i].severity), "where",
+                                               string(info->notes[i].where), "text", string(info->notes[i].text)));
+    return json_pack("{s:o,s:o,s:o}", "cameras", cameras, "clips", clips, "notes", notes);
+}
+
+static void print_json(const struct info_options *wanted, const struct fl_model_info *info)
+{
+    json_t *object = lists(info);
+    const struct {
+        const char *name;
+        uint64_t value;
+    } numbers[] = {{"nodes", info->nodes},
+                   {"meshes", info->meshes},
+                   {"triangles", info->triangles},
+                   {"sphere_sets", info->sphere_sets},
+                   {"spheres", info->spheres},
+                   {"discs", info->discs},
+                   {"materials", info->materials},
+                   {"textures", info->textures},
+                   {"lights", info->lights},
+                   {"notes_left_out", info->notes_left_out},
+                   {"read_bytes", info->import.read_bytes},
+                   {"blob_bytes", info->import.offered_bytes},
+                   {"read_ns", info->import.read_ns},
+                   {"parse_ns", info->import.parse_ns},
+                   {"hash_ns", info->import.hash_ns},
+                   {"import_ns", info->import.import_ns}};
+    json_object_set_new(object, "model", string(wanted->model != NULL ? wanted->model : ""));
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+        json_object_set_new(object, numbers[i].name, json_integer((json_int_t)numbers[i].value));
+    json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    fputc('\n', stdout);
+    json_decref(object);
+}
+
+/* Names come from the file: made harmless for a terminal. */
+static void print_text(const char *text)
+{
+    for (; *text != '\0'; text++)
+        fputc((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text, stdout);
+}
+
+static void print_table(const struct info_options *wanted, const struct fl_model_info *info)
+{
+    const struct {
+        const char *name;
+        uint64_t value;
+    } rows[] = {{"nodes", info->nodes},           {"meshes", info->meshes},     {"triangles", info->triangles},
+                {"spheres", info->spheres},       {"discs", info->discs},       {"materials", info->materials},
+                {"textures", info->textures},     {"lights", info->lights},     {"cameras", info->camera_count},
+                {"clips", info->clip_count}};
+    print_text(wanted->model != NULL ? wanted->model : wanted->environment);
+    printf("\n");
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        printf("  %-10s %12" PRIu64 "\n", rows[i].name, rows[i].value);
+    printf("  %-10s %12.3f MB in files, %.3f MB to upload at most\n", "bytes", (double)info->import.read_bytes * 1e-6,
+           (double)info->import.offered_bytes * 1e-6);
+    for (size_t i = 0; i < info->camera_count; i++) {
+        printf("  camera %zu: ", i);
+        print_text(info->cameras[i].name);
+        printf("\n");
+    }
+    for (size_t i = 0; i < info->clip_count; i++) {
+        printf("  clip %zu: ", i);
+        print_text(info->clips[i].name);
+        printf(", %.3f s, %u channels\n", (double)info->clips[i].duration_s, info->clips[i].channels);
+    }
+    for (size_t i = 0; i < info->note_count; i++) {
+        printf("  %s: ", protocol_severity_text(info->notes[i].severity));
+        print_text(info->notes[i].where);
+        printf(": ");
+        print_text(info->notes[i].text);
+        printf("\n");
+    }
+    if (info->notes_left_out > 0)
+        printf("  %" PRIu64 " more notes\n", info->notes_left_out);
+}
+
+int cli_info(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = options, .parser = parse, .args_doc = "MODEL", .doc = "Say what a model file holds, and what of it cannot be used."};
+    struct info_options wanted = {0};
+    if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
+        return cli_report(&wanted.job.error);
+    if (wanted.model == NULL && wanted.environment == NULL) {
+        cli_usage(&wanted.job, "MODEL", "no model file is named");
+        return cli_report(&wanted.job.error);
+    }
+    struct fl_error error = {0};
+    if (!cli_interrupt_begin(&error))
+        return cli_report(&error);
+    struct fl_model_info *info =
+        fl_model_info(&(struct fl_load_options){.model = wanted.model, .environment = wanted.environment},
+                      cli_interrupt_fd(), &error);
+    if (info == NULL)
+        return cli_report(&error);
+    if (wanted.json)
+        print_json(&wanted, info);
+    else
+        print_table(&wanted, info);
+    fl_model_info_destroy(info);
+    return CLI_DONE;
+}

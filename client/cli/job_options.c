@@ -1,0 +1,375 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/cli.h"
+#include "lib/text.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define RADIANS_PER_DEGREE 0.017453292519943295
+
+enum key {
+    KEY_SERVER = 's',
+    KEY_OUTPUT = 'o',
+    KEY_QUIET = 'q',
+    KEY_TRACER = 0x100,
+    KEY_BVH_BOUNDS,
+    KEY_INTEGRATOR,
+    KEY_PRIMARY,
+    KEY_TONE_MAP,
+    KEY_ENCODING,
+    KEY_SIZE,
+    KEY_SAMPLES,
+    KEY_DEPTH,
+    KEY_SEED,
+    KEY_EXPOSURE,
+    KEY_QUALITY,
+    KEY_ENVIRONMENT,
+    KEY_CAMERA,
+    KEY_EYE,
+    KEY_LOOK_AT,
+    KEY_UP,
+    KEY_FOV,
+    KEY_FORMAT,
+    KEY_HALF,
+    KEY_FLOAT,
+    KEY_TIMINGS
+};
+
+static const struct argp_option options[] = {
+    {"output", KEY_OUTPUT, "IMAGE", 0, "Image file; its ending is its format. '-' is standard output", 0},
+    {"format", KEY_FORMAT, "FORMAT", 0, "png, jpeg, exr or hdr, where the ending does not say it", 0},
+    {"half", KEY_HALF, NULL, 0, "EXR of half floats (default)", 0},
+    {"float", KEY_FLOAT, NULL, 0, "EXR of 32-bit floats", 0},
+    {"server", KEY_SERVER, "ADDRESS", 0,
+     "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: a private daemon for this command)", 0},
+    {NULL, 0, NULL, 0, "Picture:", 1},
+    {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x720)", 0},
+    {"samples", KEY_SAMPLES, "N", 0, "Samples per pixel (default 1)", 0},
+    {"depth", KEY_DEPTH, "N", 0, "Bounces after the first hit, 0 to 32 (default 8)", 0},
+    {"seed", KEY_SEED, "N", 0, "Same seed, same picture (default 0)", 0},
+    {"environment", KEY_ENVIRONMENT, "FILE", 0, "Equirectangular image (HDR or EXR) that lights the scene", 0},
+    {"exposure", KEY_EXPOSURE, "STOPS", 0, "Multiply the picture by 2 to this power (default 0)", 0},
+    {"tone-map", KEY_TONE_MAP, "NAME", 0, "neutral, aces or none, for PNG and JPEG (default neutral)", 0},
+    {NULL, 0, NULL, 0, "Camera (default: the model's first, else one that sees all of it):", 2},
+    {"camera", KEY_CAMERA, "NAME|INDEX", 0, "A camera of the model ('farlight info' lists them)", 0},
+    {"eye", KEY_EYE, "X,Y,Z", 0, "Place of the camera; needs --look-at", 0},
+    {"look-at", KEY_LOOK_AT, "X,Y,Z", 0, "What is in the middle of the picture", 0},
+    {"up", KEY_UP, "X,Y,Z", 0, "Upward direction (default 0,1,0)", 0},
+    {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 45)", 0},
+    {NULL, 0, NULL, 0, "Method:", 3},
+    {"tracer", KEY_TRACER, "NAME", 0, "bvh (default), naive", 0},
+    {"bvh-bounds", KEY_BVH_BOUNDS, "NAME", 0, "auto (default), box, sphere", 0},
+    {"integrator", KEY_INTEGRATOR, "NAME", 0, "whitted", 0},
+    {"primary", KEY_PRIMARY, "NAME", 0, "First hits: raster (default), trace", 0},
+    {"encoding", KEY_ENCODING, "NAME", 0,
+     "How pixels travel: raw, zstd, jpeg (default: raw on this machine, zstd over a network)", 0},
+    {"quality", KEY_QUALITY, "N", 0, "JPEG quality 1 to 100, or zstd level 1 to 19", 0},
+    {NULL, 0, NULL, 0, "Talk:", 4},
+    {"timings", KEY_TIMINGS, "json", OPTION_ARG_OPTIONAL,
+     "Print the time of every stage, as a table or as JSON, one object a line", 0},
+    {"quiet", KEY_QUIET, NULL, 0, "No progress, no notes about the model", 0},
+    {0}};
+
+error_t cli_usage(struct cli_job *job, const char *field, const char *format, ...)
+{
+    char text[600];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    fl_error_set(&job->error, FL_ERROR_ARGUMENT, field, "%s", text);
+    return EINVAL;
+}
+
+/* An error of lib/text.h gets the option's name. */
+static error_t name_field(struct cli_job *job, const char *field)
+{
+    snprintf(job->error.field, sizeof job->error.field, "%s", field);
+    return EINVAL;
+}
+
+static error_t unknown_value(struct cli_job *job, const char *field, const char *enum_name, const char *value)
+{
+    char known[200], words[40];
+    size_t length = 0;
+    for (const char *at = enum_name; *at != '\0' && length + 1 < sizeof words; at++)
+        words[length++] = *at == '_' ? ' ' : *at;
+    words[length] = '\0';
+    cli_usage(job, field, "unknown %s '%s'", words, value);
+    fl_error_remedy(&job->error, "known: %s", protocol_enum_list(enum_name, known, sizeof known));
+    return EINVAL;
+}
+
+static error_t set_integer(struct cli_job *job, const char *field, const char *value, uint64_t least,
+                           uint64_t greatest, uint64_t *number)
+{
+    return fl_text_integer(value, least, greatest, number, &job->error) ? 0 : name_field(job, field);
+}
+
+static error_t set_vector(struct cli_job *job, const char *field, const char *value, float vector[3], bool *is_set)
+{
+    *is_set = true;
+    return fl_text_vector(value, vector, &job->error) ? 0 : name_field(job, field);
+}
+
+/* Options whose value is a name. */
+static error_t set_name(struct cli_job *job, int key, const char *field, const char *value)
+{
+    struct fl_job_options *wanted = &job->options;
+    switch (key) {
+    case KEY_TRACER:
+        return protocol_tracer_parse(value, &wanted->tracer) ? 0 : unknown_value(job, field, "tracer", value);
+    case KEY_BVH_BOUNDS:
+        return protocol_bvh_bounds_parse(value, &wanted->bvh_bounds) ? 0
+                                                                     : unknown_value(job, field, "bvh_bounds", value);
+    case KEY_INTEGRATOR:
+        return protocol_integrator_parse(value, &wanted->integrator) ? 0
+                                                                     : unknown_value(job, field, "integrator", value);
+    case KEY_PRIMARY:
+        return protocol_primary_parse(value, &wanted->primary) ? 0 : unknown_value(job, field, "primary", value);
+    case KEY_TONE_MAP:
+        return protocol_tone_map_parse(value, &wanted->tone_map) ? 0 : unknown_value(job, field, "tone_map", value);
+    case KEY_ENCODING:
+        job->has_encoding = true;
+        return protocol_encoding_parse(value, &wanted->encoding) ? 0 : unknown_value(job, field, "encoding", value);
+    case KEY_FORMAT:
+        job->image = cli_image_by_name(value);
+        return job->image != CLI_IMAGE_UNKNOWN
+                   ? 0
+                   : cli_usage(job, field, "unknown format '%s' (known: png, jpeg, exr, hdr)", value);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* Options whose value is a number. */
+static error_t set_number(struct cli_job *job, int key, const char *field, const char *value)
+{
+    struct fl_job_options *wanted = &job->options;
+    uint64_t number = 0;
+    double real = 0;
+    error_t status = 0;
+    switch (key) {
+    case KEY_SIZE:
+        return fl_text_size(value, &wanted->width, &wanted->height, &job->error) ? 0 : name_field(job, field);
+    case KEY_SAMPLES:
+        status = set_integer(job, field, value, 1, 65536, &number);
+        wanted->samples = (uint32_t)number;
+        return status;
+    case KEY_DEPTH:
+        status = set_integer(job, field, value, 0, 32, &number);
+        wanted->depth = number == 0 ? FL_DEPTH_NONE : (int)number;
+        return status;
+    case KEY_SEED:
+        return set_integer(job, field, value, 0, UINT64_MAX, &wanted->seed);
+    case KEY_QUALITY:
+        job->has_quality = true;
+        status = set_integer(job, field, value, 1, 100, &number);
+        wanted->quality = (unsigned)number;
+        return status;
+    case KEY_EXPOSURE:
+        if (!fl_text_real(value, -64, 64, &real, &job->error))
+            return name_field(job, field);
+        wanted->exposure_stops = (float)real;
+        return 0;
+    case KEY_FOV:
+        if (!fl_text_real(value, 0.1, 177, &real, &job->error))
+            return name_field(job, field);
+        job->key.fov_y = (float)(real * RADIANS_PER_DEGREE);
+        job->has_fov = true;
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static error_t set_option(struct cli_job *job, int key, const char *field, const char *value)
+{
+    switch (key) {
+    case KEY_SERVER:
+        job->server = value;
+        return 0;
+    case KEY_OUTPUT:
+        job->output = value;
+        return 0;
+    case KEY_ENVIRONMENT:
+        job->environment = value;
+        return 0;
+    case KEY_CAMERA:
+        job->camera = value;
+        return 0;
+    case KEY_EYE:
+        return set_vector(job, field, value, job->key.eye_world, &job->has_eye);
+    case KEY_LOOK_AT:
+        return set_vector(job, field, value, job->key.look_at_world, &job->has_look_at);
+    case KEY_UP:
+        return set_vector(job, field, value, job->key.up_world, &job->has_up);
+    case KEY_HALF:
+        job->half_pixels = true;
+        return 0;
+    case KEY_FLOAT:
+        job->float_pixels = true;
+        return 0;
+    case KEY_QUIET:
+        job->quiet = true;
+        return 0;
+    case KEY_TIMINGS:
+        if (value != NULL && strcmp(value, "json") != 0)
+            return cli_usage(job, field, "'%s' is not known (known: json)", value);
+        job->timings = value != NULL ? CLI_TIMINGS_JSON : CLI_TIMINGS_TABLE;
+        return 0;
+    default: {
+        const error_t status = set_name(job, key, field, value);
+        return status == ARGP_ERR_UNKNOWN ? set_number(job, key, field, value) : status;
+    }
+    }
+}
+
+static const struct argp_option *find_option(int key)
+{
+    for (const struct argp_option *option = options; option->name != NULL || option->doc != NULL; option++)
+        if (option->name != NULL && option->key == key)
+            return option;
+    return NULL;
+}
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    const struct argp_option *option = find_option(key);
+    char field[40];
+    if (option == NULL)
+        return ARGP_ERR_UNKNOWN;
+    snprintf(field, sizeof field, "--%s", option->name);
+    return set_option(state->input, key, field, value);
+}
+
+const struct argp cli_job_argp = {.options = options, .parser = parse};
+
+/* FARLIGHT_SIZE for --size, and so on. */
+static bool read_environment(struct cli_job *job)
+{
+    static const int keys[] = {KEY_SERVER,   KEY_SIZE,     KEY_SAMPLES,    KEY_DEPTH,      KEY_SEED,
+                               KEY_EXPOSURE, KEY_TONE_MAP, KEY_TRACER,     KEY_BVH_BOUNDS, KEY_INTEGRATOR,
+                               KEY_PRIMARY,  KEY_ENCODING, KEY_QUALITY,    KEY_ENVIRONMENT};
+    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
+        char field[40] = "FARLIGHT_";
+        size_t length = strlen(field);
+        for (const char *at = find_option(keys[i])->name; *at != '\0'; at++)
+            field[length++] = *at == '-' ? '_' : (char)toupper((unsigned char)*at);
+        field[length] = '\0';
+        const char *value = getenv(field);
+        if (value != NULL && value[0] != '\0' && set_option(job, keys[i], field, value) != 0)
+            return false;
+    }
+    return true;
+}
+
+bool cli_job_begin(struct cli_job *job)
+{
+    *job = (struct cli_job){.key = {.up_world = {0, 1, 0}, .fov_y = (float)(45 * RADIANS_PER_DEGREE)}};
+    return read_environment(job);
+}
+
+/* ---- what depends on several options ---- */
+
+static bool complete_image(struct cli_job *job, bool is_series)
+{
+    if (job->output == NULL) {
+        cli_usage(job, "--output", "no image file is named");
+        return fl_error_remedy(&job->error, is_series ? "-o 'frames/%%04d.exr'" : "-o picture.png, or '-'");
+    }
+    const bool to_stdout = strcmp(job->output, "-") == 0;
+    if (to_stdout && is_series)
+        return cli_usage(job, "--output", "a series of images cannot go to standard output") == 0;
+    if (job->image == CLI_IMAGE_UNKNOWN)
+        job->image = to_stdout ? CLI_IMAGE_PNG : cli_image_by_path(job->output);
+    if (job->image == CLI_IMAGE_UNKNOWN) {
+        cli_usage(job, job->output, "its ending names no image format");
+        return fl_error_remedy(&job->error, "known: .png .jpg .jpeg .exr .hdr, or --format");
+    }
+    if (job->float_pixels && job->half_pixels)
+        return cli_usage(job, "--float", "cannot go with --half") == 0;
+    if ((job->float_pixels && job->image != CLI_IMAGE_EXR && job->image != CLI_IMAGE_HDR) ||
+        (job->half_pixels && job->image != CLI_IMAGE_EXR))
+        return cli_usage(job, job->float_pixels ? "--float" : "--half", "%s files do not have such pixels",
+                         cli_image_name(job->image)) == 0;
+    if (job->image == CLI_IMAGE_HDR || job->float_pixels)
+        job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    else if (job->image == CLI_IMAGE_EXR)
+        job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
+    return true;
+}
+
+static bool complete_encoding(struct cli_job *job)
+{
+    if (!job->has_encoding && job->server != NULL && strncmp(job->server, "unix:", 5) != 0)
+        job->options.encoding = PROTOCOL_ENCODING_ZSTD;
+    if (job->options.encoding == PROTOCOL_ENCODING_JPEG && job->options.format != PROTOCOL_PIXEL_FORMAT_RGBA8)
+        return cli_usage(job, "--encoding", "jpeg carries 8-bit pictures only, %s files need more",
+                         cli_image_name(job->image)) == 0;
+    if (job->image == CLI_IMAGE_JPEG) {
+        job->file_quality = job->options.quality;
+        if (job->options.encoding != PROTOCOL_ENCODING_JPEG)
+            job->options.quality = 0; /* the number is meant for the file */
+    }
+    if (job->options.encoding == PROTOCOL_ENCODING_ZSTD && job->options.quality > 19)
+        return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
+    return true;
+}
+
+static bool is_zero(const float vector[3])
+{
+    return vector[0] == 0 && vector[1] == 0 && vector[2] == 0;
+}
+
+/* Whether `up` and the view direction leave the picture's upright undefined. */
+static bool is_degenerate(const struct record_camera_key *key)
+{
+    double view[3], cross = 0, lengths = 0, view2 = 0, up2 = 0;
+    for (unsigned i = 0; i < 3; i++) {
+        view[i] = (double)key->look_at_world[i] - (double)key->eye_world[i];
+        view2 += view[i] * view[i];
+        up2 += (double)key->up_world[i] * (double)key->up_world[i];
+    }
+    lengths = view2 * up2;
+    for (unsigned i = 0; i < 3; i++) {
+        const unsigned j = (i + 1) % 3, k = (i + 2) % 3;
+        const double part = view[j] * (double)key->up_world[k] - view[k] * (double)key->up_world[j];
+        cross += part * part;
+    }
+    return !(cross > lengths * 1e-12);
+}
+
+static bool complete_camera(struct cli_job *job)
+{
+    const bool has_key = job->has_eye || job->has_look_at;
+    if (job->has_eye != job->has_look_at)
+        return cli_usage(job, job->has_eye ? "--eye" : "--look-at", "needs %s as well",
+                         job->has_eye ? "--look-at" : "--eye") == 0;
+    if (has_key && job->camera != NULL)
+        return cli_usage(job, "--camera", "cannot go with --eye and --look-at") == 0;
+    if (!has_key && (job->has_up || job->has_fov))
+        return cli_usage(job, job->has_up ? "--up" : "--fov", "needs --eye and --look-at") == 0;
+    if (!has_key)
+        return true;
+    if (memcmp(job->key.eye_world, job->key.look_at_world, sizeof job->key.eye_world) == 0)
+        return cli_usage(job, "--look-at", "is where --eye is") == 0;
+    if (is_zero(job->key.up_world) || is_degenerate(&job->key))
+        return cli_usage(job, "--up", "must not be parallel to the view direction") == 0;
+    job->options.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
+    job->options.keys = &job->key;
+    job->options.key_count = 1;
+    return true;
+}
+
+bool cli_job_complete(struct cli_job *job, bool is_series)
+{
+    if (job->model == NULL)
+        return cli_usage(job, "MODEL", "no model file is named") == 0;
+    return complete_image(job, is_series) && complete_encoding(job) && complete_camera(job);
+}

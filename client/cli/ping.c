@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/cli.h"
+#include "lib/text.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+struct ping_options {
+    const char *server;
+    uint64_t count;
+    struct cli_job job; /* holds the error of what was typed */
+};
+
+static const struct argp_option options[] = {
+    {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
+    {"count", 'c', "N", 0, "How many times (default 5)", 0},
+    {0}};
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct ping_options *wanted = state->input;
+    switch (key) {
+    case 's':
+        wanted->server = value;
+        return 0;
+    case 'c':
+        if (fl_text_integer(value, 1, 1000000, &wanted->count, &wanted->job.error))
+            return 0;
+        snprintf(wanted->job.error.field, sizeof wanted->job.error.field, "--count");
+        return EINVAL;
+    case ARGP_KEY_ARG:
+        return cli_usage(&wanted->job, value, "is not expected");
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static bool ping(struct fl_connection *connection, const struct ping_options *wanted, struct fl_error *error)
+{
+    uint64_t least_ns = UINT64_MAX, greatest_ns = 0, sum_ns = 0;
+    for (uint64_t i = 0; i < wanted->count; i++) {
+        uint64_t ns = 0;
+        if (!fl_ping(connection, &ns, error))
+            return false;
+        least_ns = ns < least_ns ? ns : least_ns;
+        greatest_ns = ns > greatest_ns ? ns : greatest_ns;
+        sum_ns += ns;
+    }
+    printf("%s: %" PRIu64 " round trips, least %.3f ms, mean %.3f ms, greatest %.3f ms\n",
+           fl_connection_address(connection), wanted->count, (double)least_ns * 1e-6,
+           (double)sum_ns * 1e-6 / (double)wanted->count, (double)greatest_ns * 1e-6);
+    return true;
+}
+
+int cli_ping(int argc, char **argv)
+{
+    static const struct argp argp = {.options = options, .parser = parse, .doc = "Measure the way to a daemon and back."};
+    struct ping_options wanted = {.server = getenv("FARLIGHT_SERVER"), .count = 5};
+    if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
+        return cli_report(&wanted.job.error);
+    struct fl_error error = {0};
+    if (!cli_interrupt_begin(&error))
+        return cli_report(&error);
+    struct fl_connection *connection = fl_connect(
+        &(struct fl_connect_options){
+            .server = wanted.server, .name = "farlight ping", .interrupt_fd = cli_interrupt_fd()},
+        &error);
+    const bool done = connection != NULL && ping(connection, &wanted, &error);
+    fl_connection_destroy(connection);
+    return done ? CLI_DONE : cli_report(&error);
+}

@@ -1,0 +1,254 @@
+/* SPDX-License-Identifier: MIT */
+/* From a model to image files, once: the scene handed over, frames taken and written. */
+#include "cli/cli.h"
+#include "lib/text.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#define NOTES_SHOWN 20u
+
+struct session {
+    struct cli_job *job;
+    bool is_series, to_stdout;
+    struct fl_pattern pattern;
+    char folder[4096], path[4352]; /* where the image goes; of a series, for each frame anew */
+    char temporary[4096];          /* a folder to be removed; empty: none */
+    struct fl_exporter *exporter;
+    struct fl_connection *connection;
+    struct fl_scene *scene;
+    struct fl_job *rendering;
+    struct cli_timings *timings;
+    struct cli_progress progress;
+    unsigned warnings;
+    uint64_t begin_ns, export_ns;
+};
+
+static uint64_t now_ns(void)
+{
+    struct timespec now = {0};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+}
+
+/* ---- what the import tells ---- */
+
+static void on_note(void *user, const struct fl_note *note)
+{
+    struct session *session = user;
+    if (session->job->quiet || note->severity != PROTOCOL_SEVERITY_WARNING || session->warnings++ >= NOTES_SHOWN)
+        return;
+    cli_progress_clear(&session->progress);
+    cli_note(note, false);
+}
+
+static void on_progress(void *user, uint64_t done_bytes, uint64_t total_bytes, const char *what)
+{
+    struct session *session = user;
+    cli_progress_import(&session->progress, done_bytes, total_bytes, what);
+}
+
+static void tell_hidden_warnings(struct session *session)
+{
+    if (session->warnings <= NOTES_SHOWN)
+        return;
+    cli_progress_clear(&session->progress);
+    fprintf(stderr, "farlight: %u more warnings ('farlight info' lists them)\n", session->warnings - NOTES_SHOWN);
+}
+
+/* ---- beginning ---- */
+
+/* Everything that can be known to fail before anything is rendered. */
+static bool prepare_output(struct session *session, struct fl_error *error)
+{
+    struct cli_job *job = session->job;
+    session->to_stdout = strcmp(job->output, "-") == 0;
+    if (session->to_stdout) {
+        if (isatty(STDOUT_FILENO) == 1) {
+            fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "an image would be written to the terminal");
+            return fl_error_remedy(error, "redirect it, or name a file");
+        }
+        if (!cli_temporary_folder(session->folder, sizeof session->folder, error))
+            return false;
+        memcpy(session->temporary, session->folder, sizeof session->temporary);
+        snprintf(session->path, sizeof session->path, "%s/image.%s", session->folder, cli_image_name(job->image));
+        return true;
+    }
+    if (!session->is_series)
+        return cli_check_output(job->output, session->folder, sizeof session->folder, error) &&
+               snprintf(session->path, sizeof session->path, "%s", job->output) > 0;
+    if (!fl_pattern_parse(job->output, &session->pattern, error)) {
+        snprintf(error->field, sizeof error->field, "--output");
+        return false;
+    }
+    return fl_pattern_path(&session->pattern, job->options.last_frame, session->path, sizeof session->path) &&
+           cli_check_output(session->path, session->folder, sizeof session->folder, error);
+}
+
+/* Where two programs can load at once: the importer beside the daemon, later the exporter beside the renderer. */
+static bool load_scene(struct session *session, struct fl_error *error)
+{
+    const struct cli_job *job = session->job;
+    struct fl_load_options load = {.model = job->model,
+                                   .environment = job->environment,
+                                   .note = on_note,
+                                   .progress = on_progress,
+                                   .user = session};
+    load.started = fl_import_start(&load, error);
+    if (load.started == NULL)
+        return false;
+    session->connection = fl_connect(
+        &(struct fl_connect_options){
+            .server = job->server, .name = "farlight", .interrupt_fd = cli_interrupt_fd()},
+        error);
+    if (session->connection == NULL) {
+        fl_import_destroy(load.started);
+        return false;
+    }
+    session->scene = fl_scene_load(session->connection, &load, error);
+    tell_hidden_warnings(session);
+    return session->scene != NULL;
+}
+
+static bool start_exporter(struct session *session, struct fl_error *error)
+{
+    const struct cli_job *job = session->job;
+    const struct fl_exporter_options export = {.folder = session->folder,
+                                               .model = job->model,
+                                               .frames_per_second =
+                                                   session->is_series ? job->options.frames_per_second : 0,
+                                               .interrupt_fd = cli_interrupt_fd()};
+    session->exporter = fl_exporter_start(&export, error);
+    return session->exporter != NULL;
+}
+
+/* By name or number; without either the model's first camera, unless keys or an orbit say where to look. */
+static bool choose_camera(struct session *session, struct fl_error *error)
+{
+    struct cli_job *job = session->job;
+    struct fl_job_options *options = &job->options;
+    if (options->key_count > 0 || job->is_orbit)
+        return true;
+    if (job->camera != NULL) {
+        options->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        return fl_scene_find_camera(session->scene, job->camera, &options->camera_node, error);
+    }
+    const struct fl_camera_info *first = fl_scene_camera(session->scene, 0);
+    if (first != NULL) {
+        options->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        options->camera_node = first->node;
+    }
+    return true;
+}
+
+/* ---- frames ---- */
+
+static bool export_frame(struct session *session, const struct fl_frame *frame, struct fl_error *error)
+{
+    const struct cli_job *job = session->job;
+    if (session->is_series &&
+        !fl_pattern_path(&session->pattern, frame->frame, session->path, sizeof session->path))
+        return fl_error_set(error, FL_ERROR_FILE, job->output, "the path of frame %u is too long", frame->frame);
+    const struct fl_export_options options = {.path = session->path,
+                                              .format = cli_image_name(job->image),
+                                              .half = !job->float_pixels && job->image == CLI_IMAGE_EXR,
+                                              .quality = job->image == CLI_IMAGE_JPEG ? job->file_quality : 0};
+    const uint64_t begin_ns = now_ns();
+    const bool written = fl_exporter_write(session->exporter, frame, &options, error);
+    session->export_ns += now_ns() - begin_ns;
+    return written;
+}
+
+static bool finish_export(struct session *session, struct fl_error *error)
+{
+    const uint64_t begin_ns = now_ns();
+    const bool written = fl_exporter_wait(session->exporter, error) &&
+                         (!session->to_stdout || cli_copy_to_stdout(session->path, error));
+    session->export_ns += now_ns() - begin_ns;
+    return written;
+}
+
+static bool take_frames(struct session *session, struct fl_error *error)
+{
+    const struct fl_job_options *options = &session->job->options;
+    const uint32_t step = options->frame_step > 0 ? options->frame_step : 1;
+    const uint32_t total = (options->last_frame - options->first_frame) / step + 1;
+    struct fl_frame *frame = NULL;
+    uint32_t done = 0;
+    if (session->is_series)
+        cli_progress_frames(&session->progress, 0, total);
+    while ((frame = fl_render_next(session->rendering, error)) != NULL) {
+        cli_timings_frame(session->timings, frame);
+        const bool written = export_frame(session, frame, error);
+        fl_frame_destroy(frame);
+        if (!written)
+            return false;
+        /* The file before is complete by now; this one is being written. */
+        if (session->is_series && done > 0)
+            cli_progress_frames(&session->progress, done, total);
+        done++;
+    }
+    if (error->code != FL_ERROR_NONE || !finish_export(session, error))
+        return false;
+    if (session->is_series)
+        cli_progress_frames(&session->progress, total, total);
+    return true;
+}
+
+static bool run(struct session *session, struct fl_error *error)
+{
+    struct cli_job *job = session->job;
+    if ((job->model != NULL && !cli_check_input(job->model, error)) ||
+        (job->environment != NULL && !cli_check_input(job->environment, error)) || !prepare_output(session, error) ||
+        !load_scene(session, error) || !choose_camera(session, error) || !start_exporter(session, error))
+        return false;
+    session->rendering = fl_render_start(session->scene, &job->options, error);
+    return session->rendering != NULL && take_frames(session, error);
+}
+
+/* ---- end ---- */
+
+static void print_timings(struct session *session)
+{
+    const struct cli_client_times times = {.total_ns = now_ns() - session->begin_ns,
+                                           .start_ns = fl_connection_start_ns(session->connection),
+                                           .export_ns = session->export_ns,
+                                           .import = fl_scene_import_stats(session->scene)};
+    cli_timings_end(session->timings, &times);
+}
+
+static void close_session(struct session *session)
+{
+    /* After an interruption the daemon is still told in order. */
+    if (session->connection != NULL)
+        fl_connection_set_interrupt(session->connection, 0);
+    fl_render_destroy(session->rendering);
+    fl_exporter_destroy(session->exporter);
+    fl_scene_destroy(session->scene);
+    fl_connection_destroy(session->connection);
+    cli_timings_destroy(session->timings);
+    if (session->temporary[0] != '\0') {
+        unlink(session->path);
+        rmdir(session->temporary);
+    }
+}
+
+int cli_run_job(struct cli_job *job, bool is_series)
+{
+    struct session session = {.job = job, .is_series = is_series, .begin_ns = now_ns()};
+    struct fl_error error = {0};
+    if (!cli_interrupt_begin(&error))
+        return cli_report(&error);
+    cli_progress_begin(&session.progress, job->quiet);
+    if (job->timings != CLI_TIMINGS_NONE)
+        session.timings = cli_timings_create(job->timings, strcmp(job->output, "-") == 0);
+    const bool done = run(&session, &error);
+    cli_progress_end(&session.progress, done);
+    if (done)
+        print_timings(&session);
+    close_session(&session);
+    return done ? CLI_DONE : cli_report(&error);
+}

@@ -1,0 +1,205 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/cli.h"
+
+#include <inttypes.h>
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#define KEY_JSON 0x400
+
+struct stats_options {
+    const char *server;
+    bool json;
+    struct cli_job job; /* holds the error of what was typed */
+};
+
+static const struct argp_option options[] = {
+    {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
+    {"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0},
+    {0}};
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct stats_options *wanted = state->input;
+    switch (key) {
+    case 's':
+        wanted->server = value;
+        return 0;
+    case KEY_JSON:
+        wanted->json = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        return cli_usage(&wanted->job, value, "is not expected");
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* ---- JSON ---- */
+
+static void set(json_t *object, const char *name, uint64_t value)
+{
+    json_object_set_new(object, name, json_integer((json_int_t)value));
+}
+
+static json_t *clients_array(const struct message_stats_reply *reply)
+{
+    json_t *array = json_array();
+    for (uint32_t i = 0; i < reply->clients_count; i++) {
+        const struct record_client_stat *client = &reply->clients[i];
+        json_t *object = json_pack("{s:s}", "name", client->name);
+        set(object, "client", client->client);
+        set(object, "connected_ns", client->connected_ns);
+        set(object, "received_bytes", client->received_bytes);
+        set(object, "sent_bytes", client->sent_bytes);
+        set(object, "bulk_bytes", client->bulk_bytes);
+        set(object, "requests", client->requests);
+        set(object, "scenes", client->scenes);
+        json_array_append_new(array, object);
+    }
+    return array;
+}
+
+static json_t *scenes_array(const struct message_stats_reply *reply)
+{
+    json_t *array = json_array();
+    for (uint32_t i = 0; i < reply->scenes_count; i++) {
+        const struct record_scene_stat *scene = &reply->scenes[i];
+        json_t *object = json_pack("{s:s}", "name", scene->name);
+        set(object, "client", scene->client);
+        set(object, "scene", scene->scene);
+        set(object, "revision", scene->revision);
+        set(object, "nodes", scene->nodes);
+        set(object, "instances", scene->instances);
+        set(object, "triangles", scene->triangles);
+        set(object, "spheres", scene->spheres);
+        set(object, "host_bytes", scene->host_bytes);
+        set(object, "device_bytes", scene->device_bytes);
+        json_array_append_new(array, object);
+    }
+    return array;
+}
+
+static json_t *stages_array(const struct message_stats_reply *reply)
+{
+    json_t *array = json_array();
+    for (uint32_t i = 0; i < reply->stages_count; i++) {
+        const struct record_stage_total *total = &reply->stages[i];
+        json_t *object = json_pack("{s:s,s:s}", "stage", protocol_stage_text(total->stage), "clock",
+                                   protocol_clock_text(total->clock));
+        set(object, "count", total->count);
+        set(object, "total_ns", total->total_ns);
+        set(object, "greatest_ns", total->greatest_ns);
+        json_array_append_new(array, object);
+    }
+    return array;
+}
+
+static void print_json(const struct message_stats_reply *reply)
+{
+    json_t *object = json_pack("{s:s,s:s,s:s}", "version", reply->version, "device", reply->device, "driver", reply->driver);
+    set(object, "uptime_ns", reply->uptime_ns);
+    set(object, "frames", reply->frames);
+    set(object, "rays", reply->rays);
+    set(object, "jobs", reply->jobs);
+    set(object, "host_bytes", reply->host_bytes);
+    set(object, "host_limit_bytes", reply->host_limit_bytes);
+    set(object, "device_bytes", reply->device_bytes);
+    set(object, "device_limit_bytes", reply->device_limit_bytes);
+    set(object, "blobs", reply->blobs);
+    set(object, "blob_bytes", reply->blob_bytes);
+    json_object_set_new(object, "clients", clients_array(reply));
+    json_object_set_new(object, "scenes", scenes_array(reply));
+    json_object_set_new(object, "stages", stages_array(reply));
+    json_dumpf(object, stdout, JSON_COMPACT);
+    fputc('\n', stdout);
+    json_decref(object);
+}
+
+/* ---- table ---- */
+
+static double mb(uint64_t bytes)
+{
+    return (double)bytes * 1e-6;
+}
+
+/* The daemon's and other clients' words, made harmless for a terminal. */
+static const char *plain(const char *text, char out[130])
+{
+    size_t length = 0;
+    for (; *text != '\0' && length + 1 < 130; text++)
+        out[length++] = (unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text;
+    out[length] = '\0';
+    return out;
+}
+
+static void print_stages(const struct message_stats_reply *reply)
+{
+    if (reply->stages_count > 0)
+        printf("stage        clock %12s %14s %12s %12s\n", "spans", "total ms", "mean ms", "greatest ms");
+    for (uint32_t i = 0; i < reply->stages_count; i++) {
+        const struct record_stage_total *total = &reply->stages[i];
+        const double mean = total->count > 0 ? (double)total->total_ns * 1e-6 / (double)total->count : 0;
+        printf("  %-10s %-5s %12" PRIu64 " %14.3f %12.3f %12.3f\n", protocol_stage_text(total->stage),
+               protocol_clock_text(total->clock), total->count, (double)total->total_ns * 1e-6, mean,
+               (double)total->greatest_ns * 1e-6);
+    }
+}
+
+static void print_table(const struct message_stats_reply *reply)
+{
+    char text[130];
+    printf("farlightd %s", plain(reply->version, text));
+    printf(", up %.1f s\n", (double)reply->uptime_ns * 1e-9);
+    printf("device       %s\n", plain(reply->device, text));
+    printf("driver       %s\n", plain(reply->driver, text));
+    printf("work         %" PRIu64 " frames, %" PRIu64 " rays, %u jobs now\n", reply->frames, reply->rays, reply->jobs);
+    printf("host memory  %.3f MB of %.0f MB\n", mb(reply->host_bytes), mb(reply->host_limit_bytes));
+    printf("device mem.  %.3f MB of %.0f MB\n", mb(reply->device_bytes), mb(reply->device_limit_bytes));
+    printf("blobs        %u, %.3f MB\n", reply->blobs, mb(reply->blob_bytes));
+    for (uint32_t i = 0; i < reply->clients_count; i++) {
+        const struct record_client_stat *client = &reply->clients[i];
+        printf("client %-5" PRIu64 " %s, %.1f s, %.3f MB in (%.3f MB blobs), %.3f MB out, %u requests, %u scenes\n",
+               client->client, plain(client->name, text), (double)client->connected_ns * 1e-9,
+               mb(client->received_bytes), mb(client->bulk_bytes), mb(client->sent_bytes), client->requests,
+               client->scenes);
+    }
+    for (uint32_t i = 0; i < reply->scenes_count; i++) {
+        const struct record_scene_stat *scene = &reply->scenes[i];
+        printf("scene %" PRIu64 ".%-4u %s, revision %" PRIu64 ", %u nodes, %" PRIu64 " triangles, %" PRIu64
+               " spheres, %.3f MB host, %.3f MB device\n",
+               scene->client, scene->scene, plain(scene->name, text), scene->revision, scene->nodes, scene->triangles,
+               scene->spheres, mb(scene->host_bytes), mb(scene->device_bytes));
+    }
+    print_stages(reply);
+}
+
+int cli_stats(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = options, .parser = parse, .doc = "Show a daemon's device, clients, scenes, memory and stage times."};
+    struct stats_options wanted = {.server = getenv("FARLIGHT_SERVER")};
+    if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
+        return cli_report(&wanted.job.error);
+    if (wanted.server == NULL || wanted.server[0] == '\0') {
+        cli_usage(&wanted.job, "--server", "no daemon is named");
+        fl_error_remedy(&wanted.job.error, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]");
+        return cli_report(&wanted.job.error);
+    }
+    struct fl_error error = {0};
+    if (!cli_interrupt_begin(&error))
+        return cli_report(&error);
+    struct fl_connection *connection = fl_connect(
+        &(struct fl_connect_options){
+            .server = wanted.server, .name = "farlight stats", .interrupt_fd = cli_interrupt_fd()},
+        &error);
+    const struct message_stats_reply *reply = NULL;
+    const bool done = connection != NULL && fl_stats(connection, &reply, &error);
+    if (done && wanted.json)
+        print_json(reply);
+    else if (done)
+        print_table(reply);
+    fl_connection_destroy(connection);
+    return done ? CLI_DONE : cli_report(&error);
+}

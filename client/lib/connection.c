@@ -1,0 +1,310 @@
+/* SPDX-License-Identifier: MIT */
+#include "lib/connection.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+#include <unistd.h>
+
+#define DEFAULT_TIMEOUT_MS 30000u
+#define DEFAULT_REMOTE_SOCKET "/run/farlight/farlight.sock"
+
+/* ---- failing ---- */
+
+bool fl_connection_break(struct fl_connection *connection, struct fl_error *error)
+{
+    /* An interrupted or late call leaves the stream as it was: what follows may still be said. */
+    if (error->code == FL_ERROR_INTERRUPTED || error->code == FL_ERROR_TIMEOUT)
+        return false;
+    if (connection->process.pid > 0 && error->code == FL_ERROR_CONNECTION) {
+        char words[520];
+        fl_process_last_words(&connection->process, 500, words, sizeof words);
+        if (words[0] != '\0')
+            fl_error_set(error, FL_ERROR_CONNECTION, "", "the connection is lost: %s", words);
+    }
+    connection->broken = *error;
+    return false;
+}
+
+bool fl_connection_check(const struct fl_connection *connection, struct fl_error *error)
+{
+    if (connection->broken.code == FL_ERROR_NONE)
+        return true;
+    *error = connection->broken;
+    return false;
+}
+
+bool fl_error_from_message(struct fl_error *error, const struct message_error *message)
+{
+    fl_error_set(error, FL_ERROR_REFUSED, message->field, "%s",
+                 message->text[0] != '\0' ? message->text : protocol_error_code_text(message->code));
+    fl_error_remedy(error, "%s", message->remedy);
+    error->server_code = message->code;
+    error->retryable = message->retryable != 0;
+    error->retry_after_ms = message->retry_after_ms;
+    return false;
+}
+
+/* ---- messages ---- */
+
+uint32_t fl_connection_next_request(struct fl_connection *connection)
+{
+    if (++connection->last_request == 0)
+        connection->last_request = 1;
+    return connection->last_request;
+}
+
+/* The peer has ended its side without a goodbye. */
+static bool fail_ended(struct fl_connection *connection, struct fl_error *error)
+{
+    fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon closed the connection%s",
+                 fl_stream_has_remains(&connection->stream) ? " in the middle of a message" : "");
+    return fl_connection_break(connection, error);
+}
+
+/* One round of poll and transfer. */
+static bool serve(struct fl_connection *connection, uint64_t deadline_ns, struct fl_error *error)
+{
+    struct pollfd polled = {.fd = connection->stream.fd, .events = fl_stream_events(&connection->stream)};
+    if (!fl_wait(&polled, 1, connection->interrupt_fd, deadline_ns, error) ||
+        !fl_stream_transfer(&connection->stream, error))
+        return fl_connection_break(connection, error);
+    return true;
+}
+
+bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint32_t channel,
+                        const struct message *message, struct fl_error *error)
+{
+    if (!fl_connection_check(connection, error))
+        return false;
+    if (!fl_stream_has_room(&connection->stream))
+        return fl_error_set(error, FL_ERROR_TIMEOUT, "", "the daemon takes nothing more");
+    if (!fl_stream_push(&connection->stream, request, channel, message, error))
+        return false;
+    /* While the daemon takes nothing we go on reading, so that both cannot wait for each other. What is read
+     * stays in the buffer; once that is full the message may stay in ours. */
+    if (!fl_stream_transfer(&connection->stream, error))
+        return fl_connection_break(connection, error);
+    return true;
+}
+
+int fl_connection_consume(struct fl_connection *connection, const struct framing_header *header,
+                          const struct message *message, struct fl_error *error)
+{
+    switch (message->type) {
+    case MESSAGE_PING: {
+        struct message pong = {.type = MESSAGE_PONG};
+        pong.pong.sent_ns = message->ping.sent_ns;
+        pong.pong.received_ns = fl_now_ns();
+        if (fl_stream_has_room(&connection->stream) &&
+            !fl_stream_push(&connection->stream, header->request, 0, &pong, error))
+            return -1;
+        return 1;
+    }
+    case MESSAGE_CREDIT:
+        if (message->credit.channel == FL_UPLOAD_CHANNEL && message->credit.total > connection->upload_credit)
+            connection->upload_credit = message->credit.total;
+        return 1;
+    case MESSAGE_BLOCKED:
+        return 1;
+    case MESSAGE_GOODBYE:
+        fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon ended the connection: %s",
+                     message->goodbye.text[0] != '\0' ? message->goodbye.text
+                                                      : protocol_error_code_text(message->goodbye.code));
+        error->retryable = message->goodbye.code == PROTOCOL_ERROR_CODE_SHUTTING_DOWN;
+        break;
+    case MESSAGE_ERROR:
+        if (header->request != 0)
+            return 0;
+        fl_error_from_message(error, &message->error);
+        break;
+    default:
+        return 0;
+    }
+    connection->broken = *error;
+    return -1;
+}
+
+bool fl_connection_receive(struct fl_connection *connection, struct fl_received *received, uint64_t deadline_ns,
+                           struct fl_error *error)
+{
+    if (!fl_connection_check(connection, error))
+        return false;
+    for (;;) {
+        struct frame frame;
+        const enum fl_stream_result result =
+            fl_stream_next(&connection->stream, &frame, &received->message, error);
+        if (result == FL_STREAM_ERROR)
+            return fl_connection_break(connection, error);
+        if (result == FL_STREAM_MESSAGE) {
+            received->header = frame.header;
+            const int consumed = fl_connection_consume(connection, &frame.header, &received->message, error);
+            if (consumed == 0)
+                return true;
+            if (consumed < 0)
+                return false;
+            continue;
+        }
+        if (connection->stream.ended)
+            return fail_ended(connection, error);
+        if (!serve(connection, deadline_ns, error))
+            return false;
+    }
+}
+
+bool fl_connection_answer(struct fl_connection *connection, uint32_t request, enum message_type expected,
+                          struct fl_received *received, uint64_t deadline_ns, struct fl_error *error)
+{
+    while (fl_connection_receive(connection, received, deadline_ns, error)) {
+        if (received->header.request != request)
+            continue; /* a late answer to something given up, or a frame of a cancelled job */
+        if (received->message.type == MESSAGE_ERROR)
+            return fl_error_from_message(error, &received->message.error);
+        if (received->message.type == expected)
+            return true;
+    }
+    return false;
+}
+
+/* ---- beginning and end ---- */
+
+static bool shake_hands(struct fl_connection *connection, const char *name, uint64_t deadline_ns,
+                        struct fl_error *error)
+{
+    struct fl_stream *stream = &connection->stream;
+    struct handshake_hello hello = {.version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX};
+    snprintf(hello.name, sizeof hello.name, "%s", name);
+    if (getrandom(hello.nonce, sizeof hello.nonce, 0) != (ssize_t)sizeof hello.nonce)
+        return fl_error_set(error, FL_ERROR_SYSTEM, "", "no random numbers");
+    stream->out_end = handshake_hello_encode(stream->out, &hello);
+    if (stream->out_end == 0)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "name", "the client's name is not allowed");
+    for (;;) {
+        if (!serve(connection, deadline_ns, error)) {
+            if (error->code == FL_ERROR_TIMEOUT)
+                fl_error_set(error, FL_ERROR_TIMEOUT, connection->address, "the daemon does not answer the handshake");
+            return false;
+        }
+        struct handshake_reply reply;
+        struct decode_error why = {0};
+        size_t consumed = 0;
+        const enum handshake_result result = handshake_reply_parse(
+            &reply, stream->in + stream->in_start, stream->in_end - stream->in_start, &consumed, &why);
+        if (result == HANDSHAKE_FATAL)
+            return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "no farlight daemon answers there: %s",
+                                why.text);
+        if (result == HANDSHAKE_CONSUMED) {
+            stream->in_start += consumed;
+            if (!handshake_reply_accept(&hello, &reply, &why))
+                return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "%s", why.text);
+            connection->limits = reply.limits;
+            return true;
+        }
+        if (stream->ended)
+            return fail_ended(connection, error);
+    }
+}
+
+/* `farlight bridge` on the other host. A host that begins with '-' would be an option of ssh's. */
+static bool start_ssh(struct fl_connection *connection, const char *where, int *fd, struct fl_error *error)
+{
+    char host[256], socket_address[300];
+    const size_t host_bytes = strcspn(where, ":");
+    const char *path = where[host_bytes] == ':' ? where + host_bytes + 1 : DEFAULT_REMOTE_SOCKET;
+    if (host_bytes == 0 || host_bytes >= sizeof host || where[0] == '-' || *path == '\0')
+        return fl_error_set(error, FL_ERROR_ARGUMENT, connection->address, "is not ssh:HOST[:SOCKET]");
+    /* ssh hands its words to a shell over there. */
+    const char *harmless = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-+@%,=";
+    if (path[strspn(path, harmless)] != '\0' ||
+        snprintf(socket_address, sizeof socket_address, "unix:%s", path) >= (int)sizeof socket_address)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, connection->address,
+                            "the socket's path has characters that a shell would read");
+    snprintf(host, sizeof host, "%.*s", (int)host_bytes, where);
+    const char *const arguments[] = {"-T", "--", host, "farlight", "bridge", socket_address, NULL};
+    return fl_process_start(&connection->process, "ssh", FL_WIRING_STANDARD, arguments, fd, error);
+}
+
+static bool open_stream(struct fl_connection *connection, const struct fl_connect_options *options,
+                        uint64_t deadline_ns, struct fl_error *error)
+{
+    static const char *const none[] = {NULL};
+    const char *const *arguments = options->daemon_arguments != NULL ? options->daemon_arguments : none;
+    int fd = -1;
+    if (options->server == NULL) {
+        connection->local = true;
+        if (!fl_process_start(&connection->process, "farlightd", FL_WIRING_DESCRIPTOR, arguments, &fd, error))
+            return false;
+    } else if (strncmp(options->server, "ssh:", 4) == 0) {
+        if (!start_ssh(connection, options->server + 4, &fd, error))
+            return false;
+    } else {
+        fd = fl_address_connect(options->server, deadline_ns, options->interrupt_fd, &connection->local, error);
+        if (fd < 0)
+            return false;
+    }
+    return fl_stream_init(&connection->stream, fd, MESSAGE_FROM_SERVER, "the daemon", error);
+}
+
+struct fl_connection *fl_connect(const struct fl_connect_options *options, struct fl_error *error)
+{
+    const uint64_t begin_ns = fl_now_ns();
+    const unsigned timeout_ms = options->timeout_ms > 0 ? options->timeout_ms : DEFAULT_TIMEOUT_MS;
+    const uint64_t deadline_ns = begin_ns + timeout_ms * 1000000ull;
+    struct fl_connection *connection = calloc(1, sizeof *connection);
+    if (connection == NULL) {
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    connection->stream.fd = -1;
+    connection->process.talk_fd = -1;
+    connection->interrupt_fd = options->interrupt_fd;
+    connection->last_channel = FL_UPLOAD_CHANNEL;
+    snprintf(connection->address, sizeof connection->address, "%s",
+             options->server != NULL ? options->server : "private");
+    if (!open_stream(connection, options, deadline_ns, error) ||
+        !shake_hands(connection, options->name != NULL ? options->name : "libfarlight", deadline_ns, error)) {
+        if (error->field[0] == '\0' && error->code == FL_ERROR_CONNECTION)
+            snprintf(error->field, sizeof error->field, "%.*s", (int)sizeof error->field - 1, connection->address);
+        connection->broken = *error;
+        fl_connection_destroy(connection);
+        return NULL;
+    }
+    connection->start_ns = fl_now_ns() - begin_ns;
+    return connection;
+}
+
+void fl_connection_destroy(struct fl_connection *connection)
+{
+    if (connection == NULL)
+        return;
+    if (connection->broken.code == FL_ERROR_NONE && connection->stream.fd >= 0) {
+        struct message goodbye = {.type = MESSAGE_GOODBYE};
+        goodbye.goodbye.text = "";
+        struct fl_error ignored;
+        fl_connection_send(connection, 0, 0, &goodbye, &ignored);
+    }
+    fl_stream_finish(&connection->stream);
+    fl_process_end(&connection->process, connection->broken.code == FL_ERROR_NONE ? 3000 : 500);
+    free(connection);
+}
+
+void fl_connection_set_interrupt(struct fl_connection *connection, int interrupt_fd)
+{
+    connection->interrupt_fd = interrupt_fd;
+}
+
+uint64_t fl_connection_start_ns(const struct fl_connection *connection)
+{
+    return connection->start_ns;
+}
+
+bool fl_connection_is_local(const struct fl_connection *connection)
+{
+    return connection->local;
+}
+
+const char *fl_connection_address(const struct fl_connection *connection)
+{
+    return connection->address;
+}

@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: MIT */
+/* Inside of a connection, for the files of this folder. */
+#ifndef FARLIGHT_CLIENT_LIB_CONNECTION_H
+#define FARLIGHT_CLIENT_LIB_CONNECTION_H
+
+#include "lib/process.h"
+#include "lib/stream.h"
+#include "protocol/handshake.h"
+
+/* The channel of blob data; jobs have those above. */
+#define FL_UPLOAD_CHANNEL 1u
+
+struct fl_connection {
+    struct fl_stream stream;
+    struct fl_process process; /* the private daemon or ssh */
+    struct handshake_limits limits;
+    int interrupt_fd;
+    uint32_t last_request, last_scene, last_channel;
+    uint64_t upload_credit; /* the daemon's total for the upload channel */
+    uint64_t upload_sent;   /* bytes of blob data sent on it so far */
+    struct fl_job *job;     /* the one that runs */
+    struct fl_error broken; /* why nothing works any more; code NONE: it does */
+    struct message_stats_reply stats; /* the last answer */
+    uint64_t start_ns;
+    bool local;
+    char address[300];
+};
+
+/* An answer or a frame's message that came in; the views live until the next call on the connection. */
+struct fl_received {
+    struct framing_header header;
+    struct message message;
+};
+
+/* Marks the connection as unusable, for reasons of the stream or the peer; adds what is known about a daemon
+ * that was our child. Returns false. */
+bool fl_connection_break(struct fl_connection *connection, struct fl_error *error);
+/* False, with the reason, when the connection is broken. */
+bool fl_connection_check(const struct fl_connection *connection, struct fl_error *error);
+uint32_t fl_connection_next_request(struct fl_connection *connection);
+
+/* Sends one message and waits until the kernel has it. */
+bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint32_t channel,
+                        const struct message *message, struct fl_error *error);
+/* Deals with what concerns the connection itself (ping, credit for uploads, blocked, goodbye, an error of
+ * request 0): 1: it was that; 0: it is for the caller; -1: the connection is broken, *error says why. */
+int fl_connection_consume(struct fl_connection *connection, const struct framing_header *header,
+                          const struct message *message, struct fl_error *error);
+/* The next message that is for the caller. */
+bool fl_connection_receive(struct fl_connection *connection, struct fl_received *received, uint64_t deadline_ns,
+                           struct fl_error *error);
+/* The answer to `request`; other messages are dropped. An ERROR is FL_ERROR_REFUSED. */
+bool fl_connection_answer(struct fl_connection *connection, uint32_t request, enum message_type expected,
+                          struct fl_received *received, uint64_t deadline_ns, struct fl_error *error);
+/* The daemon's error as ours; returns false. */
+bool fl_error_from_message(struct fl_error *error, const struct message_error *message);
+
+/* Connects a socket to "unix:PATH" or "tcp:HOST:PORT"; -1 on failure. `local`: see fl_connection_is_local. */
+int fl_address_connect(const char *address, uint64_t deadline_ns, int interrupt_fd, bool *local,
+                       struct fl_error *error);
+
+#endif

@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: MIT */
+/* libfarlight: a client of the farlight daemon.
+ *
+ *   struct fl_error error = {0};
+ *   struct fl_connection *connection = fl_connect(&(struct fl_connect_options){0}, &error);   a private daemon
+ *   struct fl_scene *scene = fl_scene_load(connection, &(struct fl_load_options){.model = "a.glb"}, &error);
+ *   struct fl_job *job = fl_render_start(scene, &(struct fl_job_options){.samples = 4}, &error);
+ *   struct fl_frame *frame;
+ *   while ((frame = fl_render_next(job, &error)) != NULL) { ... fl_frame_destroy(frame); }
+ *   fl_render_destroy(job); fl_scene_destroy(scene); fl_connection_destroy(connection);
+ *
+ * Zero is the default of every option. Errors are values: a function that can fail takes a struct fl_error,
+ * says so by false or NULL, and fills it; what the call made until then is undone. A lost connection is
+ * FL_ERROR_CONNECTION from then on. `destroy` takes NULL.
+ * Destroy jobs before their scene and scenes before their connection; frames stand alone.
+ *
+ * Calls block and serve one connection at a time: a connection and all that hangs on it belong to one thread
+ * at a time. Several connections may live in one process. The library installs no signal handler; helper
+ * programs and private daemons are its children and it waits for them by their process ids only.
+ *
+ * Bytes from a daemon or a helper program are not trusted: sizes are checked before anything is allocated,
+ * pixels are checked against their digest, and a peer that breaks the protocol is FL_ERROR_PROTOCOL. */
+#ifndef FARLIGHT_CLIENT_LIB_FARLIGHT_H
+#define FARLIGHT_CLIENT_LIB_FARLIGHT_H
+
+#include "protocol/messages.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define FL_API __attribute__((visibility("default")))
+
+/* ---- errors -------------------------------------------------------------------------------------- */
+
+enum fl_error_code {
+    FL_ERROR_NONE,
+    FL_ERROR_ARGUMENT,    /* what the caller gave cannot be meant */
+    FL_ERROR_FILE,        /* a file cannot be read or written */
+    FL_ERROR_CONNECTION,  /* no daemon there, or it went away */
+    FL_ERROR_PROTOCOL,    /* the peer sent what the protocol forbids */
+    FL_ERROR_REFUSED,     /* the daemon answered with an error: see `server_code` */
+    FL_ERROR_MODEL,       /* the importer refused the model */
+    FL_ERROR_TIMEOUT,     /* a deadline passed */
+    FL_ERROR_INTERRUPTED, /* the interrupt descriptor became readable */
+    FL_ERROR_MEMORY,
+    FL_ERROR_SYSTEM       /* a system call failed that does not fail */
+};
+
+struct fl_error {
+    enum fl_error_code code;
+    enum protocol_error_code server_code; /* of FL_ERROR_REFUSED */
+    bool retryable;                       /* the same call may succeed later */
+    uint32_t retry_after_ms;              /* 0: unknown */
+    char field[160];                      /* option, file or field at fault; may be empty */
+    char text[640];                       /* what is wrong */
+    char remedy[256];                     /* what to do about it; may be empty */
+};
+
+/* Sets *error (may be NULL) and returns false. */
+FL_API bool fl_error_set(struct fl_error *error, enum fl_error_code code, const char *field, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+/* Adds a remedy to an error that is set; returns false. */
+FL_API bool fl_error_remedy(struct fl_error *error, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* "FIELD: TEXT (REMEDY)", control characters made harmless; always terminated. */
+FL_API void fl_error_print(const struct fl_error *error, char *line, size_t line_bytes);
+
+/* ---- connections --------------------------------------------------------------------------------- */
+
+struct fl_connection;
+
+struct fl_connect_options {
+    /* "unix:PATH", "tcp:HOST:PORT" or "ssh:HOST[:SOCKET]"; NULL: a private daemon over a socketpair, which
+     * ends with the connection. ssh runs `farlight bridge unix:SOCKET` on HOST and speaks through it. */
+    const char *server;
+    const char *name;     /* how the client calls itself in the daemon's statistics; NULL: "libfarlight" */
+    int interrupt_fd;     /* > 0: calls give up with FL_ERROR_INTERRUPTED when it becomes readable */
+    unsigned timeout_ms;  /* to connect, start and shake hands; 0: 30 s */
+    const char *const *daemon_arguments; /* for a private daemon, NULL-terminated; NULL: none */
+};
+
+FL_API struct fl_connection *fl_connect(const struct fl_connect_options *options, struct fl_error *error);
+/* Says goodbye, ends a private daemon and waits for it (it is killed after a few seconds). */
+FL_API void fl_connection_destroy(struct fl_connection *connection);
+/* From now on; 0: nothing interrupts. For cleaning up after an interruption. */
+FL_API void fl_connection_set_interrupt(struct fl_connection *connection, int interrupt_fd);
+/* From the call of fl_connect until the daemon was ready. */
+FL_API uint64_t fl_connection_start_ns(const struct fl_connection *connection);
+/* Private or on a Unix socket: bytes cost next to nothing. */
+FL_API bool fl_connection_is_local(const struct fl_connection *connection);
+FL_API const char *fl_connection_address(const struct fl_connection *connection);
+
+FL_API bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error);
+/* *reply is valid until the next call on the connection. */
+FL_API bool fl_stats(struct fl_connection *connection, const struct message_stats_reply **reply, struct fl_error *error);
+
+/* ---- scenes -------------------------------------------------------------------------------------- */
+
+struct fl_scene;
+
+struct fl_camera_info {
+    uint32_t node;
+    char name[129]; /* the node's name, or the camera's where the node has none */
+};
+
+/* What an import told and cost. Times of the importer overlap with those of the upload. */
+struct fl_import_stats {
+    uint64_t read_bytes, read_ns, parse_ns, hash_ns; /* of the model's files, as the importer measured */
+    uint64_t import_ns;                               /* the importer's life */
+    uint64_t load_ns;                                 /* all of it, as the caller waited */
+    uint64_t offered_bytes;                           /* of the blobs that the scene uses */
+    uint64_t uploaded_bytes;                          /* of those that the daemon did not have */
+    uint64_t upload_ns;                               /* from the first of them sent to the last one taken */
+    uint64_t commit_ns;                               /* from commit to the answer: the daemon's work */
+    uint64_t revision;
+};
+
+struct fl_note {
+    enum protocol_severity severity;
+    const char *where;
+    const char *text;
+};
+
+/* An importer that was started ahead, to read the model while the daemon starts. */
+struct fl_import;
+
+struct fl_load_options {
+    const char *model;       /* path */
+    const char *environment; /* image file all around, or NULL; alone (model NULL) allowed */
+    unsigned timeout_ms;     /* after this the importer is killed; 0: 10 minutes */
+    /* Called during the load; may be NULL. Strings live as long as the call. */
+    void (*note)(void *user, const struct fl_note *note);
+    void (*progress)(void *user, uint64_t done_bytes, uint64_t total_bytes, const char *what);
+    void *user;
+    struct fl_import *started; /* by fl_import_start; the load takes it over, also when it fails. `model`,
+                                  `environment` and `timeout_ms` are those given at its start */
+};
+
+/* The options' strings must live until the load. An importer that is not loaded is to be destroyed. */
+FL_API struct fl_import *fl_import_start(const struct fl_load_options *options, struct fl_error *error);
+FL_API void fl_import_destroy(struct fl_import *started);
+
+/* Runs the importer and hands its edits to the daemon. */
+FL_API struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl_load_options *options,
+                                      struct fl_error *error);
+FL_API void fl_scene_destroy(struct fl_scene *scene); /* closes it on the daemon, too */
+FL_API const struct fl_import_stats *fl_scene_import_stats(const struct fl_scene *scene);
+FL_API size_t fl_scene_camera_count(const struct fl_scene *scene);
+FL_API const struct fl_camera_info *fl_scene_camera(const struct fl_scene *scene, size_t index);
+/* `which` is a camera's name, or its number counted from 0; a name goes before a number. */
+FL_API bool fl_scene_find_camera(const struct fl_scene *scene, const char *which, uint32_t *node,
+                                 struct fl_error *error);
+
+/* What a model file holds, without a daemon. */
+struct fl_clip_info {
+    uint32_t channels;
+    float duration_s;
+    char name[129];
+};
+struct fl_model_note {
+    enum protocol_severity severity;
+    char where[257];
+    char text[513];
+};
+struct fl_model_info {
+    uint64_t nodes, meshes, triangles, sphere_sets, spheres, discs, materials, textures, lights;
+    struct fl_import_stats import;
+    size_t camera_count, clip_count, note_count;
+    struct fl_camera_info *cameras;
+    struct fl_clip_info *clips;
+    struct fl_model_note *notes; /* at most 1000; `notes_left_out` more */
+    uint64_t notes_left_out;
+};
+/* options->note is not called: the notes are in the result. `interrupt_fd` as in the connection's options. */
+FL_API struct fl_model_info *fl_model_info(const struct fl_load_options *options, int interrupt_fd,
+                                           struct fl_error *error);
+FL_API void fl_model_info_destroy(struct fl_model_info *info);
+
+/* ---- rendering ----------------------------------------------------------------------------------- */
+
+struct fl_job;
+
+#define FL_DEPTH_NONE (-1)
+
+struct fl_job_options {
+    uint32_t width, height; /* 0: 1280x720 */
+    uint32_t samples;       /* 0: 1 */
+    int depth;              /* bounces after the first hit; 0: 8; FL_DEPTH_NONE: none */
+    uint64_t seed;
+    uint32_t first_frame, last_frame, frame_step; /* step 0: 1 */
+    float frames_per_second;                      /* 0: 24 */
+    uint32_t time_origin_frame;                   /* the frame at time 0 */
+    enum protocol_tracer tracer;
+    enum protocol_bvh_bounds bvh_bounds;
+    enum protocol_integrator integrator;
+    enum protocol_primary primary;
+    enum protocol_tone_map tone_map;
+    float exposure_stops;
+    enum protocol_pixel_format format;
+    enum protocol_encoding encoding;
+    unsigned quality; /* 0: JPEG 90, zstd 1 */
+    enum protocol_camera_path camera_path;
+    uint32_t camera_node;
+    float orbit_turn, orbit_seconds; /* radians, seconds */
+    const struct record_camera_key *keys;
+    size_t key_count;
+    unsigned frames_in_flight; /* that the daemon may send ahead; 0: 2 */
+};
+
+/* One picture and what it cost. */
+struct fl_frame {
+    uint32_t frame, width, height, samples;
+    uint64_t revision;
+    enum protocol_pixel_format format;
+    enum protocol_encoding encoding; /* as it travelled; pixels are decoded */
+    enum protocol_tracer tracer;
+    enum protocol_integrator integrator;
+    bool digest_checked; /* lossless: the pixels have the digest that the daemon computed */
+    uint64_t digest;
+    float exposure_stops, world_from_view[12], fov_y, ortho_height, time_s;
+    uint64_t primary_rays, shadow_rays, secondary_rays, splits, uploaded_bytes, structure_bytes;
+    uint64_t wire_bytes;             /* of the encoded pixels */
+    uint64_t receive_ns, decode_ns;  /* first byte to last; decoding and checking */
+    uint64_t wait_ns;                /* how long fl_render_next waited for it */
+    size_t stage_count;
+    struct record_stage_time *stages;
+    size_t pixels_bytes;             /* width * height * 4, 8 or 16 */
+    uint8_t *pixels;                 /* rows from the top, without gaps, in `format` */
+};
+
+/* One job at a time per connection. */
+FL_API struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_options *options,
+                                      struct fl_error *error);
+/* The next frame, in order; NULL with error->code FL_ERROR_NONE after the last. The caller destroys it. */
+FL_API struct fl_frame *fl_render_next(struct fl_job *job, struct fl_error *error);
+FL_API void fl_frame_destroy(struct fl_frame *frame);
+/* Ends the job early and waits until the daemon confirms it; what was sent meanwhile is dropped. */
+FL_API bool fl_render_cancel(struct fl_job *job, struct fl_error *error);
+FL_API void fl_render_destroy(struct fl_job *job); /* cancels what still runs */
+
+FL_API uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format);
+
+/* Reads an array of {"time", "eye", "look_at", "up", "fov"} (seconds; world; degrees) from a JSON file.
+ * *keys is malloc'ed. Errors name the file, the line or the entry, and the field. */
+FL_API bool fl_camera_keys_load(const char *path, struct record_camera_key **keys, size_t *key_count,
+                                struct fl_error *error);
+
+/* ---- image files --------------------------------------------------------------------------------- */
+
+/* The exporter: a helper program that writes image files; one for many files. */
+struct fl_exporter;
+
+struct fl_exporter_options {
+    const char *folder; /* where the files will be: the program can write nowhere else */
+    const char *model;  /* named in the files; may be NULL */
+    float frames_per_second; /* named in EXR files; 0: unknown */
+    int interrupt_fd;
+};
+struct fl_export_options {
+    const char *path;
+    const char *format;      /* "png", "jpeg", "exr", "hdr" where the path's ending does not say; may be NULL */
+    bool half;               /* EXR: half floats */
+    unsigned quality;        /* JPEG; 0: 95 */
+};
+
+FL_API struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error);
+/* Hands the frame over and returns; the file is complete, or has failed, by the next call of this or of
+ * fl_exporter_wait, which report the failure of the one before. The frame may be destroyed at once. */
+FL_API bool fl_exporter_write(struct fl_exporter *exporter, const struct fl_frame *frame,
+                              const struct fl_export_options *options, struct fl_error *error);
+FL_API bool fl_exporter_wait(struct fl_exporter *exporter, struct fl_error *error);
+/* Ends the program; an unfinished file is removed. */
+FL_API void fl_exporter_destroy(struct fl_exporter *exporter);
+
+/* Copies bytes both ways between descriptors and the socket at `address` ("unix:PATH", "tcp:HOST:PORT") until
+ * both directions have ended: what runs at the far end of an ssh connection. */
+FL_API bool fl_bridge(const char *address, int in_fd, int out_fd, struct fl_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

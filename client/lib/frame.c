@@ -1,0 +1,237 @@
+/* SPDX-License-Identifier: MIT */
+#include "lib/frame.h"
+#include "lib/stream.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <turbojpeg.h>
+#include <xxhash.h>
+#include <zstd.h>
+
+/* What a JPEG may take besides the worst case of its pixels: tables and markers. */
+#define JPEG_EXTRA_BYTES 65536u
+
+uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format)
+{
+    switch (format) {
+    case PROTOCOL_PIXEL_FORMAT_RGBA8:
+        return 4;
+    case PROTOCOL_PIXEL_FORMAT_RGBA16F:
+        return 8;
+    case PROTOCOL_PIXEL_FORMAT_RGBA32F:
+        return 16;
+    default:
+        return 0;
+    }
+}
+
+void fl_frame_destroy(struct fl_frame *frame)
+{
+    if (frame == NULL)
+        return;
+    free(frame->pixels);
+    free(frame->stages);
+    free(frame);
+}
+
+void fl_assembly_finish(struct fl_assembly *assembly)
+{
+    if (assembly->frame != NULL && assembly->encoded != assembly->frame->pixels)
+        free(assembly->encoded);
+    fl_frame_destroy(assembly->frame);
+    assembly->frame = NULL;
+    assembly->encoded = NULL;
+}
+
+/* The most bytes that a picture can honestly take. */
+static uint64_t encoded_bytes_max(const struct fl_frame_expected *expected, size_t pixels_bytes)
+{
+    switch (expected->encoding) {
+    case PROTOCOL_ENCODING_RAW:
+        return pixels_bytes;
+    case PROTOCOL_ENCODING_ZSTD:
+        return ZSTD_compressBound(pixels_bytes);
+    case PROTOCOL_ENCODING_JPEG:
+        return tjBufSize((int)expected->width, (int)expected->height, TJSAMP_444) + JPEG_EXTRA_BYTES;
+    default:
+        return 0;
+    }
+}
+
+static bool check_begin(const struct fl_assembly *assembly, const struct message_frame_begin *begin, uint32_t number,
+                        struct fl_error *error)
+{
+    const struct fl_frame_expected *expected = &assembly->expected;
+    if (assembly->frame != NULL)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "a frame began inside another");
+    if (begin->frame != number)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.frame", "frame %u came in place of frame %u",
+                            begin->frame, number);
+    if (begin->width != expected->width || begin->height != expected->height || begin->format != expected->format ||
+        begin->encoding != expected->encoding)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "%ux%u %s %s came in place of %ux%u %s %s",
+                            begin->width, begin->height, protocol_pixel_format_text(begin->format),
+                            protocol_encoding_text(begin->encoding), expected->width, expected->height,
+                            protocol_pixel_format_text(expected->format), protocol_encoding_text(expected->encoding));
+    const size_t pixels_bytes = (size_t)begin->width * begin->height * fl_bytes_per_pixel(begin->format);
+    const uint64_t most = encoded_bytes_max(expected, pixels_bytes);
+    const bool exact = begin->encoding == PROTOCOL_ENCODING_RAW;
+    if (begin->size_bytes == 0 || begin->size_bytes > most || (exact && begin->size_bytes != most))
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.size_bytes",
+                            "%llu bytes cannot be a picture of %ux%u", (unsigned long long)begin->size_bytes,
+                            begin->width, begin->height);
+    return true;
+}
+
+static struct fl_frame *new_frame(const struct message_frame_begin *begin)
+{
+    struct fl_frame *frame = calloc(1, sizeof *frame);
+    if (frame == NULL)
+        return NULL;
+    frame->frame = begin->frame;
+    frame->width = begin->width;
+    frame->height = begin->height;
+    frame->samples = begin->samples;
+    frame->revision = begin->revision;
+    frame->format = begin->format;
+    frame->encoding = begin->encoding;
+    frame->tracer = begin->tracer;
+    frame->integrator = begin->integrator;
+    frame->digest = begin->digest;
+    frame->exposure_stops = begin->exposure_stops;
+    memcpy(frame->world_from_view, begin->world_from_view, sizeof frame->world_from_view);
+    frame->fov_y = begin->fov_y;
+    frame->ortho_height = begin->ortho_height;
+    frame->time_s = begin->time_s;
+    frame->wire_bytes = begin->size_bytes;
+    frame->pixels_bytes = (size_t)begin->width * begin->height * fl_bytes_per_pixel(begin->format);
+    frame->pixels = malloc(frame->pixels_bytes);
+    if (frame->pixels == NULL) {
+        free(frame);
+        return NULL;
+    }
+    return frame;
+}
+
+bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_begin *begin, uint32_t number,
+                       uint64_t now_ns, struct fl_error *error)
+{
+    if (!check_begin(assembly, begin, number, error))
+        return false;
+    assembly->frame = new_frame(begin);
+    if (assembly->frame != NULL)
+        assembly->encoded = begin->encoding == PROTOCOL_ENCODING_RAW ? assembly->frame->pixels
+                                                                     : malloc((size_t)begin->size_bytes);
+    if (assembly->frame == NULL || assembly->encoded == NULL)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "no memory for a picture of %ux%u", begin->width,
+                            begin->height);
+    assembly->encoded_bytes = begin->size_bytes;
+    assembly->received_bytes = 0;
+    assembly->begin_ns = now_ns;
+    return true;
+}
+
+bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_data *data, struct fl_error *error)
+{
+    if (assembly->frame == NULL)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data", "a piece came without a frame");
+    if (data->offset_bytes != assembly->received_bytes ||
+        data->data_bytes > assembly->encoded_bytes - assembly->received_bytes)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data.offset_bytes",
+                            "a piece of %u bytes came for %llu where %llu of %llu are there", data->data_bytes,
+                            (unsigned long long)data->offset_bytes, (unsigned long long)assembly->received_bytes,
+                            (unsigned long long)assembly->encoded_bytes);
+    if (data->data_bytes > 0)
+        memcpy(assembly->encoded + assembly->received_bytes, data->data, data->data_bytes);
+    assembly->received_bytes += data->data_bytes;
+    return true;
+}
+
+static bool decode_zstd(const struct fl_assembly *assembly, struct fl_error *error)
+{
+    struct fl_frame *frame = assembly->frame;
+    const size_t made =
+        ZSTD_decompress(frame->pixels, frame->pixels_bytes, assembly->encoded, (size_t)assembly->encoded_bytes);
+    if (ZSTD_isError(made))
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "not to be decompressed: %s", ZSTD_getErrorName(made));
+    if (made != frame->pixels_bytes)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "%zu bytes came out in place of %zu", made,
+                            frame->pixels_bytes);
+    return true;
+}
+
+static bool decode_jpeg(const struct fl_assembly *assembly, struct fl_error *error)
+{
+    struct fl_frame *frame = assembly->frame;
+    const tjhandle decoder = tjInitDecompress();
+    if (decoder == NULL)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    int width = 0, height = 0, subsampling = 0, colours = 0;
+    const unsigned long bytes = (unsigned long)assembly->encoded_bytes;
+    bool good = tjDecompressHeader3(decoder, assembly->encoded, bytes, &width, &height, &subsampling, &colours) == 0;
+    if (good && (width != (int)frame->width || height != (int)frame->height)) {
+        fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "a JPEG of %dx%d came in place of %ux%u", width, height,
+                     frame->width, frame->height);
+    } else {
+        good = good && tjDecompress2(decoder, assembly->encoded, bytes, frame->pixels, width, 0, height, TJPF_RGBA,
+                                     TJFLAG_STOPONWARNING) == 0;
+        if (!good)
+            fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "the JPEG is damaged: %s", tjGetErrorStr2(decoder));
+    }
+    good = good && error->code == FL_ERROR_NONE;
+    tjDestroy(decoder);
+    return good;
+}
+
+static bool decode(const struct fl_assembly *assembly, struct fl_error *error)
+{
+    struct fl_frame *frame = assembly->frame;
+    if (frame->encoding == PROTOCOL_ENCODING_JPEG)
+        return decode_jpeg(assembly, error);
+    if (frame->encoding == PROTOCOL_ENCODING_ZSTD && !decode_zstd(assembly, error))
+        return false;
+    if (XXH3_64bits(frame->pixels, frame->pixels_bytes) != frame->digest)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame.digest", "the pixels of frame %u are not those rendered",
+                            frame->frame);
+    frame->digest_checked = true;
+    return true;
+}
+
+static bool take_costs(struct fl_frame *frame, const struct message_frame_end *end, struct fl_error *error)
+{
+    frame->primary_rays = end->primary_rays;
+    frame->shadow_rays = end->shadow_rays;
+    frame->secondary_rays = end->secondary_rays;
+    frame->splits = end->splits;
+    frame->uploaded_bytes = end->uploaded_bytes;
+    frame->structure_bytes = end->structure_bytes;
+    if (end->stages_count == 0)
+        return true;
+    frame->stages = malloc(end->stages_count * sizeof *frame->stages);
+    if (frame->stages == NULL)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    memcpy(frame->stages, end->stages, end->stages_count * sizeof *frame->stages);
+    frame->stage_count = end->stages_count;
+    return true;
+}
+
+struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct message_frame_end *end, uint64_t now_ns,
+                                 struct fl_error *error)
+{
+    struct fl_frame *frame = assembly->frame;
+    if (frame == NULL || end->frame != frame->frame || assembly->received_bytes != assembly->encoded_bytes) {
+        fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "a frame ended that is not complete");
+        return NULL;
+    }
+    const uint64_t decode_begin_ns = fl_now_ns();
+    *error = (struct fl_error){0};
+    if (!take_costs(frame, end, error) || !decode(assembly, error))
+        return NULL;
+    frame->receive_ns = now_ns - assembly->begin_ns;
+    frame->decode_ns = fl_now_ns() - decode_begin_ns;
+    if (assembly->encoded != frame->pixels)
+        free(assembly->encoded);
+    assembly->frame = NULL;
+    assembly->encoded = NULL;
+    return frame;
+}

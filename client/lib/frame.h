@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: MIT */
+/* Messages to a frame: everything that a daemon says about one is checked here. No I/O. */
+#ifndef FARLIGHT_CLIENT_LIB_FRAME_H
+#define FARLIGHT_CLIENT_LIB_FRAME_H
+
+#include "lib/farlight.h"
+
+/* What was asked for; a frame must be that. */
+struct fl_frame_expected {
+    uint32_t width, height;
+    enum protocol_pixel_format format;
+    enum protocol_encoding encoding;
+};
+
+struct fl_assembly {
+    struct fl_frame_expected expected;
+    struct fl_frame *frame; /* begun; NULL: none */
+    uint8_t *encoded;       /* where its bytes go: the pixels themselves when raw */
+    uint64_t encoded_bytes, received_bytes;
+    uint64_t begin_ns;
+};
+
+/* Each returns false on what is not allowed; the assembly must then be finished. */
+bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_begin *begin, uint32_t number,
+                       uint64_t now_ns, struct fl_error *error);
+bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_data *data, struct fl_error *error);
+/* The frame is decoded and checked, and the caller's; NULL on failure. */
+struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct message_frame_end *end, uint64_t now_ns,
+                                 struct fl_error *error);
+void fl_assembly_finish(struct fl_assembly *assembly);
+
+#endif

@@ -1,0 +1,193 @@
+/* SPDX-License-Identifier: MIT */
+/* A batch job: started, its frames taken one after the other, ended. */
+#include "lib/frame.h"
+#include "lib/scene.h"
+
+#include <stdlib.h>
+
+#define CANCEL_NS 10000000000ull
+#define DEFAULT_FRAMES_IN_FLIGHT 2u
+
+struct fl_job {
+    struct fl_connection *connection;
+    uint32_t request, channel;
+    uint64_t credit;            /* frames that the daemon may have sent by now */
+    uint64_t next_frame;        /* 64 bits: one step beyond the last cannot wrap */
+    uint32_t last_frame, frame_step;
+    bool answered;              /* the daemon has given its one answer: nothing more comes */
+    struct fl_assembly assembly;
+};
+
+/* "zero is the default", spelled out. */
+static void fill_render(struct message_render *render, const struct fl_job_options *options)
+{
+    const unsigned default_quality = options->encoding == PROTOCOL_ENCODING_JPEG ? 90 : 1;
+    render->width = options->width > 0 ? options->width : 1280;
+    render->height = options->height > 0 ? options->height : 720;
+    render->samples = options->samples > 0 ? options->samples : 1;
+    render->depth = options->depth == 0 ? 8 : options->depth < 0 ? 0 : (uint32_t)options->depth;
+    render->seed = options->seed;
+    render->first_frame = options->first_frame;
+    render->last_frame = options->last_frame;
+    render->frame_step = options->frame_step > 0 ? options->frame_step : 1;
+    render->frames_per_second = options->frames_per_second > 0 ? options->frames_per_second : 24;
+    render->time_origin_frame = options->time_origin_frame;
+    render->tracer = options->tracer;
+    render->bvh_bounds = options->bvh_bounds;
+    render->integrator = options->integrator;
+    render->primary = options->primary;
+    render->tone_map = options->tone_map;
+    render->exposure_stops = options->exposure_stops;
+    render->format = options->format;
+    render->encoding = options->encoding;
+    render->quality = options->quality > 0 ? options->quality : default_quality;
+    render->camera_path = options->camera_path;
+    render->camera_node = options->camera_node;
+    render->orbit_turn = options->orbit_turn;
+    render->orbit_seconds = options->orbit_seconds;
+    render->keys = (struct record_camera_key *)(uintptr_t)options->keys; /* only read */
+    render->keys_count = (uint32_t)options->key_count;
+    render->credit = options->frames_in_flight > 0 ? options->frames_in_flight : DEFAULT_FRAMES_IN_FLIGHT;
+}
+
+struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_options *options, struct fl_error *error)
+{
+    struct fl_connection *connection = scene->connection;
+    if (connection->job != NULL) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, "", "another job runs on this connection");
+        return NULL;
+    }
+    struct fl_job *job = calloc(1, sizeof *job);
+    if (job == NULL) {
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    struct message message = {.type = MESSAGE_RENDER};
+    struct message_render *render = &message.render;
+    fill_render(render, options);
+    job->connection = connection;
+    job->request = fl_connection_next_request(connection);
+    job->channel = ++connection->last_channel;
+    job->credit = render->credit;
+    job->next_frame = render->first_frame;
+    job->last_frame = render->last_frame;
+    job->frame_step = render->frame_step;
+    job->assembly.expected = (struct fl_frame_expected){
+        .width = render->width, .height = render->height, .format = render->format, .encoding = render->encoding};
+    render->scene = scene->scene;
+    render->channel = job->channel;
+    if (!fl_connection_send(connection, job->request, 0, &message, error)) {
+        free(job);
+        return NULL;
+    }
+    connection->job = job;
+    return job;
+}
+
+/* One more frame may come for the one that was taken. */
+static bool grant(struct fl_job *job, struct fl_error *error)
+{
+    struct message credit = {.type = MESSAGE_CREDIT};
+    credit.credit.channel = job->channel;
+    credit.credit.total = ++job->credit;
+    return fl_connection_send(job->connection, 0, 0, &credit, error);
+}
+
+/* The job's one answer has come. */
+static bool conclude(struct fl_job *job, const struct message *message, struct fl_error *error)
+{
+    job->answered = true;
+    if (message->type == MESSAGE_ERROR)
+        return fl_error_from_message(error, &message->error);
+    if (job->assembly.frame != NULL || job->next_frame <= job->last_frame)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "the job ended before its last frame");
+    return true;
+}
+
+/* What the daemon broke is not to be used any more. */
+static bool fail(struct fl_job *job, struct fl_error *error)
+{
+    fl_assembly_finish(&job->assembly);
+    if (error->code == FL_ERROR_PROTOCOL)
+        fl_connection_break(job->connection, error);
+    return false;
+}
+
+/* One message; *frame when it completed one. */
+static bool take(struct fl_job *job, const struct fl_received *received, struct fl_frame **frame,
+                 struct fl_error *error)
+{
+    const struct message *message = &received->message;
+    if (received->header.request != job->request)
+        return true; /* a late answer to something given up */
+    switch (message->type) {
+    case MESSAGE_FRAME_BEGIN:
+        if (job->next_frame > job->last_frame)
+            return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "a frame came after the last");
+        return fl_assembly_begin(&job->assembly, &message->frame_begin, (uint32_t)job->next_frame, fl_now_ns(), error);
+    case MESSAGE_FRAME_DATA:
+        return fl_assembly_data(&job->assembly, &message->frame_data, error);
+    case MESSAGE_FRAME_END:
+        *frame = fl_assembly_end(&job->assembly, &message->frame_end, fl_now_ns(), error);
+        job->next_frame += job->frame_step;
+        return *frame != NULL;
+    case MESSAGE_OK:
+    case MESSAGE_ERROR:
+        return conclude(job, message, error);
+    default:
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "a job is not answered by %s",
+                            message_type_text(message->type));
+    }
+}
+
+struct fl_frame *fl_render_next(struct fl_job *job, struct fl_error *error)
+{
+    const uint64_t begin_ns = fl_now_ns();
+    struct fl_frame *frame = NULL;
+    *error = (struct fl_error){0};
+    while (frame == NULL && !job->answered) {
+        struct fl_received received;
+        if (!fl_connection_receive(job->connection, &received, UINT64_MAX, error))
+            return NULL; /* a frame that has begun is kept: an interruption is no end */
+        if (!take(job, &received, &frame, error)) {
+            fail(job, error);
+            return NULL;
+        }
+    }
+    if (frame == NULL)
+        return NULL;
+    frame->wait_ns = fl_now_ns() - begin_ns;
+    if (job->next_frame <= job->last_frame && !grant(job, error)) {
+        fl_frame_destroy(frame);
+        return NULL;
+    }
+    return frame;
+}
+
+bool fl_render_cancel(struct fl_job *job, struct fl_error *error)
+{
+    struct fl_connection *connection = job->connection;
+    fl_assembly_finish(&job->assembly);
+    if (job->answered)
+        return true;
+    struct message cancel = {.type = MESSAGE_CANCEL};
+    cancel.cancel.target_request = job->request;
+    const uint32_t request = fl_connection_next_request(connection);
+    const uint64_t deadline_ns = fl_now_ns() + CANCEL_NS;
+    struct fl_received received;
+    job->answered = true; /* whatever still comes is dropped by request */
+    return fl_connection_send(connection, request, 0, &cancel, error) &&
+           fl_connection_answer(connection, request, MESSAGE_OK, &received, deadline_ns, error);
+}
+
+void fl_render_destroy(struct fl_job *job)
+{
+    if (job == NULL)
+        return;
+    struct fl_error ignored;
+    if (!job->answered && job->connection->broken.code == FL_ERROR_NONE)
+        fl_render_cancel(job, &ignored);
+    fl_assembly_finish(&job->assembly);
+    job->connection->job = NULL;
+    free(job);
+}

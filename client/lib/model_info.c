@@ -1,0 +1,178 @@
+/* SPDX-License-Identifier: MIT */
+/* What is in a model: the importer runs as for a daemon, and is answered here. No bulk data is asked for. */
+#include "lib/importer.h"
+#include "lib/relay.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define NOTES_MAX 1000u
+
+struct listing {
+    struct fl_importer importer;
+    struct fl_model_info *info;
+    size_t clip_capacity, note_capacity;
+    struct fl_relay relay; /* the same rules as towards a daemon */
+    uint64_t revision;
+};
+
+static bool add_clip(struct listing *listing, const struct message_import_clip *clip, struct fl_error *error)
+{
+    struct fl_model_info *info = listing->info;
+    if (!fl_grow((void **)&info->clips, &listing->clip_capacity, info->clip_count, sizeof *info->clips, error))
+        return false;
+    struct fl_clip_info *made = &info->clips[info->clip_count++];
+    *made = (struct fl_clip_info){.channels = clip->channels, .duration_s = clip->duration_s};
+    snprintf(made->name, sizeof made->name, "%s", clip->name);
+    return true;
+}
+
+static bool add_note(struct listing *listing, const struct message_import_note *note, struct fl_error *error)
+{
+    struct fl_model_info *info = listing->info;
+    if (info->note_count >= NOTES_MAX) {
+        info->notes_left_out++;
+        return true;
+    }
+    if (!fl_grow((void **)&info->notes, &listing->note_capacity, info->note_count, sizeof *info->notes, error))
+        return false;
+    struct fl_model_note *made = &info->notes[info->note_count++];
+    made->severity = note->severity;
+    snprintf(made->where, sizeof made->where, "%s", note->where);
+    snprintf(made->text, sizeof made->text, "%s", note->text);
+    return true;
+}
+
+static bool list(struct listing *listing, const struct message *message, struct fl_error *error)
+{
+    struct fl_model_info *info = listing->info;
+    switch (message->type) {
+    case MESSAGE_SET_NODE:
+        info->nodes++;
+        break;
+    case MESSAGE_SET_MESH:
+        info->meshes++;
+        info->triangles += message->set_mesh.triangle_count;
+        break;
+    case MESSAGE_SET_SPHERES:
+        info->sphere_sets++;
+        info->spheres += message->set_spheres.sphere_count;
+        break;
+    case MESSAGE_SET_DISC:
+        info->discs++;
+        break;
+    case MESSAGE_SET_MATERIAL:
+        info->materials++;
+        break;
+    case MESSAGE_SET_TEXTURE:
+        info->textures++;
+        break;
+    case MESSAGE_SET_LIGHT:
+        info->lights++;
+        break;
+    case MESSAGE_IMPORT_CLIP:
+        return add_clip(listing, &message->import_clip, error);
+    case MESSAGE_IMPORT_NOTE:
+        return add_note(listing, &message->import_note, error);
+    default:
+        break;
+    }
+    return true;
+}
+
+/* What a daemon that already has everything would say. */
+static bool answer(struct listing *listing, const struct frame *frame, const struct message *message,
+                   struct fl_error *error)
+{
+    struct message reply = {.type = MESSAGE_OK};
+    if (message->type == MESSAGE_BLOB_OFFER) {
+        for (uint32_t i = 0; i < message->blob_offer.blobs_count; i++)
+            listing->importer.stats.offered_bytes += message->blob_offer.blobs[i].size_bytes;
+        reply.type = MESSAGE_BLOB_NEED;
+        reply.blob_need = (struct message_blob_need){0};
+    } else if (message->type == MESSAGE_EDIT_COMMIT) {
+        reply.ok.revision = ++listing->revision;
+    } else {
+        return true;
+    }
+    return fl_stream_push(&listing->importer.stream, frame->header.request, 0, &reply, error);
+}
+
+static bool drain(struct listing *listing, struct fl_error *error)
+{
+    while (fl_stream_has_room(&listing->importer.stream)) {
+        struct frame frame;
+        struct message message;
+        uint32_t request = 0;
+        const enum fl_stream_result result = fl_stream_next(&listing->importer.stream, &frame, &message, error);
+        if (result != FL_STREAM_MESSAGE)
+            return result == FL_STREAM_NOTHING;
+        if (fl_relay_from_importer(&listing->relay, &frame.header, &message, &request, error) == FL_RELAY_REFUSE)
+            return false;
+        if (message.type == MESSAGE_BLOB_DATA)
+            return fl_error_set(error, FL_ERROR_PROTOCOL, "farlight-import", "the importer sent what nobody needs");
+        if (!fl_importer_observe(&listing->importer, &message, error) || !list(listing, &message, error) ||
+            !answer(listing, &frame, &message, error))
+            return false;
+    }
+    return true;
+}
+
+static bool run(struct listing *listing, int interrupt_fd, struct fl_error *error)
+{
+    struct fl_importer *importer = &listing->importer;
+    for (;;) {
+        if (!drain(listing, error))
+            return false;
+        if (importer->done)
+            return true;
+        if (importer->stream.ended)
+            return fl_importer_explain(importer, error);
+        struct pollfd polled = {.fd = importer->stream.fd, .events = fl_stream_events(&importer->stream)};
+        if (!fl_wait(&polled, 1, interrupt_fd, importer->deadline_ns, error)) {
+            if (error->code == FL_ERROR_TIMEOUT)
+                fl_error_set(error, FL_ERROR_TIMEOUT, importer->options.model, "the import took too long");
+            return false;
+        }
+        if (!fl_stream_transfer(&importer->stream, error))
+            return fl_importer_explain(importer, error);
+    }
+}
+
+struct fl_model_info *fl_model_info(const struct fl_load_options *options, int interrupt_fd, struct fl_error *error)
+{
+    struct fl_load_options quiet = *options;
+    quiet.note = NULL; /* they are in the result */
+    struct listing listing = {.relay = {.scene = 1}, .info = calloc(1, sizeof *listing.info)};
+    if (listing.info == NULL) {
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    if (!fl_importer_start(&listing.importer, &quiet, error)) {
+        fl_model_info_destroy(listing.info);
+        return NULL;
+    }
+    const bool complete = run(&listing, interrupt_fd, error);
+    fl_importer_stop(&listing.importer);
+    listing.info->import = listing.importer.stats;
+    listing.info->cameras = listing.importer.cameras;
+    listing.info->camera_count = listing.importer.camera_count;
+    listing.importer.cameras = NULL;
+    listing.importer.camera_count = 0;
+    fl_importer_finish(&listing.importer);
+    if (complete)
+        return listing.info;
+    fl_model_info_destroy(listing.info);
+    return NULL;
+}
+
+void fl_model_info_destroy(struct fl_model_info *info)
+{
+    if (info == NULL)
+        return;
+    free(info->cameras);
+    free(info->clips);
+    free(info->notes);
+    free(info);
+}

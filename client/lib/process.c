@@ -1,0 +1,245 @@
+/* SPDX-License-Identifier: MIT */
+#include "lib/process.h"
+#include "lib/stream.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/pidfd.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern char **environ;
+
+#define ARGUMENTS_MAX 32
+#define CHILD_SOCKET 3
+
+static bool is_program(const char *folder, size_t folder_bytes, const char *name, char *path, size_t path_bytes)
+{
+    const int length = snprintf(path, path_bytes, "%.*s/%s", (int)folder_bytes, folder, name);
+    return length > 0 && (size_t)length < path_bytes && access(path, X_OK) == 0;
+}
+
+bool fl_find_program(const char *name, char *path, size_t path_bytes, struct fl_error *error)
+{
+    const char *chosen = getenv("FARLIGHT_LIBEXEC");
+    if (chosen != NULL && is_program(chosen, strlen(chosen), name, path, path_bytes))
+        return true;
+    char self[4096];
+    const ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+    if (length > 0) {
+        self[length] = '\0';
+        const char *slash = strrchr(self, '/');
+        if (slash != NULL && is_program(self, (size_t)(slash - self), name, path, path_bytes))
+            return true;
+    }
+    const char *at = getenv("PATH");
+    while (at != NULL && *at != '\0') {
+        const size_t folder_bytes = strcspn(at, ":");
+        if (folder_bytes > 0 && is_program(at, folder_bytes, name, path, path_bytes))
+            return true;
+        at += folder_bytes + (at[folder_bytes] == ':');
+    }
+    fl_error_set(error, FL_ERROR_FILE, name, "this program of farlight's is not installed");
+    return fl_error_remedy(error, "put it beside this program, in PATH, or name its folder in FARLIGHT_LIBEXEC");
+}
+
+/* What the child's descriptors shall be. */
+static bool wire(posix_spawn_file_actions_t *actions, enum fl_wiring wiring, int socket_fd, int talk_fd)
+{
+    if (wiring == FL_WIRING_STANDARD)
+        return posix_spawn_file_actions_adddup2(actions, socket_fd, STDIN_FILENO) == 0 &&
+               posix_spawn_file_actions_adddup2(actions, socket_fd, STDOUT_FILENO) == 0;
+    /* The talk goes first to where it cannot be overwritten: our descriptors may be 0..3 themselves. */
+    return posix_spawn_file_actions_adddup2(actions, talk_fd, STDOUT_FILENO) == 0 &&
+           posix_spawn_file_actions_adddup2(actions, talk_fd, STDERR_FILENO) == 0 &&
+           posix_spawn_file_actions_adddup2(actions, socket_fd, CHILD_SOCKET) == 0 &&
+           posix_spawn_file_actions_addopen(actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0) == 0;
+}
+
+/* The child starts with default signals and, unless it may need the terminal, in a process group of its own: a
+ * Ctrl-C is for us, and we end the child in order. */
+static bool set_attributes(posix_spawnattr_t *attributes, enum fl_wiring wiring)
+{
+    sigset_t none, reset;
+    sigemptyset(&none);
+    sigemptyset(&reset);
+    sigaddset(&reset, SIGPIPE);
+    sigaddset(&reset, SIGINT);
+    sigaddset(&reset, SIGTERM);
+    sigaddset(&reset, SIGHUP);
+    int flags = POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF;
+    if (wiring == FL_WIRING_DESCRIPTOR)
+        flags |= POSIX_SPAWN_SETPGROUP;
+    return posix_spawnattr_setsigmask(attributes, &none) == 0 &&
+           posix_spawnattr_setsigdefault(attributes, &reset) == 0 &&
+           posix_spawnattr_setflags(attributes, (short)flags) == 0;
+}
+
+static int spawn(struct fl_process *process, const char *path, char *const *argv, enum fl_wiring wiring, int socket_fd)
+{
+    posix_spawn_file_actions_t actions;
+    posix_spawnattr_t attributes;
+    int failure = posix_spawn_file_actions_init(&actions);
+    if (failure != 0)
+        return failure;
+    failure = posix_spawnattr_init(&attributes);
+    if (failure == 0) {
+        if (!wire(&actions, wiring, socket_fd, process->talk_fd) || !set_attributes(&attributes, wiring))
+            failure = ENOMEM;
+        else
+            failure = posix_spawn(&process->pid, path, &actions, &attributes, argv, environ);
+        posix_spawnattr_destroy(&attributes);
+    }
+    posix_spawn_file_actions_destroy(&actions);
+    return failure;
+}
+
+/* Moves a descriptor above those that the child's are made of. */
+static int lift(int fd)
+{
+    if (fd < 0 || fd > CHILD_SOCKET)
+        return fd;
+    const int lifted = fcntl(fd, F_DUPFD_CLOEXEC, CHILD_SOCKET + 1);
+    close(fd);
+    return lifted;
+}
+
+static size_t fill_arguments(char *argv[ARGUMENTS_MAX], const char *path, enum fl_wiring wiring,
+                             const char *const *arguments)
+{
+    size_t count = 0;
+    argv[count++] = (char *)(uintptr_t)path; /* exec takes char *const * for history's sake and writes nothing */
+    if (wiring == FL_WIRING_DESCRIPTOR) {
+        argv[count++] = (char *)(uintptr_t) "--fd";
+        argv[count++] = (char *)(uintptr_t) "3";
+    }
+    for (; *arguments != NULL && count + 1 < ARGUMENTS_MAX; arguments++)
+        argv[count++] = (char *)(uintptr_t)*arguments;
+    argv[count] = NULL;
+    return count;
+}
+
+bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiring wiring,
+                      const char *const *arguments, int *socket_fd, struct fl_error *error)
+{
+    *process = (struct fl_process){.talk_fd = -1};
+    snprintf(process->name, sizeof process->name, "%s", name);
+    char path[4096];
+    if (!fl_find_program(name, path, sizeof path, error))
+        return false;
+    char *argv[ARGUMENTS_MAX];
+    fill_arguments(argv, path, wiring, arguments);
+    int pair[2] = {-1, -1};
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) < 0)
+        return fl_error_set(error, FL_ERROR_SYSTEM, name, "cannot be started: %s", strerror(errno));
+    int failure = 0;
+    pair[1] = lift(pair[1]);
+    if (pair[1] < 0)
+        failure = errno;
+    if (failure == 0 && wiring == FL_WIRING_DESCRIPTOR) {
+        process->talk_fd = lift(memfd_create("farlight-talk", MFD_CLOEXEC));
+        if (process->talk_fd < 0)
+            failure = errno;
+    }
+    if (failure == 0)
+        failure = spawn(process, path, argv, wiring, pair[1]);
+    if (pair[1] >= 0)
+        close(pair[1]);
+    if (failure != 0) {
+        close(pair[0]);
+        if (process->talk_fd >= 0)
+            close(process->talk_fd);
+        *process = (struct fl_process){.talk_fd = -1};
+        return fl_error_set(error, FL_ERROR_SYSTEM, path, "cannot be started: %s", strerror(failure));
+    }
+    *socket_fd = pair[0];
+    return true;
+}
+
+/* Whether the child has ended within that time; it is not reaped. */
+static bool has_ended(const struct fl_process *process, unsigned timeout_ms)
+{
+    const uint64_t deadline_ns = fl_now_ns() + timeout_ms * 1000000ull;
+    const int fd = pidfd_open(process->pid, 0);
+    bool ended = false;
+    for (;;) {
+        siginfo_t info = {0};
+        ended = waitid(P_PID, (id_t)process->pid, &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid != 0;
+        const uint64_t now_ns = fl_now_ns();
+        if (ended || now_ns >= deadline_ns)
+            break;
+        /* Without a pidfd (an old kernel) this is a look every 5 ms. */
+        struct pollfd polled = {.fd = fd, .events = POLLIN};
+        const int left_ms = (int)((deadline_ns - now_ns) / 1000000) + 1;
+        poll(&polled, 1, fd >= 0 || left_ms < 5 ? left_ms : 5);
+    }
+    if (fd >= 0)
+        close(fd);
+    return ended;
+}
+
+void fl_process_kill(struct fl_process *process)
+{
+    if (process->pid > 0)
+        kill(process->pid, SIGKILL);
+}
+
+int fl_process_end(struct fl_process *process, unsigned grace_ms)
+{
+    int status = 0;
+    if (process->pid > 0) {
+        if (!has_ended(process, grace_ms))
+            kill(process->pid, SIGTERM);
+        if (!has_ended(process, 2000))
+            kill(process->pid, SIGKILL);
+        while (waitpid(process->pid, &status, 0) < 0 && errno == EINTR)
+            continue;
+    }
+    if (process->talk_fd >= 0)
+        close(process->talk_fd);
+    process->pid = 0;
+    process->talk_fd = -1;
+    return status;
+}
+
+/* The last line of the child's talk that says something. */
+static void last_line(int fd, char *line, size_t line_bytes)
+{
+    char tail[2048];
+    line[0] = '\0';
+    const off_t size = fd >= 0 ? lseek(fd, 0, SEEK_END) : 0;
+    if (size <= 0)
+        return;
+    const off_t from = size > (off_t)sizeof tail ? size - (off_t)sizeof tail : 0;
+    const ssize_t got = pread(fd, tail, sizeof tail, from);
+    size_t end = got > 0 ? (size_t)got : 0;
+    while (end > 0 && (tail[end - 1] == '\n' || tail[end - 1] == ' '))
+        end--;
+    size_t start = end;
+    while (start > 0 && tail[start - 1] != '\n')
+        start--;
+    snprintf(line, line_bytes, "%.*s", (int)(end - start), tail + start);
+}
+
+void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes)
+{
+    char line[400], how[80] = "";
+    last_line(process->talk_fd, line, sizeof line);
+    if (process->pid > 0 && has_ended(process, grace_ms)) {
+        siginfo_t info = {0};
+        waitid(P_PID, (id_t)process->pid, &info, WEXITED | WNOHANG | WNOWAIT);
+        last_line(process->talk_fd, line, sizeof line);
+        if (info.si_code == CLD_EXITED)
+            snprintf(how, sizeof how, "%s ended with status %d", process->name, info.si_status);
+        else
+            snprintf(how, sizeof how, "%s was ended by signal %d", process->name, info.si_status);
+    }
+    snprintf(text, text_bytes, "%s%s%s", how, how[0] != '\0' && line[0] != '\0' ? ": " : "", line);
+}

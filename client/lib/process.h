@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: MIT */
+/* Child programs that speak over a stream socket: the private daemon, the importer, the exporter, ssh. */
+#ifndef FARLIGHT_CLIENT_LIB_PROCESS_H
+#define FARLIGHT_CLIENT_LIB_PROCESS_H
+
+#include "lib/farlight.h"
+
+#include <sys/types.h>
+
+enum fl_wiring {
+    FL_WIRING_DESCRIPTOR, /* the socket is descriptor 3 ("--fd 3" is put first); the program's talk is kept */
+    FL_WIRING_STANDARD,   /* the socket is standard input and output; the program talks to our standard error and
+                             may ask the terminal for a passphrase */
+};
+
+struct fl_process {
+    pid_t pid;  /* 0: none */
+    int talk_fd; /* a memory file with its standard output and error; -1: none */
+    char name[32];
+};
+
+/* Where a helper program lies: $FARLIGHT_LIBEXEC, the folder of the running program, PATH. */
+bool fl_find_program(const char *name, char *path, size_t path_bytes, struct fl_error *error);
+
+/* Starts `name` with `arguments` (NULL-terminated; without the program's name). *socket_fd is our end. */
+bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiring wiring,
+                      const char *const *arguments, int *socket_fd, struct fl_error *error);
+/* Waits until the program ends by itself, asks it to after `grace_ms`, kills it 2 s later. Its wait status;
+ * 0 where there is none. Closes nothing but the talk: `fl_process_last_words` comes first. */
+int fl_process_end(struct fl_process *process, unsigned grace_ms);
+void fl_process_kill(struct fl_process *process); /* at once; fl_process_end must follow */
+/* Waits up to `grace_ms` for its end, then puts how it ended and the last line that it wrote into `text`:
+ * "farlightd was ended by signal 11: ..."; still running: its last line alone. */
+void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes);
+
+#endif

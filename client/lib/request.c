@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: MIT */
+/* Requests of one message and one answer. */
+#include "lib/connection.h"
+
+#define ANSWER_NS 30000000000ull
+
+bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error)
+{
+    struct message ping = {.type = MESSAGE_PING};
+    struct fl_received received;
+    const uint32_t request = fl_connection_next_request(connection);
+    const uint64_t sent_ns = fl_now_ns();
+    ping.ping.sent_ns = sent_ns;
+    if (!fl_connection_send(connection, request, 0, &ping, error) ||
+        !fl_connection_answer(connection, request, MESSAGE_PONG, &received, sent_ns + ANSWER_NS, error))
+        return false;
+    *round_trip_ns = fl_now_ns() - sent_ns;
+    return true;
+}
+
+bool fl_stats(struct fl_connection *connection, const struct message_stats_reply **reply, struct fl_error *error)
+{
+    const struct message ask = {.type = MESSAGE_STATS};
+    struct fl_received received;
+    const uint32_t request = fl_connection_next_request(connection);
+    if (!fl_connection_send(connection, request, 0, &ask, error) ||
+        !fl_connection_answer(connection, request, MESSAGE_STATS_REPLY, &received, fl_now_ns() + ANSWER_NS, error))
+        return false;
+    connection->stats = received.message.stats_reply; /* its strings and arrays stay in the stream's scratch */
+    *reply = &connection->stats;
+    return true;
+}

@@ -1,0 +1,319 @@
+/* SPDX-License-Identifier: MIT */
+/* A model's way to the daemon: the importer's messages are looked at, then passed on. */
+#include "lib/importer.h"
+#include "lib/relay.h"
+#include "lib/scene.h"
+#include "lib/text.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define ANSWER_NS 30000000000ull
+
+struct load {
+    struct fl_connection *connection;
+    struct fl_importer *importer;
+    struct fl_relay relay;
+    uint64_t credit_passed;        /* the upload credit that the importer was told of */
+    uint64_t upload_begin_ns;      /* 0: nothing was sent */
+    uint64_t commit_begin_ns;      /* 0: no commit is waiting for its answer */
+    uint32_t commit_request;       /* as the daemon knows it */
+    struct fl_error refusal;       /* the daemon's first error for an importer's request */
+};
+
+/* ---- from the importer to the daemon ---- */
+
+static void count(struct load *load, const struct message *message, uint32_t request)
+{
+    struct fl_import_stats *stats = &load->importer->stats;
+    if (message->type == MESSAGE_BLOB_OFFER) {
+        for (uint32_t i = 0; i < message->blob_offer.blobs_count; i++)
+            stats->offered_bytes += message->blob_offer.blobs[i].size_bytes;
+    } else if (message->type == MESSAGE_BLOB_DATA) {
+        if (load->upload_begin_ns == 0)
+            load->upload_begin_ns = fl_now_ns();
+        stats->uploaded_bytes += message->blob_data.data_bytes;
+        load->connection->upload_sent += message->blob_data.data_bytes;
+    } else if (message->type == MESSAGE_EDIT_COMMIT) {
+        load->commit_begin_ns = fl_now_ns();
+        load->commit_request = request;
+    }
+}
+
+/* One message of the importer's. */
+static bool pass_on(struct load *load, const struct frame *frame, struct message *message, struct fl_error *error)
+{
+    uint32_t request = 0;
+    const enum fl_relay_verdict verdict =
+        fl_relay_from_importer(&load->relay, &frame->header, message, &request, error);
+    if (verdict == FL_RELAY_REFUSE || !fl_importer_observe(load->importer, message, error))
+        return false;
+    if (verdict == FL_RELAY_LOCAL)
+        return true;
+    count(load, message, request);
+    if (message->type == MESSAGE_EDIT_BEGIN)
+        return fl_stream_push(&load->connection->stream, request, 0, message, error);
+    struct framing_header header = frame->header;
+    header.request = request;
+    fl_stream_push_payload(&load->connection->stream, &header, frame->payload);
+    return true;
+}
+
+/* As many as the daemon's side has room for. */
+static bool drain_importer(struct load *load, struct fl_error *error)
+{
+    while (fl_stream_has_room(&load->connection->stream)) {
+        struct frame frame;
+        struct message message;
+        const enum fl_stream_result result = fl_stream_next(&load->importer->stream, &frame, &message, error);
+        if (result != FL_STREAM_MESSAGE)
+            return result == FL_STREAM_NOTHING;
+        if (!pass_on(load, &frame, &message, error))
+            return false;
+    }
+    return true;
+}
+
+/* ---- from the daemon to the importer ---- */
+
+static void take_answer(struct load *load, const struct frame *frame, const struct message *message)
+{
+    struct fl_import_stats *stats = &load->importer->stats;
+    const uint64_t now_ns = fl_now_ns();
+    if (message->type == MESSAGE_ERROR && load->refusal.code == FL_ERROR_NONE)
+        fl_error_from_message(&load->refusal, &message->error);
+    if (load->commit_begin_ns != 0 && frame->header.request == load->commit_request) {
+        stats->commit_ns += now_ns - load->commit_begin_ns;
+        load->commit_begin_ns = 0;
+        if (message->type == MESSAGE_OK)
+            stats->revision = message->ok.revision;
+    } else if (load->upload_begin_ns != 0 && message->type == MESSAGE_OK) {
+        stats->upload_ns = now_ns - load->upload_begin_ns;
+    }
+}
+
+static bool pass_credit(struct load *load, struct fl_error *error)
+{
+    const uint64_t credit = fl_relay_credit(&load->relay, load->connection->upload_credit);
+    if (credit <= load->credit_passed || !fl_stream_has_room(&load->importer->stream))
+        return true;
+    struct message message = {.type = MESSAGE_CREDIT};
+    message.credit.channel = FL_UPLOAD_CHANNEL;
+    message.credit.total = credit;
+    load->credit_passed = credit;
+    return fl_stream_push(&load->importer->stream, 0, 0, &message, error);
+}
+
+/* False: the connection is broken. */
+static bool drain_daemon(struct load *load, struct fl_error *error)
+{
+    struct fl_connection *connection = load->connection;
+    while (fl_stream_has_room(&load->importer->stream)) {
+        struct frame frame;
+        struct message message;
+        const enum fl_stream_result result = fl_stream_next(&connection->stream, &frame, &message, error);
+        if (result == FL_STREAM_NOTHING)
+            break;
+        if (result == FL_STREAM_ERROR)
+            return fl_connection_break(connection, error);
+        const int consumed = fl_connection_consume(connection, &frame.header, &message, error);
+        if (consumed < 0)
+            return false;
+        struct framing_header header = frame.header;
+        if (consumed == 0 && fl_relay_from_daemon(&load->relay, &frame.header, &header.request)) {
+            take_answer(load, &frame, &message);
+            fl_stream_push_payload(&load->importer->stream, &header, frame.payload);
+        }
+    }
+    return pass_credit(load, error);
+}
+
+/* ---- both ---- */
+
+static bool exchange(struct load *load, struct fl_error *error)
+{
+    struct fl_stream *daemon = &load->connection->stream, *importer = &load->importer->stream;
+    struct pollfd polled[2] = {{.fd = daemon->fd, .events = fl_stream_events(daemon)},
+                               {.fd = importer->fd, .events = fl_stream_events(importer)}};
+    if (!fl_wait(polled, 2, load->connection->interrupt_fd, load->importer->deadline_ns, error)) {
+        if (error->code == FL_ERROR_TIMEOUT)
+            fl_error_set(error, FL_ERROR_TIMEOUT, load->importer->options.model, "the import took too long");
+        return false;
+    }
+    if (!fl_stream_transfer(daemon, error))
+        return fl_connection_break(load->connection, error);
+    if (!fl_stream_transfer(importer, error))
+        return fl_importer_explain(load->importer, error);
+    return true;
+}
+
+static bool relay_all(struct load *load, struct fl_error *error)
+{
+    struct fl_stream *daemon = &load->connection->stream, *importer = &load->importer->stream;
+    for (;;) {
+        if (!drain_importer(load, error) || !drain_daemon(load, error))
+            return false;
+        if (load->importer->done && load->refusal.code == FL_ERROR_NONE)
+            return true;
+        if (daemon->ended) {
+            fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon closed the connection");
+            return fl_connection_break(load->connection, error);
+        }
+        /* What it said last may wait for room towards the daemon. */
+        if (importer->ended && fl_stream_has_room(daemon)) {
+            if (load->refusal.code == FL_ERROR_NONE)
+                return fl_importer_explain(load->importer, error);
+            *error = load->refusal;
+            return false;
+        }
+        if (!exchange(load, error))
+            return false;
+    }
+}
+
+static bool open_scene(struct fl_connection *connection, uint32_t scene, const char *name, struct fl_error *error)
+{
+    struct message open = {.type = MESSAGE_SCENE_OPEN};
+    char short_name[129];
+    const char *slash = name != NULL ? strrchr(name, '/') : NULL;
+    fl_text_utf8(slash != NULL ? slash + 1 : name != NULL ? name : "", short_name, sizeof short_name);
+    open.scene_open.scene = scene;
+    open.scene_open.name = short_name;
+    const uint32_t request = fl_connection_next_request(connection);
+    struct fl_received received;
+    return fl_connection_send(connection, request, 0, &open, error) &&
+           fl_connection_answer(connection, request, MESSAGE_OK, &received, fl_now_ns() + ANSWER_NS, error);
+}
+
+/* The importer reads the file while the daemon makes room for the scene. */
+static bool load_with(struct fl_importer *importer, struct fl_scene *scene, struct fl_error *error)
+{
+    struct fl_connection *connection = scene->connection;
+    if (!open_scene(connection, scene->scene, importer->options.model, error))
+        return false;
+    struct load load = {.connection = connection, .importer = importer};
+    load.relay = (struct fl_relay){.scene = scene->scene,
+                                   .request_base = connection->last_request,
+                                   .upload_base = connection->upload_sent};
+    const bool loaded = relay_all(&load, error);
+    connection->last_request = load.relay.request_base + load.relay.greatest_request;
+    return loaded;
+}
+
+struct fl_import {
+    struct fl_importer importer;
+};
+
+struct fl_import *fl_import_start(const struct fl_load_options *options, struct fl_error *error)
+{
+    struct fl_import *started = calloc(1, sizeof *started);
+    if (started == NULL)
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    else if (fl_importer_start(&started->importer, options, error))
+        return started;
+    free(started);
+    return NULL;
+}
+
+void fl_import_destroy(struct fl_import *started)
+{
+    if (started == NULL)
+        return;
+    fl_importer_finish(&started->importer);
+    free(started);
+}
+
+/* What was given at the start stays; who is told may only be known now. */
+static void adopt_callbacks(struct fl_importer *importer, const struct fl_load_options *options)
+{
+    importer->options.note = options->note;
+    importer->options.progress = options->progress;
+    importer->options.user = options->user;
+    importer->begin_ns = fl_now_ns(); /* `load_ns` is what the caller waits */
+}
+
+static struct fl_scene *load_started(struct fl_connection *connection, struct fl_importer *importer,
+                                     struct fl_error *error)
+{
+    struct fl_scene *scene = calloc(1, sizeof *scene);
+    if (scene == NULL) {
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    scene->connection = connection;
+    scene->scene = ++connection->last_scene;
+    const bool loaded = load_with(importer, scene, error);
+    fl_importer_stop(importer);
+    if (!loaded) {
+        fl_scene_destroy(scene);
+        return NULL;
+    }
+    scene->stats = importer->stats;
+    scene->cameras = importer->cameras;
+    scene->camera_count = importer->camera_count;
+    importer->cameras = NULL;
+    importer->camera_count = 0;
+    return scene;
+}
+
+struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl_load_options *options,
+                               struct fl_error *error)
+{
+    struct fl_scene *scene = NULL;
+    struct fl_import *started = options->started;
+    if (started == NULL && fl_connection_check(connection, error))
+        started = fl_import_start(options, error);
+    if (started == NULL)
+        return NULL;
+    adopt_callbacks(&started->importer, options);
+    if (fl_connection_check(connection, error))
+        scene = load_started(connection, &started->importer, error);
+    fl_import_destroy(started);
+    return scene;
+}
+
+/* The answer is not waited for: it is dropped when it comes. */
+void fl_scene_destroy(struct fl_scene *scene)
+{
+    if (scene == NULL)
+        return;
+    struct message close = {.type = MESSAGE_SCENE_CLOSE};
+    struct fl_error ignored;
+    close.scene_close.scene = scene->scene;
+    fl_connection_send(scene->connection, fl_connection_next_request(scene->connection), 0, &close, &ignored);
+    free(scene->cameras);
+    free(scene);
+}
+
+const struct fl_import_stats *fl_scene_import_stats(const struct fl_scene *scene)
+{
+    return &scene->stats;
+}
+
+size_t fl_scene_camera_count(const struct fl_scene *scene)
+{
+    return scene->camera_count;
+}
+
+const struct fl_camera_info *fl_scene_camera(const struct fl_scene *scene, size_t index)
+{
+    return index < scene->camera_count ? &scene->cameras[index] : NULL;
+}
+
+bool fl_scene_find_camera(const struct fl_scene *scene, const char *which, uint32_t *node, struct fl_error *error)
+{
+    for (size_t i = 0; i < scene->camera_count; i++)
+        if (strcmp(scene->cameras[i].name, which) == 0) {
+            *node = scene->cameras[i].node;
+            return true;
+        }
+    uint64_t index = 0;
+    if (scene->camera_count > 0 && fl_text_integer(which, 0, scene->camera_count - 1, &index, NULL)) {
+        *node = scene->cameras[index].node;
+        return true;
+    }
+    fl_error_set(error, FL_ERROR_ARGUMENT, "--camera", "the model has no camera '%s'", which);
+    if (scene->camera_count == 0)
+        return fl_error_remedy(error, "it has none at all; use --eye and --look-at");
+    return fl_error_remedy(error, "it has %zu; 'farlight info' lists them", scene->camera_count);
+}

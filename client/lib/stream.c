@@ -1,0 +1,223 @@
+/* SPDX-License-Identifier: MIT */
+#include "lib/stream.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+uint64_t fl_now_ns(void)
+{
+    struct timespec now = {0};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+}
+
+bool fl_stream_init(struct fl_stream *stream, int fd, uint32_t accept, const char *peer, struct fl_error *error)
+{
+    *stream = (struct fl_stream){.fd = fd, .accept = accept, .peer = peer};
+    const int flags = fcntl(fd, F_GETFL);
+    if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0) {
+        fl_error_set(error, FL_ERROR_SYSTEM, "", "cannot use the connection to %s: %s", peer, strerror(errno));
+        fl_stream_finish(stream);
+        return false;
+    }
+    stream->in = malloc(FL_STREAM_BUFFER_BYTES);
+    stream->out = malloc(FL_STREAM_BUFFER_BYTES);
+    stream->scratch_data = malloc(SCRATCH_BYTES);
+    if (stream->in == NULL || stream->out == NULL || stream->scratch_data == NULL) {
+        fl_stream_finish(stream);
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    }
+    scratch_init(&stream->scratch, stream->scratch_data, SCRATCH_BYTES);
+    return true;
+}
+
+void fl_stream_finish(struct fl_stream *stream)
+{
+    if (stream->fd >= 0)
+        close(stream->fd);
+    free(stream->in);
+    free(stream->out);
+    free(stream->scratch_data);
+    *stream = (struct fl_stream){.fd = -1, .peer = stream->peer};
+}
+
+bool fl_stream_has_output(const struct fl_stream *stream)
+{
+    return stream->out_end > stream->out_start;
+}
+
+bool fl_stream_has_room(const struct fl_stream *stream)
+{
+    return FL_STREAM_BUFFER_BYTES - (stream->out_end - stream->out_start) >= FRAMING_MESSAGE_MAX_BYTES;
+}
+
+/* Makes the free space of a buffer one piece. */
+static void compact(uint8_t *data, size_t *start, size_t *end)
+{
+    if (*start == 0)
+        return;
+    memmove(data, data + *start, *end - *start);
+    *end -= *start;
+    *start = 0;
+}
+
+bool fl_stream_push(struct fl_stream *stream, uint32_t request, uint32_t channel, const struct message *message,
+                    struct fl_error *error)
+{
+    compact(stream->out, &stream->out_start, &stream->out_end);
+    struct writer writer;
+    writer_init(&writer, stream->out + stream->out_end, FL_STREAM_BUFFER_BYTES - stream->out_end);
+    if (!message_write(&writer, request, channel, message))
+        return fl_error_set(error, FL_ERROR_ARGUMENT, writer.error.field, "%s", writer.error.text);
+    stream->out_end += writer.used_bytes;
+    return true;
+}
+
+void fl_stream_push_payload(struct fl_stream *stream, const struct framing_header *header, const uint8_t *payload)
+{
+    compact(stream->out, &stream->out_start, &stream->out_end);
+    uint8_t *out = stream->out + stream->out_end;
+    const size_t padding = (8u - header->payload_bytes % 8u) % 8u;
+    framing_header_encode(out, header);
+    if (header->payload_bytes > 0)
+        memcpy(out + FRAMING_HEADER_BYTES, payload, header->payload_bytes);
+    memset(out + FRAMING_HEADER_BYTES + header->payload_bytes, 0, padding);
+    stream->out_end += FRAMING_HEADER_BYTES + header->payload_bytes + padding;
+}
+
+static bool has_space_to_read(const struct fl_stream *stream)
+{
+    return stream->in_end - stream->in_start < FL_STREAM_BUFFER_BYTES;
+}
+
+short fl_stream_events(const struct fl_stream *stream)
+{
+    int events = 0;
+    if (fl_stream_has_output(stream))
+        events |= POLLOUT;
+    if (!stream->ended && has_space_to_read(stream))
+        events |= POLLIN;
+    return (short)events;
+}
+
+static bool lost(const struct fl_stream *stream, int number, struct fl_error *error)
+{
+    return fl_error_set(error, FL_ERROR_CONNECTION, "", "the connection to %s is lost: %s", stream->peer,
+                        strerror(number));
+}
+
+static bool write_waiting(struct fl_stream *stream, struct fl_error *error)
+{
+    while (fl_stream_has_output(stream)) {
+        const ssize_t sent =
+            send(stream->fd, stream->out + stream->out_start, stream->out_end - stream->out_start, MSG_NOSIGNAL);
+        if (sent >= 0) {
+            stream->out_start += (size_t)sent;
+        } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
+            return true;
+        } else if (errno == EPIPE || errno == ECONNRESET) {
+            /* Its last words may still lie in our receive buffer: they are read before the loss is reported. */
+            stream->out_start = stream->out_end = 0;
+            return true;
+        } else if (errno != EINTR) {
+            return lost(stream, errno, error);
+        }
+    }
+    stream->out_start = stream->out_end = 0;
+    return true;
+}
+
+bool fl_stream_transfer(struct fl_stream *stream, struct fl_error *error)
+{
+    if (!write_waiting(stream, error))
+        return false;
+    compact(stream->in, &stream->in_start, &stream->in_end);
+    while (!stream->ended && has_space_to_read(stream)) {
+        const ssize_t got = recv(stream->fd, stream->in + stream->in_end, FL_STREAM_BUFFER_BYTES - stream->in_end, 0);
+        if (got > 0)
+            stream->in_end += (size_t)got;
+        else if (got == 0 || errno == ECONNRESET)
+            stream->ended = true;
+        else if (errno == EAGAIN || errno == EWOULDBLOCK)
+            return true;
+        else if (errno != EINTR)
+            return lost(stream, errno, error);
+    }
+    return true;
+}
+
+bool fl_stream_has_remains(const struct fl_stream *stream)
+{
+    return stream->in_end > stream->in_start;
+}
+
+static enum fl_stream_result broken(const struct fl_stream *stream, const struct decode_error *why,
+                                    struct fl_error *error)
+{
+    fl_error_set(error, FL_ERROR_PROTOCOL, why->field, "%s sent what the protocol does not allow: %s", stream->peer,
+                 why->text);
+    return FL_STREAM_ERROR;
+}
+
+enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *frame, struct message *message,
+                                     struct fl_error *error)
+{
+    struct decode_error why = {0};
+    for (;;) {
+        const enum framing_result result = framing_parse(frame, stream->in + stream->in_start,
+                                                         stream->in_end - stream->in_start, stream->accept, &why);
+        if (result == FRAMING_FATAL)
+            return broken(stream, &why, error);
+        if (result == FRAMING_NEED_MORE)
+            return FL_STREAM_NOTHING;
+        stream->in_start += frame->consumed_bytes;
+        if (frame->info != NULL)
+            break;
+    }
+    if (message == NULL)
+        return FL_STREAM_MESSAGE;
+    scratch_reset(&stream->scratch);
+    if (!message_decode(message, frame->header.type, frame->payload, frame->header.payload_bytes, &stream->scratch,
+                        &why))
+        return broken(stream, &why, error);
+    return FL_STREAM_MESSAGE;
+}
+
+/* Rounded up, so that a deadline has passed when poll says so. */
+static int milliseconds_until(uint64_t deadline_ns)
+{
+    if (deadline_ns == UINT64_MAX)
+        return -1;
+    const uint64_t now = fl_now_ns();
+    const uint64_t left_ms = deadline_ns > now ? (deadline_ns - now + 999999) / 1000000 : 0;
+    return left_ms > 3600000 ? 3600000 : (int)left_ms;
+}
+
+bool fl_wait(struct pollfd *polled, size_t count, int interrupt_fd, uint64_t deadline_ns, struct fl_error *error)
+{
+    struct pollfd all[5];
+    for (;;) {
+        for (size_t i = 0; i < count; i++) {
+            all[i] = polled[i];
+            if (polled[i].events == 0)
+                all[i].fd = -1; /* else a peer that hung up would make this a busy loop */
+        }
+        all[count] = (struct pollfd){.fd = interrupt_fd > 0 ? interrupt_fd : -1, .events = POLLIN};
+        const int ready = poll(all, (nfds_t)count + 1, milliseconds_until(deadline_ns));
+        if (ready < 0 && errno != EINTR && errno != EAGAIN)
+            return fl_error_set(error, FL_ERROR_SYSTEM, "", "poll: %s", strerror(errno));
+        if (ready > 0 && all[count].revents != 0)
+            return fl_error_set(error, FL_ERROR_INTERRUPTED, "", "interrupted");
+        for (size_t i = 0; i < count; i++)
+            polled[i].revents = all[i].revents;
+        if (ready > 0)
+            return true;
+        if (deadline_ns != UINT64_MAX && fl_now_ns() >= deadline_ns)
+            return fl_error_set(error, FL_ERROR_TIMEOUT, "", "it took too long");
+    }
+}

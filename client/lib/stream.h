@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT */
+/* Messages over one non-blocking descriptor: a bounded buffer in each direction and nothing else. Used towards
+ * the daemon and towards helper programs. One thread. */
+#ifndef FARLIGHT_CLIENT_LIB_STREAM_H
+#define FARLIGHT_CLIENT_LIB_STREAM_H
+
+#include "lib/farlight.h"
+#include "protocol/framing.h"
+
+#include <poll.h>
+
+/* Two of the greatest messages: one can be completed while the other is looked at. */
+#define FL_STREAM_BUFFER_BYTES (2u * FRAMING_MESSAGE_MAX_BYTES)
+
+struct fl_stream {
+    int fd; /* owned; -1: none */
+    uint32_t accept; /* bits of enum message_from: who may have sent what comes in */
+    const char *peer; /* for error texts: "the daemon"; static */
+    bool ended; /* the peer will send nothing more */
+    uint8_t *in, *out, *scratch_data; /* FL_STREAM_BUFFER_BYTES, the same, SCRATCH_BYTES */
+    size_t in_start, in_end, out_start, out_end;
+    struct scratch scratch;
+};
+
+/* Takes the descriptor over (also on failure) and makes it non-blocking. */
+bool fl_stream_init(struct fl_stream *stream, int fd, uint32_t accept, const char *peer, struct fl_error *error);
+void fl_stream_finish(struct fl_stream *stream);
+
+/* Whether any message fits behind what waits to be written. */
+bool fl_stream_has_room(const struct fl_stream *stream);
+bool fl_stream_has_output(const struct fl_stream *stream);
+/* Puts a message behind what waits; there must be room. */
+bool fl_stream_push(struct fl_stream *stream, uint32_t request, uint32_t channel, const struct message *message,
+                    struct fl_error *error);
+/* The same for a payload as it came; header->payload_bytes says its size. */
+void fl_stream_push_payload(struct fl_stream *stream, const struct framing_header *header, const uint8_t *payload);
+
+/* poll()'s events for the stream's present state; 0 when there is nothing to wait for. */
+short fl_stream_events(const struct fl_stream *stream);
+/* Writes and reads as far as it goes without blocking. False: the peer is lost. The end of its bytes is no
+ * failure: see `ended`. */
+bool fl_stream_transfer(struct fl_stream *stream, struct fl_error *error);
+
+enum fl_stream_result { FL_STREAM_MESSAGE, FL_STREAM_NOTHING, FL_STREAM_ERROR };
+/* The next message that has come in whole; unknown ignorable ones are skipped. `frame` and `message` (may be
+ * NULL: not decoded) are valid until the next call. NOTHING with `ended`: half a message at most remains. */
+enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *frame, struct message *message,
+                                     struct fl_error *error);
+/* Whether an incomplete message lies in the buffer. */
+bool fl_stream_has_remains(const struct fl_stream *stream);
+
+uint64_t fl_now_ns(void);
+/* poll() until something is ready, the deadline passes (UINT64_MAX: never) or the interrupt descriptor (0: none)
+ * becomes readable. At most 4 entries; those with events 0 are not waited for. */
+bool fl_wait(struct pollfd *polled, size_t count, int interrupt_fd, uint64_t deadline_ns, struct fl_error *error);
+
+#endif

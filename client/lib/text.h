@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: MIT */
+/* Reads what people type: sizes, vectors, numbers, ranges of frames, names of files with a frame number.
+ *
+ * Each function takes the whole of `text` or nothing: trailing characters are a failure. On failure it
+ * returns false, sets *error (field left empty: the caller knows the option) and leaves its results alone.
+ * No locale is consulted, nothing is allocated, and user text is never used as a format. Any thread. */
+#ifndef FARLIGHT_CLIENT_LIB_TEXT_H
+#define FARLIGHT_CLIENT_LIB_TEXT_H
+
+#include "lib/farlight.h"
+
+/* Decimal digits only. */
+bool fl_text_integer(const char *text, uint64_t least, uint64_t greatest, uint64_t *value, struct fl_error *error);
+/* Finite decimal number, within [least, greatest]. */
+bool fl_text_real(const char *text, double least, double greatest, double *value, struct fl_error *error);
+/* "1280x720", each edge 1..8192. */
+bool fl_text_size(const char *text, uint32_t *width, uint32_t *height, struct fl_error *error);
+/* "X,Y,Z" */
+bool fl_text_vector(const char *text, float vector[3], struct fl_error *error);
+/* "A", "A-B" or "A-B:STEP"; A <= B, STEP >= 1. */
+bool fl_text_range(const char *text, uint32_t *first, uint32_t *last, uint32_t *step, struct fl_error *error);
+
+/* As much of `text` as is UTF-8 and fits, without cutting a character; what is not becomes '?'. */
+void fl_text_utf8(const char *text, char *out, size_t out_bytes);
+
+/* A file name with a place for the frame's number: "%d" or "%0Nd" (N digits, 1..9, filled with zeros) once,
+ * in the last component of the path; "%%" is a percent sign. */
+struct fl_pattern {
+    char before[4096];
+    char after[256];
+    unsigned digits;
+};
+bool fl_pattern_parse(const char *text, struct fl_pattern *pattern, struct fl_error *error);
+/* The path of one frame; false when it does not fit. */
+bool fl_pattern_path(const struct fl_pattern *pattern, uint32_t frame, char *path, size_t path_bytes);
+
+#endif

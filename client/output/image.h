@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: MIT */
+/* Pixels and what is known about them to the bytes of an image file, in memory. The one place that knows
+ * OpenImageIO; C++ behind C. */
+#ifndef FARLIGHT_CLIENT_OUTPUT_IMAGE_H
+#define FARLIGHT_CLIENT_OUTPUT_IMAGE_H
+
+#include "protocol/messages.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum image_format { IMAGE_UNKNOWN, IMAGE_PNG, IMAGE_JPEG, IMAGE_EXR, IMAGE_HDR };
+
+/* By the path's ending, else by `fallback` ("png", ..). */
+enum image_format image_format_of(const char *path, const char *fallback);
+
+struct image {
+    enum image_format format;
+    bool half;                             /* EXR: half floats */
+    unsigned quality;                      /* JPEG */
+    float frames_per_second;               /* 0: unknown */
+    const char *model;                     /* for the metadata; may be empty */
+    const struct message_frame_begin *begin; /* encoding raw */
+    const struct message_frame_end *end;
+    const uint8_t *pixels;
+};
+
+/* Loads what the libraries load late, while that is still allowed. False: a format is missing; its name is in
+ * `reason`. */
+bool image_prepare(char *reason, size_t reason_bytes);
+/* *file is malloc'ed. False: `reason` says why. */
+bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

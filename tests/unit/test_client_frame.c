@@ -1,0 +1,248 @@
+/* SPDX-License-Identifier: MIT */
+/* What a hostile or broken daemon can say about a frame. */
+#include "lib/frame.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <turbojpeg.h>
+#include <xxhash.h>
+#include <zstd.h>
+
+#include <cmocka.h>
+
+#define WIDTH 40u
+#define HEIGHT 24u
+#define PIXELS_BYTES (WIDTH * HEIGHT * 4u)
+
+static struct fl_error error;
+static uint8_t pixels[PIXELS_BYTES];
+
+static int fill_pixels(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof pixels; i++)
+        pixels[i] = i % 4 == 3 ? 255 : (uint8_t)(i / 64);
+    return 0;
+}
+
+static struct fl_assembly some_assembly(enum protocol_encoding encoding)
+{
+    error = (struct fl_error){0};
+    return (struct fl_assembly){.expected = {.width = WIDTH, .height = HEIGHT, .encoding = encoding}};
+}
+
+static struct message_frame_begin some_begin(enum protocol_encoding encoding, uint64_t size_bytes)
+{
+    return (struct message_frame_begin){.frame = 3,
+                                        .width = WIDTH,
+                                        .height = HEIGHT,
+                                        .samples = 1,
+                                        .size_bytes = size_bytes,
+                                        .encoding = encoding,
+                                        .digest = XXH3_64bits(pixels, sizeof pixels)};
+}
+
+static bool begin(struct fl_assembly *assembly, const struct message_frame_begin *message)
+{
+    return fl_assembly_begin(assembly, message, 3, 1, &error);
+}
+
+static bool give(struct fl_assembly *assembly, const uint8_t *bytes, size_t count, uint64_t offset)
+{
+    const struct message_frame_data data = {.offset_bytes = offset, .data = bytes, .data_bytes = (uint32_t)count};
+    return fl_assembly_data(assembly, &data, &error);
+}
+
+static struct fl_frame *end(struct fl_assembly *assembly)
+{
+    struct record_stage_time stage = {.stage = PROTOCOL_STAGE_TRACE, .duration_ns = 5};
+    const struct message_frame_end message = {.frame = 3, .primary_rays = 960, .stages = &stage, .stages_count = 1};
+    return fl_assembly_end(assembly, &message, 2, &error);
+}
+
+/* The whole way of one frame. */
+static struct fl_frame *receive(enum protocol_encoding encoding, const uint8_t *bytes, size_t count)
+{
+    struct fl_assembly assembly = some_assembly(encoding);
+    const struct message_frame_begin message = some_begin(encoding, count);
+    struct fl_frame *frame = NULL;
+    if (begin(&assembly, &message) && give(&assembly, bytes, count / 2, 0) &&
+        give(&assembly, bytes + count / 2, count - count / 2, count / 2))
+        frame = end(&assembly);
+    fl_assembly_finish(&assembly);
+    return frame;
+}
+
+static void a_raw_frame_arrives(void **state)
+{
+    (void)state;
+    struct fl_frame *frame = receive(PROTOCOL_ENCODING_RAW, pixels, sizeof pixels);
+    assert_non_null(frame);
+    assert_true(frame->digest_checked);
+    assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+    assert_int_equal(frame->frame, 3);
+    assert_int_equal(frame->primary_rays, 960);
+    assert_int_equal(frame->stage_count, 1);
+    assert_int_equal(frame->stages[0].duration_ns, 5);
+    fl_frame_destroy(frame);
+}
+
+static void a_zstd_frame_arrives(void **state)
+{
+    (void)state;
+    uint8_t packed[2 * PIXELS_BYTES];
+    const size_t count = ZSTD_compress(packed, sizeof packed, pixels, sizeof pixels, 1);
+    assert_false(ZSTD_isError(count));
+    struct fl_frame *frame = receive(PROTOCOL_ENCODING_ZSTD, packed, count);
+    assert_non_null(frame);
+    assert_true(frame->digest_checked);
+    assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+    fl_frame_destroy(frame);
+}
+
+static unsigned long make_jpeg(unsigned width, unsigned height, uint8_t **packed)
+{
+    unsigned long count = 0;
+    *packed = NULL;
+    const tjhandle encoder = tjInitCompress();
+    assert_int_equal(tjCompress2(encoder, pixels, (int)width, 0, (int)height, TJPF_RGBA, packed, &count, TJSAMP_420,
+                                 90, 0),
+                     0);
+    tjDestroy(encoder);
+    return count;
+}
+
+static void a_jpeg_frame_arrives_with_an_opaque_alpha(void **state)
+{
+    (void)state;
+    uint8_t *packed = NULL;
+    const unsigned long count = make_jpeg(WIDTH, HEIGHT, &packed);
+    struct fl_frame *frame = receive(PROTOCOL_ENCODING_JPEG, packed, count);
+    assert_non_null(frame);
+    assert_false(frame->digest_checked);
+    for (size_t i = 3; i < sizeof pixels; i += 4)
+        assert_int_equal(frame->pixels[i], 255);
+    fl_frame_destroy(frame);
+    tjFree(packed);
+}
+
+static void a_jpeg_of_another_size_is_refused(void **state)
+{
+    (void)state;
+    uint8_t *packed = NULL;
+    const unsigned long count = make_jpeg(WIDTH, HEIGHT - 8, &packed);
+    assert_null(receive(PROTOCOL_ENCODING_JPEG, packed, count));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    tjFree(packed);
+}
+
+static void a_damaged_jpeg_is_refused(void **state)
+{
+    (void)state;
+    uint8_t *packed = NULL;
+    const unsigned long count = make_jpeg(WIDTH, HEIGHT, &packed);
+    assert_null(receive(PROTOCOL_ENCODING_JPEG, packed, count - 20));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    assert_null(receive(PROTOCOL_ENCODING_JPEG, pixels, 100));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    tjFree(packed);
+}
+
+static void changed_pixels_do_not_pass_the_digest(void **state)
+{
+    (void)state;
+    uint8_t changed[PIXELS_BYTES];
+    memcpy(changed, pixels, sizeof changed);
+    changed[PIXELS_BYTES - 1] ^= 1;
+    assert_null(receive(PROTOCOL_ENCODING_RAW, changed, sizeof changed));
+    assert_string_equal(error.field, "frame.digest");
+}
+
+static void a_zstd_frame_that_unpacks_to_more_or_less_is_refused(void **state)
+{
+    (void)state;
+    uint8_t *large = calloc(1, 100 * PIXELS_BYTES), packed[2 * PIXELS_BYTES];
+    assert_non_null(large);
+    size_t count = ZSTD_compress(packed, sizeof packed, large, 100 * PIXELS_BYTES, 1);
+    assert_null(receive(PROTOCOL_ENCODING_ZSTD, packed, count));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    count = ZSTD_compress(packed, sizeof packed, large, PIXELS_BYTES - 1, 1);
+    assert_null(receive(PROTOCOL_ENCODING_ZSTD, packed, count));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    assert_null(receive(PROTOCOL_ENCODING_ZSTD, large, 50));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    free(large);
+}
+
+static void a_frame_that_was_not_asked_for_is_refused(void **state)
+{
+    (void)state;
+    for (unsigned i = 0; i < 7; i++) {
+        struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+        struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+        message.width += i == 0;
+        message.height -= i == 1;
+        message.frame += i == 2;
+        message.format = i == 3 ? PROTOCOL_PIXEL_FORMAT_RGBA32F : message.format;
+        message.encoding = i == 4 ? PROTOCOL_ENCODING_ZSTD : message.encoding;
+        message.size_bytes -= i == 5;
+        message.size_bytes += i == 6;
+        if (begin(&assembly, &message))
+            fail_msg("change %u was not noticed", i);
+        assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+        fl_assembly_finish(&assembly);
+    }
+}
+
+static void declared_sizes_beyond_all_reason_are_refused_before_memory_is_taken(void **state)
+{
+    (void)state;
+    static const enum protocol_encoding encodings[] = {PROTOCOL_ENCODING_RAW, PROTOCOL_ENCODING_ZSTD,
+                                                       PROTOCOL_ENCODING_JPEG};
+    static const uint64_t sizes[] = {0, 4294967296u, UINT64_MAX};
+    for (size_t i = 0; i < 3; i++) {
+        for (size_t j = 0; j < 3; j++) {
+            struct fl_assembly assembly = some_assembly(encodings[i]);
+            const struct message_frame_begin message = some_begin(encodings[i], sizes[j]);
+            assert_false(begin(&assembly, &message));
+            assert_null(assembly.frame);
+        }
+    }
+}
+
+static void pieces_out_of_place_are_refused(void **state)
+{
+    (void)state;
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+    const struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+    assert_false(give(&assembly, pixels, 10, 0)); /* no frame */
+    assert_true(begin(&assembly, &message));
+    assert_false(begin(&assembly, &message)); /* inside another */
+    assert_false(give(&assembly, pixels, 10, 10));
+    assert_true(give(&assembly, pixels, 10, 0));
+    assert_false(give(&assembly, pixels, 10, 0));
+    assert_false(give(&assembly, pixels, PIXELS_BYTES, 10));
+    assert_false(give(&assembly, pixels, 10, UINT64_MAX));
+    assert_null(end(&assembly)); /* not complete */
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    fl_assembly_finish(&assembly);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_raw_frame_arrives),
+        cmocka_unit_test(a_zstd_frame_arrives),
+        cmocka_unit_test(a_jpeg_frame_arrives_with_an_opaque_alpha),
+        cmocka_unit_test(a_jpeg_of_another_size_is_refused),
+        cmocka_unit_test(a_damaged_jpeg_is_refused),
+        cmocka_unit_test(changed_pixels_do_not_pass_the_digest),
+        cmocka_unit_test(a_zstd_frame_that_unpacks_to_more_or_less_is_refused),
+        cmocka_unit_test(a_frame_that_was_not_asked_for_is_refused),
+        cmocka_unit_test(declared_sizes_beyond_all_reason_are_refused_before_memory_is_taken),
+        cmocka_unit_test(pieces_out_of_place_are_refused),
+    };
+    return cmocka_run_group_tests(tests, fill_pixels, NULL);
+}
