@@ -129,8 +129,8 @@ $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 
 # The yardstick of the benchmark; the only thing that links Embree.
-$(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(SERVER_OBJ)
-	$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(SERVER_LIBS) -lembree3 -o $@
+$(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/server/base/%,$(SERVER_OBJ))
+	$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -lembree3 -o $@
 
 # The generator of the bundled scenes.
 TOOLS_OBJ := $(B)/tests/tools/make_scenes.o $(B)/tests/tools/glb.o $(B)/tests/tools/shape.o

@@ -37,10 +37,11 @@ done
 
 server="unix:$private/farlight.sock"
 scene=$private/scenes/teapot.glb
+sky=$private/scenes/sky.hdr
 echo "--- $out/demo.png, from a bundled scene, with the time of every stage"
-"$bin/farlight" render "$scene" --server "$server" --size 960x540 --samples 4 --timings -o "$out/demo.png"
+"$bin/farlight" render "$scene" --environment "$sky" --server "$server" --size 960x540 --samples 4 --timings -o "$out/demo.png"
 echo "--- $out/demo.exr, linear; the same scene again, so that no bulk data moves"
-"$bin/farlight" render "$scene" --server "$server" --size 960x540 --samples 4 --timings -o "$out/demo.exr"
+"$bin/farlight" render "$scene" --environment "$sky" --server "$server" --size 960x540 --samples 4 --timings -o "$out/demo.exr"
 echo "--- $out/orbit/, 24 frames once around a sphereflake"
 "$bin/farlight" animate "$private/scenes/sphereflake-3.nff" --server "$server" --size 480x270 --orbit \
     --frames 1-24 --fps 24 -o "$out/orbit/%04d.png"

@@ -2,6 +2,7 @@
 /* Writes the bundled scenes into a folder, so that a fresh machine has something to render:
  *   cornell.glb      a box with coloured walls, a mirror block and a glass sphere
  *   teapot.glb       a teapot on a mirror, with metal and glass beside it
+ *   sky.hdr          an evening sky with two soft lights, to be used as environment
  *   sphereflake-N.nff  Eric Haines' 'balls' of the Standard Procedural Databases, N levels
  *   bumpy-N.glb      a bumpy sphere of about N thousand triangles above a floor, the family of the benchmark */
 #include "glb.h"
@@ -34,11 +35,13 @@ static bool write_cornell(const char *path)
     struct glb_part parts[] = {{"room", {0}, white},  {"left wall", {0}, red},      {"right wall", {0}, green},
                                {"lamp", {0}, lamp},   {"mirror block", {0}, mirror}, {"glass sphere", {0}, glass},
                                {"block", {0}, white}};
+    /* The room goes on behind the camera, so that mirror and glass have something to show. */
     const float corner[8][3] = {{-1, 0, -1}, {1, 0, -1}, {-1, 2, -1}, {1, 2, -1},
-                                {-1, 0, 1},  {1, 0, 1},  {-1, 2, 1},  {1, 2, 1}};
+                                {-1, 0, 4},  {1, 0, 4},  {-1, 2, 4},  {1, 2, 4}};
     shape_quad(&parts[0].shape, corner[0], corner[4], corner[5], corner[1]); /* floor */
     shape_quad(&parts[0].shape, corner[2], corner[3], corner[7], corner[6]); /* ceiling */
     shape_quad(&parts[0].shape, corner[0], corner[1], corner[3], corner[2]); /* back */
+    shape_quad(&parts[0].shape, corner[4], corner[6], corner[7], corner[5]); /* front */
     shape_quad(&parts[1].shape, corner[0], corner[2], corner[6], corner[4]);
     shape_quad(&parts[2].shape, corner[1], corner[5], corner[7], corner[3]);
     const float lamp_corner[4][3] = {{-0.3f, 1.995f, -0.3f}, {0.3f, 1.995f, -0.3f}, {0.3f, 1.995f, 0.3f}, {-0.3f, 1.995f, 0.3f}};
@@ -46,10 +49,11 @@ static bool write_cornell(const char *path)
     shape_box(&parts[4].shape, (const float[3]){-0.38f, 0.6f, -0.35f}, (const float[3]){0.28f, 0.6f, 0.28f}, 0.35f);
     shape_sphere(&parts[5].shape, (const float[3]){0.42f, 0.33f, 0.32f}, 0.33f, 96);
     shape_box(&parts[6].shape, (const float[3]){0.48f, 0.15f, -0.45f}, (const float[3]){0.22f, 0.15f, 0.22f}, -0.4f);
-    const struct glb_light light = {"point", {1, 0.93f, 0.8f}, 2.6f, {0, 1.85f, 0}};
+    const struct glb_light lights[] = {{"point", {1, 0.93f, 0.8f}, 2.6f, {0, 1.85f, 0}},
+                                       {"point", {0.8f, 0.9f, 1}, 1.6f, {0.4f, 1.3f, 3.5f}}};
     const struct glb_camera camera = {{0, 1, 3.6f}, {0, 0.97f, 0}, 0.66f};
     const size_t count = sizeof parts / sizeof *parts;
-    return finish_parts(glb_write(path, parts, count, &light, 1, &camera), parts, count);
+    return finish_parts(glb_write(path, parts, count, lights, 2, &camera), parts, count);
 }
 
 static void add_teapot(struct shape *shape)
@@ -74,9 +78,9 @@ static void add_teapot(struct shape *shape)
     }
     shape_tube(shape, (const float(*)[3])path, radii, PATH, 32);
     for (int i = 0; i < PATH; i++) { /* handle */
-        const float angle = 1.75f + 2.75f * (float)i / (PATH - 1);
-        path[i][0] = -0.85f + 0.5f * cosf(angle);
-        path[i][1] = 0.58f + 0.34f * sinf(angle);
+        const float angle = 1.0f + 3.9f * (float)i / (PATH - 1);
+        path[i][0] = -0.72f + 0.62f * cosf(angle);
+        path[i][1] = 0.58f + 0.36f * sinf(angle);
         radii[i] = 0.07f;
     }
     shape_tube(shape, (const float(*)[3])path, radii, PATH, 32);
@@ -86,17 +90,17 @@ static bool write_teapot(const char *path)
 {
     struct glb_part parts[] = {{"table", {0}, mirror}, {"teapot", {0}, glaze}, {"gold ball", {0}, gold},
                                {"glass ball", {0}, glass}, {"red ball", {0}, red}, {"wall", {0}, white}};
-    shape_quad(&parts[0].shape, (const float[3]){-6, 0, 4}, (const float[3]){6, 0, 4}, (const float[3]){6, 0, -4},
-               (const float[3]){-6, 0, -4});
+    shape_quad(&parts[0].shape, (const float[3]){-14, 0, 4}, (const float[3]){14, 0, 4}, (const float[3]){14, 0, -4},
+               (const float[3]){-14, 0, -4});
     add_teapot(&parts[1].shape);
     shape_sphere(&parts[2].shape, (const float[3]){1.5f, 0.35f, 1.1f}, 0.35f, 96);
     shape_sphere(&parts[3].shape, (const float[3]){-0.5f, 0.3f, 1.5f}, 0.3f, 96);
     shape_sphere(&parts[4].shape, (const float[3]){-1.9f, 0.45f, 0.3f}, 0.45f, 96);
-    shape_quad(&parts[5].shape, (const float[3]){-6, 0, -4}, (const float[3]){6, 0, -4}, (const float[3]){6, 5, -4},
-               (const float[3]){-6, 5, -4});
+    shape_quad(&parts[5].shape, (const float[3]){-14, 0, -4}, (const float[3]){14, 0, -4}, (const float[3]){14, 3.2f, -4},
+               (const float[3]){-14, 3.2f, -4});
     const struct glb_light lights[] = {{"point", {1, 0.95f, 0.85f}, 42, {3, 5, 4}},
                                        {"point", {0.6f, 0.75f, 1}, 14, {-4, 3.5f, 2}}};
-    const struct glb_camera camera = {{1.2f, 1.9f, 5.4f}, {0, 0.5f, 0}, 0.7f};
+    const struct glb_camera camera = {{0.9f, 1.7f, 5.0f}, {0, 0.5f, 0}, 0.68f};
     const size_t count = sizeof parts / sizeof *parts;
     return finish_parts(glb_write(path, parts, count, lights, 2, &camera), parts, count);
 }
@@ -146,6 +150,54 @@ static bool write_sphereflake(const char *path, int levels)
     return true;
 }
 
+/* Radiance of the sky in a direction given by its height (sine of the elevation) and azimuth. */
+static void sky_radiance(float rgb[3], float height, float azimuth)
+{
+    const float up = fmaxf(height, 0), warm = expf(-6 * up);
+    const float ground = height < 0 ? 0.35f : 1;
+    rgb[0] = ground * (0.16f + 0.75f * warm);
+    rgb[1] = ground * (0.26f + 0.42f * warm);
+    rgb[2] = ground * (0.48f + 0.22f * warm);
+    /* Two soft boxes: a large warm one to the right, a slender cool one to the left. */
+    if (fabsf(azimuth - 0.9f) < 0.45f && fabsf(height - 0.55f) < 0.22f)
+        for (int i = 0; i < 3; i++)
+            rgb[i] += (const float[3]){6, 5, 4}[i];
+    if (fabsf(azimuth + 1.3f) < 0.18f && fabsf(height - 0.4f) < 0.35f)
+        for (int i = 0; i < 3; i++)
+            rgb[i] += (const float[3]){2.2f, 2.8f, 3.6f}[i];
+}
+
+/* Radiance's own format, without run lengths: https://radsite.lbl.gov/radiance/refer/filefmts.pdf */
+static bool write_sky(const char *path)
+{
+    enum { WIDTH = 512, HEIGHT = 256 };
+    FILE *file = fopen(path, "wb");
+    if (!file) {
+        fprintf(stderr, "make_scenes: %s: %s\n", path, strerror(errno));
+        return false;
+    }
+    fprintf(file, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n", HEIGHT, WIDTH);
+    for (int y = 0; y < HEIGHT; y++) {
+        for (int x = 0; x < WIDTH; x++) {
+            float rgb[3];
+            sky_radiance(rgb, cosf(3.14159265f * ((float)y + 0.5f) / HEIGHT),
+                         6.2831853f * (((float)x + 0.5f) / WIDTH - 0.5f));
+            int exponent;
+            const float mantissa = frexpf(fmaxf(rgb[0], fmaxf(rgb[1], rgb[2])), &exponent);
+            const float scale = mantissa * 256 / fmaxf(rgb[0], fmaxf(rgb[1], rgb[2]));
+            const unsigned char rgbe[4] = {(unsigned char)(rgb[0] * scale), (unsigned char)(rgb[1] * scale),
+                                           (unsigned char)(rgb[2] * scale), (unsigned char)(exponent + 128)};
+            fwrite(rgbe, 1, 4, file);
+        }
+    }
+    const bool written = !ferror(file);
+    if (fclose(file) != 0 || !written) {
+        fprintf(stderr, "make_scenes: %s: %s\n", path, strerror(errno));
+        return false;
+    }
+    return true;
+}
+
 static bool write_bumpy(const char *path, uint32_t thousand_triangles)
 {
     struct glb_part parts[] = {{"ball", {0}, white}, {"floor", {0}, gold}};
@@ -181,6 +233,8 @@ int main(int argc, char **argv)
     bool ok = write_cornell(path);
     snprintf(path, sizeof path, "%s/teapot.glb", argv[1]);
     ok &= write_teapot(path);
+    snprintf(path, sizeof path, "%s/sky.hdr", argv[1]);
+    ok &= write_sky(path);
     for (int levels = 2; levels <= 4; levels++) {
         snprintf(path, sizeof path, "%s/sphereflake-%d.nff", argv[1], levels);
         ok &= write_sphereflake(path, levels);

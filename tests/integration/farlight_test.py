@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""What the integration tests share: the programs, a daemon, the bundled scenes, and a PNG reader."""
+import os
+import pathlib
+import shutil
+import signal
+import struct
+import subprocess
+import tempfile
+import unittest
+import zlib
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BIN = pathlib.Path(os.environ.get("FARLIGHT_BIN", ROOT / "build" / "release"))
+SHARED_SCENES = pathlib.Path(os.environ.get("FARLIGHT_SCENES", ROOT.parent / "shared" / "scenes"))
+TIMEOUT_S = 240  # sanitizers and software GL together are slow
+
+_bundled = None
+
+
+def bundled_scenes():
+    """Folder with the scenes of the project's own generator; made once per run."""
+    global _bundled
+    if _bundled is None:
+        _bundled = tempfile.mkdtemp(prefix="farlight-scenes-")
+        subprocess.run([BIN / "tests/tools/make_scenes", _bundled], check=True)
+    return pathlib.Path(_bundled)
+
+
+def tearDownModule():  # pylint: disable=invalid-name
+    if _bundled:
+        shutil.rmtree(_bundled, ignore_errors=True)
+
+
+def run(program, *arguments, timeout=TIMEOUT_S, **options):
+    """Runs one of the programs to its end; text output unless text=False is given."""
+    options.setdefault("text", True)
+    return subprocess.run([BIN / program, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          check=False, timeout=timeout, **options)
+
+
+def farlight(*arguments, **options):
+    return run("farlight", *arguments, **options)
+
+
+class Daemon:
+    """A farlightd on a socket of its own; a context manager."""
+
+    def __init__(self, *arguments, listen=None):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-daemon-"))
+        self.address = listen or f"unix:{self.folder}/farlight.sock"
+        self.arguments = list(map(str, arguments))
+        self.process = None
+        self.ready = []
+
+    def __enter__(self):
+        self.log = open(self.folder / "log", "w+")
+        self.process = subprocess.Popen([BIN / "farlightd", "--listen", self.address, *self.arguments],
+                                        stdout=subprocess.PIPE, stderr=self.log, text=True)
+        for line in self.process.stdout:
+            self.ready.append(line.strip())
+            if line.startswith("READY"):
+                return self
+        status = self.process.wait()
+        raise AssertionError(f"farlightd ended with {status}: {self.messages()}")
+
+    def messages(self):
+        self.log.flush()
+        return pathlib.Path(self.log.name).read_text()
+
+    @property
+    def path(self):
+        return self.address.removeprefix("unix:")
+
+    def stop(self, number=signal.SIGTERM, timeout=TIMEOUT_S):
+        """Ends it with a signal and returns its exit status."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        return self.process.wait(timeout)
+
+    def __exit__(self, *_):
+        try:
+            self.stop()
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self.process.stdout.close()
+        self.log.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def read_png(path):
+    """(width, height, rows of bytes, channels) of an 8-bit PNG without interlacing."""
+    data = pathlib.Path(path).read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n", f"{path} is no PNG"
+    at, packed, header = 8, b"", None
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        body = data[at + 8:at + 8 + length]
+        if kind == b"IHDR":
+            header = struct.unpack(">IIBBBBB", body)
+        elif kind == b"IDAT":
+            packed += body
+        at += 12 + length
+    width, height, depth, colour, _, _, interlace = header
+    channels = {0: 1, 2: 3, 4: 2, 6: 4}[colour]
+    assert depth == 8 and interlace == 0, header
+    raw, stride, rows = zlib.decompress(packed), width * channels, []
+    before = bytearray(stride)
+    for y in range(height):
+        kind = raw[y * (stride + 1)]
+        row = bytearray(raw[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
+        for x in range(stride):
+            left = row[x - channels] if x >= channels else 0
+            up, corner = before[x], before[x - channels] if x >= channels else 0
+            if kind == 1:
+                row[x] = (row[x] + left) & 255
+            elif kind == 2:
+                row[x] = (row[x] + up) & 255
+            elif kind == 3:
+                row[x] = (row[x] + (left + up) // 2) & 255
+            elif kind == 4:
+                a, b, c = abs(up - corner), abs(left - corner), abs(left + up - 2 * corner)
+                row[x] = (row[x] + (left if a <= b and a <= c else up if b <= c else corner)) & 255
+        rows.append(bytes(row))
+        before = row
+    return width, height, rows, channels
+
+
+def grid_means(path, cells=8):
+    """Mean red, green and blue of cells x cells parts of a PNG, row by row: a picture's stored figures."""
+    width, height, rows, channels = read_png(path)
+    means = []
+    for cy in range(cells):
+        for cx in range(cells):
+            y0, y1 = cy * height // cells, (cy + 1) * height // cells
+            x0, x1 = cx * width // cells, (cx + 1) * width // cells
+            count = (y1 - y0) * (x1 - x0)
+            means.append([round(sum(sum(rows[y][x0 * channels + c:x1 * channels:channels]) for y in range(y0, y1))
+                                / count, 1) for c in range(3)])
+    return means
+
+
+def needs_shared_scenes(test):
+    return unittest.skipUnless(SHARED_SCENES.is_dir(), f"no folder of models at FARLIGHT_SCENES ({SHARED_SCENES.name})")(test)
+
+
+class Case(unittest.TestCase):
+    """A test with a folder of its own."""
+
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-test-"))
+        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+
+    def expect(self, result, status):
+        self.assertEqual(result.returncode, status, f"\nstdout: {result.stdout}\nstderr: {result.stderr}")
+        return result
+
+    def leftovers(self):
+        """Files in the test's folder, for the promise 'complete or not at all'."""
+        return sorted(str(p.relative_to(self.folder)) for p in self.folder.rglob("*") if p.is_file())

@@ -1,0 +1,388 @@
+# SPDX-License-Identifier: MIT
+"""Raw bytes to a real daemon: what a careless, broken or hostile client gets, and that nobody else notices.
+
+Each test that misbehaves ends with `assert_alive`: a bystander, connected all the while, still gets its answer.
+"""
+import os
+import pathlib
+import random
+import signal
+import socket
+import stat
+import struct
+import time
+
+import farlight_test
+from farlight_test import Case, Daemon, bundled_scenes, farlight
+
+OK, ERROR, PING, PONG, GOODBYE, CANCEL, STATS, STATS_REPLY = 1, 2, 3, 4, 5, 6, 9, 10
+SCENE_OPEN, BLOB_OFFER, BLOB_NEED, BLOB_DATA, EDIT_BEGIN, EDIT_COMMIT = 0x101, 0x110, 0x111, 0x112, 0x120, 0x121
+SET_NODE, SET_DISC, RENDER = 0x130, 0x133, 0x201
+PROTOCOL, INVALID, UNKNOWN_ID, LIMIT = 1, 3, 4, 6
+IDENTITY = (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0)
+
+
+def hello(version_min=1, version_max=1, name=b"test"):
+    data = b"FARL" + struct.pack("<HHQ", version_min, version_max, 0) + os.urandom(16) + bytes([len(name)]) + name
+    return data + bytes(-len(data) % 8)
+
+
+def message(kind, request, fixed=b"", counted=b"", channel=0):
+    payload = struct.pack("<H", len(fixed)) + fixed + counted
+    return struct.pack("<IHHII", len(payload), kind, 0, request, channel) + payload + bytes(-len(payload) % 8)
+
+
+def text(value):
+    return struct.pack("<I", len(value)) + value.encode()
+
+
+def set_node(node, parent=0, kind=0, thing=0, matrix=IDENTITY):
+    return struct.pack("<5I12f", node, parent, kind, thing, 0, *matrix)
+
+
+class Peer:
+    """A client of raw bytes."""
+
+    def __init__(self, daemon, greet=True):
+        self.socket = socket.socket(socket.AF_UNIX)
+        self.socket.settimeout(60)
+        self.socket.connect(daemon.path)
+        self.buffer = b""
+        if greet:
+            self.socket.sendall(hello())
+            self.read_reply()
+
+    def read(self, count):
+        while len(self.buffer) < count:
+            more = self.socket.recv(65536)
+            if not more:
+                raise EOFError("the daemon closed the connection")
+            self.buffer += more
+        data, self.buffer = self.buffer[:count], self.buffer[count:]
+        return data
+
+    def read_reply(self):
+        head = self.read(48)
+        magic, version, limits = head[:4], *struct.unpack("<HH", head[4:8])
+        assert magic == b"FARL", magic
+        rest = self.read(limits + 1)
+        count = 48 + limits + 1 + rest[-1]
+        self.read(rest[-1])
+        note = self.read(self.read(1)[0])
+        self.read(-(count + 1 + len(note)) % 8)
+        return version, note.decode()
+
+    def send(self, *arguments, **options):
+        self.socket.sendall(message(*arguments, **options))
+
+    def receive(self):
+        """(type, request, payload) of the next message."""
+        size, kind, _, request, _ = struct.unpack("<IHHII", self.read(16))
+        payload = self.read(size)
+        self.read(-size % 8)
+        return kind, request, payload
+
+    def answer(self, request):
+        """The answer to a request, past credit and other talk."""
+        while True:
+            kind, of, payload = self.receive()
+            if of == request and kind in (OK, ERROR, PONG, STATS_REPLY, BLOB_NEED):
+                return kind, payload
+
+    def until_closed(self):
+        """Everything that still comes before the daemon closes."""
+        messages = []
+        try:
+            while True:
+                messages.append(self.receive())
+        except (EOFError, ConnectionResetError):
+            return messages
+
+    def close(self):
+        self.socket.close()
+
+
+def error_code(payload):
+    return struct.unpack_from("<I", payload, 2)[0]
+
+
+def error_text(payload):
+    return payload[2 + struct.unpack_from("<H", payload)[0]:].decode(errors="replace")
+
+
+class Hostile(Case):
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Daemon()
+        cls.daemon.__enter__()
+        cls.bystander = Peer(cls.daemon)
+        cls.pings = 0
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.bystander.close()
+        cls.daemon.__exit__()
+
+    def assert_alive(self):
+        type(self).pings += 1
+        self.bystander.send(PING, self.pings, struct.pack("<Q", 42))
+        kind, payload = self.bystander.answer(self.pings)
+        self.assertEqual(kind, PONG)
+        self.assertEqual(struct.unpack_from("<Q", payload, 2)[0], 42)
+
+    def test_a_wrong_magic_is_closed(self):
+        peer = Peer(self.daemon, greet=False)
+        peer.socket.sendall(b"GET / HTTP/1.1\r\n\r\n")
+        peer.until_closed()
+        self.assert_alive()
+
+    def test_another_version_is_told_which_ones_there_are(self):
+        peer = Peer(self.daemon, greet=False)
+        peer.socket.sendall(hello(77, 99))
+        version, note = peer.read_reply()
+        self.assertEqual(version, 0)
+        self.assertIn("1", note)
+        self.assertEqual(peer.until_closed(), [])
+        self.assert_alive()
+
+    def test_random_bytes_are_answered_with_an_error_and_closed(self):
+        seeded = random.Random(1)
+        for _ in range(50):
+            peer = Peer(self.daemon)
+            try:
+                peer.socket.sendall(seeded.randbytes(seeded.randrange(16, 4096)))
+                peer.socket.shutdown(socket.SHUT_WR)
+            except OSError:
+                pass  # closed while we were still talking
+            for kind, request, payload in peer.until_closed():
+                if kind == ERROR and request == 0:
+                    self.assertEqual(error_code(payload), PROTOCOL, error_text(payload))
+            peer.close()
+        self.assert_alive()
+
+    def test_an_unknown_type_is_fatal_and_one_with_the_top_bit_is_skipped(self):
+        peer = Peer(self.daemon)
+        peer.send(0xBEEF, 1)
+        peer.send(PING, 2, struct.pack("<Q", 1))
+        self.assertEqual(peer.answer(2)[0], PONG)
+        peer.send(0x3EEF, 3)
+        kinds = [kind for kind, _, _ in peer.until_closed()]
+        self.assertIn(ERROR, kinds)
+        self.assert_alive()
+
+    def test_too_much_is_refused_before_it_has_come(self):
+        peer = Peer(self.daemon)
+        peer.socket.sendall(struct.pack("<IHHII", 0xFFFFFFF0, BLOB_DATA, 0, 1, 1))
+        self.assertIn(ERROR, [kind for kind, _, _ in peer.until_closed()])
+        self.assert_alive()
+
+    def test_half_a_message_and_a_vanished_client_cost_nobody_else(self):
+        whole = message(SCENE_OPEN, 1, struct.pack("<I", 1), text("half"))
+        for count in range(len(whole)):
+            peer = Peer(self.daemon)
+            peer.socket.sendall(whole[:count])
+            peer.close()
+        self.assert_alive()
+
+    def test_a_message_byte_by_byte_is_a_message(self):
+        peer = Peer(self.daemon, greet=False)
+        for byte in hello():
+            peer.socket.sendall(bytes([byte]))
+        peer.read_reply()
+        for byte in message(PING, 5, struct.pack("<Q", 9)):
+            peer.socket.sendall(bytes([byte]))
+        self.assertEqual(peer.answer(5)[0], PONG)
+        peer.close()
+
+    def test_a_message_of_the_server_from_a_client_is_refused(self):
+        peer = Peer(self.daemon)
+        peer.send(OK, 1, struct.pack("<Q", 0))
+        self.assertIn(ERROR, [kind for kind, _, _ in peer.until_closed()])
+        self.assert_alive()
+
+
+class Sessions(Case):
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Daemon()
+        cls.daemon.__enter__()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.daemon.__exit__()
+
+    def setUp(self):
+        super().setUp()
+        self.peer = Peer(self.daemon)
+        self.addCleanup(self.peer.close)
+
+    def open_scene(self):
+        self.peer.send(SCENE_OPEN, 1, struct.pack("<I", 1), text("test"))
+        self.assertEqual(self.peer.answer(1)[0], OK)
+
+    def transact(self, request, *edits):
+        self.peer.send(EDIT_BEGIN, request, struct.pack("<I", 1))
+        for kind, fixed, counted in edits:
+            self.peer.send(kind, request, fixed, counted)
+        self.peer.send(EDIT_COMMIT, request)
+        return self.peer.answer(request)
+
+    def test_revisions_count_transactions_and_a_failed_one_changes_nothing(self):
+        self.open_scene()
+        kind, payload = self.transact(2, (SET_NODE, set_node(1), text("a")))
+        self.assertEqual((kind, struct.unpack_from("<Q", payload, 2)[0]), (OK, 1))
+        kind, payload = self.transact(3, (SET_NODE, set_node(2), text("b")), (SET_NODE, set_node(3, parent=99), text("c")))
+        self.assertEqual(kind, ERROR)
+        self.assertIn("parent", error_text(payload))
+        # Had node 2 been made, it could be a parent now.
+        kind, payload = self.transact(4, (SET_NODE, set_node(4, parent=2), text("d")))
+        self.assertEqual(kind, ERROR, "the failed transaction left node 2 behind")
+        kind, payload = self.transact(5, (SET_NODE, set_node(5, parent=1), text("e")))
+        self.assertEqual((kind, struct.unpack_from("<Q", payload, 2)[0]), (OK, 2))
+
+    def test_a_cycle_of_nodes_is_refused(self):
+        self.open_scene()
+        kind, _ = self.transact(2, (SET_NODE, set_node(1, parent=2), text("")), (SET_NODE, set_node(2, parent=1), text("")))
+        self.assertEqual(kind, ERROR)
+
+    def test_not_a_number_is_refused_by_its_field(self):
+        self.open_scene()
+        for bad in (float("nan"), float("inf")):
+            peer = Peer(self.daemon)
+            peer.send(SCENE_OPEN, 1, struct.pack("<I", 1), text("x"))
+            peer.answer(1)
+            peer.send(EDIT_BEGIN, 2, struct.pack("<I", 1))
+            peer.send(SET_NODE, 2, set_node(1, matrix=(bad,) + IDENTITY[1:]), text(""))
+            errors = [error_text(payload) for kind, _, payload in self.drain(peer) if kind == ERROR]
+            self.assertTrue(any("parent_from_node" in line for line in errors), errors)
+            peer.close()
+
+    def drain(self, peer):
+        """Messages up to an error or the end of the connection."""
+        messages = []
+        try:
+            while not messages or messages[-1][0] not in (ERROR, GOODBYE):
+                messages.append(peer.receive())
+        except EOFError:
+            pass
+        return messages
+
+    def test_unknown_scenes_and_channels_are_errors_of_that_request_alone(self):
+        self.peer.send(EDIT_BEGIN, 7, struct.pack("<I", 12))
+        self.peer.send(EDIT_COMMIT, 7)
+        kind, payload = self.peer.answer(7)
+        self.assertEqual((kind, error_code(payload)), (ERROR, UNKNOWN_ID))
+        self.peer.send(CANCEL, 8, struct.pack("<I", 4711))
+        self.assertIn(self.peer.answer(8)[0], (OK, ERROR))
+        self.peer.send(PING, 9, struct.pack("<Q", 1))
+        self.assertEqual(self.peer.answer(9)[0], PONG)
+
+    def test_a_blob_with_other_bytes_than_its_hash_is_refused(self):
+        name = bytes(32)
+        self.peer.send(BLOB_OFFER, 2, b"", struct.pack("<I", 1) + struct.pack("<Q", 8) + name)
+        kind, payload = self.peer.answer(2)
+        self.assertEqual(kind, BLOB_NEED)
+        body = struct.pack("<Q", 0) + name
+        padding = -(2 + len(body) + 4) % 8
+        self.peer.send(BLOB_DATA, 3, body, struct.pack("<I", 8) + bytes(padding) + b"12345678", channel=1)
+        kind, payload = self.peer.answer(3)
+        self.assertEqual(kind, ERROR)
+        self.assertIn("hash", error_text(payload))
+
+    def test_stats_are_answered_while_others_render(self):
+        self.peer.send(STATS, 2)
+        kind, payload = self.peer.answer(2)
+        self.assertEqual(kind, STATS_REPLY)
+        self.assertGreater(len(payload), 100)
+
+
+class Listening(Case):
+    def test_the_socket_is_not_for_the_world(self):
+        with Daemon() as daemon:
+            mode = stat.S_IMODE(os.stat(daemon.path).st_mode)
+            self.assertEqual(mode & 0o007, 0, oct(mode))
+
+    def test_a_live_daemon_keeps_its_socket_and_a_stale_one_is_replaced(self):
+        with Daemon() as first:
+            second = farlight_test.run("farlightd", "--listen", first.address)
+            self.expect(second, 1)
+            self.assertIn(first.path, second.stderr)
+            Peer(first).close()
+            path = first.path
+            first.process.send_signal(signal.SIGKILL)
+            first.process.wait()
+            self.assertTrue(pathlib.Path(path).exists(), "a killed daemon leaves its socket file")
+            with Daemon(listen=first.address) as third:
+                Peer(third).close()
+
+    def test_it_ends_on_sigterm_says_goodbye_and_removes_its_socket(self):
+        with Daemon() as daemon:
+            peer = Peer(daemon)
+            self.assertEqual(daemon.stop(), 0, daemon.messages())
+            self.assertIn(GOODBYE, [kind for kind, _, _ in peer.until_closed()])
+            self.assertFalse(pathlib.Path(daemon.path).exists())
+
+    def test_tcp_on_loopback_serves_and_elsewhere_is_refused(self):
+        with Daemon(listen="tcp:127.0.0.1:0") as daemon:
+            address = next(word for line in daemon.ready for word in line.split() if word.startswith("tcp:"))
+            self.expect(farlight("stats", "--server", address), 0)
+        refused = farlight_test.run("farlightd", "--listen", "tcp:0.0.0.0:0")
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("--insecure", refused.stderr)
+
+    def test_bad_options_and_configurations_are_named(self):
+        self.assertEqual(farlight_test.run("farlightd", "--no-such-option").returncode, 2)
+        self.assertNotEqual(farlight_test.run("farlightd", "--listen", "carrier-pigeon:x").returncode, 0)
+        path = self.folder / "bad.conf"
+        path.write_text("[limits]\n\nno_such_key = 3\n")
+        result = farlight_test.run("farlightd", "--config", path, "--listen", f"unix:{self.folder}/s")
+        self.assertNotEqual(result.returncode, 0)
+        self.assertIn("bad.conf:3", result.stderr)
+        self.assertIn("no_such_key", result.stderr)
+
+    def test_help_version_and_devices_go_to_standard_output(self):
+        for option in ("--help", "--version", "--list-devices"):
+            result = self.expect(farlight_test.run("farlightd", option), 0)
+            self.assertTrue(result.stdout.strip(), option)
+
+    def test_clients_come_and_go_without_leaving_descriptors(self):
+        with Daemon() as daemon:
+            folder = f"/proc/{daemon.process.pid}/fd"
+            Peer(daemon).close()
+            time.sleep(0.5)
+            before = len(os.listdir(folder))
+            for _ in range(200):
+                Peer(daemon).close()
+            time.sleep(0.5)
+            self.assertLessEqual(len(os.listdir(folder)), before)
+
+
+class Jobs(Case):
+    def test_a_vanished_client_does_not_leave_its_job_running(self):
+        with Daemon() as daemon:
+            child = farlight_test.subprocess.Popen(
+                [farlight_test.BIN / "farlight", "animate", bundled_scenes() / "teapot.glb", "--server", daemon.address,
+                 "--frames", "1-1000", "--orbit", "--size", "320x240", "-o", self.folder / "%04d.png"],
+                stdout=farlight_test.subprocess.DEVNULL, stderr=farlight_test.subprocess.DEVNULL)
+            deadline = time.monotonic() + farlight_test.TIMEOUT_S
+            while not list(self.folder.glob("*.png")) and time.monotonic() < deadline:
+                time.sleep(0.05)
+            child.kill()
+            child.wait()
+            peer = Peer(daemon)
+            jobs = None
+            for request in range(1, 200):
+                peer.send(STATS, request)
+                kind, payload = peer.answer(request)
+                self.assertEqual(kind, STATS_REPLY)
+                # uptime frames rays host host_limit device device_limit blob_bytes: 8 u64; then blobs, jobs: u32
+                jobs = struct.unpack_from("<I", payload, 2 + 8 * 8 + 4)[0]
+                if jobs == 0:
+                    break
+                time.sleep(0.1)
+            self.assertEqual(jobs, 0)
+            peer.close()
+
+
+if __name__ == "__main__":
+    farlight_test.unittest.main()

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: MIT
+"""What a person does with `farlight`: pictures of the bundled scenes, with and without a daemon.
+
+Pictures are compared with stored figures: the mean colour of 8 x 8 parts. `python3 test_render.py --update` writes
+them anew after a change that is meant to change pictures; look at the pictures first.
+"""
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import farlight_test
+from farlight_test import BIN, Case, Daemon, bundled_scenes, farlight, grid_means, read_png
+
+FIGURES = farlight_test.ROOT / "tests/integration/figures.json"
+# Two of 255 in the mean over a cell of 20 x 15 pixels: what another driver's rounding and rasterisation may move at
+# edges, and far less than any fault of shading does.
+TOLERANCE = 2.0
+PICTURES = {
+    "cornell": ("cornell.glb", []),
+    "teapot": ("teapot.glb", []),
+    "sphereflake-2": ("sphereflake-2.nff", []),
+}
+
+
+def render_picture(name, output, *more):
+    model, options = PICTURES[name]
+    return farlight("render", bundled_scenes() / model, "-o", output, "--size", "160x120", "--samples", "4",
+                    *options, *more)
+
+
+class Pictures(Case):
+    def test_bundled_scenes_look_as_stored(self):
+        stored = json.loads(FIGURES.read_text())
+        for name in PICTURES:
+            with self.subTest(scene=name):
+                path = self.folder / f"{name}.png"
+                self.expect(render_picture(name, path), 0)
+                for cell, (got, want) in enumerate(zip(grid_means(path), stored[name])):
+                    for channel in range(3):
+                        self.assertAlmostEqual(got[channel], want[channel], delta=TOLERANCE,
+                                               msg=f"{name}, cell {cell % 8},{cell // 8}, channel {channel}")
+
+    def test_raster_and_traced_primaries_give_the_same_picture(self):
+        paths = []
+        for primary in ("raster", "trace"):
+            paths.append(self.folder / f"{primary}.png")
+            self.expect(render_picture("teapot", paths[-1], "--primary", primary), 0)
+        for got, want in zip(grid_means(paths[0]), grid_means(paths[1])):
+            for channel in range(3):
+                self.assertAlmostEqual(got[channel], want[channel], delta=TOLERANCE)
+
+    def test_boxes_spheres_and_brute_force_give_the_same_picture(self):
+        variants = {"box": ["--bvh-bounds", "box"], "sphere": ["--bvh-bounds", "sphere"],
+                    "naive": ["--tracer", "naive"]}
+        means = {}
+        for name, options in variants.items():
+            path = self.folder / f"{name}.png"
+            self.expect(render_picture("sphereflake-2", path, *options), 0)
+            means[name] = grid_means(path)
+        for name in ("sphere", "naive"):
+            for got, want in zip(means[name], means["box"]):
+                for channel in range(3):
+                    self.assertAlmostEqual(got[channel], want[channel], delta=0.5, msg=name)
+
+    def test_the_same_seed_gives_the_same_bytes(self):
+        paths = [self.folder / "a.png", self.folder / "b.png"]
+        for path in paths:
+            self.expect(render_picture("teapot", path, "--seed", "7"), 0)
+        self.assertEqual(read_png(paths[0])[2], read_png(paths[1])[2])
+
+
+class Outputs(Case):
+    def test_every_format_is_written_and_nothing_else(self):
+        magics = {"png": b"\x89PNG", "jpg": b"\xff\xd8\xff", "exr": b"\x76\x2f\x31\x01", "hdr": b"#?RADIANCE"}
+        for ending, magic in magics.items():
+            path = self.folder / f"picture.{ending}"
+            self.expect(render_picture("cornell", path), 0)
+            self.assertTrue(path.read_bytes().startswith(magic), ending)
+        self.assertEqual(self.leftovers(), sorted(f"picture.{ending}" for ending in magics))
+
+    def test_exr_metadata_holds_camera_revision_tracer_and_times(self):
+        path = self.folder / "picture.exr"
+        self.expect(render_picture("cornell", path), 0)
+        head = path.read_bytes()[:65536]
+        for attribute in (b"worldToCamera", b"farlight/revision", b"farlight/tracer", b"farlight/"):
+            self.assertIn(attribute, head)
+
+    def test_standard_output_gets_the_picture_and_no_talk(self):
+        result = farlight("render", bundled_scenes() / "cornell.glb", "-o", "-", "--format", "png", "--size", "32x24",
+                          "--timings", text=False)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertTrue(result.stdout.startswith(b"\x89PNG"), result.stdout[:40])
+        self.assertTrue(result.stdout.endswith(b"IEND\xaeB`\x82"), "text after the picture")
+
+    def test_timings_as_json_name_every_stage(self):
+        path = self.folder / "picture.png"
+        result = self.expect(render_picture("teapot", path, "--timings=json"), 0)
+        lines = [json.loads(line) for line in result.stdout.splitlines()]
+        text = json.dumps(lines)
+        for stage in ("apply", "build", "upload", "primary", "trace", "shade", "resolve", "readback", "encode", "queue",
+                      "send"):
+            self.assertIn(f'"{stage}"', text)
+
+    def test_an_animation_writes_every_frame_and_turns(self):
+        pattern = self.folder / "frames" / "%04d.png"
+        pattern.parent.mkdir()
+        self.expect(farlight("animate", bundled_scenes() / "sphereflake-2.nff", "--frames", "1-4", "--fps", "24",
+                             "--orbit", "--size", "64x48", "-o", pattern), 0)
+        self.assertEqual(self.leftovers(), [f"frames/{n:04d}.png" for n in range(1, 5)])
+        pictures = {read_png(self.folder / name)[2][24] for name in self.leftovers()}
+        self.assertEqual(len(pictures), 4, "frames of an orbit must differ")
+
+
+class BadInput(Case):
+    def refused(self, status, *arguments, says=()):
+        result = self.expect(farlight(*arguments), status)
+        for word in says:
+            self.assertIn(word, result.stderr)
+        self.assertEqual(self.leftovers(), [])
+        return result
+
+    def test_each_mistake_is_named_and_leaves_nothing_behind(self):
+        cornell, output = bundled_scenes() / "cornell.glb", self.folder / "x.png"
+        self.refused(1, "render", self.folder / "missing.glb", "-o", output, says=["missing.glb"])
+        self.refused(2, "render", cornell, "-o", output, "--tracer", "magic", says=["magic", "bvh"])
+        self.refused(2, "render", cornell, "-o", output, "--size", "0x10", says=["0x10"])
+        self.refused(2, "render", cornell, "-o", output, "--size", "99999x99999", says=["8192"])
+        self.refused(2, "render", cornell, "-o", output, "--fov", "nan", says=["nan"])
+        self.refused(2, "render", cornell, "-o", output, "--eye", "1,inf,0", "--look-at", "0,0,0", says=["inf"])
+        self.refused(2, "render", cornell, says=["-o"])
+        self.refused(2, "render", says=["MODEL"])
+        self.refused(2, "render", cornell, "-o", output, "--no-such-option")
+        self.refused(1, "render", cornell, "-o", self.folder / "no" / "x.png", says=["no"])
+        self.refused(1, "render", cornell, "-o", output, "--server", f"unix:{self.folder}/nobody.sock",
+                     says=["nobody.sock"])
+        self.refused(1, "render", cornell, "-o", output, "--camera", "no such camera", says=["no such camera"])
+        self.refused(2, "animate", cornell, "--frames", "1-4", "-o", self.folder / "%s.png", says=["%"])
+
+    def test_a_model_that_is_no_model_is_refused_by_name(self):
+        path = self.folder / "rubbish.glb"
+        path.write_bytes(b"glTF\x02\0\0\0" + bytes(range(256)) * 3)
+        result = farlight("render", path, "-o", self.folder / "x.png")
+        self.expect(result, 1)
+        self.assertIn("rubbish.glb", result.stderr)
+        self.assertEqual(self.leftovers(), ["rubbish.glb"])
+
+    def test_a_full_disk_is_reported_and_leaves_no_half_file(self):
+        result = subprocess.run(["sh", "-c", 'ulimit -f 8; exec "$0" "$@"', BIN / "farlight", "render",
+                                 bundled_scenes() / "cornell.glb", "-o", self.folder / "x.exr", "--float", "--size",
+                                 "320x240"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False,
+                                timeout=farlight_test.TIMEOUT_S)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn("x.exr", result.stderr)
+        self.assertEqual(self.leftovers(), [])
+
+    def test_an_interrupt_ends_an_animation_cleanly(self):
+        pattern = self.folder / "%04d.png"
+        child = subprocess.Popen([BIN / "farlight", "animate", bundled_scenes() / "teapot.glb", "--frames", "1-500",
+                                  "--orbit", "--size", "320x240", "-o", pattern], stdout=subprocess.PIPE,
+                                 stderr=subprocess.PIPE, text=True)
+        deadline = time.monotonic() + farlight_test.TIMEOUT_S
+        while not any(self.folder.iterdir()) and time.monotonic() < deadline and child.poll() is None:
+            time.sleep(0.05)
+        child.send_signal(signal.SIGINT)
+        _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
+        self.assertEqual(child.returncode, 130, errors)
+        for name in self.leftovers():
+            read_png(self.folder / name)  # complete, or it would not be here
+
+
+class ThroughADaemon(Case):
+    def test_the_second_upload_moves_no_bulk_data(self):
+        with Daemon() as daemon:
+            bulk = []
+            for number in range(2):
+                self.expect(render_picture("teapot", self.folder / f"{number}.png", "--server", daemon.address), 0)
+                lines = self.expect(render_picture("teapot", self.folder / f"{number}.png", "--server", daemon.address,
+                                                   "--timings=json"), 0).stdout
+                bulk.append(lines)
+            self.assertEqual(read_png(self.folder / "0.png")[2], read_png(self.folder / "1.png")[2])
+            for line in bulk[1].splitlines():
+                record = json.loads(line)
+                if "bulk_bytes" in record:
+                    self.assertEqual(record["bulk_bytes"], 0)
+                    break
+            else:
+                self.fail("no bulk_bytes in the timings")
+
+    def test_stats_name_the_device_and_the_stages(self):
+        with Daemon() as daemon:
+            self.expect(render_picture("cornell", self.folder / "x.png", "--server", daemon.address), 0)
+            record = json.loads(self.expect(farlight("stats", "--server", daemon.address, "--json"), 0).stdout)
+            self.assertTrue(record["device"])
+            self.assertGreaterEqual(record["frames"], 1)
+
+    def test_info_counts_what_is_in_a_file(self):
+        text = self.expect(farlight("info", bundled_scenes() / "cornell.glb"), 0).stdout
+        for word in ("triangles", "materials", "lights", "cameras"):
+            self.assertIn(word, text)
+
+
+def update_figures():
+    figures = {}
+    for name in PICTURES:
+        path = f"/tmp/farlight-{os.getpid()}-{name}.png"
+        result = render_picture(name, path)
+        if result.returncode:
+            sys.exit(result.stderr)
+        figures[name] = grid_means(path)
+        os.unlink(path)
+    FIGURES.write_text("{\n" + ",\n".join(f'"{name}": {json.dumps(means)}' for name, means in figures.items()) + "\n}\n")
+
+
+if __name__ == "__main__":
+    if "--update" in sys.argv:
+        update_figures()
+    else:
+        farlight_test.unittest.main()

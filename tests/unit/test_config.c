@@ -1,0 +1,155 @@
+/* SPDX-License-Identifier: MIT */
+/* config: rows, sources, errors that name the place. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "config.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static bool read_text(struct config *config, const char *text, struct error *error)
+{
+    char path[] = "/tmp/farlight-config-XXXXXX";
+    int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    assert_int_equal(write(fd, text, strlen(text)), strlen(text));
+    close(fd);
+    config_defaults(config);
+    bool ok = config_read_file(config, path, false, error);
+    unlink(path);
+    return ok;
+}
+
+static void the_defaults_are_within_their_own_bounds(void **state)
+{
+    (void)state;
+    struct config config;
+    config_defaults(&config);
+    assert_int_equal(config.connection.handshake_ms, 5000);
+    assert_int_equal(config.connection.idle_ms, 120000);
+    assert_int_equal(config.connection.queued_hard_bytes, 64 << 20);
+    assert_int_equal(config.limits.requests_in_flight, 64);
+    assert_int_equal(config.limits.unauthenticated_per_address, 8);
+    assert_int_equal(config.limits.samples, 65536);
+    assert_int_equal(config.limits.upload_window_bytes, 16 << 20);
+    assert_int_not_equal(config.scene_bytes, 0);
+    assert_string_equal(config.device, "auto");
+    assert_false(config.insecure);
+}
+
+static void a_file_sets_numbers_with_units_texts_and_switches(void **state)
+{
+    (void)state;
+    struct config config;
+    struct error error = {0};
+    assert_true(read_text(&config, "[limits]\nclients = 3\nupload_window=2M\n; note\n[server]\ninsecure = yes\n"
+                                   "listen = unix:/a tcp:[::1]:0\nlog_level = debug\n[memory]\nblob_cache = 0%\n",
+                          &error));
+    assert_int_equal(config.limits.clients, 3);
+    assert_int_equal(config.limits.upload_window_bytes, 2 << 20);
+    assert_true(config.insecure);
+    assert_string_equal(config.listen, "unix:/a tcp:[::1]:0");
+    assert_int_equal(config.log_level, 3);
+    assert_int_equal(config.limits.blob_cache_bytes, 0);
+}
+
+static void a_mistake_is_told_with_its_file_line_and_key(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *place, *what;
+    } cases[] = {
+        {"[limits]\n\nclientz = 3\n", ":3", "limits.clientz"},
+        {"[limits]\nclients = 0\n", ":2", "1 .. 65536"},
+        {"[limits]\nclients = 12x\n", ":2", "12x"},
+        {"[limits]\nclients = -1\n", ":2", "-1"},
+        {"[limits]\nclients = 99999999999999999999999\n", ":2", "no number"},
+        {"[memory]\nscene = 101%\n", ":2", "101%"},
+        {"[memory]\nscene = 18446744073709551615T\n", ":2", "no number"},
+        {"[server]\ninsecure = perhaps\n", ":2", "perhaps"},
+        {"[server]\nlog_level = loud\n", ":2", "loud"},
+        {"clients = 3\n", ":1", "clients"},
+        {"[limits\nclients = 3\n", ":1", "section"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct config config;
+        struct error error = {0};
+        assert_false(read_text(&config, cases[i].text, &error));
+        if (!strstr(error.field, cases[i].place) || !strstr(error.text, cases[i].what))
+            fail_msg("%s: got \"%s: %s\"", cases[i].text, error.field, error.text);
+    }
+}
+
+static void the_environment_goes_over_the_file_and_a_flag_over_both(void **state)
+{
+    (void)state;
+    struct config config;
+    struct error error = {0};
+    assert_true(read_text(&config, "[engine]\ndevice = 1\n", &error));
+    setenv("FARLIGHT_ENGINE_DEVICE", "2", 1);
+    assert_true(config_read_environment(&config, &error));
+    assert_string_equal(config.device, "2");
+    unsetenv("FARLIGHT_ENGINE_DEVICE");
+    assert_true(config_flag(&config, "engine.device", NULL, "--device", &error));
+    assert_string_equal(config.device, "2");
+    assert_true(config_flag(&config, "engine.device", "software", "--device", &error));
+    struct engine_options options;
+    assert_true(config_engine(&config, &options, &error));
+    assert_true(options.gpu.software);
+    assert_true(config_flag(&config, "engine.device", "fast", "--device", &error));
+    assert_false(config_engine(&config, &options, &error));
+    setenv("FARLIGHT_LIMITS_CLIENTS", "none", 1);
+    error = (struct error){0};
+    assert_false(config_read_environment(&config, &error));
+    assert_string_equal(error.field, "FARLIGHT_LIMITS_CLIENTS");
+    unsetenv("FARLIGHT_LIMITS_CLIENTS");
+}
+
+static void a_missing_file_is_an_error_only_if_it_was_asked_for(void **state)
+{
+    (void)state;
+    struct config config;
+    struct error error = {0};
+    config_defaults(&config);
+    assert_true(config_read_file(&config, "/nowhere/farlightd.conf", true, &error));
+    assert_false(config_read_file(&config, "/nowhere/farlightd.conf", false, &error));
+    assert_string_equal(error.field, "/nowhere/farlightd.conf");
+}
+
+static void what_is_dumped_reads_back_the_same(void **state)
+{
+    (void)state;
+    struct config config, again;
+    struct error error = {0};
+    assert_true(read_text(&config, "[limits]\nclients = 77\n[memory]\nscene = 3G\n[server]\ninsecure = yes\n", &error));
+    char *text = NULL;
+    size_t bytes;
+    FILE *stream = open_memstream(&text, &bytes);
+    assert_true(config_dump(&config, stream));
+    fclose(stream);
+    assert_non_null(strstr(text, "\nclients = 77\n"));
+    assert_non_null(strstr(text, "\n#requests = 64\n"));
+    if (!read_text(&again, text, &error))
+        fail_msg("%s: %s", error.field, error.text);
+    assert_memory_equal(&again, &config, sizeof config);
+    free(text);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_defaults_are_within_their_own_bounds),
+        cmocka_unit_test(a_file_sets_numbers_with_units_texts_and_switches),
+        cmocka_unit_test(a_mistake_is_told_with_its_file_line_and_key),
+        cmocka_unit_test(the_environment_goes_over_the_file_and_a_flag_over_both),
+        cmocka_unit_test(a_missing_file_is_an_error_only_if_it_was_asked_for),
+        cmocka_unit_test(what_is_dumped_reads_back_the_same),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
