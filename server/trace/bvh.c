@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: MIT
+#include "trace/bvh.h"
+
+#include "base/clock.h"
+#include "gpu/program.h"
+#include "shared/bindings.h"
+#include "trace/trace_program.h"
+
+#include <epoxy/gl.h>
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define BUILD_THREADS_MAX 8
+/* Elements that one ray may visit: every element of every instance, up to this. It stops a walk through damaged
+ * links, not a deep scene: a ray of the largest scenes visits some hundreds. */
+#define STEP_BUDGET_MAX (1u << 26)
+/* Coherent waves that walk together on software GL; see tests/bench/bench_bvh.c. Elsewhere a SIMD group of the
+ * hardware walks together already, and several rays an invocation cost registers; not measured there. */
+#define TOGETHER_SOFTWARE 8
+
+static unsigned build_threads(void)
+{
+    long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    return processors < 1 ? 1 : processors > BUILD_THREADS_MAX ? BUILD_THREADS_MAX : (unsigned)processors;
+}
+
+static struct bvh_settings settings_of(const struct tracer_options *options)
+{
+    bool plain = options->bvh_layout == BVH_LAYOUT_PLAIN;
+    /* Boxes are twice as fast as spheres (bench_bvh), so `auto` is boxes. */
+    bool spheres = plain || options->bvh_bounds == BVH_BOUNDS_SPHERE;
+    return (struct bvh_settings){
+        .bounds = spheres ? BVH_BOUNDS_OF_SPHERES : BVH_BOUNDS_OF_BOXES,
+        .plain = plain,
+        .threads = build_threads(),
+    };
+}
+
+static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_options *options, struct error *error)
+{
+    uint32_t together = options->bvh_rays_together;
+    if (together != 0 && together != 1 && together != 2 && together != 4 && together != 8) {
+        error_set(error, ERROR_INVALID, "options.bvh_rays_together", "1, 2, 4 or 8 rays walk together, not %u", together);
+        return NULL;
+    }
+    struct bvh *bvh = calloc(1, sizeof *bvh);
+    if (!bvh) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
+        return NULL;
+    }
+    struct bvh_settings settings = settings_of(options);
+    bvh_store_init(&bvh->store, device, &settings);
+    return &bvh->base;
+}
+
+static void bvh_reset(struct bvh *bvh)
+{
+    bvh_store_finish(&bvh->store);
+    bvh_top_finish(&bvh->top);
+    gpu_buffer_finish(bvh->store.device, &bvh->transform_buffer);
+    free(bvh->transforms);
+    bvh->transforms = NULL;
+    bvh->transform_count = 0;
+}
+
+static void bvh_destroy(struct tracer *tracer)
+{
+    struct bvh *bvh = (struct bvh *)tracer;
+    bvh_reset(bvh);
+    free(bvh);
+}
+
+/* ---- instances ---- */
+
+/* The tree's box in world space, with room for what taking the ray to object space rounds: a few units in the
+ * last place of everything that is summed up. Infinite where the sum overflows, which is right. */
+static struct bvh_world_box world_box(const struct bvh_entry *entry, vec4 world_from_object[3])
+{
+    struct bvh_world_box box;
+    for (int row = 0; row < 3; row++) {
+        const float *m = world_from_object[row];
+        float low = m[3], high = m[3], size = fabsf(m[3]);
+        for (int i = 0; i < 3; i++) {
+            float a = m[i] * entry->lower[i], b = m[i] * entry->upper[i];
+            low += fminf(a, b);
+            high += fmaxf(a, b);
+            size += fmaxf(fabsf(a), fabsf(b));
+        }
+        box.lower[row] = fmaxf(low - 8 * BVH_PAD_RELATIVE * size, -FLT_MAX);
+        box.upper[row] = fminf(high + 8 * BVH_PAD_RELATIVE * size, FLT_MAX);
+        if (!(box.lower[row] <= box.upper[row])) {
+            box.lower[row] = -FLT_MAX;
+            box.upper[row] = FLT_MAX;
+        }
+    }
+    return box;
+}
+
+/* What instance i is now. The box is empty where its geometry has no primitives. */
+static struct bvh_transform describe(const struct bvh *bvh, const struct scene_gpu *scene, uint32_t i,
+                                     struct bvh_world_box *box, bool *is_fresh)
+{
+    struct instance *instance = &scene->instances[i];
+    const struct bvh_entry *entry = bvh_store_entry(&bvh->store, instance->geometry);
+    struct bvh_transform transform = {0};
+    memcpy(transform.object_from_world, instance->object_from_world, sizeof transform.object_from_world);
+    *box = (struct bvh_world_box){{1, 1, 1}, {-1, -1, -1}};
+    *is_fresh = entry && entry->is_fresh;
+    if (!entry)
+        return transform;
+    transform.first_element = entry->first_element;
+    transform.element_count = entry->element_count;
+    transform.first_texel = entry->first_texel;
+    transform.first_primitive = scene->geometries[instance->geometry].device.first_primitive;
+    *box = world_box(entry, instance->world_from_object);
+    return transform;
+}
+
+static void set_step_budget(struct bvh *bvh)
+{
+    uint64_t steps = bvh->top.element_count;
+    for (uint32_t i = 0; i < bvh->transform_count; i++)
+        steps += bvh->transforms[i].element_count;
+    bvh->step_budget = steps < STEP_BUDGET_MAX ? (uint32_t)steps + 1 : STEP_BUDGET_MAX;
+}
+
+/* A new top tree and all transforms. */
+static bool rebuild_top(struct bvh *bvh, const struct scene_gpu *scene, struct error *error)
+{
+    uint32_t count = scene->instance_count;
+    struct bvh_world_box *boxes = malloc(((size_t)count + 1) * sizeof *boxes);
+    struct bvh_transform *transforms = malloc(((size_t)count + 1) * sizeof *transforms);
+    bool ok = boxes && transforms, is_fresh;
+    for (uint32_t i = 0; ok && i < count; i++)
+        transforms[i] = describe(bvh, scene, i, &boxes[i], &is_fresh);
+    bvh_top_finish(&bvh->top);
+    const struct bvh_settings *settings = &bvh->store.settings;
+    ok = ok && bvh_top_build(&bvh->top, boxes, count, settings->bounds, settings->plain);
+    free(boxes);
+    if (!ok) {
+        free(transforms);
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tree over %u instances", count);
+    }
+    free(bvh->transforms);
+    bvh->transforms = transforms;
+    bvh->transform_count = count;
+    bvh->base.stats.nodes_rebuilt += bvh->top.element_count;
+    return true;
+}
+
+/* Writes the transforms that changed and moves their elements. False: the top tree has to be made anew. */
+static bool refit_top(struct bvh *bvh, const struct scene_gpu *scene)
+{
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        struct bvh_world_box box;
+        bool is_fresh;
+        struct bvh_transform transform = describe(bvh, scene, i, &box, &is_fresh);
+        struct bvh_transform *old = &bvh->transforms[i];
+        bool same_place = memcmp(old->object_from_world, transform.object_from_world,
+                                 sizeof old->object_from_world) == 0;
+        if ((!same_place || is_fresh) && !bvh_top_move(&bvh->top, i, &box))
+            return false;
+        if (memcmp(old, &transform, sizeof transform) == 0)
+            continue;
+        *old = transform;
+        gpu_buffer_write(bvh->store.device, &bvh->transform_buffer, i * sizeof transform, &transform, sizeof transform);
+        bvh->base.stats.uploaded_bytes += sizeof transform;
+    }
+    bvh->base.stats.nodes_refitted += bvh_top_refit(&bvh->top);
+    return !bvh_top_is_stale(&bvh->top);
+}
+
+static bool upload_top(struct bvh *bvh, bool rebuilt, struct error *error)
+{
+    struct bvh_store *store = &bvh->store;
+    struct tracer_stats *stats = &bvh->base.stats;
+    size_t transform_bytes = bvh->transform_count * sizeof *bvh->transforms;
+    if (rebuilt) {
+        if (!gpu_buffer_upload(store->device, &bvh->transform_buffer, bvh->transforms, transform_bytes, error))
+            return false;
+        stats->uploaded_bytes += transform_bytes;
+    }
+    stats->uploaded_bytes += bvh_store_write_top(store, &bvh->top, rebuilt || store->top_lost);
+    bvh_top_settle(&bvh->top);
+    store->top_lost = false;
+    return true;
+}
+
+static bool update_instances(struct bvh *bvh, const struct scene_gpu *scene, struct stage_times *times,
+                             struct error *error)
+{
+    uint64_t start_ns = clock_now_ns();
+    /* First, since it may move the trees that the transforms point to. A tree of n leaves has at most 2 n - 1. */
+    uint64_t top_max = 2 * (uint64_t)scene->instance_count;
+    if (top_max > BVH_LEAF_FIRST_MASK)
+        return error_set(error, ERROR_LIMIT, NULL, "%u instances are too many", scene->instance_count);
+    if (!bvh_store_reserve_top(&bvh->store, (uint32_t)top_max, error))
+        return false;
+    bool refitted = bvh->transforms && bvh->transform_count == scene->instance_count && refit_top(bvh, scene);
+    if (!refitted && !rebuild_top(bvh, scene, error))
+        return false;
+    set_step_budget(bvh);
+    uint64_t built_ns = clock_now_ns();
+    stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, built_ns - start_ns);
+    bool ok = upload_top(bvh, !refitted, error);
+    stage_times_add(times, STAGE_UPLOAD, STAGE_CPU, 0, built_ns, clock_now_ns() - built_ns);
+    return ok;
+}
+
+static uint64_t node_count(const struct bvh *bvh)
+{
+    uint64_t nodes = bvh->top.element_count;
+    for (uint32_t i = 0; i < bvh->store.entry_count; i++)
+        nodes += bvh->store.entries[i].element_count;
+    return nodes;
+}
+
+static bool bvh_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
+                       struct stage_times *times, struct error *error)
+{
+    struct bvh *bvh = (struct bvh *)tracer;
+    struct tracer_stats *stats = &tracer->stats;
+    stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
+    if (!changes->geometry && !changes->instances)
+        return true;
+    bool ok = true;
+    if (changes->geometry) {
+        struct bvh_store_report report;
+        ok = bvh_store_update(&bvh->store, scene, &report, times, error);
+        stats->uploaded_bytes += report.uploaded_bytes;
+        stats->nodes_rebuilt += report.built_elements;
+    }
+    ok = ok && update_instances(bvh, scene, times, error);
+    if (!ok)
+        bvh_reset(bvh);
+    for (uint32_t i = 0; i < bvh->store.entry_count; i++)
+        bvh->store.entries[i].is_fresh = false;
+    stats->nodes = node_count(bvh);
+    stats->device_bytes = bvh_store_bytes(&bvh->store) + bvh->transform_buffer.capacity_bytes;
+    return ok;
+}
+
+/* ---- waves ---- */
+
+uint32_t bvh_rays_together(const struct tracer *tracer, const struct wave *wave)
+{
+    if (tracer->options.bvh_layout == BVH_LAYOUT_PLAIN)
+        return 1;
+    if (tracer->options.bvh_rays_together != 0)
+        return tracer->options.bvh_rays_together;
+    return wave->coherent && tracer->device->facts.software ? TOGETHER_SOFTWARE : 1;
+}
+
+static void bind(struct bvh *bvh)
+{
+    struct bvh_store *store = &bvh->store;
+    if (store->settings.plain) {
+        gpu_buffer_bind_storage(&store->elements, BIND_TRACER_0);
+    } else {
+        gpu_buffer_bind_texels(store->device, &store->elements, UNIT_TRACER_0, GL_RGBA32UI);
+        gpu_buffer_bind_texels(store->device, &store->links, UNIT_TRACER_1, GL_RG32UI);
+    }
+    gpu_buffer_bind_texels(store->device, &bvh->transform_buffer, UNIT_TRACER_2, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->primitives, UNIT_TRACER_3, GL_RGBA32F);
+}
+
+static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error)
+{
+    struct bvh *bvh = (struct bvh *)tracer;
+    const struct bvh_settings *settings = &bvh->store.settings;
+    struct gpu_define defines[4] = {{"TRACER_BVH", "1"}};
+    size_t n = 1;
+    if (settings->bounds == BVH_BOUNDS_OF_SPHERES)
+        defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
+    if (settings->plain)
+        defines[n++] = (struct gpu_define){"BVH_PLAIN", "1"};
+    const struct trace_program_source source = {
+        .traverse = "bvh/traverse.glsl",
+        .defines = defines,
+        .rays_together = bvh_rays_together(tracer, wave),
+    };
+    const struct gpu_program *program = trace_program_get(scene, wave->kind, &source, error);
+    if (!program)
+        return false;
+    bind(bvh);
+    gpu_uniform_uint(program, "bvh_top_count", bvh->top.element_count);
+    gpu_uniform_uint(program, "bvh_step_budget", bvh->step_budget);
+    trace_program_run(program, scene, wave, &source);
+    return true;
+}
+
+const struct tracer_impl tracer_bvh_impl = {
+    .name = "bvh",
+    .depends_on = TRACER_NEEDS_SCENE,
+    .create = bvh_create,
+    .destroy = bvh_destroy,
+    .update = bvh_update,
+    .trace = bvh_trace,
+};

@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: MIT */
+/* The tracer `bvh`: stackless traversal of bounding volume trees by baked links. What is on the device and how it
+ * is walked: shaders/shared/bvh_node.h, shaders/bvh/traverse.glsl. */
+#ifndef FARLIGHT_TRACE_BVH_H
+#define FARLIGHT_TRACE_BVH_H
+
+#include "trace/bvh_build_top.h"
+#include "trace/bvh_store.h"
+#include "trace/tracer.h"
+
+struct bvh {
+    struct tracer base;
+    struct bvh_store store;
+    struct bvh_top top;
+    struct bvh_transform *transforms; /* mirror of the buffer, one an instance of the scene */
+    uint32_t transform_count;
+    struct gpu_buffer transform_buffer;
+    uint32_t step_budget;
+};
+
+/* How many rays a wave walks together: what the options say, else what was measured to be fast. */
+uint32_t bvh_rays_together(const struct tracer *tracer, const struct wave *wave);
+
+#endif

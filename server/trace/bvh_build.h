@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: MIT */
+/* The builder of bounding volume trees: on the CPU, knows no GL, deterministic for an input whatever the number
+ * of threads. Three steps: a binary tree by the surface area heuristic in bins (bvh_build.c), the throwing back of
+ * elements that do not pay and the baking of links (bvh_build_bake.c), threads (bvh_build_threads.c).
+ *
+ * Based on: Wald. On fast Construction of SAH-based Bounding Volume Hierarchies. 2007 (binning);
+ * 'Stackless traversal of a sphere BVH' (shared/papers), sections 4 and 6: wide nodes, baked links. */
+#ifndef FARLIGHT_TRACE_BVH_BUILD_H
+#define FARLIGHT_TRACE_BVH_BUILD_H
+
+#include "base/error.h"
+#include "shared/bvh_node.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* Four floats in a register; the last is unused and 0. */
+typedef float bvh_vec4 __attribute__((vector_size(16)));
+
+struct bvh_box {
+    bvh_vec4 lower, upper;
+};
+
+/* ---- binary tree ---- */
+
+/* Nodes in depth-first order with gaps: the left child of node i is i + 1, the right one `link`; a leaf of n
+ * primitives takes 2 n - 1 places, of which the first is used. So every node's place follows from the number of
+ * primitives before it, and threads need not agree on one. */
+struct bvh_binary_node {
+    float lower[3];
+    uint32_t link; /* inner: right child; leaf: first primitive in `order` */
+    float upper[3];
+    uint32_t count_axis; /* bits 2..: primitives of a leaf, 0: inner; bits 0..1: axis of the split */
+};
+
+struct bvh_binary {
+    struct bvh_binary_node *nodes; /* 2 primitive_count - 1 places */
+    uint32_t *order;               /* primitive numbers as the leaves hold them */
+    uint32_t primitive_count;
+};
+
+/* What an element test and a primitive test cost, in whatever unit; their ratio was found by measuring. */
+struct bvh_costs {
+    float element, primitive;
+    uint32_t leaf_max; /* 1 .. BVH_LEAF_MAX */
+};
+
+/* Builds over boxes[0..count-1], which it reorders. 1 <= count <= 2^27. False: out of memory. */
+bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count, const struct bvh_costs *costs,
+                      unsigned threads);
+void bvh_binary_finish(struct bvh_binary *tree);
+/* The node after i in depth-first order, gaps left out. */
+uint32_t bvh_binary_next(const struct bvh_binary_node *nodes, uint32_t i);
+
+/* ---- baked tree ---- */
+
+/* Object space. Either triangles or spheres. Read by builder threads, not changed. */
+struct bvh_shape {
+    const float *positions;     /* 3 a vertex */
+    const uint32_t *indices;    /* 3 a triangle, in range (the scene has checked it) */
+    const float *centres_radii; /* 4 a sphere */
+    uint32_t primitive_count;   /* at least 1 */
+};
+
+enum bvh_bounds { BVH_BOUNDS_OF_BOXES, BVH_BOUNDS_OF_SPHERES };
+
+struct bvh_settings {
+    enum bvh_bounds bounds;
+    bool plain;       /* one order for every direction: no links but those in the elements */
+    unsigned threads; /* at most; small shapes take one */
+};
+
+/* Shapes of fewer primitives are built by one thread. */
+#define BVH_THREADED_PRIMITIVES 50000u
+
+struct bvh_tree {
+    struct bvh_element *elements;
+    struct bvh_link *links; /* BVH_OCTANTS x element_count; NULL: plain */
+    uint32_t element_count;
+    float *primitives; /* 4 x primitive_texels floats, see shared/bvh_node.h */
+    size_t primitive_texels;
+    float lower[3], upper[3]; /* of everything, padded */
+    uint64_t build_ns;
+};
+
+/* Bounds are padded outward by BVH_PAD_RELATIVE of their magnitude, so that the rounding of the traversal's
+ * arithmetic cannot lose a hit (shaders/bvh/bounds.glsl has the sum). ERROR_OUT_OF_MEMORY, ERROR_LIMIT. */
+bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_settings *settings,
+                    struct error *error);
+void bvh_tree_finish(struct bvh_tree *tree);
+#define BVH_PAD_RELATIVE 0x1p-21f
+
+/* One of several trees to be built. */
+struct bvh_job {
+    struct bvh_shape shape;
+    struct bvh_tree tree; /* out */
+    struct error error;   /* out; kind ERROR_NONE: built */
+};
+
+/* Builds all; the caller finishes the trees. Where there is much to do it is done in other threads than the
+ * caller's, which waits. False: one failed; its error is in *error. */
+bool bvh_jobs_run(struct bvh_job *jobs, uint32_t count, const struct bvh_settings *settings, struct error *error);
+
+/* ---- the pieces, for the top tree ---- */
+
+/* Elements in the depth-first order of octant 0. */
+struct bvh_baked {
+    uint32_t element_count;
+    uint32_t *node;   /* of an element: its binary node */
+    uint32_t *size;   /* elements of its subtree, itself included; its children begin at the next element */
+    uint32_t *parent; /* BVH_END at the root */
+    struct bvh_link *links; /* BVH_OCTANTS x element_count; NULL: plain */
+};
+
+/* Chooses which inner nodes stay, orders and links. areas[n]: surface of the bound of binary node n, up to a
+ * factor. False: out of memory. */
+bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const float *areas, bool plain,
+              unsigned threads);
+void bvh_baked_finish(struct bvh_baked *baked);
+/* The one order's link. */
+uint32_t bvh_baked_miss(const struct bvh_baked *baked, uint32_t element);
+
+uint32_t bvh_leaf(uint32_t kind, uint32_t first, uint32_t count);
+float bvh_box_area(const float lower[3], const float upper[3]);
+void bvh_element_set_box(struct bvh_element *element, const float lower[3], const float upper[3]);
+void bvh_element_set_sphere(struct bvh_element *element, const float centre[3], float radius);
+void bvh_pad_box(float lower[3], float upper[3]);
+
+/* ---- threads ---- */
+
+/* Calls work(context, i) for i in 0 .. count - 1 from up to `threads` threads, of which the caller is one, and
+ * returns when all is done. With one thread, or where none can be started, the caller does it all. */
+void bvh_parallel(unsigned threads, uint32_t count, void (*work)(void *context, uint32_t i), void *context);
+
+#endif

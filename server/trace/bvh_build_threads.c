@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+#include "trace/bvh_build.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+#define THREADS_MAX 16u
+
+struct parallel {
+    void (*work)(void *context, uint32_t i);
+    void *context;
+    uint32_t count;
+    atomic_uint next;
+};
+
+static void *parallel_run(void *argument)
+{
+    struct parallel *parallel = argument;
+    for (;;) {
+        uint32_t i = atomic_fetch_add(&parallel->next, 1);
+        if (i >= parallel->count)
+            return NULL;
+        parallel->work(parallel->context, i);
+    }
+}
+
+void bvh_parallel(unsigned threads, uint32_t count, void (*work)(void *context, uint32_t i), void *context)
+{
+    struct parallel parallel = {.work = work, .context = context, .count = count};
+    pthread_t helpers[THREADS_MAX];
+    unsigned wanted = threads < THREADS_MAX ? threads : THREADS_MAX;
+    unsigned started = 0;
+    if (wanted > count)
+        wanted = count;
+    while (started + 1 < wanted && pthread_create(&helpers[started], NULL, parallel_run, &parallel) == 0)
+        started++;
+    parallel_run(&parallel);
+    for (unsigned i = 0; i < started; i++)
+        pthread_join(helpers[i], NULL);
+}

@@ -1,0 +1,331 @@
+// SPDX-License-Identifier: MIT
+#include "trace/bvh_store.h"
+
+#include "base/clock.h"
+
+#include <epoxy/gl.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LINKS_BYTES (BVH_OCTANTS * sizeof(struct bvh_link)) /* of an element */
+#define TEXEL_BYTES (4 * sizeof(float))
+#define TOP_CAPACITY_MIN 64u
+
+void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_settings *settings)
+{
+    *store = (struct bvh_store){.device = device, .settings = *settings, .top_lost = true};
+}
+
+void bvh_store_finish(struct bvh_store *store)
+{
+    gpu_buffer_finish(store->device, &store->elements);
+    gpu_buffer_finish(store->device, &store->links);
+    gpu_buffer_finish(store->device, &store->primitives);
+    free(store->entries);
+    free(store->entry_of);
+    bvh_store_init(store, store->device, &(struct bvh_settings){store->settings.bounds, store->settings.plain,
+                                                                store->settings.threads});
+}
+
+const struct bvh_entry *bvh_store_entry(const struct bvh_store *store, uint32_t geometry)
+{
+    uint32_t entry = geometry < store->geometry_count ? store->entry_of[geometry] : BVH_END;
+    return entry == BVH_END ? NULL : &store->entries[entry];
+}
+
+uint64_t bvh_store_bytes(const struct bvh_store *store)
+{
+    return store->elements.capacity_bytes + store->links.capacity_bytes + store->primitives.capacity_bytes;
+}
+
+/* ---- room ---- */
+
+/* What a texel buffer (or a storage buffer, for the plain form's elements) can hold. */
+static bool check_limits(const struct bvh_store *store, uint64_t elements, uint64_t texels, struct error *error)
+{
+    const struct gpu_facts *facts = &store->device->facts;
+    uint64_t texels_max = facts->texture_buffer_texels_max;
+    uint64_t elements_max = store->settings.plain ? facts->storage_block_bytes_max / sizeof(struct bvh_element)
+                                                  : texels_max / BVH_OCTANTS;
+    if (elements_max > INT32_MAX / BVH_OCTANTS)
+        elements_max = INT32_MAX / BVH_OCTANTS;
+    if (elements > elements_max)
+        return error_set(error, ERROR_LIMIT, NULL, "the trees have %llu elements, this device holds %llu",
+                         (unsigned long long)elements, (unsigned long long)elements_max);
+    if (texels > texels_max || texels > INT32_MAX)
+        return error_set(error, ERROR_LIMIT, NULL, "the trees' primitives take %llu texels, this device holds %llu",
+                         (unsigned long long)texels, (unsigned long long)texels_max);
+    return true;
+}
+
+/* A run of items that stays but lies elsewhere. */
+struct move {
+    uint64_t from, to, count;
+};
+
+/* Makes the buffer hold `items`, with the runs at their new places. New storage is only taken where a run moves
+ * or the old is too small. */
+static bool resize(struct gpu_device *device, struct gpu_buffer *buffer, size_t item_bytes, uint64_t items,
+                   const struct move *moves, uint32_t move_count, struct error *error)
+{
+    bool must_move = items * item_bytes > buffer->capacity_bytes;
+    for (uint32_t i = 0; i < move_count; i++)
+        must_move = must_move || moves[i].from != moves[i].to;
+    if (!must_move)
+        return gpu_buffer_reserve(device, buffer, items * item_bytes, error);
+    struct gpu_buffer bigger = {0};
+    /* What has grown once will grow again. */
+    size_t room = items * item_bytes, slack = buffer->capacity_bytes > 0 ? room / 2 : 0;
+    if (!gpu_buffer_reserve(device, &bigger, room + slack, error) || !gpu_buffer_reserve(device, &bigger, room, error)) {
+        gpu_buffer_finish(device, &bigger);
+        return false;
+    }
+    for (uint32_t i = 0; i < move_count; i++)
+        if (moves[i].count > 0)
+            glCopyNamedBufferSubData(buffer->name, bigger.name, (GLintptr)(moves[i].from * item_bytes),
+                                     (GLintptr)(moves[i].to * item_bytes), (GLsizeiptr)(moves[i].count * item_bytes));
+    gpu_buffer_finish(device, buffer);
+    *buffer = bigger;
+    return true;
+}
+
+/* Packs the entries behind the top tree's room and leaves `elements` and `texels` behind them for new ones. */
+static bool pack(struct bvh_store *store, uint32_t top_capacity, uint64_t elements, uint64_t texels,
+                 struct error *error)
+{
+    struct move *moves = calloc(2 * (size_t)store->entry_count + 1, sizeof *moves);
+    if (!moves)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to arrange the trees");
+    struct move *element_moves = moves, *texel_moves = moves + store->entry_count;
+    uint64_t element = top_capacity, texel = 0;
+    for (uint32_t i = 0; i < store->entry_count; i++) {
+        struct bvh_entry *entry = &store->entries[i];
+        element_moves[i] = (struct move){entry->first_element, element, entry->element_count};
+        texel_moves[i] = (struct move){entry->first_texel, texel, entry->texel_count};
+        element += entry->element_count;
+        texel += entry->texel_count;
+    }
+    elements += element;
+    texels += texel;
+    const struct gpu_buffer before = store->elements;
+    bool ok = check_limits(store, elements, texels, error) &&
+              resize(store->device, &store->elements, sizeof(struct bvh_element), elements, element_moves,
+                     store->entry_count, error) &&
+              (store->settings.plain || resize(store->device, &store->links, LINKS_BYTES, elements, element_moves,
+                                               store->entry_count, error)) &&
+              resize(store->device, &store->primitives, TEXEL_BYTES, texels, texel_moves, store->entry_count, error);
+    for (uint32_t i = 0; ok && i < store->entry_count; i++) {
+        store->entries[i].first_element = (uint32_t)element_moves[i].to;
+        store->entries[i].first_texel = (uint32_t)texel_moves[i].to;
+    }
+    store->top_lost = store->top_lost || store->elements.name != before.name;
+    store->top_capacity = top_capacity;
+    free(moves);
+    return ok;
+}
+
+bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, struct error *error)
+{
+    if (element_count <= store->top_capacity && store->elements.name)
+        return true;
+    uint32_t capacity = store->top_capacity < TOP_CAPACITY_MIN ? TOP_CAPACITY_MIN : store->top_capacity;
+    while (capacity < element_count)
+        capacity *= 2;
+    return pack(store, capacity, 0, 0, error);
+}
+
+/* ---- trees ---- */
+
+static bool entry_is_of(const struct bvh_entry *entry, const struct scene_gpu_geometry *geometry)
+{
+    return entry->id == geometry->id && entry->revision == geometry->revision &&
+           entry->is_mesh == (geometry->mesh != NULL);
+}
+
+static uint64_t entry_key(bool is_mesh, uint32_t id)
+{
+    return (uint64_t)id << 1 | is_mesh;
+}
+
+static struct bvh_shape shape_of(const struct scene_gpu_geometry *geometry)
+{
+    struct bvh_shape shape = {0};
+    if (geometry->mesh) {
+        shape.positions = (const float *)(const void *)geometry->mesh->arrays[MESH_POSITIONS]->data;
+        shape.indices = (const uint32_t *)(const void *)geometry->mesh->arrays[MESH_INDICES]->data;
+        shape.primitive_count = geometry->mesh->triangle_count;
+    } else {
+        shape.centres_radii = (const float *)(const void *)geometry->spheres->centres_radii->data;
+        shape.primitive_count = geometry->spheres->sphere_count;
+    }
+    return shape;
+}
+
+/* Drops entries that the scene no longer has and lists the geometries without one. False: out of memory. */
+static bool find_missing(struct bvh_store *store, const struct scene_gpu *scene, uint32_t *missing,
+                         uint32_t *missing_count)
+{
+    struct hashmap by_key;
+    hashmap_init(&by_key);
+    bool ok = true;
+    for (uint32_t i = 0; ok && i < store->entry_count; i++) {
+        struct bvh_entry *entry = &store->entries[i];
+        entry->is_wanted = entry->is_fresh = false;
+        ok = hashmap_put(&by_key, entry_key(entry->is_mesh, entry->id), entry);
+    }
+    *missing_count = 0;
+    for (uint32_t g = 0; ok && g < scene->geometry_count; g++) {
+        const struct scene_gpu_geometry *geometry = &scene->geometries[g];
+        if (geometry->device.primitive_count == 0)
+            continue;
+        struct bvh_entry *entry = hashmap_get(&by_key, entry_key(geometry->mesh != NULL, geometry->id));
+        if (entry && entry_is_of(entry, geometry))
+            entry->is_wanted = true;
+        else
+            missing[(*missing_count)++] = g;
+    }
+    hashmap_finish(&by_key);
+    uint32_t kept = 0;
+    for (uint32_t i = 0; ok && i < store->entry_count; i++)
+        if (store->entries[i].is_wanted)
+            store->entries[kept++] = store->entries[i];
+    store->entry_count = ok ? kept : store->entry_count;
+    return ok;
+}
+
+static void upload_tree(struct bvh_store *store, const struct scene_gpu_geometry *geometry, const struct bvh_tree *tree,
+                        struct bvh_store_report *report)
+{
+    uint32_t element = store->top_capacity, texel = 0;
+    if (store->entry_count > 0) {
+        const struct bvh_entry *last = &store->entries[store->entry_count - 1];
+        element = last->first_element + last->element_count;
+        texel = last->first_texel + last->texel_count;
+    }
+    struct bvh_entry *entry = &store->entries[store->entry_count++];
+    *entry = (struct bvh_entry){.is_mesh = geometry->mesh != NULL,
+                                .id = geometry->id,
+                                .revision = geometry->revision,
+                                .is_wanted = true,
+                                .is_fresh = true,
+                                .first_element = element,
+                                .element_count = tree->element_count,
+                                .first_texel = texel,
+                                .texel_count = (uint32_t)tree->primitive_texels};
+    memcpy(entry->lower, tree->lower, sizeof entry->lower);
+    memcpy(entry->upper, tree->upper, sizeof entry->upper);
+    size_t element_bytes = tree->element_count * sizeof *tree->elements;
+    size_t link_bytes = tree->links ? tree->element_count * LINKS_BYTES : 0;
+    size_t texel_bytes = tree->primitive_texels * TEXEL_BYTES;
+    gpu_buffer_write(store->device, &store->elements, element * sizeof *tree->elements, tree->elements, element_bytes);
+    if (tree->links)
+        gpu_buffer_write(store->device, &store->links, element * LINKS_BYTES, tree->links, link_bytes);
+    gpu_buffer_write(store->device, &store->primitives, texel * TEXEL_BYTES, tree->primitives, texel_bytes);
+    report->uploaded_bytes += element_bytes + link_bytes + texel_bytes;
+    report->built_elements += tree->element_count;
+}
+
+static bool build_missing(struct bvh_store *store, const struct scene_gpu *scene, const uint32_t *missing,
+                          uint32_t missing_count, struct bvh_store_report *report, struct stage_times *times,
+                          struct error *error)
+{
+    struct bvh_job *jobs = calloc((size_t)missing_count + 1, sizeof *jobs);
+    struct bvh_entry *entries =
+        realloc(store->entries, ((size_t)store->entry_count + missing_count + 1) * sizeof *entries);
+    if (entries)
+        store->entries = entries;
+    if (!jobs || !entries) {
+        free(jobs);
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
+                         scene->geometry_count);
+    }
+    uint64_t start_ns = clock_now_ns();
+    for (uint32_t i = 0; i < missing_count; i++)
+        jobs[i].shape = shape_of(&scene->geometries[missing[i]]);
+    bool ok = bvh_jobs_run(jobs, missing_count, &store->settings, error);
+    uint64_t built_ns = clock_now_ns(), elements = 0, texels = 0;
+    stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, built_ns - start_ns);
+    for (uint32_t i = 0; i < missing_count; i++) {
+        elements += jobs[i].tree.element_count;
+        texels += jobs[i].tree.primitive_texels;
+    }
+    uint32_t top_capacity = store->top_capacity < TOP_CAPACITY_MIN ? TOP_CAPACITY_MIN : store->top_capacity;
+    ok = ok && pack(store, top_capacity, elements, texels, error);
+    for (uint32_t i = 0; i < missing_count; i++) {
+        if (ok)
+            upload_tree(store, &scene->geometries[missing[i]], &jobs[i].tree, report);
+        bvh_tree_finish(&jobs[i].tree);
+    }
+    stage_times_add(times, STAGE_UPLOAD, STAGE_CPU, 0, built_ns, clock_now_ns() - built_ns);
+    free(jobs);
+    return ok;
+}
+
+/* Which entry each geometry of the scene has. */
+static bool index_entries(struct bvh_store *store, const struct scene_gpu *scene)
+{
+    struct hashmap by_key;
+    hashmap_init(&by_key);
+    uint32_t *entry_of = malloc(((size_t)scene->geometry_count + 1) * sizeof *entry_of);
+    bool ok = entry_of != NULL;
+    for (uint32_t i = 0; ok && i < store->entry_count; i++)
+        ok = hashmap_put(&by_key, entry_key(store->entries[i].is_mesh, store->entries[i].id), &store->entries[i]);
+    for (uint32_t g = 0; ok && g < scene->geometry_count; g++) {
+        const struct scene_gpu_geometry *geometry = &scene->geometries[g];
+        const struct bvh_entry *entry = hashmap_get(&by_key, entry_key(geometry->mesh != NULL, geometry->id));
+        bool has_one = entry && geometry->device.primitive_count > 0;
+        entry_of[g] = has_one ? (uint32_t)(entry - store->entries) : BVH_END;
+    }
+    hashmap_finish(&by_key);
+    if (!ok) {
+        free(entry_of);
+        return false;
+    }
+    free(store->entry_of);
+    store->entry_of = entry_of;
+    store->geometry_count = scene->geometry_count;
+    return true;
+}
+
+bool bvh_store_update(struct bvh_store *store, const struct scene_gpu *scene, struct bvh_store_report *report,
+                      struct stage_times *times, struct error *error)
+{
+    *report = (struct bvh_store_report){0};
+    uint32_t missing_count = 0;
+    uint32_t *missing = malloc(((size_t)scene->geometry_count + 1) * sizeof *missing);
+    bool ok = missing && find_missing(store, scene, missing, &missing_count);
+    if (!ok)
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries", scene->geometry_count);
+    ok = ok && build_missing(store, scene, missing, missing_count, report, times, error);
+    free(missing);
+    if (ok && !index_entries(store, scene))
+        ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
+                       scene->geometry_count);
+    if (!ok)
+        bvh_store_finish(store);
+    return ok;
+}
+
+/* ---- top tree ---- */
+
+uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all)
+{
+    uint64_t bytes = 0;
+    for (uint32_t begin = 0; begin < top->element_count;) {
+        uint32_t end = begin;
+        while (end < top->element_count && (all || top->moved[end]))
+            end++;
+        size_t run_bytes = (end - begin) * sizeof *top->elements;
+        if (end > begin)
+            gpu_buffer_write(store->device, &store->elements, begin * sizeof *top->elements, top->elements + begin,
+                             run_bytes);
+        bytes += run_bytes;
+        begin = end + (end == begin);
+    }
+    if (all && top->baked.links && top->element_count > 0) {
+        size_t link_bytes = top->element_count * LINKS_BYTES;
+        gpu_buffer_write(store->device, &store->links, 0, top->baked.links, link_bytes);
+        bytes += link_bytes;
+    }
+    return bytes;
+}

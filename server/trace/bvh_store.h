@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: MIT */
+/* The trees on the device: one for each geometry, kept by (kind, id, revision), behind a room for the top tree.
+ * GL thread. */
+#ifndef FARLIGHT_TRACE_BVH_STORE_H
+#define FARLIGHT_TRACE_BVH_STORE_H
+
+#include "base/error.h"
+#include "base/stage_times.h"
+#include "gpu/buffer.h"
+#include "gpu/device.h"
+#include "trace/bvh_build.h"
+#include "trace/bvh_build_top.h"
+#include "trace/scene_gpu.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* A tree that is on the device. */
+struct bvh_entry {
+    bool is_mesh;
+    uint32_t id;
+    uint64_t revision;
+    bool is_wanted; /* the scene still has it, in this revision */
+    bool is_fresh;  /* built by the last update */
+    uint32_t first_element, element_count;
+    uint32_t first_texel, texel_count;
+    float lower[3], upper[3]; /* object space, padded */
+};
+
+struct bvh_store {
+    struct gpu_device *device;
+    struct bvh_settings settings;
+    struct bvh_entry *entries; /* as they lie on the device */
+    uint32_t entry_count;
+    uint32_t *entry_of; /* geometry of the scene to entry; BVH_END: without primitives */
+    uint32_t geometry_count;
+    uint32_t top_capacity; /* elements before the first entry */
+    bool top_lost;         /* the top tree has to be written again; cleared by who does */
+    struct gpu_buffer elements, links, primitives;
+};
+
+struct bvh_store_report {
+    uint64_t built_elements, uploaded_bytes;
+};
+
+void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_settings *settings);
+void bvh_store_finish(struct bvh_store *store);
+/* Trees for all geometries of the scene, building those that are new or changed. What is kept is not uploaded
+ * again, though the device may move it. After a failure the store is empty. */
+bool bvh_store_update(struct bvh_store *store, const struct scene_gpu *scene, struct bvh_store_report *report,
+                      struct stage_times *times, struct error *error);
+/* Room for a top tree of so many elements. */
+bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, struct error *error);
+/* Writes elements of the top tree: all with their links, or those marked in `moved`. Returns the bytes. */
+uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all);
+/* The tree of a geometry, NULL if it has no primitives. */
+const struct bvh_entry *bvh_store_entry(const struct bvh_store *store, uint32_t geometry);
+uint64_t bvh_store_bytes(const struct bvh_store *store);
+
+#endif

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: MIT */
+/* The device's copy of a scene, by revision; shared by all tracers and integrators. */
+#ifndef FARLIGHT_TRACE_SCENE_GPU_H
+#define FARLIGHT_TRACE_SCENE_GPU_H
+
+#include "base/error.h"
+#include "base/stage_times.h"
+#include "gpu/buffer.h"
+#include "gpu/device.h"
+#include "gpu/texture.h"
+#include "scene/scene.h"
+#include "shared/geometry.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* What one update changed; a tracer does no more than that needs. */
+struct scene_changes {
+    bool geometry;  /* primitives were added, removed or changed */
+    bool instances; /* transforms, or which instances there are */
+    bool shading;   /* materials, textures; alpha too */
+    bool lights;
+    uint64_t uploaded_bytes;
+};
+
+/* Host-side mirror of the arrays that builders need, in device order. */
+struct scene_gpu_geometry {
+    struct geometry device;
+    const struct scene_mesh *mesh;       /* one of these two; valid until the scene is edited */
+    const struct scene_spheres *spheres;
+    uint64_t revision; /* of the object: unchanged means the same shape */
+    uint32_t id;       /* the object's id; with `mesh` or `spheres` being set it is unique */
+};
+
+struct scene_gpu {
+    struct gpu_device *device;
+    uint64_t revision; /* of the scene that is on the device */
+    struct scene_gpu_geometry *geometries;
+    uint32_t geometry_count;
+    struct instance *instances; /* mirror of the buffer */
+    uint32_t instance_count;
+    struct disc *discs;
+    uint32_t disc_count;
+    uint32_t material_count, light_count;
+    bool has_spheres;     /* some geometry is a set of spheres */
+    bool has_cutout;      /* some material in use is alpha mode mask: tracers must ask for alpha */
+    bool has_translucent; /* some material lets shadow rays pass: blend or transmission */
+    bool has_environment_image;
+    float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */
+    float diagonal;                       /* of these bounds */
+    /* buffers as shared/geometry.h and shared/material.h describe them */
+    struct gpu_buffer triangles, positions, normals, tangents, texcoords, colours, spheres, sphere_materials;
+    struct gpu_buffer instance_buffer, geometry_buffer, disc_buffer;
+    struct gpu_buffer materials, texture_slots, textures, texels, lights;
+    struct gpu_texture environment;
+    float environment_colour[3], environment_rotation;
+    uint64_t geometry_revision, instances_revision, shading_revision, lights_revision; /* of what is there */
+    struct scene_gpu_state *state; /* private to scene_gpu*.c: which parts need not be uploaded again */
+};
+
+void scene_gpu_init(struct scene_gpu *gpu, struct gpu_device *device);
+void scene_gpu_finish(struct scene_gpu *gpu);
+/* Brings the copy to the scene's revision; *changes says what moved. On failure the copy is empty and will be
+ * made anew by the next update. */
+bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
+                      struct stage_times *times, struct error *error);
+/* Binds every buffer and texture at its place of shared/bindings.h. */
+void scene_gpu_bind(struct scene_gpu *gpu);
+uint64_t scene_gpu_device_bytes(const struct scene_gpu *gpu);
+
+#endif

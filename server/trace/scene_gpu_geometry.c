@@ -1,0 +1,399 @@
+/* SPDX-License-Identifier: MIT */
+/* Meshes and sphere sets into the scene-wide buffers of shared/geometry.h. */
+#include "trace/scene_gpu_state.h"
+
+#include "shared/material.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct totals {
+    uint64_t triangles, vertices, spheres;
+    uint32_t flags; /* GEOMETRY_HAS_*, of any mesh */
+};
+
+static int by_id(const void *a, const void *b)
+{
+    uint32_t id_a = ((const struct scene_gpu_geometry *)a)->id, id_b = ((const struct scene_gpu_geometry *)b)->id;
+    return id_a < id_b ? -1 : id_a > id_b;
+}
+
+static uint32_t mesh_flags(const struct scene_mesh *mesh)
+{
+    uint32_t flags = 0;
+    if (mesh->arrays[MESH_NORMALS])
+        flags |= GEOMETRY_HAS_NORMALS;
+    /* The handedness lies with the normals; and a tangent without a normal spans no frame. */
+    if (mesh->arrays[MESH_TANGENTS] && mesh->arrays[MESH_NORMALS])
+        flags |= GEOMETRY_HAS_TANGENTS;
+    if (mesh->arrays[MESH_TEXCOORDS_0])
+        flags |= GEOMETRY_HAS_TEXCOORDS_0;
+    if (mesh->arrays[MESH_TEXCOORDS_1])
+        flags |= GEOMETRY_HAS_TEXCOORDS_1;
+    if (mesh->arrays[MESH_COLOURS])
+        flags |= GEOMETRY_HAS_COLOURS;
+    return flags;
+}
+
+/* Meshes by id, then sphere sets by id: the same scene has the same order however it came about. */
+static bool list_geometries(struct scene_gpu *gpu, const struct scene *scene, struct error *error)
+{
+    const struct hashmap *meshes = &scene->objects[SCENE_MESH], *sets = &scene->objects[SCENE_SPHERES];
+    size_t total = meshes->count + sets->count, n = 0, cursor = 0;
+    uint64_t id;
+    void *value;
+    free(gpu->geometries);
+    gpu->geometry_count = 0;
+    gpu->geometries = calloc(total ? total : 1, sizeof(*gpu->geometries));
+    if (!gpu->geometries)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %zu geometries", total);
+    while (hashmap_next(meshes, &cursor, &id, &value)) {
+        const struct scene_mesh *mesh = value;
+        gpu->geometries[n++] =
+            (struct scene_gpu_geometry){.mesh = mesh, .id = (uint32_t)id, .revision = mesh->base.revision};
+    }
+    qsort(gpu->geometries, n, sizeof(*gpu->geometries), by_id);
+    for (cursor = 0; hashmap_next(sets, &cursor, &id, &value);) {
+        const struct scene_spheres *set = value;
+        gpu->geometries[n++] =
+            (struct scene_gpu_geometry){.spheres = set, .id = (uint32_t)id, .revision = set->base.revision};
+    }
+    qsort(gpu->geometries + meshes->count, n - meshes->count, sizeof(*gpu->geometries), by_id);
+    gpu->geometry_count = (uint32_t)n;
+    return true;
+}
+
+/* Where each geometry's part of the buffers begins. */
+static struct totals lay_out(struct scene_gpu *gpu)
+{
+    struct totals totals = {0};
+    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+        struct scene_gpu_geometry *geometry = &gpu->geometries[i];
+        if (geometry->mesh) {
+            geometry->device = (struct geometry){
+                .kind = GEOMETRY_MESH,
+                .first_primitive = (uint32_t)totals.triangles,
+                .primitive_count = geometry->mesh->triangle_count,
+                .first_vertex = (uint32_t)totals.vertices,
+                .vertex_count = geometry->mesh->vertex_count,
+                .flags = mesh_flags(geometry->mesh),
+            };
+            totals.triangles += geometry->mesh->triangle_count;
+            totals.vertices += geometry->mesh->vertex_count;
+            totals.flags |= geometry->device.flags;
+        } else {
+            geometry->device = (struct geometry){
+                .kind = GEOMETRY_SPHERES,
+                .first_primitive = (uint32_t)totals.spheres,
+                .primitive_count = geometry->spheres->sphere_count,
+            };
+            totals.spheres += geometry->spheres->sphere_count;
+        }
+    }
+    return totals;
+}
+
+static bool check_totals(const struct scene_gpu *gpu, const struct totals *totals, struct error *error)
+{
+    const struct {
+        const char *what;
+        uint64_t count;
+    } rows[] = {{"triangles", totals->triangles}, {"vertices", totals->vertices}, {"spheres", totals->spheres}};
+    uint64_t max = gpu->device->facts.texture_buffer_texels_max;
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
+        if (rows[i].count > max)
+            return error_set(error, ERROR_LIMIT, "scene", "%llu %s; this device's texel buffers hold at most %llu",
+                             (unsigned long long)rows[i].count, rows[i].what, (unsigned long long)max);
+    return true;
+}
+
+/* Runs of primitives with one material: the ranges, and the default material in the gaps between them. */
+struct run {
+    uint32_t first, end, material_index;
+};
+
+static struct run next_run(const struct scene_gpu *gpu, const struct material_range *ranges, uint32_t range_count,
+                           uint32_t *range, uint32_t at, uint32_t count)
+{
+    while (*range < range_count && (uint64_t)ranges[*range].first + ranges[*range].count <= at)
+        ++*range;
+    if (*range == range_count)
+        return (struct run){.first = at, .end = count};
+    const struct material_range *next = &ranges[*range];
+    if (next->first > at)
+        return (struct run){.first = at, .end = next->first < count ? next->first : count};
+    uint64_t end = (uint64_t)next->first + next->count;
+    return (struct run){.first = at,
+                        .end = end < count ? (uint32_t)end : count,
+                        .material_index = scene_gpu_material_index(gpu, next->material)};
+}
+
+static void pack_triangles(const struct scene_gpu *gpu, const struct scene_gpu_geometry *geometry, uint32_t *out)
+{
+    const struct scene_mesh *mesh = geometry->mesh;
+    const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
+    uint32_t base = geometry->device.first_vertex, range = 0;
+    out += (size_t)geometry->device.first_primitive * 4;
+    for (uint32_t at = 0; at < mesh->triangle_count;) {
+        struct run run = next_run(gpu, mesh->ranges, mesh->range_count, &range, at, mesh->triangle_count);
+        for (size_t i = run.first; i < run.end; i++) {
+            out[4 * i] = base + indices[3 * i];
+            out[4 * i + 1] = base + indices[3 * i + 1];
+            out[4 * i + 2] = base + indices[3 * i + 2];
+            out[4 * i + 3] = run.material_index;
+        }
+        at = run.end;
+    }
+}
+
+static void pack_positions(const struct scene_gpu *gpu, const struct scene_gpu_geometry *geometry, float *out)
+{
+    (void)gpu;
+    const float *in = (const float *)(const void *)geometry->mesh->arrays[MESH_POSITIONS]->data;
+    out += (size_t)geometry->device.first_vertex * 4;
+    for (size_t i = 0; i < geometry->mesh->vertex_count; i++) {
+        memcpy(&out[4 * i], &in[3 * i], 3 * sizeof(float));
+        out[4 * i + 3] = 0.0f;
+    }
+}
+
+/* A value that is not finite would spread over everything that it is averaged with. */
+static float finite_or_zero(float x)
+{
+    return isfinite(x) ? x : 0.0f;
+}
+
+static void pack_normals(const struct scene_gpu_geometry *geometry, float *out)
+{
+    const struct scene_mesh *mesh = geometry->mesh;
+    out += (size_t)geometry->device.first_vertex * 4;
+    if (!(geometry->device.flags & GEOMETRY_HAS_NORMALS)) {
+        memset(out, 0, (size_t)mesh->vertex_count * 4 * sizeof(float));
+        return;
+    }
+    const float *in = (const float *)(const void *)mesh->arrays[MESH_NORMALS]->data;
+    const float *tangents = NULL;
+    if (geometry->device.flags & GEOMETRY_HAS_TANGENTS)
+        tangents = (const float *)(const void *)mesh->arrays[MESH_TANGENTS]->data;
+    for (size_t i = 0; i < mesh->vertex_count; i++) {
+        for (size_t k = 0; k < 3; k++)
+            out[4 * i + k] = finite_or_zero(in[3 * i + k]);
+        out[4 * i + 3] = tangents ? (tangents[4 * i + 3] < 0.0f ? -1.0f : 1.0f) : 0.0f;
+    }
+}
+
+/* The C twin of pack_unit() in shaders/common/math.glsl. */
+static uint32_t pack_unit(const float v[3])
+{
+    float sum = fabsf(v[0]) + fabsf(v[1]) + fabsf(v[2]);
+    if (!(sum > 0.0f) || !isfinite(sum))
+        return 0;
+    float p[2] = {v[0] / sum, v[1] / sum};
+    if (v[2] < 0.0f) {
+        float x = p[0], y = p[1];
+        p[0] = (1.0f - fabsf(y)) * (x >= 0.0f ? 1.0f : -1.0f);
+        p[1] = (1.0f - fabsf(x)) * (y >= 0.0f ? 1.0f : -1.0f);
+    }
+    uint32_t packed[2];
+    for (int i = 0; i < 2; i++)
+        packed[i] = (uint32_t)(int32_t)lrintf(fminf(fmaxf(p[i], -1.0f), 1.0f) * 32767.0f) & 0xffffu;
+    return packed[0] | packed[1] << 16;
+}
+
+static void pack_tangents(const struct scene_gpu_geometry *geometry, uint32_t *out)
+{
+    const struct scene_mesh *mesh = geometry->mesh;
+    out += geometry->device.first_vertex;
+    if (!(geometry->device.flags & GEOMETRY_HAS_TANGENTS)) {
+        memset(out, 0, (size_t)mesh->vertex_count * sizeof(*out));
+        return;
+    }
+    const float *in = (const float *)(const void *)mesh->arrays[MESH_TANGENTS]->data;
+    for (size_t i = 0; i < mesh->vertex_count; i++)
+        out[i] = pack_unit(&in[4 * i]);
+}
+
+static void pack_texcoords(const struct scene_gpu_geometry *geometry, float *out)
+{
+    const struct scene_mesh *mesh = geometry->mesh;
+    out += (size_t)geometry->device.first_vertex * 4;
+    for (unsigned set = 0; set < 2; set++) {
+        const struct blob *blob = mesh->arrays[MESH_TEXCOORDS_0 + set];
+        const float *in = blob ? (const float *)(const void *)blob->data : NULL;
+        for (size_t i = 0; i < mesh->vertex_count; i++) {
+            out[4 * i + 2 * set] = in ? finite_or_zero(in[2 * i]) : 0.0f;
+            out[4 * i + 2 * set + 1] = in ? finite_or_zero(in[2 * i + 1]) : 0.0f;
+        }
+    }
+}
+
+static void pack_colours(const struct scene_gpu_geometry *geometry, uint32_t *out)
+{
+    const struct scene_mesh *mesh = geometry->mesh;
+    size_t bytes = (size_t)mesh->vertex_count * sizeof(*out);
+    out += geometry->device.first_vertex;
+    if (mesh->arrays[MESH_COLOURS])
+        memcpy(out, mesh->arrays[MESH_COLOURS]->data, bytes);
+    else
+        memset(out, 0, bytes);
+}
+
+/* A buffer of `count` items is mapped, each mesh writes its part, and it is unmapped. */
+#define PACK(buffer, count, type, call)                                                                           \
+    do {                                                                                                          \
+        type *out = gpu_buffer_map(gpu->device, &gpu->buffer, (size_t)(count) * sizeof(*out), error);             \
+        if (!out)                                                                                                 \
+            return false;                                                                                         \
+        for (uint32_t i = 0; i < gpu->geometry_count; i++)                                                        \
+            if (gpu->geometries[i].mesh)                                                                          \
+                call;                                                                                             \
+        gpu_buffer_unmap(gpu->device, &gpu->buffer);                                                              \
+        changes->uploaded_bytes += (uint64_t)(count) * sizeof(*out);                                              \
+    } while (0)
+
+static bool upload_meshes(struct scene_gpu *gpu, const struct totals *totals, struct scene_changes *changes,
+                          struct error *error)
+{
+    if (totals->triangles) {
+        PACK(triangles, totals->triangles * 4, uint32_t, pack_triangles(gpu, &gpu->geometries[i], out));
+        PACK(positions, totals->vertices * 4, float, pack_positions(gpu, &gpu->geometries[i], out));
+    }
+    if (totals->flags & GEOMETRY_HAS_NORMALS)
+        PACK(normals, totals->vertices * 4, float, pack_normals(&gpu->geometries[i], out));
+    if (totals->flags & GEOMETRY_HAS_TANGENTS)
+        PACK(tangents, totals->vertices, uint32_t, pack_tangents(&gpu->geometries[i], out));
+    if (totals->flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1))
+        PACK(texcoords, totals->vertices * 4, float, pack_texcoords(&gpu->geometries[i], out));
+    if (totals->flags & GEOMETRY_HAS_COLOURS)
+        PACK(colours, totals->vertices, uint32_t, pack_colours(&gpu->geometries[i], out));
+    return true;
+}
+#undef PACK
+
+static bool upload_spheres(struct scene_gpu *gpu, const struct totals *totals, struct scene_changes *changes,
+                           struct error *error)
+{
+    gpu->has_spheres = totals->spheres > 0;
+    if (!gpu->has_spheres)
+        return true;
+    size_t sphere_bytes = (size_t)totals->spheres * 4 * sizeof(float);
+    size_t material_bytes = (size_t)totals->spheres * sizeof(uint32_t);
+    float *out = gpu_buffer_map(gpu->device, &gpu->spheres, sphere_bytes, error);
+    if (!out)
+        return false;
+    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+        const struct scene_gpu_geometry *geometry = &gpu->geometries[i];
+        if (geometry->spheres)
+            memcpy(out + (size_t)geometry->device.first_primitive * 4, geometry->spheres->centres_radii->data,
+                   (size_t)geometry->spheres->sphere_count * 4 * sizeof(float));
+    }
+    gpu_buffer_unmap(gpu->device, &gpu->spheres);
+    uint32_t *materials = gpu_buffer_map(gpu->device, &gpu->sphere_materials, material_bytes, error);
+    if (!materials)
+        return false;
+    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+        const struct scene_spheres *set = gpu->geometries[i].spheres;
+        uint32_t range = 0;
+        for (uint32_t at = 0; set && at < set->sphere_count;) {
+            struct run run = next_run(gpu, set->ranges, set->range_count, &range, at, set->sphere_count);
+            for (; at < run.end; at++)
+                materials[gpu->geometries[i].device.first_primitive + at] = run.material_index;
+        }
+    }
+    gpu_buffer_unmap(gpu->device, &gpu->sphere_materials);
+    changes->uploaded_bytes += sphere_bytes + material_bytes;
+    return true;
+}
+
+/* An edit of something else may have moved the objects in the host's memory. */
+static void refresh_pointers(struct scene_gpu *gpu, const struct scene *scene)
+{
+    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+        struct scene_gpu_geometry *geometry = &gpu->geometries[i];
+        if (geometry->mesh)
+            geometry->mesh = scene_mesh(scene, geometry->id);
+        else
+            geometry->spheres = scene_spheres(scene, geometry->id);
+    }
+}
+
+bool scene_gpu_upload_geometry(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
+                               struct error *error)
+{
+    uint64_t signature = scene_gpu_signature(scene, SCENE_MESH) * 3 + scene_gpu_signature(scene, SCENE_SPHERES);
+    if (gpu->state->any_update && signature == gpu->state->shapes_signature) {
+        refresh_pointers(gpu, scene);
+        return true;
+    }
+    if (!list_geometries(gpu, scene, error))
+        return false;
+    struct totals totals = lay_out(gpu);
+    struct gpu_buffer *optional[] = {&gpu->triangles, &gpu->positions, &gpu->normals, &gpu->tangents,
+                                     &gpu->texcoords, &gpu->colours,   &gpu->spheres, &gpu->sphere_materials};
+    for (size_t i = 0; i < sizeof(optional) / sizeof(optional[0]); i++)
+        if (!gpu_buffer_reserve(gpu->device, optional[i], 0, error)) /* keeps the memory */
+            return false;
+    changes->geometry = true;
+    if (!check_totals(gpu, &totals, error) || !upload_meshes(gpu, &totals, changes, error) ||
+        !upload_spheres(gpu, &totals, changes, error))
+        return false;
+    gpu->state->shapes_signature = signature;
+    return true;
+}
+
+/* What a material asks of the tracers. */
+static void classify_material(struct scene_gpu *gpu, const struct scene *scene, uint32_t material_id,
+                              uint32_t *geometry_flags)
+{
+    const struct scene_material *material = scene_material(scene, material_id);
+    if (!material)
+        return;
+    if (material->alpha_mode == ALPHA_MASK) {
+        *geometry_flags |= GEOMETRY_HAS_CUTOUT;
+        gpu->has_cutout = true;
+    }
+    if (material->alpha_mode == ALPHA_BLEND || material->transmission > 0.0f)
+        gpu->has_translucent = true;
+}
+
+static void classify_discs(struct scene_gpu *gpu, const struct scene *scene)
+{
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    uint32_t ignored = 0;
+    while (hashmap_next(&scene->objects[SCENE_DISC], &cursor, &id, &value))
+        classify_material(gpu, scene, ((const struct scene_disc *)value)->material, &ignored);
+}
+
+bool scene_gpu_classify_geometry(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
+                                 struct error *error)
+{
+    size_t bytes = gpu->geometry_count * sizeof(struct geometry);
+    bool changed = changes->geometry;
+    gpu->has_cutout = false;
+    gpu->has_translucent = false;
+    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+        struct scene_gpu_geometry *geometry = &gpu->geometries[i];
+        const struct material_range *ranges = geometry->mesh ? geometry->mesh->ranges : geometry->spheres->ranges;
+        uint32_t range_count = geometry->mesh ? geometry->mesh->range_count : geometry->spheres->range_count;
+        uint32_t flags = geometry->device.flags & ~GEOMETRY_HAS_CUTOUT;
+        for (uint32_t k = 0; k < range_count; k++)
+            if (ranges[k].count > 0)
+                classify_material(gpu, scene, ranges[k].material, &flags);
+        changed |= flags != geometry->device.flags;
+        geometry->device.flags = flags;
+    }
+    classify_discs(gpu, scene);
+    if (!changed)
+        return true;
+    struct geometry *out = gpu_buffer_map(gpu->device, &gpu->geometry_buffer, bytes, error);
+    if (!out)
+        return false;
+    for (uint32_t i = 0; i < gpu->geometry_count; i++)
+        out[i] = gpu->geometries[i].device;
+    gpu_buffer_unmap(gpu->device, &gpu->geometry_buffer);
+    changes->uploaded_bytes += bytes;
+    return true;
+}

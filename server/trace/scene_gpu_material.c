@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: MIT */
+/* Materials and their texture slots into the buffers of shared/material.h. */
+#include "trace/scene_gpu_state.h"
+
+#include "shared/material.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* hashmap holds pointers and no NULL: an index is kept as itself plus one. */
+static void *pointer_of(uint32_t index)
+{
+    return (void *)((uintptr_t)index + 1);
+}
+
+static uint32_t index_of(const void *pointer)
+{
+    return (uint32_t)((uintptr_t)pointer - 1);
+}
+
+uint32_t scene_gpu_material_index(const struct scene_gpu *gpu, uint32_t material_id)
+{
+    const void *found = material_id ? hashmap_get(&gpu->state->material_indices.index_by_id, material_id) : NULL;
+    return found ? index_of(found) : 0;
+}
+
+static bool add_free(struct material_indices *indices, uint32_t index)
+{
+    if (indices->free_count == indices->free_capacity) {
+        uint32_t capacity = indices->free_capacity ? indices->free_capacity * 2 : 64;
+        uint32_t *larger = realloc(indices->free, capacity * sizeof(*larger));
+        if (!larger)
+            return false;
+        indices->free = larger;
+        indices->free_capacity = capacity;
+    }
+    indices->free[indices->free_count++] = index;
+    return true;
+}
+
+/* Takes back the indices of materials that are no more. */
+static bool drop_stale(struct material_indices *indices, const struct scene *scene)
+{
+    size_t cursor = 0, count = 0;
+    uint64_t id;
+    void *value;
+    uint64_t *stale = malloc((indices->index_by_id.count + 1) * sizeof(*stale));
+    if (!stale)
+        return false;
+    while (hashmap_next(&indices->index_by_id, &cursor, &id, &value))
+        if (!scene_material(scene, (uint32_t)id))
+            stale[count++] = id;
+    bool ok = true;
+    for (size_t i = 0; ok && i < count; i++)
+        ok = add_free(indices, index_of(hashmap_remove(&indices->index_by_id, stale[i])));
+    free(stale);
+    return ok;
+}
+
+bool scene_gpu_index_materials(struct scene_gpu *gpu, const struct scene *scene, struct error *error)
+{
+    struct material_indices *indices = &gpu->state->material_indices;
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    if (indices->count == 0)
+        indices->count = 1; /* the default material */
+    bool ok = drop_stale(indices, scene);
+    while (ok && hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value)) {
+        if (hashmap_get(&indices->index_by_id, id))
+            continue;
+        uint32_t index = indices->free_count ? indices->free[--indices->free_count] : indices->count++;
+        ok = hashmap_put(&indices->index_by_id, id, pointer_of(index));
+    }
+    return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the indices of materials");
+}
+
+static uint32_t add_slot(const struct scene_gpu *gpu, const struct texture_use *use, struct texture_slot *slots,
+                         uint32_t *slot_count)
+{
+    bool found = false;
+    uint32_t texture = use->texture ? scene_gpu_texture_index(gpu, use->texture, &found) : 0;
+    if (!found)
+        return 0;
+    slots[*slot_count] = (struct texture_slot){
+        .uv_matrix = {use->uv_transform[0], use->uv_transform[1], use->uv_transform[3], use->uv_transform[4]},
+        .offset_u = use->uv_transform[2],
+        .offset_v = use->uv_transform[5],
+        .strength = use->strength,
+        .texture = texture | (use->texcoord_set == 1 ? 0x80000000u : 0),
+    };
+    return (*slot_count)++;
+}
+
+static void pack_material(const struct scene_gpu *gpu, const struct scene_material *in, struct material *out,
+                          struct texture_slot *slots, uint32_t *slot_count)
+{
+    *out = (struct material){
+        .emission_ior = {in->emission[0], in->emission[1], in->emission[2], in->ior},
+        .metallic = in->metallic,
+        .roughness = in->roughness,
+        .transmission = in->transmission,
+        .alpha_cutoff = in->alpha_cutoff,
+    };
+    memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
+    out->flags = (in->alpha_mode == ALPHA_MASK ? MATERIAL_ALPHA_MASK : 0) |
+                 (in->alpha_mode == ALPHA_BLEND ? MATERIAL_ALPHA_BLEND : 0) |
+                 (in->double_sided ? MATERIAL_DOUBLE_SIDED : 0) | (in->unlit ? MATERIAL_UNLIT : 0);
+    uint32_t *const places[MATERIAL_TEXTURE_COUNT] = {
+        [MATERIAL_BASE_COLOUR] = &out->texture_base_colour,
+        [MATERIAL_NORMAL] = &out->texture_normal,
+        [MATERIAL_METALLIC_ROUGHNESS] = &out->texture_metallic_roughness,
+        [MATERIAL_OCCLUSION] = &out->texture_occlusion,
+        [MATERIAL_EMISSION] = &out->texture_emission,
+        [MATERIAL_TRANSMISSION] = &out->texture_transmission,
+        [MATERIAL_BUMP] = &out->texture_bump,
+    };
+    for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
+        *places[i] = add_slot(gpu, &in->textures[i], slots, slot_count);
+}
+
+static void pack_default(struct material *out)
+{
+    *out = (struct material){
+        .base_colour = {1.0f, 1.0f, 1.0f, 1.0f},
+        .emission_ior = {0.0f, 0.0f, 0.0f, 1.5f},
+        .roughness = 1.0f,
+        .flags = MATERIAL_DOUBLE_SIDED,
+    };
+}
+
+bool scene_gpu_upload_materials(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
+                                struct error *error)
+{
+    uint32_t count = gpu->state->material_indices.count, slot_count = 1;
+    size_t slot_max = 1 + scene->objects[SCENE_MATERIAL].count * MATERIAL_TEXTURE_COUNT, cursor = 0;
+    struct material *packed = calloc(count, sizeof(*packed));
+    struct texture_slot *slots = calloc(slot_max, sizeof(*slots));
+    uint64_t id;
+    void *value;
+    bool ok = packed && slots;
+    if (!ok)
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u materials", count);
+    else
+        pack_default(&packed[0]);
+    while (ok && hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value))
+        pack_material(gpu, value, &packed[scene_gpu_material_index(gpu, (uint32_t)id)], slots, &slot_count);
+    ok = ok && gpu_buffer_upload(gpu->device, &gpu->materials, packed, count * sizeof(*packed), error) &&
+         gpu_buffer_upload(gpu->device, &gpu->texture_slots, slots, slot_count * sizeof(*slots), error);
+    free(packed);
+    free(slots);
+    if (!ok)
+        return false;
+    gpu->material_count = count;
+    changes->shading = true;
+    changes->uploaded_bytes += count * sizeof(*packed) + slot_count * sizeof(*slots);
+    return true;
+}

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/trace_program.h"
+
+#include "shared/bindings.h"
+
+#include <stdio.h>
+
+#define OWN_DEFINES_MAX 12
+
+const struct gpu_program *trace_program_get(const struct scene_gpu *scene, enum wave_kind kind,
+                                            const struct trace_program_source *source, struct error *error)
+{
+    struct gpu_define defines[OWN_DEFINES_MAX + 8] = {0};
+    char traverse[128], together[16];
+    size_t n = 0;
+    /* In quotes: program.c takes the file to include from it. */
+    snprintf(traverse, sizeof(traverse), "\"%s\"", source->traverse);
+    snprintf(together, sizeof(together), "%u", source->rays_together ? source->rays_together : 1);
+    defines[n++] = (struct gpu_define){"TRAVERSE", traverse};
+    defines[n++] = (struct gpu_define){"RAYS_TOGETHER", together};
+    if (kind == WAVE_ANY)
+        defines[n++] = (struct gpu_define){"ANY_HIT", "1"};
+    if (scene->has_spheres)
+        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    if (scene->disc_count > 0)
+        defines[n++] = (struct gpu_define){"HAS_DISCS", "1"};
+    if (scene->has_cutout)
+        defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
+    /* To a closest hit a translucent surface is one like any other: no second program for it. */
+    if (scene->has_translucent && kind == WAVE_ANY)
+        defines[n++] = (struct gpu_define){"HAS_TRANSLUCENT", "1"};
+    for (size_t i = 0; i < OWN_DEFINES_MAX && source->defines && source->defines[i].name; i++)
+        defines[n++] = source->defines[i];
+    struct gpu_program_source whole = {.compute = "trace.comp", .defines = defines};
+    return gpu_program_get(scene->device, &whole, error);
+}
+
+void trace_program_run(const struct gpu_program *program, const struct scene_gpu *scene, const struct wave *wave,
+                       const struct trace_program_source *source)
+{
+    uint32_t together = source->rays_together ? source->rays_together : 1;
+    gpu_buffer_bind_storage(wave->rays, BIND_RAYS);
+    if (wave->kind == WAVE_ANY)
+        gpu_buffer_bind_storage(wave->visibility, BIND_VISIBILITY);
+    else
+        gpu_buffer_bind_storage(wave->hits, BIND_HITS);
+    gpu_uniform_uint(program, "ray_count", wave->ray_count);
+    gpu_uniform_uint(program, "disc_count", scene->disc_count);
+    gpu_uniform_uint(program, "instance_count", scene->instance_count);
+    gpu_dispatch(scene->device, program, ((uint64_t)wave->ray_count + together - 1) / together);
+}

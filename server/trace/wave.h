@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: MIT */
+/* Rays travel in waves: a batch of rays in, a batch of hits (or of visibilities) out, all on the device. */
+#ifndef FARLIGHT_TRACE_WAVE_H
+#define FARLIGHT_TRACE_WAVE_H
+
+#include "gpu/buffer.h"
+
+#include <stdint.h>
+
+enum wave_kind {
+    WAVE_CLOSEST, /* fills `hits` */
+    WAVE_ANY,     /* fills `visibility`: transmittance up to t_max, unorm 4x8 rgb; opaque surfaces stop it,
+                     translucent ones (transmission, blend) tint it */
+};
+
+struct wave {
+    enum wave_kind kind;
+    uint32_t ray_count;            /* on the host: how many of `rays` are to be traced */
+    struct gpu_buffer *rays;       /* struct ray */
+    struct gpu_buffer *hits;       /* struct hit; closest */
+    struct gpu_buffer *visibility; /* uint; any */
+    /* Rays next to each other in the buffer are near each other in space, such as 8x8 tiles of pixels in
+     * Morton order; a hint for how many to walk together. */
+    bool coherent;
+};
+
+#endif

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Every primitive of every instance for every ray: the plain truth that the structures are compared with.
+// Keep it as simple as can be.
+#include "common/candidate.glsl"
+
+uniform uint instance_count;
+
+#ifdef ANY_HIT
+bool trace_any(trace_ray r, inout vec3 transmittance)
+{
+    for (uint i = 0u; i < instance_count; i++) {
+        object_ray o = object_from_world_ray(r, i);
+        geometry g = geometries[instances[i].geometry];
+        for (uint p = g.first_primitive; p < g.first_primitive + g.primitive_count; p++) {
+#ifdef HAS_SPHERES
+            if (g.kind == GEOMETRY_SPHERES) {
+                if (visit_sphere_any(r, o, p, i, transmittance))
+                    return true;
+                continue;
+            }
+#endif
+            if (visit_triangle_any(r, o, p, i, transmittance))
+                return true;
+        }
+    }
+    return false;
+}
+#else
+void trace_closest(trace_ray r, inout candidate best)
+{
+    for (uint i = 0u; i < instance_count; i++) {
+        object_ray o = object_from_world_ray(r, i);
+        geometry g = geometries[instances[i].geometry];
+        for (uint p = g.first_primitive; p < g.first_primitive + g.primitive_count; p++) {
+#ifdef HAS_SPHERES
+            if (g.kind == GEOMETRY_SPHERES) {
+                visit_sphere_closest(r, o, p, i, best);
+                continue;
+            }
+#endif
+            visit_triangle_closest(r, o, p, i, best);
+        }
+    }
+}
+#endif

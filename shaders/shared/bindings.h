@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: MIT */
+/* One list of binding points, so that no two passes disagree. */
+#ifndef FARLIGHT_SHARED_BINDINGS_H
+#define FARLIGHT_SHARED_BINDINGS_H
+
+/* storage buffers; software GL has 16 a stage */
+#define BIND_RAYS 0
+#define BIND_HITS 1
+#define BIND_VISIBILITY 2   /* any-hit waves: unorm 4x8 transmittance, 0: occluded */
+#define BIND_WAVE 3         /* struct wave_state */
+#define BIND_INSTANCES 4
+#define BIND_GEOMETRIES 5
+#define BIND_MATERIALS 6
+#define BIND_TEXTURE_SLOTS 7
+#define BIND_TEXTURES 8
+#define BIND_LIGHTS 9
+#define BIND_DISCS 10
+#define BIND_TRACER_0 11    /* the tracer's own */
+#define BIND_TRACER_1 12
+#define BIND_PASS_0 11      /* the integrator's own, in passes without a tracer */
+#define BIND_PASS_1 12
+#define BIND_PASS_2 13
+#define BIND_PASS_3 14
+#define BIND_PASS_4 15
+
+/* texture units */
+#define UNIT_TRIANGLES 0
+#define UNIT_POSITIONS 1
+#define UNIT_NORMALS 2
+#define UNIT_TANGENTS 3
+#define UNIT_TEXCOORDS 4
+#define UNIT_COLOURS 5
+#define UNIT_SPHERES 6
+#define UNIT_SPHERE_MATERIALS 7
+#define UNIT_TEXELS 8
+#define UNIT_ENVIRONMENT 9
+#define UNIT_TRACER_0 10
+#define UNIT_TRACER_1 11
+#define UNIT_TRACER_2 12
+#define UNIT_TRACER_3 13
+#define UNIT_TRACER_4 14
+#define UNIT_TRACER_5 15
+#define UNIT_PASS_0 16
+#define UNIT_PASS_1 17
+
+#endif

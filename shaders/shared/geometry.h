@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: MIT */
+/* The scene on the device, shared by all tracers. Bindings are in shared/bindings.h. */
+#ifndef FARLIGHT_SHARED_GEOMETRY_H
+#define FARLIGHT_SHARED_GEOMETRY_H
+#include "shared/types.h"
+
+/* An instance is a visible node with geometry. Rows of 3x4 matrices. */
+struct instance {
+    vec4 world_from_object[3];
+    vec4 object_from_world[3];
+    uint geometry; /* index into the geometries */
+    uint node;     /* the client's node id */
+    uint flags;    /* INSTANCE_* */
+    uint pad;
+};
+SHARED_SIZE(instance, 112);
+#define INSTANCE_MIRRORED 1u /* negative determinant: winding is reversed */
+
+/* A mesh or a set of spheres, stored once however many instances show it. */
+struct geometry {
+    uint kind;            /* GEOMETRY_* */
+    uint first_primitive; /* in `triangles` or `spheres` */
+    uint primitive_count;
+    uint first_vertex;    /* meshes; indices in `triangles` are already scene-wide */
+    uint vertex_count;
+    uint flags;           /* GEOMETRY_HAS_* */
+    uint pad0, pad1;
+};
+SHARED_SIZE(geometry, 32);
+#define GEOMETRY_MESH 0u
+#define GEOMETRY_SPHERES 1u
+#define GEOMETRY_HAS_NORMALS 1u
+#define GEOMETRY_HAS_TANGENTS 2u
+#define GEOMETRY_HAS_TEXCOORDS_0 4u
+#define GEOMETRY_HAS_TEXCOORDS_1 8u
+#define GEOMETRY_HAS_COLOURS 16u
+#define GEOMETRY_HAS_CUTOUT 32u /* some material of it is alpha mode mask */
+
+/* Buffers, each a texel buffer:
+ *   triangles   RGBA32UI  i0, i1, i2 (scene-wide vertex numbers), material index
+ *   positions   RGBA32F   xyz object space, w unused
+ *   normals     RGBA32F   xyz object space, w: handedness of the tangent (0: no tangent)
+ *   tangents    R32UI     octahedral, 2 x 16 bit snorm, object space
+ *   texcoords   RGBA32F   u0 v0 u1 v1
+ *   colours     RGBA8     unorm, linear
+ *   spheres     RGBA32F   centre xyz, radius, object space
+ *   sphere_materials R32UI
+ * Vertex attributes that no mesh has keep an empty buffer; those that a mesh lacks are zero there and not read. */
+
+/* Geometry outside every tree (the paper's PERFORMGLOBALGEOMETRYTESTS), world space. */
+struct disc {
+    vec4 centre_radius;
+    vec4 normal;  /* w unused */
+    uint material, pad0, pad1, pad2;
+};
+SHARED_SIZE(disc, 48);
+
+#endif

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+#ifndef FARLIGHT_SHARED_HIT_H
+#define FARLIGHT_SHARED_HIT_H
+#include "shared/types.h"
+
+/* The answer to a ray of a closest-hit wave. Exact tracers fill it from triangle and barycentrics, sampled ones
+ * from a stored surface sample. */
+struct hit {
+    float distance;        /* in lengths of the direction; < 0: the ray left the scene */
+    uint material;         /* bits 0..23 index into the materials; then HIT_* flags */
+    uint primitive;        /* scene-wide triangle or sphere number (see geometry.h), HIT_NO_PRIMITIVE if sampled */
+    uint instance;         /* index into the instances, HIT_NO_PRIMITIVE: the discs */
+    float u0, v0, u1, v1;  /* texture coordinate sets 0 and 1 */
+    uint normal_geometric; /* octahedral, 2 x 16 bit snorm, world space, on the side of the outside (winding) */
+    uint normal_shading;   /* likewise, interpolated; same hemisphere as the geometric one */
+    uint tangent;          /* likewise with 15 bits for y; lowest bit: handedness is negative */
+    uint colour;           /* vertex colour times what a sampled tracer stored, unorm 4x8, linear */
+};
+SHARED_SIZE(hit, 48);
+
+#define HIT_MATERIAL_MASK 0x00ffffffu
+#define HIT_BACK_FACE 0x01000000u  /* the ray came from inside */
+#define HIT_HAS_TANGENT 0x02000000u
+#define HIT_NO_PRIMITIVE 0xffffffffu
+
+#endif

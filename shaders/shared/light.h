@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: MIT */
+#ifndef FARLIGHT_SHARED_LIGHT_H
+#define FARLIGHT_SHARED_LIGHT_H
+#include "shared/types.h"
+
+/* World space. Units by kind as in the protocol. */
+struct light {
+    vec4 position_kind;   /* kind as a float: LIGHT_* */
+    vec4 direction_range; /* unit, the way the light goes; range 0: unlimited */
+    vec4 colour;          /* w: sphere radius */
+    vec4 half_u_inner;    /* rectangle: half edge; w: cosine of the inner cone */
+    vec4 half_v_outer;    /* rectangle: half edge; w: cosine of the outer cone */
+};
+SHARED_SIZE(light, 80);
+#define LIGHT_KIND_POINT 0
+#define LIGHT_KIND_SPOT 1
+#define LIGHT_KIND_DIRECTIONAL 2
+#define LIGHT_KIND_RECTANGLE 3
+#define LIGHT_KIND_SPHERE 4
+
+#endif

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: MIT */
+#ifndef FARLIGHT_SHARED_MATERIAL_H
+#define FARLIGHT_SHARED_MATERIAL_H
+#include "shared/types.h"
+
+/* Index 0 is the default material: white, rough, dielectric. */
+struct material {
+    vec4 base_colour;  /* linear, alpha last */
+    vec4 emission_ior; /* radiance; index of refraction */
+    float metallic, roughness, transmission, alpha_cutoff;
+    uint flags;        /* MATERIAL_* */
+    uint texture_base_colour, texture_normal, texture_metallic_roughness; /* index into texture_uses, 0: none */
+    uint texture_occlusion, texture_emission, texture_transmission, texture_bump;
+};
+SHARED_SIZE(material, 80);
+#define MATERIAL_ALPHA_MASK 1u
+#define MATERIAL_ALPHA_BLEND 2u
+#define MATERIAL_DOUBLE_SIDED 4u
+#define MATERIAL_UNLIT 8u
+
+/* A texture as one input of a material. Entry 0 is unused. */
+struct texture_slot {
+    vec4 uv_matrix;   /* a b d e:  u' = a u + b v + c,  v' = d u + e v + f */
+    float offset_u, offset_v; /* c, f */
+    float strength;
+    uint texture;     /* index into textures, bit 31: texture coordinate set 1 */
+};
+SHARED_SIZE(texture_slot, 32);
+
+/* Texels of all textures lie in one texel buffer, RGBA8 unorm; each level of a texture after the other,
+ * level n+1 is half of level n (rounded down, at least 1), down to 1x1. */
+struct texture_info {
+    uint first_texel, width, height, flags; /* TEXTURE_* */
+};
+SHARED_SIZE(texture_info, 16);
+#define TEXTURE_SRGB 1u
+#define TEXTURE_NEAREST 2u
+#define TEXTURE_WRAP_U_SHIFT 2u /* two bits: 0 repeat, 1 clamp, 2 mirror */
+#define TEXTURE_WRAP_V_SHIFT 4u
+#define TEXTURE_LEVELS_SHIFT 8u /* number of levels, 1 and more */
+
+#endif

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: MIT */
+#ifndef FARLIGHT_SHARED_PATH_H
+#define FARLIGHT_SHARED_PATH_H
+#include "shared/bindings.h"
+#include "shared/types.h"
+
+/* What belongs to ray k of a closest-hit wave beside the ray itself.
+ *
+ * The paths of a wave are in the order of their pixels, and those of one pixel lie side by side: children take
+ * their places by a prefix sum over their parents, never by an atomic counter. So the pass that adds radiance to
+ * the pixels gives each pixel to one invocation, which adds in that order, and a picture is the same to the bit
+ * however its slices were cut. */
+struct path {
+    float weight_r, weight_g, weight_b; /* share of this ray's radiance that reaches the eye */
+    uint pixel;                         /* in the slice */
+    float cone_width, cone_spread;      /* ray cone: width at the origin, growth per unit of length */
+    uint flags;                         /* PATH_* */
+    uint pad;
+};
+SHARED_SIZE(path, 32);
+#define PATH_BOUNCES_MASK 0xffu
+#define PATH_STRAIGHT 0x100u /* nothing but alpha lies between it and the eye: counts for the picture's alpha */
+
+/* A ray of the next wave at its parent's place, before it is moved to its own. */
+struct child {
+    vec4 origin_t_min;
+    vec4 direction_t_max;
+    float weight_r, weight_g, weight_b;
+    uint pixel;
+    float cone_width, cone_spread;
+    uint flags;
+    uint pad;
+};
+SHARED_SIZE(child, 64);
+#define CHILDREN_MAX 3u       /* straight on, reflected, refracted */
+#define COMPACT_BLOCK 16u     /* paths whose hits, and then children, are counted together */
+#define COMPACT_SCAN_SIZE 64u /* invocations of the one group that scans the counts */
+
+/* The visibility buffer's first word is an instance + 1, or one of these. */
+#define VISIBLE_NOTHING 0u
+#define VISIBLE_DISC 0xffffffffu
+
+#define HIT_PLACE_NONE 0xffffffffu /* in place of a place in the list of hits: the path left the scene */
+
+/* Storage buffers of the passes of a wave. */
+#define BIND_PATHS BIND_PASS_0
+#define BIND_RADIANCE BIND_PASS_1      /* vec4 a path: what it adds to its pixel, coverage in w */
+#define BIND_CHILDREN BIND_PASS_2      /* struct child, CHILDREN_MAX a hit */
+#define BIND_CHILD_COUNTS BIND_PASS_3  /* uint a hit: children, and times 4 shadow rays */
+#define BIND_LIGHT_SAMPLES BIND_PASS_4 /* vec4 a shadow ray: what arrives if nothing is in the way */
+#define BIND_SHADOW_RAYS BIND_VISIBILITY /* struct ray; no pass both makes them and reads the answers */
+#define BIND_HIT_LIST BIND_WAVE        /* uint a hit: its path; in order */
+#define BIND_HIT_PLACES BIND_CHILD_COUNTS /* uint a path: its place in the list of hits; where children are not used */
+#define BIND_SLICE_PIXELS BIND_PASS_2  /* vec4 a pixel of the slice; where children are not used */
+#define BIND_BLOCK_OFFSETS BIND_PASS_4 /* uvec2 a block of COMPACT_BLOCK; where light samples are not used */
+#define BIND_ACCUMULATION BIND_PASS_0  /* vec4 a pixel slot of the picture's band; sum of the samples */
+#define BIND_RESOLVED BIND_PASS_1      /* pixels of the output's format, rows from the top */
+
+#endif

@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: MIT */
+#ifndef FARLIGHT_SHARED_RAY_H
+#define FARLIGHT_SHARED_RAY_H
+#include "shared/types.h"
+
+/* World space. The direction need not be unit length for a tracer; distances are in its lengths. The
+ * integrators send unit directions. A ray with t_max <= t_min is dead: it hits nothing. */
+struct ray {
+    vec4 origin_t_min;
+    vec4 direction_t_max;
+};
+SHARED_SIZE(ray, 32);
+
+#endif

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: MIT
+// One wave of rays through one acceleration structure: the entry point of every <tracer>/traverse.glsl.
+//
+// The host (trace/trace_program.c) sets the defines:
+//   TRAVERSE             "bvh/traverse.glsl", the structure's walk
+//   TRACER_BVH, TRACER_NAIVE, ..  and others of the tracer's own choice
+//   ANY_HIT              the wave asks for transmittance, not for the closest surface
+//   HAS_SPHERES          some geometry is made of spheres
+//   HAS_DISCS            there are discs
+//   HAS_CUTOUT           some material is alpha mode mask
+//   HAS_TRANSLUCENT      some material lets shadow rays pass
+//   RAYS_TOGETHER        how many consecutive rays one invocation walks together: 1, 2, 4, 8
+//
+// A traverse.glsl defines one of these, for ANY_HIT or not, and for RAYS_TOGETHER 1 or more:
+//   void trace_closest(trace_ray r, inout candidate best);
+//   bool trace_any(trace_ray r, inout vec3 transmittance);
+//   void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER]);
+//   void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 transmittance[RAYS_TOGETHER]);
+// It does not include this file; it includes common/candidate.glsl, whose visit_* and offer_* functions take a
+// primitive against a ray with cutouts and tints accounted for. A walk that intersects by its own means calls
+// offer_closest / offer_any with what it found, or where the scene has neither cutouts nor translucent surfaces
+// (no define) may compare distances itself. `best.distance` starts at the ray's end, or at the nearest disc.
+// trace_any returns true, and may stop, once offer_any did: nothing is left of the light.
+//
+// This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the
+// answer. Of rays walked together some may be dead: they have t_max = -1 and t_min = 0, direction (1 0 0) and
+// can hit nothing, so a walk must not take from ray 0
+// what another needs. Groups in which all are dead do not reach it.
+#include "shared/bindings.h"
+#include "shared/ray.h"
+#include "common/dispatch.glsl"
+#include "common/candidate.glsl"
+#include TRAVERSE
+
+#ifndef RAYS_TOGETHER
+#define RAYS_TOGETHER 1
+#endif
+
+layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
+#ifdef ANY_HIT
+layout(std430, binding = BIND_VISIBILITY) writeonly buffer visibility_block { uint visibilities[]; };
+#else
+layout(std430, binding = BIND_HITS) writeonly buffer hit_block { hit hits[]; };
+#endif
+
+uniform uint ray_count;
+#ifdef HAS_DISCS
+uniform uint disc_count;
+#else
+const uint disc_count = 0u;
+#endif
+
+bool is_alive(trace_ray r)
+{
+    return r.t_max > r.t_min;
+}
+
+trace_ray load_ray(uint ray_index)
+{
+    trace_ray dead = trace_ray(vec3(0.0), vec3(1.0, 0.0, 0.0), 0.0, -1.0);
+    if (ray_index >= ray_count)
+        return dead;
+    ray stored = rays[ray_index];
+    trace_ray r = trace_ray(stored.origin_t_min.xyz, stored.direction_t_max.xyz, stored.origin_t_min.w,
+                            stored.direction_t_max.w);
+    if (is_alive(r))
+        return r;
+    return dead;
+}
+
+#ifdef ANY_HIT
+
+bool discs_any(trace_ray r, inout vec3 transmittance)
+{
+    for (uint i = 0u; i < disc_count; i++) {
+        candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
+        disc d = discs[i];
+        if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
+                           found.distance) &&
+            offer_any(r, found, transmittance))
+            return true;
+    }
+    return false;
+}
+
+// A dead ray is stopped by nothing.
+void store_visibility(uint ray_index, vec3 transmittance)
+{
+    if (ray_index < ray_count)
+        visibilities[ray_index] = packUnorm4x8(vec4(transmittance, greatest(transmittance) > 0.0 ? 1.0 : 0.0));
+}
+
+#else
+
+void discs_closest(trace_ray r, inout candidate best)
+{
+    for (uint i = 0u; i < disc_count; i++) {
+        candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
+        disc d = discs[i];
+        if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
+                           found.distance))
+            offer_closest(r, found, best);
+    }
+}
+
+void store_hit(uint ray_index, trace_ray r, candidate best)
+{
+    if (ray_index < ray_count)
+        hits[ray_index] = surface_of(best, r.origin, r.direction);
+}
+
+#endif
+
+#if RAYS_TOGETHER == 1
+
+void main()
+{
+    uint ray_index = item_index();
+    if (ray_index >= ray_count)
+        return;
+    trace_ray r = load_ray(ray_index);
+#ifdef ANY_HIT
+    vec3 transmittance = vec3(1.0);
+    if (is_alive(r) && (discs_any(r, transmittance) || trace_any(r, transmittance)))
+        transmittance = vec3(0.0);
+    store_visibility(ray_index, transmittance);
+#else
+    candidate best = candidate_none(r.t_max);
+    if (is_alive(r)) {
+        discs_closest(r, best);
+        trace_closest(r, best);
+    }
+    store_hit(ray_index, r, best);
+#endif
+}
+
+#else
+
+void main()
+{
+    uint first_ray = item_index() * RAYS_TOGETHER;
+    if (first_ray >= ray_count)
+        return;
+    trace_ray r[RAYS_TOGETHER];
+    bool any_alive = false;
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+        r[k] = load_ray(first_ray + uint(k));
+        any_alive = any_alive || is_alive(r[k]);
+    }
+#ifdef ANY_HIT
+    vec3 transmittance[RAYS_TOGETHER];
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+        transmittance[k] = vec3(1.0);
+        if (is_alive(r[k]) && discs_any(r[k], transmittance[k])) {
+            transmittance[k] = vec3(0.0);
+            r[k].t_max = -1.0; // nothing is left to find
+            r[k].t_min = 0.0;
+        }
+    }
+    if (any_alive)
+        trace_any_together(r, transmittance);
+    for (int k = 0; k < RAYS_TOGETHER; k++)
+        store_visibility(first_ray + uint(k), transmittance[k]);
+#else
+    candidate best[RAYS_TOGETHER];
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+        best[k] = candidate_none(r[k].t_max);
+        if (is_alive(r[k]))
+            discs_closest(r[k], best[k]);
+    }
+    if (any_alive)
+        trace_closest_together(r, best);
+    for (int k = 0; k < RAYS_TOGETHER; k++)
+        store_hit(first_ray + uint(k), r[k], best[k]);
+#endif
+}
+
+#endif
