@@ -91,7 +91,7 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
 {
     uint bounces = (parent.flags & PATH_BOUNCES_MASK) + (straight ? 0u : 1u);
     // not >=: what is not a number ends here as well
-    if (!(greatest(weight) >= WEIGHT_MIN) || last_wave != 0u || bounces > frame.depth)
+    if (!(greatest(weight) >= WEIGHT_MIN && dot(direction, direction) > 0.5) || last_wave != 0u || bounces > frame.depth)
         return;
     float offset = OFFSET * max(greatest(abs(s.position)), distance_);
     vec3 side = dot(direction, s.geometric) > 0.0 ? s.geometric : -s.geometric;

@@ -294,6 +294,25 @@ static void an_empty_scene_and_a_single_pixel_are_pictures_too(void **state)
     }
 }
 
+static void a_picture_of_several_bands_has_no_seam(void **state)
+{
+    struct fixture *fixture = *state;
+    fixture->request.width = 4096;
+    fixture->request.height = 1040; /* bands hold 4M pixels: 1024 rows, and the rest */
+    fixture->request.format = FRAME_RGBA8;
+    fixture->request.camera.fov_y = 2.0f;
+    struct frame_result result = fixture_render(fixture);
+    assert_int_equal(result.size_bytes, 4096 * 1040 * 4);
+    for (uint32_t y = 1; y < 1040; y++)
+        for (uint32_t x = 0; x < 4096; x += 1023) {
+            const uint8_t *pixel = result.pixels + ((size_t)y * 4096 + x) * 4;
+            if (abs(pixel[1] - pixel[1 - 4096 * 4]) > 2 || pixel[3] != 255)
+                fail_msg("pixel %u,%u is %u with alpha %u, the one above %u", x, y, pixel[1], pixel[3],
+                         pixel[1 - 4096 * 4]);
+        }
+    frame_result_finish(&result);
+}
+
 static void impossible_requests_are_refused_with_the_field(void **state)
 {
     struct fixture *fixture = *state;
@@ -356,6 +375,7 @@ int main(void)
         TEST(an_abandoned_frame_leaves_the_next_one_whole),
         TEST(every_stage_of_the_frame_is_timed),
         TEST(an_empty_scene_and_a_single_pixel_are_pictures_too),
+        TEST(a_picture_of_several_bands_has_no_seam),
         TEST(impossible_requests_are_refused_with_the_field),
         TEST(the_automatic_camera_sees_all_corners_and_wastes_little),
     };
