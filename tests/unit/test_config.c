@@ -11,18 +11,19 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 static bool read_text(struct config *config, const char *text, struct error *error)
 {
-    char path[] = "/tmp/farlight-config-XXXXXX";
-    int fd = mkstemp(path);
+    char path[64];
+    int fd = memfd_create("config", MFD_CLOEXEC);
     assert_true(fd >= 0);
     assert_int_equal(write(fd, text, strlen(text)), strlen(text));
-    close(fd);
+    snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
     config_defaults(config);
     bool ok = config_read_file(config, path, false, error);
-    unlink(path);
+    close(fd);
     return ok;
 }
 

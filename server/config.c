@@ -1,0 +1,386 @@
+/* SPDX-License-Identifier: MIT */
+#include "config.h"
+
+#include "base/log.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <ini.h>
+#include <inttypes.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define KIB UINT64_C(1024)
+#define MIB (1024 * KIB)
+#define GIB (1024 * MIB)
+#define TIB (1024 * GIB)
+
+enum option_type { OPTION_TEXT, OPTION_BOOL, OPTION_LEVEL, OPTION_U32, OPTION_BYTES };
+
+struct option {
+    const char *section, *key;
+    enum option_type type;
+    size_t offset;
+    const char *default_text;
+    uint64_t min, max;
+    const char *unit; /* "" for plain numbers */
+    const char *doc;
+};
+
+#define AT(member) offsetof(struct config, member)
+
+/* clang-format off */
+static const struct option options[] = {
+    {"server", "listen", OPTION_TEXT, AT(listen), "unix:/run/farlight/farlight.sock", 0, 0, "",
+     "Addresses to listen at, separated by blanks: unix:/PATH, tcp:HOST:PORT"},
+    {"server", "insecure", OPTION_BOOL, AT(insecure), "no", 0, 1, "",
+     "Let TCP listen beyond loopback: nothing is encrypted and nobody is asked who he is"},
+    {"server", "log_level", OPTION_LEVEL, AT(log_level), "info", 0, 0, "", "error, warning, info or debug"},
+
+    {"engine", "device", OPTION_TEXT, AT(device), "auto", 0, 0, "",
+     "GPU: a number of --list-devices, software, or auto for the first hardware, else software"},
+    {"engine", "encode_threads", OPTION_U32, AT(encode_threads), "0", 0, 64, "",
+     "Threads that encode frames; 0: one per core, at most 4"},
+    {"engine", "frames_in_flight", OPTION_U32, AT(frames_in_flight), "3", 1, 16, "",
+     "Frames of one job between the renderer and the network"},
+    {"engine", "queue", OPTION_U32, AT(engine_queue), "1024", 16, 65536, "",
+     "Commands, and events, that may wait between the network and the renderer"},
+
+    {"memory", "scene", OPTION_BYTES, AT(scene_bytes), "25%", MIB, 16 * TIB, "bytes",
+     "Host memory of one scene; a percentage is of the host's memory"},
+    {"memory", "blobs", OPTION_BYTES, AT(limits.blob_bytes), "25%", MIB, 16 * TIB, "bytes",
+     "Host memory of all blobs together: vertices, texels and the like"},
+    {"memory", "blob_cache", OPTION_BYTES, AT(limits.blob_cache_bytes), "10%", 0, 16 * TIB, "bytes",
+     "The part of it that is kept for a user's next connection when nobody uses it any more"},
+    {"memory", "device", OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
+     "Device memory; 0: 70 % of what the device tells it has"},
+
+    {"limits", "clients", OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
+    {"limits", "unauthenticated", OPTION_U32, AT(limits.unauthenticated), "64", 1, 65536, "",
+     "Connections that have not introduced themselves yet"},
+    {"limits", "unauthenticated_per_address", OPTION_U32, AT(limits.unauthenticated_per_address), "8", 1, 65536, "",
+     "The same, from one TCP address"},
+    {"limits", "requests", OPTION_U32, AT(limits.requests_in_flight), "64", 1, 65536, "",
+     "Requests of one client in flight"},
+    {"limits", "scenes", OPTION_U32, AT(limits.scenes_per_client), "8", 1, 65536, "", "Open scenes of one client"},
+    {"limits", "jobs", OPTION_U32, AT(limits.jobs_per_client), "4", 1, 65536, "", "Running jobs of one client"},
+    {"limits", "blobs", OPTION_U32, AT(limits.blobs_per_client), "262144", 1, 16777216, "",
+     "Blobs that one connection may name"},
+    {"limits", "transaction_edits", OPTION_U32, AT(limits.transaction_edits), "1048576", 1, 16777216, "",
+     "Edits of one client that wait to be committed"},
+    {"limits", "nodes", OPTION_U32, AT(limits.nodes), "4194304", 1, 16777216, "", "Nodes of one scene"},
+    {"limits", "texture_edge", OPTION_U32, AT(limits.texture_edge_texels), "16384", 1, 16384, "texels",
+     "Width and height of a texture"},
+    {"limits", "width", OPTION_U32, AT(limits.width_pixels), "8192", 1, 8192, "pixels", "Width of a frame"},
+    {"limits", "height", OPTION_U32, AT(limits.height_pixels), "8192", 1, 8192, "pixels", "Height of a frame"},
+    {"limits", "samples", OPTION_U32, AT(limits.samples), "65536", 1, 65536, "", "Samples per pixel"},
+    {"limits", "upload_window", OPTION_BYTES, AT(limits.upload_window_bytes), "16M", MIB, GIB, "bytes",
+     "Blob data that a client may send ahead"},
+    {"limits", "frame_window", OPTION_BYTES, AT(limits.frame_window_bytes), "64M", MIB, 16 * GIB, "bytes",
+     "Rendered frames of one job that may wait to be sent, if that is more than one"},
+
+    {"network", "handshake", OPTION_U32, AT(connection.handshake_ms), "5000", 10, 600000, "ms",
+     "Time for a client to introduce itself"},
+    {"network", "progress_grace", OPTION_U32, AT(connection.progress_grace_ms), "5000", 10, 600000, "ms",
+     "Time that any message may take to come"},
+    {"network", "progress", OPTION_U32, AT(connection.progress_bytes_per_s), "1024", 1, 1048576, "bytes/s",
+     "Least rate of a message that takes longer"},
+    {"network", "idle", OPTION_U32, AT(connection.idle_ms), "120000", 0, 86400000, "ms",
+     "Silence after which a client that waits for nothing is disconnected; 0: never"},
+    {"network", "queued_soft", OPTION_BYTES, AT(connection.queued_soft_bytes), "16M", 64 * KIB, 16 * GIB, "bytes",
+     "Output waiting for a client from which on nothing more is read from it, .."},
+    {"network", "queued_soft_time", OPTION_U32, AT(connection.queued_soft_ms), "10000", 10, 600000, "ms",
+     ".. and after so long it is disconnected"},
+    {"network", "queued_hard", OPTION_BYTES, AT(connection.queued_hard_bytes), "64M", 64 * KIB, 16 * GIB, "bytes",
+     "Output waiting for a client at which it is disconnected at once"},
+};
+/* clang-format on */
+#define OPTION_COUNT (sizeof options / sizeof options[0])
+
+/* ---- values ------------------------------------------------------------------------------------------ */
+
+static bool parse_level(const char *text, uint32_t *level)
+{
+    for (uint32_t i = 0; i < LOG_LEVEL_COUNT; i++) {
+        if (strcmp(text, log_level_name((enum log_level)i)) == 0) {
+            *level = i;
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool parse_bool(const char *text, bool *value)
+{
+    *value = strcmp(text, "yes") == 0 || strcmp(text, "true") == 0 || strcmp(text, "1") == 0;
+    return *value || strcmp(text, "no") == 0 || strcmp(text, "false") == 0 || strcmp(text, "0") == 0;
+}
+
+static uint64_t host_memory_bytes(void)
+{
+    long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
+    return pages > 0 && page_bytes > 0 ? (uint64_t)pages * (uint64_t)page_bytes : 8 * GIB;
+}
+
+/* "16M", "25%" (of the host's memory, for bytes), "1024" */
+static bool parse_number(const char *text, bool bytes, uint64_t *value)
+{
+    if (!isdigit((unsigned char)text[0]))
+        return false;
+    char *end;
+    errno = 0;
+    *value = strtoull(text, &end, 10);
+    if (errno)
+        return false;
+    if (bytes && strcmp(end, "%") == 0) {
+        if (*value > 100)
+            return false;
+        *value = host_memory_bytes() / 100 * *value;
+        return true;
+    }
+    static const char suffixes[] = "KMGT";
+    const char *suffix = bytes && *end ? strchr(suffixes, toupper((unsigned char)*end)) : NULL;
+    if (suffix) {
+        unsigned shift = 10 * (unsigned)(suffix - suffixes + 1);
+        if (*value > UINT64_MAX >> shift)
+            return false;
+        *value <<= shift;
+        end++;
+    }
+    return *end == '\0';
+}
+
+static void *slot(struct config *config, const struct option *option)
+{
+    return (char *)config + option->offset;
+}
+
+static bool set_number(struct config *config, const struct option *option, const char *value, const char *field,
+                       struct error *error)
+{
+    uint64_t number;
+    bool bytes = option->type == OPTION_BYTES;
+    if (!parse_number(value, bytes, &number))
+        return error_set(error, ERROR_INVALID, field, "\"%s\" is no number%s", value,
+                         bytes ? ", nor one with K, M, G, T or %" : "");
+    if (number < option->min || number > option->max)
+        return error_set(error, ERROR_INVALID, field, "%" PRIu64 " is not within %" PRIu64 " .. %" PRIu64 " %s",
+                         number, option->min, option->max, option->unit);
+    if (bytes)
+        *(uint64_t *)slot(config, option) = number;
+    else
+        *(uint32_t *)slot(config, option) = (uint32_t)number;
+    return true;
+}
+
+static bool set_option(struct config *config, const struct option *option, const char *value, const char *field,
+                       struct error *error)
+{
+    switch (option->type) {
+    case OPTION_TEXT:
+        if (strlen(value) >= CONFIG_TEXT_BYTES)
+            return error_set(error, ERROR_INVALID, field, "longer than %d bytes", CONFIG_TEXT_BYTES - 1);
+        strcpy(slot(config, option), value);
+        return true;
+    case OPTION_BOOL:
+        return parse_bool(value, slot(config, option)) ||
+               error_set(error, ERROR_INVALID, field, "\"%s\" is neither yes nor no", value);
+    case OPTION_LEVEL:
+        return parse_level(value, slot(config, option)) ||
+               error_set(error, ERROR_INVALID, field, "\"%s\" is not one of error, warning, info, debug", value);
+    case OPTION_U32:
+    case OPTION_BYTES:
+        break;
+    }
+    return set_number(config, option, value, field, error);
+}
+
+static const struct option *find(const char *section, size_t section_bytes, const char *key)
+{
+    for (size_t i = 0; i < OPTION_COUNT; i++) {
+        if (strlen(options[i].section) == section_bytes &&
+            strncmp(options[i].section, section, section_bytes) == 0 && strcmp(options[i].key, key) == 0)
+            return &options[i];
+    }
+    return NULL;
+}
+
+void config_defaults(struct config *config)
+{
+    *config = (struct config){0};
+    for (size_t i = 0; i < OPTION_COUNT; i++)
+        set_option(config, &options[i], options[i].default_text, options[i].key, NULL);
+}
+
+static bool set_named(struct config *config, const char *name, const char *value, const char *field,
+                      struct error *error)
+{
+    const char *dot = strchr(name, '.');
+    const struct option *option = dot ? find(name, (size_t)(dot - name), dot + 1) : NULL;
+    if (dot == name)
+        return error_set(error, ERROR_INVALID, field, "a key outside of every [section]");
+    if (!option)
+        return error_set(error, ERROR_INVALID, field, "there is no such option");
+    return set_option(config, option, value, field, error);
+}
+
+bool config_flag(struct config *config, const char *name, const char *value, const char *flag, struct error *error)
+{
+    return !value || set_named(config, name, value, flag, error);
+}
+
+/* ---- sources ----------------------------------------------------------------------------------------- */
+
+struct reader {
+    struct config *config;
+    struct error error; /* the first; its line is what ini_parse_file() returns */
+};
+
+static int on_value(void *user, const char *section, const char *key, const char *value)
+{
+    struct reader *reader = user;
+    char name[128];
+    snprintf(name, sizeof name, "%s.%s", section, key);
+    return set_named(reader->config, name, value, name, &reader->error);
+}
+
+bool config_read_file(struct config *config, const char *path, bool optional, struct error *error)
+{
+    FILE *file = fopen(path, "re");
+    if (!file) {
+        if (optional && errno == ENOENT)
+            return true;
+        return error_set(error, ERROR_INVALID, path, "%s", strerror(errno));
+    }
+    struct reader reader = {.config = config};
+    int line = ini_parse_file(file, on_value, &reader);
+    fclose(file);
+    if (line == 0)
+        return true;
+    char field[sizeof error->field];
+    snprintf(field, sizeof field, "%s:%d", path, line);
+    if (reader.error.kind == ERROR_NONE)
+        return error_set(error, ERROR_INVALID, field, "neither a [section] nor key = value");
+    return error_set(error, ERROR_INVALID, field, "%s: %s", reader.error.field, reader.error.text);
+}
+
+bool config_read_environment(struct config *config, struct error *error)
+{
+    for (size_t i = 0; i < OPTION_COUNT; i++) {
+        char name[128];
+        snprintf(name, sizeof name, "FARLIGHT_%s_%s", options[i].section, options[i].key);
+        for (char *c = name; *c; c++)
+            *c = (char)toupper((unsigned char)*c);
+        const char *value = getenv(name);
+        if (value && !set_option(config, &options[i], value, name, error))
+            return false;
+    }
+    return true;
+}
+
+bool config_engine(const struct config *config, struct engine_options *engine, struct error *error)
+{
+    *engine = (struct engine_options){
+        .gpu = {.index = -1},
+        .encode_threads = config->encode_threads,
+        .queue_capacity = config->engine_queue,
+        .frames_in_flight = config->frames_in_flight,
+        .scene_limits = {.host_bytes = config->scene_bytes, .nodes = config->limits.nodes},
+        .device_bytes_limit = config->device_bytes,
+    };
+#ifdef FARLIGHT_DEBUG
+    engine->gpu.debug = true;
+#endif
+    if (strcmp(config->device, "auto") == 0)
+        return true;
+    engine->gpu.software = strcmp(config->device, "software") == 0;
+    uint64_t index;
+    if (engine->gpu.software)
+        return true;
+    if (!parse_number(config->device, false, &index) || index > INT16_MAX)
+        return error_set(error, ERROR_INVALID, "engine.device",
+                         "\"%s\" is no number of --list-devices, nor "
+                         "software, nor auto",
+                         config->device);
+    engine->gpu.index = (int)index;
+    return true;
+}
+
+void config_hub(const struct config *config, struct hub_options *hub)
+{
+    *hub = (struct hub_options){
+        .limits = config->limits,
+        .connection_limits = config->connection,
+        .scene_memory_bytes = config->scene_bytes,
+        .insecure = config->insecure,
+    };
+}
+
+/* ---- dump -------------------------------------------------------------------------------------------- */
+
+static void print_value(const struct config *config, const struct option *option, FILE *stream)
+{
+    const void *value = (const char *)config + option->offset;
+    switch (option->type) {
+    case OPTION_TEXT:
+        fprintf(stream, "%s", (const char *)value);
+        return;
+    case OPTION_BOOL:
+        fprintf(stream, "%s", *(const bool *)value ? "yes" : "no");
+        return;
+    case OPTION_LEVEL:
+        fprintf(stream, "%s", log_level_name((enum log_level) * (const uint32_t *)value));
+        return;
+    case OPTION_U32:
+        fprintf(stream, "%" PRIu32, *(const uint32_t *)value);
+        return;
+    case OPTION_BYTES:
+        fprintf(stream, "%" PRIu64, *(const uint64_t *)value);
+        return;
+    }
+}
+
+static bool is_default(const struct config *config, const struct option *option)
+{
+    struct config defaults;
+    config_defaults(&defaults);
+    const char *value = (const char *)config + option->offset, *other = (const char *)&defaults + option->offset;
+    switch (option->type) {
+    case OPTION_TEXT:
+        return strcmp(value, other) == 0;
+    case OPTION_BOOL:
+        return memcmp(value, other, sizeof(bool)) == 0;
+    case OPTION_LEVEL:
+    case OPTION_U32:
+        return memcmp(value, other, sizeof(uint32_t)) == 0;
+    case OPTION_BYTES:
+        return memcmp(value, other, sizeof(uint64_t)) == 0;
+    }
+    return false;
+}
+
+bool config_dump(const struct config *config, FILE *stream)
+{
+    fprintf(stream, "# farlightd %s. What is commented out has its default.\n", FARLIGHT_VERSION);
+    for (size_t i = 0; i < OPTION_COUNT; i++) {
+        const struct option *option = &options[i];
+        if (i == 0 || strcmp(option->section, options[i - 1].section) != 0)
+            fprintf(stream, "\n[%s]\n", option->section);
+        fprintf(stream, "# %s.", option->doc);
+        if (option->type == OPTION_U32 || option->type == OPTION_BYTES)
+            fprintf(stream, " %" PRIu64 " .. %" PRIu64 "%s%s.", option->min, option->max,
+                    option->unit[0] ? " " : "", option->unit);
+        fprintf(stream, "\n");
+        /* A default is written as in the table, since some depend on the host. */
+        if (is_default(config, option)) {
+            fprintf(stream, "#%s = %s\n", option->key, option->default_text);
+            continue;
+        }
+        fprintf(stream, "%s = ", option->key);
+        print_value(config, option, stream);
+        fprintf(stream, "\n");
+    }
+    return fflush(stream) == 0 && !ferror(stream);
+}

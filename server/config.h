@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/* What can be set: one row per option, from which parsing, checks and the commented file come. A flag goes over
+ * FARLIGHT_<SECTION>_<KEY> in the environment, over --config FILE, over /etc/farlight/farlightd.conf, over the
+ * default. An unknown key is an error that names file and line. */
+#ifndef FARLIGHT_CONFIG_H
+#define FARLIGHT_CONFIG_H
+
+#include "base/error.h"
+#include "job/engine.h"
+#include "session/hub.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#define CONFIG_SYSTEM_FILE "/etc/farlight/farlightd.conf"
+#define CONFIG_TEXT_BYTES 512
+
+struct config {
+    char listen[CONFIG_TEXT_BYTES]; /* addresses, separated by blanks */
+    bool insecure;
+    uint32_t log_level;
+    char device[CONFIG_TEXT_BYTES]; /* "auto", "software" or a number */
+    uint32_t encode_threads, frames_in_flight, engine_queue;
+    uint64_t scene_bytes, device_bytes;
+    struct session_limits limits;
+    struct connection_limits connection;
+};
+
+void config_defaults(struct config *config);
+/* One option, as "section.key". The error's field begins with `flag`. A NULL value was not given: nothing is done.
+ */
+bool config_flag(struct config *config, const char *name, const char *value, const char *flag,
+                 struct error *error);
+/* A missing file is an error unless `optional`. */
+bool config_read_file(struct config *config, const char *path, bool optional, struct error *error);
+bool config_read_environment(struct config *config, struct error *error);
+/* The engine's share; false: the device is not said in a way that can be understood. */
+bool config_engine(const struct config *config, struct engine_options *options, struct error *error);
+/* The network's share; the engine is not in it. */
+void config_hub(const struct config *config, struct hub_options *options);
+bool config_dump(const struct config *config, FILE *stream); /* false: the stream fails */
+
+#endif

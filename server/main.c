@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: MIT */
+/* farlightd: options, and the wiring of the engine to the network.
+ *
+ * Exit status: 0 when it was stopped (by SIGTERM or SIGINT, after a goodbye to its clients) or its one client is
+ * gone; 1 when it cannot start or go on; 2 for wrong usage. */
+#include "base/log.h"
+#include "config.h"
+#include "gpu/device.h"
+#include "job/engine.h"
+#include "session/daemon.h"
+
+#include <argp.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* glibc looks for it by name, which -fvisibility=hidden would hide. */
+__attribute__((visibility("default"))) const char *argp_program_version = "farlightd " FARLIGHT_VERSION;
+
+enum { KEY_FD = 256, KEY_CONFIG, KEY_DEVICE, KEY_LIST, KEY_LEVEL, KEY_DUMP, KEY_INSECURE };
+
+static const struct argp_option option_table[] = {
+    {"listen", 'l', "ADDRESS", 0, "Where clients come: unix:/PATH or tcp:HOST:PORT; may be given several times",
+     0},
+    {"fd", KEY_FD, "N", 0, "Serve the one client at the connected socket N, then exit", 0},
+    {"config", KEY_CONFIG, "FILE", 0, "Read options from FILE, after " CONFIG_SYSTEM_FILE, 0},
+    {"device", KEY_DEVICE, "N|software|auto", 0, "GPU to use", 0},
+    {"list-devices", KEY_LIST, NULL, 0, "Print the GPUs that can be used, and exit", 0},
+    {"log-level", KEY_LEVEL, "LEVEL", 0, "error, warning, info or debug", 0},
+    {"insecure", KEY_INSECURE, NULL, 0, "Let TCP listen beyond loopback, open to everybody and unencrypted", 0},
+    {"dump-config", KEY_DUMP, NULL, 0, "Print all options with their values as a configuration file, and exit", 0},
+    {0},
+};
+
+struct arguments {
+    char listen[CONFIG_TEXT_BYTES]; /* all of them, each followed by a blank */
+    const char *config_file, *device, *log_level, *insecure;
+    int fd;
+    bool list_devices, dump_config;
+};
+
+static error_t parse_option(int key, char *value, struct argp_state *state)
+{
+    struct arguments *arguments = state->input;
+    size_t used = strlen(arguments->listen), room = sizeof arguments->listen - used;
+    switch (key) {
+    case 'l':
+        if ((size_t)snprintf(arguments->listen + used, room, "%s ", value) >= room)
+            argp_error(state, "too many addresses");
+        break;
+    case KEY_FD:
+        arguments->fd = atoi(value);
+        if (arguments->fd <= 0)
+            argp_error(state, "--fd: \"%s\" is no descriptor", value);
+        break;
+    case KEY_CONFIG:
+        arguments->config_file = value;
+        break;
+    case KEY_DEVICE:
+        arguments->device = value;
+        break;
+    case KEY_LEVEL:
+        arguments->log_level = value;
+        break;
+    case KEY_INSECURE:
+        arguments->insecure = "yes";
+        break;
+    case KEY_LIST:
+        arguments->list_devices = true;
+        break;
+    case KEY_DUMP:
+        arguments->dump_config = true;
+        break;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+    return 0;
+}
+
+static int fail(const struct error *error)
+{
+    fprintf(stderr, "farlightd: %s%s%s\n", error->field, error->field[0] ? ": " : "", error->text);
+    fprintf(stderr, error->remedy[0] ? "farlightd: %s\n" : "%s", error->remedy);
+    return EXIT_FAILURE;
+}
+
+static bool read_config(struct config *config, const struct arguments *arguments, struct error *error)
+{
+    const char *listen = arguments->listen[0] ? arguments->listen : NULL;
+    config_defaults(config);
+    return config_read_file(config, CONFIG_SYSTEM_FILE, true, error) &&
+           (!arguments->config_file || config_read_file(config, arguments->config_file, false, error)) &&
+           config_read_environment(config, error) &&
+           config_flag(config, "server.listen", listen, "--listen", error) &&
+           config_flag(config, "engine.device", arguments->device, "--device", error) &&
+           config_flag(config, "server.insecure", arguments->insecure, "--insecure", error) &&
+           config_flag(config, "server.log_level", arguments->log_level, "--log-level", error);
+}
+
+static int list_devices(void)
+{
+    struct gpu_device_info list[32];
+    size_t count = gpu_device_list(list, sizeof list / sizeof list[0]);
+    for (size_t i = 0; i < count; i++)
+        printf("%d  %s  (%s, OpenGL %s%s)\n", list[i].index, list[i].name, list[i].vendor, list[i].version,
+               list[i].software ? ", software" : "");
+    return count ? EXIT_SUCCESS : (fprintf(stderr, "farlightd: no device gives OpenGL 4.5\n"), EXIT_FAILURE);
+}
+
+static bool serve(struct daemon *daemon, const struct config *config, int fd, struct error *error)
+{
+    struct engine_options engine_options;
+    if ((fd < 0 && !daemon_listen(daemon, config->listen, config->insecure, error)) ||
+        !config_engine(config, &engine_options, error))
+        return false;
+    struct engine *engine = engine_create(&engine_options, error);
+    if (!engine)
+        return false;
+    struct hub_options options;
+    config_hub(config, &options);
+    options.engine = engine_port(engine);
+    if (fd >= 0)
+        options.connection_limits.idle_ms = 0; /* whoever started us for himself may take his time */
+    bool ok = daemon_start(daemon, &options, error) && (fd < 0 || daemon_serve_fd(daemon, fd, error));
+    if (ok) {
+        daemon_print_ready(daemon, stdout);
+        ok = daemon_run(daemon, error);
+    }
+    daemon_finish(daemon);
+    engine_destroy(engine);
+    return ok;
+}
+
+int main(int argc, char **argv)
+{
+    static const struct argp argp = {option_table, parse_option, NULL, "The farlight rendering daemon.", 0, 0, 0};
+    struct arguments arguments = {.fd = -1};
+    struct config config;
+    struct error error = {0};
+    argp_err_exit_status = 2;
+    argp_parse(&argp, argc, argv, 0, NULL, &arguments);
+    if (arguments.list_devices)
+        return list_devices();
+    if (!read_config(&config, &arguments, &error))
+        return fail(&error);
+    if (arguments.dump_config)
+        return config_dump(&config, stdout) ? EXIT_SUCCESS : EXIT_FAILURE;
+    log_set_level((enum log_level)config.log_level);
+    daemon_block_signals();
+    struct daemon daemon;
+    daemon_init(&daemon);
+    bool ok = serve(&daemon, &config, arguments.fd, &error);
+    daemon_finish(&daemon);
+    return ok ? EXIT_SUCCESS : fail(&error);
+}

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: MIT */
+/* Addresses as people write them: "unix:/run/farlight/farlight.sock", "tcp:127.0.0.1:4170", "tcp:[::1]:0". */
+#ifndef FARLIGHT_NET_ADDRESS_H
+#define FARLIGHT_NET_ADDRESS_H
+
+#include "base/error.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <sys/socket.h>
+
+#define ADDRESS_TEXT_BYTES 160
+
+struct address {
+    struct sockaddr_storage storage;
+    socklen_t storage_bytes;
+};
+
+/* A host name is looked up, and the first answer is taken. Error field: the text. */
+bool address_parse(struct address *address, const char *text, struct error *error);
+void address_print(const struct address *address, char text[ADDRESS_TEXT_BYTES]); /* as it is written */
+bool address_is_unix(const struct address *address);
+bool address_is_loopback(const struct address *address); /* false for unix */
+const char *address_path(const struct address *address); /* of unix */
+/* Same host (the port aside). Unix peers have no address: all are the same. */
+bool address_same_host(const struct address *a, const struct address *b);
+
+#endif

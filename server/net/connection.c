@@ -1,0 +1,411 @@
+/* SPDX-License-Identifier: MIT */
+#include "net/connection.h"
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/sys.h"
+#include "net/patience.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+/* A client that sends or takes much at once gives others their turn after so much. */
+#define BYTES_A_TURN ((size_t)2 << 20)
+/* More bulk than this is not queued: a cancel, and another job's frame, wait behind it. */
+#define BULK_QUEUED_BYTES ((size_t)512 << 10)
+#define PARTS_A_CALL 64
+
+static void turn_end(void *context);
+static void on_ready(void *context, uint32_t epoll_events);
+static void on_timer(void *context);
+
+struct connection *connection_create(struct loop *loop, int fd, const struct connection_limits *limits,
+                                     const struct connection_handler *handler, void *context, struct error *error)
+{
+    struct connection *connection = calloc(1, sizeof *connection);
+    uint8_t *in = malloc(HANDSHAKE_HELLO_MAX_BYTES);
+    struct loop_watch *watch =
+        connection && in ? loop_watch_add(loop, fd, EPOLLIN, on_ready, connection, error) : NULL;
+    if (!watch) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "connection", "no memory");
+        free(in);
+        free(connection);
+        return NULL;
+    }
+    uint64_t now_ns = clock_now_ns();
+    *connection = (struct connection){
+        .loop = loop,
+        .limits = limits,
+        .handler = handler,
+        .context = context,
+        .fd = fd,
+        .watch = watch,
+        .timer = {.call = on_timer, .context = connection},
+        .turn_end = {.call = turn_end, .context = connection},
+        .in = in,
+        .in_capacity = HANDSHAKE_HELLO_MAX_BYTES,
+        .connected_ns = now_ns,
+        .last_received_ns = now_ns,
+        .last_sent_ns = now_ns,
+    };
+    out_queue_init(&connection->out);
+    loop_defer(loop, &connection->turn_end);
+    return connection;
+}
+
+static void destroy(struct connection *connection)
+{
+    loop_timer_stop(connection->loop, &connection->timer);
+    loop_watch_remove(connection->watch);
+    close(connection->fd);
+    out_queue_finish(&connection->out);
+    free(connection->scratch_data);
+    free(connection->in);
+    free(connection);
+}
+
+void connection_close(struct connection *connection)
+{
+    connection->state = CONNECTION_CLOSED;
+    loop_defer(connection->loop, &connection->turn_end);
+}
+
+static void queue_error(struct connection *connection, enum protocol_error_code code, const char *field,
+                        const char *text)
+{
+    struct message message;
+    message_init(&message, MESSAGE_ERROR);
+    message.error.code = code;
+    message.error.field = field;
+    message.error.text = text;
+    connection_send(connection, 0, 0, &message);
+}
+
+void connection_finish(struct connection *connection, enum protocol_error_code code, const char *field,
+                       const char *text)
+{
+    if (connection->state == CONNECTION_HELLO) {
+        /* Messages may not be sent yet. */
+        connection_close(connection);
+        return;
+    }
+    if (connection->state != CONNECTION_OPEN)
+        return;
+    out_queue_drop_all_bulk(&connection->out);
+    if (code != PROTOCOL_ERROR_CODE_NONE)
+        queue_error(connection, code, field, text);
+    struct message message;
+    message_init(&message, MESSAGE_GOODBYE);
+    message.goodbye.code = code;
+    message.goodbye.text = text;
+    connection_send(connection, 0, 0, &message);
+    if (connection->state != CONNECTION_OPEN)
+        return;
+    connection->state = CONNECTION_FLUSHING;
+    connection->closing_since_ns = clock_now_ns();
+    loop_defer(connection->loop, &connection->turn_end);
+}
+
+/* ---- sending ---------------------------------------------------------------------------------------- */
+
+bool connection_send(struct connection *connection, uint32_t request, uint32_t channel,
+                     const struct message *message)
+{
+    if (connection->state != CONNECTION_OPEN)
+        return false;
+    struct out_message *out = out_message_create(message_write_bytes(message));
+    if (!out) {
+        log_write(LOG_ERROR, "net", "no memory to answer a client; it is disconnected");
+        connection_close(connection);
+        return false;
+    }
+    struct writer writer;
+    writer_init(&writer, out->head, out->head_bytes);
+    if (!message_write(&writer, request, channel, message)) {
+        log_write(LOG_ERROR, "net", "a %s message cannot be sent: %s: %s", message_type_text(message->type),
+                  writer.error.field, writer.error.text);
+        free(out);
+        return false;
+    }
+    out->head_bytes = writer.used_bytes;
+    connection_send_raw(connection, out, false);
+    return true;
+}
+
+void connection_send_raw(struct connection *connection, struct out_message *message, bool bulk)
+{
+    out_queue_push(&connection->out, message, bulk);
+    loop_defer(connection->loop, &connection->turn_end);
+    if (connection->out.queued_bytes > connection->limits->queued_hard_bytes) {
+        log_write(LOG_WARNING, "net", "a client does not read: %zu bytes wait for it; it is disconnected",
+                  connection->out.queued_bytes);
+        connection_close(connection);
+    }
+}
+
+void connection_wake(struct connection *connection)
+{
+    loop_defer(connection->loop, &connection->turn_end);
+}
+
+bool connection_wants_bulk(const struct connection *connection)
+{
+    return connection->state == CONNECTION_OPEN && connection->out.queued_bytes < BULK_QUEUED_BYTES;
+}
+
+static void flush(struct connection *connection)
+{
+    size_t sent_bytes = 0;
+    while (connection->state != CONNECTION_CLOSED && sent_bytes < BYTES_A_TURN) {
+        if (connection_wants_bulk(connection))
+            connection->handler->room(connection->context);
+        struct iovec parts[PARTS_A_CALL];
+        struct msghdr message = {.msg_iov = parts};
+        message.msg_iovlen = out_queue_gather(&connection->out, parts, PARTS_A_CALL);
+        connection->write_blocked = false;
+        if (!message.msg_iovlen || connection->state == CONNECTION_CLOSED)
+            return;
+        ssize_t sent = sys_sendmsg(connection->fd, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+        connection->write_blocked = true; /* or there is more than one turn's worth */
+        if (sent < 0) {
+            if (errno != EAGAIN && errno != EWOULDBLOCK)
+                connection_close(connection);
+            return;
+        }
+        uint64_t now_ns = clock_now_ns();
+        sent_bytes += (size_t)sent;
+        connection->sent_bytes += (uint64_t)sent;
+        connection->last_sent_ns = now_ns;
+        out_queue_advance(&connection->out, (size_t)sent, now_ns);
+    }
+}
+
+/* ---- receiving -------------------------------------------------------------------------------------- */
+
+static void refuse_hello(struct connection *connection, struct handshake_reply *reply)
+{
+    uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
+    reply->version = 0;
+    size_t count = handshake_reply_encode(bytes, reply);
+    struct out_message *message = count ? out_message_create(count) : NULL;
+    if (!message) {
+        connection_close(connection);
+        return;
+    }
+    memcpy(message->head, bytes, count);
+    connection_send_raw(connection, message, false);
+    connection->state = CONNECTION_FLUSHING;
+    connection->closing_since_ns = clock_now_ns();
+}
+
+static bool make_room_for_messages(struct connection *connection, size_t consumed_bytes)
+{
+    uint8_t *in = malloc(FRAMING_MESSAGE_MAX_BYTES);
+    void *scratch_data = malloc(SCRATCH_BYTES);
+    if (!in || !scratch_data) {
+        free(in);
+        free(scratch_data);
+        return false;
+    }
+    connection->in_used -= consumed_bytes;
+    memcpy(in, connection->in + consumed_bytes, connection->in_used);
+    free(connection->in);
+    connection->in = in;
+    connection->in_capacity = FRAMING_MESSAGE_MAX_BYTES;
+    connection->scratch_data = scratch_data;
+    scratch_init(&connection->scratch, scratch_data, SCRATCH_BYTES);
+    return true;
+}
+
+static void process_hello(struct connection *connection)
+{
+    struct handshake_hello hello;
+    struct handshake_reply reply = {0};
+    struct decode_error error = {0};
+    size_t consumed_bytes = 0;
+    switch (handshake_hello_parse(&hello, connection->in, connection->in_used, &consumed_bytes, &error)) {
+    case HANDSHAKE_NEED_MORE:
+        return;
+    case HANDSHAKE_FATAL:
+        strncpy(reply.text, error.text, sizeof reply.text - 1);
+        refuse_hello(connection, &reply);
+        return;
+    case HANDSHAKE_CONSUMED:
+        break;
+    }
+    if (!connection->handler->hello(connection->context, &hello, &reply)) {
+        refuse_hello(connection, &reply);
+        return;
+    }
+    uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
+    size_t count = handshake_reply_encode(bytes, &reply);
+    struct out_message *message = count ? out_message_create(count) : NULL;
+    if (!message || !make_room_for_messages(connection, consumed_bytes)) {
+        free(message);
+        connection_close(connection);
+        return;
+    }
+    memcpy(message->head, bytes, count);
+    connection_send_raw(connection, message, false);
+    connection->state = CONNECTION_OPEN;
+    connection->handler->opened(connection->context);
+}
+
+/* Cuts one message off at *offset and hands it up; false: no more for now. */
+static bool process_message(struct connection *connection, size_t *offset)
+{
+    struct frame frame;
+    struct decode_error error = {0};
+    const uint8_t *bytes = connection->in + *offset;
+    switch (framing_parse(&frame, bytes, connection->in_used - *offset, MESSAGE_FROM_CLIENT, &error)) {
+    case FRAMING_NEED_MORE:
+        return false;
+    case FRAMING_FATAL:
+        connection_finish(connection, error.code, error.field, error.text);
+        return false;
+    case FRAMING_CONSUMED:
+        break;
+    }
+    *offset += frame.consumed_bytes;
+    connection->message_began_ns = 0;
+    if (!frame.info)
+        return true;
+    struct message message;
+    scratch_reset(&connection->scratch);
+    if (message_decode(&message, frame.header.type, frame.payload, frame.header.payload_bytes,
+                       &connection->scratch, &error))
+        connection->handler->message(connection->context, &frame.header, &message);
+    else if (error.code == PROTOCOL_ERROR_CODE_INVALID)
+        connection->handler->invalid(connection->context, &frame.header, &error);
+    else
+        connection_finish(connection, error.code, error.field, error.text);
+    return true;
+}
+
+static void process_messages(struct connection *connection)
+{
+    size_t offset = 0;
+    while (connection->state == CONNECTION_OPEN && !connection->held && offset < connection->in_used &&
+           process_message(connection, &offset))
+        continue;
+    connection->in_used -= offset;
+    memmove(connection->in, connection->in + offset, connection->in_used);
+    if (!connection->in_used)
+        connection->message_began_ns = 0;
+    else if (!connection->message_began_ns)
+        connection->message_began_ns = clock_now_ns();
+}
+
+static void process(struct connection *connection)
+{
+    if (connection->state == CONNECTION_HELLO)
+        process_hello(connection);
+    if (connection->state == CONNECTION_OPEN)
+        process_messages(connection);
+    if (connection->state == CONNECTION_FLUSHING || connection->state == CONNECTION_LINGERING)
+        connection->in_used = 0;
+}
+
+void connection_hold(struct connection *connection, bool held)
+{
+    if (connection->held && !held)
+        connection->message_began_ns = 0; /* the time it was held is not the client's */
+    connection->held = held;
+    loop_defer(connection->loop, &connection->turn_end);
+}
+
+static bool may_read(const struct connection *connection)
+{
+    switch (connection->state) {
+    case CONNECTION_HELLO:
+        return true;
+    case CONNECTION_OPEN:
+        return !connection->held && connection->out.queued_bytes <= connection->limits->queued_soft_bytes;
+    case CONNECTION_LINGERING:
+        return true;
+    case CONNECTION_FLUSHING:
+    case CONNECTION_CLOSED:
+        return false;
+    }
+    return false;
+}
+
+static void receive(struct connection *connection)
+{
+    size_t received_bytes = 0;
+    while (may_read(connection) && received_bytes < BYTES_A_TURN) {
+        size_t free_bytes = connection->in_capacity - connection->in_used;
+        ssize_t got = sys_read(connection->fd, connection->in + connection->in_used, free_bytes);
+        if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK))
+            return;
+        if (got <= 0) {
+            connection_close(connection);
+            return;
+        }
+        received_bytes += (size_t)got;
+        connection->in_used += (size_t)got;
+        connection->received_bytes += (uint64_t)got;
+        connection->last_received_ns = clock_now_ns();
+        process(connection);
+        if ((size_t)got < free_bytes)
+            return; /* most likely that was all; if not, the loop says so again */
+    }
+}
+
+/* ---- the loop's calls ------------------------------------------------------------------------------- */
+
+static void on_ready(void *context, uint32_t epoll_events)
+{
+    struct connection *connection = context;
+    if (epoll_events & (EPOLLIN | EPOLLHUP | EPOLLERR)) {
+        /* A peer that is gone says so even while nothing is read from it. */
+        if ((epoll_events & (EPOLLHUP | EPOLLERR)) && !may_read(connection))
+            connection_close(connection);
+        else
+            receive(connection);
+    }
+    loop_defer(connection->loop, &connection->turn_end);
+}
+
+static void linger(struct connection *connection)
+{
+    shutdown(connection->fd, SHUT_WR);
+    connection->state = CONNECTION_LINGERING;
+    connection->in_used = 0;
+}
+
+/* After everything that happened to the connection in this turn: send, say what to wait for, or release it. */
+static void turn_end(void *context)
+{
+    struct connection *connection = context;
+    if (connection->state == CONNECTION_OPEN && !connection->held && connection->in_used &&
+        !connection->message_began_ns)
+        process_messages(connection); /* what came before it was held */
+    flush(connection);
+    if (connection->state == CONNECTION_FLUSHING && !connection->out.queued_bytes)
+        linger(connection);
+    if (connection->state == CONNECTION_CLOSED) {
+        if (connection->turn_end.waiting)
+            return; /* closed just now, by the lines above: the next turn releases it */
+        connection->handler->closed(connection->context);
+        destroy(connection);
+        return;
+    }
+    bool over_soft = connection->out.queued_bytes > connection->limits->queued_soft_bytes;
+    if (!over_soft)
+        connection->over_soft_since_ns = 0;
+    else if (!connection->over_soft_since_ns)
+        connection->over_soft_since_ns = clock_now_ns();
+    loop_watch_change(connection->watch, (may_read(connection) ? (uint32_t)EPOLLIN : 0) |
+                                             (connection->write_blocked ? (uint32_t)EPOLLOUT : 0));
+    loop_timer_start(connection->loop, &connection->timer, patience_next_check_ns(connection, clock_now_ns()));
+}
+
+static void on_timer(void *context)
+{
+    struct connection *connection = context;
+    patience_check(connection, clock_now_ns());
+    loop_defer(connection->loop, &connection->turn_end);
+}

@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: MIT */
+/* One client's socket: bytes to messages, messages to bytes, and the limits of patience and memory. Knows the
+ * protocol's framing and the handshake, not what messages mean. One thread, that of the loop.
+ *
+ * A connection is destroyed by the loop at the end of a turn, never inside a call: after connection_close()
+ * it is still there, silent, until the handler's closed() has returned. */
+#ifndef FARLIGHT_NET_CONNECTION_H
+#define FARLIGHT_NET_CONNECTION_H
+
+#include "net/loop.h"
+#include "net/out_queue.h"
+#include "protocol/framing.h"
+#include "protocol/handshake.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct connection_limits {
+    uint32_t handshake_ms;         /* until the hello is complete */
+    uint32_t progress_grace_ms;    /* so long a message may take whatever its size, .. */
+    uint32_t progress_bytes_per_s; /* .. then this is the least rate */
+    uint32_t idle_ms;           /* 0: never. Silence of a client that waits for nothing, or that does not read */
+    uint32_t queued_soft_ms;    /* so long more than queued_soft_bytes may wait for it */
+    uint64_t queued_soft_bytes; /* nothing is read from a client while more than this waits for it */
+    uint64_t queued_hard_bytes;
+};
+
+/* What is told to the layer above; `context` is that of connection_create(). */
+struct connection_handler {
+    /* Fills the reply. False: the client is turned away, with reply->text. */
+    bool (*hello)(void *context, const struct handshake_hello *hello, struct handshake_reply *reply);
+    /* Hello was answered, messages may be sent. */
+    void (*opened)(void *context);
+    /* Valid in every field; gone when the call returns. */
+    void (*message)(void *context, const struct framing_header *header, const struct message *message);
+    /* A message whose frame is sound, but not all of its fields. */
+    void (*invalid)(void *context, const struct framing_header *header, const struct decode_error *error);
+    /* Little bulk is queued: the time to queue more. */
+    void (*room)(void *context);
+    /* Whether the client waits for something that the daemon owes it, so that its silence means nothing. */
+    bool (*owed)(const void *context);
+    /* The last call. The connection is freed when it returns. */
+    void (*closed)(void *context);
+};
+
+enum connection_state {
+    CONNECTION_HELLO, /* waits for the client's first bytes */
+    CONNECTION_OPEN,
+    CONNECTION_FLUSHING,  /* goodbye is queued; nothing is read */
+    CONNECTION_LINGERING, /* goodbye is sent; what still comes is thrown away, so that the kernel delivers it */
+    CONNECTION_CLOSED,
+};
+
+struct connection {
+    struct loop *loop;
+    const struct connection_limits *limits;
+    const struct connection_handler *handler;
+    void *context;
+    int fd;
+    enum connection_state state;
+    struct loop_watch *watch;
+    struct loop_timer timer;
+    struct loop_deferred turn_end;
+
+    uint8_t *in; /* in_capacity is what the largest message allowed in this state needs */
+    size_t in_capacity, in_used;
+    struct scratch scratch;
+    void *scratch_data;
+    bool held;                 /* the layer above wants no more messages for now */
+    bool write_blocked;        /* the kernel takes no more for now */
+    uint64_t message_began_ns; /* of the incomplete message at the start of `in`; 0: none */
+
+    struct out_queue out;
+    uint64_t over_soft_since_ns; /* 0: it is not */
+    uint64_t closing_since_ns;
+
+    uint64_t connected_ns, last_received_ns, last_sent_ns;
+    uint64_t received_bytes, sent_bytes;
+};
+
+/* Takes over the descriptor (non-blocking) when it succeeds. */
+struct connection *connection_create(struct loop *loop, int fd, const struct connection_limits *limits,
+                                     const struct connection_handler *handler, void *context, struct error *error);
+
+/* Control message. False, with a line in the log: it cannot be encoded, or the connection is closing. */
+bool connection_send(struct connection *connection, uint32_t request, uint32_t channel,
+                     const struct message *message);
+/* A message with header and payload in it; takes it over in any case. */
+void connection_send_raw(struct connection *connection, struct out_message *message, bool bulk);
+/* There is something for room() to queue. */
+void connection_wake(struct connection *connection);
+bool connection_wants_bulk(const struct connection *connection);
+void connection_hold(struct connection *connection, bool held);
+
+/* Says goodbye, waits a moment until it is delivered, closes. With an error code, ERROR on request 0 goes first.
+ */
+void connection_finish(struct connection *connection, enum protocol_error_code code, const char *field,
+                       const char *text);
+/* Closes without a word. */
+void connection_close(struct connection *connection);
+
+#endif

@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: MIT */
+#include "net/listen.h"
+
+#include "base/log.h"
+#include "base/sys.h"
+
+#include <errno.h>
+#include <libgen.h>
+#include <limits.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define BACKLOG 64
+
+static const struct sockaddr *raw(const struct address *address)
+{
+    return (const struct sockaddr *)&address->storage;
+}
+
+static bool make_folder(const char *path, struct error *error)
+{
+    char copy[PATH_MAX];
+    snprintf(copy, sizeof copy, "%s", path);
+    const char *folder = dirname(copy);
+    if (mkdir(folder, 0750) == 0 || errno == EEXIST)
+        return true;
+    return error_set(error, ERROR_INVALID, path, "cannot make the folder %s: %s", folder, strerror(errno));
+}
+
+/* Whoever is at the path answers a connect if it lives; a refusal shows that the file is a leftover. */
+static bool clear_path(const struct address *address, struct error *error)
+{
+    const char *path = address_path(address);
+    struct stat status;
+    if (lstat(path, &status) < 0)
+        return errno == ENOENT || error_set(error, ERROR_INVALID, path, "%s", strerror(errno));
+    if (!S_ISSOCK(status.st_mode))
+        return error_set(error, ERROR_INVALID, path, "there is a file there that is no socket; it is left alone");
+    int fd = sys.socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (fd < 0)
+        return error_set(error, ERROR_INTERNAL, path, "socket: %s", strerror(errno));
+    int result = sys.connect(fd, raw(address), address->storage_bytes);
+    int why = errno;
+    close(fd);
+    if (result < 0 && why == ECONNREFUSED) {
+        log_write(LOG_INFO, "net", "removing the stale socket %s", path);
+        if (unlink(path) == 0 || errno == ENOENT)
+            return true;
+        return error_set(error, ERROR_INVALID, path, "cannot remove the stale socket: %s", strerror(errno));
+    }
+    if (result < 0 && why == ENOENT)
+        return true;
+    if (result < 0 && why != EAGAIN && why != EINTR)
+        return error_set(error, ERROR_INVALID, path, "cannot find out who is there: %s", strerror(why));
+    error_set(error, ERROR_BUSY, path, "another daemon is listening there");
+    return error_remedy(error, "stop it, or listen at another path");
+}
+
+static bool check_tcp(const struct address *address, bool insecure, struct error *error)
+{
+    if (insecure || address_is_loopback(address))
+        return true;
+    char text[ADDRESS_TEXT_BYTES];
+    address_print(address, text);
+    error_set(
+        error, ERROR_DENIED, text,
+        "beyond loopback a plain TCP connection is open to everybody who can reach it, and so is what it carries");
+    return error_remedy(error, "listen on 127.0.0.1 and come through ssh, or spell out --insecure");
+}
+
+static bool bind_and_listen(struct listener *listener, const struct address *address, struct error *error)
+{
+    char text[ADDRESS_TEXT_BYTES];
+    address_print(address, text);
+    int on = 1;
+    if (!address_is_unix(address))
+        setsockopt(listener->fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    if (address->storage.ss_family == AF_INET6)
+        setsockopt(listener->fd, IPPROTO_IPV6, IPV6_V6ONLY, &on, sizeof on);
+    /* The file must never be open to others, not even until the chmod: the mask applies while it is made. */
+    mode_t mask = umask(0117);
+    int result = sys.bind(listener->fd, raw(address), address->storage_bytes);
+    int why = errno;
+    umask(mask);
+    if (result < 0)
+        return error_set(error, why == EADDRINUSE ? ERROR_BUSY : ERROR_INVALID, text, "%s", strerror(why));
+    listener->owns_path = address_is_unix(address);
+    if (sys.listen(listener->fd, BACKLOG) < 0)
+        return error_set(error, ERROR_INTERNAL, text, "listen: %s", strerror(errno));
+    listener->address.storage_bytes = sizeof listener->address.storage;
+    if (getsockname(listener->fd, (struct sockaddr *)&listener->address.storage,
+                    &listener->address.storage_bytes) < 0)
+        return error_set(error, ERROR_INTERNAL, text, "getsockname: %s", strerror(errno));
+    return true;
+}
+
+bool listener_open(struct listener *listener, const struct address *address, bool insecure, struct error *error)
+{
+    *listener = (struct listener){.fd = -1, .address = *address};
+    if (address_is_unix(address)) {
+        if (!make_folder(address_path(address), error) || !clear_path(address, error))
+            return false;
+    } else if (!check_tcp(address, insecure, error)) {
+        return false;
+    }
+    listener->fd = sys.socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (listener->fd < 0)
+        return error_set(error, ERROR_INTERNAL, "listen", "socket: %s", strerror(errno));
+    if (!bind_and_listen(listener, address, error)) {
+        listener_close(listener);
+        return false;
+    }
+    return true;
+}
+
+void listener_close(struct listener *listener)
+{
+    if (listener->owns_path)
+        unlink(address_path(&listener->address));
+    if (listener->fd >= 0)
+        close(listener->fd);
+    *listener = (struct listener){.fd = -1};
+}
+
+int listener_accept(const struct listener *listener, struct address *peer, bool *retry_later)
+{
+    *retry_later = false;
+    *peer = (struct address){.storage_bytes = sizeof peer->storage};
+    int fd = sys_accept(listener->fd, (struct sockaddr *)&peer->storage, &peer->storage_bytes,
+                        SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (fd < 0) {
+        *retry_later = errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM;
+        if (*retry_later)
+            log_write(LOG_WARNING, "net", "cannot let a client in: %s", strerror(errno));
+        return -1;
+    }
+    /* A Unix peer has no name of its own; the family is what the rest asks for. */
+    peer->storage.ss_family = listener->address.storage.ss_family;
+    if (!address_is_unix(peer)) {
+        int on = 1; /* answers are small and wanted at once; frames are large anyway */
+        setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    }
+    return fd;
+}

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT */
+/* Waits for descriptors and timers, and calls who asked. Knows nothing of the product. One thread. */
+#ifndef FARLIGHT_NET_LOOP_H
+#define FARLIGHT_NET_LOOP_H
+
+#include "base/error.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct loop;
+struct loop_watch;
+
+typedef void loop_ready_fn(void *context, uint32_t epoll_events);
+typedef void loop_call_fn(void *context);
+
+/* The owner's memory; all-zero is a timer that does not run. */
+struct loop_timer {
+    struct loop_timer *previous, *next;
+    bool running;
+    uint64_t due_ns;
+    loop_call_fn *call;
+    void *context;
+};
+
+/* The owner's memory; must live until it was called. */
+struct loop_deferred {
+    struct loop_deferred *next;
+    bool waiting;
+    loop_call_fn *call;
+    void *context;
+};
+
+struct loop *loop_create(struct error *error);
+void loop_destroy(struct loop *loop); /* accepts NULL; all watches are removed by then */
+
+/* Level-triggered; EPOLLERR and EPOLLHUP always come. NULL and *error on failure. */
+struct loop_watch *loop_watch_add(struct loop *loop, int fd, uint32_t epoll_events, loop_ready_fn *ready,
+                                  void *context, struct error *error);
+void loop_watch_change(struct loop_watch *watch, uint32_t epoll_events);
+/* Before the descriptor is closed. Nothing is called for it any more, even if it is ready right now.
+ * Accepts NULL. */
+void loop_watch_remove(struct loop_watch *watch);
+
+void loop_timer_start(struct loop *loop, struct loop_timer *timer, uint64_t delay_ns); /* or starts anew */
+void loop_timer_stop(struct loop *loop, struct loop_timer *timer);
+
+/* Calls back once the handlers of this turn are through: the place to release what a handler may still be
+ * using. Asking again while it waits changes
+ * nothing; asking while it is being called means once more, in the next turn. */
+void loop_defer(struct loop *loop, struct loop_deferred *deferred);
+
+bool loop_run(struct loop *loop, struct error *error); /* until loop_stop() */
+void loop_stop(struct loop *loop);
+void loop_run_deferred(struct loop *loop); /* all of it now, for an orderly end outside loop_run() */
+
+#endif

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+#include "net/notify.h"
+
+#include "base/log.h"
+
+#include <errno.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+void notify_manager(const char *state)
+{
+    const char *path = getenv("NOTIFY_SOCKET");
+    if (!path || (path[0] != '/' && path[0] != '@'))
+        return;
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    size_t bytes = strlen(path);
+    if (bytes >= sizeof address.sun_path)
+        return;
+    memcpy(address.sun_path, path, bytes);
+    if (path[0] == '@')
+        address.sun_path[0] = '\0'; /* an abstract name: no file, and no NUL at its end */
+    int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    socklen_t address_bytes = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + bytes);
+    if (fd < 0 ||
+        sendto(fd, state, strlen(state), MSG_NOSIGNAL, (const struct sockaddr *)&address, address_bytes) < 0)
+        log_write(LOG_WARNING, "net", "cannot tell the service manager %s: %s", state, strerror(errno));
+    if (fd >= 0)
+        close(fd);
+}

@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: MIT */
+/* What waits to be sent on one connection. Bodies are shared chunks of bytes with a reference count and are
+ * never copied or changed; each message keeps an offset instead. Control messages go before bulk ones, but a
+ * message that was begun is finished first. One thread. No system call in here. */
+#ifndef FARLIGHT_NET_OUT_QUEUE_H
+#define FARLIGHT_NET_OUT_QUEUE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/uio.h>
+
+/* Bytes that several messages refer to; embedded in what owns them. */
+struct out_chunk {
+    uint32_t references;
+    const uint8_t *data;
+    size_t size_bytes;
+    void (*release)(struct out_chunk *chunk); /* when the last reference is gone */
+};
+void out_chunk_ref(struct out_chunk *chunk);
+void out_chunk_unref(struct out_chunk *chunk); /* accepts NULL */
+
+/* The last byte was handed to the kernel. Not called for a message that is dropped. */
+typedef void out_sent_fn(void *context, uint64_t now_ns);
+
+struct out_message {
+    struct out_message *next;
+    uint32_t request;
+    out_sent_fn *sent;
+    void *context;
+    struct out_chunk *body; /* may be NULL; the message holds a reference */
+    size_t body_offset_bytes, body_bytes;
+    size_t padding_bytes; /* zeros after the body, at most 7 */
+    size_t sent_bytes;    /* of head, body and padding together */
+    size_t head_bytes;
+    uint8_t head[];
+};
+struct out_message *out_message_create(size_t head_bytes); /* NULL: out of memory */
+size_t out_message_bytes(const struct out_message *message);
+
+struct out_list {
+    struct out_message *first, **end;
+};
+
+struct out_queue {
+    struct out_list sending; /* in this order they go; filled from the two below */
+    struct out_list control, bulk;
+    size_t queued_bytes;      /* not handed to the kernel yet, all lists */
+    size_t queued_bulk_bytes; /* of them in `bulk` */
+};
+
+void out_queue_init(struct out_queue *queue);
+void out_queue_finish(struct out_queue *queue); /* drops everything */
+void out_queue_push(struct out_queue *queue, struct out_message *message, bool bulk);
+/* The next bytes to be sent, at most `parts_max` (at least 3) parts; the number of parts, 0: nothing waits. */
+size_t out_queue_gather(struct out_queue *queue, struct iovec *parts, size_t parts_max);
+/* That many of the gathered bytes are with the kernel. Calls `sent` of those complete, which may push. */
+void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t now_ns);
+/* Drops messages of a request that were not begun, and forgets the `sent` of one that was. Control
+ * messages stay. */
+void out_queue_drop_bulk(struct out_queue *queue, uint32_t request);
+void out_queue_drop_all_bulk(struct out_queue *queue);
+
+#endif

@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/blob_store.h"
+
+#include "base/hashmap.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct entry {
+    struct entry *older, *newer;
+    struct entry *same_key; /* the map's keys are short: what shares one hangs in a chain */
+    blob_principal principal;
+    struct blob *blob;
+};
+
+struct blob_store {
+    struct hashmap map;            /* first entry of a chain, by key_of() */
+    struct entry *oldest, *newest; /* by last use */
+    uint64_t held_bytes, reserved_bytes;
+    uint64_t limit_bytes, cache_limit_bytes;
+    size_t count;
+};
+
+static uint64_t key_of(blob_principal principal, const uint8_t hash[BLOB_HASH_BYTES])
+{
+    uint64_t key;
+    memcpy(&key, hash, sizeof key);
+    return key ^ principal * UINT64_C(0x9e3779b97f4a7c15);
+}
+
+struct blob_store *blob_store_create(uint64_t limit_bytes, uint64_t cache_limit_bytes)
+{
+    struct blob_store *store = calloc(1, sizeof *store);
+    if (!store)
+        return NULL;
+    store->limit_bytes = limit_bytes;
+    store->cache_limit_bytes = cache_limit_bytes;
+    return store;
+}
+
+static void unlink_age(struct blob_store *store, struct entry *entry)
+{
+    *(entry->older ? &entry->older->newer : &store->oldest) = entry->newer;
+    *(entry->newer ? &entry->newer->older : &store->newest) = entry->older;
+}
+
+static void link_newest(struct blob_store *store, struct entry *entry)
+{
+    entry->older = store->newest;
+    entry->newer = NULL;
+    *(store->newest ? &store->newest->newer : &store->oldest) = entry;
+    store->newest = entry;
+}
+
+static void remove_entry(struct blob_store *store, struct entry *entry)
+{
+    uint64_t key = key_of(entry->principal, entry->blob->hash);
+    struct entry *first = hashmap_get(&store->map, key);
+    if (first == entry) {
+        if (entry->same_key)
+            hashmap_put(&store->map, key, entry->same_key); /* replaces: needs no memory */
+        else
+            hashmap_remove(&store->map, key);
+    } else {
+        while (first->same_key != entry)
+            first = first->same_key;
+        first->same_key = entry->same_key;
+    }
+    unlink_age(store, entry);
+    store->held_bytes -= entry->blob->size_bytes;
+    store->count--;
+    blob_unref(entry->blob);
+    free(entry);
+}
+
+void blob_store_destroy(struct blob_store *store)
+{
+    if (!store)
+        return;
+    while (store->oldest)
+        remove_entry(store, store->oldest);
+    hashmap_finish(&store->map);
+    free(store);
+}
+
+static struct entry *find(const struct blob_store *store, blob_principal principal,
+                          const uint8_t hash[BLOB_HASH_BYTES])
+{
+    struct entry *entry = hashmap_get(&store->map, key_of(principal, hash));
+    while (entry && (entry->principal != principal || memcmp(entry->blob->hash, hash, BLOB_HASH_BYTES) != 0))
+        entry = entry->same_key;
+    return entry;
+}
+
+struct blob *blob_store_find(struct blob_store *store, blob_principal principal,
+                             const uint8_t hash[BLOB_HASH_BYTES], uint64_t size_bytes)
+{
+    struct entry *entry = find(store, principal, hash);
+    if (!entry || entry->blob->size_bytes != size_bytes)
+        return NULL;
+    unlink_age(store, entry);
+    link_newest(store, entry);
+    return blob_ref(entry->blob);
+}
+
+struct blob *blob_store_add(struct blob_store *store, blob_principal principal, struct blob *blob)
+{
+    struct entry *entry = find(store, principal, blob->hash);
+    if (entry)
+        return blob_ref(entry->blob);
+    entry = calloc(1, sizeof *entry);
+    if (!entry)
+        return NULL;
+    uint64_t key = key_of(principal, blob->hash);
+    *entry = (struct entry){.same_key = hashmap_get(&store->map, key), .principal = principal, .blob = blob};
+    if (!hashmap_put(&store->map, key, entry)) {
+        free(entry);
+        return NULL;
+    }
+    link_newest(store, entry);
+    blob_ref(blob);
+    store->held_bytes += blob->size_bytes;
+    store->count++;
+    return blob_ref(blob);
+}
+
+/* Nobody but the store has a reference. Uses end in other threads, but begin only here. */
+static bool is_idle(const struct entry *entry)
+{
+    return atomic_load_explicit(&entry->blob->references, memory_order_acquire) == 1;
+}
+
+/* Drops idle blobs, oldest first, until no more than that many bytes of them are left. */
+static void trim_to(struct blob_store *store, uint64_t idle_limit_bytes)
+{
+    uint64_t idle_bytes = 0;
+    for (const struct entry *entry = store->oldest; entry; entry = entry->newer)
+        idle_bytes += is_idle(entry) ? entry->blob->size_bytes : 0;
+    for (struct entry *entry = store->oldest, *newer; entry && idle_bytes > idle_limit_bytes; entry = newer) {
+        newer = entry->newer;
+        if (!is_idle(entry))
+            continue;
+        idle_bytes -= entry->blob->size_bytes;
+        remove_entry(store, entry);
+    }
+}
+
+void blob_store_trim(struct blob_store *store)
+{
+    trim_to(store, store->cache_limit_bytes);
+}
+
+static bool fits(const struct blob_store *store, uint64_t size_bytes)
+{
+    uint64_t used_bytes = blob_store_bytes(store);
+    return used_bytes <= store->limit_bytes && size_bytes <= store->limit_bytes - used_bytes;
+}
+
+bool blob_store_reserve(struct blob_store *store, uint64_t size_bytes, struct error *error)
+{
+    if (!fits(store, size_bytes))
+        trim_to(store, 0);
+    if (!fits(store, size_bytes)) {
+        error_set(error, ERROR_LIMIT, "blob", "%llu bytes are held, %llu more would pass the limit of %llu",
+                  (unsigned long long)blob_store_bytes(store), (unsigned long long)size_bytes,
+                  (unsigned long long)store->limit_bytes);
+        error_remedy(error,
+                     "close scenes that are not needed, or raise memory.blobs in the daemon's configuration");
+        if (error)
+            error->retryable = size_bytes <= store->limit_bytes;
+        return false;
+    }
+    store->reserved_bytes += size_bytes;
+    return true;
+}
+
+void blob_store_release(struct blob_store *store, uint64_t size_bytes)
+{
+    store->reserved_bytes -= size_bytes;
+}
+
+void blob_store_forget(struct blob_store *store, blob_principal principal)
+{
+    for (struct entry *entry = store->oldest, *newer; entry; entry = newer) {
+        newer = entry->newer;
+        if (entry->principal == principal)
+            remove_entry(store, entry);
+    }
+}
+
+uint64_t blob_store_bytes(const struct blob_store *store)
+{
+    return store->held_bytes + store->reserved_bytes;
+}
+
+size_t blob_store_count(const struct blob_store *store)
+{
+    return store->count;
+}

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/* Complete blobs by principal and content. A blob lives while a session or a scene uses it, and then in a
+ * bounded cache, least recently used out first, for the same principal's next connection. One thread. */
+#ifndef FARLIGHT_SESSION_BLOB_STORE_H
+#define FARLIGHT_SESSION_BLOB_STORE_H
+
+#include "base/blob.h"
+#include "base/error.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* Whose blobs are meant: a hash must not be a key to somebody else's data. */
+typedef uint64_t blob_principal;
+
+struct blob_store;
+
+struct blob_store *blob_store_create(uint64_t limit_bytes, uint64_t cache_limit_bytes); /* NULL: out of memory */
+void blob_store_destroy(struct blob_store *store);                                      /* accepts NULL */
+
+/* A new reference, or NULL: not there. */
+struct blob *blob_store_find(struct blob_store *store, blob_principal principal,
+                             const uint8_t hash[BLOB_HASH_BYTES], uint64_t size_bytes);
+/* Gives the store a complete blob, which takes a reference of its own, and returns a new reference to the
+ * one that is held under this name from now on: it, or an equal one that was there. NULL: out of memory. */
+struct blob *blob_store_add(struct blob_store *store, blob_principal principal, struct blob *blob);
+
+/* Room for a blob that is about to arrive; ERROR_LIMIT if there is none even without the cache. */
+bool blob_store_reserve(struct blob_store *store, uint64_t size_bytes, struct error *error);
+void blob_store_release(struct blob_store *store, uint64_t size_bytes); /* it is added now, or will not come */
+
+void blob_store_trim(struct blob_store *store); /* to be called when uses may have ended */
+void blob_store_forget(struct blob_store *store, blob_principal principal); /* it will never come back */
+uint64_t blob_store_bytes(const struct blob_store *store);                  /* held and reserved */
+size_t blob_store_count(const struct blob_store *store);
+
+#endif

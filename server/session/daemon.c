@@ -1,0 +1,253 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/daemon.h"
+
+#include "base/log.h"
+#include "net/notify.h"
+#include "session/session.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/epoll.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+/* So few at once, so that those who came first can introduce themselves before the next are counted. */
+#define ACCEPTS_A_TURN 4
+/* Out of descriptors: a listener stays readable all the time, so it is not watched for this long. */
+#define ACCEPT_PAUSE_NS UINT64_C(100000000)
+
+static void stop_signals(sigset_t *set)
+{
+    sigemptyset(set);
+    sigaddset(set, SIGTERM);
+    sigaddset(set, SIGINT);
+}
+
+void daemon_block_signals(void)
+{
+    sigset_t set;
+    stop_signals(&set);
+    sigprocmask(SIG_BLOCK, &set, NULL);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+void daemon_init(struct daemon *daemon)
+{
+    *daemon = (struct daemon){.signal_fd = -1};
+}
+
+static bool listen_at(struct daemon *daemon, const char *text, bool insecure, struct error *error)
+{
+    struct address address;
+    if (daemon->listener_count == DAEMON_LISTENERS_MAX)
+        return error_set(error, ERROR_LIMIT, text, "at most %d addresses", DAEMON_LISTENERS_MAX);
+    if (!address_parse(&address, text, error) ||
+        !listener_open(&daemon->listeners[daemon->listener_count], &address, insecure, error))
+        return false;
+    daemon->listener_count++;
+    return true;
+}
+
+bool daemon_listen(struct daemon *daemon, const char *addresses, bool insecure, struct error *error)
+{
+    char *copy = strdup(addresses), *rest = copy;
+    bool ok = copy != NULL || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
+    for (char *address; ok && (address = strsep(&rest, " \t"));)
+        ok = !address[0] || listen_at(daemon, address, insecure, error);
+    free(copy);
+    return ok && (daemon->listener_count || error_set(error, ERROR_INVALID, "server.listen", "no address"));
+}
+
+/* ---- clients ----------------------------------------------------------------------------------------- */
+
+static void watch_listeners(struct daemon *daemon, bool watched)
+{
+    for (size_t i = 0; i < daemon->listener_count; i++) {
+        if (daemon->listener_watches[i])
+            loop_watch_change(daemon->listener_watches[i], watched ? (uint32_t)EPOLLIN : 0);
+    }
+}
+
+static void on_accept_timer(void *context)
+{
+    watch_listeners(context, true);
+}
+
+static void pause_accepting(struct daemon *daemon)
+{
+    watch_listeners(daemon, false);
+    loop_timer_start(daemon->loop, &daemon->accept_timer, ACCEPT_PAUSE_NS);
+}
+
+static bool accept_one(struct daemon *daemon, const struct listener *listener)
+{
+    struct address peer;
+    bool retry_later;
+    int fd = listener_accept(listener, &peer, &retry_later);
+    if (retry_later)
+        pause_accepting(daemon);
+    if (fd < 0)
+        return false;
+    struct error error = {0};
+    if (hub_add_client(&daemon->hub, fd, &peer, &error))
+        return true;
+    log_write(LOG_WARNING, "session", "a client is turned away: %s", error.text);
+    close(fd);
+    return true;
+}
+
+static void accept_from(struct daemon *daemon, const struct listener *listener)
+{
+    for (int i = 0; i < ACCEPTS_A_TURN; i++) {
+        /* Those who wait in the listener's own queue may come when others have introduced themselves, or run out
+         * of time. */
+        if (daemon->hub.unauthenticated >= daemon->hub.options.limits.unauthenticated) {
+            pause_accepting(daemon);
+            return;
+        }
+        if (!accept_one(daemon, listener))
+            return;
+    }
+}
+
+static void on_listeners(void *context, uint32_t epoll_events)
+{
+    (void)epoll_events;
+    struct daemon *daemon = context;
+    for (size_t i = 0; i < daemon->listener_count; i++)
+        accept_from(daemon, &daemon->listeners[i]);
+}
+
+/* ---- the end ----------------------------------------------------------------------------------------- */
+
+static void stop(struct daemon *daemon)
+{
+    if (daemon->hub.stopping) {
+        loop_stop(daemon->loop); /* asked twice: without goodbye */
+        return;
+    }
+    notify_manager("STOPPING=1");
+    for (size_t i = 0; i < daemon->listener_count; i++) {
+        loop_watch_remove(daemon->listener_watches[i]);
+        daemon->listener_watches[i] = NULL;
+        listener_close(&daemon->listeners[i]);
+    }
+    daemon->listener_count = 0;
+    hub_stop(&daemon->hub);
+}
+
+static void on_signal(void *context, uint32_t epoll_events)
+{
+    (void)epoll_events;
+    struct daemon *daemon = context;
+    struct signalfd_siginfo info;
+    if (read(daemon->signal_fd, &info, sizeof info) != (ssize_t)sizeof info)
+        return;
+    log_write(LOG_INFO, "session", "stopping: %s", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
+    stop(daemon);
+}
+
+static void on_emptied(void *context)
+{
+    struct daemon *daemon = context;
+    if (daemon->hub.stopping || daemon->single_client)
+        loop_stop(daemon->loop);
+}
+
+/* ---- life -------------------------------------------------------------------------------------------- */
+
+static bool watch_signals(struct daemon *daemon, struct error *error)
+{
+    sigset_t set;
+    stop_signals(&set);
+    daemon->signal_fd = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+    if (daemon->signal_fd < 0)
+        return error_set(error, ERROR_INTERNAL, NULL, "signalfd: %s", strerror(errno));
+    daemon->signal_watch = loop_watch_add(daemon->loop, daemon->signal_fd, EPOLLIN, on_signal, daemon, error);
+    return daemon->signal_watch != NULL;
+}
+
+bool daemon_start(struct daemon *daemon, const struct hub_options *options, struct error *error)
+{
+    struct loop *loop = loop_create(error);
+    if (!loop)
+        return false;
+    if (!hub_init(&daemon->hub, loop, options, error)) {
+        loop_destroy(loop);
+        return false;
+    }
+    daemon->loop = loop;
+    daemon->hub.emptied = on_emptied;
+    daemon->hub.emptied_context = daemon;
+    daemon->accept_timer = (struct loop_timer){.call = on_accept_timer, .context = daemon};
+    if (!watch_signals(daemon, error))
+        return false;
+    for (size_t i = 0; i < daemon->listener_count; i++) {
+        daemon->listener_watches[i] =
+            loop_watch_add(loop, daemon->listeners[i].fd, EPOLLIN, on_listeners, daemon, error);
+        if (!daemon->listener_watches[i])
+            return false;
+    }
+    return true;
+}
+
+bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error)
+{
+    struct address peer = {.storage_bytes = sizeof peer.storage};
+    char field[32];
+    snprintf(field, sizeof field, "--fd %d", fd);
+    if (getpeername(fd, (struct sockaddr *)&peer.storage, &peer.storage_bytes) < 0)
+        return error_set(error, ERROR_INVALID, field, "not a connected socket: %s", strerror(errno));
+    int flags = fcntl(fd, F_GETFL);
+    if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
+        return error_set(error, ERROR_INVALID, field, "%s", strerror(errno));
+    daemon->single_client = true;
+    return hub_add_client(&daemon->hub, fd, &peer, error);
+}
+
+void daemon_print_ready(const struct daemon *daemon, FILE *stream)
+{
+    for (size_t i = 0; i < daemon->listener_count; i++) {
+        char text[ADDRESS_TEXT_BYTES];
+        address_print(&daemon->listeners[i].address, text);
+        fprintf(stream, "READY %s\n", text);
+    }
+    if (!daemon->listener_count)
+        fprintf(stream, "READY\n");
+    fflush(stream);
+}
+
+bool daemon_run(struct daemon *daemon, struct error *error)
+{
+    notify_manager("READY=1");
+    return loop_run(daemon->loop, error);
+}
+
+static void close_sessions(struct daemon *daemon)
+{
+    size_t cursor = 0;
+    void *session;
+    while (hashmap_next(&daemon->hub.sessions, &cursor, NULL, &session))
+        session_close(session);
+    loop_run_deferred(daemon->loop);
+}
+
+void daemon_finish(struct daemon *daemon)
+{
+    for (size_t i = 0; i < daemon->listener_count; i++) {
+        loop_watch_remove(daemon->listener_watches[i]);
+        listener_close(&daemon->listeners[i]);
+    }
+    if (daemon->loop) {
+        close_sessions(daemon);
+        loop_watch_remove(daemon->signal_watch);
+        loop_timer_stop(daemon->loop, &daemon->accept_timer);
+        hub_finish(&daemon->hub);
+        loop_destroy(daemon->loop);
+    }
+    if (daemon->signal_fd >= 0)
+        close(daemon->signal_fd);
+    daemon_init(daemon);
+}

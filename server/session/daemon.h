@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: MIT */
+/* The network side as a whole: listeners, signals, sessions. Runs on the thread that calls it. */
+#ifndef FARLIGHT_SESSION_DAEMON_H
+#define FARLIGHT_SESSION_DAEMON_H
+
+#include "net/listen.h"
+#include "session/hub.h"
+
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+
+#define DAEMON_LISTENERS_MAX 16
+
+struct daemon {
+    struct loop *loop;
+    struct hub hub;
+    struct listener listeners[DAEMON_LISTENERS_MAX];
+    struct loop_watch *listener_watches[DAEMON_LISTENERS_MAX];
+    size_t listener_count;
+    int signal_fd;
+    struct loop_watch *signal_watch;
+    struct loop_timer accept_timer; /* after which listeners are looked at again */
+    bool single_client;             /* ends with the one client it was given */
+};
+
+/* SIGTERM and SIGINT are blocked in the calling thread, to be taken by the loop; before any thread starts, so that
+ * all inherit it. SIGPIPE is ignored. */
+void daemon_block_signals(void);
+/* Zeroes it. */
+void daemon_init(struct daemon *daemon);
+/* Reserves addresses, separated by blanks (at least one); clients wait until daemon_start(). */
+bool daemon_listen(struct daemon *daemon, const char *addresses, bool insecure, struct error *error);
+bool daemon_start(struct daemon *daemon, const struct hub_options *options, struct error *error);
+/* Serves one client on a connected socket, then ends. Instead of listening. */
+bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error);
+/* "READY ADDRESS", one line an address, with the port that was chosen; "READY" alone with a single client. */
+void daemon_print_ready(const struct daemon *daemon, FILE *stream);
+/* Until a signal comes, or the single client is gone. Says goodbye to all. */
+bool daemon_run(struct daemon *daemon, struct error *error);
+void daemon_finish(struct daemon *daemon); /* whatever was begun; before the engine is destroyed */
+
+#endif

@@ -1,0 +1,264 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/dispatch.h"
+
+#include "base/clock.h"
+#include "session/edits.h"
+#include "session/jobs.h"
+#include "session/session.h"
+#include "session/upload.h"
+
+#include <stdio.h>
+
+/* ---- connection -------------------------------------------------------------------------------------- */
+
+static void on_ping(struct session *session, struct request *request, const struct framing_header *header,
+                    const struct message *message)
+{
+    (void)request;
+    struct message answer;
+    message_init(&answer, MESSAGE_PONG);
+    answer.pong.sent_ns = message->ping.sent_ns;
+    answer.pong.received_ns = clock_now_ns();
+    session_send(session, header->request, 0, &answer);
+}
+
+static void on_ignored(struct session *session, struct request *request, const struct framing_header *header,
+                       const struct message *message)
+{
+    (void)session, (void)request, (void)header, (void)message;
+}
+
+static void on_goodbye(struct session *session, struct request *request, const struct framing_header *header,
+                       const struct message *message)
+{
+    (void)request, (void)header, (void)message;
+    session_close(session);
+}
+
+static void on_cancel(struct session *session, struct request *request, const struct framing_header *header,
+                      const struct message *message)
+{
+    (void)header;
+    request_cancel(session, request, message->cancel.target_request);
+}
+
+static void on_credit(struct session *session, struct request *request, const struct framing_header *header,
+                      const struct message *message)
+{
+    (void)request, (void)header;
+    jobs_credit(session, &message->credit);
+}
+
+static void on_stats(struct session *session, struct request *request, const struct framing_header *header,
+                     const struct message *message)
+{
+    (void)header, (void)message;
+    session_submit(session, request, hub_command(ENGINE_STATS, session->number, request->id));
+}
+
+/* ---- scenes ------------------------------------------------------------------------------------------ */
+
+static void on_scene_open(struct session *session, struct request *request, const struct framing_header *header,
+                          const struct message *message)
+{
+    (void)header;
+    const struct message_scene_open *open = &message->scene_open;
+    struct error error = {0};
+    uint32_t limit = session->hub->options.limits.scenes_per_client;
+    if (session_scene(session, open->scene))
+        error_set(&error, ERROR_INVALID, "scene_open.scene", "scene %u is there already", open->scene);
+    else if (session->scenes.count >= limit)
+        error_set(&error, ERROR_LIMIT, "scene_open", "%u scenes are open, the limit", limit);
+    else if (!hashmap_put(&session->scenes, open->scene, (void *)(uintptr_t)SCENE_OPENING))
+        error_set(&error, ERROR_OUT_OF_MEMORY, "scene_open", "no memory");
+    if (error.kind != ERROR_NONE) {
+        request_answer_error(session, request, &error);
+        return;
+    }
+    request->scene = open->scene;
+    struct engine_command *command = hub_command(ENGINE_SCENE_OPEN, session->number, request->id);
+    if (command) {
+        command->scene = open->scene;
+        snprintf(command->name, sizeof command->name, "%s", open->name);
+    } else {
+        hashmap_remove(&session->scenes, open->scene);
+    }
+    session_submit(session, request, command);
+}
+
+static void on_scene_close(struct session *session, struct request *request, const struct framing_header *header,
+                           const struct message *message)
+{
+    (void)header;
+    uint32_t scene = message->scene_close.scene;
+    enum session_scene_state state = session_scene(session, scene);
+    if (state != SCENE_OPENING && state != SCENE_OPEN) {
+        struct error error = {0};
+        error_set(&error, ERROR_UNKNOWN_ID, "scene_close.scene", "there is no scene %u", scene);
+        request_answer_error(session, request, &error);
+        return;
+    }
+    hashmap_put(&session->scenes, scene, (void *)(uintptr_t)SCENE_CLOSING); /* replaces: needs no memory */
+    request->scene = scene;
+    struct engine_command *command = hub_command(ENGINE_SCENE_CLOSE, session->number, request->id);
+    if (command)
+        command->scene = scene;
+    session_submit(session, request, command);
+}
+
+/* ---- blobs and edits --------------------------------------------------------------------------------- */
+
+static void on_blob_offer(struct session *session, struct request *request, const struct framing_header *header,
+                          const struct message *message)
+{
+    (void)header;
+    upload_offer(session, request, &message->blob_offer);
+}
+
+static void on_blob_data(struct session *session, struct request *request, const struct framing_header *header,
+                         const struct message *message)
+{
+    (void)request;
+    upload_data(session, header, &message->blob_data);
+}
+
+static void on_edit_begin(struct session *session, struct request *request, const struct framing_header *header,
+                          const struct message *message)
+{
+    (void)header;
+    edits_begin(session, request, &message->edit_begin);
+}
+
+static void on_edit(struct session *session, struct request *request, const struct framing_header *header,
+                    const struct message *message)
+{
+    (void)header;
+    edits_add(session, request, message);
+}
+
+static void on_edit_commit(struct session *session, struct request *request, const struct framing_header *header,
+                           const struct message *message)
+{
+    (void)header, (void)message;
+    edits_commit(session, request);
+}
+
+static void on_render(struct session *session, struct request *request, const struct framing_header *header,
+                      const struct message *message)
+{
+    (void)header;
+    jobs_start(session, request, &message->render);
+}
+
+/* ---- the table --------------------------------------------------------------------------------------- */
+
+static const struct dispatch_row rows[] = {
+    {MESSAGE_PING, DISPATCH_ANY, 0, on_ping},
+    {MESSAGE_PONG, DISPATCH_ANY, 0, on_ignored},
+    {MESSAGE_GOODBYE, DISPATCH_ANY, 0, on_goodbye},
+    {MESSAGE_CANCEL, DISPATCH_STARTS, REQUEST_CANCEL, on_cancel},
+    {MESSAGE_CREDIT, DISPATCH_ANY, 0, on_credit},
+    {MESSAGE_BLOCKED, DISPATCH_ANY, 0, on_ignored},
+    {MESSAGE_STATS, DISPATCH_STARTS, REQUEST_STATS, on_stats},
+    {MESSAGE_SCENE_OPEN, DISPATCH_STARTS, REQUEST_SCENE_OPEN, on_scene_open},
+    {MESSAGE_SCENE_CLOSE, DISPATCH_STARTS, REQUEST_SCENE_CLOSE, on_scene_close},
+    {MESSAGE_BLOB_OFFER, DISPATCH_STARTS, REQUEST_OFFER, on_blob_offer},
+    {MESSAGE_BLOB_DATA, DISPATCH_ANY, REQUEST_UPLOAD, on_blob_data},
+    {MESSAGE_EDIT_BEGIN, DISPATCH_STARTS, REQUEST_TRANSACTION, on_edit_begin},
+    {MESSAGE_EDIT_COMMIT, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit_commit},
+    {MESSAGE_SET_NODE, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
+    {MESSAGE_SET_MESH, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
+    {MESSAGE_SET_SPHERES, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
+    {MESSAGE_SET_DISC, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
+    {MESSAGE_SET_MATERIAL, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
+    {MESSAGE_SET_TEXTURE, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
+    {MESSAGE_SET_LIGHT, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
+    {MESSAGE_SET_CAMERA, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
+    {MESSAGE_SET_ENVIRONMENT, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
+    {MESSAGE_REMOVE, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
+    {MESSAGE_RENDER, DISPATCH_STARTS, REQUEST_JOB, on_render},
+};
+
+const struct dispatch_row *dispatch_find(uint32_t type)
+{
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        if ((uint32_t)rows[i].type == type)
+            return &rows[i];
+    }
+    return NULL;
+}
+
+/* The request in flight that a message continues; NULL: there is none, which was seen to. */
+static struct request *continued(struct session *session, const struct dispatch_row *row, uint32_t id)
+{
+    struct request *request = request_find(session, id);
+    if (request && request->kind == row->kind)
+        return request;
+    if (requests_is_dead(session, id)) {
+        if (row->type == MESSAGE_EDIT_COMMIT)
+            requests_forget_dead(session, id);
+        return NULL;
+    }
+    struct error error = {0};
+    error_set(&error, ERROR_PROTOCOL, "request", "%s of request %u, which is no open transaction",
+              message_type_text(row->type), id);
+    session_fail(session, &error);
+    return NULL;
+}
+
+static struct request *started(struct session *session, const struct dispatch_row *row, uint32_t id)
+{
+    requests_forget_dead(session, id); /* the number is used anew */
+    struct request *request = request_begin(session, id, row->kind);
+    if (!request && row->kind == REQUEST_TRANSACTION)
+        requests_bury(session, id); /* its edits are under way */
+    return request;
+}
+
+void dispatch_message(void *context, const struct framing_header *header, const struct message *message)
+{
+    struct session *session = context;
+    const struct dispatch_row *row = dispatch_find(message->type);
+    if (!row) {
+        struct error error = {0};
+        error_set(&error, ERROR_PROTOCOL, NULL, "%s is no message for a daemon", message_type_text(message->type));
+        session_fail(session, &error);
+        return;
+    }
+    struct request *request = NULL;
+    if (row->rule == DISPATCH_STARTS)
+        request = started(session, row, header->request);
+    else if (row->rule == DISPATCH_CONTINUES)
+        request = continued(session, row, header->request);
+    if (row->rule == DISPATCH_ANY || request)
+        row->handle(session, request, header, message);
+}
+
+/* The frame of the message is sound, one of its fields is not: only its request suffers. */
+void dispatch_invalid(void *context, const struct framing_header *header, const struct decode_error *decode_error)
+{
+    struct session *session = context;
+    const struct dispatch_row *row = dispatch_find(header->type);
+    struct error error = {0};
+    error_set(&error, (enum error_kind)decode_error->code, decode_error->field, "%s", decode_error->text);
+    if (!row || (row->rule == DISPATCH_ANY && row->kind != REQUEST_UPLOAD)) {
+        session_fail(session, &error);
+        return;
+    }
+    struct request *request;
+    if (row->rule == DISPATCH_STARTS) {
+        request = started(session, row, header->request);
+        if (request && row->kind == REQUEST_TRANSACTION)
+            requests_bury(session, header->request);
+        if (request)
+            request_answer_error(session, request, &error);
+        return;
+    }
+    if (row->kind == REQUEST_UPLOAD) {
+        upload_invalid(session, header->request, &error);
+        return;
+    }
+    request = continued(session, row, header->request);
+    if (request)
+        edits_fail(session, request, &error);
+}

@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/edits.h"
+
+#include "session/session.h"
+
+#include <stdlib.h>
+
+void edits_fail(struct session *session, struct request *request, const struct error *error)
+{
+    transaction_destroy(session, request->object);
+    request->object = NULL;
+    requests_bury(session, request->id);
+    request_answer_error(session, request, error);
+}
+
+void edits_begin(struct session *session, struct request *request, const struct message_edit_begin *begin)
+{
+    struct error error = {0};
+    /* A scene that is being opened will do: the engine carries things out in order. */
+    enum session_scene_state state = session_scene(session, begin->scene);
+    struct transaction *transaction = calloc(1, sizeof *transaction);
+    if (state != SCENE_OPENING && state != SCENE_OPEN)
+        error_set(&error, ERROR_UNKNOWN_ID, "edit_begin.scene", "there is no scene %u", begin->scene);
+    else if (!transaction)
+        error_set(&error, ERROR_OUT_OF_MEMORY, "edit_begin", "no memory");
+    else
+        transaction->scene = begin->scene;
+    request->object = transaction;
+    if (error.kind != ERROR_NONE)
+        edits_fail(session, request, &error);
+}
+
+void transaction_destroy(struct session *session, struct transaction *transaction)
+{
+    if (!transaction)
+        return;
+    session->transaction_edits -= transaction->count;
+    for (size_t i = 0; i < transaction->count; i++)
+        scene_edit_finish(&transaction->edits[i]);
+    free(transaction->edits);
+    free(transaction);
+}
+
+static bool make_room(const struct session *session, struct transaction *transaction, struct error *error)
+{
+    uint32_t limit = session->hub->options.limits.transaction_edits;
+    if (session->transaction_edits >= limit)
+        return error_set(error, ERROR_LIMIT, "transaction", "%u edits wait to be committed, the limit", limit);
+    if (transaction->count < transaction->capacity)
+        return true;
+    size_t capacity = transaction->capacity ? transaction->capacity * 2 : 32;
+    struct scene_edit *edits = realloc(transaction->edits, capacity * sizeof *edits);
+    if (!edits)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "transaction", "no memory for %zu edits", capacity);
+    transaction->edits = edits;
+    transaction->capacity = capacity;
+    return true;
+}
+
+void edits_add(struct session *session, struct request *request, const struct message *message)
+{
+    struct transaction *transaction = request->object;
+    struct error error = {0};
+    if (!make_room(session, transaction, &error)) {
+        edits_fail(session, request, &error);
+        return;
+    }
+    struct scene_edit *edit = &transaction->edits[transaction->count];
+    if (edit_from_message(session, message, edit, &error)) {
+        transaction->count++;
+        session->transaction_edits++;
+        return;
+    }
+    scene_edit_finish(edit);
+    edits_fail(session, request, &error);
+}
+
+void edits_commit(struct session *session, struct request *request)
+{
+    struct transaction *transaction = request->object;
+    struct engine_command *command = NULL;
+    if (session_scene(session, transaction->scene) != SCENE_OPEN &&
+        session_scene(session, transaction->scene) != SCENE_OPENING) {
+        struct error error = {0};
+        error_set(&error, ERROR_UNKNOWN_ID, "edit_begin.scene", "scene %u was closed", transaction->scene);
+        transaction_destroy(session, transaction);
+        request_answer_error(session, request, &error);
+        return;
+    }
+    command = hub_command(ENGINE_COMMIT, session->number, request->id);
+    if (command) {
+        command->scene = transaction->scene;
+        command->edits = transaction->edits;
+        command->edit_count = transaction->count;
+        session->transaction_edits -= transaction->count;
+        transaction->edits = NULL;
+        transaction->count = 0;
+    }
+    transaction_destroy(session, transaction);
+    request->object = NULL;
+    request->kind = REQUEST_COMMIT;
+    session_submit(session, request, command);
+}

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* Transactions: messages become edits of a scene, gathered until the client commits them. */
+#ifndef FARLIGHT_SESSION_EDITS_H
+#define FARLIGHT_SESSION_EDITS_H
+
+#include "protocol/framing.h"
+#include "scene/scene.h"
+#include "session/requests.h"
+
+struct transaction {
+    uint32_t scene;
+    struct scene_edit *edits;
+    size_t count, capacity;
+};
+
+void edits_begin(struct session *session, struct request *request, const struct message_edit_begin *begin);
+/* One edit, or EDIT_COMMIT, of an open transaction. */
+void edits_add(struct session *session, struct request *request, const struct message *message);
+void edits_commit(struct session *session, struct request *request);
+/* Answers the request with the error; what still comes of the transaction is skipped. */
+void edits_fail(struct session *session, struct request *request, const struct error *error);
+void transaction_destroy(struct session *session, struct transaction *transaction); /* accepts NULL */
+
+/* Fills the edit from a SET_.. or REMOVE message. False and *error: a blob is not there, or no memory; the
+ * edit is to be finished either way. */
+bool edit_from_message(const struct session *session, const struct message *message, struct scene_edit *edit,
+                       struct error *error);
+
+#endif

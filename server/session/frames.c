@@ -1,0 +1,255 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/frames.h"
+
+#include "session/jobs.h"
+#include "session/session.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Lives until the last message that refers to its bytes is gone. */
+struct pending_frame {
+    struct out_chunk chunk; /* first: release() gets its address */
+    struct pending_frame *next;
+    struct job *job; /* NULL: dropped */
+    struct engine_frame *frame;
+    bool begun;
+    bool queued; /* all of it is with the connection */
+    size_t queued_bytes;
+    uint64_t begun_ns; /* FRAME_BEGIN was handed to the kernel */
+};
+
+static void engine_frame_destroy(struct engine_frame *frame)
+{
+    frame_result_finish(&frame->result);
+    free(frame->bytes);
+    free(frame);
+}
+
+static void release(struct out_chunk *chunk)
+{
+    struct pending_frame *pending = (struct pending_frame *)(void *)chunk;
+    engine_frame_destroy(pending->frame);
+    free(pending);
+}
+
+void frames_add(struct job *job, struct engine_frame *frame)
+{
+    struct pending_frame *pending = job->cancelled ? NULL : calloc(1, sizeof *pending);
+    if (!pending) {
+        engine_frame_destroy(frame);
+        if (!job->cancelled) {
+            struct error error = {0};
+            error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a frame");
+            session_fail(job->session, &error);
+        }
+        return;
+    }
+    *pending = (struct pending_frame){
+        .chunk = {.references = 1, .data = frame->bytes, .size_bytes = frame->size_bytes, .release = release},
+        .job = job,
+        .frame = frame,
+    };
+    *job->end = pending;
+    job->end = &pending->next;
+    connection_wake(job->session->connection);
+}
+
+static void remove_first(struct job *job)
+{
+    struct pending_frame *pending = job->first;
+    job->first = pending->next;
+    if (!job->first)
+        job->end = &job->first;
+    pending->job = NULL;
+    out_chunk_unref(&pending->chunk);
+}
+
+void frames_drop(struct session *session, struct job *job)
+{
+    if (session->connection)
+        out_queue_drop_bulk(&session->connection->out, job->request);
+    while (job->first)
+        remove_first(job);
+}
+
+/* ---- messages ---------------------------------------------------------------------------------------- */
+
+static void put_u32(uint8_t *out, uint32_t value)
+{
+    for (int i = 0; i < 4; i++)
+        out[i] = (uint8_t)(value >> (8 * i));
+}
+
+/* What message_write() makes of a frame_data message, up to the bytes of the frame (a test compares the two):
+ * writing it here spares a copy of every frame. */
+void frame_data_head(uint8_t head[FRAME_DATA_HEAD_BYTES], uint32_t request, uint32_t channel,
+                     uint64_t offset_bytes, uint32_t data_bytes)
+{
+    memset(head, 0, FRAME_DATA_HEAD_BYTES);
+    framing_header_encode(head, &(struct framing_header){
+                                    .payload_bytes = FRAME_DATA_HEAD_BYTES - FRAMING_HEADER_BYTES + data_bytes,
+                                    .type = MESSAGE_FRAME_DATA,
+                                    .request = request,
+                                    .channel = channel,
+                                });
+    uint8_t *payload = head + FRAMING_HEADER_BYTES;
+    payload[0] = 8; /* struct_bytes: offset_bytes */
+    put_u32(payload + 2, (uint32_t)offset_bytes);
+    put_u32(payload + 6, (uint32_t)(offset_bytes >> 32));
+    put_u32(payload + 10, data_bytes);
+}
+
+static void fill_begin(struct message_frame_begin *begin, const struct engine_frame *frame)
+{
+    begin->frame = frame->frame;
+    begin->width = frame->request.width;
+    begin->height = frame->request.height;
+    begin->samples = frame->request.samples;
+    begin->revision = frame->result.revision;
+    begin->size_bytes = frame->size_bytes;
+    begin->format = (enum protocol_pixel_format)frame->request.format;
+    begin->encoding = (enum protocol_encoding)frame->encoding;
+    begin->tracer = (enum protocol_tracer)frame->request.tracer;
+    begin->integrator = (enum protocol_integrator)frame->request.integrator;
+    begin->digest = frame->digest;
+    begin->exposure_stops = frame->request.exposure_stops;
+    memcpy(begin->world_from_view, frame->request.camera.world_from_view, sizeof begin->world_from_view);
+    begin->fov_y = frame->request.camera.fov_y;
+    begin->ortho_height = frame->request.camera.ortho_height;
+    begin->time_s = frame->time_s;
+}
+
+static void send_end(struct pending_frame *pending, uint64_t now_ns)
+{
+    struct job *job = pending->job;
+    struct engine_frame *frame = pending->frame;
+    struct stage_times *times = &frame->result.times;
+    uint64_t queue_ns = pending->begun_ns > frame->encoded_ns ? pending->begun_ns - frame->encoded_ns : 0;
+    uint64_t send_ns = now_ns - pending->begun_ns;
+    stage_times_add(times, STAGE_QUEUE, STAGE_CPU, 0, frame->encoded_ns, queue_ns);
+    stage_times_add(times, STAGE_SEND, STAGE_CPU, 0, pending->begun_ns, send_ns);
+    struct record_stage_time stages[STAGE_SPANS_MAX];
+    for (uint32_t i = 0; i < times->count; i++) {
+        const struct stage_span *span = &times->spans[i];
+        stages[i] = (struct record_stage_time){
+            .stage = (enum protocol_stage)span->stage,
+            .clock = (enum protocol_clock)span->clock,
+            .wave = span->wave < UINT16_MAX ? span->wave : UINT16_MAX,
+            .start_ns = span->start_ns,
+            .duration_ns = span->duration_ns,
+        };
+    }
+    struct message message;
+    message_init(&message, MESSAGE_FRAME_END);
+    message.frame_end.frame = frame->frame;
+    message.frame_end.primary_rays = frame->result.primary_rays;
+    message.frame_end.shadow_rays = frame->result.shadow_rays;
+    message.frame_end.secondary_rays = frame->result.secondary_rays;
+    message.frame_end.splits = frame->result.splits;
+    message.frame_end.uploaded_bytes = frame->result.uploaded_bytes;
+    message.frame_end.structure_bytes = frame->result.structure_bytes;
+    message.frame_end.stages = stages;
+    message.frame_end.stages_count = times->count;
+    session_send(job->session, job->request, job->channel, &message);
+    const struct engine_port *engine = &job->session->hub->options.engine;
+    engine->report_sent(engine->context, queue_ns, send_ns);
+}
+
+/* ---- on the way -------------------------------------------------------------------------------------- */
+
+static void on_begin_sent(void *context, uint64_t now_ns)
+{
+    struct pending_frame *pending = context;
+    pending->begun_ns = now_ns;
+}
+
+static void on_last_sent(void *context, uint64_t now_ns)
+{
+    struct pending_frame *pending = context;
+    struct job *job = pending->job;
+    if (!job)
+        return;
+    send_end(pending, now_ns);
+    remove_first(job);
+    job_frame_sent(job);
+}
+
+static bool queue_begin(struct pending_frame *pending)
+{
+    struct message message;
+    message_init(&message, MESSAGE_FRAME_BEGIN);
+    fill_begin(&message.frame_begin, pending->frame);
+    struct out_message *out = out_message_create(message_write_bytes(&message));
+    if (!out)
+        return false;
+    struct writer writer;
+    writer_init(&writer, out->head, out->head_bytes);
+    struct job *job = pending->job;
+    if (!message_write(&writer, job->request, job->channel, &message)) {
+        free(out);
+        return false;
+    }
+    out->request = job->request;
+    out->sent = on_begin_sent;
+    out->context = pending;
+    out->body = &pending->chunk; /* no bytes of it: it keeps the frame alive */
+    out_chunk_ref(&pending->chunk);
+    pending->begun = true;
+    connection_send_raw(job->session->connection, out, true);
+    return true;
+}
+
+static bool queue_piece(struct pending_frame *pending)
+{
+    struct job *job = pending->job;
+    size_t left_bytes = pending->frame->size_bytes - pending->queued_bytes;
+    size_t piece_bytes = left_bytes < FRAME_PIECE_BYTES ? left_bytes : FRAME_PIECE_BYTES;
+    struct out_message *out = out_message_create(FRAME_DATA_HEAD_BYTES);
+    if (!out)
+        return false;
+    frame_data_head(out->head, job->request, job->channel, pending->queued_bytes, (uint32_t)piece_bytes);
+    out->request = job->request;
+    out->context = pending;
+    out->body = &pending->chunk;
+    out->body_offset_bytes = pending->queued_bytes;
+    out->body_bytes = piece_bytes;
+    out->padding_bytes = -piece_bytes & 7;
+    out_chunk_ref(&pending->chunk);
+    pending->queued_bytes += piece_bytes;
+    pending->queued = pending->queued_bytes == pending->frame->size_bytes;
+    if (pending->queued)
+        out->sent = on_last_sent;
+    connection_send_raw(job->session->connection, out, true);
+    return true;
+}
+
+/* The first job with something to queue moves to the end of the list, so that jobs take turns. */
+static struct job *next_job(struct session *session)
+{
+    struct job **place = &session->jobs;
+    while (*place && (!(*place)->first || (*place)->first->queued))
+        place = &(*place)->next;
+    struct job *job = *place;
+    if (!job)
+        return NULL;
+    *place = job->next;
+    job->next = NULL;
+    while (*place)
+        place = &(*place)->next;
+    *place = job;
+    return job;
+}
+
+void frames_pump(struct session *session)
+{
+    struct job *job;
+    while (connection_wants_bulk(session->connection) && (job = next_job(session))) {
+        struct pending_frame *pending = job->first;
+        if ((pending->begun || queue_begin(pending)) && queue_piece(pending))
+            continue;
+        struct error error = {0};
+        error_set(&error, ERROR_INTERNAL, NULL, "a frame cannot be sent");
+        session_fail(session, &error);
+    }
+}

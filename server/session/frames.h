@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* Rendered frames on their way to the client, without a copy: FRAME_BEGIN, pieces that refer to the
+ * frame's bytes, and FRAME_END once the last of them is with the kernel, so that it can tell the times. */
+#ifndef FARLIGHT_SESSION_FRAMES_H
+#define FARLIGHT_SESSION_FRAMES_H
+
+#include "job/engine.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct job;
+struct session;
+
+#define FRAME_PIECE_BYTES ((size_t)256 << 10)
+/* Header and fixed part of a frame_data message, up to the bytes themselves. */
+#define FRAME_DATA_HEAD_BYTES 32u
+
+/* Takes the frame over, in any case. */
+void frames_add(struct job *job, struct engine_frame *frame);
+/* Drops what of the job has not been begun on the wire, and forgets the rest. */
+void frames_drop(struct session *session, struct job *job);
+/* Queues pieces as long as the connection wants bulk; jobs take turns. */
+void frames_pump(struct session *session);
+void frame_data_head(uint8_t head[FRAME_DATA_HEAD_BYTES], uint32_t request, uint32_t channel,
+                     uint64_t offset_bytes, uint32_t data_bytes);
+
+#endif

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: MIT */
+/* What all sessions share: the loop, the engine, the blobs, the limits. */
+#ifndef FARLIGHT_SESSION_HUB_H
+#define FARLIGHT_SESSION_HUB_H
+
+#include "base/hashmap.h"
+#include "net/auth.h"
+#include "net/connection.h"
+#include "net/loop.h"
+#include "session/blob_store.h"
+#include "session/engine_port.h"
+#include "session/limits.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct session;
+
+struct hub_options {
+    struct session_limits limits;
+    struct connection_limits connection_limits;
+    struct engine_port engine;
+    uint64_t scene_memory_bytes; /* of one scene, as the engine has it; told to clients */
+    bool insecure;               /* peers beyond loopback are let in */
+};
+
+struct hub {
+    struct loop *loop;
+    struct hub_options options;
+    struct blob_store *blobs;
+    struct hashmap sessions; /* struct session *, by number */
+    size_t unauthenticated;
+    uint64_t last_number, started_ns;
+    bool stopping;
+    loop_call_fn *emptied; /* called when the last session is gone; may be NULL */
+    void *emptied_context;
+
+    struct loop_watch *engine_watch;
+    /* Commands that the engine had no room for, in order. While one waits, no session reads on. */
+    struct hub_waiting *waiting, **waiting_end;
+    struct loop_timer retry_timer;
+};
+
+bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *options, struct error *error);
+void hub_finish(struct hub *hub); /* all sessions are gone */
+
+/* A new client; takes over the descriptor when it succeeds. */
+bool hub_add_client(struct hub *hub, int fd, const struct address *peer, struct error *error);
+/* Says goodbye to everybody; `emptied` is called when they are gone, at once if there is nobody. */
+void hub_stop(struct hub *hub);
+
+/* Hands a command to the engine, now or as soon as it has room; takes it over in any case. False: out of
+ * memory, the command is destroyed. */
+bool hub_submit(struct hub *hub, struct engine_command *command);
+/* The same for one of a session's requests: zeroed but for kind, client and request. NULL: out of memory. */
+struct engine_command *hub_command(enum engine_command_kind kind, uint64_t client, uint32_t request);
+
+#endif

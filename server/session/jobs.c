@@ -1,0 +1,306 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/jobs.h"
+
+#include "session/frames.h"
+#include "session/session.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* More frames than this need not wait here: the engine renders the next ones meanwhile. */
+#define WINDOW_FRAMES_MAX 4
+#define ZSTD_LEVEL_MAX 19
+
+static uint32_t bytes_per_pixel(enum protocol_pixel_format format)
+{
+    switch (format) {
+    case PROTOCOL_PIXEL_FORMAT_RGBA8:
+        return 4;
+    case PROTOCOL_PIXEL_FORMAT_RGBA16F:
+        return 8;
+    case PROTOCOL_PIXEL_FORMAT_RGBA32F:
+    case PROTOCOL_PIXEL_FORMAT_COUNT:
+        break;
+    }
+    return 16;
+}
+
+/* ---- checks ------------------------------------------------------------------------------------------ */
+
+static struct job *job_on_channel(const struct session *session, uint32_t channel)
+{
+    for (struct job *job = session->jobs; job; job = job->next) {
+        if (job->channel == channel)
+            return job;
+    }
+    return NULL;
+}
+
+static bool check_limits(const struct session *session, const struct message_render *render, struct error *error)
+{
+    const struct session_limits *limits = &session->hub->options.limits;
+    if (render->width > limits->width_pixels || render->height > limits->height_pixels)
+        return error_set(error, ERROR_LIMIT, "render.width", "%u x %u pixels, the limit is %u x %u", render->width,
+                         render->height, limits->width_pixels, limits->height_pixels);
+    if (render->samples > limits->samples)
+        return error_set(error, ERROR_LIMIT, "render.samples", "%u, the limit is %u", render->samples,
+                         limits->samples);
+    if (session->job_count >= limits->jobs_per_client) {
+        error_set(error, ERROR_LIMIT, "render", "%u jobs are running, the limit", session->job_count);
+        error->retryable = true;
+        return false;
+    }
+    return true;
+}
+
+static bool check_camera(const struct message_render *render, struct error *error)
+{
+    if (render->camera_path == PROTOCOL_CAMERA_PATH_KEYS && !render->keys_count)
+        return error_set(error, ERROR_INVALID, "render.keys", "camera path keys needs at least one key");
+    if (render->camera_path == PROTOCOL_CAMERA_PATH_NODE && !render->camera_node)
+        return error_set(error, ERROR_INVALID, "render.camera_node", "camera path node needs a node");
+    for (uint32_t i = 1; i < render->keys_count; i++) {
+        if (!(render->keys[i].time_s > render->keys[i - 1].time_s))
+            return error_set(error, ERROR_INVALID, "render.keys",
+                             "key %u is at %g s, not after the one before at %g s", i,
+                             (double)render->keys[i].time_s, (double)render->keys[i - 1].time_s);
+    }
+    return true;
+}
+
+static bool check(const struct session *session, const struct message_render *render, struct error *error)
+{
+    enum session_scene_state state = session_scene(session, render->scene);
+    if (state != SCENE_OPENING && state != SCENE_OPEN)
+        return error_set(error, ERROR_UNKNOWN_ID, "render.scene", "there is no scene %u", render->scene);
+    if (job_on_channel(session, render->channel))
+        return error_set(error, ERROR_INVALID, "render.channel", "a running job has channel %u", render->channel);
+    if (render->last_frame < render->first_frame)
+        return error_set(error, ERROR_INVALID, "render.last_frame", "%u is before the first frame %u",
+                         render->last_frame, render->first_frame);
+    if (!encoder_supports((enum encoding)render->encoding, bytes_per_pixel(render->format))) {
+        error_set(error, ERROR_UNSUPPORTED, "render.encoding", "%s does not carry %s",
+                  protocol_encoding_text(render->encoding), protocol_pixel_format_text(render->format));
+        return error_remedy(error, "raw and zstd carry every format");
+    }
+    if (render->encoding == PROTOCOL_ENCODING_ZSTD && render->quality > ZSTD_LEVEL_MAX)
+        return error_set(error, ERROR_INVALID, "render.quality", "zstd has levels up to %u, not %u",
+                         ZSTD_LEVEL_MAX, render->quality);
+    return check_limits(session, render, error) && check_camera(render, error);
+}
+
+/* ---- start ------------------------------------------------------------------------------------------- */
+
+static bool fill_keys(struct engine_job *job, const struct message_render *render)
+{
+    if (!render->keys_count)
+        return true;
+    job->keys = calloc(render->keys_count, sizeof *job->keys);
+    if (!job->keys)
+        return false;
+    job->key_count = render->keys_count;
+    for (uint32_t i = 0; i < render->keys_count; i++) {
+        const struct record_camera_key *from = &render->keys[i];
+        struct camera_key *key = &job->keys[i];
+        key->time_s = from->time_s;
+        memcpy(key->eye_world, from->eye_world, sizeof key->eye_world);
+        memcpy(key->look_at_world, from->look_at_world, sizeof key->look_at_world);
+        memcpy(key->up_world, from->up_world, sizeof key->up_world);
+        key->fov_y = from->fov_y;
+    }
+    return true;
+}
+
+static void fill_job(struct engine_job *job, const struct message_render *render, uint64_t credit)
+{
+    *job = (struct engine_job){
+        .scene = render->scene,
+        .first_frame = render->first_frame,
+        .last_frame = render->last_frame,
+        .frame_step = render->frame_step,
+        .frames_per_second = render->frames_per_second,
+        .time_origin_frame = render->time_origin_frame,
+        .frame =
+            {
+                .width = render->width,
+                .height = render->height,
+                .samples = render->samples,
+                .depth = render->depth,
+                .seed = render->seed,
+                .tracer = render->tracer,
+                .tracer_options = {.bvh_bounds = (unsigned)render->bvh_bounds},
+                .integrator = (enum frame_integrator)render->integrator,
+                .primary = (enum frame_primary)render->primary,
+                .tone_map = (enum frame_tone_map)render->tone_map,
+                .format = (enum frame_format)render->format,
+                .exposure_stops = render->exposure_stops,
+            },
+        .encoding = (enum encoding)render->encoding,
+        .quality = render->quality,
+        .path = (enum camera_path)render->camera_path,
+        .camera_node = render->camera_node,
+        .orbit_turn = render->orbit_turn,
+        .orbit_seconds = render->orbit_seconds,
+        .credit = credit,
+    };
+}
+
+/* How many frames of the job may wait in memory to be sent: at least one, whatever its size. */
+static uint64_t window_of(const struct session *session, const struct message_render *render)
+{
+    uint64_t frame_bytes = (uint64_t)render->width * render->height * bytes_per_pixel(render->format);
+    uint64_t window = session->hub->options.limits.frame_window_bytes / frame_bytes;
+    return window < 1 ? 1 : window > WINDOW_FRAMES_MAX ? WINDOW_FRAMES_MAX : window;
+}
+
+static uint64_t allowed_credit(const struct job *job)
+{
+    uint64_t room = job->frames_sent + job->window;
+    return job->client_credit < room ? job->client_credit : room;
+}
+
+void jobs_start(struct session *session, struct request *request, const struct message_render *render)
+{
+    struct error error = {0};
+    if (!check(session, render, &error)) {
+        request_answer_error(session, request, &error);
+        return;
+    }
+    struct job *job = calloc(1, sizeof *job);
+    struct engine_command *command = hub_command(ENGINE_JOB_START, session->number, request->id);
+    if (!job || !command || !fill_keys(&command->job, render)) {
+        free(job);
+        engine_command_destroy(command);
+        session_submit(session, request, NULL);
+        return;
+    }
+    *job = (struct job){
+        .next = session->jobs,
+        .session = session,
+        .request = request->id,
+        .channel = render->channel,
+        .scene = render->scene,
+        .frame_count = (render->last_frame - render->first_frame) / render->frame_step + UINT64_C(1),
+        .client_credit = render->credit,
+        .window = window_of(session, render),
+    };
+    job->end = &job->first;
+    job->engine_credit = allowed_credit(job);
+    session->jobs = job;
+    session->job_count++;
+    request->object = job;
+    struct camera_key *keys = command->job.keys;
+    uint32_t key_count = command->job.key_count;
+    fill_job(&command->job, render, job->engine_credit);
+    command->job.keys = keys;
+    command->job.key_count = key_count;
+    command->scene = render->scene;
+    session_submit(session, request, command);
+}
+
+/* ---- pace -------------------------------------------------------------------------------------------- */
+
+static void tell_engine_credit(struct job *job)
+{
+    struct session *session = job->session;
+    uint64_t allowed = allowed_credit(job);
+    if (allowed <= job->engine_credit || job->rendered || job->cancelled)
+        return;
+    struct engine_command *command = hub_command(ENGINE_JOB_CREDIT, session->number, job->request);
+    if (!command)
+        return; /* the next credit says it as well, as it is absolute */
+    command->target_request = job->request;
+    command->scene = job->scene;
+    command->credit = allowed;
+    if (hub_submit(session->hub, command))
+        job->engine_credit = allowed;
+}
+
+void jobs_credit(struct session *session, const struct message_credit *credit)
+{
+    struct job *job = job_on_channel(session, credit->channel);
+    if (!job || credit->total <= job->client_credit)
+        return; /* the job may just have ended; credit never falls */
+    job->client_credit = credit->total;
+    tell_engine_credit(job);
+}
+
+bool job_is_owed(const struct job *job)
+{
+    return job->first || job->frames_sent < job->client_credit;
+}
+
+/* ---- end --------------------------------------------------------------------------------------------- */
+
+static void destroy(struct session *session, struct job *job)
+{
+    frames_drop(session, job);
+    struct job **place = &session->jobs;
+    while (*place != job)
+        place = &(*place)->next;
+    *place = job->next;
+    session->job_count--;
+    free(job);
+}
+
+void job_failed(struct session *session, struct job *job, const struct error *error)
+{
+    struct request *request = request_find(session, job->request);
+    destroy(session, job);
+    request_answer_error(session, request, error);
+}
+
+static void fail_cancelled(struct session *session, struct job *job)
+{
+    struct error error = {0};
+    error_set(&error, ERROR_CANCELLED, NULL, "cancelled by the client");
+    job_failed(session, job, &error);
+}
+
+static void finish_if_complete(struct session *session, struct job *job)
+{
+    if (!job->rendered || job->first)
+        return;
+    struct request *request = request_find(session, job->request);
+    destroy(session, job);
+    request_answer_ok(session, request, 0);
+}
+
+void job_done(struct session *session, struct job *job)
+{
+    job->rendered = true;
+    if (job->cancelled)
+        fail_cancelled(session, job); /* it ended before the engine heard of it, but its frames are dropped */
+    else
+        finish_if_complete(session, job);
+}
+
+void job_frame_sent(struct job *job)
+{
+    job->frames_sent++;
+    tell_engine_credit(job);
+    finish_if_complete(job->session, job);
+}
+
+void job_cancel(struct session *session, struct job *job, struct request *cancel)
+{
+    if (job->rendered) {
+        fail_cancelled(session, job);
+        request_answer_ok(session, cancel, 0);
+        return;
+    }
+    job->cancelled = true;
+    frames_drop(session, job);
+    struct engine_command *command = hub_command(ENGINE_JOB_CANCEL, session->number, cancel->id);
+    if (command) {
+        command->target_request = job->request;
+        command->scene = job->scene;
+    }
+    session_submit(session, cancel, command);
+}
+
+void jobs_finish(struct session *session)
+{
+    while (session->jobs)
+        destroy(session, session->jobs);
+}

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: MIT */
+/* Render jobs of one session: checked, handed to the engine, paced by the client's credit. */
+#ifndef FARLIGHT_SESSION_JOBS_H
+#define FARLIGHT_SESSION_JOBS_H
+
+#include "job/engine.h"
+#include "protocol/framing.h"
+#include "session/requests.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct pending_frame;
+
+struct job {
+    struct job *next;
+    struct session *session;
+    uint32_t request, channel, scene;
+    uint64_t frame_count, frames_sent;
+    uint64_t client_credit;             /* frames, absolute, as the client said */
+    uint64_t engine_credit;             /* the part of it that the engine was told */
+    uint64_t window;                    /* frames that may wait here to be sent */
+    struct pending_frame *first, **end; /* from the engine, in order; the first may be under way */
+    bool rendered;                      /* the engine is done with it */
+    bool cancelled;                     /* what still comes from the engine is dropped */
+};
+
+void jobs_start(struct session *session, struct request *request, const struct message_render *render);
+void jobs_credit(struct session *session, const struct message_credit *credit);
+/* `cancel` is answered by the engine's answer to it, after the job's own request. */
+void job_cancel(struct session *session, struct job *job, struct request *cancel);
+/* The engine's events for a job's request. */
+void job_done(struct session *session, struct job *job);
+void job_failed(struct session *session, struct job *job, const struct error *error);
+void job_frame_sent(struct job *job); /* credit and the last answer */
+void jobs_finish(struct session *session);
+bool job_is_owed(const struct job *job); /* the daemon has work for it, the client waits */
+
+#endif

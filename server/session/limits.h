@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: MIT */
+/* What one client may ask for, and all of them together. Rows of the configuration. */
+#ifndef FARLIGHT_SESSION_LIMITS_H
+#define FARLIGHT_SESSION_LIMITS_H
+
+#include <stdint.h>
+
+struct session_limits {
+    uint32_t clients;
+    uint32_t unauthenticated;             /* connections whose handshake is not done, all together */
+    uint32_t unauthenticated_per_address; /* from one TCP peer; Unix peers are let in by the file's mode */
+    uint32_t requests_in_flight;
+    uint32_t scenes_per_client;
+    uint32_t jobs_per_client;
+    uint32_t blobs_per_client;
+    uint32_t transaction_edits; /* waiting in all open transactions of a client */
+    uint32_t nodes;
+    uint32_t texture_edge_texels;
+    uint32_t width_pixels, height_pixels;
+    uint32_t samples;
+    uint64_t blob_bytes;       /* all blobs of all clients, arriving ones included */
+    uint64_t blob_cache_bytes; /* of them: blobs that nobody uses now */
+    uint64_t upload_window_bytes;
+    uint64_t frame_window_bytes; /* rendered frames of one job that wait to be sent, as far as more than one */
+};
+
+#endif

@@ -1,0 +1,331 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/session.h"
+
+#include "base/log.h"
+#include "session/dispatch.h"
+#include "session/edits.h"
+#include "session/frames.h"
+#include "session/jobs.h"
+#include "session/stats.h"
+#include "session/upload.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+
+/* ---- sending ----------------------------------------------------------------------------------------- */
+
+bool session_send(struct session *session, uint32_t request, uint32_t channel, const struct message *message)
+{
+    return connection_send(session->connection, request, channel, message);
+}
+
+/* A text that was cut at its buffer's end may end within a character, which is no UTF-8. */
+static const char *whole_characters(char *text)
+{
+    size_t bytes = strlen(text), start = bytes;
+    while (start && bytes - start < 3 && ((unsigned char)text[start - 1] & 0xc0) == 0x80)
+        start--;
+    if (start && (unsigned char)text[start - 1] >= 0xc0) {
+        unsigned char first = (unsigned char)text[start - 1];
+        size_t wanted = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
+        if (bytes - (start - 1) < wanted)
+            text[start - 1] = '\0';
+    }
+    return text;
+}
+
+void session_send_error(struct session *session, uint32_t request, const struct error *error)
+{
+    struct error copy = *error;
+    struct message message;
+    message_init(&message, MESSAGE_ERROR);
+    message.error.code = (enum protocol_error_code)error->kind;
+    message.error.retryable = error->retryable;
+    message.error.retry_after_ms = error->retry_after_ms < 3600000 ? error->retry_after_ms : 3600000;
+    message.error.field = whole_characters(copy.field);
+    message.error.text = whole_characters(copy.text);
+    message.error.remedy = whole_characters(copy.remedy);
+    log_write(LOG_DEBUG, "session", "client %" PRIu64 " request %u: %s: %s: %s", session->number, request,
+              protocol_error_code_text(message.error.code), copy.field, copy.text);
+    if (session_send(session, request, 0, &message))
+        return;
+    /* The answer must come, whatever is in the texts. */
+    message.error.field = message.error.remedy = "";
+    message.error.text = "the text of this error cannot be sent";
+    session_send(session, request, 0, &message);
+}
+
+void session_fail(struct session *session, const struct error *error)
+{
+    struct error copy = *error;
+    log_write(LOG_INFO, "session", "client %" PRIu64 " (%s, %s) is disconnected: %s: %s", session->number,
+              session->name, session->identity.name, copy.field, copy.text);
+    connection_finish(session->connection, (enum protocol_error_code)error->kind, whole_characters(copy.field),
+                      whole_characters(copy.text));
+}
+
+void session_submit(struct session *session, struct request *request, struct engine_command *command)
+{
+    if (command && hub_submit(session->hub, command))
+        return;
+    struct error error = {0};
+    error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
+    if (request->kind == REQUEST_JOB && request->object)
+        job_failed(session, request->object, &error);
+    else
+        request_answer_error(session, request, &error);
+}
+
+enum session_scene_state session_scene(const struct session *session, uint32_t scene)
+{
+    return (enum session_scene_state)(uintptr_t)hashmap_get(&session->scenes, scene);
+}
+
+/* ---- the engine's answers ---------------------------------------------------------------------------- */
+
+static void on_done(struct session *session, struct request *request, const struct engine_event *event)
+{
+    switch (request->kind) {
+    case REQUEST_SCENE_OPEN:
+        if (session_scene(session, request->scene) == SCENE_OPENING)
+            hashmap_put(&session->scenes, request->scene, (void *)(uintptr_t)SCENE_OPEN);
+        request_answer_ok(session, request, 0);
+        return;
+    case REQUEST_SCENE_CLOSE:
+        hashmap_remove(&session->scenes, request->scene);
+        request_answer_ok(session, request, 0);
+        return;
+    case REQUEST_JOB:
+        job_done(session, request->object);
+        return;
+    case REQUEST_COMMIT:
+    case REQUEST_CANCEL:
+        request_answer_ok(session, request, event->revision);
+        return;
+    case REQUEST_OFFER:
+    case REQUEST_UPLOAD:
+    case REQUEST_TRANSACTION:
+    case REQUEST_STATS:
+        return; /* the engine knows nothing of these */
+    }
+}
+
+static void on_failed(struct session *session, struct request *request, const struct engine_event *event)
+{
+    struct error error = event->error;
+    error_set(&error, ERROR_INTERNAL, NULL, "the engine gave no reason");
+    switch (request->kind) {
+    case REQUEST_JOB:
+        job_failed(session, request->object, &error);
+        return;
+    case REQUEST_CANCEL:
+        request_answer_ok(session, request, 0); /* the job had just ended */
+        return;
+    case REQUEST_SCENE_OPEN:
+        if (session_scene(session, request->scene) == SCENE_OPENING)
+            hashmap_remove(&session->scenes, request->scene);
+        break;
+    case REQUEST_SCENE_CLOSE:
+        hashmap_remove(&session->scenes, request->scene);
+        break;
+    default:
+        break;
+    }
+    request_answer_error(session, request, &error);
+}
+
+void session_engine_event(struct session *session, struct engine_event *event)
+{
+    struct request *request = request_find(session, event->request);
+    if (!request || session->connection->state != CONNECTION_OPEN)
+        return;
+    switch (event->kind) {
+    case ENGINE_DONE:
+        on_done(session, request, event);
+        return;
+    case ENGINE_FAILED:
+        on_failed(session, request, event);
+        return;
+    case ENGINE_FRAME:
+        if (request->kind == REQUEST_JOB && event->frame) {
+            frames_add(request->object, event->frame);
+            event->frame = NULL;
+        }
+        return;
+    case ENGINE_STATS_READY:
+        if (request->kind == REQUEST_STATS && event->stats)
+            stats_answer(session, request, event->stats);
+        return;
+    case ENGINE_CLIENT_FORGOTTEN:
+        return;
+    }
+}
+
+/* ---- the connection's calls -------------------------------------------------------------------------- */
+
+static void fill_limits(struct handshake_limits *told, const struct hub_options *options)
+{
+    const struct session_limits *limits = &options->limits;
+    *told = (struct handshake_limits){
+        .queued_output_bytes = options->connection_limits.queued_hard_bytes,
+        .scene_memory_bytes = options->scene_memory_bytes,
+        .handshake_ms = options->connection_limits.handshake_ms,
+        .control_payload_max_bytes = CODEC_CONTROL_PAYLOAD_MAX_BYTES,
+        .bulk_chunk_max_bytes = (uint32_t)FRAME_PIECE_BYTES,
+        .requests_in_flight = limits->requests_in_flight,
+        .scenes_per_client = limits->scenes_per_client,
+        .views_per_client = limits->jobs_per_client,
+        .nodes_max = limits->nodes,
+        .texture_edge_max = limits->texture_edge_texels,
+        .width_max = limits->width_pixels,
+        .height_max = limits->height_pixels,
+        .samples_max = limits->samples,
+        .idle_seconds = options->connection_limits.idle_ms / 1000,
+    };
+}
+
+static size_t introduced_count(const struct hub *hub)
+{
+    return hub->sessions.count - hub->unauthenticated;
+}
+
+static bool on_hello(void *context, const struct handshake_hello *hello, struct handshake_reply *reply)
+{
+    struct session *session = context;
+    struct hub *hub = session->hub;
+    struct decode_error error = {0};
+    *reply = (struct handshake_reply){.name = "farlightd " FARLIGHT_VERSION};
+    reply->version = handshake_choose_version(hello, &error);
+    if (!reply->version)
+        snprintf(reply->text, sizeof reply->text, "%s", error.text);
+    else if (hub->stopping)
+        snprintf(reply->text, sizeof reply->text, "the daemon is about to stop");
+    else if (introduced_count(hub) >= hub->options.limits.clients)
+        snprintf(reply->text, sizeof reply->text, "%u clients are connected, the limit; try again later",
+                 hub->options.limits.clients);
+    if (getrandom(reply->nonce, sizeof reply->nonce, 0) < 0 ||
+        getrandom(reply->session_token, sizeof reply->session_token, 0) < 0)
+        snprintf(reply->text, sizeof reply->text, "no random numbers");
+    fill_limits(&reply->limits, &hub->options);
+    snprintf(session->name, sizeof session->name, "%s", hello->name);
+    return reply->text[0] == '\0';
+}
+
+static void on_opened(void *context)
+{
+    struct session *session = context;
+    session->introduced = true;
+    session->hub->unauthenticated--;
+    log_write(LOG_DEBUG, "session", "client %" PRIu64 " is %s, %s", session->number, session->name,
+              session->identity.name);
+    upload_begin(session);
+}
+
+static void on_room(void *context)
+{
+    frames_pump(context);
+}
+
+static bool on_owed(const void *context)
+{
+    const struct session *session = context;
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&session->requests.in_flight, &cursor, NULL, &value)) {
+        const struct request *request = value;
+        if (request->kind == REQUEST_UPLOAD || request->kind == REQUEST_TRANSACTION)
+            continue; /* the client is to go on */
+        if (request->kind != REQUEST_JOB || job_is_owed(request->object))
+            return true;
+    }
+    return false;
+}
+
+static void destroy_transactions(struct session *session)
+{
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&session->requests.in_flight, &cursor, NULL, &value)) {
+        struct request *request = value;
+        if (request->kind == REQUEST_TRANSACTION)
+            transaction_destroy(session, request->object);
+    }
+}
+
+static void on_closed(void *context)
+{
+    struct session *session = context;
+    struct hub *hub = session->hub;
+    log_write(LOG_DEBUG, "session", "client %" PRIu64 " is gone", session->number);
+    hashmap_remove(&hub->sessions, session->number);
+    jobs_finish(session);
+    destroy_transactions(session);
+    requests_finish(&session->requests);
+    upload_finish(session);
+    hashmap_finish(&session->scenes);
+    if (session->introduced) {
+        struct engine_command *command = hub_command(ENGINE_CLIENT_GONE, session->number, 0);
+        if (!command || !hub_submit(hub, command))
+            log_write(LOG_ERROR, "session", "no memory to forget client %" PRIu64 "; its scenes stay",
+                      session->number);
+    } else {
+        hub->unauthenticated--;
+    }
+    free(session);
+    if (!hub->sessions.count && hub->emptied)
+        hub->emptied(hub->emptied_context);
+}
+
+static const struct connection_handler connection_handler = {
+    .hello = on_hello,
+    .opened = on_opened,
+    .message = dispatch_message,
+    .invalid = dispatch_invalid,
+    .room = on_room,
+    .owed = on_owed,
+    .closed = on_closed,
+};
+
+/* ---- life -------------------------------------------------------------------------------------------- */
+
+struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct address *peer,
+                               const struct auth_identity *identity, struct error *error)
+{
+    struct session *session = calloc(1, sizeof *session);
+    if (!session) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
+        return NULL;
+    }
+    session->hub = hub;
+    session->number = number;
+    session->identity = *identity;
+    session->peer = *peer;
+    /* Users are 32-bit numbers; a client whose user is unknown shares with nobody. */
+    session->principal = identity->known ? identity->user : (UINT64_C(1) << 32) + number;
+    session->connection =
+        connection_create(hub->loop, fd, &hub->options.connection_limits, &connection_handler, session, error);
+    if (!session->connection) {
+        free(session);
+        return NULL;
+    }
+    hub->unauthenticated++;
+    return session;
+}
+
+void session_stop(struct session *session)
+{
+    connection_finish(session->connection, PROTOCOL_ERROR_CODE_SHUTTING_DOWN, "", "the daemon stops");
+}
+
+void session_close(struct session *session)
+{
+    connection_close(session->connection);
+}
+
+void session_hold(struct session *session, bool held)
+{
+    connection_hold(session->connection, held);
+}

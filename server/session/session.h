@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: MIT */
+/* One client, from its hello to its goodbye: what it holds, and what is done with each of its messages. */
+#ifndef FARLIGHT_SESSION_SESSION_H
+#define FARLIGHT_SESSION_SESSION_H
+
+#include "base/hashmap.h"
+#include "session/hub.h"
+#include "session/requests.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct job;
+
+enum session_scene_state { SCENE_OPENING = 1, SCENE_OPEN, SCENE_CLOSING };
+
+/* Blobs that the client named; see upload.h. */
+struct session_blobs {
+    struct hashmap offers; /* struct offer, by the head of its hash */
+    size_t offer_count;
+    uint64_t received_bytes; /* of blob data, on channel 1 */
+    uint64_t credit_bytes;   /* told to the client, absolute */
+};
+
+struct session {
+    struct hub *hub;
+    uint64_t number;
+    struct connection *connection;
+    struct auth_identity identity;
+    struct address peer;
+    blob_principal principal;
+    char name[HANDSHAKE_NAME_MAX_BYTES + 1];
+    bool introduced; /* the hello is done: the engine may know it */
+
+    struct requests requests;
+    struct hashmap scenes; /* enum session_scene_state in a pointer, by id */
+    struct session_blobs blobs;
+    size_t transaction_edits; /* in all open transactions */
+    struct job *jobs;         /* whose frame goes next is first */
+    uint32_t job_count;
+};
+
+struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct address *peer,
+                               const struct auth_identity *identity, struct error *error);
+void session_stop(struct session *session); /* the daemon stops: goodbye */
+void session_close(struct session *session);
+void session_hold(struct session *session, bool held);                          /* reads no further */
+void session_engine_event(struct session *session, struct engine_event *event); /* may take its parts */
+
+/* ---- for the files of this folder ---- */
+bool session_send(struct session *session, uint32_t request, uint32_t channel, const struct message *message);
+void session_send_error(struct session *session, uint32_t request, const struct error *error);
+/* ERROR on request 0, goodbye, end. */
+void session_fail(struct session *session, const struct error *error);
+/* Hands a request's command to the engine; NULL (out of memory) is answered as well. */
+void session_submit(struct session *session, struct request *request, struct engine_command *command);
+/* State of a scene, 0 if there is none. */
+enum session_scene_state session_scene(const struct session *session, uint32_t scene);
+
+#endif

@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/stats.h"
+
+#include "base/clock.h"
+#include "protocol/codec.h"
+#include "session/session.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CLIENTS_MAX 256
+#define SCENES_MAX 256
+#define STAGES_MAX (STAGE_COUNT * 2)
+#define NAME_BYTES 65
+
+struct stats_storage {
+    struct record_client_stat clients[CLIENTS_MAX];
+    char client_names[CLIENTS_MAX][NAME_BYTES];
+    struct record_scene_stat scenes[SCENES_MAX];
+    struct record_stage_total stages[STAGES_MAX];
+};
+
+static void fill_client(struct record_client_stat *stat, char name[NAME_BYTES], const struct session *session,
+                        uint64_t now_ns)
+{
+    const struct connection *connection = session->connection;
+    /* The client's own name is cut where a character begins, so that the text stays UTF-8. */
+    int name_bytes = (int)strlen(session->name);
+    int room = NAME_BYTES - 4 - (int)strlen(session->identity.name);
+    while (name_bytes > room || (name_bytes && ((unsigned char)session->name[name_bytes] & 0xc0) == 0x80))
+        name_bytes--;
+    snprintf(name, NAME_BYTES, "%.*s (%s)", name_bytes, session->name, session->identity.name);
+    *stat = (struct record_client_stat){
+        .client = session->number,
+        .connected_ns = now_ns - connection->connected_ns,
+        .received_bytes = connection->received_bytes,
+        .sent_bytes = connection->sent_bytes,
+        .bulk_bytes = session->blobs.received_bytes,
+        .requests = (uint32_t)session->requests.in_flight.count,
+        .scenes = (uint32_t)session->scenes.count,
+        .name = name,
+    };
+}
+
+static uint32_t fill_clients(struct stats_storage *storage, const struct hub *hub)
+{
+    uint64_t now_ns = clock_now_ns();
+    uint32_t count = 0;
+    size_t cursor = 0;
+    void *value;
+    while (count < CLIENTS_MAX && hashmap_next(&hub->sessions, &cursor, NULL, &value)) {
+        const struct session *session = value;
+        if (!session->introduced)
+            continue;
+        fill_client(&storage->clients[count], storage->client_names[count], session, now_ns);
+        count++;
+    }
+    return count;
+}
+
+static uint32_t fill_scenes(struct stats_storage *storage, const struct engine_stats *stats)
+{
+    uint32_t count = stats->scene_count < SCENES_MAX ? stats->scene_count : SCENES_MAX;
+    for (uint32_t i = 0; i < count; i++) {
+        const struct engine_scene_stat *from = &stats->scenes[i];
+        storage->scenes[i] = (struct record_scene_stat){
+            .client = from->client,
+            .scene = from->scene,
+            .revision = from->revision,
+            .nodes = from->nodes,
+            .instances = from->instances,
+            .triangles = from->triangles,
+            .spheres = from->spheres,
+            .host_bytes = from->host_bytes,
+            .device_bytes = from->device_bytes,
+            .name = from->name,
+        };
+    }
+    return count;
+}
+
+static uint32_t fill_stages(struct stats_storage *storage, const struct engine_stats *stats)
+{
+    uint32_t count = 0;
+    for (uint32_t stage = 0; stage < STAGE_COUNT; stage++) {
+        for (uint32_t clock = 0; clock < 2; clock++) {
+            if (!stats->stages[stage][clock].count)
+                continue;
+            storage->stages[count++] = (struct record_stage_total){
+                .stage = (enum protocol_stage)stage,
+                .clock = (enum protocol_clock)clock,
+                .count = stats->stages[stage][clock].count,
+                .total_ns = stats->stages[stage][clock].total_ns,
+                .greatest_ns = stats->stages[stage][clock].greatest_ns,
+            };
+        }
+    }
+    return count;
+}
+
+static void fill(struct message_stats_reply *reply, const struct hub *hub, const struct engine_stats *stats)
+{
+    reply->uptime_ns = clock_now_ns() - hub->started_ns;
+    reply->frames = stats->frames;
+    reply->rays = stats->rays;
+    reply->host_bytes = stats->host_bytes;
+    reply->host_limit_bytes = hub->options.scene_memory_bytes;
+    reply->device_bytes = stats->device_bytes;
+    reply->device_limit_bytes = stats->device_limit_bytes;
+    reply->blob_bytes = blob_store_bytes(hub->blobs);
+    reply->blobs = (uint32_t)blob_store_count(hub->blobs);
+    reply->jobs = stats->jobs;
+    reply->version = FARLIGHT_VERSION;
+    reply->device = stats->device.name;
+    reply->driver = stats->device.version;
+}
+
+void stats_answer(struct session *session, struct request *request, const struct engine_stats *stats)
+{
+    struct stats_storage *storage = calloc(1, sizeof *storage);
+    if (!storage) {
+        struct error error = {0};
+        error_set(&error, ERROR_OUT_OF_MEMORY, "stats", "no memory");
+        request_answer_error(session, request, &error);
+        return;
+    }
+    struct message message;
+    message_init(&message, MESSAGE_STATS_REPLY);
+    struct message_stats_reply *reply = &message.stats_reply;
+    fill(reply, session->hub, stats);
+    reply->clients = storage->clients;
+    reply->clients_count = fill_clients(storage, session->hub);
+    reply->scenes = storage->scenes;
+    reply->scenes_count = fill_scenes(storage, stats);
+    reply->stages = storage->stages;
+    reply->stages_count = fill_stages(storage, stats);
+    /* A very busy daemon has more to tell than one message holds: the totals matter more than the last scenes. */
+    while (reply->scenes_count && message_payload_bytes(&message) > CODEC_CONTROL_PAYLOAD_MAX_BYTES)
+        reply->scenes_count--;
+    if (session_send(session, request->id, 0, &message)) {
+        request_answered(session, request);
+    } else {
+        struct error error = {0};
+        error_set(&error, ERROR_INTERNAL, "stats", "the numbers cannot be sent");
+        request_answer_error(session, request, &error);
+    }
+    free(storage);
+}

@@ -1,0 +1,324 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/upload.h"
+
+#include "session/session.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- offers ------------------------------------------------------------------------------------------ */
+
+static uint64_t key_of(const uint8_t hash[BLOB_HASH_BYTES])
+{
+    uint64_t key;
+    memcpy(&key, hash, sizeof key);
+    return key;
+}
+
+static struct offer *find(const struct session *session, const uint8_t hash[BLOB_HASH_BYTES])
+{
+    struct offer *offer = hashmap_get(&session->blobs.offers, key_of(hash));
+    while (offer && memcmp(offer->hash, hash, BLOB_HASH_BYTES) != 0)
+        offer = offer->same_key;
+    return offer;
+}
+
+static void print_hash(const uint8_t hash[BLOB_HASH_BYTES], char text[2 * BLOB_HASH_BYTES + 1])
+{
+    for (size_t i = 0; i < BLOB_HASH_BYTES; i++)
+        snprintf(text + 2 * i, 3, "%02x", hash[i]);
+}
+
+static struct offer *add(struct session *session, const struct record_blob_ref *reference, struct error *error)
+{
+    if (session->blobs.offer_count >= session->hub->options.limits.blobs_per_client) {
+        error_set(error, ERROR_LIMIT, "blob_offer.blobs", "a client may name %u blobs",
+                  session->hub->options.limits.blobs_per_client);
+        return NULL;
+    }
+    struct offer *offer = calloc(1, sizeof *offer);
+    uint64_t key = key_of(reference->hash);
+    if (offer) {
+        offer->same_key = hashmap_get(&session->blobs.offers, key);
+        memcpy(offer->hash, reference->hash, BLOB_HASH_BYTES);
+        offer->size_bytes = reference->size_bytes;
+    }
+    if (!offer || !hashmap_put(&session->blobs.offers, key, offer)) {
+        free(offer);
+        error_set(error, ERROR_OUT_OF_MEMORY, "blob_offer.blobs", "no memory");
+        return NULL;
+    }
+    session->blobs.offer_count++;
+    return offer;
+}
+
+/* One offered blob; *needed: it is to be sent. */
+static bool take_offer(struct session *session, const struct record_blob_ref *reference, bool *needed,
+                       struct error *error)
+{
+    *needed = false;
+    if (!reference->size_bytes)
+        return true; /* none is meant */
+    struct offer *offer = find(session, reference->hash);
+    if (!offer && !(offer = add(session, reference, error)))
+        return false;
+    if (offer->size_bytes != reference->size_bytes)
+        return error_set(error, ERROR_INVALID, "blob_offer.blobs",
+                         "the same hash was offered with %" PRIu64 " and with %" PRIu64 " bytes",
+                         offer->size_bytes, reference->size_bytes);
+    if (!offer->held)
+        offer->held = blob_store_find(session->hub->blobs, session->principal, offer->hash, offer->size_bytes);
+    *needed = !offer->held;
+    return true;
+}
+
+void upload_offer(struct session *session, struct request *request, const struct message_blob_offer *message)
+{
+    struct error error = {0};
+    struct record_blob_index *needed = calloc(message->blobs_count + 1u, sizeof *needed);
+    if (!needed)
+        error_set(&error, ERROR_OUT_OF_MEMORY, "blob_offer", "no memory");
+    struct message answer;
+    message_init(&answer, MESSAGE_BLOB_NEED);
+    answer.blob_need.needed = needed;
+    for (uint32_t i = 0; needed && i < message->blobs_count; i++) {
+        bool is_needed;
+        if (!take_offer(session, &message->blobs[i], &is_needed, &error))
+            break;
+        if (is_needed)
+            needed[answer.blob_need.needed_count++].index = i;
+    }
+    if (error.kind) {
+        request_answer_error(session, request, &error);
+    } else {
+        session_send(session, request->id, 0, &answer);
+        request_answered(session, request);
+    }
+    free(needed);
+}
+
+bool upload_resolve(const struct session *session, const struct record_blob_ref *reference, const char *field,
+                    struct blob **blob, struct error *error)
+{
+    *blob = NULL;
+    if (!reference->size_bytes)
+        return true;
+    const struct offer *offer = find(session, reference->hash);
+    if (offer && offer->held && offer->size_bytes == reference->size_bytes) {
+        *blob = blob_ref(offer->held);
+        return true;
+    }
+    char text[2 * BLOB_HASH_BYTES + 1];
+    print_hash(reference->hash, text);
+    error_set(error, ERROR_UNKNOWN_ID, field, "blob %s of %" PRIu64 " bytes is not held", text,
+              reference->size_bytes);
+    return error_remedy(error, "offer it on this connection, and send it if it is needed, before the edit");
+}
+
+/* ---- pieces ------------------------------------------------------------------------------------------ */
+
+void upload_abandon(struct session *session, struct offer *offer)
+{
+    if (!offer->arriving)
+        return;
+    blob_store_release(session->hub->blobs, offer->size_bytes);
+    blob_unref(offer->arriving);
+    free(offer->chunk_hashes);
+    offer->arriving = NULL;
+    offer->chunk_hashes = NULL;
+    offer->arrived_bytes = 0;
+}
+
+/* Absolute, so it cannot drift; told when half the window is used up, so that it costs few messages. */
+static void tell_credit(struct session *session)
+{
+    struct session_blobs *blobs = &session->blobs;
+    uint64_t window_bytes = session->hub->options.limits.upload_window_bytes;
+    if (blobs->credit_bytes - blobs->received_bytes > window_bytes / 2)
+        return;
+    blobs->credit_bytes = blobs->received_bytes + window_bytes;
+    struct message message;
+    message_init(&message, MESSAGE_CREDIT);
+    message.credit.channel = UPLOAD_CHANNEL;
+    message.credit.total = blobs->credit_bytes;
+    session_send(session, 0, UPLOAD_CHANNEL, &message);
+}
+
+void upload_begin(struct session *session)
+{
+    tell_credit(session);
+}
+
+static bool begin_blob(struct session *session, struct offer *offer, struct error *error)
+{
+    if (!blob_store_reserve(session->hub->blobs, offer->size_bytes, error))
+        return false;
+    offer->arriving = blob_create_empty(offer->size_bytes);
+    if (offer->arriving)
+        return true;
+    blob_store_release(session->hub->blobs, offer->size_bytes);
+    return error_set(error, ERROR_OUT_OF_MEMORY, "blob_data", "no memory for %" PRIu64 " bytes",
+                     offer->size_bytes);
+}
+
+static bool hash_arrived(struct offer *offer, uint64_t before_bytes, struct error *error)
+{
+    uint64_t first = before_bytes / BLOB_CHUNK_BYTES, end = offer->arrived_bytes / BLOB_CHUNK_BYTES;
+    bool complete = offer->arrived_bytes == offer->size_bytes;
+    if (complete && offer->arrived_bytes % BLOB_CHUNK_BYTES)
+        end++;
+    if (first == end)
+        return true;
+    uint8_t *hashes = realloc(offer->chunk_hashes, (size_t)end * BLOB_HASH_BYTES);
+    if (!hashes)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "blob_data", "no memory");
+    offer->chunk_hashes = hashes;
+    for (uint64_t chunk = first; chunk < end; chunk++) {
+        uint64_t start_bytes = chunk * BLOB_CHUNK_BYTES;
+        uint64_t left_bytes = offer->arrived_bytes - start_bytes;
+        blob_hash_chunk(hashes + chunk * BLOB_HASH_BYTES, offer->arriving->data + start_bytes,
+                        left_bytes < BLOB_CHUNK_BYTES ? (size_t)left_bytes : BLOB_CHUNK_BYTES);
+    }
+    if (complete)
+        blob_hash_chunks(offer->arriving->hash, hashes, (size_t)end);
+    return true;
+}
+
+static bool add_piece(struct session *session, struct offer *offer, const struct message_blob_data *data,
+                      struct error *error)
+{
+    if (data->offset_bytes != offer->arrived_bytes)
+        return error_set(error, ERROR_INVALID, "blob_data.offset_bytes",
+                         "%" PRIu64 " came where %" PRIu64 " was due", data->offset_bytes, offer->arrived_bytes);
+    if (!data->data_bytes || data->data_bytes > offer->size_bytes - offer->arrived_bytes)
+        return error_set(error, ERROR_INVALID, "blob_data.data", "%u bytes came where 1 to %" PRIu64 " were left",
+                         data->data_bytes, offer->size_bytes - offer->arrived_bytes);
+    if (!offer->arriving && !begin_blob(session, offer, error))
+        return false;
+    uint64_t before_bytes = offer->arrived_bytes;
+    if (!blob_reserve(offer->arriving, (size_t)(before_bytes + data->data_bytes)))
+        return error_set(error, ERROR_OUT_OF_MEMORY, "blob_data", "no memory for %" PRIu64 " bytes",
+                         before_bytes + data->data_bytes);
+    memcpy(offer->arriving->data + before_bytes, data->data, data->data_bytes);
+    offer->arrived_bytes += data->data_bytes;
+    return hash_arrived(offer, before_bytes, error);
+}
+
+/* All pieces are there: does the content bear its name? */
+static bool complete(struct session *session, struct offer *offer, struct error *error)
+{
+    if (memcmp(offer->arriving->hash, offer->hash, BLOB_HASH_BYTES) != 0) {
+        char named[2 * BLOB_HASH_BYTES + 1], found[2 * BLOB_HASH_BYTES + 1];
+        print_hash(offer->hash, named);
+        print_hash(offer->arriving->hash, found);
+        return error_set(error, ERROR_HASH_MISMATCH, "blob_data", "the bytes of blob %s have the hash %s", named,
+                         found);
+    }
+    offer->held = blob_store_add(session->hub->blobs, session->principal, offer->arriving);
+    return offer->held || error_set(error, ERROR_OUT_OF_MEMORY, "blob_data", "no memory");
+}
+
+/* The request that the piece belongs to; NULL: it was answered, or refused, already. */
+static struct request *request_of(struct session *session, const struct framing_header *header,
+                                  const struct message_blob_data *data)
+{
+    struct request *request = request_find(session, header->request);
+    if (request && request->kind == REQUEST_UPLOAD)
+        return request;
+    if (requests_is_dead(session, header->request)) {
+        if (data->offset_bytes)
+            return NULL;
+        requests_forget_dead(session, header->request); /* the number is used anew */
+    }
+    request = request_begin(session, header->request, REQUEST_UPLOAD);
+    if (!request)
+        requests_bury(session, header->request);
+    return request;
+}
+
+static bool take_piece(struct session *session, struct request *request, const struct message_blob_data *data,
+                       struct error *error)
+{
+    struct offer *offer = find(session, data->hash);
+    if (!offer || offer->held)
+        return error_set(error, ERROR_INVALID, "blob_data.hash", "a blob that %s",
+                         offer ? "is held already" : "was not offered");
+    if (!request->object && offer->arriving)
+        return error_set(error, ERROR_INVALID, "blob_data.hash", "a blob that another request is sending");
+    if (request->object && request->object != offer)
+        return error_set(error, ERROR_INVALID, "blob_data.hash", "another blob than the request began with");
+    request->object = offer;
+    if (!add_piece(session, offer, data, error))
+        return false;
+    return offer->arrived_bytes < offer->size_bytes || complete(session, offer, error);
+}
+
+void upload_data(struct session *session, const struct framing_header *header,
+                 const struct message_blob_data *data)
+{
+    struct error error = {0};
+    struct session_blobs *blobs = &session->blobs;
+    if (header->channel != UPLOAD_CHANNEL || data->data_bytes > blobs->credit_bytes - blobs->received_bytes) {
+        error_set(&error, ERROR_PROTOCOL, "blob_data",
+                  header->channel != UPLOAD_CHANNEL ? "blob data belongs on channel 1"
+                                                    : "more came on channel 1 than credit was given for");
+        session_fail(session, &error);
+        return;
+    }
+    blobs->received_bytes += data->data_bytes;
+    tell_credit(session);
+    struct request *request = request_of(session, header, data);
+    if (!request)
+        return;
+    bool taken = take_piece(session, request, data, &error);
+    struct offer *offer = request->object;
+    if (taken && !offer->held)
+        return;
+    if (offer)
+        upload_abandon(session, offer);
+    if (taken) {
+        request_answer_ok(session, request, 0);
+        return;
+    }
+    requests_bury(session, request->id);
+    request_answer_error(session, request, &error);
+}
+
+void upload_invalid(struct session *session, uint32_t request_id, const struct error *error)
+{
+    struct request *request = request_find(session, request_id);
+    if (!request && requests_is_dead(session, request_id))
+        return;
+    if (!request)
+        request = request_begin(session, request_id, REQUEST_UPLOAD);
+    if (!request)
+        return;
+    if (request->kind != REQUEST_UPLOAD) {
+        session_fail(session, error);
+        return;
+    }
+    if (request->object)
+        upload_abandon(session, request->object);
+    requests_bury(session, request_id);
+    request_answer_error(session, request, error);
+}
+
+void upload_finish(struct session *session)
+{
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&session->blobs.offers, &cursor, NULL, &value)) {
+        for (struct offer *offer = value, *next; offer; offer = next) {
+            next = offer->same_key;
+            upload_abandon(session, offer);
+            blob_unref(offer->held);
+            free(offer);
+        }
+    }
+    hashmap_finish(&session->blobs.offers);
+    if (!session->identity.known)
+        blob_store_forget(session->hub->blobs, session->principal);
+    blob_store_trim(session->hub->blobs);
+}

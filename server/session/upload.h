@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: MIT */
+/* Blobs of one session: offered by hash, sent piece by piece where the daemon lacks them, checked. */
+#ifndef FARLIGHT_SESSION_UPLOAD_H
+#define FARLIGHT_SESSION_UPLOAD_H
+
+#include "base/blob.h"
+#include "protocol/framing.h"
+#include "session/requests.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define UPLOAD_CHANNEL 1u
+
+/* A blob that the client named. Until the connection ends it is held if it is there. */
+struct offer {
+    struct offer *same_key;
+    uint8_t hash[BLOB_HASH_BYTES];
+    uint64_t size_bytes;
+    struct blob *held;     /* complete and checked */
+    struct blob *arriving; /* while its pieces come */
+    uint64_t arrived_bytes;
+    uint8_t *chunk_hashes; /* of the complete chunks that have arrived */
+};
+
+void upload_begin(struct session *session); /* tells the first credit */
+void upload_finish(struct session *session);
+
+void upload_offer(struct session *session, struct request *request, const struct message_blob_offer *offer);
+void upload_data(struct session *session, const struct framing_header *header,
+                 const struct message_blob_data *data);
+/* A piece with a field that is not allowed: its request fails. */
+void upload_invalid(struct session *session, uint32_t request_id, const struct error *error);
+void upload_abandon(struct session *session, struct offer *offer); /* forgets the pieces that have come */
+
+/* The blob that an edit names: *blob is a new reference, or NULL where none is meant (0 bytes). False: it is not
+ * held. */
+bool upload_resolve(const struct session *session, const struct record_blob_ref *reference, const char *field,
+                    struct blob **blob, struct error *error);
+
+#endif

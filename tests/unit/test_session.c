@@ -1,0 +1,918 @@
+/* SPDX-License-Identifier: MIT */
+/* A session from hello to goodbye, over a socketpair, with an engine that answers what it is told to. Every test
+ * runs twice: with the system calls as they are, and with each of them cut short and interrupted. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "base/clock.h"
+#include "base/queue.h"
+#include "base/sys.h"
+#include "session/daemon.h"
+#include "session/dispatch.h"
+#include "session/frames.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#define FRAME_BYTES ((size_t)700001) /* three pieces, the last of odd size */
+
+/* ---- faults ------------------------------------------------------------------------------------------ */
+
+static struct sys_calls real;
+static atomic_uint calls;
+
+static bool interrupted(void)
+{
+    if (atomic_fetch_add(&calls, 1) % 3)
+        return false;
+    errno = EINTR;
+    return true;
+}
+
+static ssize_t short_read(int fd, void *data, size_t bytes)
+{
+    size_t least = atomic_load(&calls) % 5 + 1;
+    size_t most = bytes > 65536 ? bytes - 12345 : least; /* small messages in tiny parts, bulk in odd ones */
+    return interrupted() ? -1 : real.read(fd, data, bytes < most ? bytes : most);
+}
+
+static ssize_t short_sendmsg(int fd, const struct msghdr *message, int flags)
+{
+    struct iovec part = message->msg_iov[0];
+    struct msghdr shorter = {.msg_iov = &part, .msg_iovlen = 1};
+    size_t most = part.iov_len > 4096 ? part.iov_len - 777 : atomic_load(&calls) % 7 + 1;
+    part.iov_len = part.iov_len < most ? part.iov_len : most;
+    return interrupted() ? -1 : real.sendmsg(fd, &shorter, flags);
+}
+
+static int interrupted_wait(int fd, struct epoll_event *events, int max_events, int timeout_ms)
+{
+    return interrupted() ? -1 : real.epoll_wait(fd, events, max_events > 1 ? 1 : max_events, timeout_ms);
+}
+
+/* ---- an engine --------------------------------------------------------------------------------------- */
+
+static struct {
+    struct queue *events;
+    pthread_mutex_t mutex;
+    atomic_bool full;       /* takes no commands */
+    atomic_bool keep_jobs;  /* jobs render nothing until they are cancelled */
+    uint32_t job_request, next_frame, last_frame;
+    uint64_t credit_seen, commits;
+    atomic_uint edits, gone, frames_sent;
+} engine;
+
+static void event(enum engine_event_kind kind, const struct engine_command *command, uint32_t request)
+{
+    struct engine_event *made = calloc(1, sizeof *made);
+    made->kind = kind;
+    made->client = command->client;
+    made->request = request;
+    made->revision = engine.commits;
+    if (kind == ENGINE_FAILED)
+        error_set(&made->error, ERROR_CANCELLED, NULL, "cancelled");
+    if (kind == ENGINE_STATS_READY) {
+        made->stats = calloc(1, sizeof *made->stats);
+        strcpy(made->stats->device.name, "none");
+    }
+    queue_push(engine.events, made);
+}
+
+static void render(const struct engine_command *command)
+{
+    for (; engine.next_frame <= engine.last_frame && engine.next_frame < engine.credit_seen; engine.next_frame++) {
+        struct engine_event *made = calloc(1, sizeof *made);
+        made->kind = ENGINE_FRAME;
+        made->client = command->client;
+        made->request = engine.job_request;
+        made->frame = calloc(1, sizeof *made->frame);
+        struct engine_frame *frame = made->frame;
+        frame->frame = engine.next_frame;
+        frame->request.width = frame->request.height = frame->request.samples = 1;
+        frame->size_bytes = FRAME_BYTES;
+        frame->bytes = malloc(FRAME_BYTES);
+        for (size_t i = 0; i < FRAME_BYTES; i++)
+            frame->bytes[i] = (uint8_t)(i * 31 + engine.next_frame);
+        frame->encoded_ns = clock_now_ns();
+        stage_times_begin(&frame->result.times);
+        queue_push(engine.events, made);
+    }
+    if (engine.next_frame > engine.last_frame)
+        event(ENGINE_DONE, command, engine.job_request);
+}
+
+static bool submit(void *context, struct engine_command *command, struct error *error)
+{
+    (void)context;
+    if (atomic_load(&engine.full))
+        return error_set(error, ERROR_BUSY, NULL, "full");
+    switch (command->kind) {
+    case ENGINE_COMMIT:
+        engine.commits++;
+        atomic_fetch_add(&engine.edits, (unsigned)command->edit_count);
+        event(ENGINE_DONE, command, command->request);
+        break;
+    case ENGINE_SCENE_OPEN:
+    case ENGINE_SCENE_CLOSE:
+        event(ENGINE_DONE, command, command->request);
+        break;
+    case ENGINE_JOB_START:
+        engine.job_request = command->request;
+        engine.next_frame = command->job.first_frame;
+        engine.last_frame = command->job.last_frame;
+        engine.credit_seen = command->job.credit;
+        if (!atomic_load(&engine.keep_jobs))
+            render(command);
+        break;
+    case ENGINE_JOB_CREDIT:
+        engine.credit_seen = command->credit;
+        if (!atomic_load(&engine.keep_jobs))
+            render(command);
+        break;
+    case ENGINE_JOB_CANCEL:
+        event(ENGINE_FAILED, command, command->target_request);
+        event(ENGINE_DONE, command, command->request);
+        break;
+    case ENGINE_STATS:
+        event(ENGINE_STATS_READY, command, command->request);
+        break;
+    case ENGINE_CLIENT_GONE:
+        atomic_fetch_add(&engine.gone, 1);
+        event(ENGINE_CLIENT_FORGOTTEN, command, 0);
+        break;
+    }
+    engine_command_destroy(command);
+    return true;
+}
+
+static int event_fd(void *context)
+{
+    (void)context;
+    return queue_event_fd(engine.events);
+}
+
+static struct engine_event *next_event(void *context)
+{
+    (void)context;
+    return queue_try_pop(engine.events);
+}
+
+static void report_sent(void *context, uint64_t queue_ns, uint64_t send_ns)
+{
+    (void)context, (void)queue_ns, (void)send_ns;
+    atomic_fetch_add(&engine.frames_sent, 1);
+}
+
+static void drop_event(void *item)
+{
+    engine_event_destroy(item);
+}
+
+/* ---- the daemon on a thread, a client here ----------------------------------------------------------- */
+
+struct client {
+    int fd;
+    uint8_t in[2 * FRAMING_MESSAGE_MAX_BYTES];
+    size_t in_used, consumed;
+    uint8_t scratch_data[SCRATCH_BYTES];
+    struct scratch scratch;
+    struct framing_header header; /* of the last message */
+    struct message message;
+    uint64_t upload_credit;
+};
+
+static struct daemon served;
+static pthread_t thread;
+static struct client client;
+
+static void *run(void *context)
+{
+    (void)context;
+    struct error error = {0};
+    daemon_run(&served, &error);
+    return NULL;
+}
+
+static void receive_some(void)
+{
+    memmove(client.in, client.in + client.consumed, client.in_used - client.consumed);
+    client.in_used -= client.consumed;
+    client.consumed = 0;
+    struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+    if (poll(&fd, 1, 20000) != 1)
+        fail_msg("nothing came for 20 s");
+    ssize_t got = recv(client.fd, client.in + client.in_used, sizeof client.in - client.in_used, 0);
+    if (got <= 0)
+        fail_msg("the connection is closed");
+    client.in_used += (size_t)got;
+}
+
+static void send_bytes(const void *data, size_t bytes)
+{
+    const uint8_t *next = data;
+    while (bytes) {
+        ssize_t sent = send(client.fd, next, bytes, MSG_NOSIGNAL);
+        assert_true(sent > 0);
+        next += sent;
+        bytes -= (size_t)sent;
+    }
+}
+
+static void send_message(uint32_t request, uint32_t channel, const struct message *message)
+{
+    static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
+    struct writer writer;
+    writer_init(&writer, bytes, sizeof bytes);
+    if (!message_write(&writer, request, channel, message))
+        fail_msg("%s: %s", writer.error.field, writer.error.text);
+    send_bytes(bytes, writer.used_bytes);
+}
+
+/* The next message but credit and blocked; it stays until the next call. */
+static const struct message *receive(void)
+{
+    for (;;) {
+        struct frame frame;
+        struct decode_error error = {0};
+        enum framing_result result = framing_parse(&frame, client.in + client.consumed,
+                                                   client.in_used - client.consumed, MESSAGE_FROM_SERVER, &error);
+        if (result == FRAMING_NEED_MORE) {
+            receive_some();
+            continue;
+        }
+        if (result == FRAMING_FATAL)
+            fail_msg("%s: %s", error.field, error.text);
+        client.consumed += frame.consumed_bytes;
+        client.header = frame.header;
+        scratch_init(&client.scratch, client.scratch_data, sizeof client.scratch_data);
+        if (!message_decode(&client.message, frame.header.type, frame.payload, frame.header.payload_bytes,
+                            &client.scratch, &error))
+            fail_msg("%s: %s", error.field, error.text);
+        if (client.message.type == MESSAGE_CREDIT)
+            client.upload_credit = client.message.credit.total;
+        else
+            return &client.message;
+    }
+}
+
+static void expect(enum message_type type, uint32_t request)
+{
+    const struct message *message = receive();
+    if (message->type != type || client.header.request != request)
+        fail_msg("%s of request %u came instead of %s of %u: %s", message_type_text(message->type),
+                 client.header.request, message_type_text(type), request,
+                 message->type == MESSAGE_ERROR ? message->error.text : "");
+}
+
+static void expect_error(uint32_t request, enum protocol_error_code code)
+{
+    expect(MESSAGE_ERROR, request);
+    assert_int_equal(client.message.error.code, code);
+}
+
+static void expect_end(void)
+{
+    struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+    assert_int_equal(client.in_used, client.consumed);
+    assert_int_equal(poll(&fd, 1, 20000), 1);
+    assert_int_equal(recv(client.fd, client.in, 1, 0), 0);
+}
+
+static struct message made(enum message_type type)
+{
+    struct message message;
+    message_init(&message, type);
+    return message;
+}
+
+static void expect_alive(uint32_t request)
+{
+    struct message message = made(MESSAGE_PING);
+    message.ping.sent_ns = 1234567;
+    send_message(request, 0, &message);
+    expect(MESSAGE_PONG, request);
+    assert_int_equal(client.message.pong.sent_ns, 1234567);
+}
+
+static void greet(void)
+{
+    struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "test"};
+    uint8_t bytes[HANDSHAKE_HELLO_MAX_BYTES];
+    send_bytes(bytes, handshake_hello_encode(bytes, &hello));
+    struct handshake_reply reply;
+    struct decode_error error = {0};
+    while (handshake_reply_parse(&reply, client.in, client.in_used, &client.consumed, &error) == HANDSHAKE_NEED_MORE)
+        receive_some();
+    assert_int_equal(reply.version, 1);
+    assert_int_equal(reply.limits.requests_in_flight, 64);
+}
+
+static void start(const struct connection_limits *connection_limits)
+{
+    memset(&engine, 0, sizeof engine);
+    engine.events = queue_create(4096, true);
+    struct hub_options options = {
+        .limits = {.clients = 4,
+                   .unauthenticated = 4,
+                   .unauthenticated_per_address = 4,
+                   .requests_in_flight = 64,
+                   .scenes_per_client = 2,
+                   .jobs_per_client = 2,
+                   .blobs_per_client = 8,
+                   .transaction_edits = 10,
+                   .nodes = 100,
+                   .texture_edge_texels = 64,
+                   .width_pixels = 512,
+                   .height_pixels = 512,
+                   .samples = 64,
+                   .blob_bytes = 8 << 20,
+                   .blob_cache_bytes = 4 << 20,
+                   .upload_window_bytes = 1 << 20,
+                   .frame_window_bytes = 64 << 20},
+        .connection_limits = *connection_limits,
+        .engine = {.submit = submit, .event_fd = event_fd, .next_event = next_event, .report_sent = report_sent},
+    };
+    struct error error = {0};
+    int pair[2];
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
+    daemon_init(&served);
+    assert_true(daemon_start(&served, &options, &error));
+    assert_true(daemon_serve_fd(&served, pair[0], &error));
+    memset(&client, 0, sizeof client);
+    client.fd = pair[1];
+    assert_int_equal(pthread_create(&thread, NULL, run, NULL), 0);
+}
+
+static const struct connection_limits patient = {
+    .handshake_ms = 10000,
+    .progress_grace_ms = 10000,
+    .progress_bytes_per_s = 1,
+    .idle_ms = 60000,
+    .queued_soft_ms = 10000,
+    .queued_soft_bytes = 16 << 20,
+    .queued_hard_bytes = 64 << 20,
+};
+
+static int set_up(void **state)
+{
+    (void)state;
+    real = sys;
+    start(&patient);
+    greet();
+    return 0;
+}
+
+static int set_up_with_faults(void **state)
+{
+    (void)state;
+    real = sys;
+    sys.read = short_read;
+    sys.sendmsg = short_sendmsg;
+    sys.epoll_wait = interrupted_wait;
+    start(&patient);
+    greet();
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    close(client.fd);
+    pthread_join(thread, NULL);
+    daemon_finish(&served);
+    queue_destroy(engine.events, drop_event);
+    sys = real;
+    return 0;
+}
+
+/* ---- steps ------------------------------------------------------------------------------------------- */
+
+static void open_scene(uint32_t request, uint32_t scene)
+{
+    struct message message = made(MESSAGE_SCENE_OPEN);
+    message.scene_open.scene = scene;
+    send_message(request, 0, &message);
+    expect(MESSAGE_OK, request);
+}
+
+static void begin_edit(uint32_t request, uint32_t scene)
+{
+    struct message message = made(MESSAGE_EDIT_BEGIN);
+    message.edit_begin.scene = scene;
+    send_message(request, 0, &message);
+}
+
+static void send_node(uint32_t request, uint32_t node)
+{
+    struct message message = made(MESSAGE_SET_NODE);
+    message.set_node.node = node;
+    send_message(request, 0, &message);
+}
+
+static void commit(uint32_t request)
+{
+    struct message message = made(MESSAGE_EDIT_COMMIT);
+    send_message(request, 0, &message);
+}
+
+static struct record_blob_ref reference_to(const uint8_t *data, size_t bytes)
+{
+    struct record_blob_ref reference = {.size_bytes = bytes};
+    blob_hash(reference.hash, data, bytes);
+    return reference;
+}
+
+static uint32_t offer(uint32_t request, struct record_blob_ref reference)
+{
+    struct message message = made(MESSAGE_BLOB_OFFER);
+    message.blob_offer.blobs = &reference;
+    message.blob_offer.blobs_count = 1;
+    send_message(request, 0, &message);
+    expect(MESSAGE_BLOB_NEED, request);
+    return client.message.blob_need.needed_count;
+}
+
+static void send_piece(uint32_t request, const struct record_blob_ref *reference, const uint8_t *data, size_t offset,
+                       size_t bytes)
+{
+    struct message message = made(MESSAGE_BLOB_DATA);
+    message.blob_data.offset_bytes = offset;
+    memcpy(message.blob_data.hash, reference->hash, sizeof reference->hash);
+    message.blob_data.data = data + offset;
+    message.blob_data.data_bytes = (uint32_t)bytes;
+    send_message(request, 1, &message);
+}
+
+/* As far as credit goes, waiting for more by pings. */
+static void send_blob(uint32_t request, const struct record_blob_ref *reference, const uint8_t *data)
+{
+    static uint64_t sent;
+    if (served.hub.sessions.count && client.upload_credit <= 1 << 20)
+        sent = 0;
+    for (size_t offset = 0; offset < reference->size_bytes;) {
+        size_t piece = reference->size_bytes - offset < 262144 ? (size_t)reference->size_bytes - offset : 262144;
+        while (client.upload_credit < sent + piece)
+            expect_alive(9999);
+        send_piece(request, reference, data, offset, piece);
+        offset += piece;
+        sent += piece;
+    }
+}
+
+static struct message render_message(uint32_t last_frame, uint32_t credit)
+{
+    struct message message = made(MESSAGE_RENDER);
+    message.render.scene = 1;
+    message.render.channel = 2;
+    message.render.credit = credit;
+    message.render.last_frame = last_frame;
+    return message;
+}
+
+static void expect_frame(uint32_t request, uint32_t number)
+{
+    expect(MESSAGE_FRAME_BEGIN, request);
+    assert_int_equal(client.message.frame_begin.frame, number);
+    assert_int_equal(client.message.frame_begin.size_bytes, FRAME_BYTES);
+    for (size_t offset = 0; offset < FRAME_BYTES; offset += client.message.frame_data.data_bytes) {
+        expect(MESSAGE_FRAME_DATA, request);
+        const struct message_frame_data *data = &client.message.frame_data;
+        assert_int_equal(client.header.channel, 2);
+        assert_int_equal(data->offset_bytes, offset);
+        for (size_t i = 0; i < data->data_bytes; i++) {
+            if (data->data[i] != (uint8_t)((offset + i) * 31 + number))
+                fail_msg("byte %zu of frame %u is %u", offset + i, number, data->data[i]);
+        }
+    }
+    expect(MESSAGE_FRAME_END, request);
+    assert_int_equal(client.message.frame_end.frame, number);
+    bool queue = false, sent = false;
+    for (uint32_t i = 0; i < client.message.frame_end.stages_count; i++) {
+        queue = queue || client.message.frame_end.stages[i].stage == PROTOCOL_STAGE_QUEUE;
+        sent = sent || client.message.frame_end.stages[i].stage == PROTOCOL_STAGE_SEND;
+    }
+    assert_true(queue && sent);
+}
+
+/* ---- tests ------------------------------------------------------------------------------------------- */
+
+static void a_ping_is_answered_and_stats_are_told(void **state)
+{
+    (void)state;
+    expect_alive(7);
+    struct message message = made(MESSAGE_STATS);
+    send_message(8, 0, &message);
+    expect(MESSAGE_STATS_REPLY, 8);
+    assert_int_equal(client.message.stats_reply.clients_count, 1);
+    assert_non_null(strstr(client.message.stats_reply.clients[0].name, "test (user "));
+    assert_string_equal(client.message.stats_reply.device, "none");
+}
+
+static void edits_are_gathered_and_committed_together(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    begin_edit(2, 1);
+    for (uint32_t node = 1; node <= 10; node++)
+        send_node(2, node);
+    commit(2);
+    expect(MESSAGE_OK, 2);
+    assert_int_equal(client.message.ok.revision, 1);
+    assert_int_equal(atomic_load(&engine.edits), 10);
+}
+
+static void a_failed_transaction_has_one_answer_and_what_follows_it_is_skipped(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    begin_edit(2, 9); /* no such scene */
+    send_node(2, 1);
+    commit(2);
+    expect_error(2, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    begin_edit(3, 1);
+    for (uint32_t node = 1; node <= 12; node++) /* two more than fit */
+        send_node(3, node);
+    commit(3);
+    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_alive(4);
+    begin_edit(3, 1); /* the number is free again */
+    send_node(3, 1);
+    commit(3);
+    expect(MESSAGE_OK, 3);
+    assert_int_equal(atomic_load(&engine.edits), 1);
+}
+
+static void a_mesh_with_a_blob_that_is_not_held_names_it(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    begin_edit(2, 1);
+    struct record_blob_ref reference = {.size_bytes = 36, .hash = {0xab, 0xcd}};
+    struct message message = made(MESSAGE_SET_MESH);
+    message.set_mesh.mesh = 5;
+    message.set_mesh.arrays = &reference;
+    message.set_mesh.arrays_count = 1;
+    send_message(2, 0, &message);
+    expect_error(2, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    assert_non_null(strstr(client.message.error.text, "abcd0000"));
+    assert_string_equal(client.message.error.field, "set_mesh 5.arrays[0]");
+}
+
+static void a_blob_is_sent_once_and_needed_no_more(void **state)
+{
+    (void)state;
+    size_t bytes = ((size_t)2 << 20) + 12345;
+    uint8_t *data = malloc(bytes);
+    for (size_t i = 0; i < bytes; i++)
+        data[i] = (uint8_t)(i ^ i >> 9);
+    struct record_blob_ref reference = reference_to(data, bytes);
+    assert_int_equal(offer(1, reference), 1);
+    send_blob(2, &reference, data);
+    expect(MESSAGE_OK, 2);
+    assert_int_equal(offer(3, reference), 0);
+    free(data);
+}
+
+static void a_blob_with_another_hash_is_refused_and_can_be_sent_again(void **state)
+{
+    (void)state;
+    uint8_t data[1000] = {1, 2, 3}, wrong[1000] = {3, 2, 1};
+    struct record_blob_ref reference = reference_to(data, sizeof data);
+    assert_int_equal(offer(1, reference), 1);
+    send_piece(2, &reference, wrong, 0, 1000);
+    expect_error(2, PROTOCOL_ERROR_CODE_HASH_MISMATCH);
+    send_piece(3, &reference, data, 0, 500);
+    send_piece(3, &reference, data, 400, 500); /* not where it belongs */
+    send_piece(3, &reference, data, 500, 500); /* of a request that has its answer */
+    expect_error(3, PROTOCOL_ERROR_CODE_INVALID);
+    send_piece(4, &reference, data, 0, 500);
+    send_piece(4, &reference, data, 500, 500);
+    expect(MESSAGE_OK, 4);
+}
+
+static void blob_data_on_another_channel_ends_the_connection(void **state)
+{
+    (void)state;
+    static const uint8_t data[100];
+    struct record_blob_ref reference = reference_to(data, sizeof data);
+    assert_int_equal(offer(1, reference), 1);
+    struct message message = made(MESSAGE_BLOB_DATA);
+    message.blob_data.data = data;
+    message.blob_data.data_bytes = sizeof data;
+    memcpy(message.blob_data.hash, reference.hash, sizeof reference.hash);
+    send_message(2, 7, &message);
+    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect(MESSAGE_GOODBYE, 0);
+    expect_end();
+}
+
+static void frames_come_whole_in_order_and_as_far_as_credit_goes(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = render_message(6, 2);
+    send_message(2, 0, &message);
+    expect_frame(2, 0);
+    expect_frame(2, 1);
+    expect_alive(3); /* and no third one */
+    message = made(MESSAGE_CREDIT);
+    message.credit.channel = 2;
+    message.credit.total = 100;
+    send_message(0, 2, &message);
+    for (uint32_t frame = 2; frame <= 6; frame++)
+        expect_frame(2, frame);
+    expect(MESSAGE_OK, 2);
+    assert_int_equal(atomic_load(&engine.frames_sent), 7);
+}
+
+static void a_cancelled_job_has_one_answer_and_nothing_follows_it(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    atomic_store(&engine.keep_jobs, true);
+    struct message message = render_message(5, 10);
+    send_message(2, 0, &message);
+    message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 2;
+    send_message(3, 0, &message);
+    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect(MESSAGE_OK, 3);
+    send_message(4, 0, &message); /* it is gone already */
+    expect(MESSAGE_OK, 4);
+    expect_alive(5);
+}
+
+/* Cancelled in the middle of its frames: pieces may be in the socket, nothing comes after the answer. */
+static void a_job_cancelled_while_it_sends_ends_at_its_answer(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = render_message(50, 51);
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 2;
+    send_message(3, 0, &message);
+    bool answered = false;
+    for (;;) {
+        const struct message *got = receive();
+        if (got->type == MESSAGE_OK)
+            break;
+        assert_int_equal(client.header.request, 2);
+        assert_false(answered);
+        answered = got->type == MESSAGE_ERROR;
+    }
+    assert_true(answered);
+    assert_int_equal(client.header.request, 3);
+    expect_alive(4);
+}
+
+static void a_job_that_cannot_be_is_refused_by_its_field(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.scene = 3;
+    send_message(2, 0, &message);
+    expect_error(2, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    message = render_message(0, 1);
+    message.render.width = 1024;
+    send_message(3, 0, &message);
+    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    message = render_message(0, 1);
+    message.render.first_frame = 1;
+    send_message(4, 0, &message);
+    expect_error(4, PROTOCOL_ERROR_CODE_INVALID);
+    assert_string_equal(client.message.error.field, "render.last_frame");
+    message = render_message(0, 1);
+    message.render.encoding = PROTOCOL_ENCODING_JPEG;
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    send_message(5, 0, &message);
+    expect_error(5, PROTOCOL_ERROR_CODE_UNSUPPORTED);
+    message = render_message(0, 1);
+    message.render.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
+    send_message(6, 0, &message);
+    expect_error(6, PROTOCOL_ERROR_CODE_INVALID);
+}
+
+static void a_full_engine_makes_clients_wait_and_loses_nothing(void **state)
+{
+    (void)state;
+    atomic_store(&engine.full, true);
+    struct message message = made(MESSAGE_SCENE_OPEN);
+    for (uint32_t scene = 1; scene <= 2; scene++) {
+        message.scene_open.scene = scene;
+        send_message(scene, 0, &message);
+    }
+    usleep(20000);
+    atomic_store(&engine.full, false);
+    expect(MESSAGE_OK, 1);
+    expect(MESSAGE_OK, 2);
+    expect_alive(3);
+}
+
+static void rubbish_is_told_so_and_the_connection_closed(void **state)
+{
+    (void)state;
+    uint8_t bytes[64];
+    memset(bytes, 0xff, sizeof bytes);
+    send_bytes(bytes, sizeof bytes);
+    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect(MESSAGE_GOODBYE, 0);
+    expect_end();
+}
+
+static void a_request_number_in_flight_cannot_be_used_again(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    begin_edit(2, 1);
+    begin_edit(2, 1);
+    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect(MESSAGE_GOODBYE, 0);
+    expect_end();
+}
+
+static void the_65th_request_in_flight_is_refused_and_can_be_retried(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    for (uint32_t request = 2; request <= 65; request++)
+        begin_edit(request, 1);
+    begin_edit(66, 1);
+    expect_error(66, PROTOCOL_ERROR_CODE_LIMIT);
+    assert_int_equal(client.message.error.retryable, 1);
+    send_node(66, 1);
+    commit(66);
+    commit(2);
+    expect(MESSAGE_OK, 2);
+}
+
+static void a_client_that_vanishes_is_forgotten(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = render_message(50, 51);
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    shutdown(client.fd, SHUT_RDWR);
+    pthread_join(thread, NULL); /* the daemon of a single client ends with it */
+    assert_int_equal(atomic_load(&engine.gone), 1);
+    assert_int_equal(pthread_create(&thread, NULL, run, NULL), 0);
+}
+
+static void every_message_of_a_client_has_a_row(void **state)
+{
+    (void)state;
+    for (uint32_t type = 0; type <= UINT16_MAX; type++) {
+        const struct message_info *info = message_lookup(type);
+        bool from_client = info && (info->from & MESSAGE_FROM_CLIENT);
+        if (from_client != (dispatch_find(type) != NULL))
+            fail_msg("%s (%u): from a client: %d, row: %d", message_type_text(type), type, from_client, !from_client);
+    }
+}
+
+static void the_head_of_a_frame_piece_is_what_the_codec_writes(void **state)
+{
+    (void)state;
+    static uint8_t data[FRAME_PIECE_BYTES], bytes[FRAMING_MESSAGE_MAX_BYTES];
+    static const size_t sizes[] = {1, 7, 8, 1000, FRAME_PIECE_BYTES};
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        struct message message = made(MESSAGE_FRAME_DATA);
+        message.frame_data.offset_bytes = UINT64_C(0xa1b2c3d4);
+        message.frame_data.data = data;
+        message.frame_data.data_bytes = (uint32_t)sizes[i];
+        struct writer writer;
+        writer_init(&writer, bytes, sizeof bytes);
+        assert_true(message_write(&writer, 77, 5, &message));
+        uint8_t head[FRAME_DATA_HEAD_BYTES];
+        frame_data_head(head, 77, 5, UINT64_C(0xa1b2c3d4), (uint32_t)sizes[i]);
+        assert_memory_equal(head, bytes, sizeof head);
+        assert_int_equal(writer.used_bytes, (sizeof head + sizes[i] + 7) & ~(size_t)7);
+    }
+}
+
+/* ---- patience ---------------------------------------------------------------------------------------- */
+
+static void expect_closed_within(uint64_t limit_ms)
+{
+    uint64_t before_ns = clock_now_ns();
+    struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+    uint8_t bytes[4096];
+    while (poll(&fd, 1, 20000) == 1 && recv(client.fd, bytes, sizeof bytes, 0) > 0)
+        continue;
+    uint64_t waited_ms = (clock_now_ns() - before_ns) / 1000000;
+    assert_in_range(waited_ms, 20, limit_ms);
+}
+
+static int real_calls(void **state)
+{
+    (void)state;
+    real = sys;
+    return 0;
+}
+
+static void who_does_not_introduce_himself_is_closed(void **state)
+{
+    (void)state;
+    struct connection_limits limits = patient;
+    limits.handshake_ms = 50;
+    start(&limits);
+    send_bytes("FARL", 4);
+    expect_closed_within(5000);
+}
+
+static void who_does_not_finish_a_message_is_closed(void **state)
+{
+    (void)state;
+    struct connection_limits limits = patient;
+    limits.progress_grace_ms = 50;
+    limits.progress_bytes_per_s = 1000000;
+    start(&limits);
+    greet();
+    uint8_t header[FRAMING_HEADER_BYTES];
+    framing_header_encode(header, &(struct framing_header){.type = MESSAGE_PING, .payload_bytes = 10, .request = 1});
+    send_bytes(header, sizeof header);
+    expect_closed_within(5000);
+}
+
+static void who_is_silent_is_closed_but_not_while_he_waits(void **state)
+{
+    (void)state;
+    struct connection_limits limits = patient;
+    limits.idle_ms = 60;
+    start(&limits);
+    greet();
+    atomic_store(&engine.keep_jobs, true);
+    open_scene(1, 1);
+    struct message message = render_message(5, 10);
+    send_message(2, 0, &message);
+    usleep(1300000); /* past the idle time, and past the second in between two looks */
+    expect_alive(3);
+    message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 2;
+    send_message(4, 0, &message);
+    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect(MESSAGE_OK, 4);
+    expect_closed_within(5000);
+}
+
+static void who_does_not_read_is_closed(void **state)
+{
+    (void)state;
+    struct connection_limits limits = patient;
+    limits.queued_soft_bytes = 1000;
+    limits.queued_soft_ms = 100;
+    start(&limits);
+    greet();
+    open_scene(1, 1);
+    struct message message = render_message(50, 51);
+    send_message(2, 0, &message);
+    usleep(500000);
+    expect_closed_within(5000 + 20);
+    assert_int_equal(atomic_load(&engine.gone), 1);
+}
+
+#define BOTH(test)                                                                                               \
+    cmocka_unit_test_setup_teardown(test, set_up, tear_down),                                                    \
+        {#test " (calls cut short)", test, set_up_with_faults, tear_down, NULL}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        BOTH(a_ping_is_answered_and_stats_are_told),
+        BOTH(edits_are_gathered_and_committed_together),
+        BOTH(a_failed_transaction_has_one_answer_and_what_follows_it_is_skipped),
+        BOTH(a_mesh_with_a_blob_that_is_not_held_names_it),
+        BOTH(a_blob_is_sent_once_and_needed_no_more),
+        BOTH(a_blob_with_another_hash_is_refused_and_can_be_sent_again),
+        BOTH(blob_data_on_another_channel_ends_the_connection),
+        BOTH(frames_come_whole_in_order_and_as_far_as_credit_goes),
+        BOTH(a_cancelled_job_has_one_answer_and_nothing_follows_it),
+        BOTH(a_job_cancelled_while_it_sends_ends_at_its_answer),
+        BOTH(a_job_that_cannot_be_is_refused_by_its_field),
+        BOTH(a_full_engine_makes_clients_wait_and_loses_nothing),
+        BOTH(rubbish_is_told_so_and_the_connection_closed),
+        BOTH(a_request_number_in_flight_cannot_be_used_again),
+        BOTH(the_65th_request_in_flight_is_refused_and_can_be_retried),
+        BOTH(a_client_that_vanishes_is_forgotten),
+        cmocka_unit_test(every_message_of_a_client_has_a_row),
+        cmocka_unit_test(the_head_of_a_frame_piece_is_what_the_codec_writes),
+        cmocka_unit_test_setup_teardown(who_does_not_introduce_himself_is_closed, real_calls, tear_down),
+        cmocka_unit_test_setup_teardown(who_does_not_finish_a_message_is_closed, real_calls, tear_down),
+        cmocka_unit_test_setup_teardown(who_is_silent_is_closed_but_not_while_he_waits, real_calls, tear_down),
+        cmocka_unit_test_setup_teardown(who_does_not_read_is_closed, real_calls, tear_down),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
