@@ -96,6 +96,7 @@ class Peer:
             while True:
                 messages.append(self.receive())
         except (EOFError, ConnectionResetError):
+            self.close()
             return messages
 
     def close(self):
@@ -139,6 +140,7 @@ class Hostile(Case):
     def test_another_version_is_told_which_ones_there_are(self):
         peer = Peer(self.daemon, greet=False)
         peer.socket.sendall(hello(77, 99))
+        self.addCleanup(peer.close)
         version, note = peer.read_reply()
         self.assertEqual(version, 0)
         self.assertIn("1", note)
@@ -289,7 +291,7 @@ class Sessions(Case):
         self.assertEqual(kind, ERROR)
         self.assertIn("hash", error_text(payload))
 
-    def test_stats_are_answered_while_others_render(self):
+    def test_stats_are_answered_on_a_bare_connection(self):
         self.peer.send(STATS, 2)
         kind, payload = self.peer.answer(2)
         self.assertEqual(kind, STATS_REPLY)

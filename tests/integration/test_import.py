@@ -270,6 +270,9 @@ class Peer:
         try:
             self.result.stderr = process.communicate(timeout=max(0.1, began + seconds - time.monotonic()))[1].decode(
                 "utf-8", "replace")
+            # The leak sanitizer cannot stop threads that libraries started before the sandbox was entered.
+            self.result.stderr = "".join(line for line in self.result.stderr.splitlines(True)
+                                         if "was not suspended. False leaks" not in line)
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
@@ -421,11 +424,20 @@ NOT_TO_BE_HAD = {
 
 
 class Hostile(unittest.TestCase):
+    results = {}
+
+    @classmethod
+    def import_all(cls):
+        """Every file of the folder, once for all tests of this class."""
+        if not cls.results:
+            cls.results.update(import_files(list(model_files(os.path.join(SCENES, "hostile"), ("",))), memory=6 << 30))
+        return cls.results
+
     @needs_scenes
     def test_every_hostile_file_is_refused_or_imported(self):
         """All of hostile: also those that are no models, given as if they were."""
         imported, refused, slowest = 0, 0, 0.0
-        for path, result in import_files(list(model_files(os.path.join(SCENES, "hostile"), ("",))), memory=6 << 30):
+        for path, result in self.import_all().items():
             with self.subTest(shorter(path)):
                 self.assertEqual(result.faults, [])
                 self.assertIn(result.status, (0, 1), result.stderr)
@@ -453,7 +465,8 @@ class Hostile(unittest.TestCase):
             path = report_path[:-len(".report.json")]
             if report["issues"]["numErrors"] == 0 and os.path.exists(path):
                 paths.append(path)
-        for path, result in import_files(paths):
+        for path in paths:
+            result = self.import_all()[path]
             accepted += 1
             with self.subTest(shorter(path)):
                 if any(path.endswith(ending) for ending in NOT_TO_BE_HAD):

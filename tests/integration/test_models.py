@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Every real model renders, whole way: file, importer, daemon, exporter. Hostile ones render or are refused by name."""
+import concurrent.futures
+import pathlib
+
+import farlight_test
+from farlight_test import SHARED_SCENES, Case, Daemon, farlight, needs_shared_scenes, read_png
+
+ENDINGS = {".glb", ".gltf", ".obj", ".nff"}
+# Bigger ones than this are for the benchmark; the test must end on two cores under a sanitizer.
+SIZE_MAX_BYTES = 6_000_000
+
+
+def models(*folders):
+    return sorted(path for folder in folders for path in (SHARED_SCENES / folder).rglob("*")
+                  if path.suffix.lower() in ENDINGS and path.is_file())
+
+
+@needs_shared_scenes
+class Models(Case):
+    def render(self, path, daemon, output):
+        return path, output, farlight("render", path, "--server", daemon.address, "--size", "64x48", "--depth", "2",
+                                      "--quiet", "-o", output)
+
+    def render_all(self, paths):
+        """(path, output, result) of each, two at a time, through one daemon, which must outlive them all."""
+        with Daemon() as daemon, concurrent.futures.ThreadPoolExecutor(2) as pool:
+            jobs = [pool.submit(self.render, path, daemon, self.folder / f"{number}.png")
+                    for number, path in enumerate(paths)]
+            yield from (job.result() for job in jobs)
+            self.assertIsNone(daemon.process.poll(), f"the daemon died: {daemon.messages()}")
+            self.expect(farlight("stats", "--server", daemon.address), 0)
+
+    def test_every_model_renders_and_shows_something(self):
+        paths = models("common", "ldc", "bvh", "rayspace", "gltf", "screenspace")
+        small = [path for path in paths if path.stat().st_size <= SIZE_MAX_BYTES]
+        print(f"{len(small)} models, {len(paths) - len(small)} above {SIZE_MAX_BYTES} bytes are left to make bench ", end="")
+        for path, output, result in self.render_all(small):
+            with self.subTest(model=str(path.relative_to(SHARED_SCENES))):
+                # Points and lines have no surface: such a file is a picture of the background.
+                self.expect(result, 0)
+                width, height, rows, _ = read_png(output)
+                self.assertEqual((width, height), (64, 48))
+                if "Mesh_PrimitiveMode" not in path.parts:
+                    self.assertGreater(len(set(b"".join(rows))), 2, "a picture of one colour")
+
+    def test_hostile_files_are_rendered_or_refused_by_name_and_never_crash_anything(self):
+        paths = models("hostile")
+        rendered = refused = 0
+        for path, output, result in self.render_all(paths):
+            name = str(path.relative_to(SHARED_SCENES))
+            with self.subTest(model=name):
+                self.assertIn(result.returncode, (0, 1), f"{name}: {result.stderr}")
+                self.assertNotIn("Sanitizer", result.stderr)
+                if result.returncode == 0:
+                    read_png(output)
+                    rendered += 1
+                else:
+                    self.assertIn(path.name, result.stderr)
+                    self.assertFalse(pathlib.Path(output).exists())
+                    refused += 1
+        print(f"{len(paths)} files: {rendered} rendered, {refused} refused ", end="")
+        self.assertGreater(rendered, 0)
+        self.assertGreater(refused, 0)
+
+
+if __name__ == "__main__":
+    farlight_test.unittest.main()
