@@ -9,6 +9,7 @@
 //   HAS_DISCS            there are discs
 //   HAS_CUTOUT           some material is alpha mode mask
 //   HAS_TRANSLUCENT      some material lets shadow rays pass
+//   HAS_TRANSMISSION     and tints them on the way
 //   RAYS_TOGETHER        how many consecutive rays one invocation walks together: 1, 2, 4, 8
 //
 // A traverse.glsl defines one of these, for ANY_HIT or not, and for RAYS_TOGETHER 1 or more:
@@ -136,42 +137,79 @@ void main()
 
 #else
 
+// What is done ray by ray is done in a loop that picks its ray by comparing numbers: indexing the arrays by the
+// loop's number would have the compiler lay all of it (discs, textures, surfaces) out RAYS_TOGETHER times.
+#ifdef ANY_HIT
+#define found_type vec3 // transmittance
+#else
+#define found_type candidate
+#endif
+
+void look_at_discs(inout trace_ray r[RAYS_TOGETHER], inout found_type found[RAYS_TOGETHER])
+{
+    for (int i = 0; i < RAYS_TOGETHER; i++) {
+        trace_ray r_i = r[0];
+        found_type found_i = found[0];
+        for (int k = 1; k < RAYS_TOGETHER; k++) {
+            if (k == i) {
+                r_i = r[k];
+                found_i = found[k];
+            }
+        }
+        if (is_alive(r_i)) {
+#ifdef ANY_HIT
+            if (discs_any(r_i, found_i)) {
+                found_i = vec3(0.0);
+                r_i.t_max = -1.0; // nothing is left to find
+                r_i.t_min = 0.0;
+            }
+#else
+            discs_closest(r_i, found_i);
+#endif
+        }
+        for (int k = 0; k < RAYS_TOGETHER; k++) {
+            if (k == i) {
+                r[k] = r_i;
+                found[k] = found_i;
+            }
+        }
+    }
+}
+
 void main()
 {
     uint first_ray = item_index() * RAYS_TOGETHER;
     if (first_ray >= ray_count)
         return;
     trace_ray r[RAYS_TOGETHER];
+    found_type found[RAYS_TOGETHER];
     bool any_alive = false;
     for (int k = 0; k < RAYS_TOGETHER; k++) {
         r[k] = load_ray(first_ray + uint(k));
         any_alive = any_alive || is_alive(r[k]);
-    }
 #ifdef ANY_HIT
-    vec3 transmittance[RAYS_TOGETHER];
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
-        transmittance[k] = vec3(1.0);
-        if (is_alive(r[k]) && discs_any(r[k], transmittance[k])) {
-            transmittance[k] = vec3(0.0);
-            r[k].t_max = -1.0; // nothing is left to find
-            r[k].t_min = 0.0;
-        }
-    }
-    if (any_alive)
-        trace_any_together(r, transmittance);
-    for (int k = 0; k < RAYS_TOGETHER; k++)
-        store_visibility(first_ray + uint(k), transmittance[k]);
+        found[k] = vec3(1.0);
 #else
-    candidate best[RAYS_TOGETHER];
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
-        best[k] = candidate_none(r[k].t_max);
-        if (is_alive(r[k]))
-            discs_closest(r[k], best[k]);
+        found[k] = candidate_none(r[k].t_max);
+#endif
     }
+    if (disc_count > 0u)
+        look_at_discs(r, found);
+#ifdef ANY_HIT
     if (any_alive)
-        trace_closest_together(r, best);
+        trace_any_together(r, found);
     for (int k = 0; k < RAYS_TOGETHER; k++)
-        store_hit(first_ray + uint(k), r[k], best[k]);
+        store_visibility(first_ray + uint(k), found[k]);
+#else
+    if (any_alive)
+        trace_closest_together(r, found);
+    for (int i = 0; i < RAYS_TOGETHER; i++) {
+        candidate found_i = found[0];
+        for (int k = 1; k < RAYS_TOGETHER; k++)
+            if (k == i)
+                found_i = found[k];
+        store_hit(first_ray + uint(i), load_ray(first_ray + uint(i)), found_i);
+    }
 #endif
 }
 

@@ -4,7 +4,7 @@
  * elements that do not pay and the baking of links (bvh_build_bake.c), threads (bvh_build_threads.c).
  *
  * Based on: Wald. On fast Construction of SAH-based Bounding Volume Hierarchies. 2007 (binning);
- * 'Stackless traversal of a sphere BVH' (shared/papers), sections 4 and 6: wide nodes, baked links. */
+ * 'Stackless traversal of a sphere BVH, distributed ray tracing', sections 4 and 6: wide nodes, baked links. */
 #ifndef FARLIGHT_TRACE_BVH_BUILD_H
 #define FARLIGHT_TRACE_BVH_BUILD_H
 

@@ -203,11 +203,10 @@ void bvh_element_set_box(struct bvh_element *element, const float lower[3], cons
 void bvh_element_set_sphere(struct bvh_element *element, const float centre[3], float radius)
 {
     float magnitude = fabsf(centre[0]) + fabsf(centre[1]) + fabsf(centre[2]) + radius;
-    float padded = radius + magnitude * BVH_PAD_RELATIVE + FLT_MIN;
     element->lower_x = centre[0];
     element->lower_y = centre[1];
     element->lower_z = centre[2];
-    element->upper_x = padded * padded;
+    element->upper_x = radius + magnitude * BVH_PAD_RELATIVE + FLT_MIN;
     element->upper_y = 0;
     element->upper_z = 0;
 }

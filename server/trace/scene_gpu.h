@@ -45,6 +45,7 @@ struct scene_gpu {
     bool has_spheres;     /* some geometry is a set of spheres */
     bool has_cutout;      /* some material in use is alpha mode mask: tracers must ask for alpha */
     bool has_translucent; /* some material lets shadow rays pass: blend or transmission */
+    bool has_transmission;
     bool has_environment_image;
     float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */
     float diagonal;                       /* of these bounds */

@@ -355,6 +355,7 @@ static void classify_material(struct scene_gpu *gpu, const struct scene *scene, 
     }
     if (material->alpha_mode == ALPHA_BLEND || material->transmission > 0.0f)
         gpu->has_translucent = true;
+    gpu->has_transmission |= material->transmission > 0.0f;
 }
 
 static void classify_discs(struct scene_gpu *gpu, const struct scene *scene)
@@ -374,6 +375,7 @@ bool scene_gpu_classify_geometry(struct scene_gpu *gpu, const struct scene *scen
     bool changed = changes->geometry;
     gpu->has_cutout = false;
     gpu->has_translucent = false;
+    gpu->has_transmission = false;
     for (uint32_t i = 0; i < gpu->geometry_count; i++) {
         struct scene_gpu_geometry *geometry = &gpu->geometries[i];
         const struct material_range *ranges = geometry->mesh ? geometry->mesh->ranges : geometry->spheres->ranges;

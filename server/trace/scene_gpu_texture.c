@@ -5,8 +5,11 @@
 #include "shared/material.h"
 
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 uint32_t scene_gpu_texture_index(const struct scene_gpu *gpu, uint32_t texture_id, bool *found)
 {
@@ -172,32 +175,81 @@ static bool lay_out(struct scene_gpu *gpu, const struct scene *scene, struct tex
     return true;
 }
 
+/* Textures are packed by a few threads at once: halving is arithmetic on the host. They end before the call does.
+ */
+#define PACK_THREADS_MAX 8
+
+struct pack_job {
+    const struct srgb_tables *tables;
+    const struct scene_texture **list; /* in the order of `infos` */
+    const struct texture_info *infos;
+    uint32_t count;
+    size_t chain_bytes; /* of the largest texture, its first level left out */
+    uint8_t *out;
+    atomic_uint next;
+    atomic_bool failed; /* no memory to halve in */
+};
+
+static void *pack_some(void *data)
+{
+    struct pack_job *job = data;
+    uint8_t *chain = malloc(job->chain_bytes ? job->chain_bytes : 1);
+    if (!chain) {
+        atomic_store(&job->failed, true);
+        return NULL;
+    }
+    for (uint32_t i; (i = atomic_fetch_add(&job->next, 1)) < job->count;)
+        pack_texture(job->tables, job->list[i], chain, job->out + (size_t)job->infos[i].first_texel * 4);
+    free(chain);
+    return NULL;
+}
+
+static void pack_all(struct pack_job *job, uint64_t texel_count)
+{
+    pthread_t threads[PACK_THREADS_MAX];
+    long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    uint32_t wanted = processors > PACK_THREADS_MAX ? PACK_THREADS_MAX : processors < 1 ? 1 : (uint32_t)processors;
+    uint32_t started = 0;
+    /* This thread is one of them; for a few texels it is enough. */
+    if (texel_count < (1u << 18))
+        wanted = 1;
+    while (started + 1 < wanted && started + 1 < job->count &&
+           pthread_create(&threads[started], NULL, pack_some, job) == 0)
+        started++;
+    pack_some(job);
+    for (uint32_t i = 0; i < started; i++)
+        pthread_join(threads[i], NULL);
+}
+
 static bool pack_texels(struct scene_gpu *gpu, const struct scene *scene, const struct texture_info *infos,
                         uint64_t texel_count, struct error *error)
 {
-    size_t cursor = 0, chain_bytes = 0;
+    size_t cursor = 0, count = scene->objects[SCENE_TEXTURE].count;
     uint64_t id;
     void *value;
-    while (hashmap_next(&scene->objects[SCENE_TEXTURE], &cursor, &id, &value)) {
+    struct srgb_tables *tables = create_tables();
+    struct pack_job job = {.tables = tables, .infos = infos, .list = calloc(count, sizeof(*job.list))};
+    while (job.list && hashmap_next(&scene->objects[SCENE_TEXTURE], &cursor, &id, &value)) {
         const struct scene_texture *texture = value;
         uint32_t levels;
-        size_t bytes = (size_t)chain_texels(texture->width, texture->height, &levels) * 4;
-        chain_bytes = bytes > chain_bytes ? bytes : chain_bytes;
+        uint64_t texels = chain_texels(texture->width, texture->height, &levels);
+        size_t bytes = (size_t)(texels - (uint64_t)texture->width * texture->height) * 4;
+        job.chain_bytes = bytes > job.chain_bytes ? bytes : job.chain_bytes;
+        job.list[job.count++] = texture;
     }
-    struct srgb_tables *tables = create_tables();
-    uint8_t *chain = malloc(chain_bytes), *out = NULL;
-    if (!tables || !chain)
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to halve textures in");
-    else
-        out = gpu_buffer_map(gpu->device, &gpu->texels, (size_t)texel_count * 4, error);
-    uint32_t index = 0;
-    for (cursor = 0; out && hashmap_next(&scene->objects[SCENE_TEXTURE], &cursor, &id, &value); index++)
-        pack_texture(tables, value, chain, out + (size_t)infos[index].first_texel * 4);
-    if (out)
+    bool ok = tables && job.list;
+    if (ok) {
+        job.out = gpu_buffer_map(gpu->device, &gpu->texels, (size_t)texel_count * 4, error);
+        ok = job.out != NULL;
+    }
+    if (ok) {
+        pack_all(&job, texel_count);
         gpu_buffer_unmap(gpu->device, &gpu->texels);
-    free(chain);
+        ok = !atomic_load(&job.failed);
+    }
+    free(job.list);
     free(tables);
-    return out != NULL;
+    return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory to halve textures in");
 }
 
 bool scene_gpu_upload_textures(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,

@@ -10,7 +10,7 @@
 const struct gpu_program *trace_program_get(const struct scene_gpu *scene, enum wave_kind kind,
                                             const struct trace_program_source *source, struct error *error)
 {
-    struct gpu_define defines[OWN_DEFINES_MAX + 8] = {0};
+    struct gpu_define defines[OWN_DEFINES_MAX + 12] = {0};
     char traverse[128], together[16];
     size_t n = 0;
     /* In quotes: program.c takes the file to include from it. */
@@ -29,6 +29,8 @@ const struct gpu_program *trace_program_get(const struct scene_gpu *scene, enum 
     /* To a closest hit a translucent surface is one like any other: no second program for it. */
     if (scene->has_translucent && kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"HAS_TRANSLUCENT", "1"};
+    if (scene->has_transmission && kind == WAVE_ANY)
+        defines[n++] = (struct gpu_define){"HAS_TRANSMISSION", "1"};
     for (size_t i = 0; i < OWN_DEFINES_MAX && source->defines && source->defines[i].name; i++)
         defines[n++] = source->defines[i];
     struct gpu_program_source whole = {.compute = "trace.comp", .defines = defines};

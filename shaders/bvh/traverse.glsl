@@ -260,7 +260,7 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
     bound_ray bound_rays[RAYS_TOGETHER];
     for (int k = 0; k < RAYS_TOGETHER; k++) {
         o[k] = object_ray(r[k].origin, r[k].direction);
-        bound_rays[k] = bound_ray_of(o[k].origin, o[k].direction);
+        bound_rays[k] = bound_ray_of(o[k].origin, o[k].direction, WORLD_SLACK);
     }
     walk_state walk;
     walk.element = 0u;
@@ -308,8 +308,9 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
             walk.first_link = top_links;
             walk.element = after_instance;
         }
+        float slack = inside.index == NOT_INSIDE ? WORLD_SLACK : OBJECT_SLACK;
         for (int k = 0; k < RAYS_TOGETHER; k++)
-            bound_rays[k] = bound_ray_of(o[k].origin, o[k].direction);
+            bound_rays[k] = bound_ray_of(o[k].origin, o[k].direction, slack);
     }
 }
 

@@ -76,10 +76,13 @@ vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world)
     vec4 colour = base_colour_at(m, point);
     if (is_mask && colour.a < m.alpha_cutoff)
         return vec3(1.0);
+    vec3 through = vec3(0.0);
+#ifdef HAS_TRANSMISSION // else only alpha is of interest, and no colour is decoded
     float transmission = m.transmission * (1.0 - m.metallic);
     if (transmission > 0.0 && m.texture_transmission != 0u)
         transmission *= sample_slot(m.texture_transmission, point.uv01, 0.0).r;
-    vec3 through = transmission * clamp(colour.rgb, 0.0, 1.0);
+    through = transmission * clamp(colour.rgb, 0.0, 1.0);
+#endif
     return is_blend ? mix(vec3(1.0), through, clamp(colour.a, 0.0, 1.0)) : through;
 #else
     return vec3(0.0);

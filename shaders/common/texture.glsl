@@ -15,13 +15,19 @@ vec3 linear_from_srgb(vec3 c)
     return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, lessThanEqual(c, vec3(0.04045)));
 }
 
-int wrap_texel(int i, int size, uint mode)
+// Modes: 0 repeat, 1 clamp, 2 mirror.
+float wrap_coordinate(float u, uint mode)
 {
-    if (mode == 1u) // clamp
-        return clamp(i, 0, size - 1);
-    int period = mode == 2u ? 2 * size : size; // mirror, repeat
-    i = i >= 0 ? i % period : period - 1 - (-1 - i) % period; // % of a negative number is undefined
-    return i < size ? i : period - 1 - i;
+    float repeated = u - floor(u);
+    float turned = abs(u - 2.0 * floor(0.5 * u + 0.5)); // distance to the nearest even number
+    return mode == 0u ? repeated : mode == 1u ? clamp(u, 0.0, 1.0) : turned;
+}
+
+// Of a texel at most one beyond the edge. Beyond a mirrored edge lies the edge itself once more.
+int wrap_neighbour(int i, int size, uint mode)
+{
+    int repeated = i < 0 ? i + size : i >= size ? i - size : i;
+    return clamp(mode == 0u ? repeated : i, 0, size - 1);
 }
 
 // One level of a texture: its first texel and its size.
@@ -42,8 +48,8 @@ texture_level find_level(texture_info info, int level)
 
 vec4 fetch_texel(texture_info info, texture_level level, ivec2 at)
 {
-    int x = wrap_texel(at.x, level.size.x, (info.flags >> TEXTURE_WRAP_U_SHIFT) & 3u);
-    int y = wrap_texel(at.y, level.size.y, (info.flags >> TEXTURE_WRAP_V_SHIFT) & 3u);
+    int x = wrap_neighbour(at.x, level.size.x, (info.flags >> TEXTURE_WRAP_U_SHIFT) & 3u);
+    int y = wrap_neighbour(at.y, level.size.y, (info.flags >> TEXTURE_WRAP_V_SHIFT) & 3u);
     vec4 texel = texelFetch(texels, level.first_texel + y * level.size.x + x);
     if ((info.flags & TEXTURE_SRGB) != 0u)
         texel.rgb = linear_from_srgb(texel.rgb);
@@ -56,17 +62,17 @@ vec4 sample_level(texture_info info, int level_number, vec2 uv)
 {
     texture_level level = find_level(info, level_number);
     bool nearest = (info.flags & TEXTURE_NEAREST) != 0u;
-    // 1e6 repeats and more have no texels left to tell apart in a float, and must not overflow an int.
-    vec2 at = clamp(uv, vec2(-1e6), vec2(1e6)) * vec2(level.size);
-    at = clamp(at, vec2(-1e9), vec2(1e9)) - (nearest ? 0.0 : 0.5);
-    ivec2 corner = ivec2(floor(at));
+    vec2 wrapped = vec2(wrap_coordinate(uv.x, (info.flags >> TEXTURE_WRAP_U_SHIFT) & 3u),
+                        wrap_coordinate(uv.y, (info.flags >> TEXTURE_WRAP_V_SHIFT) & 3u));
+    vec2 at = wrapped * vec2(level.size) - (nearest ? 0.0 : 0.5);
+    ivec2 corner = min(ivec2(floor(at)), level.size - 1);
     vec2 weight = nearest ? vec2(0.0) : at - floor(at);
     vec4 sum = vec4(0.0);
     int tap_count = nearest ? 1 : 4;
     for (int tap = 0; tap < tap_count; tap++) {
-        ivec2 step = ivec2(tap & 1, tap >> 1);
-        vec2 share = mix(1.0 - weight, weight, vec2(step));
-        sum += share.x * share.y * fetch_texel(info, level, corner + step);
+        ivec2 beside = ivec2(tap & 1, tap >> 1);
+        vec2 share = mix(1.0 - weight, weight, vec2(beside));
+        sum += share.x * share.y * fetch_texel(info, level, corner + beside);
     }
     return sum;
 }

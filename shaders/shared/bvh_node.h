@@ -15,7 +15,7 @@
 #include "shared/types.h"
 
 /* Two texels of an RGBA32UI texel buffer, or an entry of a storage buffer in the plain form.
- * Box: lower and upper corner. Sphere: centre in `lower`, squared radius in `upper_x`; y and z are 0. */
+ * Box: lower and upper corner. Sphere: centre in `lower`, radius in `upper_x`; y and z are 0. */
 struct bvh_element {
     float lower_x, lower_y, lower_z;
     uint miss; /* the plain form's link: one order for all directions, in which a hit goes to the next element */

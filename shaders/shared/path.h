@@ -50,7 +50,7 @@ SHARED_SIZE(child, 64);
 #define BIND_LIGHT_SAMPLES BIND_PASS_4 /* vec4 a shadow ray: what arrives if nothing is in the way */
 #define BIND_SHADOW_RAYS BIND_VISIBILITY /* struct ray; no pass both makes them and reads the answers */
 #define BIND_HIT_LIST BIND_WAVE        /* uint a hit: its path; in order */
-#define BIND_HIT_PLACES BIND_CHILD_COUNTS /* uint a path: its place in the list of hits; where children are not used */
+#define BIND_HIT_PLACES BIND_CHILD_COUNTS /* uint a path: its place in the list; where children are not used */
 #define BIND_SLICE_PIXELS BIND_PASS_2  /* vec4 a pixel of the slice; where children are not used */
 #define BIND_BLOCK_OFFSETS BIND_PASS_4 /* uvec2 a block of COMPACT_BLOCK; where light samples are not used */
 #define BIND_ACCUMULATION BIND_PASS_0  /* vec4 a pixel slot of the picture's band; sum of the samples */

@@ -1,0 +1,319 @@
+/* SPDX-License-Identifier: MIT */
+/* What only the tracer `bvh` promises: edits cost what they change, and its bounds lose no hit that brute force
+ * finds. That its answers are right is shown by tests/accuracy/test_tracer_conformance.c. */
+#include "../accuracy/test_scenes.h"
+
+#include "gpu/device.h"
+#include "shared/hit.h"
+#include "shared/ray.h"
+#include "trace/bvh.h"
+#include "trace/scene_gpu.h"
+#include "trace/tracer.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#define RAY_COUNT 4096u
+
+static struct gpu_device *device;
+
+struct fixture {
+    struct scene *scene;
+    struct scene_gpu gpu;
+    struct test_edits edits;
+    struct tracer *tracer;
+};
+
+static void expect_ok(bool ok, const struct error *error)
+{
+    if (!ok)
+        fail_msg("%s: %s", error->field, error->text);
+}
+
+static void update(struct fixture *fixture)
+{
+    struct error error = {0};
+    struct scene_changes changes;
+    if (fixture->edits.count > 0)
+        test_commit(&fixture->edits);
+    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, &changes, NULL, &error), &error);
+    expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &changes, NULL, &error), &error);
+}
+
+static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)
+{
+    struct error error = {0};
+    *fixture = (struct fixture){.scene = scene, .edits = {.scene = scene}};
+    scene_gpu_init(&fixture->gpu, device);
+    fixture->tracer = tracer_create(&tracer_bvh_impl, device, options, &error);
+    expect_ok(fixture->tracer != NULL, &error);
+    update(fixture);
+}
+
+static void fixture_finish(struct fixture *fixture)
+{
+    tracer_destroy(fixture->tracer);
+    scene_gpu_finish(&fixture->gpu);
+    scene_destroy(fixture->scene);
+}
+
+/* Two meshes in many instances. */
+static struct scene *scene_of_instances(void)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    test_material(&edits, 1, 0.1f, 0.2f, 0.3f);
+    test_material(&edits, 2, 0.4f, 0.5f, 0.6f);
+    test_soup_mesh(&edits, 10, 500, 0.1f, 1);
+    test_soup_mesh(&edits, 11, 300, 0.1f, 2);
+    for (uint32_t i = 0; i < 20; i++) {
+        float m[12];
+        test_transform(m, 1, 1, 1, 0, 0.1f * (float)i, 3 * (float)(i % 5), 3 * (float)(i / 5), 0);
+        test_node(&edits, i + 1, 0, NODE_MESH, 10 + i % 2, m);
+    }
+    test_commit(&edits);
+    return edits.scene;
+}
+
+static void a_moved_node_costs_its_path_in_the_top_tree(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_instances(), NULL);
+    const struct tracer_stats *stats = &fixture.tracer->stats;
+    assert_int_equal(stats->nodes_rebuilt, stats->nodes);
+    assert_int_equal(stats->nodes_refitted, 0);
+    uint32_t top_nodes = ((struct bvh *)fixture.tracer)->top.element_count;
+    float m[12];
+    test_transform(m, 1, 1.1f, 1, 2, 0.3f, 1, 2, 0.5f);
+    test_node(&fixture.edits, 7, 0, NODE_MESH, 10, m);
+    update(&fixture);
+    assert_int_equal(stats->nodes_rebuilt, 0);
+    assert_in_range(stats->nodes_refitted, 1, top_nodes / 2);
+    uint64_t expected = sizeof(struct bvh_transform) + stats->nodes_refitted * sizeof(struct bvh_element);
+    assert_int_equal(stats->uploaded_bytes, expected);
+    fixture_finish(&fixture);
+}
+
+static void a_changed_mesh_rebuilds_its_own_tree(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_instances(), NULL);
+    const struct tracer_stats *stats = &fixture.tracer->stats;
+    uint64_t nodes = stats->nodes, first_upload = stats->uploaded_bytes;
+    test_soup_mesh(&fixture.edits, 11, 40, 0.1f, 3);
+    update(&fixture);
+    assert_in_range(stats->nodes_rebuilt, 1, 79);
+    assert_in_range(stats->nodes, 100, nodes - 1);
+    assert_in_range(stats->uploaded_bytes, 1, first_upload / 4);
+    fixture_finish(&fixture);
+}
+
+static void an_edit_of_something_else_costs_nothing(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_instances(), NULL);
+    const struct tracer_stats *stats = &fixture.tracer->stats;
+    test_material(&fixture.edits, 77, 0.5f, 0.5f, 0.5f);
+    update(&fixture);
+    assert_int_equal(stats->uploaded_bytes, 0);
+    assert_int_equal(stats->nodes_rebuilt, 0);
+    assert_int_equal(stats->nodes_refitted, 0);
+    fixture_finish(&fixture);
+}
+
+/* ---- against brute force ---- */
+
+static struct hit *trace(struct scene_gpu *gpu, const struct tracer_impl *impl, const struct tracer_options *options,
+                         const struct ray *rays)
+{
+    struct error error = {0};
+    struct gpu_buffer ray_buffer = {0}, hit_buffer = {0};
+    struct scene_changes everything = {.geometry = true, .instances = true};
+    struct tracer *tracer = tracer_create(impl, device, options, &error);
+    expect_ok(tracer && tracer_update(tracer, gpu, &everything, NULL, &error), &error);
+    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(struct ray), &error), &error);
+    expect_ok(gpu_buffer_reserve(device, &hit_buffer, RAY_COUNT * sizeof(struct hit), &error), &error);
+    scene_gpu_bind(gpu);
+    const struct wave wave = {.ray_count = RAY_COUNT, .rays = &ray_buffer, .hits = &hit_buffer};
+    expect_ok(tracer_trace(tracer, gpu, &wave, &error), &error);
+    struct hit *hits = malloc(RAY_COUNT * sizeof(struct hit));
+    gpu_buffer_read(device, &hit_buffer, 0, hits, RAY_COUNT * sizeof(struct hit));
+    gpu_buffer_finish(device, &ray_buffer);
+    gpu_buffer_finish(device, &hit_buffer);
+    tracer_destroy(tracer);
+    return hits;
+}
+
+/* Both run the same intersections on the same numbers: what differs is a hit that a bound lost. Distances may
+ * differ in the last places, as the compiler orders the arithmetic of two programs. `spurious_max`: hits that brute
+ * force may report and a tree not: a line that comes from afar in the plane of a triangle has edge functions of
+ * noise, which may agree in sign although the line passes the triangle at many times its size. */
+static void expect_like_brute_force(struct scene *scene, const struct ray *rays, uint32_t hits_min,
+                                    uint32_t spurious_max)
+{
+    static const struct tracer_options forms[] = {
+        {.bvh_rays_together = 1},
+        {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 1},
+        {.bvh_layout = BVH_LAYOUT_PLAIN},
+        {.bvh_rays_together = 4},
+    };
+    struct scene_gpu gpu;
+    struct error error = {0};
+    struct scene_changes changes;
+    scene_gpu_init(&gpu, device);
+    expect_ok(scene_gpu_update(&gpu, scene, &changes, NULL, &error), &error);
+    struct hit *expected = trace(&gpu, &tracer_naive_impl, NULL, rays);
+    uint32_t hit_count = 0;
+    for (uint32_t i = 0; i < RAY_COUNT; i++)
+        hit_count += expected[i].distance >= 0;
+    assert_in_range(hit_count, hits_min, RAY_COUNT);
+    for (size_t form = 0; form < sizeof(forms) / sizeof(forms[0]); form++) {
+        struct hit *hits = trace(&gpu, &tracer_bvh_impl, &forms[form], rays);
+        uint32_t spurious = 0;
+        for (uint32_t i = 0; i < RAY_COUNT; i++) {
+            float got = hits[i].distance, wanted = expected[i].distance;
+            if (!(fabsf(got - wanted) <= 1e-5f * fabsf(wanted)) && ++spurious > spurious_max)
+                fail_msg("form %zu, ray %u: distance %.9g, brute force %.9g", form, i, (double)got, (double)wanted);
+        }
+        free(hits);
+    }
+    free(expected);
+    scene_gpu_finish(&gpu);
+    scene_destroy(scene);
+}
+
+static struct ray make_ray(float x, float y, float z, float dx, float dy, float dz)
+{
+    return (struct ray){{x, y, z, 0}, {dx, dy, dz, 1e9f}};
+}
+
+/* A wall of squares on whole numbers, in three planes: boxes without volume, edges and corners on the rays. */
+static struct scene *scene_of_squares(void)
+{
+    enum { SIDE = 8 };
+    float positions[3 * (SIDE + 1) * (SIDE + 1)][3];
+    uint32_t indices[3 * SIDE * SIDE * 6], n = 0;
+    for (uint32_t plane = 0; plane < 3; plane++) {
+        uint32_t base = plane * (SIDE + 1) * (SIDE + 1);
+        for (uint32_t i = 0; i <= SIDE; i++) {
+            for (uint32_t j = 0; j <= SIDE; j++) {
+                float *p = positions[base + i * (SIDE + 1) + j];
+                p[plane] = (float)plane;
+                p[(plane + 1) % 3] = (float)i;
+                p[(plane + 2) % 3] = (float)j;
+            }
+        }
+        for (uint32_t i = 0; i < SIDE; i++) {
+            for (uint32_t j = 0; j < SIDE; j++, n += 6) {
+                uint32_t a = base + i * (SIDE + 1) + j, b = a + SIDE + 1;
+                memcpy(&indices[n], (uint32_t[6]){a, a + 1, b, a + 1, b + 1, b}, 6 * sizeof(*indices));
+            }
+        }
+    }
+    struct test_edits edits = {.scene = test_scene_create()};
+    test_mesh(&edits, 1, (const float (*)[3])positions, 3 * (SIDE + 1) * (SIDE + 1), indices, n / 3);
+    test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+static void rays_along_axes_through_edges_and_corners_hit_as_by_brute_force(void **state)
+{
+    (void)state;
+    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
+    uint64_t seed = 21;
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        float o[3], d[3] = {0, 0, 0};
+        for (int k = 0; k < 3; k++)
+            o[k] = (float)(test_random(&seed) % 21) * 0.5f - 1; /* on and between the vertices */
+        d[i % 3] = i & 8 ? -1.0f : 1.0f;
+        o[i % 3] = i & 8 ? 12.0f : -3.0f;
+        if (i & 16)
+            d[(i + 1) % 3] = i & 32 ? -0.0f : 0.5f;
+        rays[i] = make_ray(o[0], o[1], o[2], d[0], d[1], d[2]);
+    }
+    expect_like_brute_force(scene_of_squares(), rays, RAY_COUNT / 4, 0);
+    free(rays);
+}
+
+static void grazing_rays_hit_as_by_brute_force(void **state)
+{
+    (void)state;
+    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
+    uint64_t seed = 22;
+    for (uint32_t i = 0; i < RAY_COUNT; i++) /* a hair above the plane x = 0, or within it */
+        rays[i] = make_ray(i % 4 ? test_uniform(&seed, 0, 1e-3f) : 0, -1, test_uniform(&seed, 0, 8),
+                           test_uniform(&seed, -1e-4f, 0), 1, test_uniform(&seed, -0.2f, 0.2f));
+    expect_like_brute_force(scene_of_squares(), rays, RAY_COUNT / 4, 0);
+    free(rays);
+}
+
+static void rays_from_far_away_hit_as_by_brute_force(void **state)
+{
+    (void)state;
+    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
+    uint64_t seed = 23;
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        float far = i % 2 ? 100.0f : 3e3f, o[3], d[3];
+        for (int k = 0; k < 3; k++) {
+            o[k] = far * test_uniform(&seed, -1, 1);
+            d[k] = test_uniform(&seed, -1, 1) - o[k];
+        }
+        rays[i] = make_ray(o[0], o[1], o[2], d[0], d[1], d[2]);
+    }
+    expect_like_brute_force(test_scene_soup(), rays, RAY_COUNT / 10, 4);
+    free(rays);
+}
+
+static void transforms_behind_the_origin_and_around_it_are_entered(void **state)
+{
+    (void)state;
+    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
+    uint64_t seed = 24;
+    for (uint32_t i = 0; i < RAY_COUNT; i++) { /* from within the instances; short and long directions */
+        float length = i % 3 ? 1e-3f : 50.0f;
+        rays[i] = make_ray(test_uniform(&seed, -3, 3), test_uniform(&seed, -1, 3), test_uniform(&seed, -1, 1),
+                           length * test_uniform(&seed, -1, 1), length * test_uniform(&seed, -1, 1),
+                           length * test_uniform(&seed, -1, 1));
+    }
+    expect_like_brute_force(test_scene_soup(), rays, RAY_COUNT / 10, 0);
+    expect_like_brute_force(test_scene_spheres(), rays, RAY_COUNT / 10, 0);
+    free(rays);
+}
+
+static void a_number_of_rays_that_cannot_walk_together_is_refused(void **state)
+{
+    (void)state;
+    struct error error = {0};
+    assert_null(tracer_create(&tracer_bvh_impl, device, &(struct tracer_options){.bvh_rays_together = 3}, &error));
+    assert_int_equal(error.kind, ERROR_INVALID);
+    assert_string_equal(error.field, "options.bvh_rays_together");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_moved_node_costs_its_path_in_the_top_tree),
+        cmocka_unit_test(a_changed_mesh_rebuilds_its_own_tree),
+        cmocka_unit_test(an_edit_of_something_else_costs_nothing),
+        cmocka_unit_test(rays_along_axes_through_edges_and_corners_hit_as_by_brute_force),
+        cmocka_unit_test(grazing_rays_hit_as_by_brute_force),
+        cmocka_unit_test(rays_from_far_away_hit_as_by_brute_force),
+        cmocka_unit_test(transforms_behind_the_origin_and_around_it_are_entered),
+        cmocka_unit_test(a_number_of_rays_that_cannot_walk_together_is_refused),
+    };
+    struct error error = {0};
+    device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);
+    if (!device) {
+        printf("SKIP: no OpenGL device: %s\n", error.text);
+        return 0;
+    }
+    int failures = cmocka_run_group_tests(tests, NULL, NULL);
+    gpu_device_destroy(device);
+    return failures;
+}
