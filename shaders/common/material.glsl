@@ -43,9 +43,10 @@ bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 al
     if (geometries[i.geometry].kind == GEOMETRY_SPHERES) {
         float radius = texelFetch(spheres, int(h.primitive)).w;
         float phi = (h.u0 - 0.5) * TWO_PI, theta = h.v0 * PI;
-        along_u = affine_vector(i.world_from_object, vec3(cos(phi), 0.0, -sin(phi)) * (TWO_PI * radius * sin(theta)));
-        along_v = affine_vector(i.world_from_object, vec3(cos(theta) * sin(phi), -sin(theta), cos(theta) * cos(phi)) *
-                                                         (PI * radius));
+        vec3 east = vec3(cos(phi), 0.0, -sin(phi));
+        vec3 south = vec3(cos(theta) * sin(phi), -sin(theta), cos(theta) * cos(phi));
+        along_u = affine_vector(i.world_from_object, east * (TWO_PI * radius * sin(theta)));
+        along_v = affine_vector(i.world_from_object, south * (PI * radius));
         return true;
     }
     uvec4 triangle = texelFetch(triangles, int(h.primitive));
@@ -140,8 +141,8 @@ vec4 sample_use(texture_slot slot, vec4 uv01, float footprint_uv)
 void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 uv01, float footprint_uv)
 {
     const int BASE_COLOUR = 0, NORMAL = 1, METALLIC_ROUGHNESS = 2, OCCLUSION = 3, EMISSION = 4, TRANSMISSION = 5;
-    uint uses[6] = uint[6](m.texture_base_colour, m.texture_normal, m.texture_metallic_roughness, m.texture_occlusion,
-                           m.texture_emission, m.texture_transmission);
+    uint uses[6] = uint[6](m.texture_base_colour, m.texture_normal, m.texture_metallic_roughness,
+                           m.texture_occlusion, m.texture_emission, m.texture_transmission);
     for (int i = 0; i < 6; i++) {
         if (uses[i] == 0u)
             continue;

@@ -19,8 +19,8 @@ layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uin
 layout(std430, binding = BIND_LIGHT_SAMPLES) readonly buffer sample_block { vec4 light_samples[]; };
 layout(std430, binding = BIND_SLICE_PIXELS) buffer pixel_block { vec4 slice_pixels[]; };
 
-// The greatest radiance that reaches a pixel: half floats hold 65504, and what is brighter is white at any exposure
-// of a scene lit for the eye. Also what is not a number must not spread.
+// The greatest radiance that reaches a pixel: half floats hold 65504, and what is brighter is white at any
+// exposure of a scene lit for the eye. Also what is not a number must not spread.
 const float RADIANCE_MAX = 1e9;
 
 vec4 finite(vec4 v)

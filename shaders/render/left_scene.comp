@@ -24,6 +24,6 @@ void main()
     path p = paths[k];
     bool seen = (p.flags & PATH_STRAIGHT) != 0u && frame.environment_kind != ENVIRONMENT_NONE;
     // Pixels beyond the picture's edge have no weight.
-    radiance[k] = vec4(vec3(p.weight_r, p.weight_g, p.weight_b) * environment_radiance(rays[k].direction_t_max.xyz),
-                       seen ? p.weight_r : 0.0);
+    vec3 arriving = environment_radiance(rays[k].direction_t_max.xyz);
+    radiance[k] = vec4(vec3(p.weight_r, p.weight_g, p.weight_b) * arriving, seen ? p.weight_r : 0.0);
 }

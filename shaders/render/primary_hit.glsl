@@ -46,7 +46,8 @@ candidate candidate_sphere(uint instance_index, uint primitive, vec3 origin, vec
     vec4 sphere = texelFetch(spheres, int(primitive));
     candidate found = candidate(-1.0, primitive, instance_index, vec2(0.0));
     vec2 distances;
-    if (!intersect_sphere(affine_point(rows, origin), affine_vector(rows, direction), sphere.xyz, sphere.w, distances))
+    if (!intersect_sphere(affine_point(rows, origin), affine_vector(rows, direction), sphere.xyz, sphere.w,
+                          distances))
         return found;
     for (int i = 0; i < 2; i++) {
         found.distance = distances[i];

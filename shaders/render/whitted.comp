@@ -74,7 +74,8 @@ split split_light(surface s, float NoV)
     result.scattered = rest * (1.0 - s.transmission);
     // Glass is tinted once, where light enters it.
     result.refracted = leaves ? vec3((1.0 - dielectric) * through) : rest * s.transmission;
-    result.mirror_ray = leaves ? 1.0 : 1.0 - smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
+    float blurred = smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
+    result.mirror_ray = leaves ? 1.0 : 1.0 - blurred;
     return result;
 }
 
@@ -91,7 +92,8 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
 {
     uint bounces = (parent.flags & PATH_BOUNCES_MASK) + (straight ? 0u : 1u);
     // not >=: what is not a number ends here as well
-    if (!(greatest(weight) >= WEIGHT_MIN && dot(direction, direction) > 0.5) || last_wave != 0u || bounces > frame.depth)
+    if (!(greatest(weight) >= WEIGHT_MIN && dot(direction, direction) > 0.5) || last_wave != 0u ||
+        bounces > frame.depth)
         return;
     float offset = OFFSET * max(greatest(abs(s.position)), distance_);
     vec3 side = dot(direction, s.geometric) > 0.0 ? s.geometric : -s.geometric;
@@ -144,7 +146,8 @@ uint ask_for_lights(uint j, path parent, surface s, vec3 view, float NoV, vec3 w
         uint place = i * hit_count + j, index = first_light + i;
         vec2 u = vec2(0.5);
 #ifdef HAS_AREA_LIGHTS
-        u = random_pair(pixel.y * frame.width + pixel.x, wave_number << 16 ^ index, frame.seed, frame.sample_index);
+        u = random_pair(pixel.y * frame.width + pixel.x, wave_number << 16 ^ index, frame.seed,
+                        frame.sample_index);
 #endif
         light_sample lamp = light_sample_at(index, origin, u);
         vec3 arriving = weight * reflected_light(s, view, NoV, lamp);
@@ -193,7 +196,8 @@ void main()
     ray r = rays[k];
     hit h = hits[k];
     bool first = first_light == 0u;
-    surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, p.cone_width + p.cone_spread * h.distance);
+    float width = p.cone_width + p.cone_spread * h.distance;
+    surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, width);
     vec3 view = -r.direction_t_max.xyz;
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
     if (first) {
