@@ -89,11 +89,11 @@ static const struct option options[] = {
      "Least rate of a message that takes longer"},
     {"network", "idle", OPTION_U32, AT(connection.idle_ms), "120000", 0, 86400000, "ms",
      "Silence after which a client that waits for nothing is disconnected; 0: never"},
-    {"network", "queued_soft", OPTION_BYTES, AT(connection.queued_soft_bytes), "16M", 64 * KIB, 16 * GIB, "bytes",
+    {"network", "queued_soft", OPTION_BYTES, AT(connection.queued_soft_bytes), "16M", MIB, 16 * GIB, "bytes",
      "Output waiting for a client from which on nothing more is read from it, .."},
     {"network", "queued_soft_time", OPTION_U32, AT(connection.queued_soft_ms), "10000", 10, 600000, "ms",
      ".. and after so long it is disconnected"},
-    {"network", "queued_hard", OPTION_BYTES, AT(connection.queued_hard_bytes), "64M", 64 * KIB, 16 * GIB, "bytes",
+    {"network", "queued_hard", OPTION_BYTES, AT(connection.queued_hard_bytes), "64M", MIB, 16 * GIB, "bytes",
      "Output waiting for a client at which it is disconnected at once"},
 };
 /* clang-format on */

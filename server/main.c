@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* farlightd: options, and the wiring of the engine to the network.
- *
  * Exit status: 0 when it was stopped (by SIGTERM or SIGINT, after a goodbye to its clients) or its one client is
  * gone; 1 when it cannot start or go on; 2 for wrong usage. */
 #include "base/log.h"
@@ -19,8 +18,7 @@ __attribute__((visibility("default"))) const char *argp_program_version = "farli
 enum { KEY_FD = 256, KEY_CONFIG, KEY_DEVICE, KEY_LIST, KEY_LEVEL, KEY_DUMP, KEY_INSECURE };
 
 static const struct argp_option option_table[] = {
-    {"listen", 'l', "ADDRESS", 0, "Where clients come: unix:/PATH or tcp:HOST:PORT; may be given several times",
-     0},
+    {"listen", 'l', "ADDRESS", 0, "Listen at unix:/PATH or tcp:HOST:PORT; may be given several times", 0},
     {"fd", KEY_FD, "N", 0, "Serve the one client at the connected socket N, then exit", 0},
     {"config", KEY_CONFIG, "FILE", 0, "Read options from FILE, after " CONFIG_SYSTEM_FILE, 0},
     {"device", KEY_DEVICE, "N|software|auto", 0, "GPU to use", 0},
@@ -35,8 +33,18 @@ struct arguments {
     char listen[CONFIG_TEXT_BYTES]; /* all of them, each followed by a blank */
     const char *config_file, *device, *log_level, *insecure;
     int fd;
-    bool list_devices, dump_config;
+    bool dump_config;
 };
+
+static int list_devices(void)
+{
+    struct gpu_device_info list[32];
+    size_t count = gpu_device_list(list, sizeof list / sizeof list[0]);
+    for (size_t i = 0; i < count; i++)
+        printf("%d  %s  (%s, OpenGL %s%s)\n", list[i].index, list[i].name, list[i].vendor, list[i].version,
+               list[i].software ? ", software" : "");
+    return count ? EXIT_SUCCESS : (fprintf(stderr, "farlightd: no device gives OpenGL 4.5\n"), EXIT_FAILURE);
+}
 
 static error_t parse_option(int key, char *value, struct argp_state *state)
 {
@@ -65,8 +73,7 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
         arguments->insecure = "yes";
         break;
     case KEY_LIST:
-        arguments->list_devices = true;
-        break;
+        exit(list_devices());
     case KEY_DUMP:
         arguments->dump_config = true;
         break;
@@ -94,16 +101,6 @@ static bool read_config(struct config *config, const struct arguments *arguments
            config_flag(config, "engine.device", arguments->device, "--device", error) &&
            config_flag(config, "server.insecure", arguments->insecure, "--insecure", error) &&
            config_flag(config, "server.log_level", arguments->log_level, "--log-level", error);
-}
-
-static int list_devices(void)
-{
-    struct gpu_device_info list[32];
-    size_t count = gpu_device_list(list, sizeof list / sizeof list[0]);
-    for (size_t i = 0; i < count; i++)
-        printf("%d  %s  (%s, OpenGL %s%s)\n", list[i].index, list[i].name, list[i].vendor, list[i].version,
-               list[i].software ? ", software" : "");
-    return count ? EXIT_SUCCESS : (fprintf(stderr, "farlightd: no device gives OpenGL 4.5\n"), EXIT_FAILURE);
 }
 
 static bool serve(struct daemon *daemon, const struct config *config, int fd, struct error *error)
@@ -138,17 +135,15 @@ int main(int argc, char **argv)
     struct error error = {0};
     argp_err_exit_status = 2;
     argp_parse(&argp, argc, argv, 0, NULL, &arguments);
-    if (arguments.list_devices)
-        return list_devices();
     if (!read_config(&config, &arguments, &error))
         return fail(&error);
     if (arguments.dump_config)
-        return config_dump(&config, stdout) ? EXIT_SUCCESS : EXIT_FAILURE;
+        return !config_dump(&config, stdout);
     log_set_level((enum log_level)config.log_level);
     daemon_block_signals();
     struct daemon daemon;
     daemon_init(&daemon);
     bool ok = serve(&daemon, &config, arguments.fd, &error);
-    daemon_finish(&daemon);
+    daemon_finish(&daemon); /* what was begun before it failed */
     return ok ? EXIT_SUCCESS : fail(&error);
 }

