@@ -93,7 +93,8 @@ void files_finish(struct files *files)
 }
 
 /* Reads until the end; the size that the file system states is only where the buffer begins. */
-static unsigned char *read_all(int descriptor, uint64_t room_bytes, size_t *size_bytes, char reason[FILES_REASON_BYTES])
+static unsigned char *read_all(int descriptor, uint64_t room_bytes, size_t *size_bytes,
+                               char reason[FILES_REASON_BYTES])
 {
     struct stat status;
     size_t capacity = 0, used = 0;
@@ -143,7 +144,8 @@ unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t
 {
     uint64_t start_ns = import_now_ns();
     uint64_t room = files->read_bytes < FILES_TOTAL_MAX ? FILES_TOTAL_MAX - files->read_bytes : 0;
-    unsigned char *bytes = read_all(descriptor, room < FILES_BYTES_MAX ? room : FILES_BYTES_MAX, size_bytes, reason);
+    unsigned char *bytes =
+        read_all(descriptor, room < FILES_BYTES_MAX ? room : FILES_BYTES_MAX, size_bytes, reason);
 
     if (bytes)
         files->read_bytes += *size_bytes;
@@ -176,7 +178,8 @@ static int open_by_parts(int folder, const char *name)
             name++;
             continue;
         }
-        next = openat(at, length == 0 ? "." : part, last ? OPEN_FLAGS | O_NOFOLLOW : O_PATH | O_NOFOLLOW | O_CLOEXEC);
+        next =
+            openat(at, length == 0 ? "." : part, last ? OPEN_FLAGS | O_NOFOLLOW : O_PATH | O_NOFOLLOW | O_CLOEXEC);
         close(at);
         at = next;
         if (last)
@@ -207,7 +210,8 @@ static int open_beneath(int folder, const char *name)
     return descriptor;
 }
 
-unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes, char reason[FILES_REASON_BYTES])
+unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
+                          char reason[FILES_REASON_BYTES])
 {
     unsigned char *bytes = NULL;
     int descriptor = open_beneath(files->folder, name);

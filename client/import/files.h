@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Reads the model file and what it refers to. What a model names is opened beneath the model's own folder and nowhere
- * else, must be a regular file, and is read whole into memory. */
+/* Reads the model file and what it refers to. What a model names is opened beneath the model's own folder and
+ * nowhere else, must be a regular file, and is read whole into memory. */
 #ifndef FARLIGHT_IMPORT_FILES_H
 #define FARLIGHT_IMPORT_FILES_H
 
@@ -36,7 +36,8 @@ char *files_folder_of(const char *path);
 unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t *size_bytes,
                                      char reason[FILES_REASON_BYTES]);
 /* `name` is relative to the model's folder; '\' also separates folders if there is no file of that very name. */
-unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes, char reason[FILES_REASON_BYTES]);
+unsigned char *files_read(struct files *files, const char *name, size_t *size_bytes,
+                          char reason[FILES_REASON_BYTES]);
 
 #ifdef __cplusplus
 }

@@ -20,7 +20,8 @@ bool obj_import(struct import_scene *scene, struct files *files, const unsigned 
 bool nff_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes);
 
 /* Equirectangular image, HDR or EXR, as the scene's environment. */
-bool environment_import(struct import_scene *scene, const char *file, const unsigned char *bytes, size_t size_bytes);
+bool environment_import(struct import_scene *scene, const char *file, const unsigned char *bytes,
+                        size_t size_bytes);
 
 /* One image to decode. */
 struct texture_job {

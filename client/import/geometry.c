@@ -128,7 +128,8 @@ static void add_face_normals(const struct import_mesh *mesh, const unsigned char
                 edges[e][c] = (double)mesh->positions[(size_t)corners[e + 1] * 3 + (size_t)c] -
                               (double)mesh->positions[(size_t)corners[0] * 3 + (size_t)c];
         for (int c = 0; c < 3; c++)
-            normal[c] = edges[0][(c + 1) % 3] * edges[1][(c + 2) % 3] - edges[0][(c + 2) % 3] * edges[1][(c + 1) % 3];
+            normal[c] =
+                edges[0][(c + 1) % 3] * edges[1][(c + 2) % 3] - edges[0][(c + 2) % 3] * edges[1][(c + 1) % 3];
         for (int k = 0; k < 3; k++)
             for (int c = 0; bad[corners[k]] && c < 3; c++)
                 sums[(size_t)corners[k] * 3 + (size_t)c] += normal[c];
@@ -170,8 +171,8 @@ static bool mend_normals(struct import_scene *scene, const char *where, struct i
     }
     free(bad);
     free(sums);
-    import_note(scene, PROTOCOL_SEVERITY_INFO, where, "%zu normals are missing or unusable and were made from the faces",
-                broken);
+    import_note(scene, PROTOCOL_SEVERITY_INFO, where,
+                "%zu normals are missing or unusable and were made from the faces", broken);
     return true;
 }
 

@@ -10,9 +10,9 @@ namespace gltf
 namespace
 {
 const char *const understood[] = {
-    "KHR_lights_punctual",        "KHR_materials_transmission",          "KHR_materials_ior",
-    "KHR_materials_unlit",        "KHR_materials_emissive_strength",     "KHR_texture_transform",
-    "KHR_mesh_quantization",      "KHR_materials_pbrSpecularGlossiness", "EXT_texture_webp",
+    "KHR_lights_punctual",   "KHR_materials_transmission",          "KHR_materials_ior",
+    "KHR_materials_unlit",   "KHR_materials_emissive_strength",     "KHR_texture_transform",
+    "KHR_mesh_quantization", "KHR_materials_pbrSpecularGlossiness", "EXT_texture_webp",
 };
 // These hold nothing that could be seen.
 const char *const invisible[] = {"KHR_xmp", "KHR_xmp_json_ld", "KHR_animation_pointer", "EXT_mesh_manifold"};
@@ -26,8 +26,8 @@ void check_extensions(reader &r)
 {
     for (const std::string &name : r.model.extensionsRequired)
         if (!is_one_of(name, understood) && !is_one_of(name, invisible))
-            fail(r, "extensionsRequired", "the file cannot be shown without the extension '%.80s', which is unknown",
-                 name.c_str());
+            fail(r, "extensionsRequired",
+                 "the file cannot be shown without the extension '%.80s', which is unknown", name.c_str());
     for (const std::string &name : r.model.extensionsUsed)
         if (!is_one_of(name, understood) && !is_one_of(name, invisible))
             import_note(r.scene, PROTOCOL_SEVERITY_WARNING, "extensionsUsed",

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// glTF 2.0 through tinygltf, which parses JSON and little else here: it is given files by our callbacks, no image is
-// decoded by it, and no index, offset, stride or count that it passes on is used before it is checked.
+// glTF 2.0 through tinygltf, which parses JSON and little else here: it is given files by our callbacks, no image
+// is decoded by it, and no index, offset, stride or count that it passes on is used before it is checked.
 #ifndef FARLIGHT_IMPORT_GLTF_HPP
 #define FARLIGHT_IMPORT_GLTF_HPP
 
@@ -35,8 +35,8 @@ struct reader {
     // By texture and whether it holds colour: what has been decoded.
     std::map<std::pair<int, bool>, uint32_t> texture_ids;
     std::map<std::string, size_t> buffer_sizes; // by file: how much of it the model asks for, where that is less
-    std::vector<int> parents;                  // by node; -1: a root
-    std::vector<std::array<double, 16>> world; // by node, column-major as in glTF; filled when a skin asks
+    std::vector<int> parents;                   // by node; -1: a root
+    std::vector<std::array<double, 16>> world;  // by node, column-major as in glTF; filled when a skin asks
 };
 
 [[noreturn]] void fail(reader &r, const std::string &where, const char *format, ...)

@@ -143,7 +143,8 @@ bool is_unsigned(int component_type)
 }
 
 // Matrices of small components have padded columns; none of what is read here does.
-void copy_floats(const elements &e, size_t element, const unsigned char *bytes, int components, float fill, float *out)
+void copy_floats(const elements &e, size_t element, const unsigned char *bytes, int components, float fill,
+                 float *out)
 {
     const size_t part = component_bytes(e.component_type);
     float *to = out + element * size_t(components);
@@ -176,9 +177,9 @@ sparse_elements sparse_of(reader &r, int index, const elements &e, const std::st
         fail(r, here, "a negative offset");
     const size_t part = component_bytes(type);
     result.stride = component_bytes(e.component_type) * size_t(e.components);
-    const unsigned char *indices = range_within(r, accessor.sparse.indices.bufferView,
-                                                size_t(accessor.sparse.indices.byteOffset), size_t(count), part, part,
-                                                here);
+    const unsigned char *indices =
+        range_within(r, accessor.sparse.indices.bufferView, size_t(accessor.sparse.indices.byteOffset),
+                     size_t(count), part, part, here);
     result.values = range_within(r, accessor.sparse.values.bufferView, size_t(accessor.sparse.values.byteOffset),
                                  size_t(count), result.stride, result.stride, here);
     for (size_t i = 0; i < size_t(count); i++) {
@@ -200,8 +201,8 @@ const unsigned char *view_bytes(reader &r, int view, size_t &size_bytes, const s
         fail(r, where, "bufferViews[%d] names buffer %d, which does not exist", view, v.buffer);
     const std::vector<unsigned char> &data = r.model.buffers[size_t(v.buffer)].data;
     if (v.byteOffset > data.size() || v.byteLength > data.size() - v.byteOffset)
-        fail(r, where, "bufferViews[%d] (%zu bytes at %zu) exceeds the %zu bytes of its buffer", view, v.byteLength,
-             v.byteOffset, data.size());
+        fail(r, where, "bufferViews[%d] (%zu bytes at %zu) exceeds the %zu bytes of its buffer", view,
+             v.byteLength, v.byteOffset, data.size());
     size_bytes = v.byteLength;
     return data.data() + v.byteOffset;
 }

@@ -83,7 +83,8 @@ chunks cut_binary(reader &r, const unsigned char *bytes, size_t size_bytes)
 // tinygltf wants both chunks behind each other and whole words; most files are just so already.
 std::vector<unsigned char> rebuild_binary(const chunks &parts)
 {
-    const size_t json_bytes = (parts.json_bytes + 3) & ~size_t(3), binary_bytes = (parts.binary_bytes + 3) & ~size_t(3);
+    const size_t json_bytes = (parts.json_bytes + 3) & ~size_t(3),
+                 binary_bytes = (parts.binary_bytes + 3) & ~size_t(3);
     const size_t total = 20 + json_bytes + (binary_bytes > 0 ? 8 + binary_bytes : 0);
     std::vector<unsigned char> out(total, 0);
     const auto put = [&out](size_t at, size_t value) {
@@ -187,8 +188,8 @@ bool read_file(std::vector<unsigned char> *out, std::string *error, const std::s
 }
 
 // Keeps the encoded bytes of images that do not lie in a buffer; those that do are found there later.
-bool keep_image(tinygltf::Image *image, const int, std::string *, std::string *, int, int, const unsigned char *bytes,
-                int size, void *)
+bool keep_image(tinygltf::Image *image, const int, std::string *, std::string *, int, int,
+                const unsigned char *bytes, int size, void *)
 {
     image->as_is = true;
     if (image->bufferView < 0 && bytes && size > 0)

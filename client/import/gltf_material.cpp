@@ -136,7 +136,7 @@ void apply_transform(reader &r, const tinygltf::Value &transform, record_texture
     const std::vector<double> offset = numbers(transform, "offset"), scale = numbers(transform, "scale");
     const double angle = std::fmod(number(transform, "rotation", 0), 2 * pi);
     const double u = scale.size() == 2 ? scale[0] : 1, v = scale.size() == 2 ? scale[1] : 1;
-    const double rows[6] = {std::cos(angle) * u, std::sin(angle) * v, offset.size() == 2 ? offset[0] : 0,
+    const double rows[6] = {std::cos(angle) * u,  std::sin(angle) * v, offset.size() == 2 ? offset[0] : 0,
                             -std::sin(angle) * u, std::cos(angle) * v, offset.size() == 2 ? offset[1] : 0};
 
     for (size_t i = 0; i < 6; i++)
@@ -217,8 +217,9 @@ void core(const building &b)
     use_texture(b.r, b.all, {normal.index, normal.texCoord, normal.scale, &normal.extensions, nullptr}, false,
                 b.uses[NORMAL], b.where);
     const tinygltf::OcclusionTextureInfo &occlusion = b.source.occlusionTexture;
-    use_texture(b.r, b.all, {occlusion.index, occlusion.texCoord, occlusion.strength, &occlusion.extensions, nullptr},
-                false, b.uses[OCCLUSION], b.where);
+    use_texture(b.r, b.all,
+                {occlusion.index, occlusion.texCoord, occlusion.strength, &occlusion.extensions, nullptr}, false,
+                b.uses[OCCLUSION], b.where);
 }
 
 void emission(const building &b)
@@ -254,7 +255,8 @@ void transmission(const building &b)
         b.set.ior = value == 0 ? 10.0f : limited(b.r, b.where, "the index of refraction", value, 1, 10);
     }
     if (const tinygltf::Value *glass = extension(b.source.extensions, "KHR_materials_transmission")) {
-        b.set.transmission = limited(b.r, b.where, "transmissionFactor", number(*glass, "transmissionFactor", 0), 0, 1);
+        b.set.transmission =
+            limited(b.r, b.where, "transmissionFactor", number(*glass, "transmissionFactor", 0), 0, 1);
         use_texture(b.r, b.all, source_of(*glass, "transmissionTexture"), false, b.uses[TRANSMISSION], b.where);
     }
     b.set.unlit = extension(b.source.extensions, "KHR_materials_unlit") != nullptr;
@@ -281,8 +283,8 @@ void specular_glossiness(const building &b)
                                        diffuse[c] * (1 - metallic) + specular[c] * metallic, 0, 1);
     b.set.base_colour[3] = limited(b.r, b.where, "the diffuse colour", diffuse[3], 0, 1);
     b.set.metallic = float(metallic);
-    b.set.roughness = limited(b.r, b.where, "glossinessFactor",
-                              textured ? 0.5 : 1 - number(*old, "glossinessFactor", 1), 0, 1);
+    b.set.roughness =
+        limited(b.r, b.where, "glossinessFactor", textured ? 0.5 : 1 - number(*old, "glossinessFactor", 1), 0, 1);
     b.uses[BASE_COLOUR] = {};
     b.uses[METALLIC_ROUGHNESS] = {};
     use_texture(b.r, b.all, source_of(*old, "diffuseTexture"), true, b.uses[BASE_COLOUR], b.where);

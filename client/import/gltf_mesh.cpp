@@ -89,7 +89,8 @@ void check_counts(builder &b, const tinygltf::Primitive &primitive, size_t verti
 uint32_t lot_of(builder &b, const tinygltf::Primitive &primitive, const std::string &where)
 {
     for (size_t i = 0; i < b.lots.size(); i++)
-        if (b.lots[i].primitive->attributes == primitive.attributes && b.lots[i].primitive->targets == primitive.targets)
+        if (b.lots[i].primitive->attributes == primitive.attributes &&
+            b.lots[i].primitive->targets == primitive.targets)
             return uint32_t(i);
     const vertex_attributes a = attributes_of(primitive);
     const size_t count = accessor_count(b.r, a.position, TINYGLTF_TYPE_VEC3, where + ".POSITION");
@@ -128,7 +129,8 @@ std::vector<uint32_t> corners_of(builder &b, const tinygltf::Primitive &primitiv
     return corners;
 }
 
-void add_triangles(builder &b, const tinygltf::Primitive &primitive, const vertex_lot &lot, const std::string &where)
+void add_triangles(builder &b, const tinygltf::Primitive &primitive, const vertex_lot &lot,
+                   const std::string &where)
 {
     const std::vector<uint32_t> corners = corners_of(b, primitive, lot, where);
     const size_t count = corners.size();
@@ -164,7 +166,8 @@ void add_primitive(builder &b, const tinygltf::Primitive &primitive, size_t numb
         return;
     }
     if (attribute(primitive.attributes, "POSITION") < 0) {
-        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(), "a primitive without positions is left out");
+        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
+                    "a primitive without positions is left out");
         return;
     }
     if (primitive.material >= 0 && size_t(primitive.material) >= b.r.material_ids.size())
@@ -221,7 +224,8 @@ void apply_targets(builder &b, const vertex_lot &lot)
         apply_target(b, lot, target, "TANGENT", float(weight), b.mesh.tangents, 4);
     }
     if (!lot.primitive->targets.empty())
-        import_note(b.r.scene, PROTOCOL_SEVERITY_INFO, b.where.c_str(), "morph targets stand at their default weights");
+        import_note(b.r.scene, PROTOCOL_SEVERITY_INFO, b.where.c_str(),
+                    "morph targets stand at their default weights");
 }
 
 void read_lot(builder &b, const vertex_lot &lot)

@@ -71,9 +71,8 @@ uint32_t light_id(reader &r, int index, const std::string &where)
     message_set_light set = {};
 
     for (size_t c = 0; c < 3; c++)
-        set.colour[c] =
-            limited(r, here, "the light's colour",
-                    (light.color.size() == 3 ? light.color[c] : 1.0) * light.intensity, 0, 1e12);
+        set.colour[c] = limited(r, here, "the light's colour",
+                                (light.color.size() == 3 ? light.color[c] : 1.0) * light.intensity, 0, 1e12);
     set.range = limited(r, here, "the light's range", light.range, 0, 1e12);
     set.name = light.name.c_str();
     if (light.type == "directional") {
@@ -85,8 +84,8 @@ uint32_t light_id(reader &r, int index, const std::string &where)
         set.outer_cone = limited(r, here, "the outer cone", light.spot.outerConeAngle, 0, 1.5707);
         set.inner_cone = limited(r, here, "the inner cone", light.spot.innerConeAngle, 0, double(set.outer_cone));
     } else {
-        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, here.c_str(), "a light of unknown type '%.32s' is left out",
-                    light.type.c_str());
+        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, here.c_str(),
+                    "a light of unknown type '%.32s' is left out", light.type.c_str());
         return 0;
     }
     return import_add_light(r.scene, &set);

@@ -154,6 +154,7 @@ void apply_skin(reader &r, const tinygltf::Primitive &primitive, int skin, const
         if (arrays.tangents)
             transform(m, arrays.tangents + v * 4, 0);
     }
-    import_note(r.scene, PROTOCOL_SEVERITY_INFO, where.c_str(), "skinned meshes stand in the pose of the file's nodes");
+    import_note(r.scene, PROTOCOL_SEVERITY_INFO, where.c_str(),
+                "skinned meshes stand in the pose of the file's nodes");
 }
 } // namespace gltf

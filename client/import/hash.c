@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* BLAKE2b-256 over the BLAKE2b-256 hashes of a blob's 1 MiB chunks. All chunks of all blobs are one list of work that
- * two threads share. */
+/* BLAKE2b-256 over the BLAKE2b-256 hashes of a blob's 1 MiB chunks. All chunks of all blobs are one list of work
+ * that two threads share. */
 #include "import.h"
 
 #include <pthread.h>
@@ -33,8 +33,8 @@ static void *hash_chunks(void *argument)
 
         if (i >= work->count)
             return NULL;
-        crypto_generichash(work->chunks[i].hash, HASH_BYTES, work->chunks[i].bytes, work->chunks[i].size_bytes, NULL,
-                           0);
+        crypto_generichash(work->chunks[i].hash, HASH_BYTES, work->chunks[i].bytes, work->chunks[i].size_bytes,
+                           NULL, 0);
     }
 }
 

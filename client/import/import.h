@@ -34,7 +34,7 @@ struct import_blob {
 };
 
 struct import_edit {
-    struct message message;           /* a SET_..; its arrays of blob_ref are filled in when it is sent */
+    struct message message;            /* a SET_..; its arrays of blob_ref are filled in when it is sent */
     uint32_t blobs[IMPORT_ARRAYS_MAX]; /* numbers */
 };
 
@@ -71,8 +71,8 @@ struct import_scene {
 void import_scene_init(struct import_scene *scene, const char *file);
 void import_scene_finish(struct import_scene *scene);
 
-/* Gives up: keeps the first message. `where` names the place in the file ("mesh 3") or a file; NULL: the model file
- * as a whole. Returns false. */
+/* Gives up: keeps the first message. `where` names the place in the file ("mesh 3") or a file; NULL: the model
+ * file as a whole. Returns false. */
 bool import_fail(struct import_scene *scene, const char *where, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
@@ -80,16 +80,19 @@ bool import_fail(struct import_scene *scene, const char *where, const char *form
 void import_note(struct import_scene *scene, enum protocol_severity severity, const char *where,
                  const char *format, ...) __attribute__((format(printf, 4, 5)));
 
-/* Takes `bytes` (malloc'd) whether it succeeds or not. Returns the blob's number; 0: failed, or `bytes` is NULL. */
+/* Takes `bytes` (malloc'd) whether it succeeds or not. Returns the blob's number; 0: failed, or `bytes` is NULL.
+ */
 uint32_t import_add_blob(struct import_scene *scene, void *bytes, uint64_t size_bytes);
 
-/* Each returns the new object's identifier, 0 if the scene has failed. Identifiers in the message are ignored; names
- * are copied, cut to the protocol's length and mended to UTF-8. Numbers that the protocol does not allow fail. */
+/* Each returns the new object's identifier, 0 if the scene has failed. Identifiers in the message are ignored;
+ * names are copied, cut to the protocol's length and mended to UTF-8. Numbers that the protocol does not allow
+ * fail. */
 uint32_t import_add_node(struct import_scene *scene, const struct message_set_node *node);
 uint32_t import_add_material(struct import_scene *scene, const struct message_set_material *material);
 uint32_t import_add_light(struct import_scene *scene, const struct message_set_light *light);
 uint32_t import_add_camera(struct import_scene *scene, const struct message_set_camera *camera);
-uint32_t import_add_texture(struct import_scene *scene, const struct message_set_texture *texture, uint32_t texels);
+uint32_t import_add_texture(struct import_scene *scene, const struct message_set_texture *texture,
+                            uint32_t texels);
 void import_set_environment(struct import_scene *scene, const struct message_set_environment *environment,
                             uint32_t texels);
 void import_add_clip(struct import_scene *scene, const char *name, uint32_t channels, double duration_s);
@@ -99,12 +102,12 @@ struct import_mesh {
     const char *name;
     const char *where; /* for messages; may be NULL */
     uint32_t vertex_count, triangle_count;
-    float *positions;   /* 3 a vertex */
-    uint32_t *indices;  /* 3 a triangle */
-    float *normals;     /* 3 */
-    float *tangents;    /* 4 */
+    float *positions;    /* 3 a vertex */
+    uint32_t *indices;   /* 3 a triangle */
+    float *normals;      /* 3 */
+    float *tangents;     /* 4 */
     float *texcoords[2]; /* 2 */
-    uint8_t *colours;   /* 4, linear */
+    uint8_t *colours;    /* 4, linear */
     struct record_material_range *ranges;
     uint32_t range_count;
 };

@@ -18,7 +18,8 @@
 #define EXIT_USAGE 2
 #define CPU_SECONDS_MAX 300
 
-const char *argp_program_version = "farlight-import " FARLIGHT_VERSION;
+/* The C library looks for it by name, past our hidden visibility. */
+__attribute__((visibility("default"))) const char *argp_program_version = "farlight-import " FARLIGHT_VERSION;
 
 struct options {
     int socket;
@@ -127,21 +128,23 @@ static bool has_ending(const char *path, const char *ending)
     return path_length > length && strcasecmp(path + path_length - length, ending) == 0;
 }
 
-static bool parse_model(struct import_scene *scene, struct files *files, const char *path, const unsigned char *bytes,
-                        size_t size_bytes)
+static bool parse_model(struct import_scene *scene, struct files *files, const char *path,
+                        const unsigned char *bytes, size_t size_bytes)
 {
     const char *name = file_part(path);
     const char *dot = strrchr(name, '.');
 
     if (size_bytes == 0)
         return import_fail(scene, NULL, "the file is empty");
-    if (has_ending(name, ".gltf") || has_ending(name, ".glb") || (size_bytes >= 4 && memcmp(bytes, "glTF", 4) == 0))
+    if (has_ending(name, ".gltf") || has_ending(name, ".glb") ||
+        (size_bytes >= 4 && memcmp(bytes, "glTF", 4) == 0))
         return gltf_import(scene, files, bytes, size_bytes);
     if (has_ending(name, ".obj"))
         return obj_import(scene, files, bytes, size_bytes);
     if (has_ending(name, ".nff"))
         return nff_import(scene, bytes, size_bytes);
-    return import_fail(scene, NULL, "unknown format %s; known are .gltf, .glb, .obj and .nff", dot ? dot : "(no ending)");
+    return import_fail(scene, NULL, "unknown format %s; known are .gltf, .glb, .obj and .nff",
+                       dot ? dot : "(no ending)");
 }
 
 static bool import_all(struct import_scene *scene, struct files *files, struct sender *sender,
@@ -172,7 +175,8 @@ static bool import_all(struct import_scene *scene, struct files *files, struct s
     return imported && !scene->failed;
 }
 
-static bool run(struct import_scene *scene, struct sender *sender, const struct options *options, uint64_t start_ns)
+static bool run(struct import_scene *scene, struct sender *sender, const struct options *options,
+                uint64_t start_ns)
 {
     struct message_import_done done = {0};
     struct files files;
@@ -208,9 +212,11 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
 
 int main(int argc, char **argv)
 {
-    static const struct argp argp = {option_rows, parse_option, "MODEL",
-                                     "Turns MODEL (glTF 2.0, GLB, OBJ, NFF) into messages of farlight's protocol.", NULL,
-                                     NULL, NULL};
+    static const struct argp argp = {
+        option_rows, parse_option,
+        "MODEL",     "Turns MODEL (glTF 2.0, GLB, OBJ, NFF) into messages of farlight's protocol.",
+        NULL,        NULL,
+        NULL};
     static struct import_scene scene; /* the table of notes is too large for the stack of a careful program */
     uint64_t start_ns = import_now_ns();
     struct options options = {.socket = -1, .scene = 1};

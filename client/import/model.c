@@ -344,8 +344,9 @@ uint32_t import_add_texture(struct import_scene *scene, const struct message_set
 {
     struct import_edit *edit;
 
-    if (!scene->failed && (texels == 0 || texels > scene->blob_count || texture->width == 0 || texture->height == 0 ||
-                           scene->blobs[texels - 1].size_bytes != 4ull * texture->width * texture->height)) {
+    if (!scene->failed &&
+        (texels == 0 || texels > scene->blob_count || texture->width == 0 || texture->height == 0 ||
+         scene->blobs[texels - 1].size_bytes != 4ull * texture->width * texture->height)) {
         import_fail(scene, texture->name, "a texture's size does not fit its texels");
         return 0;
     }

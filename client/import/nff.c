@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Neutral File Format: E. Haines. A Proposal for Standard Graphics Environments. IEEE CG&A 7(11), 1987, and the text
- * that comes with the databases. Beyond it: colours of lights (SPD 3), fewer numbers after `f`, and the solids and
- * the `tess` of a widespread dialect. */
+/* Neutral File Format: E. Haines. A Proposal for Standard Graphics Environments. IEEE CG&A 7(11), 1987, and the
+ * text that comes with the databases. Beyond it: colours of lights (SPD 3), fewer numbers after `f`, and the
+ * solids and the `tess` of a widespread dialect. */
 #include "nff.h"
 
 #include "formats.h"
@@ -120,8 +120,8 @@ static bool read_numbers(struct nff *nff, float *out, uint32_t count, const char
         struct word word;
 
         if (!skip_blanks(nff, false))
-            return import_fail(nff->scene, where(nff), "the file ends where number %u of %u of '%s' should be", i + 1,
-                               count, of);
+            return import_fail(nff->scene, where(nff), "the file ends where number %u of %u of '%s' should be",
+                               i + 1, count, of);
         word = next_word(nff);
         if (!to_number(word, &out[i]))
             return import_fail(nff->scene, where(nff), "'%.*s' is no number that '%s' could have (%u of %u)",
@@ -145,7 +145,8 @@ static uint32_t read_some(struct nff *nff, float *out, uint32_t most)
             count++;
     }
     if (more)
-        import_note(nff->scene, PROTOCOL_SEVERITY_INFO, where(nff), "words at the end of a line that NFF does not have");
+        import_note(nff->scene, PROTOCOL_SEVERITY_INFO, where(nff),
+                    "words at the end of a line that NFF does not have");
     return count;
 }
 
@@ -166,7 +167,8 @@ static void fill_to_material(const float n[8], struct message_set_material *mate
     import_material_default(material);
     material->double_sided = 1;
     material->metallic = sum > 0 ? specular / sum : 0;
-    material->roughness = specular > 0 ? 0.0f : 1.0f; /* NFF's reflections are sharp; Shine only shapes highlights */
+    material->roughness =
+        specular > 0 ? 0.0f : 1.0f; /* NFF's reflections are sharp; Shine only shapes highlights */
     for (int c = 0; c < 3; c++)
         material->base_colour[c] = unit(n[c] * unit(sum));
     if (through > 0) {
@@ -222,7 +224,8 @@ static bool read_fill(struct nff *nff)
     uint32_t count = read_some(nff, wanted.numbers, 8);
 
     if (count < 3)
-        return import_fail(nff->scene, where(nff), "'f' has %u numbers; it needs at least red, green and blue", count);
+        return import_fail(nff->scene, where(nff), "'f' has %u numbers; it needs at least red, green and blue",
+                           count);
     if (nff->fill_count * 2 >= nff->fill_capacity && !grow_fills(nff))
         return false;
     found = find_fill(nff, wanted.numbers);
@@ -271,8 +274,8 @@ static bool expect(struct nff *nff, const char *text)
         word = next_word(nff);
     if (word_is(word, text))
         return true;
-    return import_fail(nff->scene, where(nff), "'%s' is missing in the viewpoint; there is '%.*s'", text, shown(word),
-                       word.text);
+    return import_fail(nff->scene, where(nff), "'%s' is missing in the viewpoint; there is '%.*s'", text,
+                       shown(word), word.text);
 }
 
 static bool view_usable(struct nff *nff)
@@ -321,7 +324,8 @@ static bool read_sphere(struct nff *nff)
         return false;
     read_some(nff, n, 0);
     if (n[3] < 0) { /* 'only the inside is visible'; ours show both sides */
-        import_note(nff->scene, PROTOCOL_SEVERITY_WARNING, where(nff), "a sphere to be seen from inside shows both sides");
+        import_note(nff->scene, PROTOCOL_SEVERITY_WARNING, where(nff),
+                    "a sphere to be seen from inside shows both sides");
         n[3] = -n[3];
     }
     if (!(n[3] > 0))
@@ -441,7 +445,8 @@ static bool add_camera(struct nff *nff)
     for (int c = 0; c < 3; c++)
         back[c] = (double)nff->from[c] - (double)nff->look_at[c];
     for (int c = 0; c < 3; c++)
-        right[c] = (double)nff->up[(c + 1) % 3] * back[(c + 2) % 3] - (double)nff->up[(c + 2) % 3] * back[(c + 1) % 3];
+        right[c] =
+            (double)nff->up[(c + 1) % 3] * back[(c + 2) % 3] - (double)nff->up[(c + 2) % 3] * back[(c + 1) % 3];
     for (int c = 0; c < 3; c++)
         up[c] = back[(c + 1) % 3] * right[(c + 2) % 3] - back[(c + 2) % 3] * right[(c + 1) % 3];
     for (int axis = 0; axis < 3; axis++) {
@@ -458,9 +463,9 @@ static bool add_camera(struct nff *nff)
     return show(nff, PROTOCOL_NODE_KIND_CAMERA, import_add_camera(nff->scene, &camera), matrix, "view");
 }
 
-/* NFF's lights do not weaken with distance, ours do: each is given the intensity that makes it as bright as NFF wants
- * it at the place that the view looks at (without a view: in the middle of the model). A surface there that scatters
- * all light then sends out what NFF's formula says, Kd times N.L times the light; hence the factor pi. */
+/* NFF's lights do not weaken with distance, ours do: each is given the intensity that makes it as bright as NFF
+ * wants it at the place that the view looks at (without a view: in the middle of the model). A surface there that
+ * scatters all light then sends out what NFF's formula says, Kd times N.L times the light; hence the factor pi. */
 static bool add_lights(struct nff *nff)
 {
     const struct nff_shapes *shapes = &nff->shapes;
@@ -485,7 +490,8 @@ static bool add_lights(struct nff *nff)
         if (!(distance2 > 1e-12))
             distance2 = 1;
         for (int c = 0; c < 3; c++)
-            set.colour[c] = (float)fmin((double)(light->coloured ? light->colour[c] : share) * PI * distance2, 1e12);
+            set.colour[c] =
+                (float)fmin((double)(light->coloured ? light->colour[c] : share) * PI * distance2, 1e12);
         snprintf(name, sizeof name, "light %zu", i + 1);
         set.name = name;
         if (!show(nff, PROTOCOL_NODE_KIND_LIGHT, import_add_light(nff->scene, &set), matrix, name))
@@ -512,7 +518,8 @@ static bool finish(struct nff *nff)
 
 bool nff_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes)
 {
-    struct nff nff = {.scene = scene, .line = 1, .at = (const char *)bytes, .end = (const char *)bytes + size_bytes};
+    struct nff nff = {
+        .scene = scene, .line = 1, .at = (const char *)bytes, .end = (const char *)bytes + size_bytes};
     bool imported = true;
 
     nff.shapes.scene = scene;

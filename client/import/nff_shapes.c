@@ -18,8 +18,8 @@ void nff_free_shapes(struct nff_shapes *shapes)
 }
 
 /* Two arrays that grow together; element sizes in bytes. */
-static bool reserve(struct import_scene *scene, void **first, size_t first_bytes, void **second, size_t second_bytes,
-                    size_t *capacity, size_t wanted)
+static bool reserve(struct import_scene *scene, void **first, size_t first_bytes, void **second,
+                    size_t second_bytes, size_t *capacity, size_t wanted)
 {
     size_t grown_to = *capacity + *capacity / 2 + 64;
     void *grown;
@@ -45,8 +45,8 @@ static bool reserve(struct import_scene *scene, void **first, size_t first_bytes
 static bool reserve_vertices(struct nff_shapes *shapes, size_t more)
 {
     void *positions = shapes->positions, *normals = shapes->normals;
-    bool reserved =
-        reserve(shapes->scene, &positions, 12, &normals, 12, &shapes->vertex_capacity, shapes->vertex_count + more);
+    bool reserved = reserve(shapes->scene, &positions, 12, &normals, 12, &shapes->vertex_capacity,
+                            shapes->vertex_count + more);
 
     shapes->positions = positions;
     shapes->normals = normals;
@@ -94,8 +94,8 @@ static void add_triangle(struct nff_shapes *shapes, uint32_t a, uint32_t b, uint
 bool nff_add_sphere(struct nff_shapes *shapes, const float centre[3], float radius)
 {
     void *spheres = shapes->spheres, *materials = shapes->sphere_materials;
-    bool reserved = reserve(shapes->scene, &spheres, 16, &materials, 4, &shapes->sphere_capacity,
-                            shapes->sphere_count + 1);
+    bool reserved =
+        reserve(shapes->scene, &spheres, 16, &materials, 4, &shapes->sphere_capacity, shapes->sphere_count + 1);
     float *to;
 
     shapes->spheres = spheres;
@@ -207,7 +207,8 @@ bool nff_add_cone(struct nff_shapes *shapes, const float ends[8], const char *wh
         import_note(shapes->scene, PROTOCOL_SEVERITY_WARNING, where, "a cone without height is left out");
         return true;
     }
-    if (!reserve_vertices(shapes, 2 * (NFF_CONE_SEGMENTS + 1)) || !reserve_triangles(shapes, 2 * NFF_CONE_SEGMENTS))
+    if (!reserve_vertices(shapes, 2 * (NFF_CONE_SEGMENTS + 1)) ||
+        !reserve_triangles(shapes, 2 * NFF_CONE_SEGMENTS))
         return false;
     for (int c = 0; c < 3; c++)
         axis[c] /= length;
@@ -247,14 +248,14 @@ static const double tetrahedron[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-
 static const double octahedron[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
 static const double cube[8][3] = {{1, 1, 1},  {1, 1, -1},  {1, -1, 1},  {1, -1, -1},
                                   {-1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}, {-1, -1, -1}};
-static const double icosahedron[12][3] = {{0, 1, PHI},  {0, 1, -PHI},  {0, -1, PHI},  {0, -1, -PHI},
-                                          {1, PHI, 0},  {1, -PHI, 0},  {-1, PHI, 0},  {-1, -PHI, 0},
-                                          {PHI, 0, 1},  {-PHI, 0, 1},  {PHI, 0, -1},  {-PHI, 0, -1}};
+static const double icosahedron[12][3] = {{0, 1, PHI}, {0, 1, -PHI}, {0, -1, PHI}, {0, -1, -PHI},
+                                          {1, PHI, 0}, {1, -PHI, 0}, {-1, PHI, 0}, {-1, -PHI, 0},
+                                          {PHI, 0, 1}, {-PHI, 0, 1}, {PHI, 0, -1}, {-PHI, 0, -1}};
 static const double dodecahedron[20][3] = {
-    {1, 1, 1},           {1, 1, -1},           {1, -1, 1},           {1, -1, -1},          {-1, 1, 1},
-    {-1, 1, -1},         {-1, -1, 1},          {-1, -1, -1},         {0, 1 / PHI, PHI},    {0, 1 / PHI, -PHI},
-    {0, -1 / PHI, PHI},  {0, -1 / PHI, -PHI},  {1 / PHI, PHI, 0},    {1 / PHI, -PHI, 0},   {-1 / PHI, PHI, 0},
-    {-1 / PHI, -PHI, 0}, {PHI, 0, 1 / PHI},    {-PHI, 0, 1 / PHI},   {PHI, 0, -1 / PHI},   {-PHI, 0, -1 / PHI}};
+    {1, 1, 1},           {1, 1, -1},          {1, -1, 1},         {1, -1, -1},        {-1, 1, 1},
+    {-1, 1, -1},         {-1, -1, 1},         {-1, -1, -1},       {0, 1 / PHI, PHI},  {0, 1 / PHI, -PHI},
+    {0, -1 / PHI, PHI},  {0, -1 / PHI, -PHI}, {1 / PHI, PHI, 0},  {1 / PHI, -PHI, 0}, {-1 / PHI, PHI, 0},
+    {-1 / PHI, -PHI, 0}, {PHI, 0, 1 / PHI},   {-PHI, 0, 1 / PHI}, {PHI, 0, -1 / PHI}, {-PHI, 0, -1 / PHI}};
 
 static double dot(const double a[3], const double b[3])
 {

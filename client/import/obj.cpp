@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Wavefront OBJ through tinyobjloader's callbacks: it cuts lines into numbers, everything that is done with them is
-// done here. One mesh for the whole file; triangles sorted by material.
+// Wavefront OBJ through tinyobjloader's callbacks: it cuts lines into numbers, everything that is done with them
+// is done here. One mesh for the whole file; triangles sorted by material.
 #include "obj.hpp"
 
 #include <algorithm>

@@ -47,7 +47,7 @@ struct prepared {
     {
         return mended.empty() ? original_bytes : mended.size();
     }
-    std::vector<uint8_t> colours; // 4 a vertex, linear; empty: the file has none
+    std::vector<uint8_t> colours;       // 4 a vertex, linear; empty: the file has none
     std::vector<std::string> libraries; // whole arguments of mtllib: names with spaces
     bool has_points_or_lines;
 };

@@ -33,8 +33,8 @@ struct image {
 
 struct building {
     reader &r;
-    std::map<std::string, image> images;         // by file name
-    std::map<std::string, uint32_t> textures;    // by file name and use
+    std::map<std::string, image> images;      // by file name
+    std::map<std::string, uint32_t> textures; // by file name and use
 };
 
 // ---- images
@@ -268,7 +268,9 @@ void transparency(const tinyobj::material_t &m, message_set_material &set)
         set.metallic = 0;
         set.roughness = m.shininess >= 100 || refracts ? 0 : set.roughness;
         for (size_t c = 0; c < 3; c++) // black glass would let nothing through: colours are for the filter
-            set.base_colour[c] = filter > 0 ? unit(m.transmittance[c]) : greatest(m.diffuse) > 0 ? unit(m.diffuse[c]) : 1;
+            set.base_colour[c] = filter > 0                ? unit(m.transmittance[c])
+                                 : greatest(m.diffuse) > 0 ? unit(m.diffuse[c])
+                                                           : 1;
     } else if (through > 0) {
         set.alpha_mode = PROTOCOL_ALPHA_MODE_BLEND;
         set.base_colour[3] = 1 - through;
@@ -282,10 +284,12 @@ void maps(building &b, const tinyobj::material_t &m, message_set_material &set, 
         uses[BASE_COLOUR] = use_of(alpha_texture(b, m, cutout), m.alpha_texopt);
         set.alpha_mode = cutout ? PROTOCOL_ALPHA_MODE_MASK : PROTOCOL_ALPHA_MODE_BLEND;
     } else if (!m.diffuse_texname.empty()) {
-        uses[BASE_COLOUR] = use_of(plain_texture(b, m.diffuse_texname, true, m.diffuse_texopt.clamp), m.diffuse_texopt);
+        uses[BASE_COLOUR] =
+            use_of(plain_texture(b, m.diffuse_texname, true, m.diffuse_texopt.clamp), m.diffuse_texopt);
     }
     if (!m.emissive_texname.empty()) {
-        uses[EMISSION] = use_of(plain_texture(b, m.emissive_texname, true, m.emissive_texopt.clamp), m.emissive_texopt);
+        uses[EMISSION] =
+            use_of(plain_texture(b, m.emissive_texname, true, m.emissive_texopt.clamp), m.emissive_texopt);
         if (greatest(m.emission) <= 0)
             set.emission[0] = set.emission[1] = set.emission[2] = 1;
     }
@@ -296,7 +300,8 @@ void maps(building &b, const tinyobj::material_t &m, message_set_material &set, 
     if (m.bump_texname.empty())
         return;
     const slot at = looks_like_normals(b.images.at(m.bump_texname)) ? NORMAL : BUMP;
-    const double strength = std::isfinite(m.bump_texopt.bump_multiplier) ? double(m.bump_texopt.bump_multiplier) : 1;
+    const double strength =
+        std::isfinite(m.bump_texopt.bump_multiplier) ? double(m.bump_texopt.bump_multiplier) : 1;
     if (at == NORMAL && uses[NORMAL].texture != 0)
         return;
     uses[at] = use_of(plain_texture(b, m.bump_texname, false, m.bump_texopt.clamp), m.bump_texopt);
@@ -307,10 +312,12 @@ void maps(building &b, const tinyobj::material_t &m, message_set_material &set, 
 
 void note_unused(building &b, const tinyobj::material_t &m)
 {
-    const std::pair<const char *, const std::string *> unused[] = {
-        {"map_Ka", &m.ambient_texname},         {"map_Ks", &m.specular_texname},
-        {"map_Ns", &m.specular_highlight_texname}, {"disp", &m.displacement_texname},
-        {"refl", &m.reflection_texname},        {"map_Ps", &m.sheen_texname}};
+    const std::pair<const char *, const std::string *> unused[] = {{"map_Ka", &m.ambient_texname},
+                                                                   {"map_Ks", &m.specular_texname},
+                                                                   {"map_Ns", &m.specular_highlight_texname},
+                                                                   {"disp", &m.displacement_texname},
+                                                                   {"refl", &m.reflection_texname},
+                                                                   {"map_Ps", &m.sheen_texname}};
     for (const auto &entry : unused)
         if (!entry.second->empty())
             import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, m.name.c_str(), "maps of kind %s are not shown",

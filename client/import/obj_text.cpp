@@ -23,7 +23,8 @@ void append_utf8(std::string &out, uint32_t code)
         out += char(0xc0 | (code >> 6));
         out += char(0x80 | (code & 0x3f));
     } else {
-        out += char(0xe0 | (code >> 12)); // those beyond 0xffff come as two surrogates and make two odd characters:
+        out +=
+            char(0xe0 | (code >> 12)); // those beyond 0xffff come as two surrogates and make two odd characters:
         out += char(0x80 | ((code >> 6) & 0x3f)); // they can only stand in names
         out += char(0x80 | (code & 0x3f));
     }
@@ -34,7 +35,8 @@ std::string from_utf16(const unsigned char *bytes, size_t size_bytes, bool big_e
     std::string out;
     out.reserve(size_bytes / 2);
     for (size_t i = 2; i + 1 < size_bytes; i += 2)
-        append_utf8(out, big_endian ? uint32_t(bytes[i]) << 8 | bytes[i + 1] : uint32_t(bytes[i + 1]) << 8 | bytes[i]);
+        append_utf8(out,
+                    big_endian ? uint32_t(bytes[i]) << 8 | bytes[i + 1] : uint32_t(bytes[i + 1]) << 8 | bytes[i]);
     return out;
 }
 
@@ -89,7 +91,8 @@ bool scan_vertex(scan &s, const char *at, const char *end)
             if (c != '.' && c != '-' && c != '+' && c != 'e' && c != 'E') {
                 // The file has a NUL behind its last byte, so strtod() ends.
                 const double value = strtod(starts[count], nullptr);
-                const std::string place = "line " + std::to_string(s.line), token(starts[count], std::find_if(at, end, is_blank));
+                const std::string place = "line " + std::to_string(s.line),
+                                  token(starts[count], std::find_if(at, end, is_blank));
                 if (!std::isfinite(value))
                     return import_fail(s.r.scene, place.c_str(), "'%.20s' is not a finite number", token.c_str());
                 if (count < 3)

@@ -74,7 +74,8 @@ static bool is_ear(const struct corner *corners, uint32_t at, uint64_t *budget)
         return false;
     for (uint32_t i = c->next; i != b->previous; i = corners[i].next) {
         const struct corner *p = &corners[i];
-        bool same = (p->x == a->x && p->y == a->y) || (p->x == b->x && p->y == b->y) || (p->x == c->x && p->y == c->y);
+        bool same =
+            (p->x == a->x && p->y == a->y) || (p->x == b->x && p->y == b->y) || (p->x == c->x && p->y == c->y);
 
         if (*budget > 0)
             --*budget;

@@ -93,7 +93,8 @@ static bool allow_folder(int ruleset, const char *folder, uint64_t rights)
 static bool allow_folders(int ruleset, const struct sandbox_options *options, uint64_t handled)
 {
     /* What the dynamic linker, the C library and the image readers' plug-in search may still open. */
-    static const char *const system_folders[] = {"/usr/lib", "/usr/lib64", "/lib", "/lib64", "/sys/devices/system/cpu"};
+    static const char *const system_folders[] = {"/usr/lib", "/usr/lib64", "/lib", "/lib64",
+                                                 "/sys/devices/system/cpu"};
     const uint64_t read_rights = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
     uint64_t write_rights =
         read_rights | LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_MAKE_REG | LANDLOCK_ACCESS_FS_TRUNCATE;
@@ -104,6 +105,8 @@ static bool allow_folders(int ruleset, const struct sandbox_options *options, ui
     for (size_t i = 0; i < sizeof system_folders / sizeof system_folders[0]; i++)
         if (!allow_folder(ruleset, system_folders[i], read_rights))
             return false;
+    if (SANITIZED && !allow_folder(ruleset, "/proc", read_rights)) /* where the leak sanitizer finds the threads */
+        return false;
     for (size_t i = 0; i < options->read_folder_count; i++)
         if (options->read_folders[i] && !allow_folder(ruleset, options->read_folders[i], read_rights))
             return false;
@@ -137,19 +140,18 @@ static int enter_landlock(const struct sandbox_options *options)
 
 static const char *const allowed_calls[] = {
     /* memory, threads, time */
-    "brk", "mmap", "munmap", "mremap", "mprotect", "madvise", "clone", "clone3", "futex", "set_robust_list", "rseq",
-    "set_tid_address", "sched_yield", "sched_getaffinity", "getcpu", "clock_gettime",
-    "clock_getres", "gettimeofday", "time", "nanosleep", "clock_nanosleep", "restart_syscall", "arch_prctl",
-    "membarrier",
+    "brk", "mmap", "munmap", "mremap", "mprotect", "madvise", "clone", "clone3", "futex", "set_robust_list",
+    "rseq", "set_tid_address", "sched_yield", "sched_getaffinity", "getcpu", "clock_gettime", "clock_getres",
+    "gettimeofday", "time", "nanosleep", "clock_nanosleep", "restart_syscall", "arch_prctl", "membarrier",
     /* descriptors */
-    "read", "readv", "pread64", "write", "writev", "pwrite64", "close", "lseek", "fstat", "newfstatat", "stat", "lstat",
-    "statx", "open", "openat", "openat2", "access", "faccessat", "faccessat2", "readlink", "readlinkat", "getdents64",
-    "dup", "poll", "ppoll", "sendto", "sendmsg", "recvfrom", "recvmsg", "shutdown", "fadvise64", "getcwd", "statfs",
-    "fstatfs", "select", "pselect6",
+    "read", "readv", "pread64", "write", "writev", "pwrite64", "close", "lseek", "fstat", "newfstatat", "stat",
+    "lstat", "statx", "open", "openat", "openat2", "access", "faccessat", "faccessat2", "readlink", "readlinkat",
+    "getdents64", "dup", "poll", "ppoll", "sendto", "sendmsg", "recvfrom", "recvmsg", "shutdown", "fadvise64",
+    "getcwd", "statfs", "fstatfs", "select", "pselect6",
     /* the process itself */
-    "exit", "exit_group", "rt_sigaction", "rt_sigprocmask", "rt_sigreturn", "sigaltstack", "getpid", "gettid", "tgkill",
-    "getuid", "geteuid", "getgid", "getegid", "getppid", "getrandom", "sysinfo", "uname", "getrusage", "times",
-    "getrlimit"};
+    "exit", "exit_group", "rt_sigaction", "rt_sigprocmask", "rt_sigreturn", "sigaltstack", "getpid", "gettid",
+    "tgkill", "getuid", "geteuid", "getgid", "getegid", "getppid", "getrandom", "sysinfo", "uname", "getrusage",
+    "times", "getrlimit"};
 static const char *const write_calls[] = {"fsync", "fdatasync", "ftruncate", "fallocate", "fchmod", "umask"};
 static const char *const rename_calls[] = {"rename", "renameat", "renameat2", "unlink", "unlinkat", "linkat"};
 
@@ -197,7 +199,9 @@ static bool enter_seccomp(const struct sandbox_options *options)
 
     if (!filter)
         return false;
-    entered = allow_calls(filter, allowed_calls, sizeof allowed_calls / sizeof allowed_calls[0]) &&
+    /* Libraries may have started threads before main(): the filter is for them, too. Landlock cannot be. */
+    entered = seccomp_attr_set(filter, SCMP_FLTATR_CTL_TSYNC, 1) == 0 &&
+              allow_calls(filter, allowed_calls, sizeof allowed_calls / sizeof allowed_calls[0]) &&
               allow_arguments(filter);
     if (entered && options->write_folder_count > 0)
         entered = allow_calls(filter, write_calls, sizeof write_calls / sizeof write_calls[0]);
@@ -228,6 +232,7 @@ bool sandbox_enter(const struct sandbox_options *options, char *reason, size_t r
         return false;
     }
     if (landlock < 0)
-        snprintf(reason, reason_bytes, "this kernel has no Landlock: reading is not confined to the model's folder");
+        snprintf(reason, reason_bytes,
+                 "this kernel has no Landlock: reading is not confined to the model's folder");
     return true;
 }

@@ -19,10 +19,10 @@ struct sandbox_options {
     size_t read_folder_count;
     const char *const *write_folders; /* files may be made, written and read beneath them */
     size_t write_folder_count;
-    bool allow_rename;             /* rename and unlink beneath the write folders */
-    uint64_t address_space_bytes;  /* 0: 8 GiB */
-    uint32_t cpu_seconds;          /* 0: unlimited */
-    uint64_t file_bytes;           /* greatest size of a written file; 0: files cannot grow at all */
+    bool allow_rename;            /* rename and unlink beneath the write folders */
+    uint64_t address_space_bytes; /* 0: 8 GiB */
+    uint32_t cpu_seconds;         /* 0: unlimited */
+    uint64_t file_bytes;          /* greatest size of a written file; 0: files cannot grow at all */
 };
 
 /* False, with `reason` set, if a protection that every supported kernel has cannot be had (limits, no new

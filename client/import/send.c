@@ -81,8 +81,10 @@ static bool handle(struct sender *sender, const struct frame *frame)
     if (!frame->info)
         return true;
     scratch_init(&scratch, scratch_bytes, sizeof scratch_bytes);
-    if (!message_decode(&message, frame->header.type, frame->payload, frame->header.payload_bytes, &scratch, &error))
-        return import_fail(sender->scene, NULL, "the server sent an invalid message: %s: %s", error.field, error.text);
+    if (!message_decode(&message, frame->header.type, frame->payload, frame->header.payload_bytes, &scratch,
+                        &error))
+        return import_fail(sender->scene, NULL, "the server sent an invalid message: %s: %s", error.field,
+                           error.text);
     switch (message.type) {
     case MESSAGE_OK:
         handle_ok(sender, request);
@@ -139,8 +141,8 @@ static bool receive(struct sender *sender)
 
 /* ---- what goes out ---- */
 
-/* Waits until something could be sent (if there is something) or has been received. Reading while sending keeps two
- * full sockets from waiting for each other. */
+/* Waits until something could be sent (if there is something) or has been received. Reading while sending keeps
+ * two full sockets from waiting for each other. */
 static bool exchange(struct sender *sender)
 {
     struct pollfd poller = {.fd = sender->socket, .events = POLLIN};

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Speaks the protocol to the program that started this one, over a connected stream socket and without handshake. */
+/* Speaks the protocol to the program that started this one, over a connected stream socket and without handshake.
+ */
 #ifndef FARLIGHT_IMPORT_SEND_H
 #define FARLIGHT_IMPORT_SEND_H
 
@@ -14,8 +15,9 @@ struct sender {
     uint64_t credit_bytes; /* of channel 1, in all */
     uint64_t sent_bytes;   /* of blob data */
     uint32_t last_request;
-    uint32_t first_upload, uploads_open; /* requests first_upload .. last_request, and how many lack their answer */
-    uint32_t awaited;                    /* request whose answer is waited for; 0: none */
+    uint32_t first_upload,
+        uploads_open; /* requests first_upload .. last_request, and how many lack their answer */
+    uint32_t awaited; /* request whose answer is waited for; 0: none */
     bool answered;
     bool *needed; /* of the lot that is offered */
     uint32_t offered;

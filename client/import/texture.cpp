@@ -30,10 +30,17 @@ struct signature {
 };
 // Targa has no signature: it is what remains, and its header is checked for plausibility.
 const signature signatures[] = {
-    {"png", 0, 8, "\x89PNG\r\n\x1a\n"}, {"jpeg", 0, 3, "\xff\xd8\xff"},  {"openexr", 0, 4, "\x76\x2f\x31\x01"},
-    {"hdr", 0, 10, "#?RADIANCE"},       {"hdr", 0, 6, "#?RGBE"},         {"tiff", 0, 4, "II*\0"},
-    {"tiff", 0, 4, "MM\0*"},            {"webp", 8, 4, "WEBP"},          {"bmp", 0, 2, "BM"},
-    {"gif", 0, 6, "GIF87a"},            {"gif", 0, 6, "GIF89a"},
+    {"png", 0, 8, "\x89PNG\r\n\x1a\n"},
+    {"jpeg", 0, 3, "\xff\xd8\xff"},
+    {"openexr", 0, 4, "\x76\x2f\x31\x01"},
+    {"hdr", 0, 10, "#?RADIANCE"},
+    {"hdr", 0, 6, "#?RGBE"},
+    {"tiff", 0, 4, "II*\0"},
+    {"tiff", 0, 4, "MM\0*"},
+    {"webp", 8, 4, "WEBP"},
+    {"bmp", 0, 2, "BM"},
+    {"gif", 0, 6, "GIF87a"},
+    {"gif", 0, 6, "GIF89a"},
 };
 
 bool looks_like_targa(const unsigned char *bytes, size_t size_bytes)
@@ -267,8 +274,9 @@ bool environment_decode(import_scene *scene, const char *file, const unsigned ch
         for (size_t c = 0; c < 3; c++)
             halves[i * 4 + c] = half_of(pixels[i * size_t(channels) + (channels == 3 ? c : 0)]);
     if (image.spec.width != 2 * image.spec.height)
-        import_note(scene, PROTOCOL_SEVERITY_INFO, file, "is %d x %d; an equirectangular image is twice as wide as high",
-                    image.spec.width, image.spec.height);
+        import_note(scene, PROTOCOL_SEVERITY_INFO, file,
+                    "is %d x %d; an equirectangular image is twice as wide as high", image.spec.width,
+                    image.spec.height);
     message_set_environment environment = {};
     environment.colour[0] = environment.colour[1] = environment.colour[2] = 1;
     environment.width = uint32_t(image.spec.width);
