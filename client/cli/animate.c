@@ -24,7 +24,8 @@ static const struct argp_option options[] = {
     {"frames", KEY_FRAMES, "A-B[:STEP]", 0, "Which frames", 0},
     {"fps", KEY_FPS, "N", 0, "Frames per second (default 24); frame A is at time 0", 0},
     {"orbit", KEY_ORBIT, "DEGREES", OPTION_ARG_OPTIONAL,
-     "Turn about the scene, or about --look-at; over the range in all (default 360; --orbit=180 with the sign =)", 0},
+     "Turn about the scene, or about --look-at; over the range in all (default 360; --orbit=180 with the sign =)",
+     0},
     {"keys", KEY_KEYS, "FILE.json", 0,
      "Camera keys: array of {\"time\", \"eye\", \"look_at\", \"up\", \"fov\"}; seconds, degrees", 0},
     {0}};
@@ -33,7 +34,8 @@ static error_t parse_frames(struct animation *animation, const char *value)
 {
     struct fl_job_options *wanted = &animation->job.options;
     animation->has_frames = true;
-    if (fl_text_range(value, &wanted->first_frame, &wanted->last_frame, &wanted->frame_step, &animation->job.error))
+    if (fl_text_range(value, &wanted->first_frame, &wanted->last_frame, &wanted->frame_step,
+                      &animation->job.error))
         return 0;
     snprintf(animation->job.error.field, sizeof animation->job.error.field, "--frames");
     return EINVAL;

@@ -59,7 +59,8 @@ struct cli_progress {
 };
 
 void cli_progress_begin(struct cli_progress *progress, bool silent);
-void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes, const char *what);
+void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes,
+                         const char *what);
 /* From the first call on frames are counted. */
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total);
 /* Removes the bar, so that something else can be written. */

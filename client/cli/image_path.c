@@ -109,7 +109,8 @@ bool cli_copy_to_stdout(const char *path, struct fl_error *error)
             if (wrote >= 0)
                 put += wrote;
             else if (errno != EINTR)
-                good = fl_error_set(error, FL_ERROR_FILE, "standard output", "cannot be written: %s", strerror(errno));
+                good = fl_error_set(error, FL_ERROR_FILE, "standard output", "cannot be written: %s",
+                                    strerror(errno));
         }
     }
     if (good && got < 0)

@@ -48,7 +48,8 @@ static json_t *lists(const struct fl_model_info *info)
 {
     json_t *cameras = json_array(), *clips = json_array(), *notes = json_array();
     for (size_t i = 0; i < info->camera_count; i++)
-        json_array_append_new(cameras, json_pack("{s:I,s:o}", "index", (json_int_t)i, "name", string(info->cameras[i].name)));
+        json_array_append_new(
+            cameras, json_pack("{s:I,s:o}", "index", (json_int_t)i, "name", string(info->cameras[i].name)));
     for (size_t i = 0; i < info->clip_count; i++)
         json_array_append_new(clips, json_pack("{s:o,s:I,s:f}", "name", string(info->clips[i].name), "channels",
                                                (json_int_t)info->clips[i].channels, "duration_s",
@@ -102,16 +103,16 @@ static void print_table(const struct info_options *wanted, const struct fl_model
     const struct {
         const char *name;
         uint64_t value;
-    } rows[] = {{"nodes", info->nodes},           {"meshes", info->meshes},     {"triangles", info->triangles},
-                {"spheres", info->spheres},       {"discs", info->discs},       {"materials", info->materials},
-                {"textures", info->textures},     {"lights", info->lights},     {"cameras", info->camera_count},
+    } rows[] = {{"nodes", info->nodes},       {"meshes", info->meshes}, {"triangles", info->triangles},
+                {"spheres", info->spheres},   {"discs", info->discs},   {"materials", info->materials},
+                {"textures", info->textures}, {"lights", info->lights}, {"cameras", info->camera_count},
                 {"clips", info->clip_count}};
     print_text(wanted->model != NULL ? wanted->model : wanted->environment);
     printf("\n");
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
         printf("  %-10s %12" PRIu64 "\n", rows[i].name, rows[i].value);
-    printf("  %-10s %12.3f MB in files, %.3f MB to upload at most\n", "bytes", (double)info->import.read_bytes * 1e-6,
-           (double)info->import.offered_bytes * 1e-6);
+    printf("  %-10s %12.3f MB in files, %.3f MB to upload at most\n", "bytes",
+           (double)info->import.read_bytes * 1e-6, (double)info->import.offered_bytes * 1e-6);
     for (size_t i = 0; i < info->camera_count; i++) {
         printf("  camera %zu: ", i);
         print_text(info->cameras[i].name);
@@ -135,8 +136,10 @@ static void print_table(const struct info_options *wanted, const struct fl_model
 
 int cli_info(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = options, .parser = parse, .args_doc = "MODEL", .doc = "Say what a model file holds, and what of it cannot be used."};
+    static const struct argp argp = {.options = options,
+                                     .parser = parse,
+                                     .args_doc = "MODEL",
+                                     .doc = "Say what a model file holds, and what of it cannot be used."};
     struct info_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);

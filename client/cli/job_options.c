@@ -125,18 +125,22 @@ static error_t set_name(struct cli_job *job, int key, const char *field, const c
     case KEY_TRACER:
         return protocol_tracer_parse(value, &wanted->tracer) ? 0 : unknown_value(job, field, "tracer", value);
     case KEY_BVH_BOUNDS:
-        return protocol_bvh_bounds_parse(value, &wanted->bvh_bounds) ? 0
-                                                                     : unknown_value(job, field, "bvh_bounds", value);
+        return protocol_bvh_bounds_parse(value, &wanted->bvh_bounds)
+                   ? 0
+                   : unknown_value(job, field, "bvh_bounds", value);
     case KEY_INTEGRATOR:
-        return protocol_integrator_parse(value, &wanted->integrator) ? 0
-                                                                     : unknown_value(job, field, "integrator", value);
+        return protocol_integrator_parse(value, &wanted->integrator)
+                   ? 0
+                   : unknown_value(job, field, "integrator", value);
     case KEY_PRIMARY:
         return protocol_primary_parse(value, &wanted->primary) ? 0 : unknown_value(job, field, "primary", value);
     case KEY_TONE_MAP:
-        return protocol_tone_map_parse(value, &wanted->tone_map) ? 0 : unknown_value(job, field, "tone_map", value);
+        return protocol_tone_map_parse(value, &wanted->tone_map) ? 0
+                                                                 : unknown_value(job, field, "tone_map", value);
     case KEY_ENCODING:
         job->has_encoding = true;
-        return protocol_encoding_parse(value, &wanted->encoding) ? 0 : unknown_value(job, field, "encoding", value);
+        return protocol_encoding_parse(value, &wanted->encoding) ? 0
+                                                                 : unknown_value(job, field, "encoding", value);
     case KEY_FORMAT:
         job->image = cli_image_by_name(value);
         return job->image != CLI_IMAGE_UNKNOWN
@@ -253,9 +257,9 @@ const struct argp cli_job_argp = {.options = options, .parser = parse};
 /* FARLIGHT_SIZE for --size, and so on. */
 static bool read_environment(struct cli_job *job)
 {
-    static const int keys[] = {KEY_SERVER,   KEY_SIZE,     KEY_SAMPLES,    KEY_DEPTH,      KEY_SEED,
-                               KEY_EXPOSURE, KEY_TONE_MAP, KEY_TRACER,     KEY_BVH_BOUNDS, KEY_INTEGRATOR,
-                               KEY_PRIMARY,  KEY_ENCODING, KEY_QUALITY,    KEY_ENVIRONMENT};
+    static const int keys[] = {KEY_SERVER,   KEY_SIZE,     KEY_SAMPLES, KEY_DEPTH,      KEY_SEED,
+                               KEY_EXPOSURE, KEY_TONE_MAP, KEY_TRACER,  KEY_BVH_BOUNDS, KEY_INTEGRATOR,
+                               KEY_PRIMARY,  KEY_ENCODING, KEY_QUALITY, KEY_ENVIRONMENT};
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
         char field[40] = "FARLIGHT_";
         size_t length = strlen(field);

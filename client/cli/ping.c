@@ -56,17 +56,20 @@ static bool ping(struct fl_connection *connection, const struct ping_options *wa
 
 int cli_ping(int argc, char **argv)
 {
-    static const struct argp argp = {.options = options, .parser = parse, .doc = "Measure the way to a daemon and back."};
+    static const struct argp argp = {
+        .options = options, .parser = parse, .doc = "Measure the way to a daemon and back."};
     struct ping_options wanted = {.server = getenv("FARLIGHT_SERVER"), .count = 5};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
+    if (wanted.server != NULL && wanted.server[0] == '\0')
+        wanted.server = NULL; /* an empty FARLIGHT_SERVER names none */
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    struct fl_connection *connection = fl_connect(
-        &(struct fl_connect_options){
-            .server = wanted.server, .name = "farlight ping", .interrupt_fd = cli_interrupt_fd()},
-        &error);
+    struct fl_connection *connection = fl_connect(&(struct fl_connect_options){.server = wanted.server,
+                                                                               .name = "farlight ping",
+                                                                               .interrupt_fd = cli_interrupt_fd()},
+                                                  &error);
     const bool done = connection != NULL && ping(connection, &wanted, &error);
     fl_connection_destroy(connection);
     return done ? CLI_DONE : cli_report(&error);

@@ -24,7 +24,8 @@ static unsigned columns(void)
 
 void cli_progress_begin(struct cli_progress *progress, bool silent)
 {
-    *progress = (struct cli_progress){.silent = silent, .bar = cli_is_terminal(STDERR_FILENO), .begin_ns = now_ns()};
+    *progress =
+        (struct cli_progress){.silent = silent, .bar = cli_is_terminal(STDERR_FILENO), .begin_ns = now_ns()};
 }
 
 void cli_progress_clear(struct cli_progress *progress)
@@ -54,7 +55,8 @@ static bool is_due(struct cli_progress *progress, bool always)
 }
 
 /* `what` of our own importer, but the importer is not trusted: only plain characters are shown. */
-void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes, const char *what)
+void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uint64_t total_bytes,
+                         const char *what)
 {
     if (progress->silent || !progress->bar || !is_due(progress, false))
         return;
@@ -111,7 +113,8 @@ void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t 
         print_duration(left, sizeof left, (total - done) / rate);
     int length = snprintf(numbers, sizeof numbers, "%u of %u frames", done, total);
     if (left[0] != '\0')
-        length += snprintf(numbers + length, sizeof numbers - (size_t)length, ", %.2f frames/s, %s left", rate, left);
+        length +=
+            snprintf(numbers + length, sizeof numbers - (size_t)length, ", %.2f frames/s, %s left", rate, left);
     if (!progress->bar) {
         fprintf(stderr, "%s\n", numbers);
         return;

@@ -30,7 +30,8 @@ int cli_render(int argc, char **argv)
                                             "FARLIGHT_SAMPLES and so on give defaults.",
                                      .children = children};
     struct cli_job job;
-    if (!cli_job_begin(&job) || argp_parse(&argp, argc, argv, 0, NULL, &job) != 0 || !cli_job_complete(&job, false))
+    if (!cli_job_begin(&job) || argp_parse(&argp, argc, argv, 0, NULL, &job) != 0 ||
+        !cli_job_complete(&job, false))
         return cli_report(&job.error);
     return cli_run_job(&job, false);
 }

@@ -100,10 +100,10 @@ static bool load_scene(struct session *session, struct fl_error *error)
     load.started = fl_import_start(&load, error);
     if (load.started == NULL)
         return false;
-    session->connection = fl_connect(
-        &(struct fl_connect_options){
-            .server = job->server, .name = "farlight", .interrupt_fd = cli_interrupt_fd()},
-        error);
+    session->connection = fl_connect(&(struct fl_connect_options){.server = job->server,
+                                                                  .name = "farlight",
+                                                                  .interrupt_fd = cli_interrupt_fd()},
+                                     error);
     if (session->connection == NULL) {
         fl_import_destroy(load.started);
         return false;
@@ -202,8 +202,9 @@ static bool run(struct session *session, struct fl_error *error)
 {
     struct cli_job *job = session->job;
     if ((job->model != NULL && !cli_check_input(job->model, error)) ||
-        (job->environment != NULL && !cli_check_input(job->environment, error)) || !prepare_output(session, error) ||
-        !load_scene(session, error) || !choose_camera(session, error) || !start_exporter(session, error))
+        (job->environment != NULL && !cli_check_input(job->environment, error)) ||
+        !prepare_output(session, error) || !load_scene(session, error) || !choose_camera(session, error) ||
+        !start_exporter(session, error))
         return false;
     session->rendering = fl_render_start(session->scene, &job->options, error);
     return session->rendering != NULL && take_frames(session, error);

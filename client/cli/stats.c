@@ -98,7 +98,8 @@ static json_t *stages_array(const struct message_stats_reply *reply)
 
 static void print_json(const struct message_stats_reply *reply)
 {
-    json_t *object = json_pack("{s:s,s:s,s:s}", "version", reply->version, "device", reply->device, "driver", reply->driver);
+    json_t *object =
+        json_pack("{s:s,s:s,s:s}", "version", reply->version, "device", reply->device, "driver", reply->driver);
     set(object, "uptime_ns", reply->uptime_ns);
     set(object, "frames", reply->frames);
     set(object, "rays", reply->rays);
@@ -154,13 +155,15 @@ static void print_table(const struct message_stats_reply *reply)
     printf(", up %.1f s\n", (double)reply->uptime_ns * 1e-9);
     printf("device       %s\n", plain(reply->device, text));
     printf("driver       %s\n", plain(reply->driver, text));
-    printf("work         %" PRIu64 " frames, %" PRIu64 " rays, %u jobs now\n", reply->frames, reply->rays, reply->jobs);
+    printf("work         %" PRIu64 " frames, %" PRIu64 " rays, %u jobs now\n", reply->frames, reply->rays,
+           reply->jobs);
     printf("host memory  %.3f MB of %.0f MB\n", mb(reply->host_bytes), mb(reply->host_limit_bytes));
     printf("device mem.  %.3f MB of %.0f MB\n", mb(reply->device_bytes), mb(reply->device_limit_bytes));
     printf("blobs        %u, %.3f MB\n", reply->blobs, mb(reply->blob_bytes));
     for (uint32_t i = 0; i < reply->clients_count; i++) {
         const struct record_client_stat *client = &reply->clients[i];
-        printf("client %-5" PRIu64 " %s, %.1f s, %.3f MB in (%.3f MB blobs), %.3f MB out, %u requests, %u scenes\n",
+        printf("client %-5" PRIu64
+               " %s, %.1f s, %.3f MB in (%.3f MB blobs), %.3f MB out, %u requests, %u scenes\n",
                client->client, plain(client->name, text), (double)client->connected_ns * 1e-9,
                mb(client->received_bytes), mb(client->bulk_bytes), mb(client->sent_bytes), client->requests,
                client->scenes);
@@ -169,16 +172,17 @@ static void print_table(const struct message_stats_reply *reply)
         const struct record_scene_stat *scene = &reply->scenes[i];
         printf("scene %" PRIu64 ".%-4u %s, revision %" PRIu64 ", %u nodes, %" PRIu64 " triangles, %" PRIu64
                " spheres, %.3f MB host, %.3f MB device\n",
-               scene->client, scene->scene, plain(scene->name, text), scene->revision, scene->nodes, scene->triangles,
-               scene->spheres, mb(scene->host_bytes), mb(scene->device_bytes));
+               scene->client, scene->scene, plain(scene->name, text), scene->revision, scene->nodes,
+               scene->triangles, scene->spheres, mb(scene->host_bytes), mb(scene->device_bytes));
     }
     print_stages(reply);
 }
 
 int cli_stats(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = options, .parser = parse, .doc = "Show a daemon's device, clients, scenes, memory and stage times."};
+    static const struct argp argp = {.options = options,
+                                     .parser = parse,
+                                     .doc = "Show a daemon's device, clients, scenes, memory and stage times."};
     struct stats_options wanted = {.server = getenv("FARLIGHT_SERVER")};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
@@ -190,10 +194,10 @@ int cli_stats(int argc, char **argv)
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    struct fl_connection *connection = fl_connect(
-        &(struct fl_connect_options){
-            .server = wanted.server, .name = "farlight stats", .interrupt_fd = cli_interrupt_fd()},
-        &error);
+    struct fl_connection *connection = fl_connect(&(struct fl_connect_options){.server = wanted.server,
+                                                                               .name = "farlight stats",
+                                                                               .interrupt_fd = cli_interrupt_fd()},
+                                                  &error);
     const struct message_stats_reply *reply = NULL;
     const bool done = connection != NULL && fl_stats(connection, &reply, &error);
     if (done && wanted.json)

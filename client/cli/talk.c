@@ -28,8 +28,7 @@ static void say(const char *kind, const char *colour, const struct fl_error *wha
 
 int cli_report(const struct fl_error *error)
 {
-    if (error->code == FL_ERROR_INTERRUPTED && cli_interrupt_signal() != 0)
-    {
+    if (error->code == FL_ERROR_INTERRUPTED && cli_interrupt_signal() != 0) {
         say("", "", error);
         return 128 + cli_interrupt_signal();
     }

@@ -19,7 +19,8 @@ struct sum {
 struct cli_timings {
     enum cli_timings_form form;
     FILE *out;
-    uint64_t frames, primary_rays, shadow_rays, secondary_rays, splits, wire_bytes, uploaded_bytes, structure_bytes;
+    uint64_t frames, primary_rays, shadow_rays, secondary_rays, splits, wire_bytes, uploaded_bytes,
+        structure_bytes;
     uint64_t pixels_bytes, wait_ns, receive_ns, decode_ns;
     struct sum stages[STAGES][CLOCKS];
     struct sum waves[2][WAVES_SHOWN][CLOCKS]; /* trace, shade */
@@ -64,9 +65,9 @@ static void add_frame(struct cli_timings *timings, const struct fl_frame *frame)
 {
     if (timings->frames++ == 0)
         snprintf(timings->title, sizeof timings->title, "%ux%u, %u sample%s, %s, %s, %s %s", frame->width,
-                 frame->height, frame->samples, frame->samples == 1 ? "" : "s", protocol_tracer_text(frame->tracer),
-                 protocol_integrator_text(frame->integrator), protocol_pixel_format_text(frame->format),
-                 protocol_encoding_text(frame->encoding));
+                 frame->height, frame->samples, frame->samples == 1 ? "" : "s",
+                 protocol_tracer_text(frame->tracer), protocol_integrator_text(frame->integrator),
+                 protocol_pixel_format_text(frame->format), protocol_encoding_text(frame->encoding));
     timings->primary_rays += frame->primary_rays;
     timings->shadow_rays += frame->shadow_rays;
     timings->secondary_rays += frame->secondary_rays;
@@ -95,10 +96,10 @@ static json_t *stages_array(const struct fl_frame *frame)
     json_t *array = json_array();
     for (size_t i = 0; i < frame->stage_count; i++) {
         const struct record_stage_time *time = &frame->stages[i];
-        json_array_append_new(
-            array, json_pack("{s:s,s:s,s:I,s:I,s:I}", "stage", protocol_stage_text(time->stage), "clock",
-                             protocol_clock_text(time->clock), "wave", (json_int_t)time->wave, "start_ns",
-                             (json_int_t)time->start_ns, "duration_ns", (json_int_t)time->duration_ns));
+        json_array_append_new(array, json_pack("{s:s,s:s,s:I,s:I,s:I}", "stage", protocol_stage_text(time->stage),
+                                               "clock", protocol_clock_text(time->clock), "wave",
+                                               (json_int_t)time->wave, "start_ns", (json_int_t)time->start_ns,
+                                               "duration_ns", (json_int_t)time->duration_ns));
     }
     return array;
 }
@@ -112,11 +113,10 @@ static void print_frame(struct cli_timings *timings, const struct fl_frame *fram
 {
     char digest[20];
     snprintf(digest, sizeof digest, "%016" PRIx64, frame->digest);
-    json_t *object = json_pack("{s:s,s:s,s:s,s:s,s:s,s:s}", "kind", "frame", "tracer",
-                               protocol_tracer_text(frame->tracer), "integrator",
-                               protocol_integrator_text(frame->integrator), "format",
-                               protocol_pixel_format_text(frame->format), "encoding",
-                               protocol_encoding_text(frame->encoding), "digest", digest);
+    json_t *object = json_pack(
+        "{s:s,s:s,s:s,s:s,s:s,s:s}", "kind", "frame", "tracer", protocol_tracer_text(frame->tracer), "integrator",
+        protocol_integrator_text(frame->integrator), "format", protocol_pixel_format_text(frame->format),
+        "encoding", protocol_encoding_text(frame->encoding), "digest", digest);
     set(object, "frame", frame->frame);
     set(object, "width", frame->width);
     set(object, "height", frame->height);
@@ -218,9 +218,10 @@ static void print_rays(const struct cli_timings *timings)
         fprintf(timings->out, "; %.2f Mray/s in primary and trace", (double)rays * 1e3 / (double)ns);
     if (timings->splits > 0)
         fprintf(timings->out, "; %" PRIu64 " slices done again as halves", timings->splits);
-    fprintf(timings->out, "\n  %-16s%12.3f MB of %.3f MB pixels; to the device %.3f MB; structure %.3f MB\n", "bytes sent",
-            (double)timings->wire_bytes * 1e-6 / frames, (double)timings->pixels_bytes * 1e-6 / frames,
-            (double)timings->uploaded_bytes * 1e-6 / frames, (double)timings->structure_bytes * 1e-6);
+    fprintf(timings->out, "\n  %-16s%12.3f MB of %.3f MB pixels; to the device %.3f MB; structure %.3f MB\n",
+            "bytes sent", (double)timings->wire_bytes * 1e-6 / frames,
+            (double)timings->pixels_bytes * 1e-6 / frames, (double)timings->uploaded_bytes * 1e-6 / frames,
+            (double)timings->structure_bytes * 1e-6);
 }
 
 static void print_part(const struct cli_timings *timings, const char *name, uint64_t ns, const char *doc)

@@ -44,8 +44,9 @@ static bool drain(struct direction *way, short revents, struct fl_error *error)
     if (revents != 0 && way->end > way->start) {
         const size_t left = way->end - way->start;
         /* A pipe that is ready takes at least PIPE_BUF without blocking. */
-        const ssize_t put = way->to_is_socket ? send(way->to, way->data + way->start, left, MSG_NOSIGNAL | MSG_DONTWAIT)
-                                              : write(way->to, way->data + way->start, left < 4096 ? left : 4096);
+        const ssize_t put = way->to_is_socket
+                                ? send(way->to, way->data + way->start, left, MSG_NOSIGNAL | MSG_DONTWAIT)
+                                : write(way->to, way->data + way->start, left < 4096 ? left : 4096);
         if (put < 0)
             return failed(errno, error);
         way->start += (size_t)put;
@@ -66,7 +67,8 @@ static bool carry(struct direction *up, struct direction *down, struct fl_error 
         struct pollfd polled[4];
         for (unsigned i = 0; i < 2; i++) {
             const bool holds = ways[i]->end > ways[i]->start;
-            polled[2 * i] = (struct pollfd){.fd = ways[i]->from, .events = holds || ways[i]->source_ended ? 0 : POLLIN};
+            polled[2 * i] =
+                (struct pollfd){.fd = ways[i]->from, .events = holds || ways[i]->source_ended ? 0 : POLLIN};
             polled[2 * i + 1] = (struct pollfd){.fd = ways[i]->to, .events = holds ? POLLOUT : 0};
         }
         if (!fl_wait(polled, 4, 0, UINT64_MAX, error))

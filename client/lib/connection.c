@@ -183,7 +183,8 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
     for (;;) {
         if (!serve(connection, deadline_ns, error)) {
             if (error->code == FL_ERROR_TIMEOUT)
-                fl_error_set(error, FL_ERROR_TIMEOUT, connection->address, "the daemon does not answer the handshake");
+                fl_error_set(error, FL_ERROR_TIMEOUT, connection->address,
+                             "the daemon does not answer the handshake");
             return false;
         }
         struct handshake_reply reply;
@@ -192,8 +193,8 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
         const enum handshake_result result = handshake_reply_parse(
             &reply, stream->in + stream->in_start, stream->in_end - stream->in_start, &consumed, &why);
         if (result == HANDSHAKE_FATAL)
-            return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "no farlight daemon answers there: %s",
-                                why.text);
+            return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address,
+                                "no farlight daemon answers there: %s", why.text);
         if (result == HANDSHAKE_CONSUMED) {
             stream->in_start += consumed;
             if (!handshake_reply_accept(&hello, &reply, &why))

@@ -16,10 +16,10 @@ struct fl_connection {
     struct handshake_limits limits;
     int interrupt_fd;
     uint32_t last_request, last_scene, last_channel;
-    uint64_t upload_credit; /* the daemon's total for the upload channel */
-    uint64_t upload_sent;   /* bytes of blob data sent on it so far */
-    struct fl_job *job;     /* the one that runs */
-    struct fl_error broken; /* why nothing works any more; code NONE: it does */
+    uint64_t upload_credit;           /* the daemon's total for the upload channel */
+    uint64_t upload_sent;             /* bytes of blob data sent on it so far */
+    struct fl_job *job;               /* the one that runs */
+    struct fl_error broken;           /* why nothing works any more; code NONE: it does */
     struct message_stats_reply stats; /* the last answer */
     uint64_t start_ns;
     bool local;

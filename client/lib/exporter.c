@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The exporter program as seen from here: frames go in, one answer a file comes back. */
 #include "lib/connection.h"
+#include "lib/text.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,7 +30,7 @@ struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options,
     }
     exporter->stream.fd = -1;
     exporter->interrupt_fd = options->interrupt_fd;
-    snprintf(exporter->model, sizeof exporter->model, "%s", options->model != NULL ? options->model : "");
+    fl_text_utf8(options->model != NULL ? options->model : "", exporter->model, sizeof exporter->model);
     char rate[32];
     snprintf(rate, sizeof rate, "%.9g", (double)options->frames_per_second);
     const char *const arguments[] = {"--folder", options->folder, options->frames_per_second > 0 ? "--fps" : NULL,

@@ -48,7 +48,7 @@ enum fl_error_code {
     FL_ERROR_TIMEOUT,     /* a deadline passed */
     FL_ERROR_INTERRUPTED, /* the interrupt descriptor became readable */
     FL_ERROR_MEMORY,
-    FL_ERROR_SYSTEM       /* a system call failed that does not fail */
+    FL_ERROR_SYSTEM /* a system call failed that does not fail */
 };
 
 struct fl_error {
@@ -62,8 +62,8 @@ struct fl_error {
 };
 
 /* Sets *error (may be NULL) and returns false. */
-FL_API bool fl_error_set(struct fl_error *error, enum fl_error_code code, const char *field, const char *format, ...)
-    __attribute__((format(printf, 4, 5)));
+FL_API bool fl_error_set(struct fl_error *error, enum fl_error_code code, const char *field, const char *format,
+                         ...) __attribute__((format(printf, 4, 5)));
 /* Adds a remedy to an error that is set; returns false. */
 FL_API bool fl_error_remedy(struct fl_error *error, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* "FIELD: TEXT (REMEDY)", control characters made harmless; always terminated. */
@@ -77,9 +77,9 @@ struct fl_connect_options {
     /* "unix:PATH", "tcp:HOST:PORT" or "ssh:HOST[:SOCKET]"; NULL: a private daemon over a socketpair, which
      * ends with the connection. ssh runs `farlight bridge unix:SOCKET` on HOST and speaks through it. */
     const char *server;
-    const char *name;     /* how the client calls itself in the daemon's statistics; NULL: "libfarlight" */
-    int interrupt_fd;     /* > 0: calls give up with FL_ERROR_INTERRUPTED when it becomes readable */
-    unsigned timeout_ms;  /* to connect, start and shake hands; 0: 30 s */
+    const char *name;    /* how the client calls itself in the daemon's statistics; NULL: "libfarlight" */
+    int interrupt_fd;    /* > 0: calls give up with FL_ERROR_INTERRUPTED when it becomes readable */
+    unsigned timeout_ms; /* to connect, start and shake hands; 0: 30 s */
     const char *const *daemon_arguments; /* for a private daemon, NULL-terminated; NULL: none */
 };
 
@@ -96,7 +96,8 @@ FL_API const char *fl_connection_address(const struct fl_connection *connection)
 
 FL_API bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error);
 /* *reply is valid until the next call on the connection. */
-FL_API bool fl_stats(struct fl_connection *connection, const struct message_stats_reply **reply, struct fl_error *error);
+FL_API bool fl_stats(struct fl_connection *connection, const struct message_stats_reply **reply,
+                     struct fl_error *error);
 
 /* ---- scenes -------------------------------------------------------------------------------------- */
 
@@ -110,12 +111,12 @@ struct fl_camera_info {
 /* What an import told and cost. Times of the importer overlap with those of the upload. */
 struct fl_import_stats {
     uint64_t read_bytes, read_ns, parse_ns, hash_ns; /* of the model's files, as the importer measured */
-    uint64_t import_ns;                               /* the importer's life */
-    uint64_t load_ns;                                 /* all of it, as the caller waited */
-    uint64_t offered_bytes;                           /* of the blobs that the scene uses */
-    uint64_t uploaded_bytes;                          /* of those that the daemon did not have */
-    uint64_t upload_ns;                               /* from the first of them sent to the last one taken */
-    uint64_t commit_ns;                               /* from commit to the answer: the daemon's work */
+    uint64_t import_ns;                              /* the importer's life */
+    uint64_t load_ns;                                /* all of it, as the caller waited */
+    uint64_t offered_bytes;                          /* of the blobs that the scene uses */
+    uint64_t uploaded_bytes;                         /* of those that the daemon did not have */
+    uint64_t upload_ns;                              /* from the first of them sent to the last one taken */
+    uint64_t commit_ns;                              /* from commit to the answer: the daemon's work */
     uint64_t revision;
 };
 
@@ -223,13 +224,13 @@ struct fl_frame {
     uint64_t digest;
     float exposure_stops, world_from_view[12], fov_y, ortho_height, time_s;
     uint64_t primary_rays, shadow_rays, secondary_rays, splits, uploaded_bytes, structure_bytes;
-    uint64_t wire_bytes;             /* of the encoded pixels */
-    uint64_t receive_ns, decode_ns;  /* first byte to last; decoding and checking */
-    uint64_t wait_ns;                /* how long fl_render_next waited for it */
+    uint64_t wire_bytes;            /* of the encoded pixels */
+    uint64_t receive_ns, decode_ns; /* first byte to last; decoding and checking */
+    uint64_t wait_ns;               /* how long fl_render_next waited for it */
     size_t stage_count;
     struct record_stage_time *stages;
-    size_t pixels_bytes;             /* width * height * 4, 8 or 16 */
-    uint8_t *pixels;                 /* rows from the top, without gaps, in `format` */
+    size_t pixels_bytes; /* width * height * 4, 8 or 16 */
+    uint8_t *pixels;     /* rows from the top, without gaps, in `format` */
 };
 
 /* One job at a time per connection. */
@@ -255,16 +256,16 @@ FL_API bool fl_camera_keys_load(const char *path, struct record_camera_key **key
 struct fl_exporter;
 
 struct fl_exporter_options {
-    const char *folder; /* where the files will be: the program can write nowhere else */
-    const char *model;  /* named in the files; may be NULL */
+    const char *folder;      /* where the files will be: the program can write nowhere else */
+    const char *model;       /* named in the files; may be NULL */
     float frames_per_second; /* named in EXR files; 0: unknown */
     int interrupt_fd;
 };
 struct fl_export_options {
     const char *path;
-    const char *format;      /* "png", "jpeg", "exr", "hdr" where the path's ending does not say; may be NULL */
-    bool half;               /* EXR: half floats */
-    unsigned quality;        /* JPEG; 0: 95 */
+    const char *format; /* "png", "jpeg", "exr", "hdr" where the path's ending does not say; may be NULL */
+    bool half;          /* EXR: half floats */
+    unsigned quality;   /* JPEG; 0: 95 */
 };
 
 FL_API struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error);

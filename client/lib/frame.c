@@ -58,8 +58,8 @@ static uint64_t encoded_bytes_max(const struct fl_frame_expected *expected, size
     }
 }
 
-static bool check_begin(const struct fl_assembly *assembly, const struct message_frame_begin *begin, uint32_t number,
-                        struct fl_error *error)
+static bool check_begin(const struct fl_assembly *assembly, const struct message_frame_begin *begin,
+                        uint32_t number, struct fl_error *error)
 {
     const struct fl_frame_expected *expected = &assembly->expected;
     if (assembly->frame != NULL)
@@ -67,12 +67,13 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
     if (begin->frame != number)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.frame", "frame %u came in place of frame %u",
                             begin->frame, number);
-    if (begin->width != expected->width || begin->height != expected->height || begin->format != expected->format ||
-        begin->encoding != expected->encoding)
+    if (begin->width != expected->width || begin->height != expected->height ||
+        begin->format != expected->format || begin->encoding != expected->encoding)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "%ux%u %s %s came in place of %ux%u %s %s",
                             begin->width, begin->height, protocol_pixel_format_text(begin->format),
                             protocol_encoding_text(begin->encoding), expected->width, expected->height,
-                            protocol_pixel_format_text(expected->format), protocol_encoding_text(expected->encoding));
+                            protocol_pixel_format_text(expected->format),
+                            protocol_encoding_text(expected->encoding));
     const size_t pixels_bytes = (size_t)begin->width * begin->height * fl_bytes_per_pixel(begin->format);
     const uint64_t most = encoded_bytes_max(expected, pixels_bytes);
     const bool exact = begin->encoding == PROTOCOL_ENCODING_RAW;
@@ -120,8 +121,8 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
         return false;
     assembly->frame = new_frame(begin);
     if (assembly->frame != NULL)
-        assembly->encoded = begin->encoding == PROTOCOL_ENCODING_RAW ? assembly->frame->pixels
-                                                                     : malloc((size_t)begin->size_bytes);
+        assembly->encoded =
+            begin->encoding == PROTOCOL_ENCODING_RAW ? assembly->frame->pixels : malloc((size_t)begin->size_bytes);
     if (assembly->frame == NULL || assembly->encoded == NULL)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "no memory for a picture of %ux%u", begin->width,
                             begin->height);
@@ -153,7 +154,8 @@ static bool decode_zstd(const struct fl_assembly *assembly, struct fl_error *err
     const size_t made =
         ZSTD_decompress(frame->pixels, frame->pixels_bytes, assembly->encoded, (size_t)assembly->encoded_bytes);
     if (ZSTD_isError(made))
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "not to be decompressed: %s", ZSTD_getErrorName(made));
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "not to be decompressed: %s",
+                            ZSTD_getErrorName(made));
     if (made != frame->pixels_bytes)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "%zu bytes came out in place of %zu", made,
                             frame->pixels_bytes);
@@ -168,7 +170,8 @@ static bool decode_jpeg(const struct fl_assembly *assembly, struct fl_error *err
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     int width = 0, height = 0, subsampling = 0, colours = 0;
     const unsigned long bytes = (unsigned long)assembly->encoded_bytes;
-    bool good = tjDecompressHeader3(decoder, assembly->encoded, bytes, &width, &height, &subsampling, &colours) == 0;
+    bool good =
+        tjDecompressHeader3(decoder, assembly->encoded, bytes, &width, &height, &subsampling, &colours) == 0;
     if (good && (width != (int)frame->width || height != (int)frame->height)) {
         fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "a JPEG of %dx%d came in place of %ux%u", width, height,
                      frame->width, frame->height);
@@ -191,8 +194,8 @@ static bool decode(const struct fl_assembly *assembly, struct fl_error *error)
     if (frame->encoding == PROTOCOL_ENCODING_ZSTD && !decode_zstd(assembly, error))
         return false;
     if (XXH3_64bits(frame->pixels, frame->pixels_bytes) != frame->digest)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame.digest", "the pixels of frame %u are not those rendered",
-                            frame->frame);
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame.digest",
+                            "the pixels of frame %u are not those rendered", frame->frame);
     frame->digest_checked = true;
     return true;
 }
@@ -215,8 +218,8 @@ static bool take_costs(struct fl_frame *frame, const struct message_frame_end *e
     return true;
 }
 
-struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct message_frame_end *end, uint64_t now_ns,
-                                 struct fl_error *error)
+struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct message_frame_end *end,
+                                 uint64_t now_ns, struct fl_error *error)
 {
     struct fl_frame *frame = assembly->frame;
     if (frame == NULL || end->frame != frame->frame || assembly->received_bytes != assembly->encoded_bytes) {

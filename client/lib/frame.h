@@ -25,8 +25,8 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
                        uint64_t now_ns, struct fl_error *error);
 bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_data *data, struct fl_error *error);
 /* The frame is decoded and checked, and the caller's; NULL on failure. */
-struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct message_frame_end *end, uint64_t now_ns,
-                                 struct fl_error *error);
+struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct message_frame_end *end,
+                                 uint64_t now_ns, struct fl_error *error);
 void fl_assembly_finish(struct fl_assembly *assembly);
 
 #endif

@@ -70,7 +70,8 @@ bool fl_importer_start(struct fl_importer *importer, const struct fl_load_option
     return false;
 }
 
-static bool remember_camera(struct fl_importer *importer, const struct message_set_node *node, struct fl_error *error)
+static bool remember_camera(struct fl_importer *importer, const struct message_set_node *node,
+                            struct fl_error *error)
 {
     if (importer->camera_count >= CAMERAS_MAX)
         return true;
@@ -125,7 +126,7 @@ bool fl_importer_observe(struct fl_importer *importer, const struct message *mes
     case MESSAGE_IMPORT_PROGRESS:
         if (importer->options.progress != NULL)
             importer->options.progress(importer->options.user, message->import_progress.done_bytes,
-                                        message->import_progress.total_bytes, message->import_progress.text);
+                                       message->import_progress.total_bytes, message->import_progress.text);
         return true;
     case MESSAGE_IMPORT_DONE:
         importer->done = true;
@@ -168,7 +169,8 @@ static void complete_names(struct fl_importer *importer)
 void fl_importer_stop(struct fl_importer *importer)
 {
     fl_stream_finish(&importer->stream);
-    if (!importer->done)
+    /* Once it is done it has no more to do than to end. */
+    if (importer->process.pid > 0 && (!importer->done || !fl_process_has_ended(&importer->process, 100)))
         fl_process_kill(&importer->process);
     fl_process_end(&importer->process, 2000);
     importer->stats.load_ns = fl_now_ns() - importer->begin_ns;

@@ -28,7 +28,8 @@ struct fl_importer {
 };
 
 /* Starts the program; it begins to read at once and waits for answers only where it needs some. */
-bool fl_importer_start(struct fl_importer *importer, const struct fl_load_options *options, struct fl_error *error);
+bool fl_importer_start(struct fl_importer *importer, const struct fl_load_options *options,
+                       struct fl_error *error);
 /* Remembers what concerns us: cameras; notes and progress go to the options' callbacks. */
 bool fl_importer_observe(struct fl_importer *importer, const struct message *message, struct fl_error *error);
 /* Why it ended without `done`: its own complaint, else how it ended. Returns false. */

@@ -11,10 +11,10 @@
 struct fl_job {
     struct fl_connection *connection;
     uint32_t request, channel;
-    uint64_t credit;            /* frames that the daemon may have sent by now */
-    uint64_t next_frame;        /* 64 bits: one step beyond the last cannot wrap */
+    uint64_t credit;     /* frames that the daemon may have sent by now */
+    uint64_t next_frame; /* 64 bits: one step beyond the last cannot wrap */
     uint32_t last_frame, frame_step;
-    bool answered;              /* the daemon has given its one answer: nothing more comes */
+    bool answered; /* the daemon has given its one answer: nothing more comes */
     struct fl_assembly assembly;
 };
 
@@ -50,7 +50,8 @@ static void fill_render(struct message_render *render, const struct fl_job_optio
     render->credit = options->frames_in_flight > 0 ? options->frames_in_flight : DEFAULT_FRAMES_IN_FLIGHT;
 }
 
-struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_options *options, struct fl_error *error)
+struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_options *options,
+                               struct fl_error *error)
 {
     struct fl_connection *connection = scene->connection;
     if (connection->job != NULL) {
@@ -124,7 +125,8 @@ static bool take(struct fl_job *job, const struct fl_received *received, struct 
     case MESSAGE_FRAME_BEGIN:
         if (job->next_frame > job->last_frame)
             return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "a frame came after the last");
-        return fl_assembly_begin(&job->assembly, &message->frame_begin, (uint32_t)job->next_frame, fl_now_ns(), error);
+        return fl_assembly_begin(&job->assembly, &message->frame_begin, (uint32_t)job->next_frame, fl_now_ns(),
+                                 error);
     case MESSAGE_FRAME_DATA:
         return fl_assembly_data(&job->assembly, &message->frame_data, error);
     case MESSAGE_FRAME_END:

@@ -25,8 +25,8 @@ static bool wrong(const struct place *place, const char *field, const char *what
 }
 
 /* Missing values keep their default; `needed` ones may not be missing. */
-static bool read_number(const struct place *place, const json_t *object, const char *field, bool needed, double least,
-                        double greatest, double *value)
+static bool read_number(const struct place *place, const json_t *object, const char *field, bool needed,
+                        double least, double greatest, double *value)
 {
     const json_t *found = json_object_get(object, field);
     if (found == NULL)
@@ -64,7 +64,8 @@ static bool check_names(const struct place *place, json_t *object)
     static const char *const known[] = {"time", "eye", "look_at", "up", "fov"};
     const char *name = NULL;
     json_t *value = NULL;
-    json_object_foreach(object, name, value) {
+    json_object_foreach(object, name, value)
+    {
         bool found = false;
         for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
             found = found || strcmp(name, known[i]) == 0;
@@ -130,7 +131,8 @@ static json_t *load(const char *path, struct fl_error *error)
     return root;
 }
 
-bool fl_camera_keys_load(const char *path, struct record_camera_key **keys, size_t *key_count, struct fl_error *error)
+bool fl_camera_keys_load(const char *path, struct record_camera_key **keys, size_t *key_count,
+                         struct fl_error *error)
 {
     json_t *root = load(path, error);
     if (root == NULL)

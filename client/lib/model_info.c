@@ -111,7 +111,8 @@ static bool drain(struct listing *listing, struct fl_error *error)
         if (fl_relay_from_importer(&listing->relay, &frame.header, &message, &request, error) == FL_RELAY_REFUSE)
             return false;
         if (message.type == MESSAGE_BLOB_DATA)
-            return fl_error_set(error, FL_ERROR_PROTOCOL, "farlight-import", "the importer sent what nobody needs");
+            return fl_error_set(error, FL_ERROR_PROTOCOL, "farlight-import",
+                                "the importer sent what nobody needs");
         if (!fl_importer_observe(&listing->importer, &message, error) || !list(listing, &message, error) ||
             !answer(listing, &frame, &message, error))
             return false;
@@ -140,7 +141,8 @@ static bool run(struct listing *listing, int interrupt_fd, struct fl_error *erro
     }
 }
 
-struct fl_model_info *fl_model_info(const struct fl_load_options *options, int interrupt_fd, struct fl_error *error)
+struct fl_model_info *fl_model_info(const struct fl_load_options *options, int interrupt_fd,
+                                    struct fl_error *error)
 {
     struct fl_load_options quiet = *options;
     quiet.note = NULL; /* they are in the result */

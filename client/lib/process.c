@@ -82,7 +82,8 @@ static bool set_attributes(posix_spawnattr_t *attributes, enum fl_wiring wiring)
            posix_spawnattr_setflags(attributes, (short)flags) == 0;
 }
 
-static int spawn(struct fl_process *process, const char *path, char *const *argv, enum fl_wiring wiring, int socket_fd)
+static int spawn(struct fl_process *process, const char *path, char *const *argv, enum fl_wiring wiring,
+                 int socket_fd)
 {
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
@@ -163,8 +164,7 @@ bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiri
     return true;
 }
 
-/* Whether the child has ended within that time; it is not reaped. */
-static bool has_ended(const struct fl_process *process, unsigned timeout_ms)
+bool fl_process_has_ended(const struct fl_process *process, unsigned timeout_ms)
 {
     const uint64_t deadline_ns = fl_now_ns() + timeout_ms * 1000000ull;
     const int fd = pidfd_open(process->pid, 0);
@@ -195,9 +195,9 @@ int fl_process_end(struct fl_process *process, unsigned grace_ms)
 {
     int status = 0;
     if (process->pid > 0) {
-        if (!has_ended(process, grace_ms))
+        if (!fl_process_has_ended(process, grace_ms))
             kill(process->pid, SIGTERM);
-        if (!has_ended(process, 2000))
+        if (!fl_process_has_ended(process, 2000))
             kill(process->pid, SIGKILL);
         while (waitpid(process->pid, &status, 0) < 0 && errno == EINTR)
             continue;
@@ -232,7 +232,7 @@ void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *
 {
     char line[400], how[80] = "";
     last_line(process->talk_fd, line, sizeof line);
-    if (process->pid > 0 && has_ended(process, grace_ms)) {
+    if (process->pid > 0 && fl_process_has_ended(process, grace_ms)) {
         siginfo_t info = {0};
         waitid(P_PID, (id_t)process->pid, &info, WEXITED | WNOHANG | WNOWAIT);
         last_line(process->talk_fd, line, sizeof line);

@@ -14,7 +14,7 @@ enum fl_wiring {
 };
 
 struct fl_process {
-    pid_t pid;  /* 0: none */
+    pid_t pid;   /* 0: none */
     int talk_fd; /* a memory file with its standard output and error; -1: none */
     char name[32];
 };
@@ -28,6 +28,8 @@ bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiri
 /* Waits until the program ends by itself, asks it to after `grace_ms`, kills it 2 s later. Its wait status;
  * 0 where there is none. Closes nothing but the talk: `fl_process_last_words` comes first. */
 int fl_process_end(struct fl_process *process, unsigned grace_ms);
+/* Whether it has ended, after waiting so long for it; it is not reaped. */
+bool fl_process_has_ended(const struct fl_process *process, unsigned timeout_ms);
 void fl_process_kill(struct fl_process *process); /* at once; fl_process_end must follow */
 /* Waits up to `grace_ms` for its end, then puts how it ended and the last line that it wrote into `text`:
  * "farlightd was ended by signal 11: ..."; still running: its last line alone. */

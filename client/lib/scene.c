@@ -14,11 +14,11 @@ struct load {
     struct fl_connection *connection;
     struct fl_importer *importer;
     struct fl_relay relay;
-    uint64_t credit_passed;        /* the upload credit that the importer was told of */
-    uint64_t upload_begin_ns;      /* 0: nothing was sent */
-    uint64_t commit_begin_ns;      /* 0: no commit is waiting for its answer */
-    uint32_t commit_request;       /* as the daemon knows it */
-    struct fl_error refusal;       /* the daemon's first error for an importer's request */
+    uint64_t credit_passed;   /* the upload credit that the importer was told of */
+    uint64_t upload_begin_ns; /* 0: nothing was sent */
+    uint64_t commit_begin_ns; /* 0: no commit is waiting for its answer */
+    uint32_t commit_request;  /* as the daemon knows it */
+    struct fl_error refusal;  /* the daemon's first error for an importer's request */
 };
 
 /* ---- from the importer to the daemon ---- */
@@ -192,9 +192,8 @@ static bool load_with(struct fl_importer *importer, struct fl_scene *scene, stru
     if (!open_scene(connection, scene->scene, importer->options.model, error))
         return false;
     struct load load = {.connection = connection, .importer = importer};
-    load.relay = (struct fl_relay){.scene = scene->scene,
-                                   .request_base = connection->last_request,
-                                   .upload_base = connection->upload_sent};
+    load.relay = (struct fl_relay){
+        .scene = scene->scene, .request_base = connection->last_request, .upload_base = connection->upload_sent};
     const bool loaded = relay_all(&load, error);
     connection->last_request = load.relay.request_base + load.relay.greatest_request;
     return loaded;

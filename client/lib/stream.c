@@ -138,7 +138,8 @@ bool fl_stream_transfer(struct fl_stream *stream, struct fl_error *error)
         return false;
     compact(stream->in, &stream->in_start, &stream->in_end);
     while (!stream->ended && has_space_to_read(stream)) {
-        const ssize_t got = recv(stream->fd, stream->in + stream->in_end, FL_STREAM_BUFFER_BYTES - stream->in_end, 0);
+        const ssize_t got =
+            recv(stream->fd, stream->in + stream->in_end, FL_STREAM_BUFFER_BYTES - stream->in_end, 0);
         if (got > 0)
             stream->in_end += (size_t)got;
         else if (got == 0 || errno == ECONNRESET)
@@ -159,8 +160,8 @@ bool fl_stream_has_remains(const struct fl_stream *stream)
 static enum fl_stream_result broken(const struct fl_stream *stream, const struct decode_error *why,
                                     struct fl_error *error)
 {
-    fl_error_set(error, FL_ERROR_PROTOCOL, why->field, "%s sent what the protocol does not allow: %s", stream->peer,
-                 why->text);
+    fl_error_set(error, FL_ERROR_PROTOCOL, why->field, "%s sent what the protocol does not allow: %s",
+                 stream->peer, why->text);
     return FL_STREAM_ERROR;
 }
 

@@ -13,10 +13,10 @@
 #define FL_STREAM_BUFFER_BYTES (2u * FRAMING_MESSAGE_MAX_BYTES)
 
 struct fl_stream {
-    int fd; /* owned; -1: none */
-    uint32_t accept; /* bits of enum message_from: who may have sent what comes in */
-    const char *peer; /* for error texts: "the daemon"; static */
-    bool ended; /* the peer will send nothing more */
+    int fd;                           /* owned; -1: none */
+    uint32_t accept;                  /* bits of enum message_from: who may have sent what comes in */
+    const char *peer;                 /* for error texts: "the daemon"; static */
+    bool ended;                       /* the peer will send nothing more */
     uint8_t *in, *out, *scratch_data; /* FL_STREAM_BUFFER_BYTES, the same, SCRATCH_BYTES */
     size_t in_start, in_end, out_start, out_end;
     struct scratch scratch;

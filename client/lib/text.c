@@ -70,7 +70,8 @@ bool fl_text_real(const char *text, double least, double greatest, double *value
     const size_t length = strlen(text);
     const double read = looks_decimal(text, length) ? read_real(text, &end) : NAN;
     if (end != text + length || !isfinite(read) || read < least || read > greatest)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a number from %g to %g", text, least, greatest);
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a number from %g to %g", text, least,
+                            greatest);
     *value = read;
     return true;
 }
@@ -82,8 +83,8 @@ bool fl_text_size(const char *text, uint32_t *width, uint32_t *height, struct fl
     const bool read_all = read_digits(&at, EDGE_MAX, &read[0]) && (*at == 'x' || *at == 'X') && *++at != '\0' &&
                           read_digits(&at, EDGE_MAX, &read[1]) && *at == '\0';
     if (!read_all || read[0] == 0 || read[1] == 0)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a size of 1x1 to %dx%d pixels", text, EDGE_MAX,
-                            EDGE_MAX);
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a size of 1x1 to %dx%d pixels", text,
+                            EDGE_MAX, EDGE_MAX);
     *width = (uint32_t)read[0];
     *height = (uint32_t)read[1];
     return true;
@@ -122,8 +123,8 @@ bool fl_text_range(const char *text, uint32_t *first, uint32_t *last, uint32_t *
         }
     }
     if (!good || *at != '\0')
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a range of frames A-B or A-B:STEP, 0 to %d", text,
-                            FRAME_MAX);
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a range of frames A-B or A-B:STEP, 0 to %d",
+                            text, FRAME_MAX);
     if (to < from)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s': the last frame lies before the first", text);
     *first = (uint32_t)from;
@@ -136,7 +137,11 @@ bool fl_text_range(const char *text, uint32_t *first, uint32_t *last, uint32_t *
 static size_t utf8_length(const unsigned char *text)
 {
     const unsigned char c = text[0];
-    const size_t length = c < 0x80 ? 1 : c >= 0xc2 && c < 0xe0 ? 2 : c >= 0xe0 && c < 0xf0 ? 3 : c >= 0xf0 && c < 0xf5 ? 4 : 0;
+    const size_t length = c < 0x80                ? 1
+                          : c >= 0xc2 && c < 0xe0 ? 2
+                          : c >= 0xe0 && c < 0xf0 ? 3
+                          : c >= 0xf0 && c < 0xf5 ? 4
+                                                  : 0;
     for (size_t i = 1; i < length; i++)
         if ((text[i] & 0xc0) != 0x80)
             return 0;
@@ -193,7 +198,8 @@ bool fl_pattern_parse(const char *text, struct fl_pattern *pattern, struct fl_er
             at += length == 1 ? 2 : length;
             if (length > 1) {
                 if (made.digits != 0)
-                    return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s': the frame's number stands twice", text);
+                    return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s': the frame's number stands twice",
+                                        text);
                 made.digits = digits;
                 out = made.after;
                 room = sizeof made.after;
@@ -204,7 +210,8 @@ bool fl_pattern_parse(const char *text, struct fl_pattern *pattern, struct fl_er
         }
         if (made.digits != 0 && c == '/')
             return fl_error_set(error, FL_ERROR_ARGUMENT, "",
-                                "'%s': the frame's number may only stand in the file's name, not in a folder's", text);
+                                "'%s': the frame's number may only stand in the file's name, not in a folder's",
+                                text);
         if (room <= 1)
             return fl_error_set(error, FL_ERROR_ARGUMENT, "", "the file's name is too long");
         *out++ = c;

@@ -17,10 +17,10 @@ enum image_format image_format_of(const char *path, const char *fallback);
 
 struct image {
     enum image_format format;
-    bool half;                             /* EXR: half floats */
-    unsigned quality;                      /* JPEG */
-    float frames_per_second;               /* 0: unknown */
-    const char *model;                     /* for the metadata; may be empty */
+    bool half;                               /* EXR: half floats */
+    unsigned quality;                        /* JPEG */
+    float frames_per_second;                 /* 0: unknown */
+    const char *model;                       /* for the metadata; may be empty */
     const struct message_frame_begin *begin; /* encoding raw */
     const struct message_frame_end *end;
     const uint8_t *pixels;
@@ -30,7 +30,8 @@ struct image {
  * `reason`. */
 bool image_prepare(char *reason, size_t reason_bytes);
 /* *file is malloc'ed. False: `reason` says why. */
-bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes);
+bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes, char *reason,
+                  size_t reason_bytes);
 
 #ifdef __cplusplus
 }

@@ -131,7 +131,8 @@ static size_t bytes_per_pixel(enum protocol_pixel_format format)
 static bool begin_frame(struct request *request, const struct message_frame_begin *begin)
 {
     const uint64_t bytes = (uint64_t)begin->width * begin->height * bytes_per_pixel(begin->format);
-    if (!request->named || request->begun || begin->encoding != PROTOCOL_ENCODING_RAW || begin->size_bytes != bytes)
+    if (!request->named || request->begun || begin->encoding != PROTOCOL_ENCODING_RAW ||
+        begin->size_bytes != bytes)
         return false;
     request->begun = true;
     request->begin = *begin;
@@ -216,8 +217,7 @@ static int read_more(struct exporter *exporter)
     exporter->end -= exporter->start;
     exporter->start = 0;
     for (;;) {
-        const ssize_t got =
-            recv(exporter->fd, exporter->buffer + exporter->end, BUFFER_BYTES - exporter->end, 0);
+        const ssize_t got = recv(exporter->fd, exporter->buffer + exporter->end, BUFFER_BYTES - exporter->end, 0);
         if (got < 0 && errno == EINTR)
             continue;
         if (got > 0)

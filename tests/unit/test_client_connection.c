@@ -232,8 +232,8 @@ static void a_silent_daemon_is_given_up_and_an_interruption_ends_the_wait(void *
     stop(daemon);
     daemon = start(play_silence);
     const int interrupt_fd = eventfd(1, EFD_CLOEXEC);
-    assert_null(fl_connect(
-        &(struct fl_connect_options){.server = daemon->address, .interrupt_fd = interrupt_fd}, &error));
+    assert_null(
+        fl_connect(&(struct fl_connect_options){.server = daemon->address, .interrupt_fd = interrupt_fd}, &error));
     check_error(FL_ERROR_INTERRUPTED, "");
     close(interrupt_fd);
     stop(daemon);
@@ -242,9 +242,10 @@ static void a_silent_daemon_is_given_up_and_an_interruption_ends_the_wait(void *
 static void wrong_addresses_are_told(void **state)
 {
     (void)state;
-    static const char *const wrong[] = {"", "unix:", "tcp:", "tcp:host", "tcp:host:", "tcp::1", "tcp:host:0",
-                                        "tcp:host:65536", "tcp:host:1x", "tcp:::1:5", "http://x", "ssh:", "ssh:-oX",
-                                        "ssh:host:", "ssh:host:/a;rm"};
+    static const char *const wrong[] = {
+        "",         "unix:",      "tcp:",           "tcp:host",    "tcp:host:",
+        "tcp::1",   "tcp:host:0", "tcp:host:65536", "tcp:host:1x", "tcp:::1:5",
+        "http://x", "ssh:",       "ssh:-oX",        "ssh:host:",   "ssh:host:/a;rm"};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         error = (struct fl_error){0};
         struct fl_connection *connection =
@@ -432,13 +433,11 @@ static void play_job(struct daemon *daemon)
 static struct fl_job *start_job(struct fl_scene *scene, uint32_t first, uint32_t last, uint32_t step)
 {
     error = (struct fl_error){0};
-    return fl_render_start(scene,
-                           &(struct fl_job_options){.width = EDGE,
-                                                    .height = EDGE,
-                                                    .first_frame = first,
-                                                    .last_frame = last,
-                                                    .frame_step = step},
-                           &error);
+    return fl_render_start(
+        scene,
+        &(struct fl_job_options){
+            .width = EDGE, .height = EDGE, .first_frame = first, .last_frame = last, .frame_step = step},
+        &error);
 }
 
 static void every_frame_of_a_job_comes_once_and_in_order(void **state)

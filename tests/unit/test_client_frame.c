@@ -58,7 +58,8 @@ static bool give(struct fl_assembly *assembly, const uint8_t *bytes, size_t coun
 static struct fl_frame *end(struct fl_assembly *assembly)
 {
     struct record_stage_time stage = {.stage = PROTOCOL_STAGE_TRACE, .duration_ns = 5};
-    const struct message_frame_end message = {.frame = 3, .primary_rays = 960, .stages = &stage, .stages_count = 1};
+    const struct message_frame_end message = {
+        .frame = 3, .primary_rays = 960, .stages = &stage, .stages_count = 1};
     return fl_assembly_end(assembly, &message, 2, &error);
 }
 
@@ -107,9 +108,8 @@ static unsigned long make_jpeg(unsigned width, unsigned height, uint8_t **packed
     unsigned long count = 0;
     *packed = NULL;
     const tjhandle encoder = tjInitCompress();
-    assert_int_equal(tjCompress2(encoder, pixels, (int)width, 0, (int)height, TJPF_RGBA, packed, &count, TJSAMP_420,
-                                 90, 0),
-                     0);
+    assert_int_equal(
+        tjCompress2(encoder, pixels, (int)width, 0, (int)height, TJPF_RGBA, packed, &count, TJSAMP_420, 90, 0), 0);
     tjDestroy(encoder);
     return count;
 }

@@ -100,7 +100,8 @@ static void an_importer_that_sends_rubbish_is_told(void **state)
 static void an_importer_may_not_speak_for_the_client(void **state)
 {
     (void)state;
-    /* The header of a `stats` request: 8 bytes of payload size and type, flags, request 1, channel 0; no fields. */
+    /* The header of a `stats` request: 8 bytes of payload size and type, flags, request 1, channel 0; no fields.
+     */
     assert_null(import_with("#!/bin/sh\nprintf '\\002\\000\\000\\000\\011\\000\\000\\000\\001\\000\\000\\000\\000"
                             "\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000' >&3\nsleep 5\n",
                             5000));
@@ -232,7 +233,8 @@ static void a_file_that_cannot_be_written_is_named_and_nothing_is_left(void **st
     const struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA8, pixels);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         char path[128];
-        snprintf(path, sizeof path, "%s%s", wrong[i][0] == '%' ? folder : "", wrong[i] + (wrong[i][0] == '%' ? 2 : 0));
+        snprintf(path, sizeof path, "%s%s", wrong[i][0] == '%' ? folder : "",
+                 wrong[i] + (wrong[i][0] == '%' ? 2 : 0));
         error = (struct fl_error){0};
         assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
         if (fl_exporter_wait(exporter, &error))

@@ -32,8 +32,9 @@ static bool load(const char *text)
 static void keys_are_read_with_defaults(void **state)
 {
     (void)state;
-    assert_true(load("[{\"time\": 0, \"eye\": [0, 1, 5], \"look_at\": [0, 0, 0]},\n"
-                     " {\"time\": 2.5, \"eye\": [5, 1, 0], \"look_at\": [0, 0, 0], \"up\": [0, 0, 1], \"fov\": 90}]"));
+    assert_true(
+        load("[{\"time\": 0, \"eye\": [0, 1, 5], \"look_at\": [0, 0, 0]},\n"
+             " {\"time\": 2.5, \"eye\": [5, 1, 0], \"look_at\": [0, 0, 0], \"up\": [0, 0, 1], \"fov\": 90}]"));
     assert_int_equal(key_count, 2);
     assert_true(keys[0].eye_world[2] == 5 && keys[0].up_world[1] == 1);
     assert_true(fabsf(keys[0].fov_y - 0.785398f) < 1e-5f);

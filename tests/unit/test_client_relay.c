@@ -14,8 +14,8 @@ static struct fl_relay some_relay(void)
     return (struct fl_relay){.scene = 5, .request_base = 100, .upload_base = 1000};
 }
 
-static enum fl_relay_verdict judge(struct fl_relay *relay, enum message_type type, uint32_t request, uint32_t channel,
-                                   uint32_t *mapped)
+static enum fl_relay_verdict judge(struct fl_relay *relay, enum message_type type, uint32_t request,
+                                   uint32_t channel, uint32_t *mapped)
 {
     struct message message;
     message_init(&message, type);
@@ -28,9 +28,9 @@ static void an_importer_may_send_blobs_edits_and_its_own_messages_only(void **st
 {
     (void)state;
     static const enum message_type forwarded[] = {
-        MESSAGE_BLOB_OFFER,  MESSAGE_BLOB_DATA,   MESSAGE_EDIT_BEGIN, MESSAGE_EDIT_COMMIT,    MESSAGE_SET_NODE,
-        MESSAGE_SET_MESH,    MESSAGE_SET_SPHERES, MESSAGE_SET_DISC,   MESSAGE_SET_MATERIAL,   MESSAGE_SET_TEXTURE,
-        MESSAGE_SET_LIGHT,   MESSAGE_SET_CAMERA,  MESSAGE_REMOVE,     MESSAGE_SET_ENVIRONMENT};
+        MESSAGE_BLOB_OFFER, MESSAGE_BLOB_DATA,   MESSAGE_EDIT_BEGIN, MESSAGE_EDIT_COMMIT,    MESSAGE_SET_NODE,
+        MESSAGE_SET_MESH,   MESSAGE_SET_SPHERES, MESSAGE_SET_DISC,   MESSAGE_SET_MATERIAL,   MESSAGE_SET_TEXTURE,
+        MESSAGE_SET_LIGHT,  MESSAGE_SET_CAMERA,  MESSAGE_REMOVE,     MESSAGE_SET_ENVIRONMENT};
     static const enum message_type local[] = {MESSAGE_IMPORT_NOTE, MESSAGE_IMPORT_CLIP, MESSAGE_IMPORT_PROGRESS,
                                               MESSAGE_IMPORT_DONE};
     static const enum message_type all[] = {

@@ -26,9 +26,10 @@ static void a_size_is_read(void **state)
 static void impossible_sizes_are_refused_and_leave_the_result_alone(void **state)
 {
     (void)state;
-    static const char *const wrong[] = {"",      "x",        "1280",    "1280x",    "x720",       "0x5",    "5x0",
-                                        "8193x1", "1x8193",   "-1x5",    "1280x720x", "1280 x 720", "+1x1",   "1.5x2",
-                                        "1x1 ",   "99999999999999999999x1", "0x10x10", "١x١"};
+    static const char *const wrong[] = {
+        "",        "x",    "1280",      "1280x",      "x720", "0x5",   "5x0",  "8193x1",
+        "1x8193",  "-1x5", "1280x720x", "1280 x 720", "+1x1", "1.5x2", "1x1 ", "99999999999999999999x1",
+        "0x10x10", "١x١"};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         uint32_t width = 7, height = 9;
         error = (struct fl_error){0};
@@ -46,11 +47,12 @@ static void a_vector_is_three_finite_numbers(void **state)
     float vector[3] = {0};
     assert_true(fl_text_vector("-1,2.5,1e3", vector, &error));
     assert_true(vector[0] == -1 && vector[1] == 2.5f && vector[2] == 1000);
-    static const char *const wrong[] = {"",        "1,2",    "1,2,3,4", "1,2,nan", "inf,0,0", "1,,3", "1,2,3 ",
-                                        " 1,2,3",  "1;2;3",  "1,2,1e40", "0x1,0,0", "1,2,",    ",,",   "1,2,3x"};
+    static const char *const wrong[] = {"",       "1,2",   "1,2,3,4",  "1,2,nan", "inf,0,0", "1,,3", "1,2,3 ",
+                                        " 1,2,3", "1;2;3", "1,2,1e40", "0x1,0,0", "1,2,",    ",,",   "1,2,3x"};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
         if (fl_text_vector(wrong[i], vector, &error))
-            fail_msg("'%s' was taken as %g,%g,%g", wrong[i], (double)vector[0], (double)vector[1], (double)vector[2]);
+            fail_msg("'%s' was taken as %g,%g,%g", wrong[i], (double)vector[0], (double)vector[1],
+                     (double)vector[2]);
     assert_true(vector[0] == -1 && vector[1] == 2.5f && vector[2] == 1000);
 }
 
@@ -84,9 +86,9 @@ static void a_range_of_frames_is_read(void **state)
     assert_true(first == 0 && last == 9 && step == 3);
     assert_true(fl_text_range("42", &first, &last, &step, &error));
     assert_true(first == 42 && last == 42 && step == 1);
-    static const char *const wrong[] = {"",    "-",     "1-",   "-5",      "5-1",        "1-5:",
-                                        "1:2", "1-5:0", "1-5x", "1--5",    "1-10000001", "1-5:2:1",
-                                        "a-b", " 1-5",  "1 -5", "4294967296"};
+    static const char *const wrong[] = {
+        "",     "-",    "1-",         "-5",      "5-1", "1-5:", "1:2",  "1-5:0",
+        "1-5x", "1--5", "1-10000001", "1-5:2:1", "a-b", " 1-5", "1 -5", "4294967296"};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
         if (fl_text_range(wrong[i], &first, &last, &step, &error))
             fail_msg("'%s' was taken as %u-%u:%u", wrong[i], first, last, step);
@@ -117,9 +119,10 @@ static void a_pattern_places_the_frame_number(void **state)
 static void what_printf_would_make_of_a_pattern_is_refused(void **state)
 {
     (void)state;
-    static const char *const wrong[] = {"a.png",     "%s.png",  "%n",       "%4d.png", "%00d.png", "%010d.png", "%",
-                                        "a%",        "%0d.png", "%d%d.png", "%d/a.png", "%-4d.png", "%ld.png",   "%*d",
-                                        "%1$d.png",  "%x.png",  "%05i.png", "%%.png",   "%%04d.png", ""};
+    static const char *const wrong[] = {"a.png",     "%s.png",   "%n",      "%4d.png",   "%00d.png",
+                                        "%010d.png", "%",        "a%",      "%0d.png",   "%d%d.png",
+                                        "%d/a.png",  "%-4d.png", "%ld.png", "%*d",       "%1$d.png",
+                                        "%x.png",    "%05i.png", "%%.png",  "%%04d.png", ""};
     struct fl_pattern pattern;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         error = (struct fl_error){0};
@@ -153,13 +156,15 @@ static void names_are_made_utf8_without_cutting_a_character(void **state)
     fl_text_utf8("plain", out, sizeof out);
     assert_string_equal(out, "plain");
     fl_text_utf8("a\xff\xc3(\x80", out, sizeof out);
-    assert_string_equal(out, "a?" "?(?");
+    assert_string_equal(out, "a?"
+                             "?(?");
     fl_text_utf8("1234567\xc3\xa4", out, sizeof out);
     assert_string_equal(out, "1234567");
     fl_text_utf8("\xed\xa0\x80\xf4\x90\x80\x80", out, sizeof out);
     assert_string_equal(out, "???????");
     fl_text_utf8("\xe2\x82", out, sizeof out);
-    assert_string_equal(out, "?" "?");
+    assert_string_equal(out, "?"
+                             "?");
 }
 
 static void an_error_never_carries_an_escape_sequence(void **state)

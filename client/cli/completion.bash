@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+# Completion of farlight's command line for bash; to be installed as .../bash-completion/completions/farlight.
+
+_farlight()
+{
+    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]}
+    local job="--output --format --half --float --server --size --samples --depth --seed --environment --exposure
+        --tone-map --camera --eye --look-at --up --fov --tracer --bvh-bounds --integrator --primary --encoding
+        --quality --timings --timings=json --quiet --help"
+    local words=
+
+    if [ "$COMP_CWORD" -eq 1 ]; then
+        words="render animate info stats ping bridge help --version"
+    else
+        case $before in
+        --tracer) words="bvh naive" ;;
+        --bvh-bounds) words="auto box sphere" ;;
+        --integrator) words="whitted" ;;
+        --primary) words="raster trace" ;;
+        --encoding) words="raw zstd jpeg" ;;
+        --tone-map) words="neutral aces none" ;;
+        --format) words="png jpeg exr hdr" ;;
+        *)
+            case $subcommand in
+            render) words=$job ;;
+            animate) words="$job --frames --fps --orbit --keys" ;;
+            info) words="--json --environment --help" ;;
+            stats) words="--server --json --help" ;;
+            ping) words="--server --count --help" ;;
+            help) words="render animate info stats ping bridge" ;;
+            esac
+            [[ $word == -* || $subcommand == help ]] || words=
+            ;;
+        esac
+    fi
+    COMPREPLY=()
+    [ -z "$words" ] || mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
+}
+complete -o default -F _farlight farlight
