@@ -39,11 +39,13 @@ static struct bvh_settings settings_of(const struct tracer_options *options)
     };
 }
 
-static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_options *options, struct error *error)
+static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_options *options,
+                                 struct error *error)
 {
     uint32_t together = options->bvh_rays_together;
     if (together != 0 && together != 1 && together != 2 && together != 4 && together != 8) {
-        error_set(error, ERROR_INVALID, "options.bvh_rays_together", "1, 2, 4 or 8 rays walk together, not %u", together);
+        error_set(error, ERROR_INVALID, "options.bvh_rays_together", "1, 2, 4 or 8 rays walk together, not %u",
+                  together);
         return NULL;
     }
     struct bvh *bvh = calloc(1, sizeof *bvh);
@@ -159,14 +161,15 @@ static bool refit_top(struct bvh *bvh, const struct scene_gpu *scene)
         bool is_fresh;
         struct bvh_transform transform = describe(bvh, scene, i, &box, &is_fresh);
         struct bvh_transform *old = &bvh->transforms[i];
-        bool same_place = memcmp(old->object_from_world, transform.object_from_world,
-                                 sizeof old->object_from_world) == 0;
+        bool same_place =
+            memcmp(old->object_from_world, transform.object_from_world, sizeof old->object_from_world) == 0;
         if ((!same_place || is_fresh) && !bvh_top_move(&bvh->top, i, &box))
             return false;
         if (memcmp(old, &transform, sizeof transform) == 0)
             continue;
         *old = transform;
-        gpu_buffer_write(bvh->store.device, &bvh->transform_buffer, i * sizeof transform, &transform, sizeof transform);
+        gpu_buffer_write(bvh->store.device, &bvh->transform_buffer, i * sizeof transform, &transform,
+                         sizeof transform);
         bvh->base.stats.uploaded_bytes += sizeof transform;
     }
     bvh->base.stats.nodes_refitted += bvh_top_refit(&bvh->top);

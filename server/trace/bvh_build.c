@@ -11,10 +11,10 @@
 #endif
 
 #define BINS_MAX 16
-#define SMALL_RANGE 24   /* ranges below are split with fewer bins: the sweep would cost more than the filling */
+#define SMALL_RANGE 24 /* ranges below are split with fewer bins: the sweep would cost more than the filling */
 #define BINS_SMALL 8
 #define TASK_PRIMITIVES 4096u /* smaller ranges stay with the thread that has them */
-#define STACK_DEPTH 40        /* the smaller half is walked first: a level at most for each doubling of the range */
+#define STACK_DEPTH 40 /* the smaller half is walked first: a level at most for each doubling of the range */
 
 struct range {
     uint32_t node, begin, end;
@@ -39,8 +39,8 @@ struct bin {
 };
 
 struct split {
-    int axis;    /* -1: none found */
-    int bin;     /* primitives of this bin and those after go right */
+    int axis; /* -1: none found */
+    int bin;  /* primitives of this bin and those after go right */
     int bins;
     float cost;
     bvh_vec4 origin, scale; /* bin = (centre - origin) scale */
@@ -145,7 +145,8 @@ static void sweep_axis(const struct bin *bins, int axis, struct split *best)
     }
 }
 
-static struct split find_split(const struct builder *builder, const struct range *range, const struct bvh_box *centres)
+static struct split find_split(const struct builder *builder, const struct range *range,
+                               const struct bvh_box *centres)
 {
     uint32_t count = range->end - range->begin;
     struct split split = {.axis = -1, .bins = count < SMALL_RANGE ? BINS_SMALL : BINS_MAX, .cost = FLT_MAX};
@@ -214,8 +215,8 @@ static bool split_range(const struct builder *builder, const struct range *range
     if (count > 1)
         split = find_split(builder, range, &centres);
     float area = box_area(&bounds);
-    bool pays = split.axis >= 0 && 2 * costs->element * area + costs->primitive * split.cost <
-                                       costs->primitive * (float)count * area;
+    bool pays = split.axis >= 0 &&
+                2 * costs->element * area + costs->primitive * split.cost < costs->primitive * (float)count * area;
     if (count <= costs->leaf_max && !pays) {
         node_set(node, &bounds, range->begin, count, 0);
         return false;
@@ -288,8 +289,8 @@ static void build_thread(void *context, uint32_t thread)
     pthread_mutex_unlock(&builder->mutex);
 }
 
-bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count, const struct bvh_costs *costs,
-                      unsigned threads)
+bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count,
+                      const struct bvh_costs *costs, unsigned threads)
 {
     *tree = (struct bvh_binary){.primitive_count = count};
     struct builder builder = {.tree = tree, .boxes = boxes, .costs = costs, .shared = threads > 1};

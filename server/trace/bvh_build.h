@@ -47,8 +47,8 @@ struct bvh_costs {
 };
 
 /* Builds over boxes[0..count-1], which it reorders. 1 <= count <= 2^27. False: out of memory. */
-bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count, const struct bvh_costs *costs,
-                      unsigned threads);
+bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count,
+                      const struct bvh_costs *costs, unsigned threads);
 void bvh_binary_finish(struct bvh_binary *tree);
 /* The node after i in depth-first order, gaps left out. */
 uint32_t bvh_binary_next(const struct bvh_binary_node *nodes, uint32_t i);
@@ -107,9 +107,9 @@ bool bvh_jobs_run(struct bvh_job *jobs, uint32_t count, const struct bvh_setting
 /* Elements in the depth-first order of octant 0. */
 struct bvh_baked {
     uint32_t element_count;
-    uint32_t *node;   /* of an element: its binary node */
-    uint32_t *size;   /* elements of its subtree, itself included; its children begin at the next element */
-    uint32_t *parent; /* BVH_END at the root */
+    uint32_t *node;         /* of an element: its binary node */
+    uint32_t *size;         /* elements of its subtree, itself included; its children begin at the next element */
+    uint32_t *parent;       /* BVH_END at the root */
     struct bvh_link *links; /* BVH_OCTANTS x element_count; NULL: plain */
 };
 

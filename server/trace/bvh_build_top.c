@@ -89,7 +89,8 @@ static bool bake_top(struct bvh_top *top, const struct bvh_binary *binary, bool 
     return ok;
 }
 
-static uint32_t collect(const struct bvh_world_box *boxes, uint32_t count, struct bvh_box *filled, uint32_t *instances)
+static uint32_t collect(const struct bvh_world_box *boxes, uint32_t count, struct bvh_box *filled,
+                        uint32_t *instances)
 {
     uint32_t filled_count = 0;
     for (uint32_t i = 0; i < count; i++) {

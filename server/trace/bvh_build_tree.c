@@ -21,7 +21,7 @@ struct work {
     struct bvh_box *boxes;
     struct bvh_binary binary;
     struct bvh_baked baked;
-    float *areas;      /* per place of the binary tree */
+    float *areas;        /* per place of the binary tree */
     float (*spheres)[4]; /* likewise: centre, radius; NULL with boxes */
 };
 
@@ -154,8 +154,8 @@ static bool make_areas(struct work *work)
         return false;
     for (uint32_t i = 0; i < places; i = bvh_binary_next(work->binary.nodes, i)) {
         const struct bvh_binary_node *node = &work->binary.nodes[i];
-        work->areas[i] = work->spheres ? work->spheres[i][3] * work->spheres[i][3]
-                                       : bvh_box_area(node->lower, node->upper);
+        work->areas[i] =
+            work->spheres ? work->spheres[i][3] * work->spheres[i][3] : bvh_box_area(node->lower, node->upper);
     }
     return true;
 }
@@ -207,7 +207,8 @@ static bool build(struct work *work)
     tree->links = work->baked.links;
     work->baked.links = NULL;
     tree->elements = malloc(tree->element_count * sizeof *tree->elements);
-    tree->primitive_texels = (size_t)count * (work->shape->centres_radii ? BVH_SPHERE_TEXELS : BVH_TRIANGLE_TEXELS);
+    tree->primitive_texels =
+        (size_t)count * (work->shape->centres_radii ? BVH_SPHERE_TEXELS : BVH_TRIANGLE_TEXELS);
     tree->primitives = malloc(tree->primitive_texels * 4 * sizeof *tree->primitives);
     if (!tree->elements || !tree->primitives)
         return false;

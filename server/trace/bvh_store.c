@@ -23,8 +23,8 @@ void bvh_store_finish(struct bvh_store *store)
     gpu_buffer_finish(store->device, &store->primitives);
     free(store->entries);
     free(store->entry_of);
-    bvh_store_init(store, store->device, &(struct bvh_settings){store->settings.bounds, store->settings.plain,
-                                                                store->settings.threads});
+    bvh_store_init(store, store->device,
+                   &(struct bvh_settings){store->settings.bounds, store->settings.plain, store->settings.threads});
 }
 
 const struct bvh_entry *bvh_store_entry(const struct bvh_store *store, uint32_t geometry)
@@ -53,7 +53,8 @@ static bool check_limits(const struct bvh_store *store, uint64_t elements, uint6
         return error_set(error, ERROR_LIMIT, NULL, "the trees have %llu elements, this device holds %llu",
                          (unsigned long long)elements, (unsigned long long)elements_max);
     if (texels > texels_max || texels > INT32_MAX)
-        return error_set(error, ERROR_LIMIT, NULL, "the trees' primitives take %llu texels, this device holds %llu",
+        return error_set(error, ERROR_LIMIT, NULL,
+                         "the trees' primitives take %llu texels, this device holds %llu",
                          (unsigned long long)texels, (unsigned long long)texels_max);
     return true;
 }
@@ -76,14 +77,16 @@ static bool resize(struct gpu_device *device, struct gpu_buffer *buffer, size_t 
     struct gpu_buffer bigger = {0};
     /* What has grown once will grow again. */
     size_t room = items * item_bytes, slack = buffer->capacity_bytes > 0 ? room / 2 : 0;
-    if (!gpu_buffer_reserve(device, &bigger, room + slack, error) || !gpu_buffer_reserve(device, &bigger, room, error)) {
+    if (!gpu_buffer_reserve(device, &bigger, room + slack, error) ||
+        !gpu_buffer_reserve(device, &bigger, room, error)) {
         gpu_buffer_finish(device, &bigger);
         return false;
     }
     for (uint32_t i = 0; i < move_count; i++)
         if (moves[i].count > 0)
             glCopyNamedBufferSubData(buffer->name, bigger.name, (GLintptr)(moves[i].from * item_bytes),
-                                     (GLintptr)(moves[i].to * item_bytes), (GLsizeiptr)(moves[i].count * item_bytes));
+                                     (GLintptr)(moves[i].to * item_bytes),
+                                     (GLsizeiptr)(moves[i].count * item_bytes));
     gpu_buffer_finish(device, buffer);
     *buffer = bigger;
     return true;
@@ -108,12 +111,13 @@ static bool pack(struct bvh_store *store, uint32_t top_capacity, uint64_t elemen
     elements += element;
     texels += texel;
     const struct gpu_buffer before = store->elements;
-    bool ok = check_limits(store, elements, texels, error) &&
-              resize(store->device, &store->elements, sizeof(struct bvh_element), elements, element_moves,
-                     store->entry_count, error) &&
-              (store->settings.plain || resize(store->device, &store->links, LINKS_BYTES, elements, element_moves,
-                                               store->entry_count, error)) &&
-              resize(store->device, &store->primitives, TEXEL_BYTES, texels, texel_moves, store->entry_count, error);
+    bool ok =
+        check_limits(store, elements, texels, error) &&
+        resize(store->device, &store->elements, sizeof(struct bvh_element), elements, element_moves,
+               store->entry_count, error) &&
+        (store->settings.plain ||
+         resize(store->device, &store->links, LINKS_BYTES, elements, element_moves, store->entry_count, error)) &&
+        resize(store->device, &store->primitives, TEXEL_BYTES, texels, texel_moves, store->entry_count, error);
     for (uint32_t i = 0; ok && i < store->entry_count; i++) {
         store->entries[i].first_element = (uint32_t)element_moves[i].to;
         store->entries[i].first_texel = (uint32_t)texel_moves[i].to;
@@ -193,8 +197,8 @@ static bool find_missing(struct bvh_store *store, const struct scene_gpu *scene,
     return ok;
 }
 
-static void upload_tree(struct bvh_store *store, const struct scene_gpu_geometry *geometry, const struct bvh_tree *tree,
-                        struct bvh_store_report *report)
+static void upload_tree(struct bvh_store *store, const struct scene_gpu_geometry *geometry,
+                        const struct bvh_tree *tree, struct bvh_store_report *report)
 {
     uint32_t element = store->top_capacity, texel = 0;
     if (store->entry_count > 0) {
@@ -217,7 +221,8 @@ static void upload_tree(struct bvh_store *store, const struct scene_gpu_geometry
     size_t element_bytes = tree->element_count * sizeof *tree->elements;
     size_t link_bytes = tree->links ? tree->element_count * LINKS_BYTES : 0;
     size_t texel_bytes = tree->primitive_texels * TEXEL_BYTES;
-    gpu_buffer_write(store->device, &store->elements, element * sizeof *tree->elements, tree->elements, element_bytes);
+    gpu_buffer_write(store->device, &store->elements, element * sizeof *tree->elements, tree->elements,
+                     element_bytes);
     if (tree->links)
         gpu_buffer_write(store->device, &store->links, element * LINKS_BYTES, tree->links, link_bytes);
     gpu_buffer_write(store->device, &store->primitives, texel * TEXEL_BYTES, tree->primitives, texel_bytes);
@@ -295,7 +300,8 @@ bool bvh_store_update(struct bvh_store *store, const struct scene_gpu *scene, st
     uint32_t *missing = malloc(((size_t)scene->geometry_count + 1) * sizeof *missing);
     bool ok = missing && find_missing(store, scene, missing, &missing_count);
     if (!ok)
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries", scene->geometry_count);
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
+                  scene->geometry_count);
     ok = ok && build_missing(store, scene, missing, missing_count, report, times, error);
     free(missing);
     if (ok && !index_entries(store, scene))

@@ -73,7 +73,8 @@ element_data fetch_element(walk_state walk)
 #ifdef BVH_PLAIN
     bvh_element e = bvh_elements[walk.first_element + walk.element];
     return element_data(floatBitsToUint(vec4(e.lower_x, e.lower_y, e.lower_z, 0.0)),
-                        uvec4(floatBitsToUint(vec3(e.upper_x, e.upper_y, e.upper_z)), e.leaf), walk.element + 1u, e.miss);
+                        uvec4(floatBitsToUint(vec3(e.upper_x, e.upper_y, e.upper_z)), e.leaf),
+                        walk.element + 1u, e.miss);
 #else
     int texel = int(walk.first_element + walk.element) * 2;
     uvec2 link = texelFetch(bvh_links, int(walk.first_link + walk.element)).xy;

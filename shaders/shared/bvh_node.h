@@ -4,8 +4,8 @@
  *
  * An element is stored once; beside it lie eight pairs of links, one for each sign of the direction's components,
  * so that every ray meets nearer children first. Octant o: bit 0: x is negative, 1: y, 2: z. A tree of n elements
- * that begins at element f has its elements at f .. f + n - 1 and the links of octant o at 8 f + o n .. Links count
- * from the tree's beginning; the walk begins at 0.
+ * that begins at element f has its elements at f .. f + n - 1 and the links of octant o at 8 f + o n .. Links
+ * count from the tree's beginning; the walk begins at 0.
  *
  * Why not eight copies of the elements, in which "the bound is hit" is "go to the next": measured on software GL
  * with 146K and 871K triangles they are 5 to 9 % faster, and take 256 bytes an element against 96, which have to
@@ -45,7 +45,7 @@ SHARED_SIZE(bvh_link, 8);
 /* The other half of a transform element: what entering an instance does. Four texels of an RGBA32UI buffer. */
 struct bvh_transform {
     vec4 object_from_world[3];
-    uint first_element;   /* of the geometry's tree, in the element buffer */
+    uint first_element; /* of the geometry's tree, in the element buffer */
     uint element_count;
     uint first_texel;     /* of the geometry's primitives, in the primitive buffer */
     uint first_primitive; /* scene-wide */

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* The forms of the tracer `bvh` side by side, through the tracer interface: rays a second, build time, memory.
  * Usage: bench_bvh [TRIANGLES ..]     (default: 5000 37000 146000 590000)
- * Nine bumpy spheres on a floor, seen from above: waves of camera rays (8x8 tiles in Morton order) and of one diffuse bounce from
- * where these hit. Each figure is the median of RUNS after a warm-up, which also compiles. Every form's hits are
- * compared ray by ray with those of the first; exit status 1 if they differ, or GL reports an error. */
+ * Nine bumpy spheres on a floor, seen from above: waves of camera rays (8x8 tiles in Morton order) and of one
+ * diffuse bounce from where these hit. Each figure is the median of RUNS after a warm-up, which also compiles.
+ * Every form's hits are compared ray by ray with those of the first; exit status 1 if they differ, or GL reports
+ * an error. */
 #include "tests/accuracy/test_scenes.h"
 
 #include "base/clock.h"
@@ -90,7 +91,7 @@ static struct scene *make_scene(uint32_t triangles, uint32_t *triangle_count)
     uint32_t steps = (uint32_t)lrintf(sqrtf((float)triangles / 18));
     steps = steps < 4 ? 4 : steps;
     uint32_t each = (steps + 1) * (steps + 1), count = 18 * steps * steps + 2;
-    float (*vertices)[3] = malloc((9 * each + 4) * sizeof(*vertices));
+    float(*vertices)[3] = malloc((9 * each + 4) * sizeof(*vertices));
     uint32_t *indices = malloc(3 * (size_t)count * sizeof(*indices));
     for (uint32_t s = 0; s < 9; s++)
         bumpy_sphere(vertices, indices + (size_t)s * steps * steps * 6, s * each, steps,
@@ -98,7 +99,8 @@ static struct scene *make_scene(uint32_t triangles, uint32_t *triangle_count)
     static const float floor_corners[4][3] = {{-20, 0, -20}, {20, 0, -20}, {20, 0, 20}, {-20, 0, 20}};
     memcpy(vertices[9 * each], floor_corners, sizeof(floor_corners));
     uint32_t f = 9 * each;
-    memcpy(indices + 3 * ((size_t)count - 2), (uint32_t[6]){f, f + 1, f + 2, f, f + 2, f + 3}, 6 * sizeof(*indices));
+    memcpy(indices + 3 * ((size_t)count - 2), (uint32_t[6]){f, f + 1, f + 2, f, f + 2, f + 3},
+           6 * sizeof(*indices));
     struct test_edits edits = {.scene = test_scene_create()};
     test_mesh(&edits, 1, (const float(*)[3])vertices, 9 * each + 4, indices, count);
     test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
@@ -153,10 +155,12 @@ static void make_secondary_rays(struct bench *bench, const struct hit *hits)
         static const float light[3] = {4, 8, 5};
         unpack_unit(normal, hits[i].normal_geometric);
         float side = hits[i].material & HIT_BACK_FACE ? -1.0f : 1.0f;
-        float z = test_uniform(&seed, -0.999f, 0.999f), phi = test_uniform(&seed, 0, 2 * PI_F), r = sqrtf(1 - z * z);
+        float z = test_uniform(&seed, -0.999f, 0.999f), phi = test_uniform(&seed, 0, 2 * PI_F),
+              r = sqrtf(1 - z * z);
         const float on_sphere[3] = {r * cosf(phi), r * sinf(phi), z};
         for (int k = 0; k < 3; k++) {
-            origin[k] = from->origin_t_min[k] + hits[i].distance * from->direction_t_max[k] + 1e-4f * side * normal[k];
+            origin[k] =
+                from->origin_t_min[k] + hits[i].distance * from->direction_t_max[k] + 1e-4f * side * normal[k];
             bounce[k] = side * normal[k] * 1.001f + on_sphere[k];
             to_light[k] = light[k] - origin[k];
         }
@@ -197,7 +201,8 @@ static uint32_t count_differing(const struct bench *bench, int kind, const void 
             differing += ((const uint32_t *)bench->reference[kind])[i] == ((const uint32_t *)answers)[i] ? 0 : 1;
             continue;
         }
-        float a = ((const struct hit *)bench->reference[kind])[i].distance, b = ((const struct hit *)answers)[i].distance;
+        float a = ((const struct hit *)bench->reference[kind])[i].distance,
+              b = ((const struct hit *)answers)[i].distance;
         differing += fabsf(a - b) <= TOLERANCE * fabsf(a) ? 0 : 1;
     }
     return differing;
@@ -209,7 +214,8 @@ static double measure(struct bench *bench, struct tracer *tracer, int kind, doub
     struct error error = {0};
     size_t bytes = RAY_COUNT * (kind == WAVE_SHADOW ? sizeof(uint32_t) : sizeof(struct hit));
     uint64_t times[RUNS];
-    require(gpu_buffer_upload(bench->device, &bench->ray_buffer, bench->rays[kind], RAY_COUNT * sizeof(struct ray), &error) &&
+    require(gpu_buffer_upload(bench->device, &bench->ray_buffer, bench->rays[kind], RAY_COUNT * sizeof(struct ray),
+                              &error) &&
                 gpu_buffer_reserve(bench->device, &bench->answers, bytes, &error),
             &error);
     scene_gpu_bind(&bench->gpu);
@@ -275,8 +281,8 @@ static bool bench_scene(struct gpu_device *device, uint32_t triangles)
     make_camera_rays(bench.rays[WAVE_PRIMARY]);
     printf("\n%u triangles\n%-32s %7s %6s %7s %7s   %6s %6s %7s   %5s %5s\n", triangle_count, "", "primary", "x",
            "bounce", "shadow", "build", "upload", "memory", "compile", "");
-    printf("%-32s %7s %6s %7s %7s   %6s %6s %7s   %5s %5s\n", "", "Mray/s", "plain", "Mray/s", "Mray/s", "ms", "ms",
-           "MiB", "ms", "ms");
+    printf("%-32s %7s %6s %7s %7s   %6s %6s %7s   %5s %5s\n", "", "Mray/s", "plain", "Mray/s", "Mray/s", "ms",
+           "ms", "MiB", "ms", "ms");
     for (size_t i = 0; i < FORM_COUNT; i++)
         measure_form(&bench, &forms[i]);
     for (int kind = 0; kind < WAVE_KINDS; kind++) {

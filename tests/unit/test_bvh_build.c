@@ -35,7 +35,8 @@ static float uniform(uint32_t *state, float low, float high)
 /* Three vertices of its own for each triangle, `size` across. */
 static struct input triangles(uint32_t count, float extent, float size, uint32_t seed)
 {
-    struct input input = {malloc(9 * (size_t)count * sizeof(float)), malloc(3 * (size_t)count * sizeof(uint32_t)), NULL, {0}};
+    struct input input = {
+        malloc(9 * (size_t)count * sizeof(float)), malloc(3 * (size_t)count * sizeof(uint32_t)), NULL, {0}};
     for (uint32_t t = 0; t < count; t++) {
         float centre[3];
         for (int k = 0; k < 3; k++)
@@ -46,7 +47,8 @@ static struct input triangles(uint32_t count, float extent, float size, uint32_t
                 input.positions[3 * v + k] = centre[k] + uniform(&seed, -size, size);
         }
     }
-    input.shape = (struct bvh_shape){.positions = input.positions, .indices = input.indices, .primitive_count = count};
+    input.shape =
+        (struct bvh_shape){.positions = input.positions, .indices = input.indices, .primitive_count = count};
     return input;
 }
 
@@ -91,7 +93,8 @@ static uint32_t primitive_number(const struct input *input, const struct bvh_tre
 {
     uint32_t number;
     const float *texels = tree->primitives;
-    memcpy(&number, input->spheres ? &texels[8 * (size_t)place + 4] : &texels[12 * (size_t)place + 3], sizeof number);
+    memcpy(&number, input->spheres ? &texels[8 * (size_t)place + 4] : &texels[12 * (size_t)place + 3],
+           sizeof number);
     return number;
 }
 
@@ -132,11 +135,13 @@ static bool sphere_contains(const struct bvh_element *sphere, const float point[
 }
 
 /* Whether a primitive lies within a bound. */
-static bool bound_contains(const struct input *input, const struct bvh_element *bound, uint32_t number, bool is_sphere)
+static bool bound_contains(const struct input *input, const struct bvh_element *bound, uint32_t number,
+                           bool is_sphere)
 {
     if (input->spheres) {
         const float *s = &input->spheres[4 * (size_t)number];
-        const float low[3] = {s[0] - s[3], s[1] - s[3], s[2] - s[3]}, high[3] = {s[0] + s[3], s[1] + s[3], s[2] + s[3]};
+        const float low[3] = {s[0] - s[3], s[1] - s[3], s[2] - s[3]},
+                    high[3] = {s[0] + s[3], s[1] + s[3], s[2] + s[3]};
         return is_sphere ? sphere_contains(bound, s, s[3]) : box_contains(bound, low) && box_contains(bound, high);
     }
     for (uint32_t c = 0; c < 3; c++) {
@@ -160,7 +165,8 @@ static void expect_bounds_contain(const struct input *input, const struct bvh_tr
         for (uint32_t below = e; below < subtree_end(tree, e); below++) {
             const struct bvh_element *other = &tree->elements[below];
             for (uint32_t i = 0; i < leaf_count(other->leaf); i++)
-                if (!bound_contains(input, bound, primitive_number(input, tree, leaf_first(other->leaf) + i), is_sphere))
+                if (!bound_contains(input, bound, primitive_number(input, tree, leaf_first(other->leaf) + i),
+                                    is_sphere))
                     fail_msg("element %u does not contain a primitive of leaf %u", e, below);
             const float low[3] = {other->lower_x, other->lower_y, other->lower_z};
             const float high[3] = {other->upper_x, other->upper_y, other->upper_z};

@@ -128,8 +128,8 @@ static void an_edit_of_something_else_costs_nothing(void **state)
 
 /* ---- against brute force ---- */
 
-static struct hit *trace(struct scene_gpu *gpu, const struct tracer_impl *impl, const struct tracer_options *options,
-                         const struct ray *rays)
+static struct hit *trace(struct scene_gpu *gpu, const struct tracer_impl *impl,
+                         const struct tracer_options *options, const struct ray *rays)
 {
     struct error error = {0};
     struct gpu_buffer ray_buffer = {0}, hit_buffer = {0};
@@ -150,9 +150,9 @@ static struct hit *trace(struct scene_gpu *gpu, const struct tracer_impl *impl, 
 }
 
 /* Both run the same intersections on the same numbers: what differs is a hit that a bound lost. Distances may
- * differ in the last places, as the compiler orders the arithmetic of two programs. `spurious_max`: hits that brute
- * force may report and a tree not: a line that comes from afar in the plane of a triangle has edge functions of
- * noise, which may agree in sign although the line passes the triangle at many times its size. */
+ * differ in the last places, as the compiler orders the arithmetic of two programs. `spurious_max`: hits that
+ * brute force may report and a tree not: a line that comes from afar in the plane of a triangle has edge functions
+ * of noise, which may agree in sign although the line passes the triangle at many times its size. */
 static void expect_like_brute_force(struct scene *scene, const struct ray *rays, uint32_t hits_min,
                                     uint32_t spurious_max)
 {
@@ -178,7 +178,8 @@ static void expect_like_brute_force(struct scene *scene, const struct ray *rays,
         for (uint32_t i = 0; i < RAY_COUNT; i++) {
             float got = hits[i].distance, wanted = expected[i].distance;
             if (!(fabsf(got - wanted) <= 1e-5f * fabsf(wanted)) && ++spurious > spurious_max)
-                fail_msg("form %zu, ray %u: distance %.9g, brute force %.9g", form, i, (double)got, (double)wanted);
+                fail_msg("form %zu, ray %u: distance %.9g, brute force %.9g", form, i, (double)got,
+                         (double)wanted);
         }
         free(hits);
     }
@@ -216,7 +217,7 @@ static struct scene *scene_of_squares(void)
         }
     }
     struct test_edits edits = {.scene = test_scene_create()};
-    test_mesh(&edits, 1, (const float (*)[3])positions, 3 * (SIDE + 1) * (SIDE + 1), indices, n / 3);
+    test_mesh(&edits, 1, (const float(*)[3])positions, 3 * (SIDE + 1) * (SIDE + 1), indices, n / 3);
     test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
     test_commit(&edits);
     return edits.scene;
