@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The thread that owns GL: commands in, slices of jobs, events out. */
+#include "job/engine.h"
+
 #include "job/engine_private.h"
 
 #include "base/log.h"
