@@ -144,6 +144,29 @@ static void what_is_dumped_reads_back_the_same(void **state)
     free(text);
 }
 
+static void the_file_in_conf_is_what_is_dumped(void **state)
+{
+    (void)state;
+    FILE *file = fopen("conf/farlightd.conf", "re");
+    if (!file) {
+        print_message("skipped: conf/farlightd.conf is not in the current folder\n");
+        skip();
+    }
+    static char there[65536];
+    size_t there_bytes = fread(there, 1, sizeof there - 1, file);
+    fclose(file);
+    there[there_bytes] = '\0';
+    struct config config;
+    config_defaults(&config);
+    char *text = NULL;
+    size_t bytes;
+    FILE *stream = open_memstream(&text, &bytes);
+    assert_true(config_dump(&config, stream));
+    fclose(stream);
+    assert_string_equal(there, text);
+    free(text);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -153,6 +176,7 @@ int main(void)
         cmocka_unit_test(the_environment_goes_over_the_file_and_a_flag_over_both),
         cmocka_unit_test(a_missing_file_is_an_error_only_if_it_was_asked_for),
         cmocka_unit_test(what_is_dumped_reads_back_the_same),
+        cmocka_unit_test(the_file_in_conf_is_what_is_dumped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
