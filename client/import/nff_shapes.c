@@ -248,9 +248,9 @@ static const double tetrahedron[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-
 static const double octahedron[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
 static const double cube[8][3] = {{1, 1, 1},  {1, 1, -1},  {1, -1, 1},  {1, -1, -1},
                                   {-1, 1, 1}, {-1, 1, -1}, {-1, -1, 1}, {-1, -1, -1}};
-static const double icosahedron[12][3] = {{0, 1, PHI}, {0, 1, -PHI}, {0, -1, PHI}, {0, -1, -PHI},
-                                          {1, PHI, 0}, {1, -PHI, 0}, {-1, PHI, 0}, {-1, -PHI, 0},
-                                          {PHI, 0, 1}, {-PHI, 0, 1}, {PHI, 0, -1}, {-PHI, 0, -1}};
+static const double icosahedron[12][3] = {{1, 0, PHI}, {1, 0, -PHI}, {-1, 0, PHI}, {-1, 0, -PHI},
+                                          {0, PHI, 1}, {0, -PHI, 1}, {0, PHI, -1}, {0, -PHI, -1},
+                                          {PHI, 1, 0}, {-PHI, 1, 0}, {PHI, -1, 0}, {-PHI, -1, 0}};
 static const double dodecahedron[20][3] = {
     {1, 1, 1},           {1, 1, -1},          {1, -1, 1},         {1, -1, -1},        {-1, 1, 1},
     {-1, 1, -1},         {-1, -1, 1},         {-1, -1, -1},       {0, 1 / PHI, PHI},  {0, 1 / PHI, -PHI},

@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Takes a helper program's rights away before it reads what may be hostile: files beneath the named
  * folders only (Landlock), few system calls (seccomp), bounded memory, time and file sizes, no new
- * privileges. Cannot be undone. Also used by farlight-export. */
+ * privileges. Cannot be undone. Also used by farlight-export.
+ *
+ * Threads that libraries have started before get the filter and the limits; Landlock binds the calling thread and
+ * those that it starts. */
 #ifndef FARLIGHT_IMPORT_SANDBOX_H
 #define FARLIGHT_IMPORT_SANDBOX_H
 

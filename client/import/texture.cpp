@@ -21,6 +21,9 @@ namespace
 constexpr int edge_max = 16384;
 constexpr uint64_t image_bytes_max = 1ull << 30;
 constexpr size_t texel_bytes = 4;
+// Of all images of a model: many small files can hold large images.
+constexpr uint64_t all_images_bytes_max = 4ull << 30;
+std::atomic<uint64_t> all_images_bytes{0};
 constexpr float half_max = 65504.0f;
 
 struct signature {
@@ -194,6 +197,10 @@ bool decode(texture_job &job, std::string &reason)
     if (!image.open(reader, reason))
         return false;
     const size_t texels = size_t(image.spec.width) * size_t(image.spec.height);
+    if (all_images_bytes.fetch_add(texels * texel_bytes) > all_images_bytes_max - texels * texel_bytes) {
+        reason = "would, with the images before it, take more than 4 GiB";
+        return false;
+    }
     job.texels = static_cast<unsigned char *>(calloc(texels, texel_bytes));
     if (!job.texels) {
         reason = "out of memory";

@@ -751,6 +751,19 @@ class Written(unittest.TestCase):
         camera = [node for node in result.of(SET_NODE) if node["kind"] == 4][0]
         self.assertEqual(camera["matrix"], (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 5))
 
+    def test_nff_solids_are_closed(self):
+        """Every edge of the triangles is met once in each direction, at equal places."""
+        for word, triangles in (("tet", 4), ("hex", 12), ("oct", 8), ("dod", 36)):
+            with self.subTest(word):
+                result = self.run_text("model.nff", word + " 1 2 3 5\n")
+                mesh, = result.of(SET_MESH)
+                self.assertEqual(mesh["triangles"], triangles)
+                positions, corners = self.floats(result, mesh, 0), self.integers(result, mesh)
+                places = [tuple(round(x, 4) for x in positions[c * 3:c * 3 + 3]) for c in corners]
+                edges = [(places[t + k], places[t + (k + 1) % 3]) for t in range(0, len(places), 3) for k in range(3)]
+                self.assertEqual(len(set(edges)), len(edges))
+                self.assertEqual(set(edges), {(b, a) for a, b in edges})
+
     def test_nff_faults_name_line_and_word(self):
         for text, expected in (("s 0 0 0\nx\n", "line 2: 'x'"), ("p 3\n0 0 0\n", "line 1: a polygon"),
                                ("f 1 0 0\nwhat 3\n", "line 2: 'what'"), ("s 0 0 0 nan\n", "'nan'"),
