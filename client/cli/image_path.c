@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
+#include "lib/text.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -56,6 +57,10 @@ static bool try_folder(const char *path, const char *folder, struct fl_error *er
 
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error)
 {
+    char plain[4097];
+    fl_text_utf8(path, plain, sizeof plain);
+    if (strcmp(path, plain) != 0)
+        return fl_error_set(error, FL_ERROR_FILE, plain, "the image's path must be UTF-8 of at most 4096 bytes");
     const char *slash = strrchr(path, '/');
     const size_t length = slash == NULL ? 1 : slash == path ? 1 : (size_t)(slash - path);
     if (length >= folder_bytes)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* A model's way to the daemon: the importer's messages are looked at, then passed on. */
+#include "lib/scene.h"
 #include "lib/importer.h"
 #include "lib/relay.h"
-#include "lib/scene.h"
 #include "lib/text.h"
 
 #include <stdlib.h>
