@@ -68,10 +68,14 @@ CLI_OBJ := $(call obj,$(CLI_SRC))
 IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX))
 EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/client/import/sandbox.o
 
+# The library for others' programs: position-independent, only what farlight.h declares is visible.
+SONAME := libfarlight.so.0
+LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC))
+
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export
 
 .PHONY: all
-all: $(PROGRAMS) $(B)/protocol.md
+all: $(PROGRAMS) $(B)/$(SONAME) $(B)/protocol.md
 
 $(B)/server/%.o: INCLUDES = -Iserver -Ishaders $(SERVER_CFLAGS)
 $(B)/shader_sources.o: INCLUDES = -Iserver
@@ -92,6 +96,14 @@ $(B)/%.o: %.c
 $(B)/%.opp: %.cpp
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
+
+$(B)/pic/protocol/%.o: VISIBILITY = -fvisibility=default
+$(B)/pic/%.o: %.c
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS_ALL) -Iclient $(CLIENT_CFLAGS) $(OPT) $(CFLAGS_ALL) -fPIC $(VISIBILITY) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+$(B)/$(SONAME): $(LIB_PIC) client/lib/libfarlight.map
+	$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--version-script=client/lib/libfarlight.map $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) \
+	    $(LIB_PIC) $(CLIENT_LIBS) -o $@
 
 $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefile
 	@mkdir -p $(@D)
@@ -175,16 +187,27 @@ lint:
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man8 \
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)/etc/farlight
+	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
+	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
-	install -m 644 man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
-	install -m 644 man/*.8 $(DESTDIR)$(PREFIX)/share/man/man8
+	install -m 755 $(B)/$(SONAME) $(DESTDIR)$(PREFIX)/lib
+	ln -sf $(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so
+	install -m 644 client/lib/farlight.h $(DESTDIR)$(PREFIX)/include/farlight/lib
+	install -m 644 protocol/messages.h protocol/messages.def $(DESTDIR)$(PREFIX)/include/farlight/protocol
+	sed 's#@PREFIX@#$(PREFIX)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
+	    >$(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc
+	install -m 644 client/cli/completion.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
+	install -m 644 conf/man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
+	install -m 644 conf/man/*.8 $(DESTDIR)$(PREFIX)/share/man/man8
 	install -m 644 README.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
 	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight
 uninstall:
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/bin/,$(notdir $(PROGRAMS)))
-	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man1/,$(notdir $(wildcard man/*.1)))
-	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man8/,$(notdir $(wildcard man/*.8)))
-	rm -rf $(DESTDIR)$(PREFIX)/share/doc/farlight
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man1/,$(notdir $(wildcard conf/man/*.1)))
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man8/,$(notdir $(wildcard conf/man/*.8)))
+	rm -f $(DESTDIR)$(PREFIX)/lib/$(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so \
+	    $(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
+	rm -rf $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)$(PREFIX)/include/farlight
 
 clean:
 	rm -rf build out
