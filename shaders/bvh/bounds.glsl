@@ -3,11 +3,12 @@
 //
 // Rounding, with u = 2^-24. A box's plane b is crossed at b i - o i, i = 1 / d: the reciprocal errs by 1 u (2.5 u
 // on hardware), each product by 1 u, the difference by 1 u, which moves the plane by at most 5 u (|b| + |o|). The
-// intersection of the primitive itself errs by about as much (its corners are taken relative to the origin), and a
+// intersection of the primitive itself errs by about as much (corners are taken relative to the origin), and a
 // sphere's distance from the line by less than 8 u of the same. The part of b is in the bounds: the builder pads
 // them by BVH_PAD_RELATIVE = 8 u of their magnitude. The part of o is the slack of the ray: OBJECT_SLACK |o| with
-// 16 u. In the top tree the ray is yet to be taken to an object's space, which rounds again, by some 6 u |o| in that
-// space, and so by that times the matrix's condition in this one: WORLD_SLACK is 128 u, for conditions up to 20.
+// 16 u. In the top tree the ray is yet to be taken to an object's space, which rounds again, by some 6 u |o| in
+// that space, and so by that times the matrix's condition in this one: WORLD_SLACK is 128 u, for conditions up to
+// 20.
 const float OBJECT_SLACK = 9.5367431640625e-7;  // 2^-20
 const float WORLD_SLACK = 7.62939453125e-6;     // 2^-17
 

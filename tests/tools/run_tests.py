@@ -51,7 +51,7 @@ def run_cmocka(tally, program, environment):
         print(output, flush=True)
     else:
         for line in output.splitlines():
-            if "skip" in line.lower():
+            if "SKIPPED" in line or line.startswith("skipped"):
                 print(line)
     print(f"   {passed} passed, {failed} failed, {skipped} skipped in {time.monotonic() - begin:.1f} s"
           + (f" (exit status {status})" if status else ""), flush=True)
