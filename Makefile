@@ -59,6 +59,13 @@ EXPORT_CXX := $(wildcard client/output/*.cpp)
 SHADERS := $(sort $(patsubst shaders/%,%,$(wildcard shaders/*/*.h shaders/*/*.glsl shaders/*/*.comp shaders/*/*.vert \
            shaders/*/*.geom shaders/*/*.frag shaders/*.comp)))
 
+# V=1 shows the commands.
+ifeq ($(V),)
+say = @printf '  %-5s %s\n' $(1) $@;
+else
+say =
+endif
+
 obj = $(patsubst %.c,$(B)/%.o,$(patsubst %.cpp,$(B)/%.opp,$(1)))
 PROTOCOL_OBJ := $(call obj,$(PROTOCOL_SRC))
 SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o
@@ -92,24 +99,24 @@ EXPORT_CFLAGS = $(eval EXPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cfl
 
 $(B)/%.o: %.c
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 $(B)/%.opp: %.cpp
 	@mkdir -p $(@D)
-	$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
+	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
 
 $(B)/pic/protocol/%.o: VISIBILITY = -fvisibility=default
 $(B)/pic/%.o: %.c
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS_ALL) -Iclient $(CLIENT_CFLAGS) $(OPT) $(CFLAGS_ALL) -fPIC $(VISIBILITY) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) -Iclient $(CLIENT_CFLAGS) $(OPT) $(CFLAGS_ALL) -fPIC $(VISIBILITY) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 $(B)/$(SONAME): $(LIB_PIC) client/lib/libfarlight.map
-	$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--version-script=client/lib/libfarlight.map $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) \
+	$(call say,LINK)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--version-script=client/lib/libfarlight.map $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) \
 	    $(LIB_PIC) $(CLIENT_LIBS) -o $@
 
 $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefile
 	@mkdir -p $(@D)
 	shaders/embed.sh $(CURDIR)/shaders $(SHADERS) >$@.new && mv $@.new $@
 $(B)/shader_sources.o: $(B)/shader_sources.c
-	$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) -c $< -o $@
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) -c $< -o $@
 
 # ---- programs --------------------------------------------------------------------------------------
 SERVER_LIBS = $(call pkg_libs,$(SERVER_PKGS)) -lm
@@ -118,15 +125,15 @@ IMPORT_LIBS = $(call pkg_libs,$(IMPORT_PKGS)) -lm
 EXPORT_LIBS = $(call pkg_libs,$(EXPORT_PKGS)) -lm
 
 $(B)/farlightd: $(B)/server/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ)
-	$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(SERVER_LIBS) -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(SERVER_LIBS) -o $@
 $(B)/farlight: $(CLI_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
-	$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(CLIENT_LIBS) -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(CLIENT_LIBS) -o $@
 $(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ)
-	$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) -o $@
+	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) -o $@
 $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ)
-	$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
+	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
 $(B)/protocol-docgen: $(B)/protocol/docgen.o $(PROTOCOL_OBJ)
-	$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
 $(B)/protocol.md: $(B)/protocol-docgen
 	$< >$@.new && mv $@.new $@
 
@@ -135,19 +142,19 @@ $(B)/protocol.md: $(B)/protocol-docgen
 UNIT_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accuracy/test_*.c))
 TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) -lm
 $(UNIT_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 BENCHES := $(patsubst %.c,$(B)/%,$(wildcard tests/bench/bench_*.c))
 $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 
 # The yardstick of the benchmark; the only thing that links Embree.
 $(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/server/base/%,$(SERVER_OBJ))
-	$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -lembree3 -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -lembree3 -o $@
 
 # The generator of the bundled scenes.
 TOOLS_OBJ := $(B)/tests/tools/make_scenes.o $(B)/tests/tools/glb.o $(B)/tests/tools/shape.o
 $(B)/tests/tools/make_scenes: $(TOOLS_OBJ)
-	$(CC) $(OPT) $(LDFLAGS_ALL) $^ -lm -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -lm -o $@
 
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
@@ -231,9 +238,9 @@ FUZZ_SECONDS ?= 20
 FUZZERS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_SEED := $(B)/tests/fuzz/seed
 $(FUZZ_SEED): %: %.o $(PROTOCOL_OBJ)
-	$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
-	$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ -o $@
+	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ -o $@
 .PHONY: fuzz $(addprefix run-fuzz-,$(FUZZERS))
 ifeq ($(config),fuzz)
 fuzz: $(addprefix run-fuzz-,$(FUZZERS))

@@ -41,8 +41,8 @@ static bool set_limit(int resource, uint64_t value)
 
     if (getrlimit((__rlimit_resource_t)resource, &limit) != 0)
         return false;
-    if (limit.rlim_max != RLIM_INFINITY && limit.rlim_max < value)
-        value = limit.rlim_max; /* somebody set a tighter one */
+    if (limit.rlim_cur != RLIM_INFINITY && limit.rlim_cur < value)
+        value = limit.rlim_cur; /* somebody set a tighter one */
     limit.rlim_cur = limit.rlim_max = (rlim_t)value;
     return setrlimit((__rlimit_resource_t)resource, &limit) == 0;
 }
@@ -58,7 +58,8 @@ static bool set_limits(const struct sandbox_options *options)
     if (options->cpu_seconds != 0 && !set_limit(RLIMIT_CPU, options->cpu_seconds))
         return false;
     signal(SIGXFSZ, SIG_IGN); /* writing beyond the limit then fails instead of killing */
-    return set_limit(RLIMIT_CORE, 0) && set_limit(RLIMIT_FSIZE, options->file_bytes);
+    /* A sanitizer's report goes to stderr, which may be a file. */
+    return set_limit(RLIMIT_CORE, 0) && (SANITIZED || set_limit(RLIMIT_FSIZE, options->file_bytes));
 }
 
 /* ---- Landlock ---- */

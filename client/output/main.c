@@ -21,7 +21,8 @@
 #define TEXT_MAX 512
 #define FILE_BYTES_MAX (UINT64_C(1) << 36)
 
-const char *argp_program_version = "farlight-export " FARLIGHT_VERSION;
+/* The C library looks for it by name, past our hidden visibility. */
+__attribute__((visibility("default"))) const char *argp_program_version = "farlight-export " FARLIGHT_VERSION;
 
 enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS };
 

@@ -343,9 +343,11 @@ class Listening(Case):
         self.assertIn("no_such_key", result.stderr)
 
     def test_help_version_and_devices_go_to_standard_output(self):
-        for option in ("--help", "--version", "--list-devices"):
-            result = self.expect(farlight_test.run("farlightd", option), 0)
-            self.assertTrue(result.stdout.strip(), option)
+        for program in ("farlight", "farlightd", "farlight-import", "farlight-export"):
+            for option in ("--help", "--version"):
+                result = self.expect(farlight_test.run(program, option), 0)
+                self.assertIn(program, result.stdout)
+        self.assertTrue(self.expect(farlight_test.run("farlightd", "--list-devices"), 0).stdout.strip())
 
     def test_clients_come_and_go_without_leaving_descriptors(self):
         with Daemon() as daemon:
