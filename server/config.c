@@ -49,11 +49,15 @@ static const struct option options[] = {
      "Commands, and events, that may wait between the network and the renderer"},
 
     {"memory", "scene", OPTION_BYTES, AT(scene_bytes), "25%", MIB, 16 * TIB, "bytes",
-     "Host memory of one scene; a percentage is of the host's memory"},
+     "Host memory of one scene, and of all together without their blobs; a percentage is of the host's memory"},
     {"memory", "blobs", OPTION_BYTES, AT(limits.blob_bytes), "25%", MIB, 16 * TIB, "bytes",
      "Host memory of all blobs together: vertices, texels and the like"},
     {"memory", "blob_cache", OPTION_BYTES, AT(limits.blob_cache_bytes), "10%", 0, 16 * TIB, "bytes",
      "The part of it that is kept for a user's next connection when nobody uses it any more"},
+    {"memory", "transactions", OPTION_BYTES, AT(limits.transaction_bytes), "10%", MIB, 16 * TIB, "bytes",
+     "Host memory of one client's edits that wait to be committed"},
+    {"memory", "frames", OPTION_BYTES, AT(limits.frame_bytes), "50%", MIB, 16 * TIB, "bytes",
+     "Host memory that the frames of all jobs may take; a job that may need more has to wait for others to end"},
     {"memory", "device", OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
      "Device memory; 0: 70 % of what the device tells it has"},
 
@@ -316,6 +320,7 @@ void config_hub(const struct config *config, struct hub_options *hub)
         .scene_memory_bytes = config->scene_bytes,
         .insecure = config->insecure,
     };
+    hub->limits.frames_in_flight = config->frames_in_flight;
 }
 
 /* ---- dump -------------------------------------------------------------------------------------------- */

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "base/hashmap.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
+#include <sys/random.h>
 
 struct hashmap_slot {
     uint64_t key;
@@ -23,9 +25,25 @@ void hashmap_finish(struct hashmap *map)
     *map = (struct hashmap){0};
 }
 
-/* Finaliser of splitmix64: identifiers are chosen by clients, mostly 1, 2, 3, .., and must spread. */
+/* Clients choose the keys: without a secret, one could choose thousands that all fall on the same place, and every
+ * search among them would be long. */
+static uint64_t secret(void)
+{
+    static atomic_uint_fast64_t value; /* 0: not chosen yet */
+    uint64_t chosen = atomic_load_explicit(&value, memory_order_relaxed);
+    if (chosen)
+        return chosen;
+    if (getrandom(&chosen, sizeof chosen, 0) != (ssize_t)sizeof chosen)
+        chosen = (uintptr_t)&chosen; /* no random numbers: better than nothing */
+    chosen |= 1;
+    uint64_t other = 0;
+    return atomic_compare_exchange_strong(&value, &other, chosen) ? chosen : other;
+}
+
+/* Finaliser of splitmix64: identifiers are mostly 1, 2, 3, .., and must spread. */
 static size_t home_of(const struct hashmap *map, uint64_t key)
 {
+    key ^= secret();
     key = (key ^ (key >> 30)) * 0xbf58476d1ce4e5b9u;
     key = (key ^ (key >> 27)) * 0x94d049bb133111ebu;
     return (size_t)(key ^ (key >> 31)) & (map->capacity - 1);

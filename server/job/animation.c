@@ -7,6 +7,9 @@
 /* What the protocol lets a key have; a spline through keys near the ends may leave it. */
 #define FOV_MIN 0.001f
 #define FOV_MAX 3.1f
+/* What it lets a frame's camera and time have: composed transforms and splines may go beyond. */
+#define PLACE_MAX 1e12f
+#define TIME_MAX_S 1e9
 
 double animation_time_s(const struct engine_job *job, uint32_t frame)
 {
@@ -228,7 +231,7 @@ bool animation_check(const struct engine_job *job, const struct scene *scene, st
     return animation_camera(job, scene, job->first_frame, &camera, error);
 }
 
-bool animation_camera(const struct engine_job *job, const struct scene *scene, uint32_t frame,
+static bool camera_at(const struct engine_job *job, const struct scene *scene, uint32_t frame,
                       struct frame_camera *camera, struct error *error)
 {
     double time_s = animation_time_s(job, frame);
@@ -248,4 +251,24 @@ bool animation_camera(const struct engine_job *job, const struct scene *scene, u
         return orbit_camera(job, scene, time_s, camera, error);
     }
     return error_set(error, ERROR_INVALID, "render.camera_path", "%u is no camera path", (unsigned)job->path);
+}
+
+bool animation_camera(const struct engine_job *job, const struct scene *scene, uint32_t frame,
+                      struct frame_camera *camera, struct error *error)
+{
+    if (!(fabs(animation_time_s(job, frame)) <= TIME_MAX_S)) {
+        error_set(error, ERROR_INVALID, "render.frames_per_second", "frame %u is at %g s, beyond %g s", frame,
+                  animation_time_s(job, frame), TIME_MAX_S);
+        return error_remedy(error, "use more frames a second, or smaller frame numbers");
+    }
+    if (!camera_at(job, scene, frame, camera, error))
+        return false;
+    for (int i = 0; i < 12; i++) {
+        if (fabsf(camera->world_from_view[i]) <= PLACE_MAX) /* false for a NaN too */
+            continue;
+        error_set(error, ERROR_INVALID, "render.camera_path", "in frame %u the camera is beyond %g m", frame,
+                  (double)PLACE_MAX);
+        return error_remedy(error, "bring the camera, or what it is to show, nearer to the origin");
+    }
+    return true;
 }

@@ -68,6 +68,16 @@ static bool jobs_reserve(struct engine *engine)
     return true;
 }
 
+/* Frames in flight: fewer of them where they are large, or a few jobs would fill the host's memory. */
+static uint32_t window_of(const struct engine *engine, const struct frame_request *frame)
+{
+    uint64_t frame_bytes = (uint64_t)frame->width * frame->height * bytes_per_pixel(frame->format);
+    uint64_t frames = engine->options.frame_window_bytes / frame_bytes;
+    return frames < 1                                  ? 1
+           : frames < engine->options.frames_in_flight ? (uint32_t)frames
+                                                       : engine->options.frames_in_flight;
+}
+
 bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_command *command,
                struct error *error)
 {
@@ -78,7 +88,7 @@ bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_
         .events = engine->events,
         .client = command->client,
         .request = command->request,
-        .window = engine->options.frames_in_flight,
+        .window = window_of(engine, &command->job.frame),
         .credit = command->job.credit,
     });
     if (!job || !output || !jobs_reserve(engine)) {

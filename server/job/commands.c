@@ -100,6 +100,7 @@ static void scene_free(struct engine *engine, struct engine_scene *scene)
 {
     hashmap_remove(&scene->client->scenes, scene->id);
     engine->backend->renderer_destroy(scene->renderer);
+    engine->table_bytes -= scene->scene->table_bytes;
     scene_destroy(scene->scene);
     free(scene->waiting);
     free(scene);
@@ -143,11 +144,24 @@ static void client_gone(struct engine *engine, struct engine_command *command)
 
 /* ---- what a frame in progress keeps waiting ----------------------------------------------------- */
 
+/* Blobs are limited where they are held, as scenes share them; tables here, all scenes together. */
+static bool commit_within_limits(struct engine *engine, struct scene *scene, struct engine_command *command,
+                                 struct error *error)
+{
+    uint64_t limit_bytes = engine->options.scene_limits.host_bytes;
+    uint64_t others_bytes = engine->table_bytes - scene->table_bytes;
+    if (limit_bytes)
+        scene->limits.table_bytes = others_bytes < limit_bytes ? limit_bytes - others_bytes : 1;
+    bool applied = scene_commit(scene, command->edits, command->edit_count, error);
+    engine->table_bytes = others_bytes + scene->table_bytes;
+    return applied;
+}
+
 static void commit(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
 {
     struct error error = {0};
     uint64_t start_ns = clock_now_ns();
-    bool applied = scene_commit(scene->scene, command->edits, command->edit_count, &error);
+    bool applied = commit_within_limits(engine, scene->scene, command, &error);
     if (!applied) {
         fail(engine, command, &error);
         return;

@@ -182,6 +182,8 @@ struct engine *engine_create(const struct engine_options *options, struct error 
         engine->options.queue_capacity = QUEUE_CAPACITY_DEFAULT;
     if (!engine->options.frames_in_flight)
         engine->options.frames_in_flight = FRAMES_IN_FLIGHT_DEFAULT;
+    if (!engine->options.frame_window_bytes)
+        engine->options.frame_window_bytes = ENGINE_FRAME_WINDOW_BYTES;
     pthread_mutex_init(&engine->start_lock, NULL);
     pthread_cond_init(&engine->start_changed, NULL);
     /* One more for the nudge. */

@@ -34,6 +34,9 @@ struct engine_scene {
     size_t waiting_count;
     uint64_t apply_start_ns, apply_ns; /* of the commits since the last frame */
     uint64_t used;                     /* number of the slice that used it last */
+    /* For stats, as of that revision: a large scene is not gone through each time that somebody asks. */
+    uint64_t counted_revision, triangles, spheres;
+    uint32_t instances;
 };
 
 struct job {
@@ -78,6 +81,7 @@ struct engine {
     size_t job_count, job_capacity;
     uint64_t slices;
     uint64_t frames, rays;
+    uint64_t table_bytes; /* of all scenes */
 };
 
 /* engine.c */

@@ -4,10 +4,32 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void describe_scene(const struct engine *engine, const struct engine_scene *from,
-                           struct engine_scene_stat *stat)
+static void count_contents(struct engine_scene *from)
 {
     const struct scene *scene = from->scene;
+    if (from->counted_revision == scene->revision)
+        return;
+    from->counted_revision = scene->revision;
+    from->instances = 0;
+    from->triangles = from->spheres = 0;
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&scene->objects[SCENE_NODE], &cursor, NULL, &value)) {
+        enum scene_node_kind kind = ((const struct scene_node *)value)->kind;
+        from->instances += kind == NODE_MESH || kind == NODE_SPHERES;
+    }
+    cursor = 0;
+    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, NULL, &value))
+        from->triangles += ((const struct scene_mesh *)value)->triangle_count;
+    cursor = 0;
+    while (hashmap_next(&scene->objects[SCENE_SPHERES], &cursor, NULL, &value))
+        from->spheres += ((const struct scene_spheres *)value)->sphere_count;
+}
+
+static void describe_scene(const struct engine *engine, struct engine_scene *from, struct engine_scene_stat *stat)
+{
+    const struct scene *scene = from->scene;
+    count_contents(from);
     *stat = (struct engine_scene_stat){
         .client = from->client->client,
         .scene = from->id,
@@ -15,20 +37,11 @@ static void describe_scene(const struct engine *engine, const struct engine_scen
         .host_bytes = scene->host_bytes,
         .device_bytes = from->renderer ? engine->backend->device_bytes(from->renderer) : 0,
         .nodes = (uint32_t)scene->objects[SCENE_NODE].count,
+        .instances = from->instances,
+        .triangles = from->triangles,
+        .spheres = from->spheres,
     };
     memcpy(stat->name, scene->name, sizeof stat->name);
-    size_t cursor = 0;
-    void *value;
-    while (hashmap_next(&scene->objects[SCENE_NODE], &cursor, NULL, &value)) {
-        enum scene_node_kind kind = ((const struct scene_node *)value)->kind;
-        stat->instances += kind == NODE_MESH || kind == NODE_SPHERES;
-    }
-    cursor = 0;
-    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, NULL, &value))
-        stat->triangles += ((const struct scene_mesh *)value)->triangle_count;
-    cursor = 0;
-    while (hashmap_next(&scene->objects[SCENE_SPHERES], &cursor, NULL, &value))
-        stat->spheres += ((const struct scene_spheres *)value)->sphere_count;
 }
 
 static bool describe_scenes(const struct engine *engine, struct engine_stats *stats)

@@ -326,10 +326,13 @@ static void turn_end(void *context)
         return;
     }
     bool over_soft = connection->out.queued_bytes > connection->limits->queued_soft_bytes;
-    if (!over_soft)
-        connection->over_soft_since_ns = 0;
-    else if (!connection->over_soft_since_ns)
+    if (over_soft && !connection->over_soft_since_ns) {
         connection->over_soft_since_ns = clock_now_ns();
+    } else if (!over_soft && connection->over_soft_since_ns) {
+        connection->over_soft_since_ns = 0;
+        if (connection->message_began_ns)
+            connection->message_began_ns = clock_now_ns(); /* until now it could not come */
+    }
     loop_watch_change(connection->watch, (may_read(connection) ? (uint32_t)EPOLLIN : 0) |
                                              (connection->write_blocked ? (uint32_t)EPOLLOUT : 0));
     loop_timer_start(connection->loop, &connection->timer, patience_next_check_ns(connection, clock_now_ns()));

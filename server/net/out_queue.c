@@ -82,7 +82,7 @@ void out_queue_finish(struct out_queue *queue)
     list_clear(&queue->sending);
     list_clear(&queue->control);
     list_clear(&queue->bulk);
-    queue->queued_bytes = queue->queued_bulk_bytes = 0;
+    queue->queued_bytes = queue->queued_bulk_bytes = queue->sending_bytes = 0;
 }
 
 void out_queue_push(struct out_queue *queue, struct out_message *message, bool bulk)
@@ -97,16 +97,13 @@ void out_queue_push(struct out_queue *queue, struct out_message *message, bool b
 /* Moves messages to the line that is being sent, control first. */
 static void line_up(struct out_queue *queue)
 {
-    size_t lined_up_bytes = 0;
-    for (const struct out_message *message = queue->sending.first; message; message = message->next)
-        lined_up_bytes += out_message_bytes(message) - message->sent_bytes;
-    while (lined_up_bytes < LINED_UP_BYTES) {
+    while (queue->sending_bytes < LINED_UP_BYTES) {
         struct out_message *message = list_take(&queue->control);
         if (!message && (message = list_take(&queue->bulk)))
             queue->queued_bulk_bytes -= out_message_bytes(message);
         if (!message)
             return;
-        lined_up_bytes += out_message_bytes(message);
+        queue->sending_bytes += out_message_bytes(message);
         list_append(&queue->sending, message);
     }
 }
@@ -147,6 +144,7 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t now_ns)
     struct out_list complete;
     list_init(&complete);
     queue->queued_bytes -= bytes;
+    queue->sending_bytes -= bytes;
     while (bytes) {
         struct out_message *message = queue->sending.first;
         size_t left_bytes = out_message_bytes(message) - message->sent_bytes;
@@ -175,6 +173,8 @@ static void drop_from(struct out_queue *queue, struct out_list *list, bool any, 
             queue->queued_bytes -= out_message_bytes(message);
             if (list == &queue->bulk)
                 queue->queued_bulk_bytes -= out_message_bytes(message);
+            else
+                queue->sending_bytes -= out_message_bytes(message);
             destroy(message);
             continue;
         }

@@ -47,6 +47,7 @@ struct out_queue {
     struct out_list control, bulk;
     size_t queued_bytes;      /* not handed to the kernel yet, all lists */
     size_t queued_bulk_bytes; /* of them in `bulk` */
+    size_t sending_bytes;     /* of them in `sending` */
 };
 
 void out_queue_init(struct out_queue *queue);

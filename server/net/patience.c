@@ -23,7 +23,8 @@ static uint64_t since(uint64_t then_ns, uint64_t now_ns)
 static uint64_t progress_due_bytes(const struct connection *connection, uint64_t now_ns)
 {
     uint64_t elapsed_ns = since(connection->message_began_ns, now_ns);
-    if (!connection->message_began_ns || connection->held ||
+    /* While nothing is read from it, the client cannot go on. */
+    if (!connection->message_began_ns || connection->held || connection->over_soft_since_ns ||
         elapsed_ns < connection->limits->progress_grace_ms * NS_PER_MS)
         return 0;
     return elapsed_ns / NS_PER_MS * connection->limits->progress_bytes_per_s / 1000;

@@ -75,12 +75,29 @@ static bool take_edit(struct draft *draft, struct scene_edit *edit)
                      draft->edit_count);
 }
 
-/* Host memory after the transaction, and nodes. */
-static bool limits_check(struct draft *draft, uint64_t *host_bytes)
+struct size {
+    uint64_t host_bytes, table_bytes, nodes;
+};
+
+static void add_object(struct size *size, enum scene_object_kind kind, const void *object)
+{
+    size->host_bytes += object_bytes(kind, object);
+    size->table_bytes += object_table_bytes(kind, object);
+    size->nodes += kind == SCENE_NODE;
+}
+
+static void take_object(struct size *size, enum scene_object_kind kind, const void *object)
+{
+    size->host_bytes -= object_bytes(kind, object);
+    size->table_bytes -= object_table_bytes(kind, object);
+    size->nodes -= kind == SCENE_NODE;
+}
+
+/* After the transaction. */
+static struct size draft_size(const struct draft *draft)
 {
     const struct scene *scene = draft->scene;
-    uint64_t bytes = scene->host_bytes;
-    uint64_t nodes = scene->objects[SCENE_NODE].count - draft->fallen_count;
+    struct size size = {scene->host_bytes, scene->table_bytes, scene->objects[SCENE_NODE].count};
     for (int k = 0; k < SCENE_OBJECT_KIND_COUNT; k++) {
         enum scene_object_kind kind = (enum scene_object_kind)k;
         size_t cursor = 0;
@@ -89,32 +106,46 @@ static bool limits_check(struct draft *draft, uint64_t *host_bytes)
         while (hashmap_next(&draft->last[kind], &cursor, &id, &value)) {
             const struct scene_edit *edit = value;
             const void *now = hashmap_get(&scene->objects[kind], id);
-            bool stays = edit->kind == EDIT_SET;
-            bytes += stays ? object_bytes(kind, &edit->set) : 0;
-            bytes -= now ? object_bytes(kind, now) : 0;
-            if (kind == SCENE_NODE)
-                nodes = nodes + stays - (now != NULL);
+            if (edit->kind == EDIT_SET)
+                add_object(&size, kind, &edit->set);
+            if (now)
+                take_object(&size, kind, now);
         }
     }
     for (size_t i = 0; i < draft->fallen_count; i++)
-        bytes -= object_bytes(SCENE_NODE, scene_node(scene, draft->fallen[i]));
+        take_object(&size, SCENE_NODE, scene_node(scene, draft->fallen[i]));
     if (draft->last_environment)
-        bytes +=
+        size.host_bytes +=
             environment_bytes(&draft->last_environment->set.environment) - environment_bytes(&scene->environment);
-    *host_bytes = bytes;
-    uint64_t nodes_max = scene->limits.nodes ? scene->limits.nodes : NODES_MAX_DEFAULT;
-    if (nodes > nodes_max && nodes > scene->objects[SCENE_NODE].count) {
+    return size;
+}
+
+/* Host memory after the transaction, and nodes. What makes a scene smaller is allowed in any case. */
+static bool limits_check(const struct draft *draft, const struct size *size)
+{
+    const struct scene *scene = draft->scene;
+    const struct scene_limits *limits = &scene->limits;
+    uint64_t nodes_max = limits->nodes ? limits->nodes : NODES_MAX_DEFAULT;
+    if (size->nodes > nodes_max && size->nodes > scene->objects[SCENE_NODE].count) {
         error_set(draft->error, ERROR_LIMIT, "edits", "the scene would have %llu nodes; %llu are allowed",
-                  (unsigned long long)nodes, (unsigned long long)nodes_max);
+                  (unsigned long long)size->nodes, (unsigned long long)nodes_max);
         return error_remedy(draft->error,
                             "remove nodes, or raise the limit of nodes in the daemon's configuration");
     }
-    if (scene->limits.host_bytes && bytes > scene->limits.host_bytes && bytes > scene->host_bytes) {
+    if (limits->host_bytes && size->host_bytes > limits->host_bytes && size->host_bytes > scene->host_bytes) {
         error_set(draft->error, ERROR_LIMIT, "edits",
                   "the scene would take %.1f MiB of the host's memory; %.1f MiB are allowed",
-                  (double)bytes / 0x1p20, (double)scene->limits.host_bytes / 0x1p20);
+                  (double)size->host_bytes / 0x1p20, (double)limits->host_bytes / 0x1p20);
         return error_remedy(draft->error,
                             "remove objects, or raise the limit of scene memory in the daemon's configuration");
+    }
+    if (limits->table_bytes && size->table_bytes > limits->table_bytes && size->table_bytes > scene->table_bytes) {
+        error_set(draft->error, ERROR_LIMIT, "edits",
+                  "the scene's tables would take %.1f MiB of the host's memory; other scenes leave %.1f MiB",
+                  (double)size->table_bytes / 0x1p20, (double)limits->table_bytes / 0x1p20);
+        return error_remedy(draft->error,
+                            "remove objects, close scenes, or raise the limit of scene memory in the "
+                            "daemon's configuration");
     }
     return true;
 }
@@ -219,11 +250,12 @@ static void apply_remove(struct scene *scene, enum scene_object_kind kind, uint3
     free(object);
 }
 
-static void apply(struct draft *draft, uint64_t host_bytes)
+static void apply(struct draft *draft, const struct size *size)
 {
     struct scene *scene = draft->scene;
     scene->revision++;
-    scene->host_bytes = host_bytes;
+    scene->host_bytes = size->host_bytes;
+    scene->table_bytes = size->table_bytes;
     for (size_t i = 0; i < draft->edit_count; i++) {
         struct scene_edit *edit = &draft->edits[i];
         if (!draft_counts(draft, edit))
@@ -246,17 +278,21 @@ static void apply(struct draft *draft, uint64_t host_bytes)
 bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_count, struct error *error)
 {
     struct draft draft = {.scene = scene, .edits = edits, .edit_count = edit_count, .error = error};
-    uint64_t host_bytes = 0;
+    struct size size = {0};
     bool sound = true;
     for (size_t i = 0; sound && i < edit_count; i++)
         sound = take_edit(&draft, &edits[i]);
-    sound = sound && structure_check(&draft) && references_check(&draft) && limits_check(&draft, &host_bytes);
+    sound = sound && structure_check(&draft) && references_check(&draft);
+    if (sound) {
+        size = draft_size(&draft);
+        sound = limits_check(&draft, &size);
+    }
     if (sound && !make_room(&draft)) {
         give_room_back(&draft);
         sound = false;
     }
     if (sound)
-        apply(&draft, host_bytes);
+        apply(&draft, &size);
     for (int kind = 0; kind < SCENE_OBJECT_KIND_COUNT; kind++)
         hashmap_finish(&draft.last[kind]);
     free(draft.fallen);

@@ -109,19 +109,27 @@ static uint64_t blob_bytes(const struct blob *blob)
     return blob ? blob->size_bytes : 0;
 }
 
-uint64_t object_bytes(enum scene_object_kind kind, const void *object)
+uint64_t object_table_bytes(enum scene_object_kind kind, const void *object)
 {
     /* Its slot in the table, at the table's usual load. */
     const uint64_t slot_bytes = 32;
-    uint64_t bytes = object_struct_bytes(kind) + slot_bytes;
+    uint64_t range_count = 0;
+    if (kind == SCENE_MESH)
+        range_count = ((const struct scene_mesh *)object)->range_count;
+    else if (kind == SCENE_SPHERES)
+        range_count = ((const struct scene_spheres *)object)->range_count;
+    return object_struct_bytes(kind) + slot_bytes + range_count * sizeof(struct material_range);
+}
+
+uint64_t object_bytes(enum scene_object_kind kind, const void *object)
+{
+    uint64_t bytes = object_table_bytes(kind, object);
     if (kind == SCENE_MESH) {
         const struct scene_mesh *mesh = object;
         for (int i = 0; i < MESH_ARRAY_COUNT; i++)
             bytes += blob_bytes(mesh->arrays[i]);
-        bytes += mesh->range_count * sizeof *mesh->ranges;
     } else if (kind == SCENE_SPHERES) {
-        const struct scene_spheres *spheres = object;
-        bytes += blob_bytes(spheres->centres_radii) + spheres->range_count * sizeof *spheres->ranges;
+        bytes += blob_bytes(((const struct scene_spheres *)object)->centres_radii);
     } else if (kind == SCENE_TEXTURE) {
         bytes += blob_bytes(((const struct scene_texture *)object)->texels);
     }

@@ -40,6 +40,7 @@ size_t first_bad_float(const float *values, size_t count, float greatest);
 
 /* Host memory that an object counts for. */
 uint64_t object_bytes(enum scene_object_kind kind, const void *object);
+uint64_t object_table_bytes(enum scene_object_kind kind, const void *object); /* of them: without blobs */
 uint64_t environment_bytes(const struct scene_environment *environment);
 /* Size of the struct of a kind. */
 size_t object_struct_bytes(enum scene_object_kind kind);

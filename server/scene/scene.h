@@ -174,6 +174,7 @@ void scene_edit_finish(struct scene_edit *edit);
 
 struct scene_limits {
     uint64_t host_bytes; /* blobs and tables of this scene; 0: no limit */
+    uint64_t table_bytes; /* its tables alone, which no other scene shares; 0: no limit */
     uint32_t nodes;      /* 0: 4 Mi */
 };
 
@@ -183,7 +184,8 @@ struct scene {
     struct hashmap objects[SCENE_OBJECT_KIND_COUNT]; /* struct scene_node * and so on, by id */
     struct scene_environment environment;
     struct scene_limits limits;
-    uint64_t host_bytes; /* blobs that objects hold, counted per object, and tables */
+    uint64_t host_bytes;  /* blobs that objects hold, counted per object, and tables */
+    uint64_t table_bytes; /* of them: tables */
     /* Revision at which anything of a sort last changed, for those who keep copies. */
     uint64_t geometry_revision;  /* meshes, spheres, discs: their shape */
     uint64_t instances_revision; /* nodes: which, where, hidden */

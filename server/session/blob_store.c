@@ -130,17 +130,22 @@ static bool is_idle(const struct entry *entry)
     return atomic_load_explicit(&entry->blob->references, memory_order_acquire) == 1;
 }
 
+static uint64_t cost_of(const struct entry *entry)
+{
+    return entry->blob->size_bytes + BLOB_STORE_OVERHEAD_BYTES;
+}
+
 /* Drops idle blobs, oldest first, until no more than that many bytes of them are left. */
 static void trim_to(struct blob_store *store, uint64_t idle_limit_bytes)
 {
     uint64_t idle_bytes = 0;
     for (const struct entry *entry = store->oldest; entry; entry = entry->newer)
-        idle_bytes += is_idle(entry) ? entry->blob->size_bytes : 0;
+        idle_bytes += is_idle(entry) ? cost_of(entry) : 0;
     for (struct entry *entry = store->oldest, *newer; entry && idle_bytes > idle_limit_bytes; entry = newer) {
         newer = entry->newer;
         if (!is_idle(entry))
             continue;
-        idle_bytes -= entry->blob->size_bytes;
+        idle_bytes -= cost_of(entry);
         remove_entry(store, entry);
     }
 }
@@ -152,7 +157,7 @@ void blob_store_trim(struct blob_store *store)
 
 static bool fits(const struct blob_store *store, uint64_t size_bytes)
 {
-    uint64_t used_bytes = blob_store_bytes(store);
+    uint64_t used_bytes = blob_store_bytes(store) + (uint64_t)store->count * BLOB_STORE_OVERHEAD_BYTES;
     return used_bytes <= store->limit_bytes && size_bytes <= store->limit_bytes - used_bytes;
 }
 
@@ -165,7 +170,8 @@ bool blob_store_reserve(struct blob_store *store, uint64_t size_bytes, struct er
                   (unsigned long long)blob_store_bytes(store), (unsigned long long)size_bytes,
                   (unsigned long long)store->limit_bytes);
         error_remedy(error,
-                     "close scenes that are not needed, or raise memory.blobs in the daemon's configuration");
+                     "end connections that are not needed, as each holds its blobs, or raise memory.blobs in the "
+                     "daemon's configuration");
         if (error)
             error->retryable = size_bytes <= store->limit_bytes;
         return false;

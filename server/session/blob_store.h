@@ -14,6 +14,9 @@
 /* Whose blobs are meant: a hash must not be a key to somebody else's data. */
 typedef uint64_t blob_principal;
 
+/* What a blob takes beside its content: counted against the limits, as small ones may be many. */
+#define BLOB_STORE_OVERHEAD_BYTES 256u
+
 struct blob_store;
 
 struct blob_store *blob_store_create(uint64_t limit_bytes, uint64_t cache_limit_bytes); /* NULL: out of memory */
@@ -26,13 +29,13 @@ struct blob *blob_store_find(struct blob_store *store, blob_principal principal,
  * one that is held under this name from now on: it, or an equal one that was there. NULL: out of memory. */
 struct blob *blob_store_add(struct blob_store *store, blob_principal principal, struct blob *blob);
 
-/* Room for a blob that is about to arrive; ERROR_LIMIT if there is none even without the cache. */
+/* Room for bytes of a blob that are about to arrive; ERROR_LIMIT if there is none even without the cache. */
 bool blob_store_reserve(struct blob_store *store, uint64_t size_bytes, struct error *error);
 void blob_store_release(struct blob_store *store, uint64_t size_bytes); /* it is added now, or will not come */
 
 void blob_store_trim(struct blob_store *store); /* to be called when uses may have ended */
 void blob_store_forget(struct blob_store *store, blob_principal principal); /* it will never come back */
-uint64_t blob_store_bytes(const struct blob_store *store);                  /* held and reserved */
+uint64_t blob_store_bytes(const struct blob_store *store);                  /* of content, held and reserved */
 size_t blob_store_count(const struct blob_store *store);
 
 #endif

@@ -71,6 +71,8 @@ static void on_scene_open(struct session *session, struct request *request, cons
         error_set(&error, ERROR_LIMIT, "scene_open", "%u scenes are open, the limit", limit);
     else if (!hashmap_put(&session->scenes, open->scene, (void *)(uintptr_t)SCENE_OPENING))
         error_set(&error, ERROR_OUT_OF_MEMORY, "scene_open", "no memory");
+    if (error.kind == ERROR_LIMIT)
+        error_remedy(&error, "close one, or raise limits.scenes in the daemon's configuration");
     if (error.kind != ERROR_NONE) {
         request_answer_error(session, request, &error);
         return;
@@ -80,8 +82,6 @@ static void on_scene_open(struct session *session, struct request *request, cons
     if (command) {
         command->scene = open->scene;
         snprintf(command->name, sizeof command->name, "%s", open->name);
-    } else {
-        hashmap_remove(&session->scenes, open->scene);
     }
     session_submit(session, request, command);
 }
@@ -98,11 +98,12 @@ static void on_scene_close(struct session *session, struct request *request, con
         request_answer_error(session, request, &error);
         return;
     }
-    hashmap_put(&session->scenes, scene, (void *)(uintptr_t)SCENE_CLOSING); /* replaces: needs no memory */
     request->scene = scene;
     struct engine_command *command = hub_command(ENGINE_SCENE_CLOSE, session->number, request->id);
-    if (command)
+    if (command) {
         command->scene = scene;
+        hashmap_put(&session->scenes, scene, (void *)(uintptr_t)SCENE_CLOSING); /* replaces: needs no memory */
+    }
     session_submit(session, request, command);
 }
 

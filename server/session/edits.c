@@ -3,6 +3,7 @@
 
 #include "session/session.h"
 
+#include <inttypes.h>
 #include <stdlib.h>
 
 void edits_fail(struct session *session, struct request *request, const struct error *error)
@@ -35,6 +36,7 @@ void transaction_destroy(struct session *session, struct transaction *transactio
     if (!transaction)
         return;
     session->transaction_edits -= transaction->count;
+    session->transaction_bytes -= transaction->bytes;
     for (size_t i = 0; i < transaction->count; i++)
         scene_edit_finish(&transaction->edits[i]);
     free(transaction->edits);
@@ -43,9 +45,13 @@ void transaction_destroy(struct session *session, struct transaction *transactio
 
 static bool make_room(const struct session *session, struct transaction *transaction, struct error *error)
 {
-    uint32_t limit = session->hub->options.limits.transaction_edits;
-    if (session->transaction_edits >= limit)
-        return error_set(error, ERROR_LIMIT, "transaction", "%u edits wait to be committed, the limit", limit);
+    const struct session_limits *limits = &session->hub->options.limits;
+    if (session->transaction_edits >= limits->transaction_edits) {
+        error_set(error, ERROR_LIMIT, "transaction", "%u edits wait to be committed, the limit",
+                  limits->transaction_edits);
+        return error_remedy(error, "commit fewer edits at a time and wait for the answer, or raise "
+                                   "limits.transaction_edits in the daemon's configuration");
+    }
     if (transaction->count < transaction->capacity)
         return true;
     size_t capacity = transaction->capacity ? transaction->capacity * 2 : 32;
@@ -54,6 +60,29 @@ static bool make_room(const struct session *session, struct transaction *transac
         return error_set(error, ERROR_OUT_OF_MEMORY, "transaction", "no memory for %zu edits", capacity);
     transaction->edits = edits;
     transaction->capacity = capacity;
+    return true;
+}
+
+/* Counts an edit that has just been made. Blobs are counted where they are held. */
+static bool account(struct session *session, struct transaction *transaction, const struct scene_edit *edit,
+                    struct error *error)
+{
+    uint64_t limit_bytes = session->hub->options.limits.transaction_bytes;
+    uint64_t bytes = sizeof *edit;
+    if (edit->kind == EDIT_SET && edit->object == SCENE_MESH)
+        bytes += edit->set.mesh.range_count * sizeof *edit->set.mesh.ranges;
+    if (edit->kind == EDIT_SET && edit->object == SCENE_SPHERES)
+        bytes += edit->set.spheres.range_count * sizeof *edit->set.spheres.ranges;
+    if (bytes > limit_bytes || session->transaction_bytes > limit_bytes - bytes) {
+        error_set(error, ERROR_LIMIT, "transaction",
+                  "the edits that wait to be committed take more than %" PRIu64 " bytes, the limit", limit_bytes);
+        return error_remedy(error, "commit fewer edits at a time and wait for the answer, or raise "
+                                   "memory.transactions in the daemon's configuration");
+    }
+    transaction->count++;
+    transaction->bytes += bytes;
+    session->transaction_edits++;
+    session->transaction_bytes += bytes;
     return true;
 }
 
@@ -66,11 +95,8 @@ void edits_add(struct session *session, struct request *request, const struct me
         return;
     }
     struct scene_edit *edit = &transaction->edits[transaction->count];
-    if (edit_from_message(session, message, edit, &error)) {
-        transaction->count++;
-        session->transaction_edits++;
+    if (edit_from_message(session, message, edit, &error) && account(session, transaction, edit, &error))
         return;
-    }
     scene_edit_finish(edit);
     edits_fail(session, request, &error);
 }
@@ -92,9 +118,12 @@ void edits_commit(struct session *session, struct request *request)
         command->scene = transaction->scene;
         command->edits = transaction->edits;
         command->edit_count = transaction->count;
-        session->transaction_edits -= transaction->count;
+        /* They are counted until the engine has answered: it may keep them for as long as a frame takes. */
+        request->edits = transaction->count;
+        request->edit_bytes = transaction->bytes;
         transaction->edits = NULL;
         transaction->count = 0;
+        transaction->bytes = 0;
     }
     transaction_destroy(session, transaction);
     request->object = NULL;

@@ -11,6 +11,7 @@ struct transaction {
     uint32_t scene;
     struct scene_edit *edits;
     size_t count, capacity;
+    uint64_t bytes; /* of the edits and what they own, blobs left out */
 };
 
 void edits_begin(struct session *session, struct request *request, const struct message_edit_begin *begin);

@@ -31,6 +31,7 @@ struct hub {
     struct blob_store *blobs;
     struct hashmap sessions; /* struct session *, by number */
     size_t unauthenticated;
+    uint64_t frame_bytes; /* what the frames of all jobs may take */
     uint64_t last_number, started_ns;
     bool stopping;
     loop_call_fn *emptied; /* called when the last session is gone; may be NULL */

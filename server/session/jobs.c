@@ -4,6 +4,7 @@
 #include "session/frames.h"
 #include "session/session.h"
 
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -40,17 +41,57 @@ static bool check_limits(const struct session *session, const struct message_ren
 {
     const struct session_limits *limits = &session->hub->options.limits;
     if (render->width > limits->width_pixels || render->height > limits->height_pixels)
-        return error_set(error, ERROR_LIMIT, "render.width", "%u x %u pixels, the limit is %u x %u", render->width,
-                         render->height, limits->width_pixels, limits->height_pixels);
-    if (render->samples > limits->samples)
-        return error_set(error, ERROR_LIMIT, "render.samples", "%u, the limit is %u", render->samples,
-                         limits->samples);
+        error_set(error, ERROR_LIMIT, "render.width", "%u x %u pixels, the limit is %u x %u", render->width,
+                  render->height, limits->width_pixels, limits->height_pixels);
+    else if (render->samples > limits->samples)
+        error_set(error, ERROR_LIMIT, "render.samples", "%u, the limit is %u", render->samples, limits->samples);
+    if (error->kind == ERROR_LIMIT)
+        return error_remedy(error, "ask for less, or raise [limits] in the daemon's configuration");
     if (session->job_count >= limits->jobs_per_client) {
         error_set(error, ERROR_LIMIT, "render", "%u jobs are running, the limit", session->job_count);
+        error_remedy(error, "wait for one to end, or cancel it");
         error->retryable = true;
         return false;
     }
     return true;
+}
+
+static uint64_t frame_bytes_of(const struct message_render *render)
+{
+    return (uint64_t)render->width * render->height * bytes_per_pixel(render->format);
+}
+
+/* How many frames of the job may wait in memory to be sent: at least one, whatever its size. */
+static uint64_t window_of(const struct session *session, const struct message_render *render)
+{
+    uint64_t window = session->hub->options.limits.frame_window_bytes / frame_bytes_of(render);
+    return window < 1 ? 1 : window > WINDOW_FRAMES_MAX ? WINDOW_FRAMES_MAX : window;
+}
+
+/* The most that its frames can take: those in the engine, and those that wait here. */
+static uint64_t job_bytes_of(const struct session *session, const struct message_render *render)
+{
+    uint64_t frame_bytes = frame_bytes_of(render);
+    uint64_t in_engine = ENGINE_FRAME_WINDOW_BYTES / frame_bytes;
+    uint64_t in_flight = session->hub->options.limits.frames_in_flight;
+    in_engine = in_engine < 1 ? 1 : in_engine < in_flight ? in_engine : in_flight;
+    return frame_bytes * (in_engine + window_of(session, render));
+}
+
+/* A job that has begun is never short of room for its next frame: there is room for it, or it does not begin. */
+static bool check_room(const struct session *session, const struct message_render *render, struct error *error)
+{
+    const struct hub *hub = session->hub;
+    uint64_t job_bytes = job_bytes_of(session, render), limit_bytes = hub->options.limits.frame_bytes;
+    if (!hub->frame_bytes || (hub->frame_bytes <= limit_bytes && job_bytes <= limit_bytes - hub->frame_bytes))
+        return true;
+    error_set(error, ERROR_BUSY, "render",
+              "frames of this job may take %" PRIu64 " bytes; running jobs may take %" PRIu64
+              ", the limit of all is %" PRIu64,
+              job_bytes, hub->frame_bytes, limit_bytes);
+    return error_remedy(error,
+                        "try again when jobs have ended, ask for smaller frames, or raise memory.frames in the "
+                        "daemon's configuration");
 }
 
 static bool check_camera(const struct message_render *render, struct error *error)
@@ -86,7 +127,8 @@ static bool check(const struct session *session, const struct message_render *re
     if (render->encoding == PROTOCOL_ENCODING_ZSTD && render->quality > ZSTD_LEVEL_MAX)
         return error_set(error, ERROR_INVALID, "render.quality", "zstd has levels up to %u, not %u",
                          ZSTD_LEVEL_MAX, render->quality);
-    return check_limits(session, render, error) && check_camera(render, error);
+    return check_limits(session, render, error) && check_camera(render, error) &&
+           check_room(session, render, error);
 }
 
 /* ---- start ------------------------------------------------------------------------------------------- */
@@ -145,14 +187,6 @@ static void fill_job(struct engine_job *job, const struct message_render *render
     };
 }
 
-/* How many frames of the job may wait in memory to be sent: at least one, whatever its size. */
-static uint64_t window_of(const struct session *session, const struct message_render *render)
-{
-    uint64_t frame_bytes = (uint64_t)render->width * render->height * bytes_per_pixel(render->format);
-    uint64_t window = session->hub->options.limits.frame_window_bytes / frame_bytes;
-    return window < 1 ? 1 : window > WINDOW_FRAMES_MAX ? WINDOW_FRAMES_MAX : window;
-}
-
 static uint64_t allowed_credit(const struct job *job)
 {
     uint64_t room = job->frames_sent + job->window;
@@ -183,11 +217,13 @@ void jobs_start(struct session *session, struct request *request, const struct m
         .frame_count = (render->last_frame - render->first_frame) / render->frame_step + UINT64_C(1),
         .client_credit = render->credit,
         .window = window_of(session, render),
+        .frame_bytes = job_bytes_of(session, render),
     };
     job->end = &job->first;
     job->engine_credit = allowed_credit(job);
     session->jobs = job;
     session->job_count++;
+    session->hub->frame_bytes += job->frame_bytes;
     request->object = job;
     struct camera_key *keys = command->job.keys;
     uint32_t key_count = command->job.key_count;
@@ -240,6 +276,7 @@ static void destroy(struct session *session, struct job *job)
         place = &(*place)->next;
     *place = job->next;
     session->job_count--;
+    session->hub->frame_bytes -= job->frame_bytes;
     free(job);
 }
 
@@ -289,10 +326,10 @@ void job_cancel(struct session *session, struct job *job, struct request *cancel
         request_answer_ok(session, cancel, 0);
         return;
     }
-    job->cancelled = true;
-    frames_drop(session, job);
     struct engine_command *command = hub_command(ENGINE_JOB_CANCEL, session->number, cancel->id);
-    if (command) {
+    if (command) { /* else the job goes on, and another cancel may end it */
+        job->cancelled = true;
+        frames_drop(session, job);
         command->target_request = job->request;
         command->scene = job->scene;
     }

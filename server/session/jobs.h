@@ -20,6 +20,7 @@ struct job {
     uint64_t client_credit;             /* frames, absolute, as the client said */
     uint64_t engine_credit;             /* the part of it that the engine was told */
     uint64_t window;                    /* frames that may wait here to be sent */
+    uint64_t frame_bytes;               /* what all its frames may take, in the engine and here */
     struct pending_frame *first, **end; /* from the engine, in order; the first may be under way */
     bool rendered;                      /* the engine is done with it */
     bool cancelled;                     /* what still comes from the engine is dropped */

@@ -13,14 +13,17 @@ struct session_limits {
     uint32_t scenes_per_client;
     uint32_t jobs_per_client;
     uint32_t blobs_per_client;
-    uint32_t transaction_edits; /* waiting in all open transactions of a client */
+    uint32_t transaction_edits; /* of a client, in all transactions that are not answered */
     uint32_t nodes;
     uint32_t texture_edge_texels;
     uint32_t width_pixels, height_pixels;
     uint32_t samples;
-    uint64_t blob_bytes;       /* all blobs of all clients, arriving ones included */
-    uint64_t blob_cache_bytes; /* of them: blobs that nobody uses now */
+    uint64_t blob_bytes;        /* all blobs of all clients, arriving ones included */
+    uint64_t blob_cache_bytes;  /* of them: blobs that nobody uses now */
+    uint64_t transaction_bytes; /* of them: memory */
     uint64_t upload_window_bytes;
+    uint64_t frame_bytes; /* what the frames of all jobs may take before they are sent; one job may always run */
+    uint32_t frames_in_flight;   /* of one job in the engine, as it has it */
     uint64_t frame_window_bytes; /* rendered frames of one job that wait to be sent, as far as more than one */
 };
 

@@ -34,6 +34,7 @@ struct request *request_begin(struct session *session, uint32_t id, enum request
     if (session->requests.in_flight.count >= session->hub->options.limits.requests_in_flight) {
         error_set(&error, ERROR_LIMIT, "request", "%zu requests are in flight, the limit",
                   session->requests.in_flight.count);
+        error_remedy(&error, "wait for the answer to one of them");
         error.retryable = true;
         session_send_error(session, id, &error);
         return NULL;
@@ -50,22 +51,36 @@ struct request *request_begin(struct session *session, uint32_t id, enum request
     return request;
 }
 
-void request_answered(struct session *session, struct request *request)
-{
-    uint32_t cancelled_by = request->cancelled_by;
-    hashmap_remove(&session->requests.in_flight, request->id);
-    free(request);
-    struct request *cancel = cancelled_by ? request_find(session, cancelled_by) : NULL;
-    if (cancel && cancel->kind == REQUEST_CANCEL)
-        request_answer_ok(session, cancel, 0);
-}
-
-void request_answer_ok(struct session *session, struct request *request, uint64_t revision)
+static void send_ok(struct session *session, const struct request *request, uint64_t revision)
 {
     struct message message;
     message_init(&message, MESSAGE_OK);
     message.ok.revision = revision;
     session_send(session, request->id, 0, &message);
+}
+
+/* The cancel that is to be answered now; NULL: none. */
+static struct request *end(struct session *session, struct request *request)
+{
+    uint32_t cancelled_by = request->cancelled_by;
+    session->transaction_edits -= request->edits;
+    session->transaction_bytes -= request->edit_bytes;
+    hashmap_remove(&session->requests.in_flight, request->id);
+    free(request);
+    struct request *cancel = cancelled_by ? request_find(session, cancelled_by) : NULL;
+    return cancel && cancel->kind == REQUEST_CANCEL ? cancel : NULL;
+}
+
+void request_answered(struct session *session, struct request *request)
+{
+    /* A cancel may be cancelled in its turn: as long a chain as there are requests. */
+    for (struct request *cancel; (cancel = end(session, request)); request = cancel)
+        send_ok(session, cancel, 0);
+}
+
+void request_answer_ok(struct session *session, struct request *request, uint64_t revision)
+{
+    send_ok(session, request, revision);
     request_answered(session, request);
 }
 

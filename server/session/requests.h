@@ -30,6 +30,8 @@ struct request {
     uint32_t scene; /* of scene open and close */
     void *object;
     uint32_t cancelled_by; /* the cancel that is answered once this one is; 0: none */
+    size_t edits;          /* of a commit: what the engine holds for it until the answer */
+    uint64_t edit_bytes;
 };
 
 /* Requests of several messages that failed before their last message came: what still comes is skipped. */

@@ -73,6 +73,11 @@ void session_submit(struct session *session, struct request *request, struct eng
         return;
     struct error error = {0};
     error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
+    /* The engine knows nothing of it: all is as before. */
+    if (request->kind == REQUEST_SCENE_OPEN)
+        hashmap_remove(&session->scenes, request->scene);
+    else if (request->kind == REQUEST_SCENE_CLOSE)
+        hashmap_put(&session->scenes, request->scene, (void *)(uintptr_t)SCENE_OPEN); /* replaces */
     if (request->kind == REQUEST_JOB && request->object)
         job_failed(session, request->object, &error);
     else

@@ -12,11 +12,14 @@
 
 struct job;
 
+#define SESSION_OFFERS_KEY_BYTES 16
+
 enum session_scene_state { SCENE_OPENING = 1, SCENE_OPEN, SCENE_CLOSING };
 
 /* Blobs that the client named; see upload.h. */
 struct session_blobs {
-    struct hashmap offers; /* struct offer, by the head of its hash */
+    struct hashmap offers; /* struct offer, by a keyed hash of its hash */
+    uint8_t offers_key[SESSION_OFFERS_KEY_BYTES];
     size_t offer_count;
     uint64_t received_bytes; /* of blob data, on channel 1 */
     uint64_t credit_bytes;   /* told to the client, absolute */
@@ -35,8 +38,9 @@ struct session {
     struct requests requests;
     struct hashmap scenes; /* enum session_scene_state in a pointer, by id */
     struct session_blobs blobs;
-    size_t transaction_edits; /* in all open transactions */
-    struct job *jobs;         /* whose frame goes next is first */
+    size_t transaction_edits;   /* in all transactions that are not answered */
+    uint64_t transaction_bytes; /* of them: memory */
+    struct job *jobs;           /* whose frame goes next is first */
     uint32_t job_count;
 };
 

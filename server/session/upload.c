@@ -4,22 +4,29 @@
 #include "session/session.h"
 
 #include <inttypes.h>
+#include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* ---- offers ------------------------------------------------------------------------------------------ */
 
-static uint64_t key_of(const uint8_t hash[BLOB_HASH_BYTES])
+_Static_assert(SESSION_OFFERS_KEY_BYTES == crypto_shorthash_KEYBYTES, "the key is libsodium's");
+_Static_assert(crypto_shorthash_BYTES == sizeof(uint64_t), "a hash of a hash is a key of the map");
+
+/* What is offered is only a claim: hashes may be made up so that any plain part of them is the same for all. */
+static uint64_t key_of(const struct session *session, const uint8_t hash[BLOB_HASH_BYTES])
 {
+    uint8_t bytes[crypto_shorthash_BYTES];
+    crypto_shorthash(bytes, hash, BLOB_HASH_BYTES, session->blobs.offers_key);
     uint64_t key;
-    memcpy(&key, hash, sizeof key);
+    memcpy(&key, bytes, sizeof key);
     return key;
 }
 
 static struct offer *find(const struct session *session, const uint8_t hash[BLOB_HASH_BYTES])
 {
-    struct offer *offer = hashmap_get(&session->blobs.offers, key_of(hash));
+    struct offer *offer = hashmap_get(&session->blobs.offers, key_of(session, hash));
     while (offer && memcmp(offer->hash, hash, BLOB_HASH_BYTES) != 0)
         offer = offer->same_key;
     return offer;
@@ -36,10 +43,11 @@ static struct offer *add(struct session *session, const struct record_blob_ref *
     if (session->blobs.offer_count >= session->hub->options.limits.blobs_per_client) {
         error_set(error, ERROR_LIMIT, "blob_offer.blobs", "a client may name %u blobs",
                   session->hub->options.limits.blobs_per_client);
+        error_remedy(error, "connect anew, or raise limits.blobs in the daemon's configuration");
         return NULL;
     }
     struct offer *offer = calloc(1, sizeof *offer);
-    uint64_t key = key_of(reference->hash);
+    uint64_t key = key_of(session, reference->hash);
     if (offer) {
         offer->same_key = hashmap_get(&session->blobs.offers, key);
         memcpy(offer->hash, reference->hash, BLOB_HASH_BYTES);
@@ -123,7 +131,7 @@ void upload_abandon(struct session *session, struct offer *offer)
 {
     if (!offer->arriving)
         return;
-    blob_store_release(session->hub->blobs, offer->size_bytes);
+    blob_store_release(session->hub->blobs, offer->arrived_bytes);
     blob_unref(offer->arriving);
     free(offer->chunk_hashes);
     offer->arriving = NULL;
@@ -148,19 +156,20 @@ static void tell_credit(struct session *session)
 
 void upload_begin(struct session *session)
 {
+    randombytes_buf(session->blobs.offers_key, sizeof session->blobs.offers_key);
     tell_credit(session);
 }
 
+/* What has no room is refused before it comes; but room is taken piece by piece, so that nobody can keep others'
+ * blobs out with a size that he only declares. */
 static bool begin_blob(struct session *session, struct offer *offer, struct error *error)
 {
     if (!blob_store_reserve(session->hub->blobs, offer->size_bytes, error))
         return false;
-    offer->arriving = blob_create_empty(offer->size_bytes);
-    if (offer->arriving)
-        return true;
     blob_store_release(session->hub->blobs, offer->size_bytes);
-    return error_set(error, ERROR_OUT_OF_MEMORY, "blob_data", "no memory for %" PRIu64 " bytes",
-                     offer->size_bytes);
+    offer->arriving = blob_create_empty(offer->size_bytes);
+    return offer->arriving || error_set(error, ERROR_OUT_OF_MEMORY, "blob_data", "no memory for %" PRIu64 " bytes",
+                                        offer->size_bytes);
 }
 
 static bool hash_arrived(struct offer *offer, uint64_t before_bytes, struct error *error)
@@ -197,10 +206,14 @@ static bool add_piece(struct session *session, struct offer *offer, const struct
                          data->data_bytes, offer->size_bytes - offer->arrived_bytes);
     if (!offer->arriving && !begin_blob(session, offer, error))
         return false;
+    if (!blob_store_reserve(session->hub->blobs, data->data_bytes, error))
+        return false;
     uint64_t before_bytes = offer->arrived_bytes;
-    if (!blob_reserve(offer->arriving, (size_t)(before_bytes + data->data_bytes)))
+    if (!blob_reserve(offer->arriving, (size_t)(before_bytes + data->data_bytes))) {
+        blob_store_release(session->hub->blobs, data->data_bytes);
         return error_set(error, ERROR_OUT_OF_MEMORY, "blob_data", "no memory for %" PRIu64 " bytes",
                          before_bytes + data->data_bytes);
+    }
     memcpy(offer->arriving->data + before_bytes, data->data, data->data_bytes);
     offer->arrived_bytes += data->data_bytes;
     return hash_arrived(offer, before_bytes, error);

@@ -361,6 +361,24 @@ class Listening(Case):
             self.assertLessEqual(len(os.listdir(folder)), before)
 
 
+    def test_stats_of_more_clients_and_scenes_than_a_message_holds_are_shortened(self):
+        with Daemon() as daemon:
+            peers = [Peer(daemon) for _ in range(250)]
+            for peer in peers:
+                for scene in (1, 2):
+                    peer.send(SCENE_OPEN, scene, struct.pack("<I", scene), text("x" * 128))
+            for peer in peers:
+                for scene in (1, 2):
+                    self.assertEqual(peer.answer(scene)[0], OK)
+            peers[0].send(STATS, 3)
+            kind, payload = peers[0].answer(3)
+            self.assertEqual(kind, STATS_REPLY)
+            self.assertGreater(len(payload), 60000)
+            self.assertLessEqual(len(payload), 65536)
+            for peer in peers:
+                peer.close()
+
+
 class Jobs(Case):
     def test_a_vanished_client_does_not_leave_its_job_running(self):
         with Daemon() as daemon:

@@ -16,6 +16,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 static void the_first_error_wins(void **state)
 {
@@ -97,6 +98,29 @@ static void a_map_keeps_what_was_put_and_forgets_what_was_removed(void **state)
     }
     assert_int_equal(seen, count);
     hashmap_finish(&map);
+}
+
+/* Undoes the finaliser of splitmix64, whose constants everybody knows. */
+static uint64_t key_with_home(uint64_t home)
+{
+    home = (home ^ home >> 31 ^ home >> 62) * 0x319642b2d24d8ec3u;
+    home = (home ^ home >> 27 ^ home >> 54) * 0x96de1b173f119089u;
+    return home ^ home >> 30 ^ home >> 60;
+}
+
+static void keys_chosen_to_collide_do_not_make_a_map_slow(void **state)
+{
+    (void)state;
+    struct hashmap map = {0};
+    int value = 0;
+    clock_t start = clock();
+    for (uint64_t i = 1; i <= 150000; i++)
+        assert_true(hashmap_put(&map, key_with_home(i << 24), &value));
+    double seconds = (double)(clock() - start) / CLOCKS_PER_SEC;
+    assert_int_equal(map.count, 150000);
+    hashmap_finish(&map);
+    if (seconds > 2) /* a few hundredths; if all fell on one place, a minute */
+        fail_msg("%.2f s for 150000 keys", seconds);
 }
 
 static void a_map_is_walked_in_the_order_of_insertion(void **state)
@@ -193,6 +217,7 @@ int main(void)
         cmocka_unit_test(an_arena_gives_zeroed_aligned_memory_up_to_its_limit),
         cmocka_unit_test(an_arena_grows_beyond_its_first_block),
         cmocka_unit_test(a_map_keeps_what_was_put_and_forgets_what_was_removed),
+        cmocka_unit_test(keys_chosen_to_collide_do_not_make_a_map_slow),
         cmocka_unit_test(a_map_is_walked_in_the_order_of_insertion),
         cmocka_unit_test(stage_spans_beyond_the_last_are_added_to_one_of_their_kind),
         cmocka_unit_test(a_blob_is_named_by_the_hash_of_its_chunks_hashes),

@@ -344,6 +344,34 @@ static void a_camera_node_gives_its_place_without_its_scale_or_mirror(void **sta
     scene_destroy(scene);
 }
 
+/* A frame tells its camera and its time to the client, in fields that have bounds. */
+static void what_a_frame_could_not_tell_is_an_error_before_it_is_rendered(void **state)
+{
+    (void)state;
+    struct scene *scene = empty_scene();
+    struct frame_camera camera;
+    struct error error = {0};
+    struct engine_job job = job_of(CAMERA_AUTO, NULL, 0);
+    job.frames_per_second = 0.001f;
+    assert_true(animation_camera(&job, scene, 900000, &camera, &error));
+    assert_false(animation_camera(&job, scene, 10000000, &camera, &error));
+    assert_int_equal(error.kind, ERROR_INVALID);
+    assert_string_equal(error.field, "render.frames_per_second");
+
+    error = (struct error){0};
+    struct camera_key keys[] = {key_at(0, 0, 0, 0), key_at(1, 1e12f, 0, 0), key_at(2, 1e12f, 0, 0),
+                                key_at(3, 0, 0, 0)};
+    for (int i = 0; i < 4; i++)
+        keys[i].look_at_world[2] = -1e12f;
+    job = job_of(CAMERA_KEYS, keys, 4);
+    assert_true(animation_camera(&job, scene, 10, &camera, &error));
+    assert_false(animation_camera(&job, scene, 15, &camera, &error)); /* the spline goes beyond its keys */
+    assert_int_equal(error.kind, ERROR_INVALID);
+    assert_string_equal(error.field, "render.camera_path");
+    assert_string_not_equal(error.remedy, "");
+    scene_destroy(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -359,6 +387,7 @@ int main(void)
         cmocka_unit_test(an_orbit_without_a_key_keeps_the_distance_of_the_automatic_camera),
         cmocka_unit_test(an_empty_scene_has_an_automatic_camera_too),
         cmocka_unit_test(a_camera_node_gives_its_place_without_its_scale_or_mirror),
+        cmocka_unit_test(what_a_frame_could_not_tell_is_an_error_before_it_is_rendered),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -67,6 +67,27 @@ static void no_frame_goes_out_beyond_its_credit(void **state)
     stop(engine);
 }
 
+static void large_frames_are_fewer_in_flight_but_always_one(void **state)
+{
+    (void)state;
+    for (int frames = 1; frames <= 4; frames++) {
+        /* A frame of the test has 48 bytes. */
+        uint64_t bytes = frames == 1 ? 10 : (uint64_t)frames * 48 + 10;
+        struct engine *engine = start((struct engine_options){.frames_in_flight = 3, .frame_window_bytes = bytes});
+        open_scene(engine, 1, 1);
+        struct engine_command *made = render(1, 2, 0, 9);
+        made->job.credit = 0;
+        submit(engine, made);
+        expect_silence(engine);
+        assert_int_equal(atomic_load(&fake.frames_begun), frames < 3 ? frames : 3);
+        submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 100);
+        for (uint32_t frame = 0; frame <= 9; frame++)
+            take_frame(engine, 1, 2, frame);
+        expect_done(engine, 1, 2);
+        stop(engine);
+    }
+}
+
 static void frames_that_nobody_takes_stop_the_rendering(void **state)
 {
     (void)state;
@@ -285,6 +306,49 @@ static void a_frame_that_fails_comes_after_those_before_it(void **state)
     stop(engine);
 }
 
+static struct engine_command *commit_of_nodes(uint64_t client, uint32_t request, uint32_t scene, uint32_t count)
+{
+    struct engine_command *made = command(ENGINE_COMMIT, client, request);
+    made->scene = scene;
+    made->edits = calloc(count, sizeof *made->edits);
+    assert_non_null(made->edits);
+    made->edit_count = count;
+    for (uint32_t i = 0; i < count; i++) {
+        made->edits[i].set.node.base.id = i + 1;
+        made->edits[i].set.node.parent_from_node[0] = 1;
+    }
+    return made;
+}
+
+static void the_tables_of_all_scenes_together_have_a_limit(void **state)
+{
+    (void)state;
+    /* Room for about 100 nodes. */
+    uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
+    struct engine *engine = start((struct engine_options){.scene_limits = {.host_bytes = limit_bytes}});
+    for (uint32_t scene = 1; scene <= 2; scene++)
+        open_scene(engine, 1, scene);
+    open_scene(engine, 2, 1);
+    submit(engine, commit_of_nodes(1, 1, 1, 60));
+    expect_done(engine, 1, 1);
+    submit(engine, commit_of_nodes(1, 2, 2, 60));
+    expect_failed(engine, 1, 2, ERROR_LIMIT, "edits");
+    submit(engine, commit_of_nodes(2, 3, 1, 60));
+    expect_failed(engine, 2, 3, ERROR_LIMIT, "edits");
+    submit(engine, commit_of_nodes(2, 4, 1, 40));
+    expect_done(engine, 2, 4);
+    submit(engine, commit_of_nodes(1, 5, 1, 60)); /* as many as it has */
+    expect_done(engine, 1, 5);
+    submit(engine, command(ENGINE_CLIENT_GONE, 2, 0));
+    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 2, 0));
+    struct engine_command *close = command(ENGINE_SCENE_CLOSE, 1, 6);
+    submit(engine, close);
+    expect_done(engine, 1, 6);
+    submit(engine, commit_of_nodes(1, 7, 2, 100));
+    expect_done(engine, 1, 7);
+    stop(engine);
+}
+
 static void an_engine_stops_with_work_in_hand(void **state)
 {
     (void)state;
@@ -302,6 +366,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(frames_come_in_order_with_what_they_cost),
         cmocka_unit_test(no_frame_goes_out_beyond_its_credit),
+        cmocka_unit_test(large_frames_are_fewer_in_flight_but_always_one),
         cmocka_unit_test(frames_that_nobody_takes_stop_the_rendering),
         cmocka_unit_test(jobs_of_two_clients_take_turns_by_slices),
         cmocka_unit_test(edits_wait_for_the_frame_in_hand_and_others_do_not),
@@ -312,6 +377,7 @@ int main(void)
         cmocka_unit_test(a_client_that_goes_is_forgotten_and_others_go_on),
         cmocka_unit_test(closing_a_scene_ends_its_jobs_first),
         cmocka_unit_test(a_frame_that_fails_comes_after_those_before_it),
+        cmocka_unit_test(the_tables_of_all_scenes_together_have_a_limit),
         cmocka_unit_test(an_engine_stops_with_work_in_hand),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -203,7 +203,30 @@ static void stats_add_up(void **state)
     assert_int_equal(stats->stages[STAGE_SEND][STAGE_CPU].count, 2);
     assert_int_equal(stats->stages[STAGE_SEND][STAGE_CPU].total_ns, 77);
     assert_int_equal(stats->stages[STAGE_QUEUE][STAGE_CPU].greatest_ns, 50);
+    assert_int_equal(stats->scenes[1].instances, 0);
     engine_event_destroy(event);
+    /* What a scene holds is counted anew after a transaction. */
+    struct engine_command *made = command(ENGINE_COMMIT, 1, 5);
+    static const float sphere[4] = {0, 0, 0, 1};
+    made->scene = 2;
+    made->edits = calloc(2, sizeof *made->edits);
+    made->edit_count = 2;
+    made->edits[0].object = SCENE_SPHERES;
+    made->edits[0].set.spheres =
+        (struct scene_spheres){.base.id = 7, .sphere_count = 1, .centres_radii = blob_create(sizeof sphere)};
+    memcpy(made->edits[0].set.spheres.centres_radii->data, sphere, sizeof sphere);
+    made->edits[1].set.node = (struct scene_node){
+        .base.id = 2, .kind = NODE_SPHERES, .object = 7, .parent_from_node = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    submit(engine, made);
+    expect_done(engine, 1, 5);
+    for (uint32_t request = 6; request <= 7; request++) {
+        submit(engine, command(ENGINE_STATS, 1, request));
+        event = expect_event(engine, ENGINE_STATS_READY, 1, request);
+        assert_int_equal(event->stats->scenes[1].nodes, 2);
+        assert_int_equal(event->stats->scenes[1].instances, 1);
+        assert_int_equal(event->stats->scenes[1].spheres, 1);
+        engine_event_destroy(event);
+    }
     stop(engine);
 }
 

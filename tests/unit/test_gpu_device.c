@@ -88,6 +88,27 @@ static void a_gl_error_is_reported_once_with_the_caller_and_is_then_gone(void **
     assert_true(gpu_check(device, "the test", NULL));
 }
 
+static void a_lost_context_is_why_whatever_fails_after_it(void **state)
+{
+    (void)state;
+    struct error error = {0};
+    const struct gpu_program_source none = {.compute = "there/is/none.comp"};
+    gpu_note_loss(device, &error);
+    expect_no_error(&error);
+    device->lost = true; /* as after a reset that the driver told of once */
+    assert_false(gpu_check(device, "the test", &error));
+    assert_int_equal(error.kind, ERROR_DEVICE_LOST);
+    error = (struct error){0};
+    gpu_note_loss(device, &error);
+    error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "what the caller makes of it");
+    assert_int_equal(error.kind, ERROR_DEVICE_LOST);
+    device->lost = false;
+    error = (struct error){0};
+    assert_null(gpu_program_get(device, &none, &error));
+    assert_int_equal(error.kind, ERROR_INTERNAL);
+    assert_true(gpu_check(device, "the test", NULL));
+}
+
 static void a_buffer_keeps_what_is_written_and_counts_its_memory(void **state)
 {
     (void)state;
@@ -365,6 +386,7 @@ int main(void)
         cmocka_unit_test(a_device_that_is_not_there_is_an_error_with_a_remedy),
         cmocka_unit_test(the_facts_are_those_of_opengl_4_5),
         cmocka_unit_test(a_gl_error_is_reported_once_with_the_caller_and_is_then_gone),
+        cmocka_unit_test(a_lost_context_is_why_whatever_fails_after_it),
         cmocka_unit_test(a_buffer_keeps_what_is_written_and_counts_its_memory),
         cmocka_unit_test(mapped_memory_reaches_the_buffer),
         cmocka_unit_test(memory_beyond_the_limit_is_refused_before_the_driver_is_asked),

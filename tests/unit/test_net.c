@@ -21,6 +21,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 /* ---- addresses --------------------------------------------------------------------------------------- */
@@ -461,10 +462,38 @@ static void what_is_dropped_is_not_sent_but_what_was_begun_is_finished(void **st
     assert_int_equal(sent_calls, 1);
     assert_int_equal(queue.queued_bytes, 0);
     assert_int_equal(queue.queued_bulk_bytes, 0);
+    assert_int_equal(queue.sending_bytes, 0);
     push(&queue, "B4", 8, &body, true);
     out_queue_finish(&queue);
     out_chunk_unref(&body);
     assert_int_equal(released, 1);
+}
+
+/* A client may ask for a great many short answers and then read them all at once. */
+static void many_short_messages_are_sent_without_looking_at_all_of_them_each_time(void **state)
+{
+    (void)state;
+    enum { MESSAGES = 400000, PARTS = 64 };
+    struct out_queue queue;
+    struct iovec parts[PARTS];
+    size_t count, sent_bytes = 0;
+    out_queue_init(&queue);
+    for (int i = 0; i < MESSAGES; i++)
+        push(&queue, "12345", 0, NULL, false);
+    clock_t start = clock();
+    while ((count = out_queue_gather(&queue, parts, PARTS))) {
+        size_t bytes = 0;
+        for (size_t i = 0; i < count; i++)
+            bytes += parts[i].iov_len;
+        out_queue_advance(&queue, bytes, 1);
+        sent_bytes += bytes;
+    }
+    double seconds = (double)(clock() - start) / CLOCKS_PER_SEC;
+    assert_int_equal(sent_bytes, 5 * MESSAGES);
+    assert_int_equal(queue.sending_bytes, 0);
+    out_queue_finish(&queue);
+    if (seconds > 1) /* a few hundredths */
+        fail_msg("%.2f s for %d messages", seconds, MESSAGES);
 }
 
 /* ---- blobs by principal ------------------------------------------------------------------------------ */
@@ -515,31 +544,58 @@ static void a_hash_is_no_key_to_somebody_elses_blob(void **state)
     blob_store_destroy(store);
 }
 
+#define KIB ((size_t)1 << 10)
+
 static void the_cache_drops_what_was_used_longest_ago_and_never_what_is_in_use(void **state)
 {
     (void)state;
     struct error error = {0};
-    struct blob_store *store = blob_store_create(1000, 250);
+    struct blob_store *store = blob_store_create(1000 * KIB, 250 * KIB);
     for (uint8_t name = 1; name <= 4; name++)
-        put(store, 7, name, 100);
-    assert_true(has(store, 7, 1, 100)); /* 1 was used just now, 2 and 3 are the oldest */
+        put(store, 7, name, 100 * KIB);
+    assert_true(has(store, 7, 1, 100 * KIB)); /* 1 was used just now, 2 and 3 are the oldest */
     blob_store_trim(store);
-    assert_true(has(store, 7, 1, 100));
-    assert_false(has(store, 7, 2, 100));
-    assert_false(has(store, 7, 3, 100));
-    assert_true(has(store, 7, 4, 100));
-    struct blob *used = made_blob(9, 600);
+    assert_true(has(store, 7, 1, 100 * KIB));
+    assert_false(has(store, 7, 2, 100 * KIB));
+    assert_false(has(store, 7, 3, 100 * KIB));
+    assert_true(has(store, 7, 4, 100 * KIB));
+    struct blob *used = made_blob(9, 600 * KIB);
     blob_unref(blob_store_add(store, 7, used));
     blob_store_trim(store);
-    assert_true(has(store, 7, 9, 600));
-    assert_true(blob_store_reserve(store, 400, &error)); /* at the cost of the cache */
-    assert_false(has(store, 7, 1, 100));
-    assert_false(blob_store_reserve(store, 1, &error));
+    assert_true(has(store, 7, 9, 600 * KIB));
+    assert_true(blob_store_reserve(store, 399 * KIB, &error)); /* at the cost of the cache */
+    assert_false(has(store, 7, 1, 100 * KIB));
+    assert_false(blob_store_reserve(store, KIB, &error));
     assert_int_equal(error.kind, ERROR_LIMIT);
-    blob_store_release(store, 400);
-    assert_int_equal(blob_store_bytes(store), 600);
+    blob_store_release(store, 399 * KIB);
+    assert_int_equal(blob_store_bytes(store), 600 * KIB);
     assert_int_equal(blob_store_count(store), 1);
     blob_unref(used);
+    blob_store_destroy(store);
+}
+
+static void small_blobs_count_with_what_they_take_beside_their_content(void **state)
+{
+    (void)state;
+    struct error error = {0};
+    struct blob_store *store = blob_store_create(100 * BLOB_STORE_OVERHEAD_BYTES, 11 * BLOB_STORE_OVERHEAD_BYTES);
+    for (uint8_t name = 1; name <= 100; name++)
+        put(store, 7, name, 1);
+    assert_int_equal(blob_store_bytes(store), 100);
+    blob_store_trim(store);
+    assert_int_equal(blob_store_count(store), 10);
+    /* In use they cannot be dropped, and leave no room. */
+    struct blob *used[100];
+    for (uint8_t name = 1; name <= 100; name++)
+        used[name - 1] = blob_store_add(store, 8, made_blob(name, 1));
+    assert_false(blob_store_reserve(store, 1, &error));
+    assert_int_equal(error.kind, ERROR_LIMIT);
+    for (int i = 0; i < 100; i++) {
+        blob_unref(used[i]);
+        blob_unref(used[i]);
+    }
+    assert_true(blob_store_reserve(store, 1, &error));
+    assert_int_equal(blob_store_count(store), 0);
     blob_store_destroy(store);
 }
 
@@ -561,8 +617,10 @@ int main(void)
         cmocka_unit_test(a_watch_that_was_removed_is_not_called_even_in_the_same_turn),
         cmocka_unit_test(control_goes_first_and_nothing_is_lost_however_little_is_taken),
         cmocka_unit_test(what_is_dropped_is_not_sent_but_what_was_begun_is_finished),
+        cmocka_unit_test(many_short_messages_are_sent_without_looking_at_all_of_them_each_time),
         cmocka_unit_test(a_hash_is_no_key_to_somebody_elses_blob),
         cmocka_unit_test(the_cache_drops_what_was_used_longest_ago_and_never_what_is_in_use),
+        cmocka_unit_test(small_blobs_count_with_what_they_take_beside_their_content),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

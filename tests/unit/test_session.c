@@ -68,6 +68,8 @@ static struct {
     pthread_mutex_t mutex;
     atomic_bool full;      /* takes no commands */
     atomic_bool keep_jobs; /* jobs render nothing until they are cancelled */
+    atomic_bool keep_commits;
+    struct engine_command *_Atomic kept_commit; /* has no answer until release_commit() */
     uint32_t job_request, next_frame, last_frame;
     uint64_t credit_seen, commits;
     atomic_uint edits, gone, frames_sent;
@@ -119,6 +121,10 @@ static bool submit(void *context, struct engine_command *command, struct error *
         return error_set(error, ERROR_BUSY, NULL, "full");
     switch (command->kind) {
     case ENGINE_COMMIT:
+        if (atomic_load(&engine.keep_commits)) {
+            atomic_store(&engine.kept_commit, command);
+            return true;
+        }
         engine.commits++;
         atomic_fetch_add(&engine.edits, (unsigned)command->edit_count);
         event(ENGINE_DONE, command, command->request);
@@ -154,6 +160,15 @@ static bool submit(void *context, struct engine_command *command, struct error *
     }
     engine_command_destroy(command);
     return true;
+}
+
+static void release_commit(void)
+{
+    struct engine_command *command;
+    while (!(command = atomic_exchange(&engine.kept_commit, NULL)))
+        usleep(1000);
+    event(ENGINE_DONE, command, command->request);
+    engine_command_destroy(command);
 }
 
 static int event_fd(void *context)
@@ -332,6 +347,7 @@ static void start(const struct connection_limits *connection_limits)
                    .jobs_per_client = 2,
                    .blobs_per_client = 8,
                    .transaction_edits = 10,
+                   .transaction_bytes = 64 << 10,
                    .nodes = 100,
                    .texture_edge_texels = 64,
                    .width_pixels = 512,
@@ -340,6 +356,8 @@ static void start(const struct connection_limits *connection_limits)
                    .blob_bytes = 8 << 20,
                    .blob_cache_bytes = 4 << 20,
                    .upload_window_bytes = 1 << 20,
+                   .frame_bytes = 10 << 20,
+                   .frames_in_flight = 3,
                    .frame_window_bytes = 64 << 20},
         .connection_limits = *connection_limits,
         .engine = {.submit = submit, .event_fd = event_fd, .next_event = next_event, .report_sent = report_sent},
@@ -554,6 +572,70 @@ static void a_failed_transaction_has_one_answer_and_what_follows_it_is_skipped(v
     assert_int_equal(atomic_load(&engine.edits), 1);
 }
 
+static void edits_count_until_their_transaction_is_answered(void **state)
+{
+    (void)state;
+    atomic_store(&engine.keep_commits, true);
+    open_scene(1, 1);
+    begin_edit(2, 1);
+    for (uint32_t node = 1; node <= 10; node++)
+        send_node(2, node);
+    commit(2);
+    begin_edit(3, 1);
+    send_node(3, 11);
+    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    assert_string_not_equal(client.message.error.remedy, "");
+    release_commit();
+    expect(MESSAGE_OK, 2);
+    begin_edit(4, 1);
+    for (uint32_t node = 1; node <= 10; node++)
+        send_node(4, node);
+    commit(4);
+    release_commit();
+    expect(MESSAGE_OK, 4);
+}
+
+static void edits_take_no_more_memory_than_the_limit(void **state)
+{
+    (void)state;
+    static struct record_material_range ranges[4096];
+    struct message message = made(MESSAGE_SET_MESH);
+    message.set_mesh.mesh = 1;
+    message.set_mesh.ranges = ranges;
+    message.set_mesh.ranges_count = 4096; /* 48 KiB of the 64 */
+    open_scene(1, 1);
+    begin_edit(2, 1);
+    send_message(2, 0, &message);
+    begin_edit(3, 1);
+    send_message(3, 0, &message);
+    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    assert_non_null(strstr(client.message.error.remedy, "memory.transactions"));
+    commit(2);
+    expect(MESSAGE_OK, 2);
+    begin_edit(4, 1);
+    send_message(4, 0, &message);
+    commit(4);
+    expect(MESSAGE_OK, 4);
+}
+
+static void cancels_of_cancels_are_answered_in_their_order(void **state)
+{
+    (void)state;
+    atomic_store(&engine.keep_commits, true);
+    open_scene(1, 1);
+    begin_edit(2, 1);
+    commit(2);
+    for (uint32_t request = 3; request <= 60; request++) {
+        struct message message = made(MESSAGE_CANCEL);
+        message.cancel.target_request = request - 1;
+        send_message(request, 0, &message);
+    }
+    expect_alive(61);
+    release_commit();
+    for (uint32_t request = 2; request <= 60; request++)
+        expect(MESSAGE_OK, request);
+}
+
 static void a_mesh_with_a_blob_that_is_not_held_names_it(void **state)
 {
     (void)state;
@@ -600,6 +682,45 @@ static void a_blob_with_another_hash_is_refused_and_can_be_sent_again(void **sta
     send_piece(4, &reference, data, 0, 500);
     send_piece(4, &reference, data, 500, 500);
     expect(MESSAGE_OK, 4);
+}
+
+static void a_size_that_is_only_declared_takes_no_room_from_others(void **state)
+{
+    (void)state;
+    static uint8_t data[3 << 20];
+    struct record_blob_ref large = {.size_bytes = 6 << 20, .hash = {1}},
+                           beyond = {.size_bytes = 9 << 20, .hash = {2}};
+    assert_int_equal(offer(1, large), 1);
+    send_piece(2, &large, data, 0, 8);
+    assert_int_equal(offer(3, beyond), 1);
+    send_piece(4, &beyond, data, 0, 8);
+    expect_error(4, PROTOCOL_ERROR_CODE_LIMIT);
+    struct record_blob_ref whole = reference_to(data, sizeof data);
+    assert_int_equal(offer(5, whole), 1);
+    for (size_t offset = 0; offset < sizeof data; offset += 131072) {
+        while (client.upload_credit < 16 + offset + 131072)
+            expect_alive(9999);
+        send_piece(6, &whole, data, offset, 131072);
+    }
+    expect(MESSAGE_OK, 6);
+}
+
+static void made_up_hashes_with_the_same_head_are_told_apart(void **state)
+{
+    (void)state;
+    uint8_t data[100] = {7};
+    struct record_blob_ref references[3] = {reference_to(data, sizeof data)};
+    for (uint8_t i = 1; i < 3; i++) {
+        references[i] = references[0];
+        references[i].hash[31] ^= i;
+    }
+    for (uint32_t i = 0; i < 3; i++)
+        assert_int_equal(offer(1 + i, references[i]), 1);
+    send_piece(4, &references[0], data, 0, sizeof data);
+    expect(MESSAGE_OK, 4);
+    assert_int_equal(offer(5, references[0]), 0);
+    assert_int_equal(offer(6, references[1]), 1);
+    assert_int_equal(offer(7, references[2]), 1);
 }
 
 static void blob_data_on_another_channel_ends_the_connection(void **state)
@@ -705,6 +826,36 @@ static void a_job_that_cannot_be_is_refused_by_its_field(void **state)
     message.render.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
     send_message(6, 0, &message);
     expect_error(6, PROTOCOL_ERROR_CODE_INVALID);
+}
+
+static void a_job_whose_frames_have_no_room_waits_for_others_to_end(void **state)
+{
+    (void)state;
+    atomic_store(&engine.keep_jobs, true);
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.width = message.render.height = 512; /* 7 MiB: 3 frames in the engine, 4 to be sent */
+    send_message(2, 0, &message);
+    message.render.channel = 3;
+    send_message(3, 0, &message);
+    expect_error(3, PROTOCOL_ERROR_CODE_BUSY);
+    assert_int_equal(client.message.error.retryable, 1);
+    assert_non_null(strstr(client.message.error.remedy, "memory.frames"));
+    message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 2;
+    send_message(4, 0, &message);
+    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect(MESSAGE_OK, 4);
+    message = render_message(0, 1);
+    message.render.width = message.render.height = 512;
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F; /* more than there is, but it is the only one */
+    send_message(5, 0, &message);
+    message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 5;
+    send_message(6, 0, &message);
+    expect_error(5, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect(MESSAGE_OK, 6);
+    assert_int_equal(served.hub.frame_bytes, 0);
 }
 
 static void a_full_engine_makes_clients_wait_and_loses_nothing(void **state)
@@ -849,6 +1000,37 @@ static void who_does_not_finish_a_message_is_closed(void **state)
     expect_closed_within_5_s();
 }
 
+static void who_cannot_finish_a_message_because_nothing_is_read_has_his_time_later(void **state)
+{
+    (void)state;
+    struct connection_limits limits = patient;
+    limits.progress_grace_ms = 100;
+    limits.progress_bytes_per_s = 1000000;
+    limits.queued_soft_bytes = 1000;
+    start(&limits);
+    greet();
+    open_scene(1, 1);
+    uint8_t bytes[1024];
+    struct writer writer;
+    writer_init(&writer, bytes, sizeof bytes);
+    struct message message = render_message(5, 6);
+    assert_true(message_write(&writer, 2, 0, &message));
+    size_t begun_bytes = writer.used_bytes + 20;
+    message = made(MESSAGE_PING);
+    assert_true(message_write(&writer, 3, 0, &message));
+    send_bytes(bytes, begun_bytes); /* the frames fill the way back, the ping is cut off */
+    usleep(400000);
+    send_bytes(bytes + begun_bytes, writer.used_bytes - begun_bytes);
+    bool pong = false, done = false;
+    while (!pong || !done) {
+        const struct message *got = receive();
+        if (got->type == MESSAGE_ERROR || got->type == MESSAGE_GOODBYE)
+            fail_msg("%s", got->type == MESSAGE_ERROR ? got->error.text : got->goodbye.text);
+        pong = pong || got->type == MESSAGE_PONG;
+        done = done || got->type == MESSAGE_OK;
+    }
+}
+
 static void who_is_silent_is_closed_but_not_while_he_waits(void **state)
 {
     (void)state;
@@ -898,14 +1080,20 @@ int main(void)
         BOTH(a_ping_is_answered_and_stats_are_told),
         BOTH(edits_are_gathered_and_committed_together),
         BOTH(a_failed_transaction_has_one_answer_and_what_follows_it_is_skipped),
+        BOTH(edits_count_until_their_transaction_is_answered),
+        BOTH(edits_take_no_more_memory_than_the_limit),
+        BOTH(cancels_of_cancels_are_answered_in_their_order),
         BOTH(a_mesh_with_a_blob_that_is_not_held_names_it),
         BOTH(a_blob_is_sent_once_and_needed_no_more),
         BOTH(a_blob_with_another_hash_is_refused_and_can_be_sent_again),
+        BOTH(a_size_that_is_only_declared_takes_no_room_from_others),
+        BOTH(made_up_hashes_with_the_same_head_are_told_apart),
         BOTH(blob_data_on_another_channel_ends_the_connection),
         BOTH(frames_come_whole_in_order_and_as_far_as_credit_goes),
         BOTH(a_cancelled_job_has_one_answer_and_nothing_follows_it),
         BOTH(a_job_cancelled_while_it_sends_ends_at_its_answer),
         BOTH(a_job_that_cannot_be_is_refused_by_its_field),
+        BOTH(a_job_whose_frames_have_no_room_waits_for_others_to_end),
         BOTH(a_full_engine_makes_clients_wait_and_loses_nothing),
         BOTH(rubbish_is_told_so_and_the_connection_closed),
         BOTH(a_request_number_in_flight_cannot_be_used_again),
@@ -915,6 +1103,8 @@ int main(void)
         cmocka_unit_test(the_head_of_a_frame_piece_is_what_the_codec_writes),
         cmocka_unit_test_setup_teardown(who_does_not_introduce_himself_is_closed, real_calls, tear_down),
         cmocka_unit_test_setup_teardown(who_does_not_finish_a_message_is_closed, real_calls, tear_down),
+        cmocka_unit_test_setup_teardown(who_cannot_finish_a_message_because_nothing_is_read_has_his_time_later,
+                                        real_calls, tear_down),
         cmocka_unit_test_setup_teardown(who_is_silent_is_closed_but_not_while_he_waits, real_calls, tear_down),
         cmocka_unit_test_setup_teardown(who_does_not_read_is_closed, real_calls, tear_down),
     };
