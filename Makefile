@@ -161,14 +161,17 @@ BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libc
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libtinygltf-dev \
     libtinyobjloader-dev libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev libembree-dev python3
+LINT_PACKAGES := clang clang-format glslang-tools python3
 
-.PHONY: tests build-packages test-packages test demo bench check-headers lint format install uninstall clean help
+.PHONY: tests build-packages test-packages lint-packages test demo bench check-headers lint format install uninstall clean help
 tests: $(UNIT_TESTS) $(BENCHES) $(B)/tests/tools/make_scenes
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
 test-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES)
+lint-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(LINT_PACKAGES)
 
 JOBS ?= $(shell nproc)
 # A second make, because packages that were just installed change what pkg-config says.
@@ -184,8 +187,9 @@ bench: test-packages
 
 check-headers:
 	@tests/tools/check_headers.sh $(CC) -I. -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS)
-lint:
+lint: lint-packages
 	python3 tests/tools/check_includes.py
+	python3 tests/tools/check_shaders.py
 	$(MAKE) -s check-headers
 	clang-format --dry-run -Werror $(wildcard server/*.[ch] server/*/*.[ch] protocol/*.[ch] client/*/*.[ch] \
 	    client/*/*.cpp tests/*/*.[ch])
@@ -225,7 +229,7 @@ help:
 	@echo 'make bench      measure, in the terms of the README'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz]'
 	@echo 'make fuzz       run every fuzzer   [config=fuzz FUZZ_SECONDS=20]'
-	@echo 'make lint       include rules, headers alone, format, clang with warnings as errors'
+	@echo 'make lint       include rules, shaders, headers alone, format, clang with warnings as errors'
 	@echo 'make install    [PREFIX=/usr/local DESTDIR=]'
 
 -include $(shell find build -name '*.d' 2>/dev/null)

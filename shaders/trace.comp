@@ -44,7 +44,8 @@ layout(std430, binding = BIND_VISIBILITY) writeonly buffer visibility_block { ui
 layout(std430, binding = BIND_HITS) writeonly buffer hit_block { hit hits[]; };
 #endif
 
-uniform uint ray_count;
+uniform uint first_ray; // of this dispatch
+uniform uint ray_count; // where it ends
 #ifdef HAS_DISCS
 uniform uint disc_count;
 #else
@@ -116,7 +117,7 @@ void store_hit(uint ray_index, trace_ray r, candidate best)
 
 void main()
 {
-    uint ray_index = item_index();
+    uint ray_index = first_ray + item_index();
     if (ray_index >= ray_count)
         return;
     trace_ray r = load_ray(ray_index);
@@ -178,14 +179,14 @@ void look_at_discs(inout trace_ray r[RAYS_TOGETHER], inout found_type found[RAYS
 
 void main()
 {
-    uint first_ray = item_index() * RAYS_TOGETHER;
-    if (first_ray >= ray_count)
+    uint first = first_ray + item_index() * RAYS_TOGETHER;
+    if (first >= ray_count)
         return;
     trace_ray r[RAYS_TOGETHER];
     found_type found[RAYS_TOGETHER];
     bool any_alive = false;
     for (int k = 0; k < RAYS_TOGETHER; k++) {
-        r[k] = load_ray(first_ray + uint(k));
+        r[k] = load_ray(first + uint(k));
         any_alive = any_alive || is_alive(r[k]);
 #ifdef ANY_HIT
         found[k] = vec3(1.0);
@@ -199,7 +200,7 @@ void main()
     if (any_alive)
         trace_any_together(r, found);
     for (int k = 0; k < RAYS_TOGETHER; k++)
-        store_visibility(first_ray + uint(k), found[k]);
+        store_visibility(first + uint(k), found[k]);
 #else
     if (any_alive)
         trace_closest_together(r, found);
@@ -208,7 +209,7 @@ void main()
         for (int k = 1; k < RAYS_TOGETHER; k++)
             if (k == i)
                 found_i = found[k];
-        store_hit(first_ray + uint(i), load_ray(first_ray + uint(i)), found_i);
+        store_hit(first + uint(i), load_ray(first + uint(i)), found_i);
     }
 #endif
 }

@@ -38,6 +38,7 @@ static bool allocate(struct gpu_device *device, struct gpu_buffer *buffer, size_
     buffer->name = gpu_object_create(device->registry, GPU_BUFFER);
     if (!buffer->name) {
         release(device, buffer);
+        gpu_note_loss(device, error);
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more buffer names");
     }
     /* What stands here from before is not this allocation's fault, but must not hide it either. */
@@ -45,9 +46,12 @@ static bool allocate(struct gpu_device *device, struct gpu_buffer *buffer, size_
     glNamedBufferStorage(buffer->name, (GLsizeiptr)capacity, NULL, STORAGE_FLAGS);
     if (glGetError() != GL_NO_ERROR) {
         release(device, buffer);
+        gpu_note_loss(device, error);
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a buffer of %zu bytes",
                          capacity);
     }
+    if (before != GL_NO_ERROR)
+        gpu_note_loss(device, error);
     if (before != GL_NO_ERROR)
         return error_set(error, ERROR_INTERNAL, NULL, "GL error 0x%04x before a buffer was made", before);
     return true;
@@ -86,9 +90,11 @@ void *gpu_buffer_map(struct gpu_device *device, struct gpu_buffer *buffer, size_
         return NULL;
     void *data = glMapNamedBufferRange(buffer->name, 0, (GLsizeiptr)buffer->size_bytes,
                                        GL_MAP_WRITE_BIT | GL_MAP_INVALIDATE_BUFFER_BIT);
-    if (!data)
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver does not map a buffer of %zu bytes", size_bytes);
-    return data;
+    if (data)
+        return data;
+    gpu_note_loss(device, error);
+    error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver does not map a buffer of %zu bytes", size_bytes);
+    return NULL;
 }
 
 void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer)

@@ -50,6 +50,13 @@ static bool sounds_like_software(const char *renderer)
 }
 
 /* The context is current. */
+static bool renders_in_software(void)
+{
+    const GLubyte *renderer = glGetString(GL_RENDERER);
+    return renderer && sounds_like_software((const char *)renderer);
+}
+
+/* The context is current. */
 static void ask_info(struct gpu_device_info *info, const struct gpu_egl_place *place)
 {
     *info = (struct gpu_device_info){.index = place->index};
@@ -85,6 +92,26 @@ static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool 
         facts->memory_bytes = get_integer(GL_GPU_MEMORY_INFO_TOTAL_AVAILABLE_MEMORY_NVX) * 1024;
 }
 
+/* What the shaders use beyond what every OpenGL 4.5 has; tests/tools/check_shaders.py holds them to it. */
+static bool has_bindings(struct error *error)
+{
+    static const struct {
+        GLenum name;
+        unsigned least;
+        const char *what;
+    } rows[] = {
+        {GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS, 16, "storage bindings"},
+        {GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, 16, "storage blocks in compute shaders"},
+        {GL_MAX_VERTEX_SHADER_STORAGE_BLOCKS, 4, "storage blocks in vertex shaders"},
+        {GL_MAX_FRAGMENT_SHADER_STORAGE_BLOCKS, 8, "storage blocks in fragment shaders"},
+    };
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
+        if (get_integer(rows[i].name) < rows[i].least)
+            return error_set(error, ERROR_UNSUPPORTED, "device", "it has %u %s; %u are needed",
+                             (unsigned)get_integer(rows[i].name), rows[i].what, rows[i].least);
+    return true;
+}
+
 size_t gpu_device_list(struct gpu_device_info *list, size_t max)
 {
     struct gpu_egl_place places[GPU_EGL_PLACES_MAX];
@@ -118,11 +145,16 @@ static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const 
             if (!fits)
                 continue;
             last = (struct error){0};
-            if (gpu_egl_open(egl, &places[i], debug, &last)) {
-                *chosen = places[i];
-                return true;
+            if (!gpu_egl_open(egl, &places[i], debug, &last)) {
+                log_write(LOG_DEBUG, "gpu", "%s", last.text);
+                continue;
             }
-            log_write(LOG_DEBUG, "gpu", "%s", last.text);
+            *chosen = places[i];
+            if (by_index || software || !renders_in_software())
+                return true;
+            /* Mesa offers itself for hardware that it cannot drive, such as that of another driver. */
+            places[i].software = true;
+            gpu_egl_close(egl);
         }
     }
     if (last.kind != ERROR_NONE)
@@ -186,7 +218,7 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
     device->memory_limit_bytes = device->facts.memory_bytes;
     if (debug)
         gpu_debug_start();
-    if (!create_defaults(device, error))
+    if (!has_bindings(error) || !create_defaults(device, error))
         goto fail;
     return device;
 fail:
@@ -228,9 +260,28 @@ static const char *gl_error_name(GLenum code)
     }
 }
 
+/* A driver tells of a reset only until it is over, while the context stays lost. */
+static bool was_reset(struct gpu_device *device)
+{
+    device->lost = device->lost || (device->facts.robust && glGetGraphicsResetStatus() != GL_NO_ERROR);
+    return device->lost;
+}
+
+void gpu_note_loss(struct gpu_device *device, struct error *error)
+{
+    for (int i = 0; !was_reset(device) && i < GL_ERRORS_READ_MAX; i++) {
+        GLenum code = glGetError();
+        if (code == GL_NO_ERROR)
+            return;
+        device->lost = code == GL_CONTEXT_LOST;
+    }
+    if (device->lost)
+        error_set(error, ERROR_DEVICE_LOST, NULL, "the GL context was lost");
+}
+
 bool gpu_check(struct gpu_device *device, const char *what, struct error *error)
 {
-    if (device->facts.robust && glGetGraphicsResetStatus() != GL_NO_ERROR)
+    if (was_reset(device))
         return error_set(error, ERROR_DEVICE_LOST, NULL, "%s: the GL context was lost", what);
     GLenum first = glGetError();
     if (first == GL_NO_ERROR)
@@ -238,7 +289,8 @@ bool gpu_check(struct gpu_device *device, const char *what, struct error *error)
     GLenum next = first;
     for (int i = 1; i < GL_ERRORS_READ_MAX && next != GL_NO_ERROR; i++)
         next = glGetError();
-    if (first == GL_CONTEXT_LOST)
+    device->lost = first == GL_CONTEXT_LOST;
+    if (device->lost)
         return error_set(error, ERROR_DEVICE_LOST, NULL, "%s: the GL context was lost", what);
     enum error_kind kind = first == GL_OUT_OF_MEMORY ? ERROR_OUT_OF_MEMORY : ERROR_INTERNAL;
     return error_set(error, kind, NULL, "%s: %s (0x%04x)", what, gl_error_name(first), first);

@@ -41,6 +41,7 @@ struct gpu_device {
     unsigned empty_buffer;         /* 256 zero bytes: what an empty buffer is bound as */
     uint64_t memory_used_bytes;    /* sum of buffers and textures made through gpu/ */
     uint64_t memory_limit_bytes;   /* 0: none; facts.memory_bytes at first */
+    bool lost;                     /* the context; nothing works any more, see gpu_note_loss */
 };
 
 struct gpu_options {
@@ -59,6 +60,9 @@ void gpu_device_destroy(struct gpu_device *device); /* accepts NULL; on the same
 /* ERROR_DEVICE_LOST if the context was lost, ERROR_INTERNAL with the GL error if there is one (a bounded
  * number is read), else true. `what` names the caller. Cheap enough for once a pass. */
 bool gpu_check(struct gpu_device *device, const char *what, struct error *error);
+/* For where something else failed than gpu_check: sets ERROR_DEVICE_LOST if that is why, else nothing, so that the
+ * caller sets its own error behind it (the first one stands). GL errors that were not read yet are gone. */
+void gpu_note_loss(struct gpu_device *device, struct error *error);
 
 /* The device that is current on this thread, NULL: none. */
 struct gpu_device *gpu_device_current(void);

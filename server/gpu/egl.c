@@ -80,10 +80,8 @@ static EGLDisplay open_display(const struct gpu_egl_place *place)
     return eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, place->device, NULL);
 }
 
-static EGLConfig choose_config(EGLDisplay display, const char *extensions)
+static EGLConfig choose_config(EGLDisplay display)
 {
-    if (has_word(extensions, "EGL_KHR_no_config_context"))
-        return EGL_NO_CONFIG_KHR;
     static const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
                                     EGL_NONE};
     EGLConfig config = EGL_NO_CONFIG_KHR;
@@ -113,6 +111,22 @@ static EGLContext create_context(EGLDisplay display, EGLConfig config, bool robu
     return eglCreateContext(display, config, EGL_NO_CONTEXT, attributes);
 }
 
+/* Robust is better, and no configuration at all fits a context that never draws to a surface. */
+static bool create_any_context(struct gpu_egl *egl, const char *extensions, bool debug)
+{
+    bool any_config = has_word(extensions, "EGL_KHR_no_config_context");
+    for (int chosen = any_config ? 0 : 1; chosen < 2; chosen++) {
+        EGLConfig config = chosen ? choose_config(egl->display) : EGL_NO_CONFIG_KHR;
+        for (int robust = 1; robust >= 0; robust--) {
+            egl->robust = robust != 0;
+            egl->context = create_context(egl->display, config, egl->robust, debug);
+            if (egl->context)
+                return true;
+        }
+    }
+    return false;
+}
+
 bool gpu_egl_open(struct gpu_egl *egl, const struct gpu_egl_place *place, bool debug, struct error *error)
 {
     EGLint major = 0, minor = 0;
@@ -135,12 +149,8 @@ bool gpu_egl_open(struct gpu_egl *egl, const struct gpu_egl_place *place, bool d
         gpu_egl_close(egl);
         return error_set(error, ERROR_UNSUPPORTED, NULL, "device %d lacks %s", place->index, lacking);
     }
-    EGLConfig config = choose_config(egl->display, extensions);
-    egl->context = create_context(egl->display, config, true, debug);
-    egl->robust = egl->context != EGL_NO_CONTEXT;
-    if (!egl->context)
-        egl->context = create_context(egl->display, config, false, debug);
-    if (!egl->context || !eglMakeCurrent(egl->display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl->context)) {
+    if (!create_any_context(egl, extensions, debug) ||
+        !eglMakeCurrent(egl->display, EGL_NO_SURFACE, EGL_NO_SURFACE, egl->context)) {
         unsigned code = (unsigned)eglGetError();
         gpu_egl_close(egl);
         return error_set(error, ERROR_UNSUPPORTED, NULL, "device %d gives no OpenGL 4.5 core context (0x%04x)",

@@ -86,6 +86,7 @@ static bool compile(struct stage *stage, struct error *error)
     glGetShaderiv(stage->shader, GL_COMPILE_STATUS, &compiled);
     if (compiled)
         return true;
+    gpu_note_loss(gpu_device_current(), error);
     glGetShaderInfoLog(stage->shader, sizeof(log), NULL, log);
     gpu_source_name_files(&stage->text, log, named, sizeof(named));
     return error_set(error, ERROR_INTERNAL, stage->path, "%s", named);
@@ -105,6 +106,7 @@ static bool link_program(GLuint program, struct stage *stages, unsigned stage_co
         glDetachShader(program, stages[i].shader);
     if (linked)
         return true;
+    gpu_note_loss(gpu_device_current(), error);
     char log[sizeof(error->text)] = "";
     glGetProgramInfoLog(program, sizeof(log), NULL, log);
     return error_set(error, ERROR_INTERNAL, stages[0].path, "%s", log);
@@ -173,6 +175,8 @@ static const struct gpu_program *create_program(struct gpu_device *device, const
     const struct gpu_program *program = NULL;
     GLuint name = gpu_object_create(device->registry, GPU_PROGRAM);
     bool ok = name != 0;
+    if (!ok)
+        gpu_note_loss(device, error);
     for (unsigned i = 0; ok && i < stage_count; i++)
         ok =
             gpu_source_expand(&stages[i].text, gpu_source_lookup_embedded, stages[i].path, source->defines, error);

@@ -67,6 +67,7 @@ bool gpu_texture_reserve(struct gpu_device *device, struct gpu_texture *texture,
     }
     if (!texture->name || glGetError() != GL_NO_ERROR) {
         gpu_texture_finish(device, texture);
+        gpu_note_loss(device, error);
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a texture of %ux%u", width,
                          height);
     }
@@ -108,6 +109,8 @@ bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *f
         return error_set(error, ERROR_INTERNAL, NULL, "a framebuffer with %u colours", colour_count);
     framebuffer->name = gpu_object_create(device->registry, GPU_FRAMEBUFFER);
     if (!framebuffer->name)
+        gpu_note_loss(device, error);
+    if (!framebuffer->name)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more framebuffer names");
     for (unsigned i = 0; i < colour_count; i++) {
         attachments[i] = GL_COLOR_ATTACHMENT0 + i;
@@ -120,6 +123,7 @@ bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *f
     if (status == GL_FRAMEBUFFER_COMPLETE)
         return true;
     gpu_framebuffer_finish(device, framebuffer);
+    gpu_note_loss(device, error);
     return error_set(error, ERROR_INTERNAL, NULL, "framebuffer is not complete: 0x%04x", status);
 }
 

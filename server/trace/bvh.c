@@ -20,6 +20,8 @@
 /* Coherent waves that walk together on software GL; see tests/bench/bench_bvh.c. Elsewhere a SIMD group of the
  * hardware walks together already, and several rays an invocation cost registers; not measured there. */
 #define TOGETHER_SOFTWARE 8
+/* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
+#define DISPATCH_RAYS_MAX (1u << 18)
 
 static unsigned build_threads(void)
 {
@@ -267,7 +269,7 @@ static void bind(struct bvh *bvh)
         gpu_buffer_bind_texels(store->device, &store->links, UNIT_TRACER_1, GL_RG32UI);
     }
     gpu_buffer_bind_texels(store->device, &bvh->transform_buffer, UNIT_TRACER_2, GL_RGBA32UI);
-    gpu_buffer_bind_texels(store->device, &store->primitives, UNIT_TRACER_3, GL_RGBA32F);
+    gpu_buffer_bind_texels(store->device, &store->primitives, UNIT_TRACER_3, GL_RGBA32UI);
 }
 
 static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error)
@@ -284,6 +286,7 @@ static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const stru
         .traverse = "bvh/traverse.glsl",
         .defines = defines,
         .rays_together = bvh_rays_together(tracer, wave),
+        .rays_a_dispatch = DISPATCH_RAYS_MAX,
     };
     const struct gpu_program *program = trace_program_get(scene, wave->kind, &source, error);
     if (!program)

@@ -5,20 +5,26 @@
 
 #include <stdlib.h>
 
+/* Rays times primitives of one dispatch: well below a second on a GPU, whose driver may end what takes longer. */
+#define DISPATCH_TESTS_MAX ((uint64_t)1 << 33)
+#define DISPATCH_RAYS_MIN 256u
+
 static const struct gpu_define naive_defines[] = {{"TRACER_NAIVE", "1"}, {0}};
-static const struct trace_program_source naive_source = {
-    .traverse = "naive/traverse.glsl",
-    .defines = naive_defines,
+
+struct naive {
+    struct tracer base;
+    uint32_t rays_a_dispatch;
 };
 
 static struct tracer *naive_create(struct gpu_device *device, const struct tracer_options *options,
                                    struct error *error)
 {
     (void)device, (void)options;
-    struct tracer *tracer = calloc(1, sizeof(*tracer));
-    if (!tracer)
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the naive tracer");
-    return tracer;
+    struct naive *naive = calloc(1, sizeof(*naive));
+    if (naive)
+        return &naive->base;
+    error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the naive tracer");
+    return NULL;
 }
 
 static void naive_destroy(struct tracer *tracer)
@@ -29,7 +35,14 @@ static void naive_destroy(struct tracer *tracer)
 static bool naive_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
                          struct stage_times *times, struct error *error)
 {
-    (void)scene, (void)changes, (void)times, (void)error;
+    (void)changes, (void)times, (void)error;
+    uint64_t primitives = 1;
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        primitives += scene->geometries[scene->instances[i].geometry].device.primitive_count;
+    uint64_t rays = DISPATCH_TESTS_MAX / primitives;
+    ((struct naive *)tracer)->rays_a_dispatch = rays > UINT32_MAX          ? UINT32_MAX
+                                                : rays < DISPATCH_RAYS_MIN ? DISPATCH_RAYS_MIN
+                                                                           : (uint32_t)rays;
     tracer->stats = (struct tracer_stats){0}; /* there is nothing but the scene itself */
     return true;
 }
@@ -37,11 +50,15 @@ static bool naive_update(struct tracer *tracer, struct scene_gpu *scene, const s
 static bool naive_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,
                         struct error *error)
 {
-    (void)tracer;
-    const struct gpu_program *program = trace_program_get(scene, wave->kind, &naive_source, error);
+    const struct trace_program_source source = {
+        .traverse = "naive/traverse.glsl",
+        .defines = naive_defines,
+        .rays_a_dispatch = ((struct naive *)tracer)->rays_a_dispatch,
+    };
+    const struct gpu_program *program = trace_program_get(scene, wave->kind, &source, error);
     if (!program)
         return false;
-    trace_program_run(program, scene, wave, &naive_source);
+    trace_program_run(program, scene, wave, &source);
     return true;
 }
 

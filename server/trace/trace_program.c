@@ -3,6 +3,7 @@
 
 #include "shared/bindings.h"
 
+#include <epoxy/gl.h>
 #include <stdio.h>
 
 #define OWN_DEFINES_MAX 12
@@ -46,8 +47,16 @@ void trace_program_run(const struct gpu_program *program, const struct scene_gpu
         gpu_buffer_bind_storage(wave->visibility, BIND_VISIBILITY);
     else
         gpu_buffer_bind_storage(wave->hits, BIND_HITS);
-    gpu_uniform_uint(program, "ray_count", wave->ray_count);
     gpu_uniform_uint(program, "disc_count", scene->disc_count);
     gpu_uniform_uint(program, "instance_count", scene->instance_count);
-    gpu_dispatch(scene->device, program, ((uint64_t)wave->ray_count + together - 1) / together);
+    for (uint32_t first = 0, part; first < wave->ray_count; first += part) {
+        part = wave->ray_count - first;
+        if (source->rays_a_dispatch && source->rays_a_dispatch < part)
+            part = source->rays_a_dispatch;
+        gpu_uniform_uint(program, "first_ray", first);
+        gpu_uniform_uint(program, "ray_count", first + part);
+        gpu_dispatch(scene->device, program, ((uint64_t)part + together - 1) / together);
+        if (part < wave->ray_count) /* a part of its own to the driver too, which may gather commands */
+            glFlush();
+    }
 }

@@ -25,7 +25,7 @@ layout(binding = UNIT_TRACER_0) uniform usamplerBuffer bvh_elements;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer bvh_links;
 #endif
 layout(binding = UNIT_TRACER_2) uniform usamplerBuffer bvh_transforms;
-layout(binding = UNIT_TRACER_3) uniform samplerBuffer bvh_primitives;
+layout(binding = UNIT_TRACER_3) uniform usamplerBuffer bvh_primitives;
 
 uniform uint bvh_top_count;   // elements of the top tree; 0: nothing there
 uniform uint bvh_step_budget; // elements that a group of rays may visit; more than all there are, so that only
@@ -197,8 +197,8 @@ void test_primitive(bool is_sphere, uint i, entered_instance inside, object_ray 
 #ifdef HAS_SPHERES
     if (is_sphere) {
         int texel = int(inside.first_texel + i * BVH_SPHERE_TEXELS);
-        vec4 sphere = texelFetch(bvh_primitives, texel);
-        c.primitive += floatBitsToUint(texelFetch(bvh_primitives, texel + 1).x);
+        vec4 sphere = uintBitsToFloat(texelFetch(bvh_primitives, texel));
+        c.primitive += texelFetch(bvh_primitives, texel + 1).x;
         for (int k = 0; k < RAYS_TOGETHER; k++) {
             vec2 distances;
             if (intersect_sphere(o[k].origin, o[k].direction, sphere.xyz, sphere.w, distances)) {
@@ -212,12 +212,13 @@ void test_primitive(bool is_sphere, uint i, entered_instance inside, object_ray 
 #endif
     {
         int texel = int(inside.first_texel + i * BVH_TRIANGLE_TEXELS);
-        vec4 v0 = texelFetch(bvh_primitives, texel);
-        vec3 v1 = texelFetch(bvh_primitives, texel + 1).xyz, v2 = texelFetch(bvh_primitives, texel + 2).xyz;
-        c.primitive += floatBitsToUint(v0.w);
+        uvec4 first = texelFetch(bvh_primitives, texel);
+        vec3 v0 = uintBitsToFloat(first.xyz), v1 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 1).xyz);
+        vec3 v2 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 2).xyz);
+        c.primitive += first.w;
         for (int k = 0; k < RAYS_TOGETHER; k++)
-            if (intersect_triangle(o[k].direction, v0.xyz - o[k].origin, v1 - o[k].origin, v2 - o[k].origin,
-                                   c.distance, c.barycentrics))
+            if (intersect_triangle(o[k].direction, v0 - o[k].origin, v1 - o[k].origin, v2 - o[k].origin, c.distance,
+                                   c.barycentrics))
                 offer_or_note(uint(2 * k), c, r[k], found[k], noted[k], noted_bits);
     }
 #ifdef ASK_MATERIALS

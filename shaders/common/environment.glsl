@@ -25,7 +25,7 @@ vec3 environment_image_radiance(vec3 direction)
     float c = cos(frame.environment_colour.w), s = sin(frame.environment_colour.w);
     vec3 d = vec3(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z);
     ivec2 size = textureSize(environment_image, 0);
-    vec2 place = vec2(atan(d.x, -d.z) / (TWO_PI) + 0.5, acos(clamp(d.y, -1.0, 1.0)) / PI);
+    vec2 place = vec2(azimuth(d.x, -d.z) / TWO_PI + 0.5, acos(clamp(d.y, -1.0, 1.0)) / PI);
     vec2 texel = place * vec2(size) - 0.5;
     ivec2 lower = ivec2(floor(texel));
     vec2 f = texel - vec2(lower);

@@ -10,6 +10,12 @@ float square(float x)
     return x * x;
 }
 
+// atan(y, x), and 0 where both are 0: there GLSL leaves it open, and some drivers make it no number.
+float azimuth(float y, float x)
+{
+    return x == 0.0 && y == 0.0 ? 0.0 : atan(y, x);
+}
+
 float greatest(vec3 v)
 {
     return max(v.x, max(v.y, v.z));

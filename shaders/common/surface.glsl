@@ -40,7 +40,7 @@ vec4 triangle_colour(uvec4 triangle, uint flags, vec3 weights)
 // Seen from the front (+z) with y up, u grows to the right and v downwards, as an image is stored.
 vec4 sphere_texcoords(vec3 normal_object)
 {
-    float u = 0.5 + atan(normal_object.x, normal_object.z) / TWO_PI;
+    float u = 0.5 + azimuth(normal_object.x, normal_object.z) / TWO_PI;
     float v = acos(clamp(normal_object.y, -1.0, 1.0)) / PI;
     return vec4(u, v, u, v);
 }

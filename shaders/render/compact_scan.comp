@@ -26,7 +26,7 @@ void main()
     barrier();
     if (self == 0u) {
         uvec2 total = uvec2(0u);
-        for (uint i = 0u; i < COMPACT_SCAN_SIZE; i++) {
+        for (int i = 0; i < COMPACT_SCAN_SIZE; i++) {
             uvec2 own = sums[i];
             sums[i] = total;
             total += own;

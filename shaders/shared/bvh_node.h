@@ -22,7 +22,7 @@ struct bvh_element {
     float upper_x, upper_y, upper_z;
     uint leaf; /* 0: an inner element; else BVH_LEAF_* */
 };
-SHARED_SIZE(bvh_element, 32);
+SHARED_SIZE(bvh_element, 32)
 #define BVH_END 0xffffffffu /* a link: this tree is done */
 #define BVH_OCTANTS 8u
 
@@ -30,7 +30,7 @@ SHARED_SIZE(bvh_element, 32);
 struct bvh_link {
     uint hit, miss; /* a leaf goes on at `miss` either way */
 };
-SHARED_SIZE(bvh_link, 8);
+SHARED_SIZE(bvh_link, 8)
 
 /* A leaf: kind (2 bits), count - 1 (3 bits), first primitive in the tree's order or instance (27 bits). */
 #define BVH_LEAF_KIND_SHIFT 30u
@@ -50,10 +50,11 @@ struct bvh_transform {
     uint first_texel;     /* of the geometry's primitives, in the primitive buffer */
     uint first_primitive; /* scene-wide */
 };
-SHARED_SIZE(bvh_transform, 64);
+SHARED_SIZE(bvh_transform, 64)
 #define BVH_TRANSFORM_TEXELS 4
 
-/* Primitives in the order of the leaves, fetched without an index in between, RGBA32F:
+/* Primitives in the order of the leaves, fetched without an index in between. RGBA32UI, though most are floats: a
+ * small integer is no float that a driver has to keep. Texels:
  *   triangle  3 texels: corners; w of the first: bits of the primitive's number in its geometry
  *   sphere    2 texels: centre and radius; x of the second: bits of the number */
 #define BVH_TRIANGLE_TEXELS 3u

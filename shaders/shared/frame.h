@@ -23,7 +23,7 @@ struct frame_uniforms {
     uint depth;              /* bounces after the first hit */
     uint seed;
 };
-SHARED_SIZE(frame_uniforms, 272);
+SHARED_SIZE(frame_uniforms, 272)
 
 #define ENVIRONMENT_NONE 0u     /* black; leaves the picture transparent */
 #define ENVIRONMENT_CONSTANT 1u

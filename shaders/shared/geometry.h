@@ -13,7 +13,7 @@ struct instance {
     uint flags;    /* INSTANCE_* */
     uint pad;
 };
-SHARED_SIZE(instance, 112);
+SHARED_SIZE(instance, 112)
 #define INSTANCE_MIRRORED 1u /* negative determinant: winding is reversed */
 
 /* A mesh or a set of spheres, stored once however many instances show it. */
@@ -26,7 +26,7 @@ struct geometry {
     uint flags;           /* GEOMETRY_HAS_* */
     uint pad0, pad1;
 };
-SHARED_SIZE(geometry, 32);
+SHARED_SIZE(geometry, 32)
 #define GEOMETRY_MESH 0u
 #define GEOMETRY_SPHERES 1u
 #define GEOMETRY_HAS_NORMALS 1u
@@ -53,6 +53,6 @@ struct disc {
     vec4 normal;  /* w unused */
     uint material, pad0, pad1, pad2;
 };
-SHARED_SIZE(disc, 48);
+SHARED_SIZE(disc, 48)
 
 #endif

@@ -16,7 +16,7 @@ struct hit {
     uint tangent;          /* likewise with 15 bits for y; lowest bit: handedness is negative */
     uint colour;           /* vertex colour times what a sampled tracer stored, unorm 4x8, linear */
 };
-SHARED_SIZE(hit, 48);
+SHARED_SIZE(hit, 48)
 
 #define HIT_MATERIAL_MASK 0x00ffffffu
 #define HIT_BACK_FACE 0x01000000u  /* the ray came from inside */

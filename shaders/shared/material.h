@@ -12,7 +12,7 @@ struct material {
     uint texture_base_colour, texture_normal, texture_metallic_roughness; /* index into texture_uses, 0: none */
     uint texture_occlusion, texture_emission, texture_transmission, texture_bump;
 };
-SHARED_SIZE(material, 80);
+SHARED_SIZE(material, 80)
 #define MATERIAL_ALPHA_MASK 1u
 #define MATERIAL_ALPHA_BLEND 2u
 #define MATERIAL_DOUBLE_SIDED 4u
@@ -25,14 +25,14 @@ struct texture_slot {
     float strength;
     uint texture;     /* index into textures, bit 31: texture coordinate set 1 */
 };
-SHARED_SIZE(texture_slot, 32);
+SHARED_SIZE(texture_slot, 32)
 
 /* Texels of all textures lie in one texel buffer, RGBA8 unorm; each level of a texture after the other,
  * level n+1 is half of level n (rounded down, at least 1), down to 1x1. */
 struct texture_info {
     uint first_texel, width, height, flags; /* TEXTURE_* */
 };
-SHARED_SIZE(texture_info, 16);
+SHARED_SIZE(texture_info, 16)
 #define TEXTURE_SRGB 1u
 #define TEXTURE_NEAREST 2u
 #define TEXTURE_WRAP_U_SHIFT 2u /* two bits: 0 repeat, 1 clamp, 2 mirror */

@@ -17,7 +17,7 @@ struct path {
     uint flags;                         /* PATH_* */
     uint pad;
 };
-SHARED_SIZE(path, 32);
+SHARED_SIZE(path, 32)
 #define PATH_BOUNCES_MASK 0xffu
 #define PATH_STRAIGHT 0x100u /* nothing but alpha lies between it and the eye: counts for the picture's alpha */
 
@@ -31,10 +31,10 @@ struct child {
     uint flags;
     uint pad;
 };
-SHARED_SIZE(child, 64);
+SHARED_SIZE(child, 64)
 #define CHILDREN_MAX 3u       /* straight on, reflected, refracted */
 #define COMPACT_BLOCK 16u     /* paths whose hits, and then children, are counted together */
-#define COMPACT_SCAN_SIZE 64u /* invocations of the one group that scans the counts */
+#define COMPACT_SCAN_SIZE 64  /* invocations of the one group that scans the counts */
 
 /* The visibility buffer's first word is an instance + 1, or one of these. */
 #define VISIBLE_NOTHING 0u

@@ -9,6 +9,6 @@ struct ray {
     vec4 origin_t_min;
     vec4 direction_t_max;
 };
-SHARED_SIZE(ray, 32);
+SHARED_SIZE(ray, 32)
 
 #endif

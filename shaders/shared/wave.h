@@ -9,6 +9,6 @@ struct wave_state {
     uint capacity;
     uint pad0, pad1;
 };
-SHARED_SIZE(wave_state, 16);
+SHARED_SIZE(wave_state, 16)
 
 #endif

@@ -90,7 +90,7 @@ static inline int fixture_clear(void **state)
     scene_destroy(fixture->scene);
     frame_renderer_destroy(fixture->renderer); /* what it keeps belongs to one scene */
     fixture->renderer = frame_renderer_create(fixture->device, &error);
-    fixture->scene = scene_create("test", &(struct scene_limits){1u << 30, 100000});
+    fixture->scene = scene_create("test", &(struct scene_limits){.host_bytes = 1u << 30});
     assert_non_null(fixture->renderer);
     assert_non_null(fixture->scene);
     fixture->edit_count = 0;

@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""All variants of all shaders against glslangValidator: what only one driver accepts is found without the others.
+
+A program's text is made as server/gpu/program_source.c makes it. The defines that a program may have are those that
+its files ask for; each is tried alone, all and none together, for every choice that is not on or off (CHOICES).
+Exit status 1 and the compiler's lines for each program that does not pass. Run from the root of the project;
+needs glslang-tools.
+"""
+import itertools
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+
+ROOT = pathlib.Path("shaders")
+# Program -> its stages, and the defines of which it has one combination always.
+TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "RAYS_TOGETHER": "1"}] + [
+    {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "RAYS_TOGETHER": together, **bounds}
+    for together in ("1", "8")
+    for bounds in ({}, {"BVH_SPHERES": "1"}, {"BVH_SPHERES": "1", "BVH_PLAIN": "1"})]
+CHOICES = {
+    "trace.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
+    "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
+}
+STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"]}
+# Storage blocks of a stage; server/gpu/device.c asks a driver for as many.
+STORAGE_BLOCKS_MAX = {".comp": 16, ".vert": 4, ".frag": 8}
+
+DIRECTIVE = re.compile(r"^[ \t]*#[ \t]*(include|version)\b[ \t]*(.*?)[ \t]*$")
+QUOTED = re.compile(r'^"([^"]*)"')
+ASKED = re.compile(r"^[ \t]*#[ \t]*(?:ifdef[ \t]+(\w+)|(?:el)?if\b(.*))", re.MULTILINE)
+OWN = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", re.MULTILINE)
+DEFINED = re.compile(r"\bdefined[ \t]*\(?[ \t]*(\w+)")
+STORAGE_BLOCK = re.compile(r"\bbuffer\s+\w+\s*\{")
+
+
+def expand(path, defines, files):
+    """The lines of a file with everything that it includes; `files` grows by the files' names."""
+    if path in files:
+        return [""]
+    files.append(path)
+    number = files.index(path)
+    lines = [f"#line 1 {number}"]
+    for i, line in enumerate((ROOT / path).read_text().splitlines(), 1):
+        found = DIRECTIVE.match(line)
+        if not found:
+            lines.append(line)
+        elif found[1] == "version" or found[2].startswith("<"):
+            lines.append("")
+        else:
+            quoted = QUOTED.match(found[2]) or QUOTED.match(defines.get(found[2].split()[0], ""))
+            if not quoted:
+                sys.exit(f"{path}:{i}: #include names no file")
+            lines += expand(quoted[1], defines, files) + [f"#line {i + 1} {number}"]
+    return lines
+
+
+def text_of(path, defines):
+    files = []
+    head = ["#version 450 core"]
+    head += [f"#define {name} {value}" for name, value in defines.items() if not value.startswith('"')]
+    return "\n".join(head + expand(path, defines, files)) + "\n", files
+
+
+def optional_defines(paths, chosen, all_chosen):
+    """What the files ask for and the host may set or not."""
+    names = set()
+    for path in paths:
+        text, _ = text_of(path, chosen)
+        for ifdef, condition in ASKED.findall(text):
+            names.update([ifdef] if ifdef else DEFINED.findall(condition))
+        names.difference_update(OWN.findall(text))
+    return sorted(name for name in names if name not in all_chosen and not name.startswith("GL_"))
+
+
+def variants(program):
+    stages = STAGES.get(program, [program])
+    combinations = [{name: value for part in parts for name, value in part.items()}
+                    for parts in itertools.product(*CHOICES.get(program, [[{}]]))]
+    all_chosen = {name for combination in combinations for name in combination}
+    for chosen in combinations:
+        optional = optional_defines(stages, chosen, all_chosen)
+        for on in [[], optional] + [[name] for name in optional if len(optional) > 1]:
+            if on or on is not optional:
+                yield stages, {**chosen, **{name: "1" for name in on}}
+
+
+def run(arguments):
+    done = subprocess.run(["glslangValidator", *arguments], capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+def complaints_in(log, files_of):
+    """Lines of a log, in which `0:12` stands for a file of the stage that was named last and its line."""
+    complaints, files = [], []
+    for line in log.splitlines():
+        files = files_of.get(line.strip(), files)
+        if re.match("ERROR|WARNING", line):
+            complaints.append(re.sub(r"^(\w+: )(\d+):", lambda m: f"{m[1]}{files[int(m[2])]}:", line))
+    return complaints
+
+
+def complaints_of(variant):
+    """What is wrong with one program, whose stages are compiled and linked."""
+    stages, defines = variant
+    complaints, files_of = [], {}
+    with tempfile.TemporaryDirectory() as folder:
+        for stage in stages:
+            text, names = text_of(stage, defines)
+            path = os.path.join(folder, "stage" + pathlib.Path(stage).suffix)
+            pathlib.Path(path).write_text(text)
+            files_of[path] = names
+            blocks = len(STORAGE_BLOCK.findall(run(["-E", path])[1]))
+            most = STORAGE_BLOCKS_MAX[pathlib.Path(stage).suffix]
+            if blocks > most:
+                complaints.append(f"{stage}: {blocks} storage blocks, where {most} are asked of a driver")
+        status, log = run(["-l", *files_of])
+        found = complaints_in(log, files_of)
+        complaints += found if found or status == 0 else [log]
+    shown = " ".join(f"{name}={value}" for name, value in defines.items())
+    return [f"{stages[0]} [{shown}]: {line}" for line in complaints]
+
+
+def main():
+    found = sorted(str(path.relative_to(ROOT)) for path in ROOT.rglob("*.comp"))
+    found += sorted(str(path.relative_to(ROOT)) for path in ROOT.rglob("*.vert"))
+    all_variants = [variant for program in found for variant in variants(program)]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        complaints = [line for lines in pool.map(complaints_of, all_variants) for line in lines]
+    print("\n".join(complaints), end="\n" if complaints else "")
+    print(f"{len(all_variants)} variants of {len(found)} programs, {len(complaints)} complaints", file=sys.stderr)
+    return 1 if complaints else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
