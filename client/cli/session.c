@@ -88,7 +88,28 @@ static bool prepare_output(struct session *session, struct fl_error *error)
            cli_check_output(session->path, session->folder, sizeof session->folder, error);
 }
 
-/* Where two programs can load at once: the importer beside the daemon, later the exporter beside the renderer. */
+static bool start_exporter(struct session *session, struct fl_error *error)
+{
+    const struct cli_job *job = session->job;
+    const struct fl_exporter_options export = {.folder = session->folder,
+                                               .model = job->model,
+                                               .frames_per_second =
+                                                   session->is_series ? job->options.frames_per_second : 0,
+                                               .interrupt_fd = cli_interrupt_fd()};
+    session->exporter = fl_exporter_start(&export, error);
+    return session->exporter != NULL;
+}
+
+static bool connect_and_start(struct session *session, struct fl_error *error)
+{
+    const struct fl_connect_options options = {
+        .server = session->job->server, .name = "farlight", .interrupt_fd = cli_interrupt_fd()};
+    session->connection = fl_connect(&options, error);
+    return session->connection != NULL && start_exporter(session, error);
+}
+
+/* The importer loads its libraries beside the daemon's start, and the exporter beside the importer: once the scene
+ * is there the daemon wants all processors. */
 static bool load_scene(struct session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
@@ -100,29 +121,13 @@ static bool load_scene(struct session *session, struct fl_error *error)
     load.started = fl_import_start(&load, error);
     if (load.started == NULL)
         return false;
-    session->connection = fl_connect(&(struct fl_connect_options){.server = job->server,
-                                                                  .name = "farlight",
-                                                                  .interrupt_fd = cli_interrupt_fd()},
-                                     error);
-    if (session->connection == NULL) {
+    if (!connect_and_start(session, error)) {
         fl_import_destroy(load.started);
         return false;
     }
     session->scene = fl_scene_load(session->connection, &load, error);
     tell_hidden_warnings(session);
     return session->scene != NULL;
-}
-
-static bool start_exporter(struct session *session, struct fl_error *error)
-{
-    const struct cli_job *job = session->job;
-    const struct fl_exporter_options export = {.folder = session->folder,
-                                               .model = job->model,
-                                               .frames_per_second =
-                                                   session->is_series ? job->options.frames_per_second : 0,
-                                               .interrupt_fd = cli_interrupt_fd()};
-    session->exporter = fl_exporter_start(&export, error);
-    return session->exporter != NULL;
 }
 
 /* By name or number; without either the model's first camera, unless keys or an orbit say where to look. */
@@ -203,8 +208,7 @@ static bool run(struct session *session, struct fl_error *error)
     struct cli_job *job = session->job;
     if ((job->model != NULL && !cli_check_input(job->model, error)) ||
         (job->environment != NULL && !cli_check_input(job->environment, error)) ||
-        !prepare_output(session, error) || !load_scene(session, error) || !choose_camera(session, error) ||
-        !start_exporter(session, error))
+        !prepare_output(session, error) || !load_scene(session, error) || !choose_camera(session, error))
         return false;
     session->rendering = fl_render_start(session->scene, &job->options, error);
     return session->rendering != NULL && take_frames(session, error);

@@ -250,7 +250,9 @@ std::vector<uint32_t> read_integers(reader &r, int accessor, int components, con
     if (e.components != components)
         fail(r, where, "accessors[%d] should have %d components, not %d", accessor, components, e.components);
     std::vector<uint32_t> out(e.count * size_t(components));
-    if (e.bytes)
+    if (e.bytes && part == sizeof(uint32_t) && e.stride == part * size_t(components))
+        memcpy(out.data(), e.bytes, out.size() * part);
+    else if (e.bytes)
         for (size_t i = 0; i < e.count; i++)
             for (size_t c = 0; c < size_t(components); c++)
                 out[i * size_t(components) + c] = integer_of(e.bytes + i * e.stride + c * part, e.component_type);

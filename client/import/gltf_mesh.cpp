@@ -111,6 +111,18 @@ void add_triangle(builder &b, uint32_t first, uint32_t x, uint32_t y, uint32_t z
     b.indices.push_back(first + z);
 }
 
+// Whole triangles. Most meshes are one list of them, and large ones would feel a copy.
+void add_corners(builder &b, uint32_t first, std::vector<uint32_t> corners)
+{
+    if (first > 0)
+        for (uint32_t &corner : corners)
+            corner += first;
+    if (b.indices.empty())
+        b.indices = std::move(corners);
+    else
+        b.indices.insert(b.indices.end(), corners.begin(), corners.end());
+}
+
 std::vector<uint32_t> corners_of(builder &b, const tinygltf::Primitive &primitive, const vertex_lot &lot,
                                  const std::string &where)
 {
@@ -132,16 +144,15 @@ std::vector<uint32_t> corners_of(builder &b, const tinygltf::Primitive &primitiv
 void add_triangles(builder &b, const tinygltf::Primitive &primitive, const vertex_lot &lot,
                    const std::string &where)
 {
-    const std::vector<uint32_t> corners = corners_of(b, primitive, lot, where);
+    std::vector<uint32_t> corners = corners_of(b, primitive, lot, where);
     const size_t count = corners.size();
 
     if (primitive.mode == TINYGLTF_MODE_TRIANGLES) {
         if (count % 3 != 0)
             import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
                         "corners that make no whole triangle were left out");
-        b.indices.reserve(b.indices.size() + count);
-        for (size_t i = 0; i + 3 <= count; i += 3)
-            add_triangle(b, lot.first, corners[i], corners[i + 1], corners[i + 2]);
+        corners.resize(count - count % 3);
+        add_corners(b, lot.first, std::move(corners));
         return;
     }
     for (size_t i = 2; i < count; i++) {

@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "trace/bvh_build.h"
 
-#include <float.h>
-#include <math.h>
+#include "trace/bvh_build_split.h"
+
+#include <assert.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#if defined(__SSE__)
-#include <xmmintrin.h>
-#endif
 
-#define BINS_MAX 16
-#define SMALL_RANGE 24 /* ranges below are split with fewer bins: the sweep would cost more than the filling */
-#define BINS_SMALL 8
 #define TASK_PRIMITIVES 4096u /* smaller ranges stay with the thread that has them */
 #define STACK_DEPTH 40 /* the smaller half is walked first: a level at most for each doubling of the range */
 
@@ -23,6 +18,7 @@ struct range {
 struct builder {
     struct bvh_binary *tree;
     struct bvh_box *boxes;
+    uint32_t *order_right; /* where each range puts its right half while its left half is gathered */
     const struct bvh_costs *costs;
     /* ranges that wait for a thread */
     pthread_mutex_t mutex;
@@ -33,158 +29,54 @@ struct builder {
     bool shared; /* several threads */
 };
 
-struct bin {
-    struct bvh_box box;
-    uint32_t count;
-};
-
-struct split {
-    int axis; /* -1: none found */
-    int bin;  /* primitives of this bin and those after go right */
-    int bins;
-    float cost;
-    bvh_vec4 origin, scale; /* bin = (centre - origin) scale */
-};
-
-#if defined(__SSE__)
-static inline bvh_vec4 vec_min(bvh_vec4 a, bvh_vec4 b)
-{
-    return (bvh_vec4)_mm_min_ps((__m128)a, (__m128)b);
-}
-static inline bvh_vec4 vec_max(bvh_vec4 a, bvh_vec4 b)
-{
-    return (bvh_vec4)_mm_max_ps((__m128)a, (__m128)b);
-}
-#else
-static inline bvh_vec4 vec_min(bvh_vec4 a, bvh_vec4 b)
-{
-    for (int i = 0; i < 4; i++)
-        a[i] = a[i] < b[i] ? a[i] : b[i];
-    return a;
-}
-static inline bvh_vec4 vec_max(bvh_vec4 a, bvh_vec4 b)
-{
-    for (int i = 0; i < 4; i++)
-        a[i] = a[i] > b[i] ? a[i] : b[i];
-    return a;
-}
-#endif
-
-static inline struct bvh_box box_empty(void)
-{
-    return (struct bvh_box){{FLT_MAX, FLT_MAX, FLT_MAX, 0}, {-FLT_MAX, -FLT_MAX, -FLT_MAX, 0}};
-}
-
-static inline void box_add(struct bvh_box *box, const struct bvh_box *other)
-{
-    box->lower = vec_min(box->lower, other->lower);
-    box->upper = vec_max(box->upper, other->upper);
-}
-
-/* Half the surface: a constant factor changes no choice. */
-static inline float box_area(const struct bvh_box *box)
+/* Half the surface, as the costs of splits are. */
+static inline float half_area(const struct bvh_box *box)
 {
     bvh_vec4 d = box->upper - box->lower;
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
 }
 
-static inline bvh_vec4 box_centre(const struct bvh_box *box)
+/* The places of its nodes are free until a range has been split: room for its boxes, of the same size. */
+static struct bvh_box *spare_boxes(const struct builder *builder, const struct range *range)
 {
-    return 0.5f * box->lower + 0.5f * box->upper; /* halves first: the sum of two large ones is infinite */
+    static_assert(sizeof(struct bvh_box) == sizeof(struct bvh_binary_node), "a box fits where a node goes");
+    return (struct bvh_box *)(void *)(builder->tree->nodes + range->node);
 }
 
-/* A NaN (infinite extent times zero) goes to bin 0. */
-static inline int bin_of(float place, int bins)
+/* Returns the first primitive of the right half. Which way one goes is a coin toss, so nothing branches on it:
+ * each is written to both places, and only one of them moves on. */
+static uint32_t partition(const struct builder *builder, const struct range *range, const struct bvh_split *split)
 {
-    if (!(place > 0))
-        return 0;
-    return place < (float)bins ? (int)place : bins - 1;
-}
-
-static void fill_bins(const struct builder *builder, const struct range *range, const struct split *frame,
-                      struct bin bins[3][BINS_MAX])
-{
-    for (int axis = 0; axis < 3; axis++)
-        for (int i = 0; i < frame->bins; i++)
-            bins[axis][i] = (struct bin){box_empty(), 0};
+    struct bvh_box *boxes = builder->boxes, *boxes_right = spare_boxes(builder, range);
+    uint32_t *order = builder->tree->order, *order_right = builder->order_right + range->begin;
+    uint32_t left = range->begin, right = 0;
     for (uint32_t i = range->begin; i < range->end; i++) {
-        const struct bvh_box *box = &builder->boxes[i];
-        bvh_vec4 place = (box_centre(box) - frame->origin) * frame->scale;
-        for (int axis = 0; axis < 3; axis++) {
-            struct bin *bin = &bins[axis][bin_of(place[axis], frame->bins)];
-            box_add(&bin->box, box);
-            bin->count++;
-        }
+        const struct bvh_box box = boxes[i];
+        const uint32_t number = order[i];
+        bool goes_left = bvh_split_goes_left(split, &box);
+        boxes[left] = boxes_right[right] = box;
+        order[left] = order_right[right] = number;
+        left += goes_left;
+        right += !goes_left;
     }
+    memcpy(boxes + left, boxes_right, right * sizeof *boxes);
+    memcpy(order + left, order_right, right * sizeof *order);
+    return left;
 }
 
-/* The cheapest border between bins of one axis. */
-static void sweep_axis(const struct bin *bins, int axis, struct split *best)
+static void find_bounds(const struct bvh_box *boxes, uint32_t count, struct bvh_box *bounds,
+                        struct bvh_box *centres)
 {
-    float area_right[BINS_MAX];
-    struct bvh_box box = box_empty();
-    uint32_t total = 0, left = 0;
-    for (int i = best->bins - 1; i > 0; i--) {
-        box_add(&box, &bins[i].box);
-        total += bins[i].count;
-        area_right[i] = total ? box_area(&box) : 0;
+    struct bvh_box all = bvh_box_empty(), middle = bvh_box_empty();
+    for (uint32_t i = 0; i < count; i++) {
+        bvh_vec4 centre = bvh_box_centre(&boxes[i]);
+        all.lower = bvh_vec_min(all.lower, boxes[i].lower);
+        all.upper = bvh_vec_max(all.upper, boxes[i].upper);
+        middle.lower = bvh_vec_min(middle.lower, centre);
+        middle.upper = bvh_vec_max(middle.upper, centre);
     }
-    total += bins[0].count;
-    box = box_empty();
-    for (int i = 1; i < best->bins; i++) {
-        box_add(&box, &bins[i - 1].box);
-        left += bins[i - 1].count;
-        if (left == 0 || left == total)
-            continue;
-        float cost = box_area(&box) * (float)left + area_right[i] * (float)(total - left);
-        if (cost < best->cost) {
-            best->cost = cost;
-            best->axis = axis;
-            best->bin = i;
-        }
-    }
-}
-
-static struct split find_split(const struct builder *builder, const struct range *range,
-                               const struct bvh_box *centres)
-{
-    uint32_t count = range->end - range->begin;
-    struct split split = {.axis = -1, .bins = count < SMALL_RANGE ? BINS_SMALL : BINS_MAX, .cost = FLT_MAX};
-    split.origin = centres->lower;
-    bvh_vec4 extent = centres->upper - centres->lower;
-    for (int axis = 0; axis < 3; axis++)
-        split.scale[axis] = extent[axis] > 0 ? (float)split.bins / extent[axis] : 0;
-    struct bin bins[3][BINS_MAX];
-    fill_bins(builder, range, &split, bins);
-    for (int axis = 0; axis < 3; axis++)
-        if (extent[axis] > 0)
-            sweep_axis(bins[axis], axis, &split);
-    return split;
-}
-
-static inline void swap_primitives(const struct builder *builder, uint32_t a, uint32_t b)
-{
-    struct bvh_box box = builder->boxes[a];
-    uint32_t number = builder->tree->order[a];
-    builder->boxes[a] = builder->boxes[b];
-    builder->tree->order[a] = builder->tree->order[b];
-    builder->boxes[b] = box;
-    builder->tree->order[b] = number;
-}
-
-/* Returns the first primitive of the right half. */
-static uint32_t partition(const struct builder *builder, const struct range *range, const struct split *split)
-{
-    uint32_t begin = range->begin, end = range->end;
-    float origin = split->origin[split->axis], scale = split->scale[split->axis];
-    while (begin < end) {
-        float centre = box_centre(&builder->boxes[begin])[split->axis];
-        if (bin_of((centre - origin) * scale, split->bins) < split->bin)
-            begin++;
-        else
-            swap_primitives(builder, begin, --end);
-    }
-    return begin;
+    *bounds = all;
+    *centres = middle;
 }
 
 static void node_set(struct bvh_binary_node *node, const struct bvh_box *box, uint32_t link, uint32_t count,
@@ -202,19 +94,15 @@ static void node_set(struct bvh_binary_node *node, const struct bvh_box *box, ui
 static bool split_range(const struct builder *builder, const struct range *range, struct range *left,
                         struct range *right)
 {
-    struct bvh_box bounds = box_empty(), centres = box_empty();
-    for (uint32_t i = range->begin; i < range->end; i++) {
-        bvh_vec4 centre = box_centre(&builder->boxes[i]);
-        box_add(&bounds, &builder->boxes[i]);
-        box_add(&centres, &(struct bvh_box){centre, centre});
-    }
+    struct bvh_box bounds, centres;
+    find_bounds(builder->boxes + range->begin, range->end - range->begin, &bounds, &centres);
     struct bvh_binary_node *node = &builder->tree->nodes[range->node];
+    float area = builder->tree->areas[range->node] = half_area(&bounds);
     const struct bvh_costs *costs = builder->costs;
     uint32_t count = range->end - range->begin, middle = range->begin + count / 2, axis = 0;
-    struct split split = {.axis = -1};
+    struct bvh_split split = {.axis = -1};
     if (count > 1)
-        split = find_split(builder, range, &centres);
-    float area = box_area(&bounds);
+        split = bvh_split_find(builder->boxes + range->begin, count, &centres);
     bool pays = split.axis >= 0 &&
                 2 * costs->element * area + costs->primitive * split.cost < costs->primitive * (float)count * area;
     if (count <= costs->leaf_max && !pays) {
@@ -289,16 +177,24 @@ static void build_thread(void *context, uint32_t thread)
     pthread_mutex_unlock(&builder->mutex);
 }
 
+static void free_work(struct builder *builder)
+{
+    free(builder->order_right);
+    free(builder->waiting);
+}
+
 bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count,
                       const struct bvh_costs *costs, unsigned threads)
 {
     *tree = (struct bvh_binary){.primitive_count = count};
     struct builder builder = {.tree = tree, .boxes = boxes, .costs = costs, .shared = threads > 1};
-    tree->nodes = malloc((2 * (size_t)count - 1) * sizeof *tree->nodes);
+    tree->nodes = aligned_alloc(16, (2 * (size_t)count - 1) * sizeof *tree->nodes);
+    tree->areas = malloc((2 * (size_t)count - 1) * sizeof *tree->areas);
     tree->order = malloc(count * sizeof *tree->order);
     builder.waiting = malloc((count / TASK_PRIMITIVES + 1) * sizeof *builder.waiting);
-    if (!tree->nodes || !tree->order || !builder.waiting) {
-        free(builder.waiting);
+    builder.order_right = malloc(count * sizeof *builder.order_right);
+    if (!tree->nodes || !tree->areas || !tree->order || !builder.waiting || !builder.order_right) {
+        free_work(&builder);
         bvh_binary_finish(tree);
         return false;
     }
@@ -310,13 +206,14 @@ bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t c
     bvh_parallel(threads, threads, build_thread, &builder);
     pthread_cond_destroy(&builder.changed);
     pthread_mutex_destroy(&builder.mutex);
-    free(builder.waiting);
+    free_work(&builder);
     return true;
 }
 
 void bvh_binary_finish(struct bvh_binary *tree)
 {
     free(tree->nodes);
+    free(tree->areas);
     free(tree->order);
     *tree = (struct bvh_binary){0};
 }

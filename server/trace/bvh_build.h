@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The builder of bounding volume trees: on the CPU, knows no GL, deterministic for an input whatever the number
- * of threads. Three steps: a binary tree by the surface area heuristic in bins (bvh_build.c), the throwing back of
- * elements that do not pay and the baking of links (bvh_build_bake.c), threads (bvh_build_threads.c).
+ * of threads. Three steps: a binary tree by the surface area heuristic in bins (bvh_build.c, bvh_build_split.c),
+ * the throwing back of elements that do not pay and the baking of links (bvh_build_bake.c), threads
+ * (bvh_build_threads.c).
  *
  * Based on: Wald. On fast Construction of SAH-based Bounding Volume Hierarchies. 2007 (binning);
  * 'Stackless traversal of a sphere BVH, distributed ray tracing', sections 4 and 6: wide nodes, baked links. */
@@ -36,6 +37,7 @@ struct bvh_binary_node {
 
 struct bvh_binary {
     struct bvh_binary_node *nodes; /* 2 primitive_count - 1 places */
+    float *areas;                  /* of each place: half the surface of the node's box */
     uint32_t *order;               /* primitive numbers as the leaves hold them */
     uint32_t primitive_count;
 };

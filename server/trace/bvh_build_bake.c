@@ -11,15 +11,17 @@
  * care (2 %), spheres lose 10 % where nothing is thrown back, and 0.5 leaves a fifth fewer elements. */
 #define THROW_BACK 0.5f
 
+/* Octants are linked four at a time, one in each lane. */
+#define LANES 4
+typedef uint32_t lanes __attribute__((vector_size(LANES * sizeof(uint32_t))));
+
 struct bake {
     struct bvh_baked *baked;
     const struct bvh_binary_node *nodes;
     uint32_t place_count; /* of the binary tree */
-    /* per place of the binary tree */
-    uint32_t *above;  /* nearest kept ancestor, an element */
-    uint32_t *before; /* elements before it */
-    uint32_t *kept;   /* elements in its subtree */
-    bool failed[BVH_OCTANTS];
+    uint32_t *element;    /* of each place; of inner nodes that are thrown back BVH_END */
+    uint32_t waiting_max; /* right children that wait in a walk through the tree, at most */
+    bool failed[BVH_OCTANTS / LANES];
 };
 
 static bool node_is_leaf(const struct bvh_binary_node *node)
@@ -27,105 +29,117 @@ static bool node_is_leaf(const struct bvh_binary_node *node)
     return node->count_axis >> 2 > 0;
 }
 
-/* First sweep, in depth-first order: who stays, and whose child it becomes. */
+/* In depth-first order: who stays, and whose child it becomes. */
 static void choose_elements(struct bake *bake, const float *areas)
 {
     struct bvh_baked *baked = bake->baked;
-    uint32_t elements = 0;
-    bake->above[0] = BVH_END;
+    uint32_t elements = 0, waiting = 0;
+    uint32_t *above = bake->element; /* the nearest kept ancestor, until the node itself is reached */
+    above[0] = BVH_END;
     for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i)) {
         const struct bvh_binary_node *node = &bake->nodes[i];
-        uint32_t above = bake->above[i];
-        bake->before[i] = elements;
+        uint32_t parent = above[i];
         /* written so that areas which are not numbers keep their node */
-        bool pays = i == 0 || node_is_leaf(node) || !(areas[i] >= THROW_BACK * areas[baked->node[above]]);
+        bool pays = i == 0 || node_is_leaf(node) || !(areas[i] >= THROW_BACK * areas[baked->node[parent]]);
         if (pays) {
             baked->node[elements] = i;
-            baked->parent[elements] = above;
+            baked->parent[elements] = parent;
             baked->size[elements] = 1;
-            above = elements++;
+            parent = elements++;
         }
-        if (!node_is_leaf(node)) {
-            bake->above[i + 1] = above;
-            bake->above[node->link] = above;
+        if (node_is_leaf(node)) {
+            waiting -= waiting > 0;
+        } else {
+            above[i + 1] = above[node->link] = parent;
+            waiting++;
+            if (waiting > bake->waiting_max)
+                bake->waiting_max = waiting;
         }
+        bake->element[i] = pays ? parent : BVH_END;
     }
     baked->element_count = elements;
     for (uint32_t e = elements - 1; e > 0; e--)
         baked->size[baked->parent[e]] += baked->size[e];
 }
 
-/* Second sweep: how many elements each binary subtree kept. */
-static void count_kept(struct bake *bake)
+/* All ones in the lanes of octants that meet the left child of a node first: its axis is positive there. */
+static lanes left_is_near(const struct bvh_binary_node *node, uint32_t first_octant)
 {
-    bake->kept[0] = bake->baked->element_count;
-    for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i)) {
-        const struct bvh_binary_node *node = &bake->nodes[i];
-        if (node_is_leaf(node))
-            continue;
-        uint32_t left = bake->before[node->link] - bake->before[i + 1];
-        uint32_t end = bake->before[i] + bake->kept[i];
-        bake->kept[i + 1] = left;
-        bake->kept[node->link] = end - bake->before[node->link];
-    }
+    const lanes octants = {first_octant, first_octant + 1, first_octant + 2, first_octant + 3};
+    return (lanes)((octants >> (node->count_axis & 3) & 1) == 0);
 }
 
-/* Where each element lies in the octant's order: the nearer child by the split's axis goes first.
- * `first[i]`: place of the first element of binary subtree i. */
-static void place_elements(const struct bake *bake, uint32_t octant, uint32_t *first, uint32_t *place)
+static lanes choose(lanes which, lanes yes, lanes no)
 {
-    const struct bvh_baked *baked = bake->baked;
-    first[0] = 0;
-    for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i)) {
-        const struct bvh_binary_node *node = &bake->nodes[i];
-        uint32_t element = bake->before[i], next = first[i];
-        if (element < baked->element_count && baked->node[element] == i)
-            place[element] = next++;
-        if (node_is_leaf(node))
-            continue;
-        bool left_first = !(octant >> (node->count_axis & 3) & 1);
-        uint32_t near = left_first ? i + 1 : node->link, far = left_first ? node->link : i + 1;
-        first[near] = next;
-        first[far] = next + bake->kept[near];
-    }
+    return (yes & which) | (no & ~which);
 }
 
-/* The links of one octant. In its order a hit leads to the next place and a miss behind the subtree; what lies
- * behind the last place is BVH_END at once, however many levels end there. */
-static void link_octant(void *context, uint32_t octant)
+/* The first element of subtree i in the order of each octant: where nodes are thrown back it lies below them. */
+static lanes first_elements(const struct bake *bake, uint32_t i, uint32_t first_octant)
+{
+    uint32_t element = bake->element[i];
+    lanes first = {element, element, element, element};
+    if (element != BVH_END)
+        return first;
+    for (uint32_t lane = 0; lane < LANES; lane++) {
+        uint32_t place = i;
+        while (bake->element[place] == BVH_END) {
+            const struct bvh_binary_node *node = &bake->nodes[place];
+            place = (first_octant + lane) >> (node->count_axis & 3) & 1 ? node->link : place + 1;
+        }
+        first[lane] = bake->element[place];
+    }
+    return first;
+}
+
+static void set_links(const struct bake *bake, uint32_t first_octant, uint32_t element, lanes hit, lanes miss)
+{
+    size_t count = bake->baked->element_count;
+    struct bvh_link *links = bake->baked->links + first_octant * count + element;
+    for (uint32_t lane = 0; lane < LANES; lane++)
+        links[lane * count] = (struct bvh_link){hit[lane], miss[lane]};
+}
+
+/* The links of four octants, in one walk that carries what comes after the subtree it is in: a miss leads there, a
+ * hit to the nearer child's first element, and after the nearer child comes the farther one. After the last
+ * comes BVH_END at once, however many levels end there. */
+static void link_octants(void *context, uint32_t group)
 {
     struct bake *bake = context;
-    struct bvh_baked *baked = bake->baked;
-    uint32_t count = baked->element_count;
-    struct bvh_link *links = baked->links + (size_t)octant * count;
-    uint32_t *first = malloc(bake->place_count * sizeof *first);
-    uint32_t *place = malloc(count * sizeof *place), *order = malloc(count * sizeof *order);
-    bake->failed[octant] = !first || !place || !order;
-    if (!bake->failed[octant]) {
-        place_elements(bake, octant, first, place);
-        for (uint32_t e = 0; e < count; e++)
-            order[place[e]] = e;
-        for (uint32_t e = 0; e < count; e++) {
-            uint32_t behind = place[e] + baked->size[e];
-            links[e].miss = behind < count ? order[behind] : BVH_END;
-            links[e].hit = baked->size[e] > 1 ? order[place[e] + 1] : links[e].miss;
+    uint32_t first_octant = group * LANES, waiting = 0;
+    lanes after = {BVH_END, BVH_END, BVH_END, BVH_END};
+    lanes *after_right = aligned_alloc(sizeof after, ((size_t)bake->waiting_max + 1) * sizeof after);
+    bake->failed[group] = !after_right;
+    if (!after_right)
+        return;
+    for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i)) {
+        const struct bvh_binary_node *node = &bake->nodes[i];
+        uint32_t element = bake->element[i];
+        if (node_is_leaf(node)) {
+            set_links(bake, first_octant, element, after, after);
+            if (waiting > 0)
+                after = after_right[--waiting];
+            continue;
         }
+        lanes left = first_elements(bake, i + 1, first_octant);
+        lanes right = first_elements(bake, node->link, first_octant);
+        lanes left_first = left_is_near(node, first_octant);
+        if (element != BVH_END)
+            set_links(bake, first_octant, element, choose(left_first, left, right), after);
+        after_right[waiting++] = choose(left_first, after, left);
+        after = choose(left_first, right, after);
     }
-    free(first);
-    free(place);
-    free(order);
+    free(after_right);
 }
 
 static bool bake_alloc(struct bake *bake, struct bvh_baked *baked)
 {
     size_t places = bake->place_count;
-    bake->above = malloc(places * sizeof *bake->above);
-    bake->before = malloc(places * sizeof *bake->before);
-    bake->kept = malloc(places * sizeof *bake->kept);
+    bake->element = malloc(places * sizeof *bake->element);
     baked->node = malloc(places * sizeof *baked->node);
     baked->size = malloc(places * sizeof *baked->size);
     baked->parent = malloc(places * sizeof *baked->parent);
-    return bake->above && bake->before && bake->kept && baked->node && baked->size && baked->parent;
+    return bake->element && baked->node && baked->size && baked->parent;
 }
 
 bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const float *areas, bool plain,
@@ -134,21 +148,17 @@ bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const floa
     *baked = (struct bvh_baked){0};
     struct bake bake = {.baked = baked, .nodes = tree->nodes, .place_count = 2 * tree->primitive_count - 1};
     bool ok = bake_alloc(&bake, baked);
-    if (ok) {
+    if (ok)
         choose_elements(&bake, areas);
-        count_kept(&bake);
-    }
     if (ok && !plain) {
         baked->links = malloc((size_t)BVH_OCTANTS * baked->element_count * sizeof *baked->links);
         ok = baked->links != NULL;
         if (ok)
-            bvh_parallel(threads, BVH_OCTANTS, link_octant, &bake);
+            bvh_parallel(threads, BVH_OCTANTS / LANES, link_octants, &bake);
     }
-    for (uint32_t octant = 0; octant < BVH_OCTANTS; octant++)
-        ok = ok && !bake.failed[octant];
-    free(bake.above);
-    free(bake.before);
-    free(bake.kept);
+    for (uint32_t group = 0; group < BVH_OCTANTS / LANES; group++)
+        ok = ok && !bake.failed[group];
+    free(bake.element);
     if (!ok)
         bvh_baked_finish(baked);
     return ok;

@@ -77,14 +77,7 @@ static void fill_elements(struct bvh_top *top, const struct bvh_binary *binary, 
 
 static bool bake_top(struct bvh_top *top, const struct bvh_binary *binary, bool plain)
 {
-    uint32_t places = 2 * binary->primitive_count - 1;
-    float *areas = malloc(places * sizeof *areas);
-    if (!areas)
-        return false;
-    for (uint32_t i = 0; i < places; i = bvh_binary_next(binary->nodes, i))
-        areas[i] = bvh_box_area(binary->nodes[i].lower, binary->nodes[i].upper);
-    bool ok = bvh_bake(&top->baked, binary, areas, plain, 1);
-    free(areas);
+    bool ok = bvh_bake(&top->baked, binary, binary->areas, plain, 1);
     top->element_count = top->baked.element_count;
     return ok;
 }

@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,11 +19,10 @@ struct work {
     const struct bvh_shape *shape;
     const struct bvh_settings *settings;
     unsigned threads;
-    struct bvh_box *boxes;
+    struct bvh_box *boxes; /* gone when the primitives are there */
     struct bvh_binary binary;
     struct bvh_baked baked;
-    float *areas;        /* per place of the binary tree */
-    float (*spheres)[4]; /* likewise: centre, radius; NULL with boxes */
+    float (*spheres)[4]; /* per place of the binary tree: centre, radius; NULL with boxes */
 };
 
 static const float *triangle_corner(const struct bvh_shape *shape, uint32_t triangle, unsigned corner)
@@ -140,23 +140,9 @@ static bool make_spheres(struct work *work)
         }
         /* Each sum above rounds a few times. */
         sphere[3] = fminf(sphere[3], other) * (1 + 0x1p-21f);
+        work->binary.areas[order[count]] = sphere[3] * sphere[3]; /* the surface, up to a factor */
     }
     free(order);
-    return true;
-}
-
-/* Surfaces, up to a factor. */
-static bool make_areas(struct work *work)
-{
-    uint32_t places = 2 * work->binary.primitive_count - 1;
-    work->areas = malloc(places * sizeof *work->areas);
-    if (!work->areas)
-        return false;
-    for (uint32_t i = 0; i < places; i = bvh_binary_next(work->binary.nodes, i)) {
-        const struct bvh_binary_node *node = &work->binary.nodes[i];
-        work->areas[i] =
-            work->spheres ? work->spheres[i][3] * work->spheres[i][3] : bvh_box_area(node->lower, node->upper);
-    }
     return true;
 }
 
@@ -188,29 +174,38 @@ static uint32_t chunk_count(uint32_t count)
     return count / CHUNK + (count % CHUNK > 0);
 }
 
+/* The boxes lie where the primitives will be, which are not fewer bytes and are written when the boxes have
+ * served: memory that is touched for the first time costs more than what is done here with most of it. */
+static bool alloc_primitives(struct work *work)
+{
+    size_t count = work->shape->primitive_count;
+    size_t texels = work->shape->centres_radii ? BVH_SPHERE_TEXELS : BVH_TRIANGLE_TEXELS;
+    static_assert(BVH_SPHERE_TEXELS * 4 * sizeof(float) >= sizeof(struct bvh_box), "a box fits in any primitive");
+    work->tree->primitive_texels = count * texels;
+    work->tree->primitives = aligned_alloc(16, count * texels * 4 * sizeof(float));
+    work->boxes = (struct bvh_box *)(void *)work->tree->primitives;
+    return work->boxes != NULL;
+}
+
 static bool build(struct work *work)
 {
     struct bvh_tree *tree = work->tree;
     uint32_t count = work->shape->primitive_count;
     unsigned threads = work->threads;
-    work->boxes = aligned_alloc(16, count * sizeof *work->boxes);
-    if (!work->boxes)
+    if (!alloc_primitives(work))
         return false;
     bvh_parallel(threads, chunk_count(count), chunk_boxes, work);
     if (!bvh_binary_build(&work->binary, work->boxes, count, &costs, threads))
         return false;
     if (work->settings->bounds == BVH_BOUNDS_OF_SPHERES && !make_spheres(work))
         return false;
-    if (!make_areas(work) || !bvh_bake(&work->baked, &work->binary, work->areas, work->settings->plain, threads))
+    if (!bvh_bake(&work->baked, &work->binary, work->binary.areas, work->settings->plain, threads))
         return false;
     tree->element_count = work->baked.element_count;
     tree->links = work->baked.links;
     work->baked.links = NULL;
     tree->elements = malloc(tree->element_count * sizeof *tree->elements);
-    tree->primitive_texels =
-        (size_t)count * (work->shape->centres_radii ? BVH_SPHERE_TEXELS : BVH_TRIANGLE_TEXELS);
-    tree->primitives = malloc(tree->primitive_texels * 4 * sizeof *tree->primitives);
-    if (!tree->elements || !tree->primitives)
+    if (!tree->elements)
         return false;
     bvh_parallel(threads, chunk_count(tree->element_count), chunk_elements, work);
     bvh_parallel(threads, chunk_count(count), chunk_primitives, work);
@@ -232,8 +227,6 @@ bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const 
     if (shape->primitive_count >= BVH_THREADED_PRIMITIVES && settings->threads > 1)
         work.threads = settings->threads;
     bool ok = build(&work);
-    free(work.boxes);
-    free(work.areas);
     free(work.spheres);
     bvh_binary_finish(&work.binary);
     bvh_baked_finish(&work.baked);
