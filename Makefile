@@ -187,12 +187,15 @@ bench: test-packages
 
 check-headers:
 	@tests/tools/check_headers.sh $(CC) -I. -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS)
+FORMATTED = $(wildcard server/*.[ch] server/*/*.[ch] shaders/shared/*.h protocol/*.[ch] client/*/*.[ch] client/*/*.hpp \
+    client/*/*.cpp tests/*/*.[ch])
+format:
+	clang-format -i $(FORMATTED)
 lint: lint-packages
 	python3 tests/tools/check_includes.py
 	python3 tests/tools/check_shaders.py
 	$(MAKE) -s check-headers
-	clang-format --dry-run -Werror $(wildcard server/*.[ch] server/*/*.[ch] protocol/*.[ch] client/*/*.[ch] \
-	    client/*/*.cpp tests/*/*.[ch])
+	@clang-format --dry-run -Werror $(FORMATTED)
 	$(MAKE) CC=clang CXX=clang++ config=debug B=build/clang all tests
 
 install: all
@@ -230,6 +233,7 @@ help:
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz]'
 	@echo 'make fuzz       run every fuzzer   [config=fuzz FUZZ_SECONDS=20]'
 	@echo 'make lint       include rules, shaders, headers alone, format, clang with warnings as errors'
+	@echo 'make format     clang-format over our sources'
 	@echo 'make install    [PREFIX=/usr/local DESTDIR=]'
 
 -include $(shell find build -name '*.d' 2>/dev/null)

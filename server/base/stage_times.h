@@ -29,8 +29,8 @@ enum stage_clock { STAGE_CPU, STAGE_GPU };
 struct stage_span {
     enum stage_id stage;
     enum stage_clock clock;
-    uint32_t wave;        /* of trace and shade: number of the wave in its frame */
-    uint64_t start_ns;    /* since `origin_ns` */
+    uint32_t wave;     /* of trace and shade: number of the wave in its frame */
+    uint64_t start_ns; /* since `origin_ns` */
     uint64_t duration_ns;
 };
 

@@ -12,10 +12,10 @@
 
 /* All-zero is the valid empty buffer. */
 struct gpu_buffer {
-    unsigned name;       /* GL buffer, 0: none yet */
-    unsigned texture;    /* GL buffer texture over it, 0: none */
+    unsigned name;         /* GL buffer, 0: none yet */
+    unsigned texture;      /* GL buffer texture over it, 0: none */
     unsigned texel_format; /* GL_RGBA32F .. of that texture */
-    size_t size_bytes;   /* in use */
+    size_t size_bytes;     /* in use */
     size_t capacity_bytes;
 };
 
@@ -35,7 +35,7 @@ void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer);
 void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
                      size_t size_bytes); /* waits for the GPU */
 void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint32_t value); /* every u32 */
-void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer); /* leaves it empty */
+void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer);                /* leaves it empty */
 
 /* SSBO; an empty one is bound as a few zeros. */
 void gpu_buffer_bind_storage(const struct gpu_buffer *buffer, unsigned binding);

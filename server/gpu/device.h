@@ -11,43 +11,43 @@
 #include <stdint.h>
 
 struct gpu_device_info {
-    int index;          /* what --device takes */
+    int index; /* what --device takes */
     bool software;
-    char name[128];     /* GL_RENDERER */
+    char name[128]; /* GL_RENDERER */
     char vendor[64];
-    char version[128];  /* GL_VERSION */
-    char drm_path[64];  /* "" if the driver tells none */
+    char version[128]; /* GL_VERSION */
+    char drm_path[64]; /* "" if the driver tells none */
 };
 
 /* Facts asked once. */
 struct gpu_facts {
-    bool software;              /* llvmpipe and the like: SSBO loads are gathers, dispatches are synchronous */
-    bool robust;                /* context tells of its loss */
+    bool software; /* llvmpipe and the like: SSBO loads are gathers, dispatches are synchronous */
+    bool robust;   /* context tells of its loss */
     bool debug_output;
     bool has_program_binary;
     uint64_t texture_buffer_texels_max;
     uint64_t storage_block_bytes_max;
-    uint32_t work_groups_max;   /* on x; more is a GL error */
-    uint32_t texture_size_max;  /* texels along an edge of a 2D texture */
-    uint64_t memory_bytes;      /* device memory, 0: the driver does not tell */
+    uint32_t work_groups_max;  /* on x; more is a GL error */
+    uint32_t texture_size_max; /* texels along an edge of a 2D texture */
+    uint64_t memory_bytes;     /* device memory, 0: the driver does not tell */
 };
 
 struct gpu_device {
     struct gpu_device_info info;
     struct gpu_facts facts;
-    struct gpu_egl *egl;           /* private to device.c */
-    struct gpu_registry *registry; /* every GL object that lives, see registry.h */
+    struct gpu_egl *egl;                /* private to device.c */
+    struct gpu_registry *registry;      /* every GL object that lives, see registry.h */
     struct gpu_program_cache *programs; /* private to program.c */
-    unsigned empty_buffer;         /* 256 zero bytes: what an empty buffer is bound as */
-    uint64_t memory_used_bytes;    /* sum of buffers and textures made through gpu/ */
-    uint64_t memory_limit_bytes;   /* 0: none; facts.memory_bytes at first */
-    bool lost;                     /* the context; nothing works any more, see gpu_note_loss */
+    unsigned empty_buffer;              /* 256 zero bytes: what an empty buffer is bound as */
+    uint64_t memory_used_bytes;         /* sum of buffers and textures made through gpu/ */
+    uint64_t memory_limit_bytes;        /* 0: none; facts.memory_bytes at first */
+    bool lost;                          /* the context; nothing works any more, see gpu_note_loss */
 };
 
 struct gpu_options {
-    int index;          /* of gpu_device_list; -1: first hardware, else software */
-    bool software;      /* insist on software */
-    bool debug;         /* debug context, messages to the log */
+    int index;     /* of gpu_device_list; -1: first hardware, else software */
+    bool software; /* insist on software */
+    bool debug;    /* debug context, messages to the log */
 };
 
 /* Devices that give an OpenGL 4.5 core context; each is opened for a moment to be asked its name.

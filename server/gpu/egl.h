@@ -12,9 +12,9 @@
 
 /* Where a display can be had from. */
 struct gpu_egl_place {
-    int index;       /* in the order of EGL; stable while the machine's devices stay */
-    void *device;    /* EGLDeviceEXT; NULL: Mesa's surfaceless platform */
-    bool software;   /* the driver says so; of the surfaceless platform it is not known */
+    int index;     /* in the order of EGL; stable while the machine's devices stay */
+    void *device;  /* EGLDeviceEXT; NULL: Mesa's surfaceless platform */
+    bool software; /* the driver says so; of the surfaceless platform it is not known */
     char drm_path[64];
 };
 

@@ -20,14 +20,14 @@ struct gpu_define {
 };
 
 struct gpu_program_source {
-    const char *compute;                       /* "render/resolve.comp"; or: */
-    const char *vertex, *geometry, *fragment;  /* geometry may be NULL; fragment NULL: depth only */
-    const struct gpu_define *defines;          /* ends with {0} ; may be NULL */
+    const char *compute;                      /* "render/resolve.comp"; or: */
+    const char *vertex, *geometry, *fragment; /* geometry may be NULL; fragment NULL: depth only */
+    const struct gpu_define *defines;         /* ends with {0} ; may be NULL */
 };
 
 struct gpu_program {
-    unsigned name;         /* GL program */
-    uint32_t group_size;   /* compute: local_size_x * y * z */
+    unsigned name;       /* GL program */
+    uint32_t group_size; /* compute: local_size_x * y * z */
 };
 
 /* The cached program, or compiles it. The device owns it. NULL and *error with the compiler's log. */

@@ -18,9 +18,9 @@ enum gpu_object_kind {
 
 struct gpu_registry;
 
-struct gpu_registry *gpu_registry_create(void);                /* NULL: out of memory */
-void gpu_registry_destroy(struct gpu_registry *registry);      /* the list, not the objects; accepts NULL */
-void gpu_registry_destroy_all(struct gpu_registry *registry);  /* every object that is left */
+struct gpu_registry *gpu_registry_create(void);               /* NULL: out of memory */
+void gpu_registry_destroy(struct gpu_registry *registry);     /* the list, not the objects; accepts NULL */
+void gpu_registry_destroy_all(struct gpu_registry *registry); /* every object that is left */
 size_t gpu_registry_count(const struct gpu_registry *registry, enum gpu_object_kind kind);
 /* Makes an object; 0: out of memory. */
 unsigned gpu_object_create(struct gpu_registry *registry, enum gpu_object_kind kind);

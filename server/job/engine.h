@@ -25,11 +25,11 @@ struct engine_backend;
 
 struct engine_options {
     struct gpu_options gpu;
-    unsigned encode_threads;   /* 0: one per core, at most 4 */
-    size_t queue_capacity;     /* commands and events; 0: 1024 */
-    uint32_t frames_in_flight; /* per job, rendered but not taken; 0: 3 */
+    unsigned encode_threads;     /* 0: one per core, at most 4 */
+    size_t queue_capacity;       /* commands and events; 0: 1024 */
+    uint32_t frames_in_flight;   /* per job, rendered but not taken; 0: 3 */
     uint64_t frame_window_bytes; /* the same in bytes of pixels, if that is fewer, but at least one; 0: default */
-    struct scene_limits scene_limits; /* host_bytes is also what the tables of all scenes may take together */
+    struct scene_limits scene_limits;     /* host_bytes is also what the tables of all scenes may take together */
     uint64_t device_bytes_limit;          /* 0: 70 % of what the device has, or no limit if it does not tell */
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
 };

@@ -15,8 +15,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define BACKLOG SOMAXCONN /* a farm comes all at once; a client that does not wait gets an error when it is full  \
-                           */
+#define BACKLOG                                                                                                   \
+    SOMAXCONN /* a farm comes all at once; a client that does not wait gets an error when it is full              \
+               */
 
 static const struct sockaddr *raw(const struct address *address)
 {

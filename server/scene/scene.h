@@ -173,9 +173,9 @@ struct scene_edit {
 void scene_edit_finish(struct scene_edit *edit);
 
 struct scene_limits {
-    uint64_t host_bytes; /* blobs and tables of this scene; 0: no limit */
+    uint64_t host_bytes;  /* blobs and tables of this scene; 0: no limit */
     uint64_t table_bytes; /* its tables alone, which no other scene shares; 0: no limit */
-    uint32_t nodes;      /* 0: 4 Mi */
+    uint32_t nodes;       /* 0: 4 Mi */
 };
 
 struct scene {

@@ -26,7 +26,7 @@ struct scene_changes {
 /* Host-side mirror of the arrays that builders need, in device order. */
 struct scene_gpu_geometry {
     struct geometry device;
-    const struct scene_mesh *mesh;       /* one of these two; valid until the scene is edited */
+    const struct scene_mesh *mesh; /* one of these two; valid until the scene is edited */
     const struct scene_spheres *spheres;
     uint64_t revision; /* of the object: unchanged means the same shape */
     uint32_t id;       /* the object's id; with `mesh` or `spheres` being set it is unique */

@@ -16,12 +16,12 @@ struct material_indices {
 
 struct scene_gpu_state {
     struct material_indices material_indices;
-    uint64_t shapes_signature;   /* of the meshes and sphere sets that are packed */
+    uint64_t shapes_signature; /* of the meshes and sphere sets that are packed */
     uint64_t discs_signature;
     uint64_t textures_signature;
     uint64_t environment_revision;
     struct hashmap texture_index_by_id; /* value: (index + 1) as a pointer */
-    bool any_update;             /* false: nothing is there yet */
+    bool any_update;                    /* false: nothing is there yet */
 };
 
 /* Changes when an object of the kind is added, removed or set again; 0 for none. */

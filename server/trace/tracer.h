@@ -14,9 +14,9 @@
 #include <stdint.h>
 
 enum tracer_dependency { /* bits: what a structure is built from */
-    TRACER_NEEDS_SCENE = 1,
-    TRACER_NEEDS_VIEW = 2,
-    TRACER_NEEDS_RAYS = 4,
+                         TRACER_NEEDS_SCENE = 1,
+                         TRACER_NEEDS_VIEW = 2,
+                         TRACER_NEEDS_RAYS = 4,
 };
 
 /* Options of all tracers; zero is the default of each. */

@@ -6,8 +6,8 @@
 /* storage buffers; software GL has 16 a stage */
 #define BIND_RAYS 0
 #define BIND_HITS 1
-#define BIND_VISIBILITY 2   /* any-hit waves: unorm 4x8 transmittance, 0: occluded */
-#define BIND_WAVE 3         /* struct wave_state */
+#define BIND_VISIBILITY 2 /* any-hit waves: unorm 4x8 transmittance, 0: occluded */
+#define BIND_WAVE 3       /* struct wave_state */
 #define BIND_INSTANCES 4
 #define BIND_GEOMETRIES 5
 #define BIND_MATERIALS 6
@@ -15,9 +15,9 @@
 #define BIND_TEXTURES 8
 #define BIND_LIGHTS 9
 #define BIND_DISCS 10
-#define BIND_TRACER_0 11    /* the tracer's own */
+#define BIND_TRACER_0 11 /* the tracer's own */
 #define BIND_TRACER_1 12
-#define BIND_PASS_0 11      /* the integrator's own, in passes without a tracer */
+#define BIND_PASS_0 11 /* the integrator's own, in passes without a tracer */
 #define BIND_PASS_1 12
 #define BIND_PASS_2 13
 #define BIND_PASS_3 14

@@ -5,8 +5,8 @@
 
 #define UNIFORM_FRAME 0 /* binding of the uniform block below */
 
-/* What every pass of a frame may know; a std140 block. The order of the pixels is that of `slots`: 8x8 tiles row by
- * row, Morton order inside a tile; tiles at the right and lower edge may stick out of the picture. */
+/* What every pass of a frame may know; a std140 block. The order of the pixels is that of `slots`: 8x8 tiles row
+ * by row, Morton order inside a tile; tiles at the right and lower edge may stick out of the picture. */
 struct frame_uniforms {
     vec4 world_from_view[3]; /* rows; rigid; looks along -z, y up */
     vec4 extent_near;        /* xy: half width and half height of the view at distance 1 (perspective) or of
@@ -18,16 +18,16 @@ struct frame_uniforms {
     uint width, height;      /* pixels */
     uint tiles_across;
     uint sample_index;
-    uint environment_kind;   /* ENVIRONMENT_* */
+    uint environment_kind; /* ENVIRONMENT_* */
     uint light_count;
-    uint depth;              /* bounces after the first hit */
+    uint depth; /* bounces after the first hit */
     uint seed;
 };
 SHARED_SIZE(frame_uniforms, 272)
 
-#define ENVIRONMENT_NONE 0u     /* black; leaves the picture transparent */
+#define ENVIRONMENT_NONE 0u /* black; leaves the picture transparent */
 #define ENVIRONMENT_CONSTANT 1u
 #define ENVIRONMENT_IMAGE 2u
-#define ENVIRONMENT_SKY 3u      /* the default of a scene without any light */
+#define ENVIRONMENT_SKY 3u /* the default of a scene without any light */
 
 #endif

@@ -21,9 +21,9 @@ struct geometry {
     uint kind;            /* GEOMETRY_* */
     uint first_primitive; /* in `triangles` or `spheres` */
     uint primitive_count;
-    uint first_vertex;    /* meshes; indices in `triangles` are already scene-wide */
+    uint first_vertex; /* meshes; indices in `triangles` are already scene-wide */
     uint vertex_count;
-    uint flags;           /* GEOMETRY_HAS_* */
+    uint flags; /* GEOMETRY_HAS_* */
     uint pad0, pad1;
 };
 SHARED_SIZE(geometry, 32)
@@ -50,7 +50,7 @@ SHARED_SIZE(geometry, 32)
 /* Geometry outside every tree (the paper's PERFORMGLOBALGEOMETRYTESTS), world space. */
 struct disc {
     vec4 centre_radius;
-    vec4 normal;  /* w unused */
+    vec4 normal; /* w unused */
     uint material, pad0, pad1, pad2;
 };
 SHARED_SIZE(disc, 48)

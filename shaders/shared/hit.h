@@ -19,7 +19,7 @@ struct hit {
 SHARED_SIZE(hit, 48)
 
 #define HIT_MATERIAL_MASK 0x00ffffffu
-#define HIT_BACK_FACE 0x01000000u  /* the ray came from inside */
+#define HIT_BACK_FACE 0x01000000u /* the ray came from inside */
 #define HIT_HAS_TANGENT 0x02000000u
 #define HIT_NO_PRIMITIVE 0xffffffffu
 

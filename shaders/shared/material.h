@@ -8,7 +8,7 @@ struct material {
     vec4 base_colour;  /* linear, alpha last */
     vec4 emission_ior; /* radiance; index of refraction */
     float metallic, roughness, transmission, alpha_cutoff;
-    uint flags;        /* MATERIAL_* */
+    uint flags;                                                           /* MATERIAL_* */
     uint texture_base_colour, texture_normal, texture_metallic_roughness; /* index into texture_uses, 0: none */
     uint texture_occlusion, texture_emission, texture_transmission, texture_bump;
 };
@@ -20,10 +20,10 @@ SHARED_SIZE(material, 80)
 
 /* A texture as one input of a material. Entry 0 is unused. */
 struct texture_slot {
-    vec4 uv_matrix;   /* a b d e:  u' = a u + b v + c,  v' = d u + e v + f */
+    vec4 uv_matrix;           /* a b d e:  u' = a u + b v + c,  v' = d u + e v + f */
     float offset_u, offset_v; /* c, f */
     float strength;
-    uint texture;     /* index into textures, bit 31: texture coordinate set 1 */
+    uint texture; /* index into textures, bit 31: texture coordinate set 1 */
 };
 SHARED_SIZE(texture_slot, 32)
 

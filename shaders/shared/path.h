@@ -32,9 +32,9 @@ struct child {
     uint pad;
 };
 SHARED_SIZE(child, 64)
-#define CHILDREN_MAX 3u       /* straight on, reflected, refracted */
-#define COMPACT_BLOCK 16u     /* paths whose hits, and then children, are counted together */
-#define COMPACT_SCAN_SIZE 64  /* invocations of the one group that scans the counts */
+#define CHILDREN_MAX 3u      /* straight on, reflected, refracted */
+#define COMPACT_BLOCK 16u    /* paths whose hits, and then children, are counted together */
+#define COMPACT_SCAN_SIZE 64 /* invocations of the one group that scans the counts */
 
 /* The visibility buffer's first word is an instance + 1, or one of these. */
 #define VISIBLE_NOTHING 0u
@@ -44,16 +44,16 @@ SHARED_SIZE(child, 64)
 
 /* Storage buffers of the passes of a wave. */
 #define BIND_PATHS BIND_PASS_0
-#define BIND_RADIANCE BIND_PASS_1      /* vec4 a path: what it adds to its pixel, coverage in w */
-#define BIND_CHILDREN BIND_PASS_2      /* struct child, CHILDREN_MAX a hit */
-#define BIND_CHILD_COUNTS BIND_PASS_3  /* uint a hit: children, and times 4 shadow rays */
-#define BIND_LIGHT_SAMPLES BIND_PASS_4 /* vec4 a shadow ray: what arrives if nothing is in the way */
-#define BIND_SHADOW_RAYS BIND_VISIBILITY /* struct ray; no pass both makes them and reads the answers */
-#define BIND_HIT_LIST BIND_WAVE        /* uint a hit: its path; in order */
+#define BIND_RADIANCE BIND_PASS_1         /* vec4 a path: what it adds to its pixel, coverage in w */
+#define BIND_CHILDREN BIND_PASS_2         /* struct child, CHILDREN_MAX a hit */
+#define BIND_CHILD_COUNTS BIND_PASS_3     /* uint a hit: children, and times 4 shadow rays */
+#define BIND_LIGHT_SAMPLES BIND_PASS_4    /* vec4 a shadow ray: what arrives if nothing is in the way */
+#define BIND_SHADOW_RAYS BIND_VISIBILITY  /* struct ray; no pass both makes them and reads the answers */
+#define BIND_HIT_LIST BIND_WAVE           /* uint a hit: its path; in order */
 #define BIND_HIT_PLACES BIND_CHILD_COUNTS /* uint a path: its place in the list; where children are not used */
-#define BIND_SLICE_PIXELS BIND_PASS_2  /* vec4 a pixel of the slice; where children are not used */
-#define BIND_BLOCK_OFFSETS BIND_PASS_4 /* uvec2 a block of COMPACT_BLOCK; where light samples are not used */
-#define BIND_ACCUMULATION BIND_PASS_0  /* vec4 a pixel slot of the picture's band; sum of the samples */
-#define BIND_RESOLVED BIND_PASS_1      /* pixels of the output's format, rows from the top */
+#define BIND_SLICE_PIXELS BIND_PASS_2     /* vec4 a pixel of the slice; where children are not used */
+#define BIND_BLOCK_OFFSETS BIND_PASS_4    /* uvec2 a block of COMPACT_BLOCK; where light samples are not used */
+#define BIND_ACCUMULATION BIND_PASS_0     /* vec4 a pixel slot of the picture's band; sum of the samples */
+#define BIND_RESOLVED BIND_PASS_1         /* pixels of the output's format, rows from the top */
 
 #endif

@@ -5,7 +5,7 @@
 
 /* How many rays a wave holds; counted on the device by those who append, read by the host after a pass. */
 struct wave_state {
-    uint ray_count;      /* may exceed the capacity: then the wave has overflowed */
+    uint ray_count; /* may exceed the capacity: then the wave has overflowed */
     uint capacity;
     uint pad0, pad1;
 };

@@ -85,8 +85,9 @@ static void make_rays(struct fixture *fixture, uint64_t seed)
             ray->direction_t_max[3] = i % 2 ? 0.0f : -1.0f;
     }
     struct error error = {0};
-    expect_ok(gpu_buffer_upload(device, &fixture->rays, fixture->host_rays, RAY_COUNT * sizeof(struct ray), &error),
-              &error);
+    expect_ok(
+        gpu_buffer_upload(device, &fixture->rays, fixture->host_rays, RAY_COUNT * sizeof(struct ray), &error),
+        &error);
 }
 
 static void update(struct fixture *fixture)
@@ -205,7 +206,8 @@ static void expect_hit(const struct fixture *fixture, uint32_t ray, const struct
     uint32_t index = got->material & HIT_MATERIAL_MASK;
     assert_in_range(index, 0, fixture->gpu.material_count - 1);
     for (int k = 0; k < 4; k++)
-        expect_near(ray, "base colour of the material", fixture->materials[index].base_colour[k], base_colour[k], 0);
+        expect_near(ray, "base colour of the material", fixture->materials[index].base_colour[k], base_colour[k],
+                    0);
 }
 
 static void compare_closest(struct fixture *fixture, bool coherent)
@@ -234,7 +236,8 @@ static void compare_any(struct fixture *fixture, bool coherent)
         twin_trace(&walk, &fixture->twin, &fixture->host_rays[i]);
         close_calls += walk.close_call;
         for (int k = 0; k < 3 && !walk.close_call; k++)
-            expect_near(i, "transmittance", (visibilities[i] >> (8 * k) & 255) / 255.0, walk.transmittance[k], 6e-3);
+            expect_near(i, "transmittance", (visibilities[i] >> (8 * k) & 255) / 255.0, walk.transmittance[k],
+                        6e-3);
     }
     free(visibilities);
     assert_in_range(close_calls, 0, CLOSE_CALLS_MAX);
@@ -421,7 +424,8 @@ int main(void)
                 states[n] = (struct case_state){&tracers[t], &scenes[s]};
                 snprintf(names[n], sizeof(names[n]), "%s: %s: %s", tracers[t].name, checks[c].name,
                          checks[c].once ? "any scene" : scenes[s].name);
-                tests[n] = (struct CMUnitTest){.name = names[n], .test_func = checks[c].run, .initial_state = &states[n]};
+                tests[n] =
+                    (struct CMUnitTest){.name = names[n], .test_func = checks[c].run, .initial_state = &states[n]};
                 n++;
             }
         }

@@ -57,8 +57,8 @@ static void look_rotation(float q[4], const struct glb_camera *camera)
     q[3] = cy * cp;
 }
 
-static void print_nodes(FILE *json, const struct glb_part *parts, size_t part_count, const struct glb_light *lights,
-                        size_t light_count, const struct glb_camera *camera)
+static void print_nodes(FILE *json, const struct glb_part *parts, size_t part_count,
+                        const struct glb_light *lights, size_t light_count, const struct glb_camera *camera)
 {
     fprintf(json, "\"scene\":0,\"scenes\":[{\"nodes\":[");
     for (size_t i = 0; i < part_count + light_count + 1; i++)
@@ -71,7 +71,8 @@ static void print_nodes(FILE *json, const struct glb_part *parts, size_t part_co
                 lights[i].position[0], lights[i].position[1], lights[i].position[2], i);
     float q[4];
     look_rotation(q, camera);
-    fprintf(json, "{\"name\":\"camera\",\"camera\":0,\"translation\":[%g,%g,%g],\"rotation\":[%.9g,%.9g,%.9g,%.9g]}],",
+    fprintf(json,
+            "{\"name\":\"camera\",\"camera\":0,\"translation\":[%g,%g,%g],\"rotation\":[%.9g,%.9g,%.9g,%.9g]}],",
             camera->eye[0], camera->eye[1], camera->eye[2], q[0], q[1], q[2], q[3]);
     fprintf(json, "\"cameras\":[{\"type\":\"perspective\",\"perspective\":{\"yfov\":%g,\"znear\":0.01}}],",
             camera->fov_y);
@@ -87,8 +88,9 @@ static void print_json(FILE *json, const struct glb_part *parts, size_t part_cou
     if (light_count) {
         fprintf(json, "\"extensions\":{\"KHR_lights_punctual\":{\"lights\":[");
         for (size_t i = 0; i < light_count; i++)
-            fprintf(json, "%s{\"type\":\"%s\",\"color\":[%g,%g,%g],\"intensity\":%g}", i ? "," : "", lights[i].kind,
-                    lights[i].colour[0], lights[i].colour[1], lights[i].colour[2], lights[i].intensity);
+            fprintf(json, "%s{\"type\":\"%s\",\"color\":[%g,%g,%g],\"intensity\":%g}", i ? "," : "",
+                    lights[i].kind, lights[i].colour[0], lights[i].colour[1], lights[i].colour[2],
+                    lights[i].intensity);
         fprintf(json, "]}},");
     }
     fprintf(json, "\"materials\":[");
@@ -106,13 +108,14 @@ static void print_json(FILE *json, const struct glb_part *parts, size_t part_cou
     fprintf(json, "],\"accessors\":[");
     for (size_t i = 0; i < part_count; i++)
         print_accessors(json, &parts[i].shape, i, &offset);
-    fprintf(json, "],\"bufferViews\":[{\"buffer\":0,\"byteLength\":%zu}],\"buffers\":[{\"byteLength\":%zu}]}", offset,
-            offset);
+    fprintf(json, "],\"bufferViews\":[{\"buffer\":0,\"byteLength\":%zu}],\"buffers\":[{\"byteLength\":%zu}]}",
+            offset, offset);
 }
 
 static void write_u32(FILE *file, size_t value)
 {
-    const uint8_t bytes[4] = {(uint8_t)value, (uint8_t)(value >> 8), (uint8_t)(value >> 16), (uint8_t)(value >> 24)};
+    const uint8_t bytes[4] = {(uint8_t)value, (uint8_t)(value >> 8), (uint8_t)(value >> 16),
+                              (uint8_t)(value >> 24)};
     fwrite(bytes, 1, 4, file);
 }
 

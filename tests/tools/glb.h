@@ -12,8 +12,8 @@ struct glb_material {
     const char *name;
     float base_colour[4];
     float metallic, roughness;
-    float transmission, ior;  /* 0: opaque */
-    float emission[3];        /* may exceed 1 */
+    float transmission, ior; /* 0: opaque */
+    float emission[3];       /* may exceed 1 */
 };
 
 struct glb_part {

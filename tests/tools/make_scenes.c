@@ -32,8 +32,8 @@ static bool finish_parts(bool written, struct glb_part *parts, size_t count)
 
 static bool write_cornell(const char *path)
 {
-    struct glb_part parts[] = {{"room", {0}, white},  {"left wall", {0}, red},      {"right wall", {0}, green},
-                               {"lamp", {0}, lamp},   {"mirror block", {0}, mirror}, {"glass sphere", {0}, glass},
+    struct glb_part parts[] = {{"room", {0}, white}, {"left wall", {0}, red},       {"right wall", {0}, green},
+                               {"lamp", {0}, lamp},  {"mirror block", {0}, mirror}, {"glass sphere", {0}, glass},
                                {"block", {0}, white}};
     /* The room goes on behind the camera, so that mirror and glass have something to show. */
     const float corner[8][3] = {{-1, 0, -1}, {1, 0, -1}, {-1, 2, -1}, {1, 2, -1},
@@ -44,11 +44,14 @@ static bool write_cornell(const char *path)
     shape_quad(&parts[0].shape, corner[4], corner[6], corner[7], corner[5]); /* front */
     shape_quad(&parts[1].shape, corner[0], corner[2], corner[6], corner[4]);
     shape_quad(&parts[2].shape, corner[1], corner[5], corner[7], corner[3]);
-    const float lamp_corner[4][3] = {{-0.3f, 1.995f, -0.3f}, {0.3f, 1.995f, -0.3f}, {0.3f, 1.995f, 0.3f}, {-0.3f, 1.995f, 0.3f}};
+    const float lamp_corner[4][3] = {
+        {-0.3f, 1.995f, -0.3f}, {0.3f, 1.995f, -0.3f}, {0.3f, 1.995f, 0.3f}, {-0.3f, 1.995f, 0.3f}};
     shape_quad(&parts[3].shape, lamp_corner[0], lamp_corner[1], lamp_corner[2], lamp_corner[3]);
-    shape_box(&parts[4].shape, (const float[3]){-0.38f, 0.6f, -0.35f}, (const float[3]){0.28f, 0.6f, 0.28f}, 0.35f);
+    shape_box(&parts[4].shape, (const float[3]){-0.38f, 0.6f, -0.35f}, (const float[3]){0.28f, 0.6f, 0.28f},
+              0.35f);
     shape_sphere(&parts[5].shape, (const float[3]){0.42f, 0.33f, 0.32f}, 0.33f, 96);
-    shape_box(&parts[6].shape, (const float[3]){0.48f, 0.15f, -0.45f}, (const float[3]){0.22f, 0.15f, 0.22f}, -0.4f);
+    shape_box(&parts[6].shape, (const float[3]){0.48f, 0.15f, -0.45f}, (const float[3]){0.22f, 0.15f, 0.22f},
+              -0.4f);
     const struct glb_light lights[] = {{"point", {1, 0.93f, 0.8f}, 2.6f, {0, 1.85f, 0}},
                                        {"point", {0.8f, 0.9f, 1}, 1.6f, {0.4f, 1.3f, 3.5f}}};
     const struct glb_camera camera = {{0, 1, 3.6f}, {0, 0.97f, 0}, 0.66f};
@@ -88,16 +91,16 @@ static void add_teapot(struct shape *shape)
 
 static bool write_teapot(const char *path)
 {
-    struct glb_part parts[] = {{"table", {0}, mirror}, {"teapot", {0}, glaze}, {"gold ball", {0}, gold},
+    struct glb_part parts[] = {{"table", {0}, mirror},     {"teapot", {0}, glaze}, {"gold ball", {0}, gold},
                                {"glass ball", {0}, glass}, {"red ball", {0}, red}, {"wall", {0}, white}};
-    shape_quad(&parts[0].shape, (const float[3]){-14, 0, 4}, (const float[3]){14, 0, 4}, (const float[3]){14, 0, -4},
-               (const float[3]){-14, 0, -4});
+    shape_quad(&parts[0].shape, (const float[3]){-14, 0, 4}, (const float[3]){14, 0, 4},
+               (const float[3]){14, 0, -4}, (const float[3]){-14, 0, -4});
     add_teapot(&parts[1].shape);
     shape_sphere(&parts[2].shape, (const float[3]){1.5f, 0.35f, 1.1f}, 0.35f, 96);
     shape_sphere(&parts[3].shape, (const float[3]){-0.5f, 0.3f, 1.5f}, 0.3f, 96);
     shape_sphere(&parts[4].shape, (const float[3]){-1.9f, 0.45f, 0.3f}, 0.45f, 96);
-    shape_quad(&parts[5].shape, (const float[3]){-14, 0, -4}, (const float[3]){14, 0, -4}, (const float[3]){14, 3.2f, -4},
-               (const float[3]){-14, 3.2f, -4});
+    shape_quad(&parts[5].shape, (const float[3]){-14, 0, -4}, (const float[3]){14, 0, -4},
+               (const float[3]){14, 3.2f, -4}, (const float[3]){-14, 3.2f, -4});
     const struct glb_light lights[] = {{"point", {1, 0.95f, 0.85f}, 42, {3, 5, 4}},
                                        {"point", {0.6f, 0.75f, 1}, 14, {-4, 3.5f, 2}}};
     const struct glb_camera camera = {{0.9f, 1.7f, 5.0f}, {0, 0.5f, 0}, 0.68f};

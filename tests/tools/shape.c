@@ -100,7 +100,8 @@ void shape_box(struct shape *shape, const float centre[3], const float half_size
         corners[i][1] = centre[1] + (i & 2 ? half_size[1] : -half_size[1]);
         corners[i][2] = centre[2] - x * sinf(turn) + z * cosf(turn);
     }
-    static const int faces[6][4] = {{4, 5, 7, 6}, {1, 0, 2, 3}, {5, 1, 3, 7}, {0, 4, 6, 2}, {6, 7, 3, 2}, {0, 1, 5, 4}};
+    static const int faces[6][4] = {{4, 5, 7, 6}, {1, 0, 2, 3}, {5, 1, 3, 7},
+                                    {0, 4, 6, 2}, {6, 7, 3, 2}, {0, 1, 5, 4}};
     for (int i = 0; i < 6; i++)
         shape_quad(shape, corners[faces[i][0]], corners[faces[i][1]], corners[faces[i][2]], corners[faces[i][3]]);
 }
@@ -127,7 +128,8 @@ void shape_lathe(struct shape *shape, const float (*profile)[2], uint32_t profil
         const float d_height = profile[after][1] - profile[before][1];
         for (uint32_t i = 0; i <= segments; i++) {
             const float angle = two_pi * (float)(i % segments) / (float)segments;
-            const float position[3] = {profile[row][0] * cosf(angle), profile[row][1], profile[row][0] * sinf(angle)};
+            const float position[3] = {profile[row][0] * cosf(angle), profile[row][1],
+                                       profile[row][0] * sinf(angle)};
             float normal[3] = {d_height * cosf(angle), -d_radius, d_height * sinf(angle)};
             normalise(normal);
             add_vertex(shape, position, normal);
