@@ -158,7 +158,7 @@ void add_rate(OIIO::ImageSpec &spec, float frames_per_second)
         rational[0] = static_cast<int>(television);
         rational[1] = 1001;
     }
-    spec.attribute("FramesPerSecond", OIIO::TypeRational, rational);
+    spec.attribute("framesPerSecond", OIIO::TypeRational, rational);
 }
 
 std::string now_text()

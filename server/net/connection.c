@@ -168,6 +168,7 @@ static void flush(struct connection *connection)
         connection->write_blocked = false;
         if (!message.msg_iovlen || connection->state == CONNECTION_CLOSED)
             return;
+        uint64_t before_ns = clock_now_ns();
         ssize_t sent = sys_sendmsg(connection->fd, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
         connection->write_blocked = true; /* or there is more than one turn's worth */
         if (sent < 0) {
@@ -179,7 +180,7 @@ static void flush(struct connection *connection)
         sent_bytes += (size_t)sent;
         connection->sent_bytes += (uint64_t)sent;
         connection->last_sent_ns = now_ns;
-        out_queue_advance(&connection->out, (size_t)sent, now_ns);
+        out_queue_advance(&connection->out, (size_t)sent, before_ns, now_ns);
     }
 }
 

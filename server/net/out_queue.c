@@ -138,7 +138,7 @@ size_t out_queue_gather(struct out_queue *queue, struct iovec *parts, size_t par
     return count;
 }
 
-void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t now_ns)
+void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns, uint64_t now_ns)
 {
     /* First the books, then the calls: what they push or drop must find the queue in order. */
     struct out_list complete;
@@ -148,6 +148,8 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t now_ns)
     while (bytes) {
         struct out_message *message = queue->sending.first;
         size_t left_bytes = out_message_bytes(message) - message->sent_bytes;
+        if (!message->begun_ns)
+            message->begun_ns = before_ns;
         if (bytes < left_bytes) {
             message->sent_bytes += bytes;
             break;
@@ -157,7 +159,7 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t now_ns)
     }
     for (struct out_message *message; (message = list_take(&complete));) {
         if (message->sent)
-            message->sent(message->context, now_ns);
+            message->sent(message->context, message->begun_ns, now_ns);
         destroy(message);
     }
 }

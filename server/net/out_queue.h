@@ -20,8 +20,9 @@ struct out_chunk {
 void out_chunk_ref(struct out_chunk *chunk);
 void out_chunk_unref(struct out_chunk *chunk); /* accepts NULL */
 
-/* The last byte was handed to the kernel. Not called for a message that is dropped. */
-typedef void out_sent_fn(void *context, uint64_t now_ns);
+/* The last byte was handed to the kernel by `now_ns`; the call that took the first one began at `begun_ns`. Not
+ * called for a message that is dropped. */
+typedef void out_sent_fn(void *context, uint64_t begun_ns, uint64_t now_ns);
 
 struct out_message {
     struct out_message *next;
@@ -32,6 +33,7 @@ struct out_message {
     size_t body_offset_bytes, body_bytes;
     size_t padding_bytes; /* zeros after the body, at most 7 */
     size_t sent_bytes;    /* of head, body and padding together */
+    uint64_t begun_ns;    /* when the first of them was about to go; 0: not yet */
     size_t head_bytes;
     uint8_t head[];
 };
@@ -55,8 +57,9 @@ void out_queue_finish(struct out_queue *queue); /* drops everything */
 void out_queue_push(struct out_queue *queue, struct out_message *message, bool bulk);
 /* The next bytes to be sent, at most `parts_max` (at least 3) parts; the number of parts, 0: nothing waits. */
 size_t out_queue_gather(struct out_queue *queue, struct iovec *parts, size_t parts_max);
-/* That many of the gathered bytes are with the kernel. Calls `sent` of those complete, which may push. */
-void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t now_ns);
+/* That many of the gathered bytes are with the kernel, by a call that lasted from `before_ns` to `now_ns`. Calls
+ * `sent` of those complete, which may push. */
+void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns, uint64_t now_ns);
 /* Drops messages of a request that were not begun, and forgets the `sent` of one that was. Control
  * messages stay. */
 void out_queue_drop_bulk(struct out_queue *queue, uint32_t request);

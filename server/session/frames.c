@@ -158,14 +158,16 @@ static void send_end(struct pending_frame *pending, uint64_t now_ns)
 
 /* ---- on the way -------------------------------------------------------------------------------------- */
 
-static void on_begin_sent(void *context, uint64_t now_ns)
+static void on_begin_sent(void *context, uint64_t begun_ns, uint64_t now_ns)
 {
+    (void)now_ns;
     struct pending_frame *pending = context;
-    pending->begun_ns = now_ns;
+    pending->begun_ns = begun_ns;
 }
 
-static void on_last_sent(void *context, uint64_t now_ns)
+static void on_last_sent(void *context, uint64_t begun_ns, uint64_t now_ns)
 {
+    (void)begun_ns;
     struct pending_frame *pending = context;
     struct job *job = pending->job;
     if (!job)
