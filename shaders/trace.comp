@@ -24,7 +24,7 @@
 // trace_any returns true, and may stop, once offer_any did: nothing is left of the light.
 //
 // This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the
-// answer. Of rays walked together some may be dead: they have t_max = -1 and t_min = 0, direction (1 0 0) and
+// answer: a visibility, or a crossing (shared/hit.h) of which surface.comp makes a hit. Of rays walked together some may be dead: they have t_max = -1 and t_min = 0, direction (1 0 0) and
 // can hit nothing, so a walk must not take from ray 0
 // what another needs. Groups in which all are dead do not reach it.
 #include "shared/bindings.h"
@@ -41,7 +41,7 @@ layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
 #ifdef ANY_HIT
 layout(std430, binding = BIND_VISIBILITY) writeonly buffer visibility_block { uint visibilities[]; };
 #else
-layout(std430, binding = BIND_HITS) writeonly buffer hit_block { hit hits[]; };
+layout(std430, binding = BIND_HITS) writeonly buffer hit_block { hit crossings[]; };
 #endif
 
 uniform uint first_ray; // of this dispatch
@@ -105,10 +105,15 @@ void discs_closest(trace_ray r, inout candidate best)
     }
 }
 
-void store_hit(uint ray_index, trace_ray r, candidate best)
+void store_crossing(uint ray_index, candidate best)
 {
-    if (ray_index < ray_count)
-        hits[ray_index] = surface_of(best, r.origin, r.direction);
+    if (ray_index >= ray_count)
+        return;
+    crossings[ray_index].distance = best.primitive == HIT_NO_PRIMITIVE ? -1.0 : best.distance;
+    crossings[ray_index].primitive = best.primitive;
+    crossings[ray_index].instance = best.instance_index;
+    crossings[ray_index].u0 = best.barycentrics.x;
+    crossings[ray_index].v0 = best.barycentrics.y;
 }
 
 #endif
@@ -132,7 +137,7 @@ void main()
         discs_closest(r, best);
         trace_closest(r, best);
     }
-    store_hit(ray_index, r, best);
+    store_crossing(ray_index, best);
 #endif
 }
 
@@ -204,13 +209,8 @@ void main()
 #else
     if (any_alive)
         trace_closest_together(r, found);
-    for (int i = 0; i < RAYS_TOGETHER; i++) {
-        candidate found_i = found[0];
-        for (int k = 1; k < RAYS_TOGETHER; k++)
-            if (k == i)
-                found_i = found[k];
-        store_hit(first + uint(i), load_ray(first + uint(i)), found_i);
-    }
+    for (int k = 0; k < RAYS_TOGETHER; k++)
+        store_crossing(first + uint(k), found[k]);
 #endif
 }
 

@@ -3,10 +3,10 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/parallel.h"
 
 #include <pthread.h>
 #include <stdlib.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #define THREADS_MAX 64
@@ -100,10 +100,9 @@ struct encode_pool *encode_pool_create(const struct encode_pool_options *options
     }
     pool->options = *options;
     pool->tasks = tasks;
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    unsigned threads = options->threads;
+    unsigned threads = options->threads, processors = parallel_processors();
     if (!threads)
-        threads = cores < 1 ? 1 : cores > THREADS_AUTO_MAX ? THREADS_AUTO_MAX : (unsigned)cores;
+        threads = processors > THREADS_AUTO_MAX ? THREADS_AUTO_MAX : processors;
     threads = threads > THREADS_MAX ? THREADS_MAX : threads;
     while (pool->thread_count < threads) {
         if (pthread_create(&pool->threads[pool->thread_count], NULL, run_thread, pool)) {

@@ -2,6 +2,7 @@
 #include "trace/bvh.h"
 
 #include "base/clock.h"
+#include "base/parallel.h"
 #include "gpu/program.h"
 #include "shared/bindings.h"
 #include "trace/trace_program.h"
@@ -11,7 +12,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #define BUILD_THREADS_MAX 8
 /* Elements that one ray may visit: every element of every instance, up to this. It stops a walk through damaged
@@ -25,8 +25,8 @@
 
 static unsigned build_threads(void)
 {
-    long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    return processors < 1 ? 1 : processors > BUILD_THREADS_MAX ? BUILD_THREADS_MAX : (unsigned)processors;
+    unsigned processors = parallel_processors();
+    return processors > BUILD_THREADS_MAX ? BUILD_THREADS_MAX : processors;
 }
 
 static struct bvh_settings settings_of(const struct tracer_options *options)
@@ -294,8 +294,7 @@ static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const stru
     bind(bvh);
     gpu_uniform_uint(program, "bvh_top_count", bvh->top.element_count);
     gpu_uniform_uint(program, "bvh_step_budget", bvh->step_budget);
-    trace_program_run(program, scene, wave, &source);
-    return true;
+    return trace_program_run(program, scene, wave, &source, error);
 }
 
 const struct tracer_impl tracer_bvh_impl = {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "trace/bvh_build.h"
 
+#include "base/parallel.h"
 #include "trace/bvh_build_split.h"
 
 #include <assert.h>
@@ -203,7 +204,7 @@ bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t c
     pthread_mutex_init(&builder.mutex, NULL);
     pthread_cond_init(&builder.changed, NULL);
     builder.waiting[builder.waiting_count++] = (struct range){0, 0, count};
-    bvh_parallel(threads, threads, build_thread, &builder);
+    parallel_run(threads, threads, build_thread, &builder);
     pthread_cond_destroy(&builder.changed);
     pthread_mutex_destroy(&builder.mutex);
     free_work(&builder);

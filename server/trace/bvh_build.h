@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The builder of bounding volume trees: on the CPU, knows no GL, deterministic for an input whatever the number
  * of threads. Three steps: a binary tree by the surface area heuristic in bins (bvh_build.c, bvh_build_split.c),
- * the throwing back of elements that do not pay and the baking of links (bvh_build_bake.c), threads
- * (bvh_build_threads.c).
+ * the throwing back of elements that do not pay and the baking of links (bvh_build_bake.c), many
+ * trees at once (bvh_build_jobs.c).
  *
  * Based on: Wald. On fast Construction of SAH-based Bounding Volume Hierarchies. 2007 (binning);
  * 'Stackless traversal of a sphere BVH, distributed ray tracing', sections 4 and 6: wide nodes, baked links. */
@@ -128,11 +128,5 @@ float bvh_box_area(const float lower[3], const float upper[3]);
 void bvh_element_set_box(struct bvh_element *element, const float lower[3], const float upper[3]);
 void bvh_element_set_sphere(struct bvh_element *element, const float centre[3], float radius);
 void bvh_pad_box(float lower[3], float upper[3]);
-
-/* ---- threads ---- */
-
-/* Calls work(context, i) for i in 0 .. count - 1 from up to `threads` threads, of which the caller is one, and
- * returns when all is done. With one thread, or where none can be started, the caller does it all. */
-void bvh_parallel(unsigned threads, uint32_t count, void (*work)(void *context, uint32_t i), void *context);
 
 #endif

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "trace/bvh_build.h"
 
+#include "base/parallel.h"
+
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -154,7 +156,7 @@ bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const floa
         baked->links = malloc((size_t)BVH_OCTANTS * baked->element_count * sizeof *baked->links);
         ok = baked->links != NULL;
         if (ok)
-            bvh_parallel(threads, BVH_OCTANTS / LANES, link_octants, &bake);
+            parallel_run(threads, BVH_OCTANTS / LANES, link_octants, &bake);
     }
     for (uint32_t group = 0; group < BVH_OCTANTS / LANES; group++)
         ok = ok && !bake.failed[group];

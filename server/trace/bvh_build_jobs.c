@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "trace/bvh_build.h"
 
+#include "base/parallel.h"
+
 #include <pthread.h>
 
 struct batch {
@@ -35,7 +37,7 @@ static void *run_batch(void *argument)
     for (uint32_t i = 0; i < batch->count; i++)
         primitives += is_large(&batch->jobs[i]) ? 0 : batch->jobs[i].shape.primitive_count;
     unsigned threads = primitives >= BVH_THREADED_PRIMITIVES ? batch->settings->threads : 1;
-    bvh_parallel(threads, batch->count, run_small, batch);
+    parallel_run(threads, batch->count, run_small, batch);
     return NULL;
 }
 

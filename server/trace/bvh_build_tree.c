@@ -2,6 +2,7 @@
 #include "trace/bvh_build.h"
 
 #include "base/clock.h"
+#include "base/parallel.h"
 
 #include <assert.h>
 #include <math.h>
@@ -194,7 +195,7 @@ static bool build(struct work *work)
     unsigned threads = work->threads;
     if (!alloc_primitives(work))
         return false;
-    bvh_parallel(threads, chunk_count(count), chunk_boxes, work);
+    parallel_run(threads, chunk_count(count), chunk_boxes, work);
     if (!bvh_binary_build(&work->binary, work->boxes, count, &costs, threads))
         return false;
     if (work->settings->bounds == BVH_BOUNDS_OF_SPHERES && !make_spheres(work))
@@ -207,8 +208,8 @@ static bool build(struct work *work)
     tree->elements = malloc(tree->element_count * sizeof *tree->elements);
     if (!tree->elements)
         return false;
-    bvh_parallel(threads, chunk_count(tree->element_count), chunk_elements, work);
-    bvh_parallel(threads, chunk_count(count), chunk_primitives, work);
+    parallel_run(threads, chunk_count(tree->element_count), chunk_elements, work);
+    parallel_run(threads, chunk_count(count), chunk_primitives, work);
     memcpy(tree->lower, work->binary.nodes[0].lower, sizeof tree->lower);
     memcpy(tree->upper, work->binary.nodes[0].upper, sizeof tree->upper);
     bvh_pad_box(tree->lower, tree->upper);

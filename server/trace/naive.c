@@ -58,8 +58,7 @@ static bool naive_trace(struct tracer *tracer, struct scene_gpu *scene, const st
     const struct gpu_program *program = trace_program_get(scene, wave->kind, &source, error);
     if (!program)
         return false;
-    trace_program_run(program, scene, wave, &source);
-    return true;
+    return trace_program_run(program, scene, wave, &source, error);
 }
 
 const struct tracer_impl tracer_naive_impl = {

@@ -2,14 +2,13 @@
 /* Textures with their mip chains into the one texel buffer of shared/material.h. */
 #include "trace/scene_gpu_state.h"
 
+#include "base/parallel.h"
 #include "shared/material.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 uint32_t scene_gpu_texture_index(const struct scene_gpu *gpu, uint32_t texture_id, bool *found)
 {
@@ -184,41 +183,32 @@ struct pack_job {
     const struct scene_texture **list; /* in the order of `infos` */
     const struct texture_info *infos;
     uint32_t count;
-    size_t chain_bytes; /* of the largest texture, its first level left out */
     uint8_t *out;
-    atomic_uint next;
     atomic_bool failed; /* no memory to halve in */
 };
 
-static void *pack_some(void *data)
+static void pack_one(void *context, uint32_t i)
 {
-    struct pack_job *job = data;
-    uint8_t *chain = malloc(job->chain_bytes ? job->chain_bytes : 1);
-    if (!chain) {
+    struct pack_job *job = context;
+    const struct scene_texture *texture = job->list[i];
+    uint32_t levels;
+    uint64_t below =
+        chain_texels(texture->width, texture->height, &levels) - (uint64_t)texture->width * texture->height;
+    uint8_t *chain = malloc((size_t)below * 4 + 1);
+    if (chain)
+        pack_texture(job->tables, texture, chain, job->out + (size_t)job->infos[i].first_texel * 4);
+    else
         atomic_store(&job->failed, true);
-        return NULL;
-    }
-    for (uint32_t i; (i = atomic_fetch_add(&job->next, 1)) < job->count;)
-        pack_texture(job->tables, job->list[i], chain, job->out + (size_t)job->infos[i].first_texel * 4);
     free(chain);
-    return NULL;
 }
 
 static void pack_all(struct pack_job *job, uint64_t texel_count)
 {
-    pthread_t threads[PACK_THREADS_MAX];
-    long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    uint32_t wanted = processors > PACK_THREADS_MAX ? PACK_THREADS_MAX : processors < 1 ? 1 : (uint32_t)processors;
-    uint32_t started = 0;
-    /* This thread is one of them; for a few texels it is enough. */
+    unsigned threads = parallel_processors();
+    /* For a few texels this thread is enough. */
     if (texel_count < (1u << 18))
-        wanted = 1;
-    while (started + 1 < wanted && started + 1 < job->count &&
-           pthread_create(&threads[started], NULL, pack_some, job) == 0)
-        started++;
-    pack_some(job);
-    for (uint32_t i = 0; i < started; i++)
-        pthread_join(threads[i], NULL);
+        threads = 1;
+    parallel_run(threads > PACK_THREADS_MAX ? PACK_THREADS_MAX : threads, job->count, pack_one, job);
 }
 
 static bool pack_texels(struct scene_gpu *gpu, const struct scene *scene, const struct texture_info *infos,
@@ -230,12 +220,7 @@ static bool pack_texels(struct scene_gpu *gpu, const struct scene *scene, const 
     struct srgb_tables *tables = create_tables();
     struct pack_job job = {.tables = tables, .infos = infos, .list = calloc(count, sizeof(*job.list))};
     while (job.list && hashmap_next(&scene->objects[SCENE_TEXTURE], &cursor, &id, &value)) {
-        const struct scene_texture *texture = value;
-        uint32_t levels;
-        uint64_t texels = chain_texels(texture->width, texture->height, &levels);
-        size_t bytes = (size_t)(texels - (uint64_t)texture->width * texture->height) * 4;
-        job.chain_bytes = bytes > job.chain_bytes ? bytes : job.chain_bytes;
-        job.list[job.count++] = texture;
+        job.list[job.count++] = value;
     }
     bool ok = tables && job.list;
     if (ok) {

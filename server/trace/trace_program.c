@@ -38,8 +38,25 @@ const struct gpu_program *trace_program_get(const struct scene_gpu *scene, enum 
     return gpu_program_get(scene->device, &whole, error);
 }
 
-void trace_program_run(const struct gpu_program *program, const struct scene_gpu *scene, const struct wave *wave,
-                       const struct trace_program_source *source)
+bool trace_surfaces(const struct scene_gpu *scene, const struct wave *wave, struct error *error)
+{
+    if (wave->kind == WAVE_ANY || wave->crossings_only)
+        return true;
+    static const struct gpu_define spheres[] = {{"HAS_SPHERES", "1"}, {NULL, NULL}};
+    const struct gpu_program_source source = {.compute = "surface.comp",
+                                              .defines = scene->has_spheres ? spheres : NULL};
+    const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
+    if (!program)
+        return false;
+    gpu_uniform_uint(program, "ray_count", wave->ray_count);
+    gpu_buffer_bind_storage(wave->rays, BIND_RAYS);
+    gpu_buffer_bind_storage(wave->hits, BIND_HITS);
+    gpu_dispatch(scene->device, program, wave->ray_count);
+    return true;
+}
+
+bool trace_program_run(const struct gpu_program *program, const struct scene_gpu *scene, const struct wave *wave,
+                       const struct trace_program_source *source, struct error *error)
 {
     uint32_t together = source->rays_together ? source->rays_together : 1;
     gpu_buffer_bind_storage(wave->rays, BIND_RAYS);
@@ -59,4 +76,5 @@ void trace_program_run(const struct gpu_program *program, const struct scene_gpu
         if (part < wave->ray_count) /* a part of its own to the driver too, which may gather commands */
             glFlush();
     }
+    return trace_surfaces(scene, wave, error);
 }

@@ -8,6 +8,7 @@
 #include "trace/scene_gpu.h"
 #include "trace/wave.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* Zero is the default of each. */
@@ -22,9 +23,11 @@ struct trace_program_source {
  * device's cache. The tracer may set uniforms of its own on it before trace_program_run. */
 const struct gpu_program *trace_program_get(const struct scene_gpu *scene, enum wave_kind kind,
                                             const struct trace_program_source *source, struct error *error);
-/* Binds the wave's buffers, sets `ray_count`, `disc_count` and `instance_count`, and dispatches. The scene's
- * buffers and the tracer's own are bound already. */
-void trace_program_run(const struct gpu_program *program, const struct scene_gpu *scene, const struct wave *wave,
-                       const struct trace_program_source *source);
+/* Binds the wave's buffers, sets `ray_count`, `disc_count` and `instance_count`, dispatches, and makes hits of the
+ * crossings. The scene's buffers and the tracer's own are bound already. */
+bool trace_program_run(const struct gpu_program *program, const struct scene_gpu *scene, const struct wave *wave,
+                       const struct trace_program_source *source, struct error *error);
+/* From crossings to hits, in place: what trace_program_run ends with. Nothing to do for any-hit waves. */
+bool trace_surfaces(const struct scene_gpu *scene, const struct wave *wave, struct error *error);
 
 #endif

@@ -22,6 +22,8 @@ struct wave {
     /* Rays next to each other in the buffer are near each other in space, such as 8x8 tiles of pixels in
      * Morton order; a hint for how many to walk together. */
     bool coherent;
+    /* Closest hits of an exact tracer stay crossings (shared/hit.h): for benchmarks, of the walk alone. */
+    bool crossings_only;
 };
 
 #endif

@@ -325,7 +325,7 @@ static void a_wave_in_parts_has_the_answers_of_the_whole(void **state)
     const struct gpu_program *program = trace_program_get(&fixture.gpu, WAVE_CLOSEST, &parts, &error);
     expect_ok(program != NULL, &error);
     gpu_buffer_clear(device, &fixture.answers, UNTOUCHED);
-    trace_program_run(program, &fixture.gpu, &wave, &parts);
+    expect_ok(trace_program_run(program, &fixture.gpu, &wave, &parts, &error), &error);
     gpu_buffer_read(device, &fixture.answers, 0, hits, RAY_COUNT * sizeof(struct hit));
     assert_memory_equal(hits, whole, RAY_COUNT * sizeof(struct hit));
     free(hits);

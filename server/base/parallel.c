@@ -1,10 +1,11 @@
-// SPDX-License-Identifier: MIT
-#include "trace/bvh_build.h"
+/* SPDX-License-Identifier: MIT */
+#include "base/parallel.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
+#include <unistd.h>
 
-#define THREADS_MAX 16u
+#define THREADS_MAX 64u
 
 struct parallel {
     void (*work)(void *context, uint32_t i);
@@ -13,7 +14,7 @@ struct parallel {
     atomic_uint next;
 };
 
-static void *parallel_run(void *argument)
+static void *work_off(void *argument)
 {
     struct parallel *parallel = argument;
     for (;;) {
@@ -24,7 +25,7 @@ static void *parallel_run(void *argument)
     }
 }
 
-void bvh_parallel(unsigned threads, uint32_t count, void (*work)(void *context, uint32_t i), void *context)
+void parallel_run(unsigned threads, uint32_t count, void (*work)(void *context, uint32_t i), void *context)
 {
     struct parallel parallel = {.work = work, .context = context, .count = count};
     pthread_t helpers[THREADS_MAX];
@@ -32,9 +33,15 @@ void bvh_parallel(unsigned threads, uint32_t count, void (*work)(void *context, 
     unsigned started = 0;
     if (wanted > count)
         wanted = count;
-    while (started + 1 < wanted && pthread_create(&helpers[started], NULL, parallel_run, &parallel) == 0)
+    while (started + 1 < wanted && pthread_create(&helpers[started], NULL, work_off, &parallel) == 0)
         started++;
-    parallel_run(&parallel);
+    work_off(&parallel);
     for (unsigned i = 0; i < started; i++)
         pthread_join(helpers[i], NULL);
+}
+
+unsigned parallel_processors(void)
+{
+    long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    return processors < 1 ? 1 : (unsigned)processors;
 }
