@@ -3,13 +3,8 @@
 //
 //   radiance    emission, and a constant ambient term in Whitted's sense: the environment's irradiance, not
 //               shadowed but for the occlusion texture
-//   shadow rays one to every light, with the light that arrives if nothing is in the way (Lambert + GGX)
+//   shadow rays one to every light, with the light that arrives if nothing is in the way
 //   children    straight on (alpha blending), mirrored, refracted
-//
-// A dielectric reflects by Fresnel's equations, a metal by Schlick's approximation. A rough surface has no one
-// mirror direction, and one ray cannot blur: as the roughness grows, its mirror ray is faded out and what it
-// carried is replaced by the irradiance about that direction, and Fresnel's rise at grazing angles is faded out
-// too. What is reflected, refracted and scattered never adds up to more than what arrives.
 //
 // Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl.
 //
@@ -18,11 +13,11 @@
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "common/dispatch.glsl"
-#include "common/brdf.glsl"
 #include "common/environment.glsl"
 #include "common/light.glsl"
 #include "common/material.glsl"
 #include "common/rng.glsl"
+#include "common/scattering.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -44,47 +39,10 @@ layout(std430, binding = BIND_LIGHT_SAMPLES) writeonly buffer sample_block { vec
 
 // A path that carries less than this to its pixel ends: a third of a step of an 8-bit picture.
 const float WEIGHT_MIN = 1.0 / 1024.0;
-// Roughness at which the mirror ray begins to fade and at which it is gone.
-const float MIRROR_ROUGHNESS_SHARP = 0.1, MIRROR_ROUGHNESS_GONE = 0.5;
 // Rays start this share of their place's coordinates (and of the way to it) off the surface: some hundred times
 // what rounding may be off.
 const float OFFSET = 1.0 / 65536.0;
 const float FAR = 1e30;
-
-// How a surface splits what arrives along the view.
-struct split {
-    vec3 mirror;      // Fresnel reflectance
-    vec3 scattered;   // Lambert's albedo times what is not mirrored
-    vec3 refracted;
-    float mirror_ray; // share of `mirror` that the mirror ray carries; the rest is blurred
-};
-
-split split_light(surface s, float NoV)
-{
-    float through = s.transmission * (1.0 - s.metallic);
-    bool leaves = s.inside && s.transmission > 0.0;
-    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
-    float smooth_dielectric = fresnel_dielectric(NoV, leaves ? 1.0 / s.ior : s.ior);
-    // Total reflection is no matter of roughness, and glass is refracted sharply anyhow.
-    float dielectric = mix(smooth_dielectric, min(f0, smooth_dielectric), s.roughness * (1.0 - s.transmission));
-    vec3 metal = mix(fresnel_schlick(s.base, NoV), s.base, s.roughness);
-    split result;
-    result.mirror = mix(vec3(dielectric), metal, s.metallic);
-    vec3 rest = s.base * ((1.0 - dielectric) * (1.0 - s.metallic));
-    result.scattered = rest * (1.0 - s.transmission);
-    // Glass is tinted once, where light enters it.
-    result.refracted = leaves ? vec3((1.0 - dielectric) * through) : rest * s.transmission;
-    float blurred = smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
-    result.mirror_ray = leaves ? 1.0 : 1.0 - blurred;
-    return result;
-}
-
-// The mirrored direction; about the geometric normal where the shading normal would send it into the surface.
-vec3 mirror_direction(surface s, vec3 direction)
-{
-    vec3 mirrored = reflect(direction, s.normal);
-    return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
-}
 
 uint child_count = 0u;
 
@@ -112,23 +70,6 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     child_count++;
 }
 
-// Light of one lamp that the surface sends along the view, unshadowed; Cook and Torrance 1981 with GGX.
-vec3 reflected_light(surface s, vec3 view, float NoV, light_sample lamp)
-{
-    float NoL = dot(s.normal, lamp.direction);
-    if (NoL <= 0.0 || dot(s.geometric, lamp.direction) <= 0.0)
-        return vec3(0.0);
-    vec3 half_way = normalize(view + lamp.direction);
-    float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), VoH = clamp(dot(view, half_way), 0.0, 1.0);
-    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
-    vec3 dielectric = fresnel_schlick(vec3(f0), VoH);
-    vec3 mirror = mix(dielectric, fresnel_schlick(s.base, VoH), s.metallic);
-    vec3 scattered = s.base * (1.0 - dielectric) * ((1.0 - s.metallic) * (1.0 - s.transmission));
-    float alpha = square(max(s.roughness, ROUGHNESS_MIN_LIGHT));
-    vec3 specular = mirror * (D_GGX(NoH, alpha) * V_SmithGGXCorrelated(NoV, NoL, alpha));
-    return (scattered * INVERSE_PI + specular) * lamp.irradiance * NoL;
-}
-
 void no_shadow_ray(uint place)
 {
     shadow_rays[place] = ray(vec4(0.0), vec4(0.0, 0.0, 1.0, -1.0));
@@ -150,7 +91,8 @@ uint ask_for_lights(uint j, path parent, surface s, vec3 view, float NoV, vec3 w
                         frame.sample_index);
 #endif
         light_sample lamp = light_sample_at(index, origin, u);
-        vec3 arriving = weight * reflected_light(s, view, NoV, lamp);
+        float NoL = dot(s.normal, lamp.direction);
+        vec3 arriving = weight * (brdf(s, view, NoV, lamp.direction) * lamp.irradiance * NoL);
         if (!(greatest(arriving) > 0.0)) {
             no_shadow_ray(place);
             continue;

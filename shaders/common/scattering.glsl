@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// What a surface does with light: how much of what arrives along the view it mirrors, scatters and refracts, and
+// its reflectance from a lamp to the eye.
+//
+// A dielectric reflects by Fresnel's equations, a metal by Schlick's approximation. A rough surface has no one
+// mirror direction, and one ray cannot blur: as the roughness grows, its mirror ray is faded out and what it
+// carried is replaced by the irradiance about that direction, and Fresnel's rise at grazing angles is faded out
+// too. What is reflected, refracted and scattered never adds up to more than what arrives.
+//
+// Defines: those of common/material.glsl.
+
+#include "common/brdf.glsl"
+#include "common/material.glsl"
+
+// Roughness at which the mirror ray begins to fade and at which it is gone.
+const float MIRROR_ROUGHNESS_SHARP = 0.1, MIRROR_ROUGHNESS_GONE = 0.5;
+
+// How a surface splits what arrives along the view.
+struct split {
+    vec3 mirror;      // Fresnel reflectance
+    vec3 scattered;   // Lambert's albedo times what is not mirrored
+    vec3 refracted;
+    float mirror_ray; // share of `mirror` that the mirror ray carries; the rest is blurred
+};
+
+split split_light(surface s, float NoV)
+{
+    float through = s.transmission * (1.0 - s.metallic);
+    bool leaves = s.inside && s.transmission > 0.0;
+    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
+    float smooth_dielectric = fresnel_dielectric(NoV, leaves ? 1.0 / s.ior : s.ior);
+    // Total reflection is no matter of roughness, and glass is refracted sharply anyhow.
+    float dielectric = mix(smooth_dielectric, min(f0, smooth_dielectric), s.roughness * (1.0 - s.transmission));
+    vec3 metal = mix(fresnel_schlick(s.base, NoV), s.base, s.roughness);
+    split result;
+    result.mirror = mix(vec3(dielectric), metal, s.metallic);
+    vec3 rest = s.base * ((1.0 - dielectric) * (1.0 - s.metallic));
+    result.scattered = rest * (1.0 - s.transmission);
+    // Glass is tinted once, where light enters it.
+    result.refracted = leaves ? vec3((1.0 - dielectric) * through) : rest * s.transmission;
+    float blurred = smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
+    result.mirror_ray = leaves ? 1.0 : 1.0 - blurred;
+    return result;
+}
+
+// The mirrored direction; about the geometric normal where the shading normal would send it into the surface.
+vec3 mirror_direction(surface s, vec3 direction)
+{
+    vec3 mirrored = reflect(direction, s.normal);
+    return dot(mirrored, s.geometric) > 0.0 ? mirrored : reflect(direction, s.geometric);
+}
+
+// Share of the irradiance from a direction (of a lamp, unit) that goes to the eye, per steradian; without the
+// cosine. 0 from below the horizon. Cook and Torrance 1981 with GGX.
+vec3 brdf(surface s, vec3 view, float NoV, vec3 light)
+{
+    float NoL = dot(s.normal, light);
+    if (NoL <= 0.0 || dot(s.geometric, light) <= 0.0)
+        return vec3(0.0);
+    vec3 half_way = normalize(view + light);
+    float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), VoH = clamp(dot(view, half_way), 0.0, 1.0);
+    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
+    vec3 dielectric = fresnel_schlick(vec3(f0), VoH);
+    vec3 mirror = mix(dielectric, fresnel_schlick(s.base, VoH), s.metallic);
+    vec3 scattered = s.base * (1.0 - dielectric) * ((1.0 - s.metallic) * (1.0 - s.transmission));
+    float alpha = square(max(s.roughness, ROUGHNESS_MIN_LIGHT));
+    vec3 specular = mirror * (D_GGX(NoH, alpha) * V_SmithGGXCorrelated(NoV, NoL, alpha));
+    return scattered * INVERSE_PI + specular;
+}
