@@ -8,21 +8,47 @@
 const float ROUGHNESS_MIN_LIGHT = 0.08;
 
 // Share that a smooth boundary reflects, unpolarised; eta = index behind / index before. 1 at total internal
-// reflection. Fresnel's equations as in Pharr, Jakob, Humphreys. Physically Based Rendering. 9.5.
+// reflection, 0 where eta is 1. Fresnel's equations in the form of Cook and Torrance. A Reflectance Model for
+// Computer Graphics. 1982, which does not divide by the cosine of the bent ray.
 float fresnel_dielectric(float cos_i, float eta)
 {
-    float sin2_t = (1.0 - cos_i * cos_i) / (eta * eta);
-    if (sin2_t >= 1.0)
+    float g2 = (eta - 1.0) * (eta + 1.0) + cos_i * cos_i;
+    if (g2 < 0.0)
         return 1.0;
-    float cos_t = sqrt(1.0 - sin2_t);
-    float parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-    float perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    return 0.5 * (parallel * parallel + perpendicular * perpendicular);
+    float g = sqrt(g2), perpendicular = (g - cos_i) / (g + cos_i);
+    float parallel = perpendicular * ((cos_i * (g + cos_i) - 1.0) / (cos_i * (g - cos_i) + 1.0));
+    return 0.5 * (perpendicular * perpendicular + parallel * parallel);
 }
 
-// Schlick. An Inexpensive BRDF Model for Physically-Based Rendering. 1994. What reflects less than any dielectric
-// (2 %) loses its grazing reflection with it, as in Lagarde, de Rousiers. Moving Frostbite to PBR. 2014: so an
-// index of refraction of 1 is a Lambert surface and nothing else.
+float rough_fade(float roughness)
+{
+    return 0.9 * smoothstep(0.2, 0.8, roughness);
+}
+
+// Share that a rough boundary reflects: Fresnel's rise at grazing angles fades, as the facets that are seen there
+// face the viewer. At middle angles a rough boundary reflects a little more than a smooth one, hence the lesser
+// cosine (not so where the index is so high that F falls before it rises). The constants are chosen so that for
+// eta in 1..10 and any angle it is at least what D_GGX and V_SmithGGXCorrelated reflect with Fresnel's equations:
+// what it leaves for other lobes then never makes more than 1.
+float fresnel_rough_dielectric(float cos_i, float eta, float roughness)
+{
+    float f0 = square((eta - 1.0) / (eta + 1.0));
+    float lower = 1.0 - 0.5 * square(roughness * (1.0 - f0));
+    return mix(fresnel_dielectric(cos_i * lower, eta), f0, rough_fade(roughness));
+}
+
+// The mean of it over the hemisphere, cosine-weighted, or up to 0.004 less. The smooth boundary's is a polynomial
+// fitted from below for eta in 1..10.
+float fresnel_rough_dielectric_mean(float eta, float roughness)
+{
+    float s = (eta - 1.0) / (eta + 1.0);
+    float mean = s * (0.4524 + s * (-0.1282 + s * 0.6494));
+    return mix(mean, s * s, rough_fade(roughness));
+}
+
+// Schlick. An Inexpensive BRDF Model for Physically-Based Rendering. 1994; for metals. What reflects less than any
+// metal (2 %) loses its grazing reflection with it, as in Lagarde, de Rousiers. Moving Frostbite to PBR. 2014: so
+// black stays black.
 vec3 fresnel_schlick(vec3 f0, float cos_i)
 {
     float m = clamp(1.0 - cos_i, 0.0, 1.0), m2 = m * m;
@@ -30,11 +56,13 @@ vec3 fresnel_schlick(vec3 f0, float cos_i)
     return f0 + (f90 - f0) * (m2 * m2 * m);
 }
 
-// Walter et al. Microfacet Models for Refraction through Rough Surfaces. 2007. Equation 33.
-float D_GGX(float NoH, float alpha)
+// Walter et al. Microfacet Models for Refraction through Rough Surfaces. 2007. Equation 33. `sin2_NoH`: squared
+// sine between normal and half-way vector, by a cross product: 1 - NoH^2 loses all its digits where a narrow
+// highlight is.
+float D_GGX(float NoH, float sin2_NoH, float alpha)
 {
     float a2 = alpha * alpha;
-    float d = NoH * NoH * (a2 - 1.0) + 1.0;
+    float d = NoH * NoH * a2 + sin2_NoH;
     return a2 / (PI * d * d);
 }
 

@@ -5,7 +5,8 @@
 // A dielectric reflects by Fresnel's equations, a metal by Schlick's approximation. A rough surface has no one
 // mirror direction, and one ray cannot blur: as the roughness grows, its mirror ray is faded out and what it
 // carried is replaced by the irradiance about that direction, and Fresnel's rise at grazing angles is faded out
-// too. What is reflected, refracted and scattered never adds up to more than what arrives.
+// too. What is reflected, refracted and scattered never adds up to more than what arrives, be it from all around
+// (struct split) or from a lamp (brdf); tests/accuracy/test_shading_energy.c holds both to it.
 //
 // Defines: those of common/material.glsl.
 
@@ -25,19 +26,17 @@ struct split {
 
 split split_light(surface s, float NoV)
 {
-    float through = s.transmission * (1.0 - s.metallic);
     bool leaves = s.inside && s.transmission > 0.0;
-    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
-    float smooth_dielectric = fresnel_dielectric(NoV, leaves ? 1.0 / s.ior : s.ior);
-    // Total reflection is no matter of roughness, and glass is refracted sharply anyhow.
-    float dielectric = mix(smooth_dielectric, min(f0, smooth_dielectric), s.roughness * (1.0 - s.transmission));
+    // Total reflection is no matter of roughness.
+    float dielectric = leaves ? fresnel_rough_dielectric(NoV, 1.0 / s.ior, s.roughness * (1.0 - s.transmission))
+                              : fresnel_rough_dielectric(NoV, s.ior, s.roughness);
     vec3 metal = mix(fresnel_schlick(s.base, NoV), s.base, s.roughness);
     split result;
     result.mirror = mix(vec3(dielectric), metal, s.metallic);
     vec3 rest = s.base * ((1.0 - dielectric) * (1.0 - s.metallic));
     result.scattered = rest * (1.0 - s.transmission);
     // Glass is tinted once, where light enters it.
-    result.refracted = leaves ? vec3((1.0 - dielectric) * through) : rest * s.transmission;
+    result.refracted = (leaves ? vec3((1.0 - dielectric) * (1.0 - s.metallic)) : rest) * s.transmission;
     float blurred = smoothstep(MIRROR_ROUGHNESS_SHARP, MIRROR_ROUGHNESS_GONE, s.roughness);
     result.mirror_ray = leaves ? 1.0 : 1.0 - blurred;
     return result;
@@ -51,19 +50,24 @@ vec3 mirror_direction(surface s, vec3 direction)
 }
 
 // Share of the irradiance from a direction (of a lamp, unit) that goes to the eye, per steradian; without the
-// cosine. 0 from below the horizon. Cook and Torrance 1981 with GGX.
-vec3 brdf(surface s, vec3 view, float NoV, vec3 light)
+// cosine. 0 from below the horizon, and for glass seen from inside, where no lamp is asked. The same when light
+// and view change places. `parts`: of the same surface and NoV.
+//
+// What is mirrored: Cook and Torrance 1982 with GGX. What is scattered went through the boundary twice and is
+// diminished both times: Shirley et al. A Practitioners' Assessment of Light Reflection Models. 1997, with our
+// reflectance in the place of Schlick's. (1 - F) of the half-way vector alone, as often seen, would give out up
+// to 1.7 of what arrives at grazing angles.
+vec3 brdf(surface s, split parts, vec3 view, float NoV, vec3 light)
 {
     float NoL = dot(s.normal, light);
     if (NoL <= 0.0 || dot(s.geometric, light) <= 0.0)
         return vec3(0.0);
-    vec3 half_way = normalize(view + light);
+    vec3 half_way = normalize(view + light), across = cross(s.normal, half_way);
     float NoH = clamp(dot(s.normal, half_way), 0.0, 1.0), VoH = clamp(dot(view, half_way), 0.0, 1.0);
-    float f0 = square((s.ior - 1.0) / (s.ior + 1.0));
-    vec3 dielectric = fresnel_schlick(vec3(f0), VoH);
-    vec3 mirror = mix(dielectric, fresnel_schlick(s.base, VoH), s.metallic);
-    vec3 scattered = s.base * (1.0 - dielectric) * ((1.0 - s.metallic) * (1.0 - s.transmission));
+    vec3 mirror = mix(vec3(fresnel_dielectric(VoH, s.ior)), fresnel_schlick(s.base, VoH), s.metallic);
     float alpha = square(max(s.roughness, ROUGHNESS_MIN_LIGHT));
-    vec3 specular = mirror * (D_GGX(NoH, alpha) * V_SmithGGXCorrelated(NoV, NoL, alpha));
-    return scattered * INVERSE_PI + specular;
+    vec3 specular = mirror * (D_GGX(NoH, dot(across, across), alpha) * V_SmithGGXCorrelated(NoV, NoL, alpha));
+    float enters = 1.0 - fresnel_rough_dielectric(NoL, s.ior, s.roughness);
+    float enters_mean = 1.0 - fresnel_rough_dielectric_mean(s.ior, s.roughness);
+    return parts.scattered * (enters / enters_mean * INVERSE_PI) + specular;
 }

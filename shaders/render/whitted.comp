@@ -77,7 +77,8 @@ void no_shadow_ray(uint place)
 }
 
 // Returns how many of the batch's shadow rays are alive.
-uint ask_for_lights(uint j, path parent, surface s, vec3 view, float NoV, vec3 weight, float distance_)
+uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, float NoV, vec3 weight,
+                    float distance_)
 {
     uvec2 pixel = pixel_of_slot(first_slot + parent.pixel);
     float offset = OFFSET * max(greatest(abs(s.position)), distance_);
@@ -92,7 +93,7 @@ uint ask_for_lights(uint j, path parent, surface s, vec3 view, float NoV, vec3 w
 #endif
         light_sample lamp = light_sample_at(index, origin, u);
         float NoL = dot(s.normal, lamp.direction);
-        vec3 arriving = weight * (brdf(s, view, NoV, lamp.direction) * lamp.irradiance * NoL);
+        vec3 arriving = weight * (brdf(s, parts, view, NoV, lamp.direction) * lamp.irradiance * NoL);
         if (!(greatest(arriving) > 0.0)) {
             no_shadow_ray(place);
             continue;
@@ -111,12 +112,11 @@ void no_lights(uint j)
         no_shadow_ray(i * hit_count + j);
 }
 
-vec3 shade(uint j, path p, surface s, ray r, float distance_, vec3 weight, float NoV)
+vec3 shade(uint j, path p, surface s, split parts, ray r, float distance_, vec3 weight)
 {
     vec3 direction = r.direction_t_max.xyz;
     if (s.unlit)
         return weight * s.base;
-    split parts = split_light(s, NoV);
     vec3 mirrored = mirror_direction(s, direction);
     add_child(j, p, s, distance_, mirrored, weight * parts.mirror * parts.mirror_ray, false);
     vec3 bent = refract(direction, s.normal, s.inside ? s.ior : 1.0 / s.ior);
@@ -142,16 +142,17 @@ void main()
     surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, width);
     vec3 view = -r.direction_t_max.xyz;
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
+    split parts = split_light(s, NoV);
     if (first) {
         float seen = (p.flags & PATH_STRAIGHT) != 0u ? p.weight_r * s.alpha : 0.0;
         if (s.alpha < 1.0)
             add_child(j, p, s, h.distance, r.direction_t_max.xyz, weight * (1.0 - s.alpha), true);
-        radiance[k] = vec4(shade(j, p, s, r, h.distance, weight * s.alpha, NoV), seen);
+        radiance[k] = vec4(shade(j, p, s, parts, r, h.distance, weight * s.alpha), seen);
     }
     uint shadows = 0u;
     if (s.unlit || s.alpha <= 0.0 || (s.inside && s.transmission > 0.0))
         no_lights(j);
     else
-        shadows = ask_for_lights(j, p, s, view, NoV, weight * s.alpha, h.distance);
+        shadows = ask_for_lights(j, p, s, parts, view, NoV, weight * s.alpha, h.distance);
     child_counts[j] = (first ? child_count : child_counts[j]) + (shadows << 2);
 }
