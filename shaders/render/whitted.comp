@@ -118,12 +118,15 @@ vec3 shade(uint j, path p, surface s, split parts, ray r, float distance_, vec3 
     if (s.unlit)
         return weight * s.base;
     vec3 mirrored = mirror_direction(s, direction);
-    add_child(j, p, s, distance_, mirrored, weight * parts.mirror * parts.mirror_ray, false);
     vec3 bent = refract(direction, s.normal, s.inside ? s.ior : 1.0 / s.ior);
-    if (dot(bent, s.geometric) < 0.0) // not so where it is totally reflected
+    // Not so where it is totally reflected, or where a tilted normal would send it back: it is mirrored then.
+    bool through = dot(bent, s.geometric) < 0.0;
+    vec3 mirror = parts.mirror + (through ? vec3(0.0) : parts.refracted);
+    add_child(j, p, s, distance_, mirrored, weight * mirror * parts.mirror_ray, false);
+    if (through)
         add_child(j, p, s, distance_, bent, weight * parts.refracted, false);
     vec3 ambient = parts.scattered * environment_irradiance(s.normal) +
-                   parts.mirror * (1.0 - parts.mirror_ray) * environment_irradiance(mirrored);
+                   mirror * (1.0 - parts.mirror_ray) * environment_irradiance(mirrored);
     return weight * (s.emission + s.occlusion * ambient);
 }
 

@@ -103,54 +103,6 @@ static void refraction_obeys_snells_law(void **state)
     frame_result_finish(&result);
 }
 
-static void white_furnace(struct fixture *fixture, float roughness, float metallic, float ior, float least)
-{
-    struct scene_material *material = fixture_material(fixture);
-    material->roughness = roughness;
-    material->metallic = metallic;
-    material->ior = ior;
-    fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, material->base.id);
-    fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
-    struct frame_result result = fixture_render(fixture);
-    for (uint32_t y = 0; y < 32; y++)
-        for (uint32_t x = 0; x < 32; x++) {
-            float value = fixture_pixel(&result, x, y)[0];
-            if (!(value >= least && value <= 1.0001f))
-                fail_msg("pixel %u,%u of roughness %g, metallic %g, ior %g is %g", x, y, (double)roughness,
-                         (double)metallic, (double)ior, (double)value);
-        }
-    frame_result_finish(&result);
-}
-
-/* A white thing in a white world is not to be seen; what is lost is a mirror ray below the least weight. */
-static void a_white_sphere_vanishes_in_a_white_furnace(void **state)
-{
-    static const float roughnesses[] = {0.0f, 0.2f, 0.35f, 0.7f, 1.0f};
-    for (int i = 0; i < 5; i++)
-        for (int metallic = 0; metallic <= 2; metallic++) {
-            fixture_clear(state);
-            white_furnace(*state, roughnesses[i], (float)metallic / 2.0f, 1.5f, 0.999f - 1.0f / 1024.0f);
-        }
-    fixture_clear(state);
-    white_furnace(*state, 1.0f, 0.0f, 1.0f, 0.9999f);
-}
-
-static void a_glass_sphere_vanishes_in_a_white_furnace_as_the_depth_grows(void **state)
-{
-    struct fixture *fixture = *state;
-    struct scene_material *glass = fixture_material(fixture);
-    glass->transmission = 1.0f;
-    glass->roughness = 0.0f;
-    glass->ior = 1.5f;
-    fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, glass->base.id);
-    fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
-    fixture->request.depth = 12;
-    struct frame_result result = fixture_render(fixture);
-    for (uint32_t x = 0; x < 32; x++)
-        assert_near(fixture_pixel(&result, x, 16)[0], 1.0, 0.02);
-    frame_result_finish(&result);
-}
-
 /* Half floats of an image whose upper half is 1 and whose lower half is 0. */
 static void an_environment_image_lights_by_its_irradiance(void **state)
 {
@@ -325,8 +277,6 @@ int main(void)
         TEST(glass_at_a_slant_follows_fresnels_equations),
         TEST(light_is_totally_reflected_inside_glass),
         TEST(refraction_obeys_snells_law),
-        TEST(a_white_sphere_vanishes_in_a_white_furnace),
-        TEST(a_glass_sphere_vanishes_in_a_white_furnace_as_the_depth_grows),
         TEST(an_environment_image_lights_by_its_irradiance),
         TEST(an_environment_image_stands_the_right_way_round),
         TEST(blended_layers_let_through_what_alpha_leaves),
