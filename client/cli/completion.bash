@@ -10,7 +10,7 @@ _farlight()
     local words=
 
     if [ "$COMP_CWORD" -eq 1 ]; then
-        words="render animate info stats ping bridge help --version"
+        words="render animate info compare stats ping bridge help --version"
     else
         case $before in
         --tracer) words="bvh naive" ;;
@@ -20,14 +20,17 @@ _farlight()
         --encoding) words="raw zstd jpeg" ;;
         --tone-map) words="neutral aces none" ;;
         --format) words="png jpeg exr hdr" ;;
+        --layout) words="heat side" ;;
+        --fail-above) words="psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite=" ;;
         *)
             case $subcommand in
             render) words=$job ;;
             animate) words="$job --frames --fps --orbit --keys" ;;
             info) words="--json --environment --help" ;;
+            compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help" ;;
             stats) words="--server --json --help" ;;
             ping) words="--server --count --help" ;;
-            help) words="render animate info stats ping bridge" ;;
+            help) words="render animate info compare stats ping bridge" ;;
             esac
             [[ $word == -* || $subcommand == help ]] || words=
             ;;
