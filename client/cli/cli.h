@@ -80,7 +80,7 @@ void cli_progress_end(struct cli_progress *progress, bool done);
 enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
 
 struct cli_job {
-    const char *model, *server, *environment, *output, *camera, *keys_file;
+    const char *model, *server, *environment, *output, *camera, *keys_file, *trace_file;
     enum cli_image image;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
     bool float_pixels, half_pixels, has_encoding, has_quality, quiet, is_orbit;

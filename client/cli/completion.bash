@@ -6,7 +6,7 @@ _farlight()
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]}
     local job="--output --format --half --float --server --size --samples --depth --seed --environment --exposure
         --tone-map --camera --eye --look-at --up --fov --tracer --bvh-bounds --integrator --primary --encoding
-        --quality --timings --timings=json --quiet --help"
+        --quality --timings --timings=json --trace-file --quiet --help"
     local words=
 
     if [ "$COMP_CWORD" -eq 1 ]; then
