@@ -40,6 +40,15 @@ const signature *signature_of(const uint8_t *file, size_t file_bytes)
     return nullptr;
 }
 
+// libjpeg makes up what is missing of a file that was cut off, and only warns.
+bool is_cut_off(const signature &kind, const uint8_t *file, size_t file_bytes)
+{
+    while (file_bytes > 0 && file[file_bytes - 1] == 0) // padding
+        file_bytes--;
+    return std::strcmp(kind.reader, "jpeg") == 0 &&
+           (file_bytes < 2 || file[file_bytes - 2] != 0xff || file[file_bytes - 1] != 0xd9);
+}
+
 bool fail(std::string &reason, const std::string &text)
 {
     reason = text;
@@ -127,6 +136,8 @@ bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made
     const signature *kind = signature_of(file, file_bytes);
     if (kind == nullptr)
         return fail(reason, "is no EXR, HDR, PNG or JPEG image");
+    if (is_cut_off(*kind, file, file_bytes))
+        return fail(reason, "is cut off: the end of the JPEG image is missing");
     const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(kind->reader);
     if (input == nullptr)
         return fail(reason, OIIO::geterror());

@@ -363,10 +363,10 @@ class BadFiles(Compare):
     def test_no_beginning_of_a_file_is_taken_for_an_image(self):
         whole = {"png": self.good.read_bytes(), "exr": self.exr("e.exr", [0.5] * 768).read_bytes()}
         path = self.folder / "j.jpg"
-        self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", path, "--size", "40x30", "-q"), 0)
+        self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", path, "--size", "160x120", "-q"), 0)
         whole["jpg"] = path.read_bytes()
         for ending, data in whole.items():
-            for length in (0, 30, len(data) // 2):
+            for length in (0, 30, len(data) // 2, len(data) - 40):
                 with self.subTest(ending=ending, length=length):
                     path = self.folder / f"cut.{ending}"
                     path.write_bytes(data[:length])
