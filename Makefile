@@ -41,7 +41,7 @@ endif
 SERVER_PKGS := epoxy egl libzstd libsodium libxxhash libturbojpeg inih cglm
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
 IMPORT_PKGS := OpenImageIO tinygltf tinyobjloader libsodium libseccomp
-EXPORT_PKGS := OpenImageIO libseccomp
+EXPORT_PKGS := OpenImageIO libjxl libseccomp
 TEST_PKGS := cmocka
 # pkg-config is only asked when something is built.
 pkg_cflags = $(shell $(PKG_CONFIG) --cflags $(1) 2>/dev/null)
@@ -158,7 +158,7 @@ $(B)/tests/tools/make_scenes: $(TOOLS_OBJ)
 
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
-    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libtinygltf-dev \
+    libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libjxl-dev libtinygltf-dev \
     libtinyobjloader-dev libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev libembree-dev python3
 LINT_PACKAGES := clang clang-format glslang-tools python3

@@ -38,6 +38,8 @@ static const struct option options[] = {
     {"server", "insecure", OPTION_BOOL, AT(insecure), "no", 0, 1, "",
      "Let TCP listen beyond loopback: nothing is encrypted and nobody is asked who he is"},
     {"server", "log_level", OPTION_LEVEL, AT(log_level), "info", 0, 0, "", "error, warning, info or debug"},
+    {"server", "trace_file", OPTION_TEXT, AT(trace_file), "", 0, 0, "",
+     "File that gets the stages of all frames as trace events, for ui.perfetto.dev or chrome://tracing"},
 
     {"engine", "device", OPTION_TEXT, AT(device), "auto", 0, 0, "",
      "GPU: a number of --list-devices, software, or auto for the first hardware, else software"},
@@ -84,6 +86,8 @@ static const struct option options[] = {
      "Blob data that a client may send ahead"},
     {"limits", "frame_window", OPTION_BYTES, AT(limits.frame_window_bytes), "64M", MIB, 16 * GIB, "bytes",
      "Rendered frames of one job that may wait to be sent, if that is more than one"},
+    {"limits", "trace_file", OPTION_BYTES, AT(trace_file_bytes), "256M", KIB, TIB, "bytes",
+     "Size of the trace file; then nothing more is written to it"},
 
     {"network", "handshake", OPTION_U32, AT(connection.handshake_ms), "5000", 10, 600000, "ms",
      "Time for a client to introduce itself"},

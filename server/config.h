@@ -20,6 +20,8 @@ struct config {
     char listen[CONFIG_TEXT_BYTES]; /* addresses, separated by blanks */
     bool insecure;
     uint32_t log_level;
+    char trace_file[CONFIG_TEXT_BYTES]; /* empty: none */
+    uint64_t trace_file_bytes;
     char device[CONFIG_TEXT_BYTES]; /* "auto", "software" or a number */
     uint32_t encode_threads, frames_in_flight, engine_queue;
     uint64_t scene_bytes, device_bytes;

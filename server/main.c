@@ -3,6 +3,7 @@
  * Exit status: 0 when it was stopped (by SIGTERM or SIGINT, after a goodbye to its clients) or its one client is
  * gone; 1 when it cannot start or go on; 2 for wrong usage. */
 #include "base/log.h"
+#include "base/timeline.h"
 #include "config.h"
 #include "gpu/device.h"
 #include "job/engine.h"
@@ -15,7 +16,7 @@
 /* glibc looks for it by name, which -fvisibility=hidden would hide. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlightd " FARLIGHT_VERSION;
 
-enum { KEY_FD = 256, KEY_CONFIG, KEY_DEVICE, KEY_LIST, KEY_LEVEL, KEY_DUMP, KEY_INSECURE };
+enum { KEY_FD = 256, KEY_CONFIG, KEY_DEVICE, KEY_LIST, KEY_LEVEL, KEY_DUMP, KEY_INSECURE, KEY_TRACE };
 
 static const struct argp_option option_table[] = {
     {"listen", 'l', "ADDRESS", 0, "Listen at unix:/PATH or tcp:HOST:PORT; may be given several times", 0},
@@ -24,6 +25,8 @@ static const struct argp_option option_table[] = {
     {"device", KEY_DEVICE, "N|software|auto", 0, "GPU to use", 0},
     {"list-devices", KEY_LIST, NULL, 0, "Print the GPUs that can be used, and exit", 0},
     {"log-level", KEY_LEVEL, "LEVEL", 0, "error, warning, info or debug", 0},
+    {"trace-file", KEY_TRACE, "FILE", 0,
+     "Write the stages of all frames to FILE as trace events, for ui.perfetto.dev or chrome://tracing", 0},
     {"insecure", KEY_INSECURE, NULL, 0, "Let TCP listen beyond loopback, open to everybody and unencrypted", 0},
     {"dump-config", KEY_DUMP, NULL, 0, "Print all options with their values as a configuration file, and exit", 0},
     {0},
@@ -31,7 +34,7 @@ static const struct argp_option option_table[] = {
 
 struct arguments {
     char listen[CONFIG_TEXT_BYTES]; /* all of them, each followed by a blank */
-    const char *config_file, *device, *log_level, *insecure;
+    const char *config_file, *device, *log_level, *insecure, *trace_file;
     int fd;
     bool dump_config;
 };
@@ -69,6 +72,9 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
     case KEY_LEVEL:
         arguments->log_level = value;
         break;
+    case KEY_TRACE:
+        arguments->trace_file = value;
+        break;
     case KEY_INSECURE:
         arguments->insecure = "yes";
         break;
@@ -100,10 +106,12 @@ static bool read_config(struct config *config, const struct arguments *arguments
            config_flag(config, "server.listen", listen, "--listen", error) &&
            config_flag(config, "engine.device", arguments->device, "--device", error) &&
            config_flag(config, "server.insecure", arguments->insecure, "--insecure", error) &&
+           config_flag(config, "server.trace_file", arguments->trace_file, "--trace-file", error) &&
            config_flag(config, "server.log_level", arguments->log_level, "--log-level", error);
 }
 
-static bool serve(struct daemon *daemon, const struct config *config, int fd, struct error *error)
+static bool serve(struct daemon *daemon, const struct config *config, int fd, struct timeline *timeline,
+                  struct error *error)
 {
     struct engine_options engine_options;
     if ((fd < 0 && !daemon_listen(daemon, config->listen, config->insecure, error)) ||
@@ -115,6 +123,7 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, st
     struct hub_options options;
     config_hub(config, &options);
     options.engine = engine_port(engine);
+    options.timeline = timeline;
     if (fd >= 0)
         options.connection_limits.idle_ms = 0; /* whoever started us for himself may take his time */
     bool ok = daemon_start(daemon, &options, error) && (fd < 0 || daemon_serve_fd(daemon, fd, error));
@@ -143,7 +152,11 @@ int main(int argc, char **argv)
     daemon_block_signals();
     struct daemon daemon;
     daemon_init(&daemon);
-    bool ok = serve(&daemon, &config, arguments.fd, &error);
+    struct timeline *timeline = NULL;
+    if (config.trace_file[0])
+        timeline = timeline_create(config.trace_file, config.trace_file_bytes, &error);
+    bool ok = (timeline || !config.trace_file[0]) && serve(&daemon, &config, arguments.fd, timeline, &error);
     daemon_finish(&daemon); /* what was begun before it failed */
+    timeline_destroy(timeline);
     return ok ? EXIT_SUCCESS : fail(&error);
 }

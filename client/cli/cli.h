@@ -8,12 +8,19 @@
 #include <argp.h>
 
 /* Exit statuses; 128 + signal besides. */
-enum cli_status { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2, CLI_TRY_AGAIN = 75 };
+enum cli_status {
+    CLI_DONE = 0,
+    CLI_FAILED = 1, /* of `compare`: a figure is beyond its limit */
+    CLI_USAGE = 2,
+    CLI_TROUBLE = 2, /* of `compare`: there is no figure */
+    CLI_TRY_AGAIN = 75
+};
 
 /* Subcommands: argv[0] is "farlight NAME". They return the exit status. */
 int cli_render(int argc, char **argv);
 int cli_animate(int argc, char **argv);
 int cli_info(int argc, char **argv);
+int cli_compare(int argc, char **argv);
 int cli_stats(int argc, char **argv);
 int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
@@ -73,7 +80,7 @@ void cli_progress_end(struct cli_progress *progress, bool done);
 enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
 
 struct cli_job {
-    const char *model, *server, *environment, *output, *camera, *keys_file;
+    const char *model, *server, *environment, *output, *camera, *keys_file, *trace_file;
     enum cli_image image;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
     bool float_pixels, half_pixels, has_encoding, has_quality, quiet, is_orbit;

@@ -6,11 +6,11 @@ _farlight()
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]}
     local job="--output --format --half --float --server --size --samples --depth --seed --environment --exposure
         --tone-map --camera --eye --look-at --up --fov --tracer --bvh-bounds --integrator --primary --encoding
-        --quality --timings --timings=json --quiet --help"
+        --quality --timings --timings=json --trace-file --quiet --help"
     local words=
 
     if [ "$COMP_CWORD" -eq 1 ]; then
-        words="render animate info stats ping bridge help --version"
+        words="render animate info compare stats ping bridge help --version"
     else
         case $before in
         --tracer) words="bvh naive" ;;
@@ -20,14 +20,17 @@ _farlight()
         --encoding) words="raw zstd jpeg" ;;
         --tone-map) words="neutral aces none" ;;
         --format) words="png jpeg exr hdr" ;;
+        --layout) words="heat side" ;;
+        --fail-above) words="psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite=" ;;
         *)
             case $subcommand in
             render) words=$job ;;
             animate) words="$job --frames --fps --orbit --keys" ;;
             info) words="--json --environment --help" ;;
+            compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help" ;;
             stats) words="--server --json --help" ;;
             ping) words="--server --count --help" ;;
-            help) words="render animate info stats ping bridge" ;;
+            help) words="render animate info compare stats ping bridge" ;;
             esac
             [[ $word == -* || $subcommand == help ]] || words=
             ;;

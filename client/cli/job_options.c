@@ -37,7 +37,8 @@ enum key {
     KEY_FORMAT,
     KEY_HALF,
     KEY_FLOAT,
-    KEY_TIMINGS
+    KEY_TIMINGS,
+    KEY_TRACE_FILE
 };
 
 static const struct argp_option options[] = {
@@ -72,6 +73,8 @@ static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Talk:", 4},
     {"timings", KEY_TIMINGS, "json", OPTION_ARG_OPTIONAL,
      "Print the time of every stage, as a table or as JSON, one object a line", 0},
+    {"trace-file", KEY_TRACE_FILE, "FILE", 0,
+     "Write every stage to FILE as trace events, for ui.perfetto.dev or chrome://tracing", 0},
     {"quiet", KEY_QUIET, NULL, 0, "No progress, no notes about the model", 0},
     {0}};
 
@@ -221,6 +224,9 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return 0;
     case KEY_QUIET:
         job->quiet = true;
+        return 0;
+    case KEY_TRACE_FILE:
+        job->trace_file = value;
         return 0;
     case KEY_TIMINGS:
         if (value != NULL && strcmp(value, "json") != 0)

@@ -13,6 +13,7 @@ static const struct subcommand {
     {"render", "farlight render", cli_render, "one picture of a model"},
     {"animate", "farlight animate", cli_animate, "a series of pictures along a camera's path"},
     {"info", "farlight info", cli_info, "what a model file holds"},
+    {"compare", "farlight compare", cli_compare, "how far two images are apart"},
     {"stats", "farlight stats", cli_stats, "what a daemon has and does"},
     {"ping", "farlight ping", cli_ping, "the way to a daemon and back"},
     {"bridge", "farlight bridge", cli_bridge, "what ssh runs on the daemon's host"},

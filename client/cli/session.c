@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* From a model to image files, once: the scene handed over, frames taken and written. */
 #include "cli/cli.h"
+#include "cli/trace_file.h"
 #include "lib/text.h"
 
 #include <stdio.h>
@@ -22,9 +23,10 @@ struct session {
     struct fl_scene *scene;
     struct fl_job *rendering;
     struct cli_timings *timings;
+    struct cli_trace_file *trace; /* NULL: none is wanted */
     struct cli_progress progress;
     unsigned warnings;
-    uint64_t begin_ns, export_ns;
+    uint64_t begin_ns, import_begin_ns, export_ns;
 };
 
 static uint64_t now_ns(void)
@@ -104,8 +106,13 @@ static bool connect_and_start(struct session *session, struct fl_error *error)
 {
     const struct fl_connect_options options = {
         .server = session->job->server, .name = "farlight", .interrupt_fd = cli_interrupt_fd()};
+    const uint64_t begin_ns = now_ns();
     session->connection = fl_connect(&options, error);
-    return session->connection != NULL && start_exporter(session, error);
+    if (session->connection == NULL)
+        return false;
+    cli_trace_span(session->trace, CLI_TRACE_CLIENT, "start", -1, begin_ns,
+                   fl_connection_start_ns(session->connection));
+    return start_exporter(session, error);
 }
 
 /* The importer loads its libraries beside the daemon's start, and the exporter beside the importer: once the scene
@@ -118,6 +125,7 @@ static bool load_scene(struct session *session, struct fl_error *error)
                                    .note = on_note,
                                    .progress = on_progress,
                                    .user = session};
+    session->import_begin_ns = now_ns();
     load.started = fl_import_start(&load, error);
     if (load.started == NULL)
         return false;
@@ -127,7 +135,10 @@ static bool load_scene(struct session *session, struct fl_error *error)
     }
     session->scene = fl_scene_load(session->connection, &load, error);
     tell_hidden_warnings(session);
-    return session->scene != NULL;
+    if (session->scene == NULL)
+        return false;
+    cli_trace_import(session->trace, fl_scene_import_stats(session->scene), session->import_begin_ns, now_ns());
+    return true;
 }
 
 /* By name or number; without either the model's first camera, unless keys or an orbit say where to look. */
@@ -151,6 +162,13 @@ static bool choose_camera(struct session *session, struct fl_error *error)
 
 /* ---- frames ---- */
 
+static void add_export(struct session *session, int64_t frame, uint64_t begin_ns)
+{
+    const uint64_t duration_ns = now_ns() - begin_ns;
+    session->export_ns += duration_ns;
+    cli_trace_span(session->trace, CLI_TRACE_CLIENT, "export", frame, begin_ns, duration_ns);
+}
+
 static bool export_frame(struct session *session, const struct fl_frame *frame, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
@@ -163,7 +181,7 @@ static bool export_frame(struct session *session, const struct fl_frame *frame, 
                                               .quality = job->image == CLI_IMAGE_JPEG ? job->file_quality : 0};
     const uint64_t begin_ns = now_ns();
     const bool written = fl_exporter_write(session->exporter, frame, &options, error);
-    session->export_ns += now_ns() - begin_ns;
+    add_export(session, frame->frame, begin_ns);
     return written;
 }
 
@@ -172,7 +190,7 @@ static bool finish_export(struct session *session, struct fl_error *error)
     const uint64_t begin_ns = now_ns();
     const bool written = fl_exporter_wait(session->exporter, error) &&
                          (!session->to_stdout || cli_copy_to_stdout(session->path, error));
-    session->export_ns += now_ns() - begin_ns;
+    add_export(session, -1, begin_ns);
     return written;
 }
 
@@ -186,6 +204,7 @@ static bool take_frames(struct session *session, struct fl_error *error)
     if (session->is_series)
         cli_progress_frames(&session->progress, 0, total);
     while ((frame = fl_render_next(session->rendering, error)) != NULL) {
+        cli_trace_frame(session->trace, frame, now_ns());
         cli_timings_frame(session->timings, frame);
         const bool written = export_frame(session, frame, error);
         fl_frame_destroy(frame);
@@ -250,10 +269,17 @@ int cli_run_job(struct cli_job *job, bool is_series)
     cli_progress_begin(&session.progress, job->quiet);
     if (job->timings != CLI_TIMINGS_NONE)
         session.timings = cli_timings_create(job->timings, strcmp(job->output, "-") == 0);
-    const bool done = run(&session, &error);
+    if (job->trace_file != NULL)
+        session.trace = cli_trace_file_create(job->trace_file, &error);
+    bool done = (session.trace != NULL || job->trace_file == NULL) && run(&session, &error);
     cli_progress_end(&session.progress, done);
     if (done)
         print_timings(&session);
     close_session(&session);
+    cli_trace_span(session.trace, CLI_TRACE_COMMAND, is_series ? "animate" : "render", -1, session.begin_ns,
+                   now_ns() - session.begin_ns);
+    /* An interruption or failure before it is what the command ended for. */
+    if (!cli_trace_file_destroy(session.trace, done ? &error : NULL))
+        done = false;
     return done ? CLI_DONE : cli_report(&error);
 }

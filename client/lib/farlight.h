@@ -277,6 +277,68 @@ FL_API bool fl_exporter_wait(struct fl_exporter *exporter, struct fl_error *erro
 /* Ends the program; an unfinished file is removed. */
 FL_API void fl_exporter_destroy(struct fl_exporter *exporter);
 
+/* ---- comparison of images ------------------------------------------------------------------------ */
+
+#define FL_THRESHOLD_NONE (-1.0f)
+#define FL_THRESHOLD_DEFAULT 0.01f
+
+/* Files are read by a helper program without rights, which may open nothing but the two. Both must have the same
+ * size and the same channels, one to four of them, at most 8192 pixels each way. */
+struct fl_compare_options {
+    const char *a, *b;          /* image files: EXR, HDR, PNG or JPEG, by their content */
+    bool ignore_alpha;          /* colours only; also where only one of the files has alpha */
+    float threshold;            /* a pixel is beyond where a channel differs by more; 0: FL_THRESHOLD_DEFAULT,
+                                   FL_THRESHOLD_NONE: any difference */
+    const char *picture;        /* where the picture of the errors goes, PNG or JPEG; NULL: nowhere */
+    const char *picture_format; /* "png" or "jpeg" where the path's ending does not say; may be NULL */
+    enum protocol_comparison_layout layout;
+    const char *label_a, *label_b; /* over the pictures of the layout `side`; NULL: the files' names */
+    float heat_top;                /* the error with the brightest colour; 0: the greatest error, at most 1 */
+    unsigned timeout_ms;           /* 0: 10 minutes */
+    int interrupt_fd;              /* as of fl_connect_options */
+};
+
+/* How far two images are apart. An error is the difference of one channel of one pixel, without sign, in units of
+ * `space`: linear light where both files are linear (EXR, HDR), else what a screen shows, 0 to 1. Alpha counts as
+ * a channel. Pixels with NaN or infinity in either file count as beyond and are left out of everything else. */
+struct fl_comparison {
+    uint32_t width, height, channels;
+    char channel_names[257]; /* "R,G,B,A" */
+    enum protocol_comparison_space space;
+    float threshold;                              /* that was used */
+    uint64_t pixels;                              /* all of them */
+    uint64_t nonfinite_a, nonfinite_b, nonfinite; /* pixels with NaN or infinity; in either */
+    uint64_t beyond;                              /* pixels beyond the threshold */
+    bool has_errors;                              /* false: no pixel is finite, the next six mean nothing */
+    bool identical;                               /* no error at all, and no pixel that is not finite */
+    double psnr_db; /* peak signal to noise ratio, 20 log10(1 / rms_error): the peak is white, 1, in both spaces;
+                       INFINITY without error */
+    double mean_error, rms_error, greatest_error;
+    uint32_t greatest_x, greatest_y, greatest_channel; /* from the top left; counted from 0 */
+    /* Structural similarity (Wang, Bovik, Sheikh, Simoncelli. Image quality assessment: from error visibility to
+     * structural similarity. 2004): 11x11 Gaussian window of sigma 1.5, K1 0.01, K2 0.03, range 1, on the luma of
+     * what a screen shows (linear files: neutral tone map and sRGB curve, as in a PNG of the renderer); the mean
+     * over all windows that lie within the picture. */
+    bool has_ssim; /* the picture is at least 11x11 */
+    double ssim;
+    /* Butteraugli distance as libjxl computes it, of what a screen of 80 cd/m2 shows: about 1 where a difference
+     * is just seen. */
+    bool has_butteraugli;                     /* the picture is at least 8x8 and has at most 2^24 pixels */
+    double butteraugli, butteraugli_greatest; /* 3-norm over the picture; the greatest */
+    uint64_t visible;                         /* pixels with a distance above 1 */
+    /* The picture: black is no error, the brightest colour `heat_top` and above, in between by the square root of
+     * the error (of a pixel's channels the greatest); pixels that are not finite are magenta. */
+    double heat_top;
+    uint32_t picture_width, picture_height; /* 0: none */
+};
+
+/* The picture is there, complete, when this returns true. Fails with FL_ERROR_FILE where a file cannot be read or
+ * written or the two cannot be compared; `field` names the file at fault. */
+FL_API bool fl_compare(const struct fl_compare_options *options, struct fl_comparison *comparison,
+                       struct fl_error *error);
+
+/* ---- elsewhere ----------------------------------------------------------------------------------- */
+
 /* Copies bytes both ways between descriptors and the socket at `address` ("unix:PATH", "tcp:HOST:PORT") until
  * both directions have ended: what runs at the far end of an ssh connection. */
 FL_API bool fl_bridge(const char *address, int in_fd, int out_fd, struct fl_error *error);

@@ -57,3 +57,58 @@ bool file_write(const char *path, const uint8_t *bytes, size_t count, char *reas
     unlink(temporary);
     return fail(reason, reason_bytes, failure);
 }
+
+int file_open(const char *path, char *reason, size_t reason_bytes)
+{
+    struct stat status;
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    if (fd < 0 || fstat(fd, &status) < 0) {
+        snprintf(reason, reason_bytes, "cannot be read: %s", strerror(errno));
+    } else if (!S_ISREG(status.st_mode)) {
+        snprintf(reason, reason_bytes, "is not a file");
+    } else {
+        return fd;
+    }
+    if (fd >= 0)
+        close(fd);
+    return -1;
+}
+
+/* Until `capacity` bytes are there or the file ends; *count is what came. */
+static bool read_up_to(int fd, uint8_t *bytes, size_t capacity, size_t *count)
+{
+    *count = 0;
+    while (*count < capacity) {
+        const ssize_t got = pread(fd, bytes + *count, capacity - *count, (off_t)*count);
+        if (got < 0 && errno != EINTR)
+            return false;
+        if (got == 0)
+            break;
+        if (got > 0)
+            *count += (size_t)got;
+    }
+    return true;
+}
+
+bool file_read(int fd, size_t greatest_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes)
+{
+    struct stat status;
+    *bytes = NULL;
+    if (fstat(fd, &status) < 0) {
+        snprintf(reason, reason_bytes, "cannot be read: %s", strerror(errno));
+        return false;
+    }
+    if (status.st_size <= 0 || (uint64_t)status.st_size > greatest_bytes) {
+        snprintf(reason, reason_bytes, status.st_size <= 0 ? "is empty" : "is larger than %zu MiB",
+                 greatest_bytes >> 20);
+        return false;
+    }
+    /* What grows meanwhile is read as it was. */
+    *bytes = malloc((size_t)status.st_size);
+    if (*bytes != NULL && read_up_to(fd, *bytes, (size_t)status.st_size, count))
+        return true;
+    snprintf(reason, reason_bytes, "cannot be read: %s", strerror(errno));
+    free(*bytes);
+    *bytes = NULL;
+    return false;
+}

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A file that appears complete or not at all. */
+/* Files in one piece: one that is written appears complete or not at all. */
 #ifndef FARLIGHT_CLIENT_OUTPUT_FILE_H
 #define FARLIGHT_CLIENT_OUTPUT_FILE_H
 
@@ -7,8 +7,21 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Writes under a temporary name in the path's folder and renames; on failure nothing is left and `reason` says
  * why. An existing file is replaced. */
 bool file_write(const char *path, const uint8_t *bytes, size_t count, char *reason, size_t reason_bytes);
+
+/* Opens an ordinary file for reading; -1, with `reason`, for anything else: a FIFO holds nobody. */
+int file_open(const char *path, char *reason, size_t reason_bytes);
+/* Reads all of it. *bytes is malloc'ed. */
+bool file_read(int fd, size_t greatest_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -104,22 +104,72 @@ void insert_comments(std::vector<unsigned char> &file, const struct image &image
     }
 }
 
+struct pixel_source {
+    OIIO::TypeDesc type;
+    const void *pixels;
+    size_t pixel_bytes;
+};
+
+bool write_pixels(enum image_format format, const OIIO::ImageSpec &spec, const struct pixel_source &source,
+                  std::vector<unsigned char> &file, std::string &why)
+{
+    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin_of(format));
+    OIIO::Filesystem::IOVecOutput memory(file);
+    if (output == nullptr)
+        why = OIIO::geterror();
+    else if (!output->set_ioproxy(&memory))
+        why = "this build of OpenImageIO cannot write it to memory";
+    else if (!output->open(std::string("image.") + plugin_of(format), spec) ||
+             !output->write_image(source.type, source.pixels, static_cast<OIIO::stride_t>(source.pixel_bytes)) ||
+             !output->close())
+        why = output->geterror();
+    else
+        return true;
+    return false;
+}
+
 bool encode(const struct image &image, std::vector<unsigned char> &file, char *reason, size_t reason_bytes)
 {
-    const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin_of(image.format));
-    if (output == nullptr)
-        return fail(reason, reason_bytes, OIIO::geterror());
-    const OIIO::ImageSpec spec = make_spec(image);
     const OIIO::TypeDesc type = stored_type(image.begin->format);
-    OIIO::Filesystem::IOVecOutput memory(file);
-    if (!output->set_ioproxy(&memory))
-        return fail(reason, reason_bytes, "this build of OpenImageIO cannot write it to memory");
-    const std::string name = std::string("image.") + plugin_of(image.format);
-    if (!output->open(name, spec) ||
-        !output->write_image(type, image.pixels, static_cast<OIIO::stride_t>(4 * type.size())) || !output->close())
-        return fail(reason, reason_bytes, output->geterror());
+    std::string why;
+    if (!write_pixels(image.format, make_spec(image), {type, image.pixels, 4 * type.size()}, file, why))
+        return fail(reason, reason_bytes, why);
     if (image.format == IMAGE_HDR)
         insert_comments(file, image);
+    return true;
+}
+
+bool encode(const struct plain_image &image, std::vector<unsigned char> &file, char *reason, size_t reason_bytes)
+{
+    OIIO::ImageSpec spec(static_cast<int>(image.width), static_cast<int>(image.height), 3, OIIO::TypeDesc::UINT8);
+    if (image.format != IMAGE_PNG && image.format != IMAGE_JPEG)
+        return fail(reason, reason_bytes, "a picture of errors is PNG or JPEG");
+    spec.attribute("oiio:ColorSpace", "sRGB");
+    spec.attribute("Compression", "jpeg:95");
+    spec.attribute("png:compressionLevel", 4);
+    spec.attribute("Software", "farlight " FARLIGHT_VERSION);
+    spec.attribute("ImageDescription", image.description);
+    std::string why;
+    return write_pixels(image.format, spec, {OIIO::TypeDesc::FLOAT, image.pixels, 3 * sizeof(float)}, file, why) ||
+           fail(reason, reason_bytes, why);
+}
+
+template <typename kind_of_image>
+bool encode_to_memory(const kind_of_image &image, uint8_t **file, size_t *file_bytes, char *reason,
+                      size_t reason_bytes)
+{
+    try {
+        std::vector<unsigned char> made;
+        if (!encode(image, made, reason, reason_bytes))
+            return false;
+        *file = static_cast<uint8_t *>(std::malloc(made.size()));
+        if (*file == nullptr)
+            return fail(reason, reason_bytes, "out of memory");
+        std::memcpy(*file, made.data(), made.size());
+        *file_bytes = made.size();
+    } catch (const std::exception &exception) {
+        return fail(reason, reason_bytes, exception.what());
+    }
     return true;
 }
 
@@ -165,17 +215,11 @@ bool image_prepare(char *reason, size_t reason_bytes)
 
 bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes, char *reason, size_t reason_bytes)
 {
-    try {
-        std::vector<unsigned char> made;
-        if (!encode(*image, made, reason, reason_bytes))
-            return false;
-        *file = static_cast<uint8_t *>(std::malloc(made.size()));
-        if (*file == nullptr)
-            return fail(reason, reason_bytes, "out of memory");
-        std::memcpy(*file, made.data(), made.size());
-        *file_bytes = made.size();
-    } catch (const std::exception &exception) {
-        return fail(reason, reason_bytes, exception.what());
-    }
-    return true;
+    return encode_to_memory(*image, file, file_bytes, reason, reason_bytes);
+}
+
+bool image_encode_plain(const struct plain_image *image, uint8_t **file, size_t *file_bytes, char *reason,
+                        size_t reason_bytes)
+{
+    return encode_to_memory(*image, file, file_bytes, reason, reason_bytes);
 }

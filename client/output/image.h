@@ -33,6 +33,17 @@ bool image_prepare(char *reason, size_t reason_bytes);
 bool image_encode(const struct image *image, uint8_t **file, size_t *file_bytes, char *reason,
                   size_t reason_bytes);
 
+/* A picture that is no frame. */
+struct plain_image {
+    enum image_format format; /* PNG or JPEG */
+    uint32_t width, height;
+    const float *pixels; /* red, green, blue, sRGB, 0 to 1 */
+    const char *description;
+};
+/* As image_encode. */
+bool image_encode_plain(const struct plain_image *image, uint8_t **file, size_t *file_bytes, char *reason,
+                        size_t reason_bytes);
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* farlight-export: takes pictures over a socket that the program that started it has connected already, and
- * writes image files. A program of its own so that nothing else links OpenImageIO; it may write beneath one
- * folder and open nothing else. */
+ * writes image files; compares image files. A program of its own so that nothing else links OpenImageIO; it may
+ * write beneath one folder, read the files that it was started with, and open nothing else. */
+#include "compare.h"
 #include "file.h"
 #include "image.h"
 #include "import/sandbox.h"
@@ -19,17 +20,22 @@
 
 #define EXIT_USAGE 2
 #define TEXT_MAX 512
+#define FIELD_MAX 128
 #define FILE_BYTES_MAX (UINT64_C(1) << 36)
 
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-export " FARLIGHT_VERSION;
 
-enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS };
+enum { KEY_FD = 0x100, KEY_FOLDER, KEY_FPS, KEY_READ };
+
+#define READ_MAX 2u
 
 struct options {
     int fd;
     const char *folder;
     float frames_per_second;
+    struct compare_file files[READ_MAX];
+    size_t file_count;
 };
 
 /* What has come of the file that is being received. */
@@ -47,6 +53,8 @@ struct request {
 struct exporter {
     int fd;
     float frames_per_second;
+    const struct compare_file *files; /* that may be compared */
+    size_t file_count;
     uint8_t *buffer;
     size_t start, end;
     struct scratch scratch;
@@ -83,29 +91,39 @@ static bool send_all(int fd, const uint8_t *bytes, size_t count)
     return true;
 }
 
+static bool send_message(struct exporter *exporter, uint32_t number, const struct message *message)
+{
+    uint8_t bytes[2048];
+    struct writer writer;
+    writer_init(&writer, bytes, sizeof bytes);
+    return message_write(&writer, number, 0, message) && send_all(exporter->fd, bytes, writer.used_bytes);
+}
+
+/* `field` and `reason` are shortened to what a message holds. */
+static bool send_failure(struct exporter *exporter, uint32_t number, char *field, char *reason)
+{
+    struct message message = {.type = MESSAGE_ERROR};
+    cut_text(field, FIELD_MAX);
+    cut_text(reason, TEXT_MAX - 1);
+    message.error.code = PROTOCOL_ERROR_CODE_INVALID;
+    message.error.field = field;
+    message.error.text = reason;
+    message.error.remedy = "";
+    if (send_message(exporter, number, &message))
+        return true;
+    /* The library's text was no UTF-8. */
+    message.error.field = "";
+    message.error.text = "no more can be said";
+    return send_message(exporter, number, &message);
+}
+
 static bool answer(struct exporter *exporter)
 {
     struct request *request = &exporter->request;
-    struct message message = {.type = MESSAGE_OK};
-    uint8_t bytes[2048];
-    struct writer writer;
-    if (request->reason[0] != '\0') {
-        cut_text(request->reason, TEXT_MAX - 1);
-        message = (struct message){.type = MESSAGE_ERROR};
-        message.error.code = PROTOCOL_ERROR_CODE_INVALID;
-        message.error.field = "";
-        message.error.text = request->reason;
-        message.error.remedy = "";
-    }
-    writer_init(&writer, bytes, sizeof bytes);
-    if (!message_write(&writer, request->number, 0, &message)) {
-        /* The library's text was no UTF-8. */
-        message.error.text = "cannot be written";
-        writer_init(&writer, bytes, sizeof bytes);
-        if (!message_write(&writer, request->number, 0, &message))
-            return false;
-    }
-    return send_all(exporter->fd, bytes, writer.used_bytes);
+    char field[] = "";
+    if (request->reason[0] != '\0')
+        return send_failure(exporter, request->number, field, request->reason);
+    return send_message(exporter, request->number, &(struct message){.type = MESSAGE_OK});
 }
 
 /* ---- one file ---- */
@@ -188,8 +206,33 @@ static bool end_frame(struct exporter *exporter, const struct message_frame_end 
     return answered;
 }
 
+/* ---- one comparison ---- */
+
+/* The files are those that were named at the start: a message opens nothing. */
+static const struct compare_file *find_file(const struct exporter *exporter, const char *path)
+{
+    for (size_t i = 0; i < exporter->file_count; i++)
+        if (strcmp(exporter->files[i].path, path) == 0)
+            return &exporter->files[i];
+    return NULL;
+}
+
+static bool compare(struct exporter *exporter, uint32_t number, const struct message_compare_images *wanted)
+{
+    struct compare_result result = {0};
+    const struct compare_file *a = find_file(exporter, wanted->a), *b = find_file(exporter, wanted->b);
+    if (a == NULL || b == NULL)
+        return false;
+    if (!compare_images(wanted, a, b, &result))
+        return send_failure(exporter, number, result.field, result.reason);
+    const struct message message = {.type = MESSAGE_IMAGES_COMPARED, .images_compared = result.answer};
+    return send_message(exporter, number, &message);
+}
+
 static bool handle(struct exporter *exporter, uint32_t number, const struct message *message)
 {
+    if (message->type == MESSAGE_COMPARE_IMAGES)
+        return !exporter->request.named && compare(exporter, number, &message->compare_images);
     if (message->type != MESSAGE_EXPORT_IMAGE && number != exporter->request.number)
         return false;
     switch (message->type) {
@@ -282,14 +325,19 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_FOLDER:
         options->folder = value;
         return 0;
+    case KEY_READ:
+        if (options->file_count == READ_MAX)
+            argp_error(state, "--read: two files are the most");
+        options->files[options->file_count++].path = value;
+        return 0;
     case KEY_FPS:
         options->frames_per_second = strtof(value, &end);
         if (end == value || *end != '\0' || !(options->frames_per_second > 0))
             argp_error(state, "--fps: '%s' is no rate", value);
         return 0;
     case ARGP_KEY_END:
-        if (options->fd < 0 || options->folder == NULL)
-            argp_error(state, "--fd and --folder are needed: this program is started by farlight");
+        if (options->fd < 0 || (options->folder == NULL && options->file_count == 0))
+            argp_error(state, "--fd, and --folder or --read, are needed: this program is started by farlight");
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -305,15 +353,31 @@ static uint64_t file_bytes_limit(void)
     return limit.rlim_cur;
 }
 
-static bool enter_sandbox(const struct options *options)
+/* What is wrong with a file is said when somebody asks for it. */
+static void open_files(struct options *options)
 {
-    const char *const folders[] = {options->folder};
-    const struct sandbox_options sandbox = {.write_folders = folders,
-                                            .write_folder_count = 1,
-                                            .allow_rename = true,
-                                            .file_bytes = file_bytes_limit(),
+    for (size_t i = 0; i < options->file_count; i++) {
+        struct compare_file *file = &options->files[i];
+        file->fd = file_open(file->path, file->reason, sizeof file->reason);
+    }
+    if (options->file_count > 0)
+        compare_prepare();
+}
+
+static bool enter_sandbox(struct options *options)
+{
+    const char *const write_folders[] = {options->folder};
+    const char *const read_folders[] = {options->file_count > 0 ? compare_font_folder : NULL};
+    const bool writes = options->folder != NULL;
+    const struct sandbox_options sandbox = {.read_folders = read_folders,
+                                            .read_folder_count = 1,
+                                            .write_folders = write_folders,
+                                            .write_folder_count = writes ? 1 : 0,
+                                            .allow_rename = writes,
+                                            .file_bytes = writes ? file_bytes_limit() : 0,
                                             .address_space_bytes = UINT64_C(16) << 30};
     char reason[TEXT_MAX] = "";
+    open_files(options);
     if (!image_prepare(reason, sizeof reason) || !sandbox_enter(&sandbox, reason, sizeof reason)) {
         refuse("", reason);
         return false;
@@ -325,18 +389,24 @@ int main(int argc, char **argv)
 {
     static const struct argp_option rows[] = {
         {"fd", KEY_FD, "N", 0, "Connected stream socket to speak over (needed)", 0},
-        {"folder", KEY_FOLDER, "DIR", 0, "The one folder that may be written to (needed)", 0},
+        {"folder", KEY_FOLDER, "DIR", 0, "The one folder that may be written to", 0},
+        {"read", KEY_READ, "FILE", 0, "An image that may be read and compared; twice", 0},
         {"fps", KEY_FPS, "N", 0, "Frames per second, for the metadata of EXR files", 0},
         {0}};
-    static const struct argp argp = {
-        .options = rows, .parser = parse, .doc = "Write image files for farlight, which starts this program."};
+    static const struct argp argp = {.options = rows,
+                                     .parser = parse,
+                                     .doc =
+                                         "Write and compare image files for farlight, which starts this program."};
     struct options options = {.fd = -1};
     argp_err_exit_status = EXIT_USAGE;
     if (argp_parse(&argp, argc, argv, 0, NULL, &options) != 0)
         return EXIT_USAGE;
     /* A limit on file sizes is an error of write(), not the end. */
     signal(SIGXFSZ, SIG_IGN);
-    struct exporter exporter = {.fd = options.fd, .frames_per_second = options.frames_per_second};
+    struct exporter exporter = {.fd = options.fd,
+                                .frames_per_second = options.frames_per_second,
+                                .files = options.files,
+                                .file_count = options.file_count};
     uint8_t *scratch = malloc(SCRATCH_BYTES);
     exporter.buffer = malloc(BUFFER_BYTES);
     int status = EXIT_FAILURE;

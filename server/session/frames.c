@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "session/frames.h"
 
+#include "base/timeline.h"
 #include "session/jobs.h"
 #include "session/session.h"
 
@@ -152,7 +153,13 @@ static void send_end(struct pending_frame *pending, uint64_t now_ns)
     message.frame_end.stages = stages;
     message.frame_end.stages_count = times->count;
     session_send(job->session, job->request, job->channel, &message);
-    const struct engine_port *engine = &job->session->hub->options.engine;
+    const struct hub_options *hub = &job->session->hub->options;
+    timeline_frame(hub->timeline, &(struct timeline_frame){.client = job->session->number,
+                                                           .client_name = job->session->name,
+                                                           .job = job->request,
+                                                           .frame = frame->frame,
+                                                           .times = times});
+    const struct engine_port *engine = &hub->engine;
     engine->report_sent(engine->context, queue_ns, send_ns);
 }
 

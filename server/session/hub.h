@@ -21,6 +21,7 @@ struct hub_options {
     struct session_limits limits;
     struct connection_limits connection_limits;
     struct engine_port engine;
+    struct timeline *timeline;   /* hears of every frame that was sent; may be NULL */
     uint64_t scene_memory_bytes; /* of one scene, as the engine has it; told to clients */
     bool insecure;               /* peers beyond loopback are let in */
 };

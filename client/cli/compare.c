@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: MIT */
+/* What is compared is decided by the operands: two image files. */
+#include "cli/cli.h"
+#include "cli/comparison.h"
+#include "lib/text.h"
+
+#include <errno.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#define OPERANDS_MAX 2u
+
+enum key { KEY_JSON = 0x500, KEY_THRESHOLD, KEY_FAIL_ABOVE, KEY_LAYOUT, KEY_HEAT_TOP, KEY_IGNORE_ALPHA };
+
+struct comparing {
+    const char *operands[OPERANDS_MAX];
+    size_t operand_count;
+    struct fl_compare_options options;
+    struct cli_limits limits;
+    bool json;
+    struct cli_job job; /* holds the error of what was typed */
+};
+
+static const struct argp_option options[] = {
+    {"output", 'o', "IMAGE", 0, "Write a picture of the errors, PNG or JPEG by its ending", 0},
+    {"layout", KEY_LAYOUT, "NAME", 0,
+     "Of that picture: heat, the errors alone (default), or side, with both images", 0},
+    {"heat-top", KEY_HEAT_TOP, "ERROR", 0,
+     "The error with the brightest colour (default: the greatest error, at most 1)", 0},
+    {"threshold", KEY_THRESHOLD, "ERROR", 0, "A pixel is beyond where a channel differs by more (default 0.01)",
+     0},
+    {"fail-above", KEY_FAIL_ABOVE, "[FIGURE=]VALUE", 0,
+     "Exit with 1 if a figure is worse: psnr (dB) and ssim below the value; mean, rms, max, butteraugli, and the "
+     "shares beyond, visible and nonfinite (0.001 or 0.1%) above it. Without a name: max. May be repeated",
+     0},
+    {"ignore-alpha", KEY_IGNORE_ALPHA, NULL, 0, "Compare colours only", 0},
+    {"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0},
+    {0}};
+
+/* An error of what a function of the library read gets the option's name. */
+static error_t name_field(struct comparing *comparing, const char *field)
+{
+    snprintf(comparing->job.error.field, sizeof comparing->job.error.field, "%s", field);
+    return EINVAL;
+}
+
+static error_t parse_error(struct comparing *comparing, const char *field, const char *value, float *error)
+{
+    double real = 0;
+    if (!fl_text_real(value, 0, 1e9, &real, &comparing->job.error))
+        return name_field(comparing, field);
+    *error = (float)real;
+    return 0;
+}
+
+static error_t add_operand(struct comparing *comparing, char *value)
+{
+    if (comparing->operand_count == OPERANDS_MAX)
+        return cli_usage(&comparing->job, value, "two images are compared, not more");
+    comparing->operands[comparing->operand_count++] = value;
+    return 0;
+}
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct comparing *comparing = state->input;
+    error_t status = 0;
+    switch (key) {
+    case 'o':
+        comparing->options.picture = value;
+        return 0;
+    case KEY_LAYOUT:
+        if (!protocol_comparison_layout_parse(value, &comparing->options.layout))
+            return cli_usage(&comparing->job, "--layout", "'%s' is not known (known: heat, side)", value);
+        return 0;
+    case KEY_HEAT_TOP:
+        return parse_error(comparing, "--heat-top", value, &comparing->options.heat_top);
+    case KEY_THRESHOLD:
+        status = parse_error(comparing, "--threshold", value, &comparing->options.threshold);
+        if (!(comparing->options.threshold > 0))
+            comparing->options.threshold = FL_THRESHOLD_NONE;
+        return status;
+    case KEY_FAIL_ABOVE:
+        return cli_limits_add(&comparing->limits, value, &comparing->job.error)
+                   ? 0
+                   : name_field(comparing, "--fail-above");
+    case KEY_IGNORE_ALPHA:
+        comparing->options.ignore_alpha = true;
+        return 0;
+    case KEY_JSON:
+        comparing->json = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        return add_operand(comparing, value);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* As of cmp and diff: 1 is an answer, so what brought no answer is 2. */
+static int trouble(const struct fl_error *error)
+{
+    const int status = cli_report(error);
+    return status == CLI_FAILED ? CLI_TROUBLE : status;
+}
+
+static bool is_same_file(const char *a, const char *b)
+{
+    struct stat first, second;
+    return stat(a, &first) == 0 && stat(b, &second) == 0 && first.st_dev == second.st_dev &&
+           first.st_ino == second.st_ino;
+}
+
+/* Everything that can be known to fail before anything is compared. */
+static bool check_picture(const struct comparing *comparing, struct fl_error *error)
+{
+    const char *picture = comparing->options.picture;
+    char folder[4097];
+    if (picture == NULL)
+        return true;
+    const enum cli_image image = cli_image_by_path(picture);
+    if (image != CLI_IMAGE_PNG && image != CLI_IMAGE_JPEG) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, picture, "a picture of errors is PNG or JPEG");
+        return fl_error_remedy(error, "known endings: .png .jpg .jpeg");
+    }
+    for (size_t i = 0; i < comparing->operand_count; i++)
+        if (is_same_file(picture, comparing->operands[i]))
+            return fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "would replace '%s'",
+                                comparing->operands[i]);
+    return cli_check_output(picture, folder, sizeof folder, error);
+}
+
+/* ---- two image files ---- */
+
+/* Names come from people and files: made harmless for a terminal. */
+static void print_name(const char *text)
+{
+    for (; *text != '\0'; text++)
+        putchar((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text);
+}
+
+static void print_figures(const struct comparing *comparing, const struct fl_comparison *comparison)
+{
+    print_name(comparing->options.a);
+    fputs(" and ", stdout);
+    print_name(comparing->options.b);
+    putchar('\n');
+    cli_comparison_print(stdout, comparison, &comparing->limits);
+}
+
+static void print_object(const struct comparing *comparing, const struct fl_comparison *comparison)
+{
+    const char *picture = comparing->options.picture;
+    json_t *object = cli_comparison_json(comparison, &comparing->limits);
+    json_object_set_new(object, "a", json_string(comparing->options.a));
+    json_object_set_new(object, "b", json_string(comparing->options.b));
+    json_object_set_new(object, "picture", picture != NULL ? json_string(picture) : json_null());
+    json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    putchar('\n');
+    json_decref(object);
+}
+
+static int compare_images(struct comparing *comparing)
+{
+    struct fl_error error = {0};
+    struct fl_comparison comparison;
+    if (!check_picture(comparing, &error) || !cli_interrupt_begin(&error))
+        return trouble(&error);
+    comparing->options.a = comparing->operands[0];
+    comparing->options.b = comparing->operands[1];
+    comparing->options.interrupt_fd = cli_interrupt_fd();
+    if (!fl_compare(&comparing->options, &comparison, &error))
+        return trouble(&error);
+    if (comparing->json)
+        print_object(comparing, &comparison);
+    else
+        print_figures(comparing, &comparison);
+    return cli_limits_hold(&comparing->limits, &comparison) ? CLI_DONE : CLI_FAILED;
+}
+
+int cli_compare(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = options,
+        .parser = parse,
+        .args_doc = "IMAGE IMAGE",
+        .doc =
+            "Say how far two images of one size are apart.\v"
+            "Images are EXR, HDR, PNG or JPEG. EXR and HDR files are compared in linear light, others as what a "
+            "screen shows, 0 to 1. Exit status: 0 within all limits, 1 not, 2 not compared."};
+    struct comparing comparing = {0};
+    if (argp_parse(&argp, argc, argv, 0, NULL, &comparing) != 0)
+        return trouble(&comparing.job.error);
+    if (comparing.operand_count < 2) {
+        cli_usage(&comparing.job, "IMAGE", "two image files are needed");
+        return trouble(&comparing.job.error);
+    }
+    return compare_images(&comparing);
+}

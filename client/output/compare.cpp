@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+#include "compare.h"
+#include "file.h"
+#include "heat_map.hpp"
+#include "image.h"
+#include "picture.hpp"
+#include "similarity.hpp"
+
+#include <OpenImageIO/imagebufalgo.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <vector>
+
+namespace
+{
+using OIIO::ImageBuf;
+namespace algo = OIIO::ImageBufAlgo;
+
+// Two frames of 8192x8192 as raw floats have half of it.
+constexpr size_t file_bytes_max = size_t(1) << 31;
+constexpr float sent_max = 3e38f;
+
+struct comparison {
+    const struct message_compare_images &wanted;
+    struct compare_result &result;
+    struct picture a, b;
+    std::vector<bool> nonfinite; // a pixel each
+};
+
+bool fail(struct compare_result &result, const char *path, const std::string &reason)
+{
+    const size_t length = std::strlen(path);
+    const bool is_long = length >= sizeof result.field;
+    std::snprintf(result.field, sizeof result.field, "%s%s", is_long ? "..." : "",
+                  path + (is_long ? length - sizeof result.field + 4 : 0));
+    std::string line = reason.empty() ? "cannot be read" : reason;
+    std::replace(line.begin(), line.end(), '\n', ' '); // a library's message may have several lines
+    while (!line.empty() && line.back() == ' ')
+        line.pop_back();
+    std::snprintf(result.reason, sizeof result.reason, "%s", line.c_str());
+    return false;
+}
+
+bool read_picture(const struct compare_file &file, struct picture &made, struct compare_result &result)
+{
+    char reason[160] = "";
+    uint8_t *bytes = nullptr;
+    size_t count = 0;
+    if (file.fd < 0)
+        return fail(result, file.path, file.reason);
+    if (!file_read(file.fd, file_bytes_max, &bytes, &count, reason, sizeof reason))
+        return fail(result, file.path, reason);
+    const std::unique_ptr<uint8_t, decltype(&std::free)> owner(bytes, std::free);
+    std::string why;
+    return picture_decode(bytes, count, made, why) || fail(result, file.path, why);
+}
+
+std::string size_text(const struct picture &picture)
+{
+    return std::to_string(picture.width()) + "x" + std::to_string(picture.height());
+}
+
+bool check_alike(const struct comparison &each)
+{
+    const struct message_compare_images &wanted = each.wanted;
+    if (each.a.width() != each.b.width() || each.a.height() != each.b.height())
+        return fail(each.result, wanted.a,
+                    "has " + size_text(each.a) + " pixels, but " + wanted.b + " has " + size_text(each.b));
+    if (each.a.channel_names() != each.b.channel_names())
+        return fail(each.result, wanted.a,
+                    "has the channels " + each.a.channel_names() + ", but " + wanted.b + " has " +
+                        each.b.channel_names());
+    return true;
+}
+
+// Counts what is no number and makes it 0 in both, for no sum holds such a thing.
+void set_aside_nonfinite(struct comparison &each)
+{
+    const size_t channels = static_cast<size_t>(each.a.channels());
+    const auto is_number = [](float value) { return std::isfinite(value); };
+    each.nonfinite.assign(each.a.count(), false);
+    float *a = each.a.data(), *b = each.b.data();
+    for (size_t i = 0; i < each.nonfinite.size(); i++, a += channels, b += channels) {
+        const bool bad_a = !std::all_of(a, a + channels, is_number);
+        const bool bad_b = !std::all_of(b, b + channels, is_number);
+        if (!bad_a && !bad_b)
+            continue;
+        each.nonfinite[i] = true;
+        each.result.answer.nonfinite++;
+        each.result.answer.nonfinite_a += bad_a;
+        each.result.answer.nonfinite_b += bad_b;
+        std::fill_n(a, channels, 0.0f);
+        std::fill_n(b, channels, 0.0f);
+    }
+}
+
+// The difference of two floats may be more than a float holds.
+float sendable(double value)
+{
+    return static_cast<float>(std::min<double>(value, static_cast<double>(sent_max)));
+}
+
+// What was set aside differs by 0 and is among the pixels that the library divides by.
+void measure_errors(struct comparison &each)
+{
+    struct message_images_compared &answer = each.result.answer;
+    const double pixels = static_cast<double>(each.a.count());
+    const double finite = pixels - static_cast<double>(answer.nonfinite);
+    const algo::CompareResults found =
+        algo::compare(each.a.pixels, each.b.pixels, each.wanted.threshold, each.wanted.threshold);
+    const double part = finite > 0 ? pixels / finite : 0;
+    answer.beyond = found.nfail + answer.nonfinite;
+    answer.mean_error = sendable(found.meanerror * part);
+    answer.rms_error = sendable(found.rms_error * std::sqrt(part));
+    answer.greatest_error = sendable(found.maxerror);
+    answer.greatest_x = static_cast<uint32_t>(found.maxx);
+    answer.greatest_y = static_cast<uint32_t>(found.maxy);
+    answer.greatest_channel = static_cast<uint32_t>(found.maxc);
+    const float greatest = answer.greatest_error;
+    answer.heat_top = each.wanted.heat_top > 0 ? each.wanted.heat_top : std::min(greatest, 1.0f);
+}
+
+void measure_likeness(struct comparison &each, const ImageBuf &screen_a, const ImageBuf &screen_b)
+{
+    struct message_images_compared &answer = each.result.answer;
+    struct butteraugli found = {};
+    answer.has_ssim = similarity_ssim(screen_a, screen_b, answer.ssim);
+    answer.has_butteraugli = similarity_butteraugli(screen_a, screen_b, found);
+    if (!answer.has_butteraugli)
+        return;
+    answer.butteraugli = sendable(found.distance);
+    answer.butteraugli_greatest = sendable(found.greatest);
+    answer.visible = found.visible;
+}
+
+bool write_picture(struct comparison &each, const ImageBuf &screen_a, const ImageBuf &screen_b)
+{
+    const struct message_compare_images &wanted = each.wanted;
+    struct message_images_compared &answer = each.result.answer;
+    char reason[512] = "", scale[64];
+    const ImageBuf errors = algo::maxchan(algo::absdiff(each.a.pixels, each.b.pixels));
+    ImageBuf shown = heat_map(errors, answer.heat_top, each.nonfinite);
+    std::snprintf(scale, sizeof scale, "error, 0 to %.4g", static_cast<double>(answer.heat_top));
+    if (wanted.layout == PROTOCOL_COMPARISON_LAYOUT_SIDE) {
+        const ImageBuf heat = shown;
+        shown = side_by_side({&screen_a, &screen_b, &heat}, {wanted.label_a, wanted.label_b, scale});
+    }
+    uint8_t *file = nullptr;
+    size_t file_bytes = 0;
+    const struct plain_image image = {
+        image_format_of(wanted.picture, wanted.format), static_cast<uint32_t>(shown.spec().width),
+        static_cast<uint32_t>(shown.spec().height), static_cast<const float *>(shown.localpixels()), scale};
+    if (!image_encode_plain(&image, &file, &file_bytes, reason, sizeof reason))
+        return fail(each.result, wanted.picture, reason);
+    const bool written = file_write(wanted.picture, file, file_bytes, reason, sizeof reason);
+    std::free(file);
+    answer.picture_width = image.width;
+    answer.picture_height = image.height;
+    return written || fail(each.result, wanted.picture, reason);
+}
+
+bool compare(struct comparison &each)
+{
+    struct message_images_compared &answer = each.result.answer;
+    if (each.wanted.ignore_alpha != 0) {
+        picture_drop_alpha(each.a);
+        picture_drop_alpha(each.b);
+    }
+    if (!check_alike(each))
+        return false;
+    set_aside_nonfinite(each);
+    const ImageBuf screen_a = picture_screen_colours(each.a), screen_b = picture_screen_colours(each.b);
+    if (each.a.linear != each.b.linear) {
+        picture_to_screen(each.a);
+        picture_to_screen(each.b);
+    }
+    answer.width = static_cast<uint32_t>(each.a.width());
+    answer.height = static_cast<uint32_t>(each.a.height());
+    answer.channels = static_cast<uint32_t>(each.a.channels());
+    answer.space = each.a.linear ? PROTOCOL_COMPARISON_SPACE_LINEAR : PROTOCOL_COMPARISON_SPACE_SRGB;
+    std::snprintf(each.result.channel_names, sizeof each.result.channel_names, "%s",
+                  each.a.channel_names().c_str());
+    answer.channel_names = each.result.channel_names;
+    measure_errors(each);
+    measure_likeness(each, screen_a, screen_b);
+    return each.wanted.picture[0] == '\0' || write_picture(each, screen_a, screen_b);
+}
+
+} // namespace
+
+const char *const compare_font_folder = "/usr/share/fonts";
+
+void compare_prepare(void)
+{
+    heat_map_prepare();
+}
+
+bool compare_images(const struct message_compare_images *wanted, const struct compare_file *a,
+                    const struct compare_file *b, struct compare_result *result)
+{
+    try {
+        struct comparison each = {*wanted, *result, {}, {}, {}};
+        OIIO::attribute("threads", 0); // all processors: nothing else runs meanwhile
+        return read_picture(*a, each.a, *result) && read_picture(*b, each.b, *result) && compare(each);
+    } catch (const std::bad_alloc &) {
+        return fail(*result, wanted->a, "and the other picture need more memory than there is");
+    } catch (const std::exception &exception) {
+        return fail(*result, wanted->a, exception.what());
+    }
+}

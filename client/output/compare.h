@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/* How far two image files are apart: figures, and a picture of the errors. C++ behind C. */
+#ifndef FARLIGHT_CLIENT_OUTPUT_COMPARE_H
+#define FARLIGHT_CLIENT_OUTPUT_COMPARE_H
+
+#include "protocol/messages.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A file that was opened while that was still allowed. */
+struct compare_file {
+    const char *path; /* as the request names it */
+    int fd;           /* -1: `reason` says why */
+    char reason[160];
+};
+
+/* What the answer's string points to, and why there is none. */
+struct compare_result {
+    struct message_images_compared answer;
+    char channel_names[256];
+    char field[128]; /* the end of the path of the file at fault */
+    char reason[512];
+};
+
+/* Where fonts are, for titles; nothing else has to be read after the sandbox is entered. */
+extern const char *const compare_font_folder;
+/* Loads what the libraries load late, while that is still allowed. */
+void compare_prepare(void);
+/* Reads the files, writes the picture that is wanted. False: `field` and `reason` are set, and there is no
+ * picture. */
+bool compare_images(const struct message_compare_images *wanted, const struct compare_file *a,
+                    const struct compare_file *b, struct compare_result *result);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#include "heat_map.hpp"
+#include "picture.hpp"
+
+#include <OpenImageIO/imagebufalgo.h>
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+namespace
+{
+using OIIO::ImageBuf;
+using OIIO::ROI;
+namespace algo = OIIO::ImageBufAlgo;
+
+constexpr int gap = 4;          // pixels between pictures
+constexpr int font_pixels = 14; // height of titles
+constexpr int title_pixels = 22;
+constexpr int title_width_min = 96;
+const float background[3] = {0.5f, 0.5f, 0.5f};
+const float ink[3] = {1, 1, 1};
+const char *const fonts[] = {"DejaVuSans", "LiberationSans-Regular", "NotoSans-Regular", "FreeSans"};
+
+// "" where none is installed.
+std::string find_font()
+{
+    for (const char *name : fonts)
+        if (algo::text_size("x", font_pixels, name).defined())
+            return name;
+    OIIO::geterror();
+    return "";
+}
+
+// The end of a title says most: that of a file's name is shown.
+std::string fit(const std::string &title, int width, const std::string &font)
+{
+    std::string fitting = title;
+    size_t cut = 0;
+    while (cut < title.size() && algo::text_size(fitting, font_pixels, font).width() > width) {
+        cut++;
+        while (cut < title.size() && (static_cast<unsigned char>(title[cut]) & 0xc0) == 0x80) // within a character
+            cut++;
+        fitting = ".." + title.substr(cut);
+    }
+    return fitting;
+}
+
+} // namespace
+
+void heat_map_prepare()
+{
+    find_font();
+}
+
+ImageBuf heat_map(const ImageBuf &errors, float top, const std::vector<bool> &marked)
+{
+    const float scale = top > 0 ? 1 / top : 0;
+    const ImageBuf colours =
+        algo::color_map(algo::pow(algo::clamp(algo::mul(errors, scale), 0.0f, 1.0f), 0.5f), 0, "inferno");
+    if (colours.localpixels() == nullptr)
+        throw std::bad_alloc();
+    ImageBuf made = make_plane(errors.spec().width, errors.spec().height, 3);
+    const float *from = static_cast<const float *>(colours.localpixels());
+    float *to = static_cast<float *>(made.localpixels());
+    for (size_t i = 0; i < marked.size(); i++, from += 3, to += 3) {
+        for (size_t c = 0; c < 3; c++) // the map's colours are linear
+            to[c] = marked[i] ? (c == 1 ? 0.0f : 1.0f) : srgb_from_linear(from[c]);
+    }
+    return made;
+}
+
+ImageBuf side_by_side(const std::vector<const ImageBuf *> &pictures, const std::vector<std::string> &titles)
+{
+    const int width = pictures[0]->spec().width, height = pictures[0]->spec().height;
+    const std::string font = width >= title_width_min ? find_font() : "";
+    const int top = font.empty() ? 0 : title_pixels;
+    const int count = static_cast<int>(pictures.size());
+    ImageBuf made = make_plane(count * width + (count - 1) * gap, height + top, 3);
+    algo::fill(made, background);
+    for (int i = 0; i < count; i++) {
+        const int left = i * (width + gap);
+        algo::paste(made, left, top, 0, 0, *pictures[static_cast<size_t>(i)]);
+        if (top == 0)
+            continue;
+        algo::fill(made, {0.1f, 0.1f, 0.1f}, ROI(left, left + width, 0, top));
+        algo::render_text(made, left + 4, title_pixels - 7, fit(titles[static_cast<size_t>(i)], width - 8, font),
+                          font_pixels, font, ink, algo::TextAlignX::Left, algo::TextAlignY::Baseline, 0,
+                          ROI(left, left + width, 0, top));
+    }
+    return made;
+}

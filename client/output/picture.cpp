@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: MIT
+#include "picture.hpp"
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imagebufalgo.h>
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <vector>
+
+namespace
+{
+
+constexpr int edge_max = 8192; // as of frames
+constexpr int channels_max = 4;
+
+struct signature {
+    const char *reader;
+    bool linear;
+    size_t length;
+    const char *bytes;
+};
+
+const signature signatures[] = {{"png", false, 8, "\x89PNG\r\n\x1a\n"},
+                                {"jpeg", false, 3, "\xff\xd8\xff"},
+                                {"openexr", true, 4, "\x76\x2f\x31\x01"},
+                                {"hdr", true, 10, "#?RADIANCE"},
+                                {"hdr", true, 6, "#?RGBE"}};
+
+const signature *signature_of(const uint8_t *file, size_t file_bytes)
+{
+    for (const signature &each : signatures)
+        if (file_bytes >= each.length && std::memcmp(file, each.bytes, each.length) == 0)
+            return &each;
+    return nullptr;
+}
+
+// libjpeg makes up what is missing of a file that was cut off, and only warns.
+bool is_cut_off(const signature &kind, const uint8_t *file, size_t file_bytes)
+{
+    while (file_bytes > 0 && file[file_bytes - 1] == 0) // padding
+        file_bytes--;
+    return std::strcmp(kind.reader, "jpeg") == 0 &&
+           (file_bytes < 2 || file[file_bytes - 2] != 0xff || file[file_bytes - 1] != 0xd9);
+}
+
+bool fail(std::string &reason, const std::string &text)
+{
+    reason = text;
+    return false;
+}
+
+bool check_spec(const OIIO::ImageSpec &spec, std::string &reason)
+{
+    if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.deep)
+        return fail(reason, "is not a flat image");
+    if (spec.width > edge_max || spec.height > edge_max)
+        return fail(reason, "is " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
+                                " pixels, more than " + std::to_string(edge_max) + " one way");
+    if (spec.nchannels < 1 || spec.nchannels > channels_max)
+        return fail(reason, "has " + std::to_string(spec.nchannels) + " channels, at most " +
+                                std::to_string(channels_max) + " are compared");
+    return true;
+}
+
+// Khronos PBR Neutral Tone Mapper, specification 1.0: F_90 = 0.04, K_s = 0.8 - F_90, K_d = 0.15.
+void tone_map_neutral(float colour[3])
+{
+    const float start = 0.8f - 0.04f, desaturation = 0.15f;
+    const float least = std::min({colour[0], colour[1], colour[2]});
+    const float offset = least < 0.08f ? least - 6.25f * least * least : 0.04f;
+    for (int c = 0; c < 3; c++)
+        colour[c] -= offset;
+    const float peak = std::max({colour[0], colour[1], colour[2]});
+    if (peak < start)
+        return;
+    const float d = 1 - start;
+    const float new_peak = 1 - d * d / (peak + d - start);
+    const float g = 1 - 1 / (desaturation * (peak - new_peak) + 1);
+    for (int c = 0; c < 3; c++)
+        colour[c] = colour[c] * (new_peak / peak) * (1 - g) + new_peak * g;
+}
+
+// The same as the renderer's resolve pass does for 8-bit pixels.
+void screen_from_linear(float colour[3], float alpha)
+{
+    for (int c = 0; c < 3; c++)
+        colour[c] = std::clamp(alpha > 0 ? colour[c] / alpha : colour[c], 0.0f, 1e9f);
+    tone_map_neutral(colour);
+    for (int c = 0; c < 3; c++)
+        colour[c] = srgb_from_linear(std::clamp(colour[c], 0.0f, 1.0f));
+}
+
+// Which channels are red, green and blue; a grey picture has one for all.
+std::array<size_t, 3> colour_channels(const struct picture &picture)
+{
+    std::vector<size_t> colours;
+    for (int c = 0; c < picture.channels(); c++)
+        if (c != picture.alpha)
+            colours.push_back(static_cast<size_t>(c));
+    const size_t last = colours.size() - 1;
+    return {colours[0], colours[std::min<size_t>(1, last)], colours[std::min<size_t>(2, last)]};
+}
+
+float alpha_of(const struct picture &picture, const float *pixel)
+{
+    return picture.alpha >= 0 ? pixel[picture.alpha] : 1;
+}
+
+} // namespace
+
+std::string picture::channel_names() const
+{
+    std::string names;
+    for (const std::string &name : pixels.spec().channelnames)
+        names += (names.empty() ? "" : ",") + name;
+    return names;
+}
+
+OIIO::ImageBuf make_plane(int width, int height, int channels)
+{
+    OIIO::ImageBuf made(OIIO::ImageSpec(width, height, channels, OIIO::TypeDesc::FLOAT),
+                        OIIO::InitializePixels::Yes);
+    if (made.localpixels() == nullptr)
+        throw std::bad_alloc();
+    return made;
+}
+
+bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made, std::string &reason)
+{
+    const signature *kind = signature_of(file, file_bytes);
+    if (kind == nullptr)
+        return fail(reason, "is no EXR, HDR, PNG or JPEG image");
+    if (is_cut_off(*kind, file, file_bytes))
+        return fail(reason, "is cut off: the end of the JPEG image is missing");
+    const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(kind->reader);
+    if (input == nullptr)
+        return fail(reason, OIIO::geterror());
+    OIIO::Filesystem::IOMemReader memory(const_cast<uint8_t *>(file), file_bytes); // only read
+    OIIO::ImageSpec spec, hints;
+    hints.attribute("oiio:UnassociatedAlpha", 1); // as stored
+    hints.attribute("oiio:reorient", 0);
+    if (!input->set_ioproxy(&memory) || !input->open(std::string("image.") + kind->reader, spec, hints))
+        return fail(reason, input->geterror());
+    if (!check_spec(spec, reason))
+        return false;
+    made.linear = kind->linear;
+    made.alpha = spec.nchannels > 1 ? spec.alpha_channel : -1; // alpha alone is looked at like grey
+    made.pixels = make_plane(spec.width, spec.height, spec.nchannels);
+    made.pixels.specmod().channelnames = spec.channelnames;
+    if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, made.data()))
+        return fail(reason, input->geterror());
+    return true;
+}
+
+void picture_drop_alpha(struct picture &picture)
+{
+    if (picture.alpha < 0 || picture.channels() < 2)
+        return;
+    std::vector<int> kept;
+    std::vector<std::string> names;
+    for (int c = 0; c < picture.channels(); c++) {
+        if (c == picture.alpha)
+            continue;
+        kept.push_back(c);
+        names.push_back(picture.pixels.spec().channelnames[static_cast<size_t>(c)]);
+    }
+    picture.pixels = OIIO::ImageBufAlgo::channels(picture.pixels, static_cast<int>(kept.size()), kept, {}, names);
+    picture.alpha = -1;
+}
+
+float srgb_from_linear(float linear)
+{
+    return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
+}
+
+void picture_to_screen(struct picture &picture)
+{
+    if (!picture.linear)
+        return;
+    const std::array<size_t, 3> channel = colour_channels(picture);
+    float *pixel = picture.data();
+    for (size_t i = 0; i < picture.count(); i++, pixel += picture.channels()) {
+        float colour[3] = {pixel[channel[0]], pixel[channel[1]], pixel[channel[2]]};
+        screen_from_linear(colour, alpha_of(picture, pixel));
+        for (size_t c = 0; c < 3; c++)
+            pixel[channel[c]] = colour[c];
+    }
+    picture.linear = false;
+}
+
+OIIO::ImageBuf picture_screen_colours(const struct picture &picture)
+{
+    OIIO::ImageBuf made = make_plane(picture.width(), picture.height(), 3);
+    const std::array<size_t, 3> channel = colour_channels(picture);
+    const float *from = picture.data();
+    float *to = static_cast<float *>(made.localpixels());
+    for (size_t i = 0; i < picture.count(); i++, from += picture.channels(), to += 3) {
+        for (size_t c = 0; c < 3; c++)
+            to[c] = from[channel[c]];
+        if (picture.linear)
+            screen_from_linear(to, alpha_of(picture, from));
+        for (size_t c = 0; c < 3; c++)
+            to[c] = std::clamp(to[c], 0.0f, 1.0f);
+    }
+    return made;
+}

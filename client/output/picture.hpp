@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// An image file as floats, as it is stored; and what a screen shows of it.
+#pragma once
+
+#include <OpenImageIO/imagebuf.h>
+
+#include <cstdint>
+#include <string>
+
+struct picture {
+    OIIO::ImageBuf pixels; // floats without gaps, origin 0,0
+    bool linear = false;   // linear light, colours multiplied by alpha; else sRGB, straight alpha
+    int alpha = -1;        // channel; -1: none
+
+    int width() const
+    {
+        return pixels.spec().width;
+    }
+    int height() const
+    {
+        return pixels.spec().height;
+    }
+    int channels() const
+    {
+        return pixels.spec().nchannels;
+    }
+    size_t count() const
+    {
+        return static_cast<size_t>(width()) * static_cast<size_t>(height());
+    }
+    float *data()
+    {
+        return static_cast<float *>(pixels.localpixels());
+    }
+    const float *data() const
+    {
+        return static_cast<const float *>(pixels.localpixels());
+    }
+    std::string channel_names() const; // "R,G,B,A"
+};
+
+// Floats of these dimensions, zero. Throws std::bad_alloc.
+OIIO::ImageBuf make_plane(int width, int height, int channels);
+
+// Decodes EXR, HDR, PNG or JPEG, known by their first bytes; what the header claims is checked before a pixel is
+// read. False: `reason` says why.
+bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made, std::string &reason);
+// Leaves the colours alone.
+void picture_drop_alpha(struct picture &picture);
+
+// IEC 61966-2-1.
+float srgb_from_linear(float linear);
+// The colours, alpha aside, become what a PNG of the renderer holds: divided by alpha, through the Khronos PBR
+// Neutral tone mapper (specification 1.0) and the sRGB curve. Does nothing to a picture that is not linear.
+void picture_to_screen(struct picture &picture);
+// Red, green and blue of what a screen shows, 0 to 1.
+OIIO::ImageBuf picture_screen_colours(const struct picture &picture);

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: MIT */
+/* Stage times of all frames as a file of trace events, which ui.perfetto.dev and chrome://tracing open: the array
+ * form of the Trace Event Format (Google. Trace Event Format. 2016), complete events ("X"), microseconds of
+ * clock_now_ns(), processes are clients, threads are tracks of a job: render, output (encoding, waiting, sending)
+ * and GPU, each with more lanes where frames overlap, so that the events of one thread nest.
+ * A thread of its own writes; whoever reports never waits for the disk. While the daemon runs, and after a crash,
+ * the file lacks its last line, "]", which the format allows. */
+#ifndef FARLIGHT_BASE_TIMELINE_H
+#define FARLIGHT_BASE_TIMELINE_H
+
+#include "base/error.h"
+#include "base/stage_times.h"
+
+struct timeline;
+
+struct timeline_frame {
+    uint64_t client;
+    const char *client_name; /* UTF-8 */
+    uint32_t job, frame;
+    const struct stage_times *times;
+};
+
+/* Replaces the file at `path`. It gets no larger than `limit_bytes`: then nothing more is written, and the log
+ * says so once. */
+struct timeline *timeline_create(const char *path, uint64_t limit_bytes, struct error *error);
+/* Copies what it needs. From one thread. `timeline` may be NULL. A frame is left out, and counted, where the disk
+ * is so slow that 8 MiB wait for it. */
+void timeline_frame(struct timeline *timeline, const struct timeline_frame *frame);
+/* Writes what waits and the end of the array. */
+void timeline_destroy(struct timeline *timeline);
+
+#endif
