@@ -143,13 +143,17 @@ UNIT_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accurac
 TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) -lm
 $(UNIT_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
-BENCHES := $(patsubst %.c,$(B)/%,$(wildcard tests/bench/bench_*.c))
+# Programs of the benchmark; the rest of its folder is what they share.
+BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_tracers)
 $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 MODEL_OBJ := $(B)/tests/bench/load_model.o
 $(B)/tests/unit/test_load_model: $(MODEL_OBJ)
+$(B)/tests/bench/bench_tracers: TEST_LIBS += -lembree3
+$(B)/tests/bench/bench_tracers: $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/,bench_contest.c bench_embree.c \
+    bench_options.c bench_scene.c bench_stats.c bench_waves.c))
 
-# The yardstick of the benchmark; the only thing that links Embree.
+# The yardstick of the one-shot command: reading a file and Embree's build of it.
 $(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/server/base/%,$(SERVER_OBJ))
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -lembree3 -o $@
 
