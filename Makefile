@@ -167,15 +167,18 @@ BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libc
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libtinygltf-dev \
     libtinyobjloader-dev libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev libembree-dev python3
+PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
-.PHONY: tests build-packages test-packages lint-packages test demo bench check-headers lint format install uninstall clean help
-tests: $(UNIT_TESTS) $(BENCHES) $(B)/tests/tools/make_scenes
+.PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help
+tests: $(UNIT_TESTS) $(BENCHES) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
 test-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES)
+plot-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(PLOT_PACKAGES)
 lint-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(LINT_PACKAGES)
 
@@ -187,9 +190,15 @@ test: test-packages
 demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out
+# The programs that are measured, and those that measure.
+BENCHED = all $(BENCHES) $(B)/tests/tools/make_scenes $(B)/tests/bench/embree_build
 bench: test-packages
-	$(MAKE) -j$(JOBS) all tests $(B)/tests/bench/embree_build
-	python3 tests/bench/bench.py $(B)
+	$(MAKE) -j$(JOBS) $(BENCHED)
+	python3 tests/bench/bench.py $(B) $(BENCH)
+# Measures what the curves need where out/bench.json does not have it yet.
+bench-plot: plot-packages
+	$(MAKE) -j$(JOBS) $(BENCHED)
+	python3 tests/bench/bench_plot.py $(B)
 
 check-headers:
 	@tests/tools/check_headers.sh $(CC) -I. -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS)
@@ -235,7 +244,8 @@ clean:
 help:
 	@echo 'make demo       install what is missing, build, render the bundled scenes into out/'
 	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
-	@echo 'make bench      measure, in the terms of the README'
+	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
+	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz]'
 	@echo 'make fuzz       run every fuzzer   [config=fuzz FUZZ_SECONDS=20]'
 	@echo 'make lint       include rules, shaders, headers alone, format, clang with warnings as errors'

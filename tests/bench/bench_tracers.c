@@ -124,7 +124,7 @@ static bool build_all(struct bench *bench, struct error *error)
         if (!impl || (bench->options.tracers ? !bench_is_named(bench->options.tracers, impl->name)
                                              : impl == &tracer_naive_impl))
             continue;
-        fprintf(stderr, "  building %s\n", impl->name);
+        fprintf(stderr, "    building %s\n", impl->name);
         if (!add_tracer(bench, impl, "auto", NULL, error))
             return false;
         /* What choosing the number of rays walked together is measured by. */
@@ -132,7 +132,7 @@ static bool build_all(struct bench *bench, struct error *error)
             !add_tracer(bench, impl, "1 ray", &(struct tracer_options){.bvh_rays_together = 1}, error))
             return false;
     }
-    fprintf(stderr, "  building embree\n");
+    fprintf(stderr, "    building embree\n");
     return add_embree(bench, false, error) && (bench->options.quick || add_embree(bench, true, error));
 }
 
@@ -268,7 +268,7 @@ static bool run_wave(struct bench *bench, enum bench_wave_kind kind, const struc
         memcpy(rays, camera_rays, pixels * sizeof *rays);
     else
         wave.ray_count = bench_secondary_rays(rays, kind, camera_rays, hits, pixels, each, &bench->scene);
-    fprintf(stderr, "  %s: %u rays\n", bench_wave_facts[kind].name, wave.ray_count);
+    fprintf(stderr, "    %s: %u rays\n", bench_wave_facts[kind].name, wave.ray_count);
     bool ok = wave.ray_count == 0 || bench_contest_wave(&bench->contest, &wave, error);
     if (ok && wave.ray_count > 0)
         json_array_append_new(waves, wave_json(bench, &wave));
@@ -297,10 +297,12 @@ static bool run_waves(struct bench *bench, json_t *waves, struct error *error)
 static bool run_bench(struct bench *bench, struct error *error)
 {
     bench->options.scene.aspect = (float)bench->options.width / (float)bench->options.height;
-    fprintf(stderr, "%s, %ux%u\n", bench->options.scene.model ? bench->options.scene.model : "family",
-            bench->options.width, bench->options.height);
     if (!bench_scene_init(&bench->scene, bench->device, &bench->options.scene, error))
         return false;
+    fprintf(stderr, "  %s: %llu triangles, %llu spheres, %ux%u\n",
+            bench->options.scene.model ? bench->options.scene.model : "family",
+            (unsigned long long)bench->scene.triangle_count, (unsigned long long)bench->scene.sphere_count,
+            bench->options.width, bench->options.height);
     bench->contest =
         (struct bench_contest){.device = bench->device, .scene = &bench->scene, .runs = bench->options.runs};
     json_t *waves = json_array();
