@@ -18,14 +18,14 @@ from bench_rays import CURVES, curve
 # One colour a contender, told apart without colour vision too (Okabe and Ito 2008); one dash and mark a kind of ray.
 COLOURS = {"bvh, walk": "#0072b2", "bvh, hits": "#56b4e9", "reference, hits": "#009e73", "Embree, 1 ray a call": "#d55e00"}
 KINDS = {"primary": (1, 7), "occlusion": (1, 7), "bounce": (2, 9)}  # gnuplot's dash and point types
-SIZES = {"svg": "svg size 900,600 dynamic enhanced font 'DejaVu Sans,14' background '#ffffff'",
-         "png": "pngcairo size 1350,900 enhanced font 'DejaVu Sans,18' background '#ffffff'"}
+SIZES = {"svg": "svg size 1100,560 dynamic enhanced font 'DejaVu Sans,14' background '#ffffff'",
+         "png": "pngcairo size 1650,840 enhanced font 'DejaVu Sans,18' background '#ffffff'"}
 
 
 def named(name, letter, values):
     """The line's name with the exponent that fits it."""
     fit = fit_exponent([(at, y) for at, y, _ in values])
-    return name + (f"  ({letter}^{{ {fit[0]:.2f}}})" if fit else "")
+    return name + (f"  ({letter}^{{{fit[0]:.2f}}})" if fit else "")
 
 
 def time_lines(results, kinds, x, letter, per_ray):
@@ -60,7 +60,7 @@ def script(title, x_label, y_label, x_ticks, lines, terminal, path):
     text = [f"set terminal {terminal}", f"set output '{path}'", f"set title {quoted(title)}", "set logscale xy",
             f"set xlabel '{x_label}'", f"set ylabel '{y_label}'", "set grid xtics ytics lc rgb '#dddddd' lt 1",
             "set border 3 lc rgb '#555555'", "set tics nomirror", "set bars 0.5",
-            "set key outside bottom center horizontal Left reverse maxcols 2 samplen 3 spacing 1.1",
+            "set key outside right center vertical Left reverse samplen 3 spacing 1.3 width -4",
             f"set xrange [{x_ticks[0][0] / 1.2:g}:{x_ticks[-1][0] * 1.2:g}]"]
     text.append("set xtics (" + ", ".join(f"'{label}' {at}" for at, label in x_ticks) + ")")
     low = min(y for line in lines for _, y, _ in line[4])

@@ -76,7 +76,7 @@ def middle_model(bench):
 def measure_pixels(bench):
     title, arguments = middle_model(bench)
     edges = (16, 32, 64) if bench.tiny else (128, 256, 512, 1024)
-    return {"results": [trace(bench, f"{title}, {edge}x{edge}", 3, *arguments, "--size", f"{edge}x{edge}", "--waves",
+    return {"results": [trace(bench, f"{title}, {edge}x{edge}", 5, *arguments, "--size", f"{edge}x{edge}", "--waves",
                               "primary,bounce", "--quick") for edge in edges]}
 
 
@@ -84,7 +84,7 @@ def measure_rays(bench):
     title, arguments = middle_model(bench)
     size = "32x32" if bench.tiny else "256x256"
     counts = (1, 2, 4) if bench.tiny else (1, 2, 4, 8, 16)
-    return {"results": [trace(bench, f"{title}, {n} rays a pixel", 3, *arguments, "--size", size, "--waves",
+    return {"results": [trace(bench, f"{title}, {n} rays a pixel", 5, *arguments, "--size", size, "--waves",
                               "occlusion,bounce", "--quick", "--rays-per-pixel", n) for n in counts]}
 
 
@@ -209,12 +209,12 @@ CURVES = [("bvh, walk", "bvh", "auto", "walk"), ("bvh, hits", "bvh", "auto", "in
 
 
 def curve(results, kind, which, x):
-    """[(x, ns a ray as a figure)] of one line of a plot."""
+    """[(x, ns a ray as a figure)] of one line of a plot. What the interface adds to a walk is surfaces: not for any hit."""
     points = []
     for result in results:
         wave = find_wave(result, kind)
         measure = find_measure(wave, *which[1:])
-        if measure:
+        if measure and not (wave["any"] and which[0] == "bvh, hits"):
             points.append((x(result), figure([ns / wave["rays"] for ns in measure["time"]["runs_ns"]])))
     return points
 
