@@ -143,16 +143,16 @@ UNIT_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accurac
 TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) -lm
 $(UNIT_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
-# Programs of the benchmark; the rest of its folder is what they share.
+# Programs of the benchmark; the rest of its folder is what they share. They hold us against Embree itself.
 BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_tracers)
 $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -lembree3 -o $@
 MODEL_OBJ := $(B)/tests/bench/load_model.o
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c stats.c waves.c))
 $(B)/tests/unit/test_load_model: $(MODEL_OBJ)
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
-$(B)/tests/bench/bench_tracers $(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3
+$(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3
 
 # The yardstick of the one-shot command: reading a file and Embree's build of it.
 $(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/server/base/%,$(SERVER_OBJ))

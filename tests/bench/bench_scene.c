@@ -126,10 +126,8 @@ bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the scene");
     }
     if (!scene_gpu_update(&scene->gpu, scene->loaded.scene, &changes, NULL, error) ||
-        !choose_camera(scene, options, error)) {
-        bench_scene_finish(scene);
+        !choose_camera(scene, options, error))
         return false;
-    }
     choose_light(scene);
     count_primitives(scene);
     return true;

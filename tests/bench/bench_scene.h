@@ -26,7 +26,7 @@ struct bench_scene {
     uint64_t triangle_count, sphere_count; /* as the rays meet them: every instance counts */
 };
 
-/* The device must be current. Zeroes *scene first. */
+/* The device must be current. Zeroes *scene first, which is to be finished either way. */
 bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
                       const struct bench_scene_options *options, struct error *error);
 void bench_scene_finish(struct bench_scene *scene);
