@@ -59,6 +59,14 @@ def section(title, text):
     return f"## {title}\n\n{text}\n"
 
 
+def part_section(name, data):
+    title, _, show = PARTS[name]
+    text = show(data)
+    if data.get("left_out"):
+        text += "\n\nleft out, as they are not below FARLIGHT_SCENES: " + ", ".join(data["left_out"])
+    return section(title, text)
+
+
 def show_environment(facts):
     where = "software GL" if facts["software"] else "GPU"
     return (f"farlight {facts['commit']}, {facts['date']}\n{facts['device']} ({where}), {facts['version']}\n"
@@ -67,13 +75,7 @@ def show_environment(facts):
 
 def render(document):
     sections = [show_environment(document["environment"])]
-    for name, (title, _, show) in PARTS.items():
-        data = document["parts"].get(name)
-        if data:
-            text = show(data)
-            if data.get("left_out"):
-                text += "\n\nleft out, as they are not below FARLIGHT_SCENES: " + ", ".join(data["left_out"])
-            sections.append(section(title, text))
+    sections += [part_section(name, document["parts"][name]) for name in PARTS if name in document["parts"]]
     if "wanted" in document["parts"]:
         sections.append(section(WANTED_TITLE, bench_reach.show(document["parts"]["wanted"])))
     return "\n".join(sections)
@@ -91,18 +93,18 @@ def write(document, out):
 def measure(bench, names, document, out):
     """Part by part; what is done is written at once, so that an interrupted run has left something."""
     for number, name in enumerate(names, 1):
-        title, run, show = PARTS[name]
-        say(f"[{number}/{len(names)}] {name}: {title.lower()}")
+        title, run_part, _ = PARTS[name]
+        say(f"[{number}/{len(names)}] {name}: {title[0].lower()}{title[1:]}")
         begin = time.monotonic()
         try:
-            document["parts"][name] = run(bench)
+            document["parts"][name] = run_part(bench)
         except Failure as failure:
             bench.faults.append(f"{name}: {failure}")
             say(f"bench: {failure}")
             continue
         say(f"    {time.monotonic() - begin:.0f} s")
         write(document, out)
-        print(section(title, show(document["parts"][name])), flush=True)
+        print(part_section(name, document["parts"][name]), flush=True)
 
 
 def run(build, names, out, runs=None, tiny=False):
