@@ -13,7 +13,8 @@ embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are obje
 and runs; keys end with their unit. tracers, reach, family, pixels and rays have `results`, one for each call of
 bench_tracers: title, triangles, spheres, instances, width, height, rays_per_pixel, `structures` (tracer, form, build,
 memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, form, way, time, rays_per_s, agreement). `wanted`
-has the lines that are to be reached: line, wanted, measured, met.
+has the lines that are to be reached: line, wanted, measured, met, within_spread (missed by no more than twice its
+deviation), where.
 
 Exit status 1 if something failed, or a tracer gave wrong answers; a line that was missed is no failure.
 """

@@ -47,7 +47,7 @@ def ray_models(bench, left_out):
 def measure_tracers(bench):
     left_out = []
     size = "64x64" if bench.tiny else "512x512"
-    results = [trace(bench, title, 3, "--model", model, "--size", size, "--waves", ",".join(WAVES), *options)
+    results = [trace(bench, title, 5, "--model", model, "--size", size, "--waves", ",".join(WAVES), *options)
                for title, model, options in ray_models(bench, left_out)]
     return {"results": results, "left_out": left_out}
 
@@ -89,9 +89,9 @@ def measure_rays(bench):
 
 
 def measure_forms(bench):
-    """The table of the forms of `bvh` that bench_bvh prints, with a warm-up and medians of its own."""
+    """The table of the forms of `bvh` that bench_bvh prints, with a warm-up and medians of its own; two of its sizes."""
     say("  bench_bvh")
-    return {"text": command(bench.program("tests/bench/bench_bvh"), *(["1000"] if bench.tiny else []))}
+    return {"text": command(bench.program("tests/bench/bench_bvh"), *(["1000"] if bench.tiny else ["37000", "146000"]))}
 
 
 # ---- reading results --------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ sys.path.insert(0, str(BENCH))
 import bench_common  # noqa: E402  pylint: disable=wrong-import-position
 import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
 import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
+import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 
 PARTS = ("frames", "tracers", "family", "pixels", "rays", "reach")
 
@@ -37,6 +38,20 @@ class Figures(unittest.TestCase):
 
     def test_counts_are_short_on_an_axis(self):
         self.assertEqual([bench_plot.count_text(n) for n in (884, 2180, 64514, 1028180)], ["884", "2.2K", "65K", "1M"])
+
+
+class Verdicts(unittest.TestCase):
+    def verdict(self, median, deviation, **how):
+        return bench_reach.verdict(bench_reach.row("line", 0.8, {"median": median, "deviation": deviation}, "", **how))
+
+    def test_what_is_reached_by_the_median_is_met(self):
+        self.assertEqual(self.verdict(0.8, 0.1), "met")
+        self.assertEqual(self.verdict(0.7, 0.1, at_most=True), "met")
+
+    def test_a_miss_within_twice_the_deviation_is_told_from_one_beyond(self):
+        self.assertEqual(self.verdict(0.7, 0.06), "missed, within the spread")
+        self.assertEqual(self.verdict(0.7, 0.04), "MISSED")
+        self.assertEqual(self.verdict(0.9, 0.04, at_most=True), "MISSED")
 
 
 class Benchmark(unittest.TestCase):
@@ -99,6 +114,7 @@ class Benchmark(unittest.TestCase):
             self.assertTrue(any(part in row["line"] for row in rows), part)
         for row in rows:
             self.assertIn(row["met"], (True, False))
+            self.assertFalse(row["met"] and row["within_spread"], row)
             self.assertIn(row["line"], text)
 
     @unittest.skipUnless(shutil.which("gnuplot"), "gnuplot is not installed")
