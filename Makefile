@@ -153,6 +153,12 @@ $(B)/tests/unit/test_load_model: $(MODEL_OBJ)
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
 $(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3
+BENCH_PROGRAMS := $(BENCHES) $(B)/tests/bench/embree_build
+# EMBREE=0 leaves out what cannot be built without it.
+ifeq ($(EMBREE),0)
+UNIT_TESTS := $(filter-out $(B)/tests/unit/test_bench_contest,$(UNIT_TESTS))
+BENCH_PROGRAMS :=
+endif
 
 # The yardstick of the one-shot command: reading a file and Embree's build of it.
 $(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/server/base/%,$(SERVER_OBJ))
@@ -172,7 +178,7 @@ PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
 .PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help
-tests: $(UNIT_TESTS) $(BENCHES) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
+tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(B)/tests/tools/make_scenes
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
@@ -192,7 +198,7 @@ demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out
 # The programs that are measured, and those that measure.
-BENCHED = all $(BENCHES) $(B)/tests/tools/make_scenes $(B)/tests/bench/embree_build
+BENCHED = all $(BENCHES) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
 bench: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench.py $(B) $(BENCH)

@@ -54,6 +54,7 @@ class Verdicts(unittest.TestCase):
         self.assertEqual(self.verdict(0.9, 0.04, at_most=True), "MISSED")
 
 
+@unittest.skipUnless((BIN / "tests/bench/bench_tracers").is_file(), "built without Embree, which the benchmark compares with")
 class Benchmark(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
