@@ -20,9 +20,9 @@ MEBI = 1 << 20
 # ---- measuring --------------------------------------------------------------------------------------
 
 
-def trace(bench, title, usual_runs, *arguments):
+def trace(bench, title, runs, *arguments):
     """One call of bench_tracers, which says what it does on our standard error. A disagreement is noted as a fault."""
-    full = [bench.program("tests/bench/bench_tracers"), "--runs", bench.times(usual_runs), *arguments]
+    full = [bench.program("tests/bench/bench_tracers"), "--runs", runs, *arguments]
     result = subprocess.run(list(map(str, full)), stdout=subprocess.PIPE, text=True, check=False)
     if not result.stdout:
         raise Failure(f"{' '.join(map(str, full))} ended with {result.returncode}")
@@ -47,7 +47,7 @@ def ray_models(bench, left_out):
 def measure_tracers(bench):
     left_out = []
     size = "64x64" if bench.tiny else "512x512"
-    results = [trace(bench, title, 5, "--model", model, "--size", size, "--waves", ",".join(WAVES), *options)
+    results = [trace(bench, title, bench.times(5), "--model", model, "--size", size, "--waves", ",".join(WAVES), *options)
                for title, model, options in ray_models(bench, left_out)]
     return {"results": results, "left_out": left_out}
 
@@ -55,14 +55,41 @@ def measure_tracers(bench):
 def measure_reach(bench):
     sizes = (1000,) if bench.tiny else REACH
     size = "64x64" if bench.tiny else "512x512"
-    return {"results": [trace(bench, f"family {n}", 5, "--family", n, "--size", size) for n in sizes]}
+    return {"results": [trace(bench, f"family {n}", bench.times(5), "--family", n, "--size", size) for n in sizes]}
+
+
+def join_times(into, more):
+    """Adds the runs of a figure of bench_tracers to those of another."""
+    into["runs_ns"] += more["runs_ns"]
+    joined = figure(into["runs_ns"])
+    into.update({f"{key}_ns": joined[key] for key in ("median", "deviation", "least", "greatest")})
+
+
+def join(into, more):
+    """Adds the runs of a result to those of another of the same scene."""
+    for structure, other in zip(into["structures"], more["structures"]):
+        join_times(structure["build"], other["build"])
+    for wave, other_wave in zip(into["waves"], more["waves"]):
+        for measure, other in zip(wave["measures"], other_wave["measures"]):
+            join_times(measure["time"], other["time"])
+            measure["rays_per_s"] = 1e9 * wave["rays"] / measure["time"]["median_ns"]
+
+
+def sweep(bench, calls):
+    """Results of calls (title, arguments) that make a curve. There and back, so that a machine that grows slower or faster
+    meanwhile bends the curve less; the runs are put together."""
+    runs = max(1, bench.times(6) // 2)
+    results = [trace(bench, title, runs, *arguments, "--quick") for title, arguments in calls]
+    if bench.times(6) > 1:
+        for result, (title, arguments) in reversed(list(zip(results, calls))):
+            join(result, trace(bench, title, runs, *arguments, "--quick"))
+    return {"results": results}
 
 
 def measure_family(bench):
     sizes = FAMILY[:3] if bench.tiny else FAMILY
     size = "64x64" if bench.tiny else "512x512"
-    return {"results": [trace(bench, f"family {n}", 5, "--family", n, "--size", size, "--waves", "primary,bounce",
-                              "--quick") for n in sizes]}
+    return sweep(bench, [(f"family {n}", ["--family", n, "--size", size, "--waves", "primary,bounce"]) for n in sizes])
 
 
 def middle_model(bench):
@@ -76,16 +103,16 @@ def middle_model(bench):
 def measure_pixels(bench):
     title, arguments = middle_model(bench)
     edges = (16, 32, 64) if bench.tiny else (128, 256, 512, 1024)
-    return {"results": [trace(bench, f"{title}, {edge}x{edge}", 5, *arguments, "--size", f"{edge}x{edge}", "--waves",
-                              "primary,bounce", "--quick") for edge in edges]}
+    return sweep(bench, [(f"{title}, {edge}x{edge}", [*arguments, "--size", f"{edge}x{edge}", "--waves", "primary,bounce"])
+                         for edge in edges])
 
 
 def measure_rays(bench):
     title, arguments = middle_model(bench)
     size = "32x32" if bench.tiny else "256x256"
     counts = (1, 2, 4) if bench.tiny else (1, 2, 4, 8, 16)
-    return {"results": [trace(bench, f"{title}, {n} rays a pixel", 5, *arguments, "--size", size, "--waves",
-                              "occlusion,bounce", "--quick", "--rays-per-pixel", n) for n in counts]}
+    return sweep(bench, [(f"{title}, {n} rays a pixel", [*arguments, "--size", size, "--waves", "occlusion,bounce",
+                                                         "--rays-per-pixel", n]) for n in counts])
 
 
 def measure_forms(bench):

@@ -36,6 +36,18 @@ class Figures(unittest.TestCase):
         ratio = bench_common.paired_ratio([10, 40, 10], [5, 20, 5])
         self.assertEqual((ratio["median"], ratio["deviation"]), (2, 0))
 
+    def test_runs_there_and_back_are_put_together(self):
+        def result(*times):
+            time = {"runs_ns": list(times)}
+            return {"structures": [{"build": dict(time, runs_ns=list(times))}],
+                    "waves": [{"rays": 1000, "measures": [{"time": time}]}]}
+        joined = result(10, 20, 30)
+        bench_rays.join(joined, result(40, 50))
+        measure = joined["waves"][0]["measures"][0]
+        self.assertEqual((measure["time"]["median_ns"], measure["time"]["greatest_ns"]), (30, 50))
+        self.assertEqual(joined["structures"][0]["build"]["runs_ns"], [10, 20, 30, 40, 50])
+        self.assertAlmostEqual(measure["rays_per_s"] * 30e-9, 1000)
+
     def test_counts_are_short_on_an_axis(self):
         self.assertEqual([bench_plot.count_text(n) for n in (884, 2180, 64514, 1028180)], ["884", "2.2K", "65K", "1M"])
 
