@@ -143,11 +143,24 @@ UNIT_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accurac
 TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) -lm
 $(UNIT_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
-BENCHES := $(patsubst %.c,$(B)/%,$(wildcard tests/bench/bench_*.c))
+# Programs of the benchmark; the rest of its folder is what they share. They hold us against Embree itself.
+BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_tracers)
 $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -lembree3 -o $@
+MODEL_OBJ := $(B)/tests/bench/load_model.o
+CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c stats.c waves.c))
+$(B)/tests/unit/test_load_model: $(MODEL_OBJ)
+$(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
+$(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
+$(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3
+BENCH_PROGRAMS := $(BENCHES) $(B)/tests/bench/embree_build
+# EMBREE=0 leaves out what cannot be built without it.
+ifeq ($(EMBREE),0)
+UNIT_TESTS := $(filter-out $(B)/tests/unit/test_bench_contest,$(UNIT_TESTS))
+BENCH_PROGRAMS :=
+endif
 
-# The yardstick of the benchmark; the only thing that links Embree.
+# The yardstick of the one-shot command: reading a file and Embree's build of it.
 $(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/server/base/%,$(SERVER_OBJ))
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -lembree3 -o $@
 
@@ -161,15 +174,18 @@ BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libc
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libjxl-dev libtinygltf-dev \
     libtinyobjloader-dev libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev libembree-dev python3
+PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
-.PHONY: tests build-packages test-packages lint-packages test demo bench check-headers lint format install uninstall clean help
-tests: $(UNIT_TESTS) $(BENCHES) $(B)/tests/tools/make_scenes
+.PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help
+tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(B)/tests/tools/make_scenes
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
 test-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES)
+plot-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(PLOT_PACKAGES)
 lint-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(LINT_PACKAGES)
 
@@ -181,9 +197,15 @@ test: test-packages
 demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out
+# The programs that are measured, and those that measure.
+BENCHED = all $(BENCHES) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
 bench: test-packages
-	$(MAKE) -j$(JOBS) all tests $(B)/tests/bench/embree_build
-	python3 tests/bench/bench.py $(B)
+	$(MAKE) -j$(JOBS) $(BENCHED)
+	python3 tests/bench/bench.py $(B) $(BENCH)
+# Measures what the curves need where out/bench.json does not have it yet.
+bench-plot: plot-packages
+	$(MAKE) -j$(JOBS) $(BENCHED)
+	python3 tests/bench/bench_plot.py $(B)
 
 check-headers:
 	@tests/tools/check_headers.sh $(CC) -I. -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS)
@@ -229,7 +251,8 @@ clean:
 help:
 	@echo 'make demo       install what is missing, build, render the bundled scenes into out/'
 	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
-	@echo 'make bench      measure, in the terms of the README'
+	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
+	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz]'
 	@echo 'make fuzz       run every fuzzer   [config=fuzz FUZZ_SECONDS=20]'
 	@echo 'make lint       include rules, shaders, headers alone, format, clang with warnings as errors'

@@ -24,7 +24,7 @@ static uint64_t key_of(const struct session *session, const uint8_t hash[BLOB_HA
     return key;
 }
 
-static struct offer *find(const struct session *session, const uint8_t hash[BLOB_HASH_BYTES])
+struct offer *upload_find(const struct session *session, const uint8_t hash[BLOB_HASH_BYTES])
 {
     struct offer *offer = hashmap_get(&session->blobs.offers, key_of(session, hash));
     while (offer && memcmp(offer->hash, hash, BLOB_HASH_BYTES) != 0)
@@ -38,7 +38,7 @@ static void print_hash(const uint8_t hash[BLOB_HASH_BYTES], char text[2 * BLOB_H
         snprintf(text + 2 * i, 3, "%02x", hash[i]);
 }
 
-static struct offer *add(struct session *session, const struct record_blob_ref *reference, struct error *error)
+struct offer *upload_add(struct session *session, const struct record_blob_ref *reference, struct error *error)
 {
     if (session->blobs.offer_count >= session->hub->options.limits.blobs_per_client) {
         error_set(error, ERROR_LIMIT, "blob_offer.blobs", "a client may name %u blobs",
@@ -69,8 +69,8 @@ static bool take_offer(struct session *session, const struct record_blob_ref *re
     *needed = false;
     if (!reference->size_bytes)
         return true; /* none is meant */
-    struct offer *offer = find(session, reference->hash);
-    if (!offer && !(offer = add(session, reference, error)))
+    struct offer *offer = upload_find(session, reference->hash);
+    if (!offer && !(offer = upload_add(session, reference, error)))
         return false;
     if (offer->size_bytes != reference->size_bytes)
         return error_set(error, ERROR_INVALID, "blob_offer.blobs",
@@ -113,7 +113,7 @@ bool upload_resolve(const struct session *session, const struct record_blob_ref 
     *blob = NULL;
     if (!reference->size_bytes)
         return true;
-    const struct offer *offer = find(session, reference->hash);
+    const struct offer *offer = upload_find(session, reference->hash);
     if (offer && offer->held && offer->size_bytes == reference->size_bytes) {
         *blob = blob_ref(offer->held);
         return true;
@@ -254,7 +254,7 @@ static struct request *request_of(struct session *session, const struct framing_
 static bool take_piece(struct session *session, struct request *request, const struct message_blob_data *data,
                        struct error *error)
 {
-    struct offer *offer = find(session, data->hash);
+    struct offer *offer = upload_find(session, data->hash);
     if (!offer || offer->held)
         return error_set(error, ERROR_INVALID, "blob_data.hash", "a blob that %s",
                          offer ? "is held already" : "was not offered");

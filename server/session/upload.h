@@ -33,6 +33,11 @@ void upload_data(struct session *session, const struct framing_header *header,
 void upload_invalid(struct session *session, uint32_t request_id, const struct error *error);
 void upload_abandon(struct session *session, struct offer *offer); /* forgets the pieces that have come */
 
+/* An offer of this session; NULL: it made none of this hash. */
+struct offer *upload_find(const struct session *session, const uint8_t hash[BLOB_HASH_BYTES]);
+/* Notes an offer that is not there yet, with nothing held. NULL and *error: too many, or no memory. */
+struct offer *upload_add(struct session *session, const struct record_blob_ref *reference, struct error *error);
+
 /* The blob that an edit names: *blob is a new reference, or NULL where none is meant (0 bytes). False: it is not
  * held. */
 bool upload_resolve(const struct session *session, const struct record_blob_ref *reference, const char *field,

@@ -1,213 +1,154 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""`make bench`: where the time goes, in tables. Usage: bench.py BUILD_FOLDER
+"""`make bench`: where the time goes, in tables and as JSON. Usage: bench.py BUILD_FOLDER [PART ..] [--out FOLDER]
 
-Everything is run several times after a warm-up; the median is printed. Ratios come from one run on one machine.
-Scenes of FARLIGHT_SCENES (default: ../shared/scenes beside the checkout) are left out, and named, where missing.
+Parts: start, oneshot, frames, animation, tracers, reach, family, pixels, rays, forms; all of them where none is named. Each
+figure is the median of several runs after a warm-up, with the median absolute deviation beside it; what is compared takes
+turns, run by run. Scenes of FARLIGHT_SCENES (default: ../shared/scenes beside the checkout) are left out, and named, where
+missing.
+
+Writes FOLDER/bench.txt and FOLDER/bench.json (FOLDER: out). Parts that an earlier run on the same device and commit left
+there stay. The JSON: {"format": 1, "environment": {date, commit, processor, processors, device, vendor, version, software,
+embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are objects of median, deviation, least, greatest
+and runs; keys end with their unit. tracers, reach, family, pixels and rays have `results`, one for each call of
+bench_tracers: title, triangles, spheres, instances, width, height, rays_per_pixel, `structures` (tracer, form, build,
+memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, form, way, time, rays_per_s, agreement). `wanted`
+has the lines that are to be reached: line, wanted, measured, met, within_spread (missed by no more than twice its
+deviation), where.
+
+Exit status 1 if something failed, or a tracer gave wrong answers; a line that was missed is no failure.
 """
+import argparse
 import json
-import os
 import pathlib
 import shutil
-import statistics
-import struct
-import subprocess
 import sys
 import tempfile
 import time
 
-BUILD = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "build/release").resolve()
-SHARED = pathlib.Path(os.environ.get("FARLIGHT_SCENES", "../shared/scenes"))
-FARLIGHT = BUILD / "farlight"
-RUNS = int(os.environ.get("BENCH_RUNS", "3"))
-STAGES = ("apply", "build", "upload", "primary", "trace", "shade", "resolve", "readback", "encode", "queue", "send")
+import bench_client
+import bench_rays
+import bench_reach
+from bench_common import Bench, Failure, command, environment, say
+
+# name: (title, measure, show)
+PARTS = {
+    "start": ("Starting", bench_client.measure_start, bench_client.show_start),
+    "oneshot": ("One command with a daemon of its own", bench_client.measure_oneshot, bench_client.show_oneshot),
+    "frames": ("Frames", bench_client.measure_frames, bench_client.show_frames),
+    "animation": ("An animation", bench_client.measure_animation, bench_client.show_animation),
+    "tracers": ("Tracers, scene by scene", bench_rays.measure_tracers, bench_rays.show_tracers),
+    "forms": ("The forms of bvh", bench_rays.measure_forms, lambda data: data["text"].rstrip()),
+    "family": ("Time against triangles", bench_rays.measure_family, bench_rays.show_family),
+    "pixels": ("Time against pixels", bench_rays.measure_pixels, bench_rays.show_pixels),
+    "rays": ("Time against rays per pixel", bench_rays.measure_rays, bench_rays.show_rays),
+    "reach": ("bvh beside Embree", bench_rays.measure_reach, bench_rays.show_reach),
+}
+WANTED_TITLE = "What is wanted"
+SAME = ("commit", "device", "version", "processor", "processors")
 
 
-def command(*arguments):
-    result = subprocess.run(list(map(str, arguments)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                            check=False)
-    if result.returncode != 0:
-        sys.exit(f"bench: {' '.join(map(str, arguments))} ended with {result.returncode}: {result.stderr}")
-    return result.stdout
-
-
-def timed(*arguments):
-    begin = time.monotonic()
-    command(*arguments)
-    return time.monotonic() - begin
-
-
-def records(*arguments):
-    lines = [json.loads(line) for line in command(*arguments).splitlines()]
-    return [r for r in lines if r["kind"] == "frame"], next(r for r in lines if r["kind"] == "client")
-
-
-def stage_ms(frame, stage, clock="cpu"):
-    return sum(s["duration_ns"] for s in frame["stages"] if s["stage"] == stage and s["clock"] == clock) / 1e6
-
-
-class Daemon:
-    def __init__(self):
-        self.folder = tempfile.mkdtemp(prefix="farlight-bench-")
-        self.address = f"unix:{self.folder}/socket"
-        self.process = subprocess.Popen([BUILD / "farlightd", "--listen", self.address], stdout=subprocess.PIPE,
-                                        stderr=subprocess.DEVNULL, text=True)
-        for line in self.process.stdout:
-            if line.startswith("READY"):
-                return
-        sys.exit("bench: the daemon did not start")
-
-    def close(self):
-        self.process.terminate()
-        self.process.wait()
-        self.process.stdout.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
-
-
-def models(folder):
-    """(title, model, further options) of the bundled and the shared scenes."""
-    sky = ["--environment", folder / "sky.hdr"]
-    yield "teapot (bundled)", folder / "teapot.glb", sky
-    yield "cornell (bundled)", folder / "cornell.glb", []
-    yield "sphereflake-4 (bundled)", folder / "sphereflake-4.nff", []
-    yield "bumpy 150K (bundled)", folder / "bumpy-150.glb", sky
-    kitchen = ["--eye", "7.634,-4.168,1.422", "--look-at", "12.037,4.713,0.107", "--up", "0,0,1", "--fov", "58.7"]
-    for title, name, options in (("dragon 47K", "common/dragon-47k.glb", sky), ("bunny 69K", "common/bunny-69k.obj", sky),
-                                 ("kitchen 86K", "rayspace/kitchen.obj", sky + kitchen),
-                                 ("helmet, textured", "gltf/DamagedHelmet.glb", sky),
-                                 ("balls, 7,381 spheres", "bvh/spd-balls-4.nff", []),
-                                 ("gears 37K", "bvh/spd-gears.nff", []), ("dragon 871K", "common/dragon-871k.glb", sky)):
-        if (SHARED / name).is_file():
-            yield title, SHARED / name, options
-        else:
-            print(f"left out: {name} is not below FARLIGHT_SCENES")
-
-
-def scene_table(folder):
-    print("\n## Scenes: 640x480, one sample, depth 4; milliseconds on the daemon's clock; a warm daemon\n")
-    print(f"{'scene':24} {'import':>7} {'upload':>7} " + " ".join(f"{s:>8}" for s in STAGES[1:]) +
-          f" {'Mray/s':>7} {'2nd bulk B':>10}")
-    for title, model, options in models(folder):
-        daemon = Daemon()
-        try:
-            runs, again = [], None
-            for run in range(RUNS + 1):
-                frames, client = records(FARLIGHT, "render", model, "-o", f"{daemon.folder}/x.png", "--size", "640x480",
-                                         "--depth", "4", "--server", daemon.address, "--timings=json", *options)
-                if run == 0:
-                    first = client
-                else:
-                    runs.append(frames[0])
-                    again = client
-            median = {s: statistics.median(stage_ms(f, s) for f in runs) for s in STAGES}
-            rays = runs[0]["primary_rays"] + runs[0]["shadow_rays"] + runs[0]["secondary_rays"]
-            rate = rays / 1e3 / max(median["primary"] + median["trace"], 1e-9)
-            print(f"{title:24} {first['import_ns'] / 1e6:7.0f} {first['upload_ns'] / 1e6:7.1f} " +
-                  " ".join(f"{median[s]:8.1f}" for s in STAGES[1:]) + f" {rate:7.2f} {again['uploaded_bytes']:10d}",
-                  flush=True)
-        finally:
-            daemon.close()
-
-
-def start_table():
-    print("\n## Starting: seconds, median of 9, help texts\n")
-    for name, arguments in (("farlight --help", [FARLIGHT, "--help"]), ("farlightd --help", [BUILD / "farlightd", "--help"]),
-                            ("farlight-import --help", [BUILD / "farlight-import", "--help"]),
-                            ("farlight-export --help", [BUILD / "farlight-export", "--help"])):
-        print(f"{name:28} {statistics.median(timed(*arguments) for _ in range(9)):8.4f}")
-    daemon = Daemon()
+def load(path):
     try:
-        stats = statistics.median(timed(FARLIGHT, "stats", "--server", daemon.address) for _ in range(9))
-    finally:
-        daemon.close()
-    importer = statistics.median(timed(BUILD / "farlight-import", "--help") for _ in range(9))
-    print(f"{'farlight stats':28} {stats:8.4f}   {stats / importer:.3f} of farlight-import --help (wanted: at most 0.1)")
+        document = json.loads(path.read_text())
+        return document if document.get("format") == 1 else None
+    except (OSError, ValueError):
+        return None
 
 
-def animation_table(folder):
-    print("\n## An animation over the socket: teapot, 24 frames, 480x270, one sample\n")
-    daemon = Daemon()
-    try:
-        arguments = [FARLIGHT, "animate", folder / "teapot.glb", "--environment", folder / "sky.hdr", "--frames", "1-24",
-                     "--size", "480x270", "--orbit", "--server", daemon.address, "--timings=json", "--quiet", "-o",
-                     f"{daemon.folder}/%04d.jpg"]
-        records(*arguments)  # warm-up
-        frames, client = records(*arguments)
-    finally:
-        daemon.close()
-    wall_ms = client["wait_ns"] / 1e6
-    per_stage = {s: sum(stage_ms(f, s) for f in frames) for s in STAGES}
-    render_ms = sum(per_stage[s] for s in STAGES[:8])
-    slowest = max(render_ms, per_stage["encode"], per_stage["send"])
-    busy = max(wall_ms, client["total_ns"] / 1e6 - client["start_ns"] / 1e6 - client["load_ns"] / 1e6)
-    print(f"frames per second          {1000 * len(frames) / busy:8.2f}")
-    print(f"render, encode, send, ms   {render_ms / len(frames):8.2f} {per_stage['encode'] / len(frames):8.2f} "
-          f"{per_stage['send'] / len(frames):8.2f}   a frame")
-    print(f"share of the time that is not the slowest stage: {max(0.0, 1 - slowest / busy):.3f}")
+def section(title, text):
+    return f"## {title}\n\n{text}\n"
 
 
-def glb_triangles(path):
-    """Offsets of positions and indices in a GLB of one float mesh: what the yardstick reads."""
-    data = path.read_bytes()
-    json_bytes = struct.unpack_from("<I", data, 12)[0]
-    gltf = json.loads(data[20:20 + json_bytes])
-    base = 20 + json_bytes + 8
-    primitive = gltf["meshes"][0]["primitives"][0]
-
-    def place(accessor):
-        view = gltf["bufferViews"][accessor["bufferView"]]
-        return base + view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-    positions = gltf["accessors"][primitive["attributes"]["POSITION"]]
-    indices = gltf["accessors"][primitive["indices"]]
-    return place(positions), positions["count"], place(indices), indices["count"] // 3
+def part_section(name, data):
+    title, _, show = PARTS[name]
+    text = show(data)
+    if data.get("left_out"):
+        text += "\n\nleft out, as they are not below FARLIGHT_SCENES: " + ", ".join(data["left_out"])
+    return section(title, text)
 
 
-def one_shot_table():
-    model = SHARED / "common/dragon-871k.glb"
-    if not model.is_file():
-        print("\nleft out: dragon-871k.glb is not below FARLIGHT_SCENES")
-        return
-    print("\n## One command, private daemon: dragon-871k.glb to a 1280x720 PNG; milliseconds\n")
-    embree = BUILD / "tests/bench/embree_build"
-    yardstick = json.loads(command(embree, model, *glb_triangles(model)))
-    best = sum(yardstick.values()) / 1e6
-    folder = tempfile.mkdtemp(prefix="farlight-bench-")
-    runs = []
-    for run in range(RUNS + 1):
+def show_environment(facts):
+    where = "software GL" if facts["software"] else "GPU"
+    return (f"farlight {facts['commit']}, {facts['date']}\n{facts['device']} ({where}), {facts['version']}\n"
+            f"{facts['processor']}, {facts['processors']} processors; Embree {facts['embree']}\n")
+
+
+def render(document):
+    sections = [show_environment(document["environment"])]
+    sections += [part_section(name, document["parts"][name]) for name in PARTS if name in document["parts"]]
+    if "wanted" in document["parts"]:
+        sections.append(section(WANTED_TITLE, bench_reach.show(document["parts"]["wanted"])))
+    return "\n".join(sections)
+
+
+def write(document, out):
+    wanted = bench_reach.derive(document["parts"])
+    if wanted:
+        document["parts"]["wanted"] = wanted
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "bench.json").write_text(json.dumps(document, indent=1) + "\n")
+    (out / "bench.txt").write_text(render(document))
+
+
+def measure(bench, names, document, out):
+    """Part by part; what is done is written at once, so that an interrupted run has left something."""
+    for number, name in enumerate(names, 1):
+        title, run_part, _ = PARTS[name]
+        say(f"[{number}/{len(names)}] {name}: {title[0].lower()}{title[1:]}")
         begin = time.monotonic()
-        frames, client = records(FARLIGHT, "render", model, "-o", f"{folder}/x.png", "--size", "1280x720", "--timings=json")
-        wall_ms = 1000 * (time.monotonic() - begin)
-        if run:
-            runs.append((wall_ms, frames[0], client))
-    shutil.rmtree(folder)
-    runs.sort(key=lambda r: r[0])
-    wall_ms, frame, client = runs[len(runs) // 2]
-    rows = [("whole command", wall_ms), ("start of the daemon", client["start_ns"] / 1e6), ("load", client["load_ns"] / 1e6),
-            ("  importer's own work", client["import_ns"] / 1e6), ("  upload over the socket", client["upload_ns"] / 1e6),
-            ("  commit", client["commit_ns"] / 1e6)]
-    rows += [(f"frame: {stage}", stage_ms(frame, stage)) for stage in STAGES] + [("export", client["export_ns"] / 1e6)]
-    for name, value in rows:
-        print(f"{name:28} {value:9.1f}")
-    import_upload_build = client["load_ns"] / 1e6 + stage_ms(frame, "upload") + stage_ms(frame, "build")
-    print(f"\n{'read + hash + Embree build':28} {best:9.1f}   (" +
-          ", ".join(f"{key[:-3]} {value / 1e6:.1f}" for key, value in yardstick.items()) + ")")
-    print(f"{'import + upload + build':28} {import_upload_build:9.1f}   {import_upload_build / best:.2f} of it "
-          "(wanted: under 5)")
+        try:
+            document["parts"][name] = run_part(bench)
+        except Failure as failure:
+            bench.faults.append(f"{name}: {failure}")
+            say(f"bench: {failure}")
+            continue
+        say(f"    {time.monotonic() - begin:.0f} s")
+        write(document, out)
+        print(part_section(name, document["parts"][name]), flush=True)
+
+
+def run(build, names, out, runs=None, tiny=False):
+    """Measures, writes, prints. Returns what went wrong, as texts."""
+    bench = Bench(build, runs, tiny)
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-bench-"))
+    try:
+        command(bench.program("tests/tools/make_scenes"), folder, *([] if tiny else ["150"]))
+        bench.scenes = folder
+        facts = environment(bench)
+        before = load(out / "bench.json")
+        keep = before and all(before["environment"].get(key) == facts[key] for key in SAME)
+        document = {"format": 1, "environment": facts, "parts": before["parts"] if keep else {}}
+        print(show_environment(facts), flush=True)
+        measure(bench, names, document, out)
+        if "wanted" in document["parts"]:
+            print(section(WANTED_TITLE, bench_reach.show(document["parts"]["wanted"])))
+    except Failure as failure:
+        bench.faults.append(str(failure))
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    return bench.faults
 
 
 def main():
-    folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-bench-"))
-    try:
-        command(BUILD / "tests/tools/make_scenes", folder, "150")
-        start_table()
-        one_shot_table()
-        scene_table(folder)
-        animation_table(folder)
-        print("\n## bvh against its plain form\n", flush=True)
-        subprocess.run([BUILD / "tests/bench/bench_bvh"], check=True)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+    parser = argparse.ArgumentParser(description="Measures farlight; see the head of this file.")
+    parser.add_argument("build", help="folder with the programs, build/release")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS))
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out"), help="where the tables go (out)")
+    parser.add_argument("--runs", type=int, help="how many runs a figure has (3 to 9)")
+    parser.add_argument("--tiny", action="store_true", help="the smallest scenes only: shows that it works, measures nothing")
+    arguments = parser.parse_args()
+    unknown = [name for name in arguments.parts if name not in PARTS]
+    if unknown:
+        parser.error(f"no part is called {', '.join(unknown)}; there are {', '.join(PARTS)}")
+    if arguments.runs is not None and not 1 <= arguments.runs <= 64:
+        parser.error("between 1 and 64 runs")
+    faults = run(arguments.build, arguments.parts or list(PARTS), arguments.out, arguments.runs, arguments.tiny)
+    for fault in faults:
+        print(f"bench: {fault}", file=sys.stderr)
+    print(f"{arguments.out / 'bench.txt'}\n{arguments.out / 'bench.json'}")
+    return 1 if faults else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: MIT */
+/* Contenders take turns at the same wave of rays, run by run, so that a machine that slows down slows all of them;
+ * then their answers are held against the truth, ray by ray. */
+#ifndef FARLIGHT_TESTS_BENCH_CONTEST_H
+#define FARLIGHT_TESTS_BENCH_CONTEST_H
+
+#include "tests/bench/bench_embree.h"
+#include "tests/bench/bench_stats.h"
+#include "tests/bench/bench_waves.h"
+#include "trace/tracer.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define BENCH_CONTENDERS_MAX 32
+
+enum bench_way {
+    BENCH_INTERFACE, /* rays on the device to hits there, or to visibilities */
+    BENCH_WALK,      /* closest hits only: distance, primitive, instance, barycentrics */
+    BENCH_RAW,       /* the same from Embree itself */
+};
+
+struct bench_contender {
+    const char *tracer, *form; /* "bvh", "1 ray" */
+    enum bench_way way;
+    struct tracer *tracer_used;        /* interface and walk */
+    const struct bench_embree *embree; /* raw */
+    unsigned packet;
+    bool is_exact; /* its disagreement is a fault, not a property */
+    /* of the last wave */
+    struct bench_runs runs;
+    bool is_compared;
+    uint32_t differing; /* rays whose answer is not the truth's */
+    uint32_t edges;     /* of them: the truth gives that answer to a ray a hair's breadth away */
+};
+
+struct bench_contest {
+    struct gpu_device *device;
+    struct bench_scene *scene;
+    struct bench_contender contenders[BENCH_CONTENDERS_MAX];
+    unsigned contender_count, runs;
+    struct gpu_buffer ray_buffer, answer_buffer;
+};
+
+/* A wave on the host. */
+struct bench_wave {
+    enum bench_wave_kind kind;
+    const struct ray *rays;
+    uint32_t ray_count;
+};
+
+/* The one that is added, zeroed but for the arguments; the array has room for BENCH_CONTENDERS_MAX. */
+struct bench_contender *bench_contest_add(struct bench_contest *contest, const char *tracer, const char *form,
+                                          enum bench_way way);
+/* Whether a contender can be asked about such a wave and means the same by it. */
+bool bench_contest_fits(const struct bench_contest *contest, const struct bench_contender *contender,
+                        enum bench_wave_kind kind);
+/* A warm-up, then the runs; fills what the contenders know of the last wave. */
+bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *wave, struct error *error);
+/* One untimed run through the interface: the hits, for what is made of them. */
+bool bench_contest_hits(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
+                        struct hit *hits, struct error *error);
+/* More than 0.01 % of the rays wrong, edges aside. */
+bool bench_contender_failed(const struct bench_contender *contender, uint32_t ray_count);
+void bench_contest_finish(struct bench_contest *contest); /* the buffers */
+
+#endif

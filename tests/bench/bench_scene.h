@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: MIT */
+/* What is looked at: a model or one of a family of like scenes, on the device, with a camera and a light. */
+#ifndef FARLIGHT_TESTS_BENCH_SCENE_H
+#define FARLIGHT_TESTS_BENCH_SCENE_H
+
+#include "render/frame.h"
+#include "tests/bench/load_model.h"
+#include "trace/scene_gpu.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct bench_scene_options {
+    const char *model;         /* a file; NULL: the family */
+    uint32_t family_triangles; /* about so many */
+    bool has_eye;              /* else the model's first camera, or one that sees all */
+    float eye[3], look_at[3], up[3], fov_y;
+    float aspect;
+};
+
+struct bench_scene {
+    struct loaded_model loaded;
+    struct scene_gpu gpu;
+    struct frame_camera camera;            /* perspective */
+    float light_world[3];                  /* a point that shadow rays go to */
+    uint64_t triangle_count, sphere_count; /* as the rays meet them: every instance counts */
+};
+
+/* The device must be current. Zeroes *scene first, which is to be finished either way. */
+bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
+                      const struct bench_scene_options *options, struct error *error);
+void bench_scene_finish(struct bench_scene *scene);
+
+/* Nine bumpy spheres on a floor, one mesh: the tree is to be measured, not the number of instances. */
+struct scene *bench_family_scene(uint32_t triangles);
+
+#endif

@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: MIT */
+/* A figure of a benchmark: several runs, told as their median and how far they lie from it. */
+#ifndef FARLIGHT_TESTS_BENCH_STATS_H
+#define FARLIGHT_TESTS_BENCH_STATS_H
+
+#include <stdint.h>
+
+#define BENCH_RUNS_MAX 64
+
+struct bench_runs {
+    uint64_t times_ns[BENCH_RUNS_MAX];
+    unsigned count;
+};
+
+struct bench_figure {
+    double median_ns, least_ns, greatest_ns;
+    double deviation_ns; /* median of the absolute deviations from the median */
+};
+
+void bench_add(struct bench_runs *runs, uint64_t time_ns);       /* beyond BENCH_RUNS_MAX: forgotten */
+struct bench_figure bench_figure(const struct bench_runs *runs); /* all zero where there are no runs */
+
+#endif

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT
+"""The benchmark itself, on the smallest scenes: that it runs, and that its JSON has what is documented."""
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from farlight_test import BIN, ROOT, TIMEOUT_S
+
+BENCH = ROOT / "tests" / "bench"
+sys.path.insert(0, str(BENCH))
+import bench_common  # noqa: E402  pylint: disable=wrong-import-position
+import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
+import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
+import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
+
+PARTS = ("frames", "tracers", "family", "pixels", "rays", "reach")
+
+
+class Figures(unittest.TestCase):
+    def test_a_power_law_is_found_with_no_error(self):
+        slope, error = bench_common.fit_exponent([(n, 3 * n ** 0.25) for n in (1000, 2000, 4000, 8000)])
+        self.assertAlmostEqual(slope, 0.25, places=9)
+        self.assertAlmostEqual(error, 0, places=9)
+
+    def test_a_bent_law_has_an_error_and_two_points_have_no_fit(self):
+        _, error = bench_common.fit_exponent([(1, 1), (2, 4), (4, 5)])
+        self.assertGreater(error, 0.1)
+        self.assertIsNone(bench_common.fit_exponent([(1, 1), (2, 4)]))
+
+    def test_what_slows_both_of_two_that_take_turns_leaves_their_ratio(self):
+        ratio = bench_common.paired_ratio([10, 40, 10], [5, 20, 5])
+        self.assertEqual((ratio["median"], ratio["deviation"]), (2, 0))
+
+    def test_runs_there_and_back_are_put_together(self):
+        def result(*times):
+            time = {"runs_ns": list(times)}
+            return {"structures": [{"build": dict(time, runs_ns=list(times))}],
+                    "waves": [{"rays": 1000, "measures": [{"time": time}]}]}
+        joined = result(10, 20, 30)
+        bench_rays.join(joined, result(40, 50))
+        measure = joined["waves"][0]["measures"][0]
+        self.assertEqual((measure["time"]["median_ns"], measure["time"]["greatest_ns"]), (30, 50))
+        self.assertEqual(joined["structures"][0]["build"]["runs_ns"], [10, 20, 30, 40, 50])
+        self.assertAlmostEqual(measure["rays_per_s"] * 30e-9, 1000)
+
+    def test_counts_are_short_on_an_axis(self):
+        self.assertEqual([bench_plot.count_text(n) for n in (884, 2180, 64514, 1028180)], ["884", "2.2K", "65K", "1M"])
+
+
+class Verdicts(unittest.TestCase):
+    def verdict(self, median, deviation, **how):
+        return bench_reach.verdict(bench_reach.row("line", 0.8, {"median": median, "deviation": deviation}, "", **how))
+
+    def test_what_is_reached_by_the_median_is_met(self):
+        self.assertEqual(self.verdict(0.8, 0.1), "met")
+        self.assertEqual(self.verdict(0.7, 0.1, at_most=True), "met")
+
+    def test_a_miss_within_twice_the_deviation_is_told_from_one_beyond(self):
+        self.assertEqual(self.verdict(0.7, 0.06), "missed, within the spread")
+        self.assertEqual(self.verdict(0.7, 0.04), "MISSED")
+        self.assertEqual(self.verdict(0.9, 0.04, at_most=True), "MISSED")
+
+
+@unittest.skipUnless((BIN / "tests/bench/bench_tracers").is_file(), "built without Embree, which the benchmark compares with")
+class Benchmark(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.out = pathlib.Path(tempfile.mkdtemp(prefix="farlight-bench-"))
+        cls.result = subprocess.run([sys.executable, BENCH / "bench.py", BIN, *PARTS, "--tiny", "--runs", "1", "--out",
+                                     cls.out], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False,
+                                    timeout=TIMEOUT_S, cwd=ROOT, env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"})
+        text = (cls.out / "bench.json").read_text() if (cls.out / "bench.json").is_file() else "{}"
+        cls.document = json.loads(text)
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.out, ignore_errors=True)
+
+    def test_a_tiny_run_succeeds_and_names_its_files(self):
+        self.assertEqual(self.result.returncode, 0, self.result.stderr[-2000:])
+        self.assertEqual(self.result.stdout.split()[-2:], [str(self.out / "bench.txt"), str(self.out / "bench.json")])
+
+    def test_it_says_where_it_was_measured(self):
+        for key in ("date", "commit", "processor", "processors", "device", "vendor", "version", "software", "embree"):
+            self.assertIn(key, self.document["environment"])
+        self.assertEqual(set(self.document["parts"]), {*PARTS, "wanted"})
+
+    def test_every_result_has_structures_and_waves_that_agree_with_the_reference(self):
+        results = [r for part in PARTS[1:] for r in self.document["parts"][part]["results"]]
+        self.assertGreaterEqual(len(results), 11)
+        for result in results:
+            self.assertGreater(result["triangles"] + result["spheres"], 0)
+            tracers = {(s["tracer"], s["form"]) for s in result["structures"]}
+            self.assertLessEqual({("bvh", "auto"), ("embree", "default")}, tracers)
+            for structure in result["structures"]:
+                self.assertGreater(structure["build"]["median_ns"], 0)
+            for wave in result["waves"]:
+                self.assertGreater(wave["rays"], 0)
+                for measure in wave["measures"]:
+                    self.assertGreater(measure["rays_per_s"], 0)
+                    self.assertEqual(len(measure["time"]["runs_ns"]), 1)
+                    self.assertFalse(measure.get("agreement", {}).get("failed"), (result["title"], wave["kind"], measure))
+
+    def test_embree_is_there_with_1_8_and_16_rays_a_call_beside_the_walk(self):
+        result = self.document["parts"]["reach"]["results"][0]
+        self.assertEqual([w["kind"] for w in result["waves"]], [*bench_rays.WAVES, "shuffled"])
+        for wave in result["waves"]:
+            for form in ("1 a call", "8 a call", "16 a call", "1 a call, robust"):
+                self.assertIsNotNone(bench_rays.find_measure(wave, "embree", form, "raw"), (wave["kind"], form))
+            walk = bench_rays.find_measure(wave, "bvh", "auto", "walk")
+            self.assertEqual(walk["agreement"]["differing"] - walk["agreement"]["edges"], 0)
+
+    def test_rays_per_pixel_multiply_the_rays(self):
+        rays = {r["rays_per_pixel"]: next(w["rays"] for w in r["waves"] if w["kind"] == "bounce")
+                for r in self.document["parts"]["rays"]["results"]}
+        self.assertEqual(rays[4], 4 * rays[1])
+
+    def test_the_wanted_lines_have_a_verdict_and_stand_in_the_text(self):
+        text = (self.out / "bench.txt").read_text()
+        rows = self.document["parts"]["wanted"]["rows"]
+        for part in ("rtcIntersect1", "as many together as chosen / 1 ray", "exponent of time against triangles"):
+            self.assertTrue(any(part in row["line"] for row in rows), part)
+        for row in rows:
+            self.assertIn(row["met"], (True, False))
+            self.assertFalse(row["met"] and row["within_spread"], row)
+            self.assertIn(row["line"], text)
+
+    @unittest.skipUnless(shutil.which("gnuplot"), "gnuplot is not installed")
+    def test_the_curves_are_drawn(self):
+        paths = bench_plot.draw(self.document, self.out)
+        self.assertEqual(len(paths), 8)
+        for path in paths:
+            start = path.read_bytes()[:200]
+            self.assertTrue(start.startswith(b"\x89PNG") or b"<svg" in start, path)
+
+    def test_a_part_that_is_not_there_is_a_usage_error(self):
+        result = subprocess.run([sys.executable, BENCH / "bench.py", BIN, "speed"], stdout=subprocess.PIPE,
+                                stderr=subprocess.PIPE, text=True, check=False, timeout=TIMEOUT_S, cwd=ROOT)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("speed", result.stderr)
