@@ -76,6 +76,7 @@ const char *stage_name(enum stage_id stage)
         [STAGE_PRIMARY] = "primary", [STAGE_TRACE] = "trace",       [STAGE_SHADE] = "shade",
         [STAGE_RESOLVE] = "resolve", [STAGE_READBACK] = "readback", [STAGE_ENCODE] = "encode",
         [STAGE_QUEUE] = "queue",     [STAGE_SEND] = "send",         [STAGE_FRAME] = "frame",
+        [STAGE_COMPARE] = "compare",
     };
     return (unsigned)stage < STAGE_COUNT ? names[stage] : "unknown";
 }

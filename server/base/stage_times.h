@@ -21,6 +21,7 @@ enum stage_id {
     STAGE_QUEUE,
     STAGE_SEND,
     STAGE_FRAME,
+    STAGE_COMPARE,
     STAGE_COUNT
 };
 

@@ -15,7 +15,7 @@
 
 /* ---- start -------------------------------------------------------------------------------------- */
 
-static bool tracer_check(unsigned number, struct error *error)
+static bool tracer_check(unsigned number, const char *field, struct error *error)
 {
     if (tracer_impl_by_number(number))
         return true;
@@ -26,7 +26,7 @@ static bool tracer_check(unsigned number, struct error *error)
         if (impl)
             used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", used ? ", " : "", impl->name);
     }
-    error_set(error, ERROR_UNSUPPORTED, "render.tracer", "this build has no tracer number %u", number);
+    error_set(error, ERROR_UNSUPPORTED, field, "this build has no tracer number %u", number);
     return error_remedy(error, "available: %s", list);
 }
 
@@ -52,7 +52,9 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
                   (unsigned)spec->encoding, bytes_per_pixel(spec->frame.format));
         return error_remedy(error, "use the pixel format rgba8, or the encoding zstd or raw");
     }
-    return tracer_check(spec->frame.tracer, error) && animation_check(spec, scene, error);
+    return tracer_check(spec->frame.tracer, "render.tracer", error) &&
+           (!spec->frame.compare || tracer_check(spec->frame.compare_with, "render.compare_with", error)) &&
+           animation_check(spec, scene, error);
 }
 
 static bool jobs_reserve(struct engine *engine)

@@ -22,6 +22,7 @@ struct render_context {
     struct gpu_device *device;
     struct scene_gpu *scene;
     struct tracer *tracer;
+    struct comparison *comparison; /* of the frame in hand; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;
     struct stage_times times;

@@ -6,11 +6,13 @@
 #include "base/clock.h"
 #include "render/camera.h"
 #include "render/compact.h"
+#include "render/comparison.h"
 #include "render/context.h"
 #include "render/integrator.h"
 #include "render/picture.h"
 #include "render/primary.h"
 #include "render/tracer_set.h"
+#include "render/wave_trace.h"
 #include "shared/path.h"
 
 #include <math.h>
@@ -34,6 +36,9 @@ struct frame_renderer {
     struct render_context context;
     struct primary primary;
     struct picture picture;
+    struct comparison *comparison; /* NULL: no frame has asked for one */
+    const struct tracer_impl *stand_in;
+    unsigned stand_in_number;
     uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */
     /* the frame in hand */
     enum frame_phase phase;
@@ -49,6 +54,7 @@ struct frame_renderer {
 void frame_result_finish(struct frame_result *result)
 {
     free(result->pixels);
+    free(result->comparisons);
     *result = (struct frame_result){0};
 }
 
@@ -84,6 +90,7 @@ void frame_renderer_destroy(struct frame_renderer *renderer)
     if (!renderer)
         return;
     destroy_integrator(renderer);
+    comparison_destroy(renderer->comparison);
     tracer_set_finish(&renderer->tracers);
     primary_finish(&renderer->primary, renderer->device);
     picture_finish(&renderer->picture, renderer->device);
@@ -99,6 +106,18 @@ void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice
     renderer->wanted_wave_rays = wave_rays;
 }
 
+void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, const struct tracer_impl *impl)
+{
+    renderer->stand_in = impl;
+    renderer->stand_in_number = number;
+}
+
+static const struct tracer_impl *find_tracer(const struct frame_renderer *renderer, unsigned number)
+{
+    bool stands_in = renderer->stand_in && renderer->stand_in_number == number;
+    return stands_in ? renderer->stand_in : tracer_impl_by_number(number);
+}
+
 uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer)
 {
     uint64_t sum = scene_gpu_device_bytes(&renderer->scene) + tracer_set_device_bytes(&renderer->tracers) +
@@ -108,11 +127,14 @@ uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer)
         sum += renderer->picture.bands[i].capacity_bytes;
     if (renderer->integrator)
         sum += renderer->integrator->impl->device_bytes(renderer->integrator);
+    if (renderer->comparison)
+        sum += comparison_device_bytes(renderer->comparison);
     return sum;
 }
 
 /* The session has checked what a client sent; this is what would go wrong here all the same. */
-static bool check_request(const struct frame_request *request, struct error *error)
+static bool check_request(const struct frame_renderer *renderer, const struct frame_request *request,
+                          struct error *error)
 {
     if (request->width == 0 || request->height == 0 || request->width > SIZE_MAX_PIXELS ||
         request->height > SIZE_MAX_PIXELS)
@@ -120,9 +142,12 @@ static bool check_request(const struct frame_request *request, struct error *err
                          request->width, request->height, SIZE_MAX_PIXELS);
     if (request->samples == 0)
         return error_set(error, ERROR_INVALID, "samples", "a picture of no samples");
-    if (!tracer_impl_by_number(request->tracer))
+    if (!find_tracer(renderer, request->tracer))
         return error_set(error, ERROR_UNSUPPORTED, "tracer", "this build has no tracer number %u",
                          request->tracer);
+    if (request->compare && !find_tracer(renderer, request->compare_with))
+        return error_set(error, ERROR_UNSUPPORTED, "compare_with", "this build has no tracer number %u",
+                         request->compare_with);
     if (!integrator_impl_by_number(request->integrator))
         return error_set(error, ERROR_UNSUPPORTED, "integrator", "there is no integrator number %u",
                          (unsigned)request->integrator);
@@ -152,7 +177,7 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     if (!updated)
         return false;
     renderer->result.uploaded_bytes = changes.uploaded_bytes;
-    context->tracer = tracer_set_get(&renderer->tracers, &renderer->scene, tracer_impl_by_number(request->tracer),
+    context->tracer = tracer_set_get(&renderer->tracers, &renderer->scene, find_tracer(renderer, request->tracer),
                                      &request->tracer_options, &context->times, error);
     if (!context->tracer)
         return false;
@@ -163,6 +188,31 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     updated = environment_update(&context->environment, renderer->device, scene, &renderer->scene, error);
     stage_times_add(&context->times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return updated;
+}
+
+/* The second tracer's structure is no part of what the frame's own tracer cost. */
+static bool begin_comparison(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->context;
+    const struct frame_request *request = &context->request;
+    context->comparison = NULL;
+    if (!request->compare) {
+        comparison_destroy(renderer->comparison);
+        renderer->comparison = NULL;
+        return true;
+    }
+    uint64_t start_ns = clock_now_ns();
+    struct tracer *second =
+        tracer_set_get(&renderer->tracers, &renderer->scene, find_tracer(renderer, request->compare_with),
+                       &request->tracer_options, NULL, error);
+    if (!renderer->comparison)
+        renderer->comparison = comparison_create(renderer->device, error);
+    if (!second || !renderer->comparison)
+        return false;
+    comparison_begin(renderer->comparison, &renderer->scene, context->tracer, second, request->compare_far_share);
+    context->comparison = renderer->comparison;
+    stage_times_add(&context->times, STAGE_COMPARE, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    return true;
 }
 
 static uint32_t at_least(uint32_t value, uint32_t least)
@@ -200,8 +250,8 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     if (!reserve_waves(renderer, error))
         return false;
     /* A picture too large for the visibility buffer is traced from the first ray: the same hits, another way. */
-    renderer->rasterise =
-        context->request.primary == PRIMARY_RASTER && primary_reserve(&renderer->primary, context, NULL);
+    renderer->rasterise = context->request.primary == PRIMARY_RASTER && !context->request.compare &&
+                          primary_reserve(&renderer->primary, context, NULL);
     return true;
 }
 
@@ -210,12 +260,12 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
 {
     struct render_context *context = &renderer->context;
     frame_abandon(renderer);
-    if (!check_request(request, error))
+    if (!check_request(renderer, request, error))
         return false;
     context->request = *request;
     renderer->result = (struct frame_result){0};
     stage_times_begin(&context->times);
-    if (!update_scene(renderer, scene, error))
+    if (!update_scene(renderer, scene, error) || !begin_comparison(renderer, error))
         return false;
     camera_fill_uniforms(&context->uniforms, request, &renderer->scene);
     environment_fill_uniforms(&context->environment, &context->uniforms, &renderer->scene);
@@ -289,6 +339,8 @@ static bool split_slice(struct frame_renderer *renderer, struct error *error)
     struct render_context *context = &renderer->context;
     struct slice *slice = &context->slice;
     renderer->result.splits++;
+    if (context->comparison)
+        comparison_drop_slice(context->comparison);
     renderer->phase = PHASE_SLICE;
     if (slice->slot_count == 1) {
         if (context->wave_capacity > renderer->device->facts.storage_block_bytes_max / sizeof(struct child) / 8)
@@ -312,10 +364,7 @@ static bool trace_wave(struct render_context *context, struct error *error)
         .rays = &context->rays,
         .hits = &context->hits,
     };
-    context_span_begin(context, STAGE_TRACE);
-    bool traced = tracer_trace(context->tracer, context->scene, &wave, error);
-    context_span_end(context);
-    if (!traced || !gpu_check(context->device, "tracing a wave", error))
+    if (!wave_trace(context, RAY_SECONDARY, &wave, error))
         return false;
     context_span_begin(context, STAGE_SHADE);
     bool listed = compact_hits(context, error);
@@ -335,17 +384,21 @@ static bool shade_wave(struct frame_renderer *renderer, struct error *error)
         renderer->result.shadow_rays += context->shadow_rays;
         renderer->result.secondary_rays += context->secondary_rays;
         renderer->phase = PHASE_SLICE;
-        return picture_accumulate(&renderer->picture, context, error);
+        return (!context->comparison || comparison_keep_slice(context->comparison, error)) &&
+               picture_accumulate(&renderer->picture, context, error);
     case INTEGRATOR_FAILED:
         break;
     }
     return false;
 }
 
-static void hand_out(struct frame_renderer *renderer, struct frame_result *result)
+static bool hand_out(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
 {
     struct render_context *context = &renderer->context;
     const struct frame_request *request = &context->request;
+    if (context->comparison && !comparison_take(context->comparison, &renderer->result.comparisons,
+                                                &renderer->result.comparison_count, error))
+        return false;
     context_collect(context);
     stage_times_add(&context->times, STAGE_FRAME, STAGE_CPU, 0, context->times.origin_ns,
                     clock_now_ns() - context->times.origin_ns);
@@ -359,6 +412,7 @@ static void hand_out(struct frame_renderer *renderer, struct frame_result *resul
     result->primary_rays = (uint64_t)request->width * request->height * request->samples;
     result->times = context->times;
     renderer->phase = PHASE_IDLE;
+    return true;
 }
 
 enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
@@ -390,6 +444,8 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
     }
     if (renderer->phase != PHASE_RESOLVE || renderer->band < renderer->picture.band_count)
         return FRAME_MORE;
-    hand_out(renderer, result);
-    return FRAME_DONE;
+    if (hand_out(renderer, result, error))
+        return FRAME_DONE;
+    frame_abandon(renderer);
+    return FRAME_FAILED;
 }

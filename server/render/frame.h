@@ -8,6 +8,7 @@
 #include "gpu/device.h"
 #include "scene/scene.h"
 #include "trace/tracer.h"
+#include "trace/wave_compare.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -36,6 +37,11 @@ struct frame_request {
     enum frame_tone_map tone_map;
     enum frame_format format;
     float exposure_stops;
+    /* Every wave is traced by a second tracer too, primary rays included (`primary` is taken to be PRIMARY_TRACE),
+     * and the result has what came of it. The picture is that of `tracer`. */
+    bool compare;
+    unsigned compare_with;   /* protocol's number; with the same options */
+    float compare_far_share; /* 0: WAVE_FAR_SHARE, see trace/wave_compare.h */
 };
 
 /* What a picture holds:
@@ -54,6 +60,8 @@ struct frame_result {
     uint64_t primary_rays, shadow_rays, secondary_rays, splits;
     uint64_t uploaded_bytes, structure_bytes;
     struct stage_times times;
+    struct wave_comparison *comparisons; /* owned; ascending by wave and kind; NULL: nothing was compared */
+    uint32_t comparison_count;
 };
 void frame_result_finish(struct frame_result *result);
 
@@ -76,6 +84,8 @@ uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer);
 /* How many pixels a slice has and how many rays a wave may have; 0: chosen for the device. A wave that becomes
  * larger than that splits its slice, which costs time and never changes the picture. From the next frame on. */
 void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice_pixels, uint32_t wave_rays);
+/* For tests: from the next frame on `impl` stands for that number of tracer_impl_by_number(); NULL: none does. */
+void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, const struct tracer_impl *impl);
 
 /* A camera that sees all of the bounds, from the front right above, as `--camera auto` does. */
 void frame_camera_auto(struct frame_camera *camera, const float lower[3], const float upper[3], float aspect);

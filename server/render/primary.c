@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/primary.h"
 
+#include "render/wave_trace.h"
+
 #include "render/compact.h"
 #include "shared/bindings.h"
 #include "shared/path.h"
@@ -182,6 +184,7 @@ static bool fill_hits(struct render_context *context, struct error *error)
     return true;
 }
 
+/* Between two spans of the caller's. */
 static bool trace_hits(struct render_context *context, struct error *error)
 {
     const struct wave wave = {
@@ -191,7 +194,10 @@ static bool trace_hits(struct render_context *context, struct error *error)
         .hits = &context->hits,
         .coherent = true,
     };
-    return tracer_trace(context->tracer, context->scene, &wave, error);
+    context_span_end(context);
+    bool traced = wave_trace(context, RAY_PRIMARY, &wave, error);
+    context_span_begin(context, STAGE_PRIMARY);
+    return traced;
 }
 
 bool primary_slice(const struct primary *primary, struct render_context *context, struct error *error)

@@ -4,6 +4,7 @@
  * shaders/render/whitted.comp. */
 #include "render/compact.h"
 #include "render/integrator.h"
+#include "render/wave_trace.h"
 
 #include "shared/bindings.h"
 #include "shared/hit.h"
@@ -168,10 +169,7 @@ static bool trace_shadows(struct whitted *whitted, struct render_context *contex
         .visibility = &whitted->visibility,
         .coherent = context->wave_number == 0, /* neighbours on the picture look at the same light */
     };
-    context_span_begin(context, STAGE_TRACE);
-    bool traced = tracer_trace(context->tracer, context->scene, &wave, error);
-    context_span_end(context);
-    return traced;
+    return wave_trace(context, RAY_SHADOW, &wave, error);
 }
 
 static bool gather_pass(struct whitted *whitted, struct render_context *context, bool first, uint32_t light_count,

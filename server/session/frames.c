@@ -121,6 +121,36 @@ static void fill_begin(struct message_frame_begin *begin, const struct engine_fr
     begin->time_s = frame->time_s;
 }
 
+static uint32_t fill_comparisons(struct record_wave_comparison *records, const struct frame_result *result)
+{
+    uint32_t count = result->comparison_count < COMPARISONS_MAX ? result->comparison_count : COMPARISONS_MAX;
+    for (uint32_t i = 0; i < count; i++) {
+        const struct wave_comparison *from = &result->comparisons[i];
+        records[i] = (struct record_wave_comparison){
+            .wave = from->wave,
+            .kind = (enum protocol_ray_kind)from->kind,
+            .rays = from->rays,
+            .both_hit = from->both_hit,
+            .both_missed = from->both_missed,
+            .only_tracer = from->only_first,
+            .only_reference = from->only_second,
+            .far = from->far,
+            .edges = from->edges,
+            .other_surface = from->other_surface,
+            .tracer_ns = from->first_ns,
+            .reference_ns = from->second_ns,
+            .distance_median = from->distance_median,
+            .distance_p99 = from->distance_p99,
+            .distance_greatest = from->distance_greatest,
+            .relative_median = from->relative_median,
+            .normal_median = from->normal_median,
+            .normal_p99 = from->normal_p99,
+            .normal_greatest = from->normal_greatest,
+        };
+    }
+    return count;
+}
+
 static void send_end(struct pending_frame *pending, uint64_t now_ns)
 {
     struct job *job = pending->job;
@@ -141,6 +171,7 @@ static void send_end(struct pending_frame *pending, uint64_t now_ns)
             .duration_ns = span->duration_ns,
         };
     }
+    struct record_wave_comparison comparisons[COMPARISONS_MAX];
     struct message message;
     message_init(&message, MESSAGE_FRAME_END);
     message.frame_end.frame = frame->frame;
@@ -152,6 +183,8 @@ static void send_end(struct pending_frame *pending, uint64_t now_ns)
     message.frame_end.structure_bytes = frame->result.structure_bytes;
     message.frame_end.stages = stages;
     message.frame_end.stages_count = times->count;
+    message.frame_end.comparisons = comparisons;
+    message.frame_end.comparisons_count = fill_comparisons(comparisons, &frame->result);
     session_send(job->session, job->request, job->channel, &message);
     const struct hub_options *hub = &job->session->hub->options;
     timeline_frame(hub->timeline, &(struct timeline_frame){.client = job->session->number,

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/* The waves of a frame traced a second time by another tracer, and both answers compared. What is compared and
+ * counted: trace/wave_compare.h. */
+#ifndef FARLIGHT_RENDER_COMPARISON_H
+#define FARLIGHT_RENDER_COMPARISON_H
+
+#include "base/error.h"
+#include "gpu/device.h"
+#include "trace/tracer.h"
+#include "trace/wave_compare.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct comparison;
+
+struct comparison *comparison_create(struct gpu_device *device, struct error *error);
+void comparison_destroy(struct comparison *comparison); /* accepts NULL */
+uint64_t comparison_device_bytes(const struct comparison *comparison);
+
+/* A frame begins. The tracers are brought to the scene already and live as long as the frame; far_share as in
+ * wave_compare_settings, 0: WAVE_FAR_SHARE. */
+void comparison_begin(struct comparison *comparison, struct scene_gpu *scene, struct tracer *first,
+                      struct tracer *second, float far_share);
+/* Before the first tracer traces the wave: compiles what both need for it, so that their times are of tracing
+ * alone, and waits until the device has nothing else to do. */
+bool comparison_prepare(struct comparison *comparison, const struct wave *wave, struct error *error);
+/* The wave has been traced, in first_ns, and its buffers hold the answers. The scene is bound. */
+bool comparison_wave(struct comparison *comparison, const struct wave *wave, enum ray_kind kind,
+                     uint32_t wave_number, uint64_t first_ns, struct error *error);
+/* The slice in hand has reached the picture, and what was counted of it counts; or it is done again in parts. */
+bool comparison_keep_slice(struct comparison *comparison, struct error *error);
+void comparison_drop_slice(struct comparison *comparison);
+/* The figures of the frame, ascending by wave and kind; malloc'ed, the caller's. */
+bool comparison_take(struct comparison *comparison, struct wave_comparison **figures, uint32_t *count,
+                     struct error *error);
+
+#endif
