@@ -6,6 +6,7 @@
 #include "lib/farlight.h"
 
 #include <argp.h>
+#include <jansson.h>
 
 /* Exit statuses; 128 + signal besides. */
 enum cli_status {
@@ -21,6 +22,7 @@ int cli_render(int argc, char **argv);
 int cli_animate(int argc, char **argv);
 int cli_info(int argc, char **argv);
 int cli_compare(int argc, char **argv);
+int cli_compare_tracers(int argc, char **argv); /* where cli_compare finds --tracers */
 int cli_stats(int argc, char **argv);
 int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
@@ -29,6 +31,7 @@ int cli_bridge(int argc, char **argv);
 
 /* "farlight: FIELD: TEXT (REMEDY)"; returns the exit status that belongs to the error. */
 int cli_report(const struct fl_error *error);
+int cli_trouble(const struct fl_error *error); /* likewise, of `compare` (compare.c): 2 where others say 1 */
 /* A note about a model: warnings always, plain information only if `chatty`. */
 void cli_note(const struct fl_note *note, bool chatty);
 bool cli_is_terminal(int fd); /* one that can move its cursor */
@@ -93,6 +96,8 @@ struct cli_job {
 
 /* A child parser; its input is a struct cli_job. */
 extern const struct argp cli_job_argp;
+/* Likewise, without what says where the picture goes, which tracer makes it and how its first hits are found. */
+const struct argp *cli_picture_argp(void);
 /* Defaults, then FARLIGHT_*; before the command line is read. */
 bool cli_job_begin(struct cli_job *job);
 /* Sets the job's error and returns EINVAL. */
@@ -100,6 +105,35 @@ error_t cli_usage(struct cli_job *job, const char *field, const char *format, ..
     __attribute__((format(printf, 3, 4)));
 /* After the command line: what depends on several options. `is_series`: output is a pattern. */
 bool cli_job_complete(struct cli_job *job, bool is_series);
+
+/* ---- loading.c: from what the command line named to a scene on a daemon ---- */
+
+/* `job` and `progress` are the caller's; the rest is zero at first. */
+struct cli_loading {
+    const struct cli_job *job;
+    struct cli_progress *progress;
+    struct fl_load_options load;
+    struct fl_connection *connection;
+    struct fl_scene *scene;
+    unsigned warnings;
+    uint64_t import_begin_ns, connect_begin_ns; /* monotonic clock */
+};
+
+/* Checks that the files are there, starts the importer and the way to the daemon. */
+bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error);
+/* Waits for the scene. */
+bool cli_loading_end(struct cli_loading *loading, struct fl_error *error);
+void cli_loading_close(struct cli_loading *loading);
+/* Sets the job's camera where the command line leaves it to the model. */
+bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error);
+
+/* ---- wave_table.c: what came of comparing the waves of a frame ---- */
+
+/* Tables and what their columns mean, on standard output. */
+void cli_print_waves(const struct fl_frame *frame, enum protocol_tracer reference, double far_share);
+json_t *cli_waves_json(const struct fl_frame *frame);      /* an object a wave and kind of ray */
+json_t *cli_wave_total_json(const struct fl_frame *frame); /* all of them together */
+double cli_wave_agreement(const struct fl_frame *frame);   /* likewise; see fl_wave_agreement */
 
 /* ---- timings.c ---- */
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is compared is decided by the operands: two image files. */
+/* What is compared is decided by the command line: two image files, or with --tracers two tracers. */
 #include "cli/cli.h"
 #include "cli/comparison.h"
 #include "lib/text.h"
@@ -98,7 +98,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
 }
 
 /* As of cmp and diff: 1 is an answer, so what brought no answer is 2. */
-static int trouble(const struct fl_error *error)
+int cli_trouble(const struct fl_error *error)
 {
     const int status = cli_report(error);
     return status == CLI_FAILED ? CLI_TROUBLE : status;
@@ -165,12 +165,12 @@ static int compare_images(struct comparing *comparing)
     struct fl_error error = {0};
     struct fl_comparison comparison;
     if (!check_picture(comparing, &error) || !cli_interrupt_begin(&error))
-        return trouble(&error);
+        return cli_trouble(&error);
     comparing->options.a = comparing->operands[0];
     comparing->options.b = comparing->operands[1];
     comparing->options.interrupt_fd = cli_interrupt_fd();
     if (!fl_compare(&comparing->options, &comparison, &error))
-        return trouble(&error);
+        return cli_trouble(&error);
     if (comparing->json)
         print_object(comparing, &comparison);
     else
@@ -178,22 +178,34 @@ static int compare_images(struct comparing *comparing)
     return cli_limits_hold(&comparing->limits, &comparison) ? CLI_DONE : CLI_FAILED;
 }
 
+static bool is_about_tracers(int argc, char **argv)
+{
+    static const char option[] = "--tracers";
+    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++)
+        if (strncmp(argv[i], option, sizeof option - 1) == 0)
+            return true;
+    return false;
+}
+
 int cli_compare(int argc, char **argv)
 {
+    if (is_about_tracers(argc, argv))
+        return cli_compare_tracers(argc, argv);
     static const struct argp argp = {
         .options = options,
         .parser = parse,
-        .args_doc = "IMAGE IMAGE",
+        .args_doc = "IMAGE IMAGE\nMODEL --tracers A,B",
         .doc =
-            "Say how far two images of one size are apart.\v"
+            "Say how far two images of one size are apart, or two tracers on a model, ray by ray.\v"
+            "Options of the second form: 'farlight compare --tracers bvh,reference --help'. "
             "Images are EXR, HDR, PNG or JPEG. EXR and HDR files are compared in linear light, others as what a "
             "screen shows, 0 to 1. Exit status: 0 within all limits, 1 not, 2 not compared."};
     struct comparing comparing = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &comparing) != 0)
-        return trouble(&comparing.job.error);
+        return cli_trouble(&comparing.job.error);
     if (comparing.operand_count < 2) {
         cli_usage(&comparing.job, "IMAGE", "two image files are needed");
-        return trouble(&comparing.job.error);
+        return cli_trouble(&comparing.job.error);
     }
     return compare_images(&comparing);
 }

@@ -14,6 +14,7 @@ _farlight()
     else
         case $before in
         --tracer) words="bvh naive" ;;
+        --tracers) words="bvh,naive" ;;
         --bvh-bounds) words="auto box sphere" ;;
         --integrator) words="whitted" ;;
         --primary) words="raster trace" ;;
@@ -21,13 +22,15 @@ _farlight()
         --tone-map) words="neutral aces none" ;;
         --format) words="png jpeg exr hdr" ;;
         --layout) words="heat side" ;;
-        --fail-above) words="psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite=" ;;
+        --fail-above) words="psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite= agree=" ;;
         *)
             case $subcommand in
             render) words=$job ;;
             animate) words="$job --frames --fps --orbit --keys" ;;
             info) words="--json --environment --help" ;;
-            compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help" ;;
+            compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help
+                --tracers --far --server --size --samples --depth --seed --environment --exposure --camera --eye --look-at
+                --up --fov --bvh-bounds --integrator --encoding --quality --quiet" ;;
             stats) words="--server --json --help" ;;
             ping) words="--server --count --help" ;;
             help) words="render animate info compare stats ping bridge" ;;

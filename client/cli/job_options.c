@@ -260,6 +260,23 @@ static error_t parse(int key, char *value, struct argp_state *state)
 
 const struct argp cli_job_argp = {.options = options, .parser = parse};
 
+const struct argp *cli_picture_argp(void)
+{
+    static const int left_out[] = {KEY_OUTPUT, KEY_FORMAT,  KEY_HALF,    KEY_FLOAT,     KEY_TONE_MAP,
+                                   KEY_TRACER, KEY_PRIMARY, KEY_TIMINGS, KEY_TRACE_FILE};
+    static struct argp_option kept[sizeof options / sizeof options[0]];
+    static const struct argp argp = {.options = kept, .parser = parse};
+    size_t count = 0;
+    for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
+        bool is_kept = true;
+        for (size_t k = 0; k < sizeof left_out / sizeof left_out[0]; k++)
+            is_kept = is_kept && options[i].key != left_out[k];
+        if (is_kept)
+            kept[count++] = options[i];
+    }
+    return &argp;
+}
+
 /* FARLIGHT_SIZE for --size, and so on. */
 static bool read_environment(struct cli_job *job)
 {

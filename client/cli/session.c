@@ -10,8 +10,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#define NOTES_SHOWN 20u
-
 struct session {
     struct cli_job *job;
     bool is_series, to_stdout;
@@ -19,14 +17,12 @@ struct session {
     char folder[4096], path[4352]; /* where the image goes; of a series, for each frame anew */
     char temporary[4096];          /* a folder to be removed; empty: none */
     struct fl_exporter *exporter;
-    struct fl_connection *connection;
-    struct fl_scene *scene;
+    struct cli_loading loading;
     struct fl_job *rendering;
     struct cli_timings *timings;
     struct cli_trace_file *trace; /* NULL: none is wanted */
     struct cli_progress progress;
-    unsigned warnings;
-    uint64_t begin_ns, import_begin_ns, export_ns;
+    uint64_t begin_ns, export_ns;
 };
 
 static uint64_t now_ns(void)
@@ -34,31 +30,6 @@ static uint64_t now_ns(void)
     struct timespec now = {0};
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
-
-/* ---- what the import tells ---- */
-
-static void on_note(void *user, const struct fl_note *note)
-{
-    struct session *session = user;
-    if (session->job->quiet || note->severity != PROTOCOL_SEVERITY_WARNING || session->warnings++ >= NOTES_SHOWN)
-        return;
-    cli_progress_clear(&session->progress);
-    cli_note(note, false);
-}
-
-static void on_progress(void *user, uint64_t done_bytes, uint64_t total_bytes, const char *what)
-{
-    struct session *session = user;
-    cli_progress_import(&session->progress, done_bytes, total_bytes, what);
-}
-
-static void tell_hidden_warnings(struct session *session)
-{
-    if (session->warnings <= NOTES_SHOWN)
-        return;
-    cli_progress_clear(&session->progress);
-    fprintf(stderr, "farlight: %u more warnings ('farlight info' lists them)\n", session->warnings - NOTES_SHOWN);
 }
 
 /* ---- beginning ---- */
@@ -102,61 +73,18 @@ static bool start_exporter(struct session *session, struct fl_error *error)
     return session->exporter != NULL;
 }
 
-static bool connect_and_start(struct session *session, struct fl_error *error)
-{
-    const struct fl_connect_options options = {
-        .server = session->job->server, .name = "farlight", .interrupt_fd = cli_interrupt_fd()};
-    const uint64_t begin_ns = now_ns();
-    session->connection = fl_connect(&options, error);
-    if (session->connection == NULL)
-        return false;
-    cli_trace_span(session->trace, CLI_TRACE_CLIENT, "start", -1, begin_ns,
-                   fl_connection_start_ns(session->connection));
-    return start_exporter(session, error);
-}
-
 /* The importer loads its libraries beside the daemon's start, and the exporter beside the importer: once the scene
  * is there the daemon wants all processors. */
 static bool load_scene(struct session *session, struct fl_error *error)
 {
-    const struct cli_job *job = session->job;
-    struct fl_load_options load = {.model = job->model,
-                                   .environment = job->environment,
-                                   .note = on_note,
-                                   .progress = on_progress,
-                                   .user = session};
-    session->import_begin_ns = now_ns();
-    load.started = fl_import_start(&load, error);
-    if (load.started == NULL)
+    struct cli_loading *loading = &session->loading;
+    if (!cli_loading_begin(loading, error))
         return false;
-    if (!connect_and_start(session, error)) {
-        fl_import_destroy(load.started);
+    cli_trace_span(session->trace, CLI_TRACE_CLIENT, "start", -1, loading->connect_begin_ns,
+                   fl_connection_start_ns(loading->connection));
+    if (!start_exporter(session, error) || !cli_loading_end(loading, error))
         return false;
-    }
-    session->scene = fl_scene_load(session->connection, &load, error);
-    tell_hidden_warnings(session);
-    if (session->scene == NULL)
-        return false;
-    cli_trace_import(session->trace, fl_scene_import_stats(session->scene), session->import_begin_ns, now_ns());
-    return true;
-}
-
-/* By name or number; without either the model's first camera, unless keys or an orbit say where to look. */
-static bool choose_camera(struct session *session, struct fl_error *error)
-{
-    struct cli_job *job = session->job;
-    struct fl_job_options *options = &job->options;
-    if (options->key_count > 0 || job->is_orbit)
-        return true;
-    if (job->camera != NULL) {
-        options->camera_path = PROTOCOL_CAMERA_PATH_NODE;
-        return fl_scene_find_camera(session->scene, job->camera, &options->camera_node, error);
-    }
-    const struct fl_camera_info *first = fl_scene_camera(session->scene, 0);
-    if (first != NULL) {
-        options->camera_path = PROTOCOL_CAMERA_PATH_NODE;
-        options->camera_node = first->node;
-    }
+    cli_trace_import(session->trace, fl_scene_import_stats(loading->scene), loading->import_begin_ns, now_ns());
     return true;
 }
 
@@ -225,11 +153,10 @@ static bool take_frames(struct session *session, struct fl_error *error)
 static bool run(struct session *session, struct fl_error *error)
 {
     struct cli_job *job = session->job;
-    if ((job->model != NULL && !cli_check_input(job->model, error)) ||
-        (job->environment != NULL && !cli_check_input(job->environment, error)) ||
-        !prepare_output(session, error) || !load_scene(session, error) || !choose_camera(session, error))
+    if (!prepare_output(session, error) || !load_scene(session, error) ||
+        !cli_choose_camera(job, session->loading.scene, error))
         return false;
-    session->rendering = fl_render_start(session->scene, &job->options, error);
+    session->rendering = fl_render_start(session->loading.scene, &job->options, error);
     return session->rendering != NULL && take_frames(session, error);
 }
 
@@ -238,21 +165,20 @@ static bool run(struct session *session, struct fl_error *error)
 static void print_timings(struct session *session)
 {
     const struct cli_client_times times = {.total_ns = now_ns() - session->begin_ns,
-                                           .start_ns = fl_connection_start_ns(session->connection),
+                                           .start_ns = fl_connection_start_ns(session->loading.connection),
                                            .export_ns = session->export_ns,
-                                           .import = fl_scene_import_stats(session->scene)};
+                                           .import = fl_scene_import_stats(session->loading.scene)};
     cli_timings_end(session->timings, &times);
 }
 
 static void close_session(struct session *session)
 {
     /* After an interruption the daemon is still told in order. */
-    if (session->connection != NULL)
-        fl_connection_set_interrupt(session->connection, 0);
+    if (session->loading.connection != NULL)
+        fl_connection_set_interrupt(session->loading.connection, 0);
     fl_render_destroy(session->rendering);
     fl_exporter_destroy(session->exporter);
-    fl_scene_destroy(session->scene);
-    fl_connection_destroy(session->connection);
+    cli_loading_close(&session->loading);
     cli_timings_destroy(session->timings);
     if (session->temporary[0] != '\0') {
         unlink(session->path);
@@ -266,6 +192,7 @@ int cli_run_job(struct cli_job *job, bool is_series)
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
+    session.loading = (struct cli_loading){.job = job, .progress = &session.progress};
     cli_progress_begin(&session.progress, job->quiet);
     if (job->timings != CLI_TIMINGS_NONE)
         session.timings = cli_timings_create(job->timings, strcmp(job->output, "-") == 0);

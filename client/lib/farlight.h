@@ -210,6 +210,12 @@ struct fl_job_options {
     const struct record_camera_key *keys;
     size_t key_count;
     unsigned frames_in_flight; /* that the daemon may send ahead; 0: 2 */
+    /* Every wave of rays, the primary one too (which is traced then, not rasterised), is traced by `compare_with`
+     * as well, and the answers are compared ray by ray: frames come with wave_comparisons. The picture is
+     * `tracer`'s. */
+    bool compare;
+    enum protocol_tracer compare_with;
+    float compare_far; /* two hits are far from each other beyond this share of the scene's diagonal; 0: 1/10000 */
 };
 
 /* One picture and what it cost. */
@@ -229,8 +235,10 @@ struct fl_frame {
     uint64_t wait_ns;               /* how long fl_render_next waited for it */
     size_t stage_count;
     struct record_stage_time *stages;
-    size_t pixels_bytes; /* width * height * 4, 8 or 16 */
-    uint8_t *pixels;     /* rows from the top, without gaps, in `format` */
+    size_t wave_comparison_count;                    /* 0: the job does not compare */
+    struct record_wave_comparison *wave_comparisons; /* ascending by wave and kind of ray; see messages.def */
+    size_t pixels_bytes;                             /* width * height * 4, 8 or 16 */
+    uint8_t *pixels;                                 /* rows from the top, without gaps, in `format` */
 };
 
 /* One job at a time per connection. */
@@ -242,6 +250,13 @@ FL_API void fl_frame_destroy(struct fl_frame *frame);
 /* Ends the job early and waits until the daemon confirms it; what was sent meanwhile is dropped. */
 FL_API bool fl_render_cancel(struct fl_job *job, struct fl_error *error);
 FL_API void fl_render_destroy(struct fl_job *job); /* cancels what still runs */
+
+/* Rays of which both tracers said the same, as a share of those that are on no edge; 1 without rays. What shading
+ * makes of it does not matter. */
+FL_API double fl_wave_agreement(const struct record_wave_comparison *comparison);
+/* Counts and times of several waves added up, greatest errors as the greatest; medians and percentiles, which
+ * cannot be added, are 0. `into` may be all zero. */
+FL_API void fl_wave_add(struct record_wave_comparison *into, const struct record_wave_comparison *from);
 
 FL_API uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format);
 

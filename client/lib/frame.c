@@ -31,6 +31,7 @@ void fl_frame_destroy(struct fl_frame *frame)
         return;
     free(frame->pixels);
     free(frame->stages);
+    free(frame->wave_comparisons);
     free(frame);
 }
 
@@ -200,6 +201,15 @@ static bool decode(const struct fl_assembly *assembly, struct fl_error *error)
     return true;
 }
 
+/* NULL for no bytes, too. */
+static void *copy(const void *data, size_t bytes)
+{
+    void *made = bytes > 0 ? malloc(bytes) : NULL;
+    if (made != NULL)
+        memcpy(made, data, bytes);
+    return made;
+}
+
 static bool take_costs(struct fl_frame *frame, const struct message_frame_end *end, struct fl_error *error)
 {
     frame->primary_rays = end->primary_rays;
@@ -208,13 +218,13 @@ static bool take_costs(struct fl_frame *frame, const struct message_frame_end *e
     frame->splits = end->splits;
     frame->uploaded_bytes = end->uploaded_bytes;
     frame->structure_bytes = end->structure_bytes;
-    if (end->stages_count == 0)
-        return true;
-    frame->stages = malloc(end->stages_count * sizeof *frame->stages);
-    if (frame->stages == NULL)
+    frame->stages = copy(end->stages, end->stages_count * sizeof *frame->stages);
+    frame->wave_comparisons = copy(end->comparisons, end->comparisons_count * sizeof *frame->wave_comparisons);
+    if ((end->stages_count > 0 && frame->stages == NULL) ||
+        (end->comparisons_count > 0 && frame->wave_comparisons == NULL))
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
-    memcpy(frame->stages, end->stages, end->stages_count * sizeof *frame->stages);
     frame->stage_count = end->stages_count;
+    frame->wave_comparison_count = end->comparisons_count;
     return true;
 }
 

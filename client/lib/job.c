@@ -45,6 +45,9 @@ static void fill_render(struct message_render *render, const struct fl_job_optio
     render->camera_node = options->camera_node;
     render->orbit_turn = options->orbit_turn;
     render->orbit_seconds = options->orbit_seconds;
+    render->compare = options->compare ? 1 : 0;
+    render->compare_with = options->compare_with;
+    render->compare_far = options->compare_far;
     render->keys = (struct record_camera_key *)(uintptr_t)options->keys; /* only read */
     render->keys_count = (uint32_t)options->key_count;
     render->credit = options->frames_in_flight > 0 ? options->frames_in_flight : DEFAULT_FRAMES_IN_FLIGHT;

@@ -230,6 +230,51 @@ static void pieces_out_of_place_are_refused(void **state)
     fl_assembly_finish(&assembly);
 }
 
+static void comparisons_of_waves_arrive(void **state)
+{
+    (void)state;
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+    const struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+    struct record_wave_comparison waves[2] = {{.rays = 960, .both_hit = 960},
+                                              {.kind = PROTOCOL_RAY_KIND_SHADOW, .rays = 7, .both_missed = 7}};
+    const struct message_frame_end last = {.frame = 3, .comparisons = waves, .comparisons_count = 2};
+    assert_true(begin(&assembly, &message));
+    assert_true(give(&assembly, pixels, PIXELS_BYTES, 0));
+    struct fl_frame *frame = fl_assembly_end(&assembly, &last, 2, &error);
+    assert_non_null(frame);
+    assert_int_equal(frame->wave_comparison_count, 2);
+    assert_int_equal(frame->wave_comparisons[0].both_hit, 960);
+    assert_int_equal(frame->wave_comparisons[1].kind, PROTOCOL_RAY_KIND_SHADOW);
+    assert_int_equal(frame->stage_count, 0);
+    fl_frame_destroy(frame);
+}
+
+static void agreement_leaves_edges_aside_and_stays_a_share_whatever_a_daemon_says(void **state)
+{
+    (void)state;
+    struct record_wave_comparison wave = {.rays = 1000,
+                                          .both_hit = 900,
+                                          .both_missed = 90,
+                                          .only_tracer = 4,
+                                          .only_reference = 6,
+                                          .far = 5,
+                                          .edges = 5};
+    assert_true(fl_wave_agreement(&wave) == 1 - 10.0 / 995);
+    struct record_wave_comparison sum = {0};
+    assert_true(fl_wave_agreement(&sum) == 1);
+    wave.distance_greatest = 0.5f;
+    fl_wave_add(&sum, &wave);
+    wave.distance_greatest = 0.25f;
+    fl_wave_add(&sum, &wave);
+    assert_int_equal(sum.rays, 2000);
+    assert_true(sum.distance_greatest == 0.5f);
+    assert_true(fl_wave_agreement(&sum) == fl_wave_agreement(&wave));
+    struct record_wave_comparison lie = {.rays = 1, .only_tracer = UINT64_MAX, .far = UINT64_MAX};
+    assert_true(fl_wave_agreement(&lie) == 0);
+    lie.edges = UINT64_MAX;
+    assert_true(fl_wave_agreement(&lie) >= 0 && fl_wave_agreement(&lie) <= 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -243,6 +288,8 @@ int main(void)
         cmocka_unit_test(a_frame_that_was_not_asked_for_is_refused),
         cmocka_unit_test(declared_sizes_beyond_all_reason_are_refused_before_memory_is_taken),
         cmocka_unit_test(pieces_out_of_place_are_refused),
+        cmocka_unit_test(comparisons_of_waves_arrive),
+        cmocka_unit_test(agreement_leaves_edges_aside_and_stays_a_share_whatever_a_daemon_says),
     };
     return cmocka_run_group_tests(tests, fill_pixels, NULL);
 }

@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: MIT */
+/* From what the command line named to a scene on a daemon. */
+#include "cli/cli.h"
+
+#include <stdio.h>
+#include <time.h>
+
+#define NOTES_SHOWN 20u
+
+static uint64_t now_ns(void)
+{
+    struct timespec now = {0};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+}
+
+static void on_note(void *user, const struct fl_note *note)
+{
+    struct cli_loading *loading = user;
+    if (loading->job->quiet || note->severity != PROTOCOL_SEVERITY_WARNING || loading->warnings++ >= NOTES_SHOWN)
+        return;
+    cli_progress_clear(loading->progress);
+    cli_note(note, false);
+}
+
+static void on_progress(void *user, uint64_t done_bytes, uint64_t total_bytes, const char *what)
+{
+    struct cli_loading *loading = user;
+    cli_progress_import(loading->progress, done_bytes, total_bytes, what);
+}
+
+bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
+{
+    const struct cli_job *job = loading->job;
+    if ((job->model != NULL && !cli_check_input(job->model, error)) ||
+        (job->environment != NULL && !cli_check_input(job->environment, error)))
+        return false;
+    loading->load = (struct fl_load_options){.model = job->model,
+                                             .environment = job->environment,
+                                             .note = on_note,
+                                             .progress = on_progress,
+                                             .user = loading};
+    loading->import_begin_ns = now_ns();
+    loading->load.started = fl_import_start(&loading->load, error);
+    if (loading->load.started == NULL)
+        return false;
+    const struct fl_connect_options connect = {
+        .server = job->server, .name = "farlight", .interrupt_fd = cli_interrupt_fd()};
+    loading->connect_begin_ns = now_ns();
+    loading->connection = fl_connect(&connect, error);
+    return loading->connection != NULL;
+}
+
+bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
+{
+    loading->scene = fl_scene_load(loading->connection, &loading->load, error);
+    loading->load.started = NULL; /* the load took it over */
+    if (loading->warnings > NOTES_SHOWN) {
+        cli_progress_clear(loading->progress);
+        fprintf(stderr, "farlight: %u more warnings ('farlight info' lists them)\n",
+                loading->warnings - NOTES_SHOWN);
+    }
+    return loading->scene != NULL;
+}
+
+void cli_loading_close(struct cli_loading *loading)
+{
+    fl_import_destroy(loading->load.started);
+    fl_scene_destroy(loading->scene);
+    fl_connection_destroy(loading->connection);
+}
+
+/* By name or number; without either the model's first camera, unless keys or an orbit say where to look. */
+bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error)
+{
+    struct fl_job_options *options = &job->options;
+    if (options->key_count > 0 || job->is_orbit)
+        return true;
+    if (job->camera != NULL) {
+        options->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        return fl_scene_find_camera(scene, job->camera, &options->camera_node, error);
+    }
+    const struct fl_camera_info *first = fl_scene_camera(scene, 0);
+    if (first != NULL) {
+        options->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        options->camera_node = first->node;
+    }
+    return true;
+}

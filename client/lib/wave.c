@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: MIT */
+/* Figures of compared waves. What a daemon says need not add up; nothing here depends on it. */
+#include "lib/farlight.h"
+
+static double larger(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+double fl_wave_agreement(const struct record_wave_comparison *comparison)
+{
+    const double edges = (double)comparison->edges;
+    const double rays = larger((double)comparison->rays - edges, 0);
+    const double differing =
+        (double)comparison->only_tracer + (double)comparison->only_reference + (double)comparison->far - edges;
+    return rays > 0 ? larger(1 - larger(differing, 0) / rays, 0) : 1;
+}
+
+void fl_wave_add(struct record_wave_comparison *into, const struct record_wave_comparison *from)
+{
+    into->rays += from->rays;
+    into->both_hit += from->both_hit;
+    into->both_missed += from->both_missed;
+    into->only_tracer += from->only_tracer;
+    into->only_reference += from->only_reference;
+    into->far += from->far;
+    into->edges += from->edges;
+    into->other_surface += from->other_surface;
+    into->tracer_ns += from->tracer_ns;
+    into->reference_ns += from->reference_ns;
+    into->distance_median = into->distance_p99 = into->relative_median = 0;
+    into->normal_median = into->normal_p99 = 0;
+    if (from->distance_greatest > into->distance_greatest)
+        into->distance_greatest = from->distance_greatest;
+    if (from->normal_greatest > into->normal_greatest)
+        into->normal_greatest = from->normal_greatest;
+}
