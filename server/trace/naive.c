@@ -8,6 +8,11 @@
 /* Rays times primitives of one dispatch: well below a second on a GPU, whose driver may end what takes longer. */
 #define DISPATCH_TESTS_MAX ((uint64_t)1 << 33)
 #define DISPATCH_RAYS_MIN 256u
+/* Software GL (llvmpipe) leaves the loops of an invocation after 65535 rounds in all, without a word; what lies
+ * behind would be missed. Materials that are asked for at a crossing have loops of their own, of which each
+ * primitive's counts a round whether it is crossed or not: five were measured. */
+#define SOFTWARE_ROUNDS_MAX 65000u
+#define ROUNDS_WITH_MATERIALS 8u
 
 static const struct gpu_define naive_defines[] = {{"TRACER_NAIVE", "1"}, {0}};
 
@@ -35,10 +40,17 @@ static void naive_destroy(struct tracer *tracer)
 static bool naive_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
                          struct stage_times *times, struct error *error)
 {
-    (void)changes, (void)times, (void)error;
+    (void)changes, (void)times;
     uint64_t primitives = 1;
     for (uint32_t i = 0; i < scene->instance_count; i++)
         primitives += scene->geometries[scene->instances[i].geometry].device.primitive_count;
+    uint64_t rounds = scene->has_cutout || scene->has_translucent ? ROUNDS_WITH_MATERIALS : 1;
+    if (tracer->device->facts.software && primitives * rounds > SOFTWARE_ROUNDS_MAX) {
+        error_set(error, ERROR_LIMIT, "tracer",
+                  "naive: %llu primitives; on software GL it can look at %u in this scene",
+                  (unsigned long long)primitives - 1, SOFTWARE_ROUNDS_MAX / (unsigned)rounds);
+        return error_remedy(error, "take another tracer");
+    }
     uint64_t rays = DISPATCH_TESTS_MAX / primitives;
     ((struct naive *)tracer)->rays_a_dispatch = rays > UINT32_MAX          ? UINT32_MAX
                                                 : rays < DISPATCH_RAYS_MIN ? DISPATCH_RAYS_MIN
