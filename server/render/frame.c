@@ -120,9 +120,8 @@ static bool check_request(const struct frame_request *request, struct error *err
                          request->width, request->height, SIZE_MAX_PIXELS);
     if (request->samples == 0)
         return error_set(error, ERROR_INVALID, "samples", "a picture of no samples");
-    if (!tracer_impl_by_number(request->tracer))
-        return error_set(error, ERROR_UNSUPPORTED, "tracer", "this build has no tracer number %u",
-                         request->tracer);
+    if (!tracer_find(request->tracer, "tracer", error))
+        return false;
     if (!integrator_impl_by_number(request->integrator))
         return error_set(error, ERROR_UNSUPPORTED, "integrator", "there is no integrator number %u",
                          (unsigned)request->integrator);
