@@ -13,7 +13,7 @@ _farlight()
         words="render animate info compare stats ping bridge help --version"
     else
         case $before in
-        --tracer) words="bvh naive" ;;
+        --tracer) words="bvh naive reference" ;;
         --bvh-bounds) words="auto box sphere" ;;
         --integrator) words="whitted" ;;
         --primary) words="raster trace" ;;

@@ -54,7 +54,7 @@ static unsigned native_width(RTCDevice device)
 {
     if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED))
         return 16;
-    return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8 : 1;
+    return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8 : 4;
 }
 
 /* Distributions build Embree with more or less in it. */
@@ -102,7 +102,6 @@ static struct tracer *reference_create(struct gpu_device *device, const struct t
     }
     pthread_mutex_init(&reference->failure_mutex, NULL);
     reference->base.device = device;
-    reference->width = width;
     reference->device = rtcNewDevice(NULL);
     if (!reference->device) {
         error_set(error, ERROR_UNSUPPORTED, NULL, "Embree does not start (error %d)",
@@ -112,7 +111,7 @@ static struct tracer *reference_create(struct gpu_device *device, const struct t
     }
     rtcSetDeviceErrorFunction(reference->device, note_failure, reference);
     rtcSetDeviceMemoryMonitorFunction(reference->device, count_memory, reference);
-    reference->width_max = native_width(reference->device);
+    reference->width = width ? width : native_width(reference->device);
     if (!check_features(reference->device, error)) {
         reference_destroy(&reference->base);
         return NULL;

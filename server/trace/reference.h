@@ -14,6 +14,8 @@
 #include <stdatomic.h>
 
 #define REFERENCE_RAYS_MAX 16u /* a call of Embree */
+/* A quarter of what Embree takes for a coordinate, for what its own arithmetic rounds. */
+#define REFERENCE_COORDINATE_MAX 4.6e17f
 
 /* A geometry of the scene, built; one Embree scene of one geometry, which any number of instances show. */
 struct reference_entry {
@@ -51,10 +53,10 @@ struct reference {
     RTCScene top;
     struct reference_instance *instances;
     uint32_t instance_count;
+    float coordinate_max;      /* of a ray's origin and direction; what lies beyond hits nothing */
     RTCGeometry disc_geometry; /* NULL: no discs */
     struct opacity_surface disc_surface;
-    unsigned width;     /* rays a call; 0: chosen for each wave */
-    unsigned width_max; /* what this processor does at once */
+    unsigned width; /* rays a call */
     /* What Embree's callbacks write, from any thread. */
     atomic_llong device_bytes;
     pthread_mutex_t failure_mutex;

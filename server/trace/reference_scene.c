@@ -8,11 +8,15 @@
 #include "base/hashmap.h"
 #include "base/parallel.h"
 
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Embree builds one scene on all cores; scenes smaller than this are built several at once instead. */
 #define ALONE_PRIMITIVES_MIN 20000u
+/* World coordinates that rays may have at least, else the scene is refused. */
+#define REACH_MIN 1e9
 /* Embree reads a vertex of 12 bytes as one of 16. */
 #define VERTEX_SLACK_BYTES 4u
 
@@ -334,6 +338,27 @@ static bool resize_instances(struct reference *reference, uint32_t count)
     return true;
 }
 
+/* The greatest world coordinate that Embree can take to the instance's space. It computes with coordinates up to
+ * 1.844e18 and ends the process at a ray beyond (Debian's is built with its assertions); and it inverts the
+ * transform by a determinant in single precision, which must neither vanish nor overflow. 0: it cannot at all. */
+static float reach_of(struct instance *instance)
+{
+    const float *m = instance->world_from_object[0], *inverse = instance->object_from_world[0];
+    double lengths = 1.0, reach = REFERENCE_COORDINATE_MAX;
+    for (size_t k = 0; k < 3; k++) {
+        const double x = m[k], y = m[4 + k], z = m[8 + k];
+        const double sum =
+            fabs((double)inverse[4 * k]) + fabs((double)inverse[4 * k + 1]) + fabs((double)inverse[4 * k + 2]);
+        lengths *= sqrt(x * x + y * y + z * z);
+        reach = fmin(reach, (REFERENCE_COORDINATE_MAX - fabs((double)inverse[4 * k + 3])) / sum);
+    }
+    const double determinant = (double)m[0] * ((double)m[5] * m[10] - (double)m[6] * m[9]) -
+                               (double)m[1] * ((double)m[4] * m[10] - (double)m[6] * m[8]) +
+                               (double)m[2] * ((double)m[4] * m[9] - (double)m[5] * m[8]);
+    bool inverts = fabs(determinant) > 1e-30 && lengths < 1e30 && fabs(determinant) >= 1e-5 * lengths;
+    return inverts && reach >= REACH_MIN ? (float)reach : 0.0f;
+}
+
 /* Tells Embree what moved, or shows something else now. True if anything did. */
 static bool place_instance(struct reference *reference, const struct scene_gpu *scene, uint32_t i)
 {
@@ -355,10 +380,32 @@ static bool place_instance(struct reference *reference, const struct scene_gpu *
     return true;
 }
 
+static bool find_reach(struct reference *reference, const struct scene_gpu *scene, struct error *error)
+{
+    reference->coordinate_max = REFERENCE_COORDINATE_MAX;
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        float reach = reach_of(&scene->instances[i]);
+        if (reach == 0.0f) {
+            char field[64];
+            snprintf(field, sizeof(field), "node %u.parent_from_node", scene->instances[i].node);
+            error_set(error, ERROR_UNSUPPORTED, field,
+                      "its place in the world is scaled, sheared or moved too far");
+            return error_remedy(error,
+                                "the tracer reference computes in single precision: choose bvh, or scale by "
+                                "more than 1e-9");
+        }
+        reference->coordinate_max = fminf(reference->coordinate_max, reach);
+    }
+    return true;
+}
+
 /* `look`: some may have moved, or show what was built anew. */
-static bool update_instances(struct reference *reference, const struct scene_gpu *scene, bool look, bool *changed)
+static bool update_instances(struct reference *reference, const struct scene_gpu *scene, bool look, bool *changed,
+                             struct error *error)
 {
     struct tracer_stats *stats = &reference->base.stats;
+    if (look && !find_reach(reference, scene, error))
+        return false;
     *changed = *changed || reference->instance_count != scene->instance_count;
     if (!resize_instances(reference, scene->instance_count))
         return false;
@@ -386,7 +433,7 @@ static bool update_materials(struct reference *reference, const struct scene_gpu
 }
 
 static bool update_parts(struct reference *reference, const struct scene_gpu *scene,
-                         const struct scene_changes *changes)
+                         const struct scene_changes *changes, struct error *error)
 {
     bool changed = !reference->top, shading = changes->shading || changes->geometry;
     if (!reference->top)
@@ -396,14 +443,14 @@ static bool update_parts(struct reference *reference, const struct scene_gpu *sc
         return false;
     commit_entries(reference);
     return update_discs(reference, scene, shading, &changed) &&
-           update_instances(reference, scene, shading || changes->instances, &changed);
+           update_instances(reference, scene, shading || changes->instances, &changed, error);
 }
 
 bool reference_scene_update(struct reference *reference, const struct scene_gpu *scene,
                             const struct scene_changes *changes, struct error *error)
 {
     struct tracer_stats *stats = &reference->base.stats;
-    bool ok = update_parts(reference, scene, changes);
+    bool ok = update_parts(reference, scene, changes, error);
     /* What Embree says comes first: where it fails it says why. */
     if (!reference_check(reference, "building", error) || !ok)
         return no_memory(error, scene);

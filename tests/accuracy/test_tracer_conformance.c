@@ -33,10 +33,10 @@ static const struct tracer_row tracers[] = {
     {"bvh in the plain form", 0, {.bvh_layout = BVH_LAYOUT_PLAIN}},
     {"bvh, two rays together", 0, {.bvh_rays_together = 2}},
     {"bvh with spheres, four rays together", 0, {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 4}},
-    {"reference", 2, {0}}, /* one ray a call, and as many as the processor takes where a wave is coherent */
+    {"reference", 2, {0}}, /* as many rays a call as the processor takes at once */
+    {"reference, one ray a call", 2, {.reference_rays_a_call = 1}},
     {"reference, four rays a call", 2, {.reference_rays_a_call = 4}},
     {"reference, eight rays a call", 2, {.reference_rays_a_call = 8}},
-    {"reference, sixteen rays a call", 2, {.reference_rays_a_call = 16}},
 };
 
 struct scene_row {
