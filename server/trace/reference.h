@@ -2,6 +2,8 @@
 /* The tracer `reference`: Embree on the CPU, the truth that the other tracers are compared with. Private to
  * reference*.c, which are built only where Embree 3 is found.
  *
+ * Of two surfaces in one place it may report the other one than bvh does.
+ *
  * Embree: Wald, Woop, Benthin, Johnson, Ernst. Embree: A Kernel Framework for Efficient CPU Ray Tracing. 2014. */
 #ifndef FARLIGHT_TRACE_REFERENCE_H
 #define FARLIGHT_TRACE_REFERENCE_H
