@@ -37,6 +37,11 @@ else
 $(error config=$(config) is not one of debug, release, sanitize, fuzz)
 endif
 
+# The tracer `reference` is Embree: built in where its header is found. EMBREE=0 leaves it out.
+ifeq ($(origin EMBREE),undefined)
+EMBREE := $(if $(shell printf '\#include <embree3/rtcore.h>' | $(CC) $(CPPFLAGS) -E -x c - >/dev/null 2>&1 && echo 1),1,0)
+endif
+
 # Linked libraries, by program.
 SERVER_PKGS := epoxy egl libzstd libsodium libxxhash libturbojpeg inih cglm
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
@@ -50,6 +55,9 @@ pkg_libs = $(shell $(PKG_CONFIG) --libs $(1) 2>/dev/null)
 # ---- sources ---------------------------------------------------------------------------------------
 PROTOCOL_SRC := $(filter-out protocol/docgen.c,$(wildcard protocol/*.c))
 SERVER_SRC := $(filter-out server/main.c,$(wildcard server/*.c server/*/*.c))
+ifneq ($(EMBREE),1)
+SERVER_SRC := $(filter-out server/trace/reference%,$(SERVER_SRC))
+endif
 LIB_SRC := $(wildcard client/lib/*.c)
 CLI_SRC := $(wildcard client/cli/*.c)
 IMPORT_C := $(wildcard client/import/*.c)
@@ -83,8 +91,19 @@ PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-expo
 
 .PHONY: all
 all: $(PROGRAMS) $(B)/$(SONAME) $(B)/protocol.md
+ifneq ($(EMBREE),1)
+	@echo 'built without Embree: the tracer reference is left out (its header is in the package libembree-dev)'
+endif
 
 $(B)/server/%.o: INCLUDES = -Iserver -Ishaders $(SERVER_CFLAGS)
+# The one object that knows whether Embree is in; it is made again when that changes, and all that links it.
+EMBREE_STAMP := $(B)/embree-$(EMBREE)
+$(EMBREE_STAMP):
+	@mkdir -p $(B) && rm -f $(B)/embree-[01] && touch $@
+$(B)/server/trace/tracer.o: $(EMBREE_STAMP)
+ifeq ($(EMBREE),1)
+$(B)/server/trace/tracer.o: CPPFLAGS_ALL += -DFARLIGHT_HAVE_EMBREE
+endif
 $(B)/shader_sources.o: INCLUDES = -Iserver
 $(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
 $(B)/client/import/%.opp $(B)/client/import/%.o: INCLUDES = -Iclient $(IMPORT_CFLAGS)
@@ -119,7 +138,8 @@ $(B)/shader_sources.o: $(B)/shader_sources.c
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) -c $< -o $@
 
 # ---- programs --------------------------------------------------------------------------------------
-SERVER_LIBS = $(call pkg_libs,$(SERVER_PKGS)) -lm
+EMBREE_LIBS := $(if $(filter 1,$(EMBREE)),-lembree3)
+SERVER_LIBS = $(call pkg_libs,$(SERVER_PKGS)) $(EMBREE_LIBS) -lm
 CLIENT_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 IMPORT_LIBS = $(call pkg_libs,$(IMPORT_PKGS)) -lm
 EXPORT_LIBS = $(call pkg_libs,$(EXPORT_PKGS)) -lm
@@ -140,7 +160,7 @@ $(B)/protocol.md: $(B)/protocol-docgen
 # ---- tests -----------------------------------------------------------------------------------------
 # A unit or accuracy test is one file with a main(); it may use everything but the programs' main().
 UNIT_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accuracy/test_*.c))
-TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) -lm
+TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) $(EMBREE_LIBS) -lm
 $(UNIT_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 # Programs of the benchmark; the rest of its folder is what they share. They hold us against Embree itself.
@@ -172,8 +192,8 @@ $(B)/tests/tools/make_scenes: $(TOOLS_OBJ)
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libegl1 libgl1-mesa-dri
-TEST_PACKAGES := libcmocka-dev libembree-dev python3
+    libtinyobjloader-dev libembree-dev libegl1 libgl1-mesa-dri
+TEST_PACKAGES := libcmocka-dev python3
 PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
@@ -253,7 +273,7 @@ help:
 	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
-	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz]'
+	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz EMBREE=0]'
 	@echo 'make fuzz       run every fuzzer   [config=fuzz FUZZ_SECONDS=20]'
 	@echo 'make lint       include rules, shaders, headers alone, format, clang with warnings as errors'
 	@echo 'make format     clang-format over our sources'

@@ -13,8 +13,8 @@ _farlight()
         words="render animate info compare stats ping bridge help --version"
     else
         case $before in
-        --tracer) words="bvh naive" ;;
-        --tracers) words="bvh,naive" ;;
+        --tracer) words="bvh naive reference" ;;
+        --tracers) words="bvh,reference bvh,naive naive,reference" ;;
         --bvh-bounds) words="auto box sphere" ;;
         --integrator) words="whitted" ;;
         --primary) words="raster trace" ;;

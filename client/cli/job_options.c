@@ -63,7 +63,7 @@ static const struct argp_option options[] = {
     {"up", KEY_UP, "X,Y,Z", 0, "Upward direction (default 0,1,0)", 0},
     {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 45)", 0},
     {NULL, 0, NULL, 0, "Method:", 3},
-    {"tracer", KEY_TRACER, "NAME", 0, "bvh (default), naive", 0},
+    {"tracer", KEY_TRACER, "NAME", 0, "bvh (default), naive, reference", 0},
     {"bvh-bounds", KEY_BVH_BOUNDS, "NAME", 0, "auto (default), box, sphere", 0},
     {"integrator", KEY_INTEGRATOR, "NAME", 0, "whitted", 0},
     {"primary", KEY_PRIMARY, "NAME", 0, "First hits: raster (default), trace", 0},

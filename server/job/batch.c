@@ -6,29 +6,10 @@
 #include "base/log.h"
 #include "job/animation.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Tracer numbers are an enum of the protocol, which grows; this is far above it. */
-#define TRACER_NUMBERS 64
-
 /* ---- start -------------------------------------------------------------------------------------- */
-
-static bool tracer_check(unsigned number, const char *field, struct error *error)
-{
-    if (tracer_impl_by_number(number))
-        return true;
-    char list[128] = "";
-    size_t used = 0;
-    for (unsigned i = 0; i < TRACER_NUMBERS && used < sizeof list; i++) {
-        const struct tracer_impl *impl = tracer_impl_by_number(i);
-        if (impl)
-            used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", used ? ", " : "", impl->name);
-    }
-    error_set(error, ERROR_UNSUPPORTED, field, "this build has no tracer number %u", number);
-    return error_remedy(error, "available: %s", list);
-}
 
 static uint32_t bytes_per_pixel(enum frame_format format)
 {
@@ -52,8 +33,8 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
                   (unsigned)spec->encoding, bytes_per_pixel(spec->frame.format));
         return error_remedy(error, "use the pixel format rgba8, or the encoding zstd or raw");
     }
-    return tracer_check(spec->frame.tracer, "render.tracer", error) &&
-           (!spec->frame.compare || tracer_check(spec->frame.compare_with, "render.compare_with", error)) &&
+    return tracer_find(spec->frame.tracer, "render.tracer", error) &&
+           (!spec->frame.compare || tracer_find(spec->frame.compare_with, "render.compare_with", error)) &&
            animation_check(spec, scene, error);
 }
 

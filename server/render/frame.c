@@ -112,10 +112,11 @@ void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, c
     renderer->stand_in_number = number;
 }
 
-static const struct tracer_impl *find_tracer(const struct frame_renderer *renderer, unsigned number)
+static const struct tracer_impl *find_tracer(const struct frame_renderer *renderer, unsigned number,
+                                             const char *field, struct error *error)
 {
     bool stands_in = renderer->stand_in && renderer->stand_in_number == number;
-    return stands_in ? renderer->stand_in : tracer_impl_by_number(number);
+    return stands_in ? renderer->stand_in : tracer_find(number, field, error);
 }
 
 uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer)
@@ -142,12 +143,9 @@ static bool check_request(const struct frame_renderer *renderer, const struct fr
                          request->width, request->height, SIZE_MAX_PIXELS);
     if (request->samples == 0)
         return error_set(error, ERROR_INVALID, "samples", "a picture of no samples");
-    if (!find_tracer(renderer, request->tracer))
-        return error_set(error, ERROR_UNSUPPORTED, "tracer", "this build has no tracer number %u",
-                         request->tracer);
-    if (request->compare && !find_tracer(renderer, request->compare_with))
-        return error_set(error, ERROR_UNSUPPORTED, "compare_with", "this build has no tracer number %u",
-                         request->compare_with);
+    if (!find_tracer(renderer, request->tracer, "tracer", error) ||
+        (request->compare && !find_tracer(renderer, request->compare_with, "compare_with", error)))
+        return false;
     if (!integrator_impl_by_number(request->integrator))
         return error_set(error, ERROR_UNSUPPORTED, "integrator", "there is no integrator number %u",
                          (unsigned)request->integrator);
@@ -177,7 +175,8 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     if (!updated)
         return false;
     renderer->result.uploaded_bytes = changes.uploaded_bytes;
-    context->tracer = tracer_set_get(&renderer->tracers, &renderer->scene, find_tracer(renderer, request->tracer),
+    context->tracer = tracer_set_get(&renderer->tracers, &renderer->scene,
+                                     find_tracer(renderer, request->tracer, "tracer", error),
                                      &request->tracer_options, &context->times, error);
     if (!context->tracer)
         return false;
@@ -203,7 +202,8 @@ static bool begin_comparison(struct frame_renderer *renderer, struct error *erro
     }
     uint64_t start_ns = clock_now_ns();
     struct tracer *second =
-        tracer_set_get(&renderer->tracers, &renderer->scene, find_tracer(renderer, request->compare_with),
+        tracer_set_get(&renderer->tracers, &renderer->scene,
+                       find_tracer(renderer, request->compare_with, "compare_with", error),
                        &request->tracer_options, NULL, error);
     if (!renderer->comparison)
         renderer->comparison = comparison_create(renderer->device, error);

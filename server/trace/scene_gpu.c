@@ -96,6 +96,7 @@ bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, struct s
 {
     uint64_t start_ns = clock_now_ns();
     *changes = (struct scene_changes){0};
+    gpu->scene = scene;
     if (!gpu->state && !(gpu->state = calloc(1, sizeof(*gpu->state))))
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the device's copy of a scene");
     if (gpu->state->any_update && gpu->revision == scene->revision)

@@ -34,7 +34,8 @@ struct scene_gpu_geometry {
 
 struct scene_gpu {
     struct gpu_device *device;
-    uint64_t revision; /* of the scene that is on the device */
+    const struct scene *scene; /* of the last update, for tracers on the host; valid until it is edited */
+    uint64_t revision;         /* of the scene that is on the device */
     struct scene_gpu_geometry *geometries;
     uint32_t geometry_count;
     struct instance *instances; /* mirror of the buffer */

@@ -4,15 +4,44 @@
 #include "shared/hit.h"
 #include "shared/ray.h"
 
+#include <stdio.h>
+
+#define NUMBER_REFERENCE 2
+
 /* By the protocol's numbers; a tracer that a build leaves out is NULL. */
 static const struct tracer_impl *const tracers[] = {
     [0] = &tracer_bvh_impl,
     [1] = &tracer_naive_impl,
+#ifdef FARLIGHT_HAVE_EMBREE
+    [NUMBER_REFERENCE] = &tracer_reference_impl,
+#endif
 };
+#define TRACER_COUNT (sizeof(tracers) / sizeof(tracers[0]))
 
 const struct tracer_impl *tracer_impl_by_number(unsigned number)
 {
-    return number < sizeof(tracers) / sizeof(tracers[0]) ? tracers[number] : NULL;
+    return number < TRACER_COUNT ? tracers[number] : NULL;
+}
+
+const struct tracer_impl *tracer_find(unsigned number, const char *field, struct error *error)
+{
+    const struct tracer_impl *impl = tracer_impl_by_number(number);
+    if (impl)
+        return impl;
+    char list[128] = "";
+    size_t used = 0;
+    for (size_t i = 0; i < TRACER_COUNT && used < sizeof(list); i++)
+        if (tracers[i])
+            used += (size_t)snprintf(list + used, sizeof(list) - used, "%s%s", used ? ", " : "", tracers[i]->name);
+    if (number == NUMBER_REFERENCE) {
+        error_set(error, ERROR_UNSUPPORTED, field,
+                  "this farlightd was built without Embree, which the tracer reference is");
+        error_remedy(error, "install libembree-dev and build it again, or choose another tracer: %s", list);
+    } else {
+        error_set(error, ERROR_UNSUPPORTED, field, "this build has no tracer number %u", number);
+        error_remedy(error, "available: %s", list);
+    }
+    return NULL;
 }
 
 struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *device,

@@ -24,7 +24,8 @@ struct tracer_options {
     enum { BVH_BOUNDS_AUTO, BVH_BOUNDS_BOX, BVH_BOUNDS_SPHERE } bvh_bounds; /* protocol's numbers */
     /* plain: sphere links in a storage buffer, for the benchmark */
     enum { BVH_LAYOUT_FAST, BVH_LAYOUT_PLAIN } bvh_layout;
-    uint32_t bvh_rays_together; /* 0: chosen; 1, 2, 4, 8 */
+    uint32_t bvh_rays_together;     /* 0: chosen; 1, 2, 4, 8 */
+    uint32_t reference_rays_a_call; /* 0: chosen; 1, 4, 8, 16 */
 };
 
 struct tracer_stats {
@@ -33,6 +34,8 @@ struct tracer_stats {
     uint64_t nodes;          /* elements of the structure */
     uint64_t nodes_rebuilt;  /* by the last update */
     uint64_t nodes_refitted;
+    uint64_t
+        walk_ns; /* `reference`: of the last wave, in Embree alone, without the copies from and to the device */
 };
 
 struct tracer {
@@ -52,14 +55,16 @@ struct tracer_impl {
      * Everything is marked changed on the first. Reports STAGE_BUILD and STAGE_UPLOAD. */
     bool (*update)(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
                    struct stage_times *times, struct error *error);
-    /* Buffers of the scene are bound. Queues the work; does not wait. */
+    /* Buffers of the scene are bound. Queues the work; does not wait, unless it is done on the CPU. */
     bool (*trace)(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error);
 };
 
-extern const struct tracer_impl tracer_bvh_impl, tracer_naive_impl;
+extern const struct tracer_impl tracer_bvh_impl, tracer_naive_impl, tracer_reference_impl;
 
 /* The table of what this build has; index is the protocol's tracer number, NULL where it is left out. */
 const struct tracer_impl *tracer_impl_by_number(unsigned number);
+/* The same for who asked for it: where there is none, ERROR_UNSUPPORTED says why and what can be done. */
+const struct tracer_impl *tracer_find(unsigned number, const char *field, struct error *error);
 
 struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *device,
                              const struct tracer_options *options, struct error *error);

@@ -33,6 +33,10 @@ static const struct tracer_row tracers[] = {
     {"bvh in the plain form", 0, {.bvh_layout = BVH_LAYOUT_PLAIN}},
     {"bvh, two rays together", 0, {.bvh_rays_together = 2}},
     {"bvh with spheres, four rays together", 0, {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 4}},
+    {"reference", 2, {0}}, /* as many rays a call as the processor takes at once */
+    {"reference, one ray a call", 2, {.reference_rays_a_call = 1}},
+    {"reference, four rays a call", 2, {.reference_rays_a_call = 4}},
+    {"reference, eight rays a call", 2, {.reference_rays_a_call = 8}},
 };
 
 struct scene_row {
@@ -417,6 +421,11 @@ int main(void)
     struct error error = {0};
     size_t n = 0;
     for (size_t t = 0; t < COUNT(tracers); t++) {
+        if (!tracer_find(tracers[t].number, tracers[t].name, &error)) {
+            printf("SKIP: %s: %s\n", tracers[t].name, error.text);
+            error = (struct error){0};
+            continue;
+        }
         for (size_t s = 0; s < COUNT(scenes); s++) {
             for (size_t c = 0; c < COUNT(checks); c++) {
                 if (checks[c].once && s > 0)
