@@ -172,6 +172,7 @@ CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c 
 $(B)/tests/unit/test_load_model: $(MODEL_OBJ)
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
+$(B)/tests/bench/bench_bvh: $(MODEL_OBJ) $(B)/tests/bench/bench_scene.o $(B)/tests/bench/bench_waves.o
 $(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3
 BENCH_PROGRAMS := $(BENCHES) $(B)/tests/bench/embree_build
 # EMBREE=0 leaves out what cannot be built without it.

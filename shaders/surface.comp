@@ -1,22 +1,40 @@
 // SPDX-License-Identifier: MIT
 // From the crossings of a closest-hit wave to hits: the second half of every exact tracer. Apart from the walk, whose
-// program stays small by it.
+// program stays small by it; and the walk need not carry barycentrics along.
 //
 // Defines: HAS_SPHERES as the scene has them.
-#include "shared/ray.h"
 #include "common/dispatch.glsl"
-#include "common/surface.glsl"
+#include "common/crossing.glsl"
 
-layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
-layout(std430, binding = BIND_HITS) buffer hit_block { hit hits[]; };
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
+layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; a crossing is the first
 
 uniform uint ray_count;
+
+bool is_triangle(candidate found)
+{
+    if (found.primitive == HIT_NO_PRIMITIVE || found.instance_index == HIT_NO_PRIMITIVE)
+        return false;
+#ifdef HAS_SPHERES
+    return geometry_at(instance_at(found.instance_index).geometry).kind != GEOMETRY_SPHERES;
+#else
+    return true;
+#endif
+}
 
 void main()
 {
     uint k = item_index();
     if (k >= ray_count)
         return;
-    candidate found = candidate(hits[k].distance, hits[k].primitive, hits[k].instance, vec2(hits[k].u0, hits[k].v0));
-    hits[k] = surface_of(found, rays[k].origin_t_min.xyz, rays[k].direction_t_max.xyz);
+    uvec4 crossing = imageLoad(hits, int(3u * k));
+    vec3 origin = texelFetch(rays, int(2u * k)).xyz, direction = texelFetch(rays, int(2u * k + 1u)).xyz;
+    candidate found = candidate(uintBitsToFloat(crossing.x), crossing.z, crossing.w, vec2(0.0));
+    if (is_triangle(found))
+        found.barycentrics =
+            candidate_triangle(found.instance_index, found.primitive, origin, direction).barycentrics;
+    hit h = surface_of(found, origin, direction);
+    imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material, h.primitive, h.instance));
+    imageStore(hits, int(3u * k + 1u), floatBitsToUint(vec4(h.u0, h.v0, h.u1, h.v1)));
+    imageStore(hits, int(3u * k + 2u), uvec4(h.normal_geometric, h.normal_shading, h.tangent, h.colour));
 }

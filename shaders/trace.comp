@@ -24,9 +24,9 @@
 // trace_any returns true, and may stop, once offer_any did: nothing is left of the light.
 //
 // This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the
-// answer: a visibility, or a crossing (shared/hit.h) of which surface.comp makes a hit. Of rays walked together some may be dead: they have t_max = -1 and t_min = 0, direction (1 0 0) and
-// can hit nothing, so a walk must not take from ray 0
-// what another needs. Groups in which all are dead do not reach it.
+// answer: a visibility, or a crossing (shared/hit.h) of which surface.comp makes a hit. Of rays walked together some
+// may be dead: they have t_max = -1 and t_min = 0, direction (1 0 0) and can hit nothing, so a walk must not take
+// from ray 0 what another needs. Groups in which all are dead do not reach it.
 #include "shared/bindings.h"
 #include "shared/ray.h"
 #include "common/dispatch.glsl"
@@ -37,11 +37,11 @@
 #define RAYS_TOGETHER 1
 #endif
 
-layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each: software GL fetches those faster
 #ifdef ANY_HIT
 layout(std430, binding = BIND_VISIBILITY) writeonly buffer visibility_block { uint visibilities[]; };
 #else
-layout(std430, binding = BIND_HITS) writeonly buffer hit_block { hit crossings[]; };
+layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer crossings;
 #endif
 
 uniform uint first_ray; // of this dispatch
@@ -62,9 +62,9 @@ trace_ray load_ray(uint ray_index)
     trace_ray dead = trace_ray(vec3(0.0), vec3(1.0, 0.0, 0.0), 0.0, -1.0);
     if (ray_index >= ray_count)
         return dead;
-    ray stored = rays[ray_index];
-    trace_ray r = trace_ray(stored.origin_t_min.xyz, stored.direction_t_max.xyz, stored.origin_t_min.w,
-                            stored.direction_t_max.w);
+    vec4 origin_t_min = texelFetch(rays, int(2u * ray_index));
+    vec4 direction_t_max = texelFetch(rays, int(2u * ray_index + 1u));
+    trace_ray r = trace_ray(origin_t_min.xyz, direction_t_max.xyz, origin_t_min.w, direction_t_max.w);
     if (is_alive(r))
         return r;
     return dead;
@@ -109,11 +109,8 @@ void store_crossing(uint ray_index, candidate best)
 {
     if (ray_index >= ray_count)
         return;
-    crossings[ray_index].distance = best.primitive == HIT_NO_PRIMITIVE ? -1.0 : best.distance;
-    crossings[ray_index].primitive = best.primitive;
-    crossings[ray_index].instance = best.instance_index;
-    crossings[ray_index].u0 = best.barycentrics.x;
-    crossings[ray_index].v0 = best.barycentrics.y;
+    float distance_ = best.primitive == HIT_NO_PRIMITIVE ? -1.0 : best.distance;
+    imageStore(crossings, int(3u * ray_index), uvec4(floatBitsToUint(distance_), 0u, best.primitive, best.instance_index));
 }
 
 #endif

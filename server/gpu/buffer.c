@@ -150,8 +150,7 @@ void gpu_buffer_bind_uniform(const struct gpu_buffer *buffer, unsigned binding)
     glBindBufferBase(GL_UNIFORM_BUFFER, binding, name_or_empty(buffer));
 }
 
-void gpu_buffer_bind_texels(struct gpu_device *device, struct gpu_buffer *buffer, unsigned unit,
-                            unsigned texel_format)
+static void need_texture(struct gpu_device *device, struct gpu_buffer *buffer, unsigned texel_format)
 {
     if (!buffer->texture || buffer->texel_format != texel_format) {
         gpu_object_destroy(device->registry, GPU_TEXTURE_BUFFER, buffer->texture);
@@ -162,5 +161,18 @@ void gpu_buffer_bind_texels(struct gpu_device *device, struct gpu_buffer *buffer
         else
             glTextureBufferRange(buffer->texture, texel_format, device->empty_buffer, 0, 16);
     }
+}
+
+void gpu_buffer_bind_texels(struct gpu_device *device, struct gpu_buffer *buffer, unsigned unit,
+                            unsigned texel_format)
+{
+    need_texture(device, buffer, texel_format);
     glBindTextureUnit(unit, buffer->texture);
+}
+
+void gpu_buffer_bind_image(struct gpu_device *device, struct gpu_buffer *buffer, unsigned unit,
+                           unsigned texel_format)
+{
+    need_texture(device, buffer, texel_format);
+    glBindImageTexture(unit, buffer->texture, 0, GL_FALSE, 0, GL_READ_WRITE, texel_format);
 }

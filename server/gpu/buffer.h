@@ -44,5 +44,8 @@ void gpu_buffer_bind_uniform(const struct gpu_buffer *buffer, unsigned binding);
  * GL_RGBA8 ..) on a texture unit. An empty buffer is bound as one of a single zero texel. */
 void gpu_buffer_bind_texels(struct gpu_device *device, struct gpu_buffer *buffer, unsigned unit,
                             unsigned texel_format);
+/* Likewise as a uimageBuffer / imageBuffer, which can be written to, on an image unit. */
+void gpu_buffer_bind_image(struct gpu_device *device, struct gpu_buffer *buffer, unsigned unit,
+                           unsigned texel_format);
 
 #endif

@@ -23,8 +23,8 @@ struct comparison {
     struct scene_gpu *scene;
     struct tracer *tracers[2];
     struct wave_compare_settings settings;
-    bool prepared[2][2];                /* this frame: kind of wave, coherent */
-    struct gpu_buffer hits, visibility; /* the second tracer's */
+    bool prepared[2][COMPARED_WAVES_MAX]; /* this frame: kind of wave, number */
+    struct gpu_buffer hits, visibility;   /* the second tracer's */
     struct gpu_buffer moved_rays, moved_hits, moved_visibility;
     struct tally_list slice, frame;
     struct chunk {
@@ -176,14 +176,15 @@ static bool make_twin(struct comparison *comparison, const struct wave *wave, st
     return reserve_answers(comparison, wave, twin->hits, twin->visibility, error);
 }
 
-bool comparison_prepare(struct comparison *comparison, const struct wave *wave, struct error *error)
+bool comparison_prepare(struct comparison *comparison, const struct wave *wave, uint32_t wave_number,
+                        struct error *error)
 {
-    bool *prepared = &comparison->prepared[wave->kind == WAVE_ANY][wave->coherent];
+    wave_number = wave_number < COMPARED_WAVES_MAX ? wave_number : COMPARED_WAVES_MAX - 1;
+    bool *prepared = &comparison->prepared[wave->kind == WAVE_ANY][wave_number];
     struct wave twin;
     if (!*prepared) {
         if (!make_twin(comparison, wave, &twin, error))
             return false;
-        twin.ray_count = 1;
         for (int i = 0; i < 2; i++)
             if (!tracer_trace(comparison->tracers[i], comparison->scene, &twin, error))
                 return false;

@@ -22,9 +22,11 @@ uint64_t comparison_device_bytes(const struct comparison *comparison);
  * wave_compare_settings, 0: WAVE_FAR_SHARE. */
 void comparison_begin(struct comparison *comparison, struct scene_gpu *scene, struct tracer *first,
                       struct tracer *second, float far_share);
-/* Before the first tracer traces the wave: compiles what both need for it, so that their times are of tracing
- * alone, and waits until the device has nothing else to do. */
-bool comparison_prepare(struct comparison *comparison, const struct wave *wave, struct error *error);
+/* Before the first tracer traces the wave: has both trace it once unmeasured if it is the frame's first of its
+ * number and kind, which compiles what they need for it, so that their times are of tracing alone; and waits until
+ * the device has nothing else to do. */
+bool comparison_prepare(struct comparison *comparison, const struct wave *wave, uint32_t wave_number,
+                        struct error *error);
 /* The wave has been traced, in first_ns, and its buffers hold the answers. The scene is bound. */
 bool comparison_wave(struct comparison *comparison, const struct wave *wave, enum ray_kind kind,
                      uint32_t wave_number, uint64_t first_ns, struct error *error);

@@ -201,10 +201,9 @@ static bool begin_comparison(struct frame_renderer *renderer, struct error *erro
         return true;
     }
     uint64_t start_ns = clock_now_ns();
-    struct tracer *second =
-        tracer_set_get(&renderer->tracers, &renderer->scene,
-                       find_tracer(renderer, request->compare_with, "compare_with", error),
-                       &request->tracer_options, NULL, error);
+    struct tracer *second = tracer_set_get(&renderer->tracers, &renderer->scene,
+                                           find_tracer(renderer, request->compare_with, "compare_with", error),
+                                           &request->tracer_options, NULL, error);
     if (!renderer->comparison)
         renderer->comparison = comparison_create(renderer->device, error);
     if (!second || !renderer->comparison)

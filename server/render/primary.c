@@ -192,7 +192,7 @@ static bool trace_hits(struct render_context *context, struct error *error)
         .ray_count = context->ray_count,
         .rays = &context->rays,
         .hits = &context->hits,
-        .coherent = true,
+        .shared_origin = context->request.camera.fov_y > 0.0f, /* a perspective camera's eye */
     };
     context_span_end(context);
     bool traced = wave_trace(context, RAY_PRIMARY, &wave, error);

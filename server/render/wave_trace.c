@@ -18,7 +18,7 @@ static bool trace_and_compare(struct render_context *context, enum ray_kind kind
                               struct error *error)
 {
     context_span_begin(context, STAGE_COMPARE);
-    bool ready = comparison_prepare(context->comparison, wave, error);
+    bool ready = comparison_prepare(context->comparison, wave, context->wave_number, error);
     context_span_end(context);
     uint64_t start_ns = clock_now_ns();
     if (!ready || !trace(context, kind, wave, error))

@@ -167,7 +167,6 @@ static bool trace_shadows(struct whitted *whitted, struct render_context *contex
         .ray_count = context->hit_count * light_count,
         .rays = &whitted->shadow_rays,
         .visibility = &whitted->visibility,
-        .coherent = context->wave_number == 0, /* neighbours on the picture look at the same light */
     };
     return wave_trace(context, RAY_SHADOW, &wave, error);
 }

@@ -14,12 +14,19 @@
 #include <string.h>
 
 #define BUILD_THREADS_MAX 8
-/* Elements that one ray may visit: every element of every instance, up to this. It stops a walk through damaged
- * links, not a deep scene: a ray of the largest scenes visits some hundreds. */
-#define STEP_BUDGET_MAX (1u << 26)
-/* Coherent waves that walk together on software GL; see tests/bench/bench_bvh.c. Elsewhere a SIMD group of the
- * hardware walks together already, and several rays an invocation cost registers; not measured there. */
-#define TOGETHER_SOFTWARE 8
+/* How many walk together on software GL where that pays. Elsewhere a SIMD group of the hardware walks together
+ * already, and several rays an invocation cost registers; not measured there. */
+#define TOGETHER_SOFTWARE 8u
+/* A walk of several rays takes as long as four of single ones (tests/bench, part `together`): it pays where it is
+ * shared by more than that. */
+#define RAYS_A_WALK_MIN 5u
+/* Groups of which the coherence of a wave is found, and the rays below which it is not worth it. */
+#define COHERENCE_GROUPS 512u
+#define COHERENCE_RAYS_MIN 1024u
+/* A grid that makes boxes so much larger costs more steps than its smaller elements save. */
+#define GRID_COST_MAX 1.3f
+/* Rays that are walked together begin within this share of the scene's diagonal. */
+#define REACH_TOGETHER (1.0f / 512)
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX (1u << 18)
 
@@ -65,6 +72,7 @@ static void bvh_reset(struct bvh *bvh)
     bvh_store_finish(&bvh->store);
     bvh_top_finish(&bvh->top);
     gpu_buffer_finish(bvh->store.device, &bvh->transform_buffer);
+    gpu_buffer_finish(bvh->store.device, &bvh->coherence);
     free(bvh->transforms);
     bvh->transforms = NULL;
     bvh->transform_count = 0;
@@ -119,16 +127,10 @@ static struct bvh_transform describe(const struct bvh *bvh, const struct scene_g
     transform.element_count = entry->element_count;
     transform.first_texel = entry->first_texel;
     transform.first_primitive = scene->geometries[instance->geometry].device.first_primitive;
+    memcpy(transform.grid_lower, entry->grid.lower, sizeof entry->grid.lower);
+    memcpy(transform.cells_per_unit, entry->grid.cells_per_unit, sizeof entry->grid.cells_per_unit);
     *box = world_box(entry, instance->world_from_object);
     return transform;
-}
-
-static void set_step_budget(struct bvh *bvh)
-{
-    uint64_t steps = bvh->top.element_count;
-    for (uint32_t i = 0; i < bvh->transform_count; i++)
-        steps += bvh->transforms[i].element_count;
-    bvh->step_budget = steps < STEP_BUDGET_MAX ? (uint32_t)steps + 1 : STEP_BUDGET_MAX;
 }
 
 /* A new top tree and all transforms. */
@@ -141,8 +143,7 @@ static bool rebuild_top(struct bvh *bvh, const struct scene_gpu *scene, struct e
     for (uint32_t i = 0; ok && i < count; i++)
         transforms[i] = describe(bvh, scene, i, &boxes[i], &is_fresh);
     bvh_top_finish(&bvh->top);
-    const struct bvh_settings *settings = &bvh->store.settings;
-    ok = ok && bvh_top_build(&bvh->top, boxes, count, settings->bounds, settings->plain);
+    ok = ok && bvh_top_build(&bvh->top, boxes, count, &bvh->store.settings);
     free(boxes);
     if (!ok) {
         free(transforms);
@@ -207,7 +208,6 @@ static bool update_instances(struct bvh *bvh, const struct scene_gpu *scene, str
     bool refitted = bvh->transforms && bvh->transform_count == scene->instance_count && refit_top(bvh, scene);
     if (!refitted && !rebuild_top(bvh, scene, error))
         return false;
-    set_step_budget(bvh);
     uint64_t built_ns = clock_now_ns();
     stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, built_ns - start_ns);
     bool ok = upload_top(bvh, !refitted, error);
@@ -223,6 +223,31 @@ static uint64_t node_count(const struct bvh *bvh)
     return nodes;
 }
 
+/* A tree with more detail than its grid can tell apart, a statue in a landscape, say. */
+static bool has_coarse_grid(const struct bvh *bvh)
+{
+    for (uint32_t i = 0; i < bvh->store.entry_count; i++)
+        if (bvh->store.entries[i].grid_cost > GRID_COST_MAX)
+            return true;
+    return false;
+}
+
+static bool update_geometries(struct bvh *bvh, const struct scene_gpu *scene, struct stage_times *times,
+                              struct error *error)
+{
+    struct tracer_stats *stats = &bvh->base.stats;
+    struct bvh_store_report report;
+    bool ok = bvh_store_update(&bvh->store, scene, &report, times, error);
+    stats->uploaded_bytes += report.uploaded_bytes;
+    stats->nodes_rebuilt += report.built_elements;
+    if (!ok || !has_coarse_grid(bvh))
+        return ok;
+    /* All trees again with boxes in floats, and so from now on. */
+    bvh_reset(bvh);
+    bvh->store.settings.whole = true;
+    return update_geometries(bvh, scene, times, error);
+}
+
 static bool bvh_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
                        struct stage_times *times, struct error *error)
 {
@@ -231,14 +256,8 @@ static bool bvh_update(struct tracer *tracer, struct scene_gpu *scene, const str
     stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
     if (!changes->geometry && !changes->instances)
         return true;
-    bool ok = true;
-    if (changes->geometry) {
-        struct bvh_store_report report;
-        ok = bvh_store_update(&bvh->store, scene, &report, times, error);
-        stats->uploaded_bytes += report.uploaded_bytes;
-        stats->nodes_rebuilt += report.built_elements;
-    }
-    ok = ok && update_instances(bvh, scene, times, error);
+    bool ok = (!changes->geometry || update_geometries(bvh, scene, times, error)) &&
+              update_instances(bvh, scene, times, error);
     if (!ok)
         bvh_reset(bvh);
     for (uint32_t i = 0; i < bvh->store.entry_count; i++)
@@ -250,13 +269,44 @@ static bool bvh_update(struct tracer *tracer, struct scene_gpu *scene, const str
 
 /* ---- waves ---- */
 
-uint32_t bvh_rays_together(const struct tracer *tracer, const struct wave *wave)
+/* Of a sample of the wave: rays alive, and walks that they would take. */
+static bool measure_coherence(struct bvh *bvh, const struct scene_gpu *scene, const struct wave *wave,
+                              uint32_t counts[2], struct error *error)
 {
-    if (tracer->options.bvh_layout == BVH_LAYOUT_PLAIN)
+    struct gpu_device *device = scene->device;
+    static const struct gpu_define defines[] = {{"RAYS_TOGETHER", "8"}, {NULL, NULL}};
+    _Static_assert(TOGETHER_SOFTWARE == 8, "the define above");
+    const struct gpu_program *program = gpu_program_get(
+        device, &(struct gpu_program_source){.compute = "bvh/coherence.comp", .defines = defines}, error);
+    if (!program || !gpu_buffer_reserve(device, &bvh->coherence, 2 * sizeof(uint32_t), error))
+        return false;
+    uint32_t groups = wave->ray_count / TOGETHER_SOFTWARE;
+    uint32_t step = groups > COHERENCE_GROUPS ? groups / COHERENCE_GROUPS : 1;
+    gpu_buffer_clear(device, &bvh->coherence, 0);
+    gpu_buffer_bind_storage(&bvh->coherence, BIND_TRACER_0);
+    gpu_buffer_bind_texels(device, wave->rays, UNIT_RAYS, GL_RGBA32F);
+    gpu_uniform_uint(program, "group_count", groups / step);
+    gpu_uniform_uint(program, "group_stride", step * TOGETHER_SOFTWARE);
+    gpu_uniform_float(program, "bvh_reach_together", REACH_TOGETHER * scene->diagonal);
+    gpu_dispatch(device, program, groups / step);
+    gpu_buffer_read(device, &bvh->coherence, 0, counts, 2 * sizeof *counts);
+    return true;
+}
+
+uint32_t bvh_rays_together(struct bvh *bvh, const struct scene_gpu *scene, const struct wave *wave,
+                           struct error *error)
+{
+    const struct tracer_options *options = &bvh->base.options;
+    uint32_t counts[2];
+    if (options->bvh_layout == BVH_LAYOUT_PLAIN)
         return 1;
-    if (tracer->options.bvh_rays_together != 0)
-        return tracer->options.bvh_rays_together;
-    return wave->coherent && tracer->device->facts.software ? TOGETHER_SOFTWARE : 1;
+    if (options->bvh_rays_together != 0)
+        return options->bvh_rays_together;
+    if (!scene->device->facts.software || wave->ray_count < COHERENCE_RAYS_MIN)
+        return 1;
+    if (!measure_coherence(bvh, scene, wave, counts, error))
+        return 0;
+    return counts[0] >= (uint64_t)RAYS_A_WALK_MIN * counts[1] && counts[1] > 0 ? TOGETHER_SOFTWARE : 1;
 }
 
 static void bind(struct bvh *bvh)
@@ -266,34 +316,61 @@ static void bind(struct bvh *bvh)
         gpu_buffer_bind_storage(&store->elements, BIND_TRACER_0);
     } else {
         gpu_buffer_bind_texels(store->device, &store->elements, UNIT_TRACER_0, GL_RGBA32UI);
-        gpu_buffer_bind_texels(store->device, &store->links, UNIT_TRACER_1, GL_RG32UI);
     }
-    gpu_buffer_bind_texels(store->device, &bvh->transform_buffer, UNIT_TRACER_2, GL_RGBA32UI);
-    gpu_buffer_bind_texels(store->device, &store->primitives, UNIT_TRACER_3, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &bvh->transform_buffer, UNIT_TRACER_1, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->primitives, UNIT_TRACER_2, GL_RGBA32UI);
+}
+
+/* A tree over one instance is that instance: its transform element is entered at once. */
+static bool is_one_instance(const struct bvh *bvh)
+{
+    return bvh->top.element_count == 1;
+}
+
+static void set_uniforms(const struct bvh *bvh, const struct gpu_program *program, const struct scene_gpu *scene)
+{
+    gpu_uniform_float(program, "bvh_reach_together", REACH_TOGETHER * scene->diagonal);
+    if (is_one_instance(bvh)) {
+        gpu_uniform_uint(program, "bvh_instance", bvh->top.leaves[0] & BVH_LEAF_FIRST_MASK);
+        return;
+    }
+    gpu_uniform_uint(program, "bvh_top_count", bvh->top.element_count);
+    if (bvh_is_packed(&bvh->store.settings)) {
+        gpu_uniform_vec(program, "bvh_top_grid_lower", 3, bvh->top.grid.lower);
+        gpu_uniform_vec(program, "bvh_top_cells_per_unit", 3, bvh->top.grid.cells_per_unit);
+    }
 }
 
 static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error)
 {
     struct bvh *bvh = (struct bvh *)tracer;
     const struct bvh_settings *settings = &bvh->store.settings;
-    struct gpu_define defines[4] = {{"TRACER_BVH", "1"}};
+    uint32_t together = bvh_rays_together(bvh, scene, wave, error);
+    if (together == 0)
+        return false;
+    struct gpu_define defines[7] = {{"TRACER_BVH", "1"}};
     size_t n = 1;
     if (settings->bounds == BVH_BOUNDS_OF_SPHERES)
         defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
     if (settings->plain)
         defines[n++] = (struct gpu_define){"BVH_PLAIN", "1"};
+    if (bvh_is_packed(settings))
+        defines[n++] = (struct gpu_define){"BVH_PACKED", "1"};
+    if (is_one_instance(bvh))
+        defines[n++] = (struct gpu_define){"BVH_ONE_INSTANCE", "1"};
+    if (wave->shared_origin && together > 1)
+        defines[n++] = (struct gpu_define){"SHARED_ORIGIN", "1"};
     const struct trace_program_source source = {
         .traverse = "bvh/traverse.glsl",
         .defines = defines,
-        .rays_together = bvh_rays_together(tracer, wave),
+        .rays_together = together,
         .rays_a_dispatch = DISPATCH_RAYS_MAX,
     };
     const struct gpu_program *program = trace_program_get(scene, wave->kind, &source, error);
     if (!program)
         return false;
     bind(bvh);
-    gpu_uniform_uint(program, "bvh_top_count", bvh->top.element_count);
-    gpu_uniform_uint(program, "bvh_step_budget", bvh->step_budget);
+    set_uniforms(bvh, program, scene);
     return trace_program_run(program, scene, wave, &source, error);
 }
 

@@ -15,10 +15,12 @@ struct bvh {
     struct bvh_transform *transforms; /* mirror of the buffer, one an instance of the scene */
     uint32_t transform_count;
     struct gpu_buffer transform_buffer;
-    uint32_t step_budget;
+    struct gpu_buffer coherence; /* what bvh/coherence.comp counts */
 };
 
-/* How many rays a wave walks together: what the options say, else what was measured to be fast. */
-uint32_t bvh_rays_together(const struct tracer *tracer, const struct wave *wave);
+/* How many rays of the wave walk together: what the options say, else what is faster for a wave as coherent as
+ * this one, of which a sample is measured. 0: failed. */
+uint32_t bvh_rays_together(struct bvh *bvh, const struct scene_gpu *scene, const struct wave *wave,
+                           struct error *error);
 
 #endif

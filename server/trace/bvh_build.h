@@ -69,22 +69,35 @@ enum bvh_bounds { BVH_BOUNDS_OF_BOXES, BVH_BOUNDS_OF_SPHERES };
 
 struct bvh_settings {
     enum bvh_bounds bounds;
-    bool plain;       /* one order for every direction: no links but those in the elements */
+    bool plain;       /* one order for every direction */
+    bool whole;       /* boxes in floats, not on a grid */
     unsigned threads; /* at most; small shapes take one */
 };
 
 /* Shapes of fewer primitives are built by one thread. */
 #define BVH_THREADED_PRIMITIVES 50000u
 
+/* Where the cells of packed elements lie: a coordinate x is at cell (x - lower) * cells_per_unit. */
+struct bvh_grid {
+    float lower[3], cells_per_unit[3];
+};
+
 struct bvh_tree {
-    struct bvh_element *elements;
-    struct bvh_link *links; /* BVH_OCTANTS x element_count; NULL: plain */
+    uint32_t *elements; /* as the device has them: octants x element_count x words */
     uint32_t element_count;
+    struct bvh_grid grid;
+    float grid_cost;   /* how much larger the grid makes a box's surface, in the mean: 1 .. 4; 1: not packed */
     float *primitives; /* 4 x primitive_texels floats, see shared/bvh_node.h */
     size_t primitive_texels;
     float lower[3], upper[3]; /* of everything, padded */
     uint64_t build_ns;
 };
+
+/* What the settings mean for elements. */
+uint32_t bvh_octants(const struct bvh_settings *settings); /* copies: BVH_OCTANTS or 1 */
+bool bvh_is_packed(const struct bvh_settings *settings);
+uint32_t bvh_element_words(const struct bvh_settings *settings); /* uint32_t of one element of one copy */
+size_t bvh_element_bytes(const struct bvh_settings *settings);   /* of one element in all copies */
 
 /* Bounds are padded outward by BVH_PAD_RELATIVE of their magnitude, so that the rounding of the traversal's
  * arithmetic cannot lose a hit (shaders/bvh/bounds.glsl has the sum). ERROR_OUT_OF_MEMORY, ERROR_LIMIT. */
@@ -106,27 +119,41 @@ bool bvh_jobs_run(struct bvh_job *jobs, uint32_t count, const struct bvh_setting
 
 /* ---- the pieces, for the top tree ---- */
 
+#define BVH_NONE 0xffffffffu
+
 /* Elements in the depth-first order of octant 0. */
 struct bvh_baked {
     uint32_t element_count;
-    uint32_t *node;         /* of an element: its binary node */
-    uint32_t *size;         /* elements of its subtree, itself included; its children begin at the next element */
-    uint32_t *parent;       /* BVH_END at the root */
-    struct bvh_link *links; /* BVH_OCTANTS x element_count; NULL: plain */
+    uint32_t *node;   /* of an element: its binary node */
+    uint32_t *size;   /* elements of its subtree, itself included; its children begin at the next element */
+    uint32_t *parent; /* BVH_NONE at the root */
+    uint32_t *place;  /* octants x element_count: where the octant's order has it; NULL: one octant */
 };
 
-/* Chooses which inner nodes stay, orders and links. areas[n]: surface of the bound of binary node n, up to a
+/* Chooses which inner nodes stay, and orders them. areas[n]: surface of the bound of binary node n, up to a
  * factor. False: out of memory. */
-bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const float *areas, bool plain,
+bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const float *areas, uint32_t octants,
               unsigned threads);
 void bvh_baked_finish(struct bvh_baked *baked);
-/* The one order's link. */
-uint32_t bvh_baked_miss(const struct bvh_baked *baked, uint32_t element);
 
+/* A box, or a sphere: its centre in `lower`, its radius in upper[0]. */
+struct bvh_bound {
+    float lower[3], upper[3];
+};
+struct bvh_bound bvh_bound_of_box(const float lower[3], const float upper[3]); /* padded */
+struct bvh_bound bvh_bound_of_sphere(const float centre[3], float radius);     /* padded */
+/* Writes element e into every copy. leaf: 0 for an inner element. Packed, the box must lie in the grid. */
+void bvh_write_element(uint32_t *elements, const struct bvh_settings *settings, const struct bvh_baked *baked,
+                       const struct bvh_grid *grid, uint32_t e, const struct bvh_bound *bound, uint32_t leaf);
 uint32_t bvh_leaf(uint32_t kind, uint32_t first, uint32_t count);
 float bvh_box_area(const float lower[3], const float upper[3]);
-void bvh_element_set_box(struct bvh_element *element, const float lower[3], const float upper[3]);
-void bvh_element_set_sphere(struct bvh_element *element, const float centre[3], float radius);
 void bvh_pad_box(float lower[3], float upper[3]);
+
+/* A grid over a padded box, with some room to all sides where `room` is set, a share of the box's extent. */
+struct bvh_grid bvh_grid_over(const float lower[3], const float upper[3], float room);
+/* Cells of a padded box, two an axis; rounded outward. False: some of it lies outside of the grid. */
+bool bvh_grid_cells(const struct bvh_grid *grid, const float lower[3], const float upper[3], uint32_t cells[3][2]);
+/* Surface of the box that those cells span, as bvh_box_area. */
+float bvh_grid_area(const struct bvh_grid *grid, uint32_t cells[3][2]);
 
 #endif

@@ -3,8 +3,6 @@
 
 #include "base/parallel.h"
 
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
 
 /* An inner node whose surface is at least this share of its nearest kept ancestor's is thrown back: its children
@@ -13,7 +11,7 @@
  * care (2 %), spheres lose 10 % where nothing is thrown back, and 0.5 leaves a fifth fewer elements. */
 #define THROW_BACK 0.5f
 
-/* Octants are linked four at a time, one in each lane. */
+/* Octants are ordered four at a time, one in each lane. */
 #define LANES 4
 typedef uint32_t lanes __attribute__((vector_size(LANES * sizeof(uint32_t))));
 
@@ -21,7 +19,8 @@ struct bake {
     struct bvh_baked *baked;
     const struct bvh_binary_node *nodes;
     uint32_t place_count; /* of the binary tree */
-    uint32_t *element;    /* of each place; of inner nodes that are thrown back BVH_END */
+    uint32_t *element;    /* of each binary node; of inner nodes that are thrown back BVH_NONE */
+    uint32_t *below;      /* elements of each binary node's subtree */
     uint32_t waiting_max; /* right children that wait in a walk through the tree, at most */
     bool failed[BVH_OCTANTS / LANES];
 };
@@ -37,7 +36,7 @@ static void choose_elements(struct bake *bake, const float *areas)
     struct bvh_baked *baked = bake->baked;
     uint32_t elements = 0, waiting = 0;
     uint32_t *above = bake->element; /* the nearest kept ancestor, until the node itself is reached */
-    above[0] = BVH_END;
+    above[0] = BVH_NONE;
     for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i)) {
         const struct bvh_binary_node *node = &bake->nodes[i];
         uint32_t parent = above[i];
@@ -57,7 +56,7 @@ static void choose_elements(struct bake *bake, const float *areas)
             if (waiting > bake->waiting_max)
                 bake->waiting_max = waiting;
         }
-        bake->element[i] = pays ? parent : BVH_END;
+        bake->element[i] = pays ? parent : BVH_NONE;
     }
     baked->element_count = elements;
     for (uint32_t e = elements - 1; e > 0; e--)
@@ -76,75 +75,88 @@ static lanes choose(lanes which, lanes yes, lanes no)
     return (yes & which) | (no & ~which);
 }
 
-/* The first element of subtree i in the order of each octant: where nodes are thrown back it lies below them. */
-static lanes first_elements(const struct bake *bake, uint32_t i, uint32_t first_octant)
+/* Elements below each binary node. A right child's place comes after its left sibling's and all below that: going
+ * backwards, both children are done before their parent. The binary nodes' places have gaps, whence the list. */
+static bool count_below(struct bake *bake)
 {
-    uint32_t element = bake->element[i];
-    lanes first = {element, element, element, element};
-    if (element != BVH_END)
-        return first;
-    for (uint32_t lane = 0; lane < LANES; lane++) {
-        uint32_t place = i;
-        while (bake->element[place] == BVH_END) {
-            const struct bvh_binary_node *node = &bake->nodes[place];
-            place = (first_octant + lane) >> (node->count_axis & 3) & 1 ? node->link : place + 1;
-        }
-        first[lane] = bake->element[place];
+    uint32_t count = 0;
+    uint32_t *order = malloc(bake->place_count * sizeof *order);
+    if (!order)
+        return false;
+    for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i))
+        order[count++] = i;
+    while (count-- > 0) {
+        uint32_t i = order[count];
+        const struct bvh_binary_node *node = &bake->nodes[i];
+        bake->below[i] = bake->element[i] != BVH_NONE;
+        if (!node_is_leaf(node))
+            bake->below[i] += bake->below[i + 1] + bake->below[node->link];
     }
-    return first;
+    free(order);
+    return true;
 }
 
-static void set_links(const struct bake *bake, uint32_t first_octant, uint32_t element, lanes hit, lanes miss)
-{
-    size_t count = bake->baked->element_count;
-    struct bvh_link *links = bake->baked->links + first_octant * count + element;
-    for (uint32_t lane = 0; lane < LANES; lane++)
-        links[lane * count] = (struct bvh_link){hit[lane], miss[lane]};
-}
-
-/* The links of four octants, in one walk that carries what comes after the subtree it is in: a miss leads there, a
- * hit to the nearer child's first element, and after the nearer child comes the farther one. After the last
- * comes BVH_END at once, however many levels end there. */
-static void link_octants(void *context, uint32_t group)
+/* The places of all elements in four octants' orders, in one walk that carries where the subtree it is in begins:
+ * its own element first, then all of the nearer child, then all of the farther one. */
+static void place_octants(void *context, uint32_t group)
 {
     struct bake *bake = context;
     uint32_t first_octant = group * LANES, waiting = 0;
-    lanes after = {BVH_END, BVH_END, BVH_END, BVH_END};
-    lanes *after_right = aligned_alloc(sizeof after, ((size_t)bake->waiting_max + 1) * sizeof after);
-    bake->failed[group] = !after_right;
-    if (!after_right)
+    size_t count = bake->baked->element_count;
+    uint32_t *places = bake->baked->place + first_octant * count;
+    lanes begin = {0, 0, 0, 0};
+    lanes *begin_right = aligned_alloc(sizeof begin, ((size_t)bake->waiting_max + 1) * sizeof begin);
+    bake->failed[group] = !begin_right;
+    if (!begin_right)
         return;
     for (uint32_t i = 0; i < bake->place_count; i = bvh_binary_next(bake->nodes, i)) {
         const struct bvh_binary_node *node = &bake->nodes[i];
         uint32_t element = bake->element[i];
+        if (element != BVH_NONE) {
+            for (uint32_t lane = 0; lane < LANES; lane++)
+                places[lane * count + element] = begin[lane];
+            begin += 1;
+        }
         if (node_is_leaf(node)) {
-            set_links(bake, first_octant, element, after, after);
             if (waiting > 0)
-                after = after_right[--waiting];
+                begin = begin_right[--waiting];
             continue;
         }
-        lanes left = first_elements(bake, i + 1, first_octant);
-        lanes right = first_elements(bake, node->link, first_octant);
+        const lanes none = {0}, left = none + bake->below[i + 1], right = none + bake->below[node->link];
         lanes left_first = left_is_near(node, first_octant);
-        if (element != BVH_END)
-            set_links(bake, first_octant, element, choose(left_first, left, right), after);
-        after_right[waiting++] = choose(left_first, after, left);
-        after = choose(left_first, right, after);
+        begin_right[waiting++] = begin + choose(left_first, left, none);
+        begin += choose(left_first, none, right);
     }
-    free(after_right);
+    free(begin_right);
 }
 
 static bool bake_alloc(struct bake *bake, struct bvh_baked *baked)
 {
     size_t places = bake->place_count;
     bake->element = malloc(places * sizeof *bake->element);
+    bake->below = malloc(places * sizeof *bake->below);
     baked->node = malloc(places * sizeof *baked->node);
     baked->size = malloc(places * sizeof *baked->size);
     baked->parent = malloc(places * sizeof *baked->parent);
-    return bake->element && baked->node && baked->size && baked->parent;
+    return bake->element && bake->below && baked->node && baked->size && baked->parent;
 }
 
-bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const float *areas, bool plain,
+static bool place_all(struct bake *bake, uint32_t octants, unsigned threads)
+{
+    struct bvh_baked *baked = bake->baked;
+    if (octants == 1)
+        return true;
+    baked->place = malloc((size_t)octants * baked->element_count * sizeof *baked->place);
+    if (!baked->place || !count_below(bake))
+        return false;
+    parallel_run(threads, octants / LANES, place_octants, bake);
+    for (uint32_t group = 0; group < octants / LANES; group++)
+        if (bake->failed[group])
+            return false;
+    return true;
+}
+
+bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const float *areas, uint32_t octants,
               unsigned threads)
 {
     *baked = (struct bvh_baked){0};
@@ -152,15 +164,9 @@ bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const floa
     bool ok = bake_alloc(&bake, baked);
     if (ok)
         choose_elements(&bake, areas);
-    if (ok && !plain) {
-        baked->links = malloc((size_t)BVH_OCTANTS * baked->element_count * sizeof *baked->links);
-        ok = baked->links != NULL;
-        if (ok)
-            parallel_run(threads, BVH_OCTANTS / LANES, link_octants, &bake);
-    }
-    for (uint32_t group = 0; group < BVH_OCTANTS / LANES; group++)
-        ok = ok && !bake.failed[group];
+    ok = ok && place_all(&bake, octants, threads);
     free(bake.element);
+    free(bake.below);
     if (!ok)
         bvh_baked_finish(baked);
     return ok;
@@ -171,54 +177,6 @@ void bvh_baked_finish(struct bvh_baked *baked)
     free(baked->node);
     free(baked->size);
     free(baked->parent);
-    free(baked->links);
+    free(baked->place);
     *baked = (struct bvh_baked){0};
-}
-
-uint32_t bvh_baked_miss(const struct bvh_baked *baked, uint32_t element)
-{
-    uint32_t next = element + baked->size[element];
-    return next < baked->element_count ? next : BVH_END;
-}
-
-uint32_t bvh_leaf(uint32_t kind, uint32_t first, uint32_t count)
-{
-    return kind << BVH_LEAF_KIND_SHIFT | (count - 1) << BVH_LEAF_COUNT_SHIFT | first;
-}
-
-float bvh_box_area(const float lower[3], const float upper[3])
-{
-    float x = upper[0] - lower[0], y = upper[1] - lower[1], z = upper[2] - lower[2];
-    return x * y + y * z + z * x;
-}
-
-void bvh_pad_box(float lower[3], float upper[3])
-{
-    for (int i = 0; i < 3; i++) {
-        lower[i] -= fabsf(lower[i]) * BVH_PAD_RELATIVE + FLT_MIN;
-        upper[i] += fabsf(upper[i]) * BVH_PAD_RELATIVE + FLT_MIN;
-    }
-}
-
-void bvh_element_set_box(struct bvh_element *element, const float lower[3], const float upper[3])
-{
-    float low[3] = {lower[0], lower[1], lower[2]}, high[3] = {upper[0], upper[1], upper[2]};
-    bvh_pad_box(low, high);
-    element->lower_x = low[0];
-    element->lower_y = low[1];
-    element->lower_z = low[2];
-    element->upper_x = high[0];
-    element->upper_y = high[1];
-    element->upper_z = high[2];
-}
-
-void bvh_element_set_sphere(struct bvh_element *element, const float centre[3], float radius)
-{
-    float magnitude = fabsf(centre[0]) + fabsf(centre[1]) + fabsf(centre[2]) + radius;
-    element->lower_x = centre[0];
-    element->lower_y = centre[1];
-    element->lower_z = centre[2];
-    element->upper_x = radius + magnitude * BVH_PAD_RELATIVE + FLT_MIN;
-    element->upper_y = 0;
-    element->upper_z = 0;
 }

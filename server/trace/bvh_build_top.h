@@ -10,20 +10,23 @@ struct bvh_world_box {
 };
 
 struct bvh_top {
-    struct bvh_element *elements; /* as the device has them */
+    uint32_t *elements; /* as the device has them */
     uint32_t element_count;
     struct bvh_baked baked;
+    struct bvh_grid grid;
     struct bvh_world_box *boxes; /* of each element, not padded */
-    uint32_t *element_of;        /* instance to element; BVH_END: not in the tree */
+    uint32_t *leaves;            /* of each element: its link, 0: an inner one */
+    uint32_t *element_of;        /* instance to element; BVH_NONE: not in the tree */
     bool *moved;                 /* elements whose box is to be made again */
     uint32_t instance_count;
-    enum bvh_bounds bounds;
+    struct bvh_settings settings;
     float built_cost; /* when the tree was built; see bvh_top_is_stale */
+    bool left_grid;   /* something has moved out of the grid */
 };
 
 /* Transform elements of instances 0 .. count - 1. False: out of memory. */
-bool bvh_top_build(struct bvh_top *top, const struct bvh_world_box *boxes, uint32_t count, enum bvh_bounds bounds,
-                   bool plain);
+bool bvh_top_build(struct bvh_top *top, const struct bvh_world_box *boxes, uint32_t count,
+                   const struct bvh_settings *settings);
 void bvh_top_finish(struct bvh_top *top);
 /* An instance has a new box. One that comes or goes (becomes empty or was) needs a new tree: false. */
 bool bvh_top_move(struct bvh_top *top, uint32_t instance, const struct bvh_world_box *box);

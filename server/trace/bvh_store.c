@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LINKS_BYTES (BVH_OCTANTS * sizeof(struct bvh_link)) /* of an element */
 #define TEXEL_BYTES (4 * sizeof(float))
 #define TOP_CAPACITY_MIN 64u
 
@@ -19,23 +18,22 @@ void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const st
 void bvh_store_finish(struct bvh_store *store)
 {
     gpu_buffer_finish(store->device, &store->elements);
-    gpu_buffer_finish(store->device, &store->links);
     gpu_buffer_finish(store->device, &store->primitives);
     free(store->entries);
     free(store->entry_of);
-    bvh_store_init(store, store->device,
-                   &(struct bvh_settings){store->settings.bounds, store->settings.plain, store->settings.threads});
+    const struct bvh_settings settings = store->settings;
+    bvh_store_init(store, store->device, &settings);
 }
 
 const struct bvh_entry *bvh_store_entry(const struct bvh_store *store, uint32_t geometry)
 {
-    uint32_t entry = geometry < store->geometry_count ? store->entry_of[geometry] : BVH_END;
-    return entry == BVH_END ? NULL : &store->entries[entry];
+    uint32_t entry = geometry < store->geometry_count ? store->entry_of[geometry] : BVH_NONE;
+    return entry == BVH_NONE ? NULL : &store->entries[entry];
 }
 
 uint64_t bvh_store_bytes(const struct bvh_store *store)
 {
-    return store->elements.capacity_bytes + store->links.capacity_bytes + store->primitives.capacity_bytes;
+    return store->elements.capacity_bytes + store->primitives.capacity_bytes;
 }
 
 /* ---- room ---- */
@@ -45,10 +43,11 @@ static bool check_limits(const struct bvh_store *store, uint64_t elements, uint6
 {
     const struct gpu_facts *facts = &store->device->facts;
     uint64_t texels_max = facts->texture_buffer_texels_max;
+    size_t element_texels = bvh_element_bytes(&store->settings) / TEXEL_BYTES;
     uint64_t elements_max = store->settings.plain ? facts->storage_block_bytes_max / sizeof(struct bvh_element)
-                                                  : texels_max / BVH_OCTANTS;
-    if (elements_max > INT32_MAX / BVH_OCTANTS)
-        elements_max = INT32_MAX / BVH_OCTANTS;
+                                                  : texels_max / element_texels;
+    if (elements_max > INT32_MAX / element_texels)
+        elements_max = INT32_MAX / element_texels;
     if (elements > elements_max)
         return error_set(error, ERROR_LIMIT, NULL, "the trees have %llu elements, this device holds %llu",
                          (unsigned long long)elements, (unsigned long long)elements_max);
@@ -113,10 +112,8 @@ static bool pack(struct bvh_store *store, uint32_t top_capacity, uint64_t elemen
     const struct gpu_buffer before = store->elements;
     bool ok =
         check_limits(store, elements, texels, error) &&
-        resize(store->device, &store->elements, sizeof(struct bvh_element), elements, element_moves,
+        resize(store->device, &store->elements, bvh_element_bytes(&store->settings), elements, element_moves,
                store->entry_count, error) &&
-        (store->settings.plain ||
-         resize(store->device, &store->links, LINKS_BYTES, elements, element_moves, store->entry_count, error)) &&
         resize(store->device, &store->primitives, TEXEL_BYTES, texels, texel_moves, store->entry_count, error);
     for (uint32_t i = 0; ok && i < store->entry_count; i++) {
         store->entries[i].first_element = (uint32_t)element_moves[i].to;
@@ -218,15 +215,13 @@ static void upload_tree(struct bvh_store *store, const struct scene_gpu_geometry
                                 .texel_count = (uint32_t)tree->primitive_texels};
     memcpy(entry->lower, tree->lower, sizeof entry->lower);
     memcpy(entry->upper, tree->upper, sizeof entry->upper);
-    size_t element_bytes = tree->element_count * sizeof *tree->elements;
-    size_t link_bytes = tree->links ? tree->element_count * LINKS_BYTES : 0;
+    entry->grid = tree->grid;
+    entry->grid_cost = tree->grid_cost;
+    size_t each_bytes = bvh_element_bytes(&store->settings), element_bytes = tree->element_count * each_bytes;
     size_t texel_bytes = tree->primitive_texels * TEXEL_BYTES;
-    gpu_buffer_write(store->device, &store->elements, element * sizeof *tree->elements, tree->elements,
-                     element_bytes);
-    if (tree->links)
-        gpu_buffer_write(store->device, &store->links, element * LINKS_BYTES, tree->links, link_bytes);
+    gpu_buffer_write(store->device, &store->elements, element * each_bytes, tree->elements, element_bytes);
     gpu_buffer_write(store->device, &store->primitives, texel * TEXEL_BYTES, tree->primitives, texel_bytes);
-    report->uploaded_bytes += element_bytes + link_bytes + texel_bytes;
+    report->uploaded_bytes += element_bytes + texel_bytes;
     report->built_elements += tree->element_count;
 }
 
@@ -279,7 +274,7 @@ static bool index_entries(struct bvh_store *store, const struct scene_gpu *scene
         const struct scene_gpu_geometry *geometry = &scene->geometries[g];
         const struct bvh_entry *entry = hashmap_get(&by_key, entry_key(geometry->mesh != NULL, geometry->id));
         bool has_one = entry && geometry->device.primitive_count > 0;
-        entry_of[g] = has_one ? (uint32_t)(entry - store->entries) : BVH_END;
+        entry_of[g] = has_one ? (uint32_t)(entry - store->entries) : BVH_NONE;
     }
     hashmap_finish(&by_key);
     if (!ok) {
@@ -314,24 +309,37 @@ bool bvh_store_update(struct bvh_store *store, const struct scene_gpu *scene, st
 
 /* ---- top tree ---- */
 
-uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all)
+/* One octant's copy: runs of elements that lie side by side there. */
+static uint64_t write_top_copy(struct bvh_store *store, const struct bvh_top *top, uint32_t octant,
+                               const bool *moved)
 {
+    size_t each_bytes = bvh_element_words(&store->settings) * sizeof *top->elements;
+    size_t first = (size_t)octant * top->element_count;
     uint64_t bytes = 0;
     for (uint32_t begin = 0; begin < top->element_count;) {
         uint32_t end = begin;
-        while (end < top->element_count && (all || top->moved[end]))
+        while (end < top->element_count && (!moved || moved[end]))
             end++;
-        size_t run_bytes = (end - begin) * sizeof *top->elements;
+        size_t run_bytes = (end - begin) * each_bytes;
         if (end > begin)
-            gpu_buffer_write(store->device, &store->elements, begin * sizeof *top->elements, top->elements + begin,
-                             run_bytes);
+            gpu_buffer_write(store->device, &store->elements, (first + begin) * each_bytes,
+                             (const uint8_t *)top->elements + (first + begin) * each_bytes, run_bytes);
         bytes += run_bytes;
         begin = end + (end == begin);
     }
-    if (all && top->baked.links && top->element_count > 0) {
-        size_t link_bytes = top->element_count * LINKS_BYTES;
-        gpu_buffer_write(store->device, &store->links, 0, top->baked.links, link_bytes);
-        bytes += link_bytes;
+    return bytes;
+}
+
+uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all)
+{
+    uint64_t bytes = 0;
+    uint32_t count = top->element_count;
+    bool *moved = all || count == 0 ? NULL : malloc(count);
+    for (uint32_t octant = 0; octant < bvh_octants(&store->settings); octant++) {
+        for (uint32_t e = 0; moved && e < count; e++)
+            moved[top->baked.place ? top->baked.place[(size_t)octant * count + e] : e] = top->moved[e];
+        bytes += write_top_copy(store, top, octant, moved); /* without memory for the marks: all */
     }
+    free(moved);
     return bytes;
 }

@@ -25,6 +25,8 @@ struct bvh_entry {
     uint32_t first_element, element_count;
     uint32_t first_texel, texel_count;
     float lower[3], upper[3]; /* object space, padded */
+    struct bvh_grid grid;
+    float grid_cost;
 };
 
 struct bvh_store {
@@ -32,11 +34,11 @@ struct bvh_store {
     struct bvh_settings settings;
     struct bvh_entry *entries; /* as they lie on the device */
     uint32_t entry_count;
-    uint32_t *entry_of; /* geometry of the scene to entry; BVH_END: without primitives */
+    uint32_t *entry_of; /* geometry of the scene to entry; BVH_NONE: without primitives */
     uint32_t geometry_count;
     uint32_t top_capacity; /* elements before the first entry */
     bool top_lost;         /* the top tree has to be written again; cleared by who does */
-    struct gpu_buffer elements, links, primitives;
+    struct gpu_buffer elements, primitives;
 };
 
 struct bvh_store_report {
@@ -51,7 +53,7 @@ bool bvh_store_update(struct bvh_store *store, const struct scene_gpu *scene, st
                       struct stage_times *times, struct error *error);
 /* Room for a top tree of so many elements. */
 bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, struct error *error);
-/* Writes elements of the top tree: all with their links, or those marked in `moved`. Returns the bytes. */
+/* Writes elements of the top tree: all, or those marked in `moved`. Returns the bytes. */
 uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all);
 /* The tree of a geometry, NULL if it has no primitives. */
 const struct bvh_entry *bvh_store_entry(const struct bvh_store *store, uint32_t geometry);

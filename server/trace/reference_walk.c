@@ -219,8 +219,6 @@ static struct hit crossing_of(const struct reference *reference, const struct pa
     uint32_t instance = hits[HIT_INSTANCE * n + lane].u;
     crossing.distance = packet->lanes[RAY_T_FAR * n + lane].f + begin_of(ray);
     crossing.primitive = hits[HIT_PRIMITIVE * n + lane].u;
-    crossing.u0 = hits[HIT_U * n + lane].f;
-    crossing.v0 = hits[HIT_V * n + lane].f;
     if (instance != RTC_INVALID_GEOMETRY_ID) {
         crossing.instance = instance - 1;
         crossing.primitive += reference->instances[instance - 1].first_primitive;

@@ -121,8 +121,8 @@ bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, struct s
 void scene_gpu_bind(struct scene_gpu *gpu)
 {
     struct gpu_device *device = gpu->device;
-    gpu_buffer_bind_storage(&gpu->instance_buffer, BIND_INSTANCES);
-    gpu_buffer_bind_storage(&gpu->geometry_buffer, BIND_GEOMETRIES);
+    gpu_buffer_bind_texels(gpu->device, &gpu->instance_buffer, UNIT_INSTANCES, GL_RGBA32UI);
+    gpu_buffer_bind_texels(gpu->device, &gpu->geometry_buffer, UNIT_GEOMETRIES, GL_RGBA32UI);
     gpu_buffer_bind_storage(&gpu->materials, BIND_MATERIALS);
     gpu_buffer_bind_storage(&gpu->texture_slots, BIND_TEXTURE_SLOTS);
     gpu_buffer_bind_storage(&gpu->textures, BIND_TEXTURES);

@@ -49,8 +49,8 @@ bool trace_surfaces(const struct scene_gpu *scene, const struct wave *wave, stru
     if (!program)
         return false;
     gpu_uniform_uint(program, "ray_count", wave->ray_count);
-    gpu_buffer_bind_storage(wave->rays, BIND_RAYS);
-    gpu_buffer_bind_storage(wave->hits, BIND_HITS);
+    gpu_buffer_bind_texels(scene->device, wave->rays, UNIT_RAYS, GL_RGBA32F);
+    gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
     gpu_dispatch(scene->device, program, wave->ray_count);
     return true;
 }
@@ -59,11 +59,11 @@ bool trace_program_run(const struct gpu_program *program, const struct scene_gpu
                        const struct trace_program_source *source, struct error *error)
 {
     uint32_t together = source->rays_together ? source->rays_together : 1;
-    gpu_buffer_bind_storage(wave->rays, BIND_RAYS);
+    gpu_buffer_bind_texels(scene->device, wave->rays, UNIT_RAYS, GL_RGBA32F);
     if (wave->kind == WAVE_ANY)
         gpu_buffer_bind_storage(wave->visibility, BIND_VISIBILITY);
     else
-        gpu_buffer_bind_storage(wave->hits, BIND_HITS);
+        gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
     gpu_uniform_uint(program, "disc_count", scene->disc_count);
     gpu_uniform_uint(program, "instance_count", scene->instance_count);
     for (uint32_t first = 0, part; first < wave->ray_count; first += part) {

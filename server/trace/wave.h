@@ -19,9 +19,7 @@ struct wave {
     struct gpu_buffer *rays;       /* struct ray */
     struct gpu_buffer *hits;       /* struct hit; closest */
     struct gpu_buffer *visibility; /* uint; any */
-    /* Rays next to each other in the buffer are near each other in space, such as 8x8 tiles of pixels in
-     * Morton order; a hint for how many to walk together. */
-    bool coherent;
+    bool shared_origin;            /* all rays begin at one point */
     /* Closest hits of an exact tracer stay crossings (shared/hit.h): for benchmarks, of the walk alone. */
     bool crossings_only;
 };

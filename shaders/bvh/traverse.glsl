@@ -4,9 +4,12 @@
 //
 // The host (trace/bvh.c) sets, besides the defines of trace.comp:
 //   BVH_SPHERES  bounds are spheres, not boxes
+//   BVH_PACKED   boxes are on a grid
 //   BVH_PLAIN    the paper's form, for comparison: elements in a storage buffer, one order for all directions
+//   BVH_ONE_INSTANCE  there is one: no top tree is walked
+//   SHARED_ORIGIN     all rays of the wave begin at one point
 //
-// RAYS_TOGETHER rays walk as one: an element is entered when any of them hits its bound, a primitive is fetched
+// RAYS_TOGETHER rays walk as one: an element is entered when any of them may hit its bound, a primitive is fetched
 // once and tested against all. The octant is that of the first live ray; the others' answers are right
 // whatever the order, only less is pruned.
 //
@@ -15,225 +18,100 @@
 // software GL runs the code of both sides of a branch for the whole group, so leaf code in the inner loop would
 // be paid for at each element.
 #include "shared/bvh_node.h"
-#include "common/candidate.glsl"
 #include "bvh/bounds.glsl"
+#include "bvh/leaf.glsl"
+#include "bvh/together.glsl"
 
 #ifdef BVH_PLAIN
 layout(std430, binding = BIND_TRACER_0) readonly buffer bvh_element_block { bvh_element bvh_elements[]; };
 #else
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer bvh_elements;
-layout(binding = UNIT_TRACER_1) uniform usamplerBuffer bvh_links;
 #endif
-layout(binding = UNIT_TRACER_2) uniform usamplerBuffer bvh_transforms;
-layout(binding = UNIT_TRACER_3) uniform usamplerBuffer bvh_primitives;
+layout(binding = UNIT_TRACER_1) uniform usamplerBuffer bvh_transforms;
 
-uniform uint bvh_top_count;   // elements of the top tree; 0: nothing there
-uniform uint bvh_step_budget; // elements that a group of rays may visit; more than all there are, so that only
-                              // links that lead in a circle could use it up
+#ifdef BVH_ONE_INSTANCE
+uniform uint bvh_instance;
+#else
+uniform uint bvh_top_count; // elements of the top tree; 0: nothing there
+#endif
+#ifdef BVH_PACKED
+uniform vec3 bvh_top_grid_lower;
+uniform vec3 bvh_top_cells_per_unit;
+#endif
 
 #define NOT_INSIDE 0xffffffffu
-
-#if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
-#define ASK_MATERIALS
-#endif
-
-#ifdef ANY_HIT
-#define answer vec3 // transmittance
-#else
-#define answer candidate
-#endif
+#define NO_GRID tree_grid(vec3(0.0), vec3(1.0))
 
 struct walk_state {
-    uint first_element; // of the tree that is walked
-    uint first_link;
-    uint element;       // next one, counted from the tree's first; BVH_END
-    uint budget;
+    uint first;   // the walked tree's copy for the octant
+    uint end;     // its number of elements
+    uint element; // next one, counted from the first
 };
 
-struct leaf_element {
-    uint bits; // 0: none, the tree is done
-    uint miss;
-};
-
-// What is known of the instance that is walked.
-struct entered_instance {
-    uint index; // NOT_INSIDE: the top tree is walked
-    uint first_texel;
-    uint first_primitive;
-};
-
-struct element_data {
-    uvec4 lower;
-    uvec4 upper; // w: leaf
-    uint hit, miss;
-};
-
-element_data fetch_element(walk_state walk)
+void begin_tree(inout walk_state walk, uint first_element, uint element_count, uint octant)
 {
 #ifdef BVH_PLAIN
-    bvh_element e = bvh_elements[walk.first_element + walk.element];
-    return element_data(floatBitsToUint(vec4(e.lower_x, e.lower_y, e.lower_z, 0.0)),
-                        uvec4(floatBitsToUint(vec3(e.upper_x, e.upper_y, e.upper_z)), e.leaf),
-                        walk.element + 1u, e.miss);
+    walk.first = first_element;
 #else
-    int texel = int(walk.first_element + walk.element) * 2;
-    uvec2 link = texelFetch(bvh_links, int(walk.first_link + walk.element)).xy;
-    return element_data(texelFetch(bvh_elements, texel), texelFetch(bvh_elements, texel + 1), link.x, link.y);
+    walk.first = first_element * BVH_OCTANTS + octant * element_count;
 #endif
+    walk.end = element_count;
+    walk.element = 0u;
 }
 
-uint octant_of(vec3 direction)
-{
-    return (direction.x < 0.0 ? 1u : 0u) | (direction.y < 0.0 ? 2u : 0u) | (direction.z < 0.0 ? 4u : 0u);
-}
-
-void begin_tree(inout walk_state walk, uint first_element, uint element_count, vec3 direction)
-{
-    walk.first_element = first_element;
-    walk.first_link = first_element * BVH_OCTANTS + octant_of(direction) * element_count;
-}
-
-float end_of(trace_ray r, answer found)
-{
-#ifdef ANY_HIT
-    return r.t_max;
-#else
-    return found.distance;
-#endif
-}
-
-// The inner loop: on to the next leaf whose bound some ray hits.
-leaf_element next_leaf(inout walk_state walk, bound_ray bound_rays[RAYS_TOGETHER], trace_ray r[RAYS_TOGETHER],
-                       answer found[RAYS_TOGETHER])
-{
-    leaf_element leaf = leaf_element(0u, BVH_END);
-    while (walk.element != BVH_END && walk.budget != 0u) {
-        element_data e = fetch_element(walk);
-        walk.budget--;
-        bool any_hit = false;
-        for (int k = 0; k < RAYS_TOGETHER; k++)
-            any_hit = bound_is_hit(bound_rays[k], e.lower, e.upper, r[k].t_min, end_of(r[k], found[k])) || any_hit;
-        leaf = leaf_element(e.upper.w, e.miss);
-        if (any_hit && leaf.bits != 0u)
-            break;
-        leaf.bits = 0u;
-        walk.element = any_hit ? e.hit : e.miss;
-    }
-    return leaf;
-}
-
-// A candidate against its ray; a ray of which nothing is left is put out.
-void offer(inout trace_ray r, candidate c, inout answer found)
-{
-#ifdef ANY_HIT
-    if (offer_any(r, c, found)) {
-        found = vec3(0.0);
-        r.t_max = -1.0; // no bound and no primitive is hit by it any more
-        r.t_min = 0.0;
-    }
-#else
-    offer_closest(r, c, found);
-#endif
-}
-
-// Where materials have to be asked, what the rays found on a primitive is noted first and settled one by one in a
-// loop: the code that asks (textures and all) would else stand in the program once for each ray and root.
-struct noted_hits {
-    vec2 distances; // triangles have the first alone
-    vec2 barycentrics;
+// Before which and after which distance no ray has anything to find.
+struct distances_left {
+    float t_min, t_max;
 };
 
-void offer_or_note(uint bit, candidate c, inout trace_ray r, inout answer found, inout noted_hits noted,
-                   inout uint noted_bits)
+distances_left left_of(trace_ray r[RAYS_TOGETHER], answer found[RAYS_TOGETHER])
 {
-#ifdef ASK_MATERIALS
-    if (c.distance > r.t_min && c.distance < end_of(r, found)) {
-        noted.distances[bit & 1u] = c.distance;
-        noted.barycentrics = c.barycentrics;
-        noted_bits |= 1u << bit;
+    distances_left left = distances_left(r[0].t_min, end_of(r[0], found[0]));
+    for (int k = 1; k < RAYS_TOGETHER; k++) {
+        left.t_min = min(left.t_min, r[k].t_min);
+        left.t_max = max(left.t_max, end_of(r[k], found[k]));
     }
+    return left;
+}
+
+// The inner loop: on to the next leaf whose bound some ray may hit. Returns its link, 0: the tree is done.
+uint next_leaf(inout walk_state walk, bundle b, distances_left left, trace_ray r[RAYS_TOGETHER],
+               answer found[RAYS_TOGETHER])
+{
+    uint leaf = 0u;
+    while (leaf == 0u && walk.element < walk.end) {
+#ifdef BVH_PLAIN
+        bvh_element e = bvh_elements[walk.first + walk.element];
+        vec4 lower = vec4(e.lower_x, e.lower_y, e.lower_z, e.upper_x);
+        uint link = e.link;
+#elif !defined BVH_PACKED
+        int texel = int(walk.first + walk.element) * 2;
+        uvec4 first_half = texelFetch(bvh_elements, texel);
+        vec3 lower_corner = uintBitsToFloat(first_half.xyz);
+        vec3 upper_corner = uintBitsToFloat(texelFetch(bvh_elements, texel + 1).xyz);
+        vec4 lower = vec4(lower_corner, upper_corner.x);
+        uint link = first_half.w;
 #else
-    offer(r, c, found);
+        uvec4 element = texelFetch(bvh_elements, int(walk.first + walk.element));
+        uint link = element.w;
 #endif
-}
-
-#ifdef ASK_MATERIALS
-void settle(uint noted_bits, candidate common_part, noted_hits noted[RAYS_TOGETHER],
-            inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
-{
-    while (noted_bits != 0u) {
-        int bit = findLSB(noted_bits), chosen = bit >> 1;
-        noted_bits &= noted_bits - 1u;
-        trace_ray ray_asking = r[0];
-        noted_hits noted_here = noted[0];
-        answer found_here = found[0];
-        for (int k = 1; k < RAYS_TOGETHER; k++) {
-            if (k == chosen) {
-                ray_asking = r[k];
-                noted_here = noted[k];
-                found_here = found[k];
-            }
-        }
-        common_part.distance = (bit & 1) == 0 ? noted_here.distances.x : noted_here.distances.y;
-        common_part.barycentrics = noted_here.barycentrics;
-        offer(ray_asking, common_part, found_here);
-        for (int k = 0; k < RAYS_TOGETHER; k++) {
-            if (k == chosen) {
-                r[k] = ray_asking;
-                found[k] = found_here;
-            }
-        }
-    }
-}
-#endif
-
-// Primitive i of a leaf against all rays.
-void test_primitive(bool is_sphere, uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
-                    inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
-{
-    candidate c = candidate(0.0, inside.first_primitive, inside.index, vec2(0.0));
-    noted_hits noted[RAYS_TOGETHER];
-    uint noted_bits = 0u;
-#ifdef HAS_SPHERES
-    if (is_sphere) {
-        int texel = int(inside.first_texel + i * BVH_SPHERE_TEXELS);
-        vec4 sphere = uintBitsToFloat(texelFetch(bvh_primitives, texel));
-        c.primitive += texelFetch(bvh_primitives, texel + 1).x;
-        for (int k = 0; k < RAYS_TOGETHER; k++) {
-            vec2 distances;
-            if (intersect_sphere(o[k].origin, o[k].direction, sphere.xyz, sphere.w, distances)) {
-                c.distance = distances.x;
-                offer_or_note(uint(2 * k), c, r[k], found[k], noted[k], noted_bits);
-                c.distance = distances.y;
-                offer_or_note(uint(2 * k + 1), c, r[k], found[k], noted[k], noted_bits);
-            }
-        }
-    } else
-#endif
-    {
-        int texel = int(inside.first_texel + i * BVH_TRIANGLE_TEXELS);
-        uvec4 first = texelFetch(bvh_primitives, texel);
-        vec3 v0 = uintBitsToFloat(first.xyz), v1 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 1).xyz);
-        vec3 v2 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 2).xyz);
-        c.primitive += first.w;
+#ifdef BVH_SPHERES
+        bool any_hit = false;
         for (int k = 0; k < RAYS_TOGETHER; k++)
-            if (intersect_triangle(o[k].direction, v0 - o[k].origin, v1 - o[k].origin, v2 - o[k].origin, c.distance,
-                                   c.barycentrics))
-                offer_or_note(uint(2 * k), c, r[k], found[k], noted[k], noted_bits);
-    }
-#ifdef ASK_MATERIALS
-    settle(noted_bits, c, noted, r, found);
+            any_hit = sphere_is_hit(b.rays[k], lower, r[k].t_min, end_of(r[k], found[k])) || any_hit;
+#elif defined BVH_PACKED
+        bool any_hit = box_is_hit(b, vec3(ivec3(element.xyz & 0xffffu)), vec3(ivec3(element.xyz >> 16)), left.t_min,
+                                  left.t_max);
+#else
+        bvec3 negative = notEqual(uvec3(b.octant) & uvec3(1u, 2u, 4u), uvec3(0u));
+        bool any_hit = box_is_hit(b, mix(lower_corner, upper_corner, negative),
+                                  mix(upper_corner, lower_corner, negative), left.t_min, left.t_max);
 #endif
-}
-
-void test_leaf(uint bits, entered_instance inside, object_ray o[RAYS_TOGETHER], inout trace_ray r[RAYS_TOGETHER],
-               inout answer found[RAYS_TOGETHER])
-{
-    uint first = bits & BVH_LEAF_FIRST_MASK;
-    uint end = first + (bits >> BVH_LEAF_COUNT_SHIFT & BVH_LEAF_COUNT_MASK) + 1u;
-    bool is_sphere = bits >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_SPHERES;
-    for (uint i = first; i < end; i++)
-        test_primitive(is_sphere, i, inside, o, r, found);
+        bool is_leaf = link >> BVH_LEAF_KIND_SHIFT != 0u;
+        leaf = any_hit && is_leaf ? link : 0u;
+        walk.element = any_hit || is_leaf ? walk.element + 1u : link;
+    }
+    return leaf;
 }
 
 bool is_alive_any(trace_ray r[RAYS_TOGETHER])
@@ -244,77 +122,138 @@ bool is_alive_any(trace_ray r[RAYS_TOGETHER])
     return alive;
 }
 
-// The direction whose octant orders the walk.
-vec3 leading_direction(trace_ray r[RAYS_TOGETHER], object_ray o[RAYS_TOGETHER])
+// Enters a tree with all rays that are still alive: what it needs of them in its space.
+void enter_tree(object_ray o[RAYS_TOGETHER], trace_ray r[RAYS_TOGETHER], tree_grid grid, float slack,
+                out bundle b, out relative_rays rays)
 {
-    vec3 leading = o[0].direction;
-    for (int k = RAYS_TOGETHER - 1; k >= 0; k--)
-        if (r[k].t_max > r[k].t_min)
-            leading = o[k].direction;
-    return leading;
+    bool alive[RAYS_TOGETHER];
+    int leading = 0;
+    vec3 centre = o[0].origin;
+    for (int k = RAYS_TOGETHER - 1; k >= 0; k--) {
+        alive[k] = r[k].t_max > r[k].t_min;
+        leading = alive[k] ? k : leading;
+        centre = alive[k] ? o[k].origin : centre;
+    }
+    b = bundle_of(o, alive, leading, grid, slack);
+    rays = relative_to(centre, o);
 }
+
+// A transform element: the rays go on in the instance's space, wherever the instance lies.
+void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], out entered_instance inside,
+                    out object_ray o[RAYS_TOGETHER], out walk_state walk, out bundle b, out relative_rays rays)
+{
+    int texel = int(instance_index) * BVH_TRANSFORM_TEXELS;
+    vec4 rows[3] = vec4[3](uintBitsToFloat(texelFetch(bvh_transforms, texel)),
+                           uintBitsToFloat(texelFetch(bvh_transforms, texel + 1)),
+                           uintBitsToFloat(texelFetch(bvh_transforms, texel + 2)));
+    tree_grid grid = NO_GRID;
+#ifdef BVH_PACKED
+    grid = tree_grid(uintBitsToFloat(texelFetch(bvh_transforms, texel + 3)).xyz,
+                     uintBitsToFloat(texelFetch(bvh_transforms, texel + 4)).xyz);
+#endif
+    uvec4 tree = texelFetch(bvh_transforms, texel + 5);
+    inside = entered_instance(instance_index, tree.z, tree.w);
+    for (int k = 0; k < RAYS_TOGETHER; k++)
+        o[k] = object_ray(affine_point(rows, r[k].origin), affine_vector(rows, r[k].direction));
+    enter_tree(o, r, grid, OBJECT_SLACK, b, rays);
+    begin_tree(walk, tree.x, tree.y, b.octant);
+}
+
+// All leaves on the way of the tree that is walked, up to an instance, whose link is returned; 0: the tree is done.
+uint test_leaves(inout walk_state walk, bundle b, entered_instance inside, object_ray o[RAYS_TOGETHER],
+                 relative_rays rays, inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+{
+    for (;;) {
+        uint leaf = next_leaf(walk, b, left_of(r, found), r, found);
+        if (leaf == 0u || leaf >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_INSTANCE)
+            return leaf;
+        test_leaf(leaf, inside, o, rays, r, found);
+#ifdef ANY_HIT
+        if (!is_alive_any(r))
+            walk.element = walk.end;
+#endif
+    }
+}
+
+#ifdef BVH_ONE_INSTANCE
+
+void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+{
+    entered_instance inside;
+    object_ray o[RAYS_TOGETHER];
+    walk_state walk;
+    bundle b;
+    relative_rays rays;
+    enter_instance(bvh_instance, r, inside, o, walk, b, rays);
+    test_leaves(walk, b, inside, o, rays, r, found);
+}
+
+#else
 
 void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
 {
     if (bvh_top_count == 0u)
         return;
-    object_ray o[RAYS_TOGETHER];
-    bound_ray bound_rays[RAYS_TOGETHER];
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
-        o[k] = object_ray(r[k].origin, r[k].direction);
-        bound_rays[k] = bound_ray_of(o[k].origin, o[k].direction, WORLD_SLACK);
-    }
-    walk_state walk;
-    walk.element = 0u;
-    walk.budget = bvh_step_budget;
-    begin_tree(walk, 0u, bvh_top_count, leading_direction(r, o));
-    entered_instance inside = entered_instance(NOT_INSIDE, 0u, 0u);
-    uint top_links = walk.first_link;  // one order for the whole top tree, also when the leading ray is done
-    uint after_instance = BVH_END;     // where the top tree goes on
-    for (;;) {
-        leaf_element leaf;
-        for (;;) {
-            leaf = next_leaf(walk, bound_rays, r, found);
-            if (leaf.bits == 0u || leaf.bits >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_INSTANCE)
-                break;
-            test_leaf(leaf.bits, inside, o, r, found);
-            walk.element = leaf.miss;
-#ifdef ANY_HIT
-            if (!is_alive_any(r))
-                return;
+    tree_grid grid = NO_GRID;
+#ifdef BVH_PACKED
+    grid = tree_grid(bvh_top_grid_lower, bvh_top_cells_per_unit);
 #endif
-        }
-        if (leaf.bits != 0u) {
-            // A transform element: the ray goes on in the instance's space, wherever the instance lies.
-            inside.index = leaf.bits & BVH_LEAF_FIRST_MASK;
-            int texel = int(inside.index) * BVH_TRANSFORM_TEXELS;
-            vec4 rows[3] = vec4[3](uintBitsToFloat(texelFetch(bvh_transforms, texel)),
-                                   uintBitsToFloat(texelFetch(bvh_transforms, texel + 1)),
-                                   uintBitsToFloat(texelFetch(bvh_transforms, texel + 2)));
-            uvec4 tree = texelFetch(bvh_transforms, texel + 3);
-            inside.first_texel = tree.z;
-            inside.first_primitive = tree.w;
-            for (int k = 0; k < RAYS_TOGETHER; k++)
-                o[k] = object_ray(affine_point(rows, r[k].origin), affine_vector(rows, r[k].direction));
-            begin_tree(walk, tree.x, tree.y, leading_direction(r, o));
-            walk.element = 0u;
-            after_instance = leaf.miss;
+    object_ray o[RAYS_TOGETHER];
+    for (int k = 0; k < RAYS_TOGETHER; k++)
+        o[k] = object_ray(r[k].origin, r[k].direction);
+    bundle b, world_bundle;
+    relative_rays rays;
+    enter_tree(o, r, grid, WORLD_SLACK, world_bundle, rays);
+    walk_state walk, world_walk;
+    begin_tree(world_walk, 0u, bvh_top_count, world_bundle.octant);
+    entered_instance inside = entered_instance(NOT_INSIDE, 0u, 0u);
+    b = world_bundle;
+    walk = world_walk;
+    for (;;) {
+        uint leaf = test_leaves(walk, b, inside, o, rays, r, found);
+        if (leaf != 0u) {
+            world_walk.element = walk.element;
+            enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, inside, o, walk, b, rays);
         } else {
-            // The tree is done. Out of an instance the world's ray comes back as it was, not by a second matrix.
-            if (inside.index == NOT_INSIDE || after_instance == BVH_END || walk.budget == 0u)
+            // The tree is done. Out of an instance the world's bundle comes back as it was.
+            bool all_done = inside.index == NOT_INSIDE;
+#ifdef ANY_HIT
+            all_done = all_done || !is_alive_any(r);
+#endif
+            if (all_done)
                 return;
             inside.index = NOT_INSIDE;
-            for (int k = 0; k < RAYS_TOGETHER; k++)
-                o[k] = object_ray(r[k].origin, r[k].direction);
-            walk.first_element = 0u;
-            walk.first_link = top_links;
-            walk.element = after_instance;
+            b = world_bundle;
+            walk = world_walk;
         }
-        float slack = inside.index == NOT_INSIDE ? WORLD_SLACK : OBJECT_SLACK;
-        for (int k = 0; k < RAYS_TOGETHER; k++)
-            bound_rays[k] = bound_ray_of(o[k].origin, o[k].direction, slack);
     }
 }
+
+#endif
+
+#if RAYS_TOGETHER > 1
+// In each walk all that go the way of the first one left.
+void trace_in_groups(trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+{
+    uint waiting = 0u;
+    for (int k = 0; k < RAYS_TOGETHER; k++)
+        waiting |= r[k].t_max > r[k].t_min ? 1u << k : 0u;
+    while (waiting != 0u) {
+        trace_ray leading = r[0], walked[RAYS_TOGETHER];
+        for (int k = RAYS_TOGETHER - 1; k >= 0; k--)
+            if ((waiting >> k & 1u) != 0u)
+                leading = r[k];
+        for (int k = 0; k < RAYS_TOGETHER; k++) {
+            walked[k] = r[k];
+            if ((waiting >> k & 1u) != 0u && go_together(leading.origin, leading.direction, r[k].origin, r[k].direction))
+                waiting &= ~(1u << k);
+            else
+                put_out(walked[k]);
+        }
+        trace_together(walked, found);
+    }
+}
+#endif
 
 // What trace.comp calls.
 #ifdef ANY_HIT
@@ -333,7 +272,9 @@ bool trace_any(trace_ray r, inout vec3 transmittance)
 
 void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 transmittance[RAYS_TOGETHER])
 {
-    trace_together(r, transmittance);
+#if RAYS_TOGETHER > 1
+    trace_in_groups(r, transmittance);
+#endif
 }
 #else
 void trace_closest(trace_ray r, inout candidate best)
@@ -350,6 +291,8 @@ void trace_closest(trace_ray r, inout candidate best)
 
 void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER])
 {
-    trace_together(r, best);
+#if RAYS_TOGETHER > 1
+    trace_in_groups(r, best);
+#endif
 }
 #endif

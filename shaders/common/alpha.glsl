@@ -8,7 +8,7 @@ uint material_index_of(candidate found)
     if (found.instance_index == HIT_NO_PRIMITIVE)
         return discs[found.primitive].material;
 #ifdef HAS_SPHERES
-    if (geometries[instances[found.instance_index].geometry].kind == GEOMETRY_SPHERES)
+    if (geometry_at(instance_at(found.instance_index).geometry).kind == GEOMETRY_SPHERES)
         return texelFetch(sphere_materials, int(found.primitive)).x;
 #endif
     return texelFetch(triangles, int(found.primitive)).w & HIT_MATERIAL_MASK;
@@ -26,16 +26,16 @@ surface_point point_of(candidate found, vec3 origin_world, vec3 direction_world)
         return surface_point(disc_texcoords(discs[found.primitive],
                                             origin_world + found.distance * direction_world),
                              vec4(1.0));
-    instance i = instances[found.instance_index];
+    instance i = instance_at(found.instance_index);
 #ifdef HAS_SPHERES
-    if (geometries[i.geometry].kind == GEOMETRY_SPHERES) {
+    if (geometry_at(i.geometry).kind == GEOMETRY_SPHERES) {
         vec4 sphere = texelFetch(spheres, int(found.primitive));
         vec3 position_object = affine_point(i.object_from_world, origin_world) +
                                found.distance * affine_vector(i.object_from_world, direction_world);
         return surface_point(sphere_texcoords(normalize(position_object - sphere.xyz)), vec4(1.0));
     }
 #endif
-    uint flags = geometries[i.geometry].flags;
+    uint flags = geometry_at(i.geometry).flags;
     uvec4 triangle = texelFetch(triangles, int(found.primitive));
     vec3 weights = triangle_weights(found.barycentrics);
     return surface_point(triangle_texcoords(triangle, flags, weights), triangle_colour(triangle, flags, weights));

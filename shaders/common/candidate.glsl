@@ -19,7 +19,7 @@ struct object_ray {
 
 object_ray object_from_world_ray(trace_ray r, uint instance_index)
 {
-    vec4 rows[3] = instances[instance_index].object_from_world;
+    vec4 rows[3] = instance_at(instance_index).object_from_world;
     return object_ray(affine_point(rows, r.origin), affine_vector(rows, r.direction));
 }
 

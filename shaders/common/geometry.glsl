@@ -12,6 +12,31 @@ layout(binding = UNIT_COLOURS) uniform samplerBuffer colours;            // rgba
 layout(binding = UNIT_SPHERES) uniform samplerBuffer spheres;            // centre, radius
 layout(binding = UNIT_SPHERE_MATERIALS) uniform usamplerBuffer sphere_materials;
 
-layout(std430, binding = BIND_INSTANCES) readonly buffer instance_block { instance instances[]; };
-layout(std430, binding = BIND_GEOMETRIES) readonly buffer geometry_block { geometry geometries[]; };
+// Structs in texels: software GL reads a storage buffer a word and a lane at a time.
+layout(binding = UNIT_INSTANCES) uniform usamplerBuffer instances;
+layout(binding = UNIT_GEOMETRIES) uniform usamplerBuffer geometries;
 layout(std430, binding = BIND_DISCS) readonly buffer disc_block { disc discs[]; };
+
+// What of a struct is not used is not fetched.
+instance instance_at(uint index)
+{
+    int texel = int(index) * INSTANCE_TEXELS;
+    instance i;
+    for (int row = 0; row < 3; row++) {
+        i.world_from_object[row] = uintBitsToFloat(texelFetch(instances, texel + row));
+        i.object_from_world[row] = uintBitsToFloat(texelFetch(instances, texel + 3 + row));
+    }
+    uvec4 last = texelFetch(instances, texel + 6);
+    i.geometry = last.x;
+    i.node = last.y;
+    i.flags = last.z;
+    i.pad = last.w;
+    return i;
+}
+
+geometry geometry_at(uint index)
+{
+    int texel = int(index) * GEOMETRY_TEXELS;
+    uvec4 first = texelFetch(geometries, texel), second = texelFetch(geometries, texel + 1);
+    return geometry(first.x, first.y, first.z, first.w, second.x, second.y, second.z, second.w);
+}

@@ -39,8 +39,8 @@ bool surface_derivatives(hit h, texture_slot slot, out vec3 along_u, out vec3 al
         along_v = -2.0 * d.centre_radius.w * bitangent;
         return true;
     }
-    instance i = instances[h.instance];
-    if (geometries[i.geometry].kind == GEOMETRY_SPHERES) {
+    instance i = instance_at(h.instance);
+    if (geometry_at(i.geometry).kind == GEOMETRY_SPHERES) {
         float radius = texelFetch(spheres, int(h.primitive)).w;
         float phi = (h.u0 - 0.5) * TWO_PI, theta = h.v0 * PI;
         vec3 east = vec3(cos(phi), 0.0, -sin(phi));
@@ -122,7 +122,7 @@ bool is_textured(material m)
 float footprint_of(hit h, material m, vec3 geometric, vec3 direction, float width)
 {
     if (!is_textured(m) || h.primitive == HIT_NO_PRIMITIVE || h.instance == HIT_NO_PRIMITIVE ||
-        geometries[instances[h.instance].geometry].kind == GEOMETRY_SPHERES)
+        geometry_at(instance_at(h.instance).geometry).kind == GEOMETRY_SPHERES)
         return 0.0;
     float slant = max(abs(dot(geometric, direction)), 0.01);
     return width * inversesqrt(slant) * texcoords_per_metre(h.instance, h.primitive);

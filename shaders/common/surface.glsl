@@ -134,8 +134,8 @@ hit finish_hit(uint material_index, float distance, vec3 direction_world, vec3 g
 
 hit surface_triangle(uint instance_index, uint primitive, vec2 barycentrics, float distance, vec3 direction_world)
 {
-    instance i = instances[instance_index];
-    uint flags = geometries[i.geometry].flags;
+    instance i = instance_at(instance_index);
+    uint flags = geometry_at(i.geometry).flags;
     uvec4 triangle = texelFetch(triangles, int(primitive));
     vec3 weights = triangle_weights(barycentrics);
     vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
@@ -169,7 +169,7 @@ hit surface_triangle(uint instance_index, uint primitive, vec2 barycentrics, flo
 
 hit surface_sphere(uint instance_index, uint primitive, float distance, vec3 origin_world, vec3 direction_world)
 {
-    instance i = instances[instance_index];
+    instance i = instance_at(instance_index);
     vec4 sphere = texelFetch(spheres, int(primitive));
     vec3 position_object = affine_point(i.object_from_world, origin_world) +
                            distance * affine_vector(i.object_from_world, direction_world);
@@ -208,7 +208,7 @@ hit surface_of(candidate found, vec3 origin_world, vec3 direction_world)
     if (found.instance_index == HIT_NO_PRIMITIVE)
         return surface_disc(found.primitive, found.distance, origin_world, direction_world);
 #ifdef HAS_SPHERES
-    if (geometries[instances[found.instance_index].geometry].kind == GEOMETRY_SPHERES)
+    if (geometry_at(instance_at(found.instance_index).geometry).kind == GEOMETRY_SPHERES)
         return surface_sphere(found.instance_index, found.primitive, found.distance, origin_world,
                               direction_world);
 #endif
@@ -219,9 +219,9 @@ hit surface_of(candidate found, vec3 origin_world, vec3 direction_world)
 // How far texture coordinates of set 0 run per metre of a triangle: for the level of detail of a footprint.
 float texcoords_per_metre(uint instance_index, uint primitive)
 {
-    instance i = instances[instance_index];
+    instance i = instance_at(instance_index);
     uvec4 triangle = texelFetch(triangles, int(primitive));
-    if ((geometries[i.geometry].flags & GEOMETRY_HAS_TEXCOORDS_0) == 0u)
+    if ((geometry_at(i.geometry).flags & GEOMETRY_HAS_TEXCOORDS_0) == 0u)
         return 0.0;
     vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
     vec3 e1 = affine_vector(i.world_from_object, texelFetch(positions, int(triangle.y)).xyz - p0);

@@ -10,7 +10,7 @@ bool trace_any(trace_ray r, inout vec3 transmittance)
 {
     for (uint i = 0u; i < instance_count; i++) {
         object_ray o = object_from_world_ray(r, i);
-        geometry g = geometries[instances[i].geometry];
+        geometry g = geometry_at(instance_at(i).geometry);
         for (uint p = g.first_primitive; p < g.first_primitive + g.primitive_count; p++) {
 #ifdef HAS_SPHERES
             if (g.kind == GEOMETRY_SPHERES) {
@@ -30,7 +30,7 @@ void trace_closest(trace_ray r, inout candidate best)
 {
     for (uint i = 0u; i < instance_count; i++) {
         object_ray o = object_from_world_ray(r, i);
-        geometry g = geometries[instances[i].geometry];
+        geometry g = geometry_at(instance_at(i).geometry);
         for (uint p = g.first_primitive; p < g.first_primitive + g.primitive_count; p++) {
 #ifdef HAS_SPHERES
             if (g.kind == GEOMETRY_SPHERES) {

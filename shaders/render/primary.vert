@@ -22,13 +22,13 @@ void main()
 #if PRIMITIVE_KIND == 0
     uvec4 triangle = texelFetch(triangles, int(first_primitive) + gl_VertexID / 3);
     vec3 object = texelFetch(positions, int(triangle[gl_VertexID % 3])).xyz;
-    vec3 world = affine_point(instances[instance_index].world_from_object, object);
+    vec3 world = affine_point(instance_at(instance_index).world_from_object, object);
 #elif PRIMITIVE_KIND == 1
     vec4 sphere = texelFetch(spheres, int(first_primitive) + gl_VertexID / 36);
     uint corner = BOX_CORNERS[gl_VertexID % 36];
     vec3 outward = vec3(corner & 1u, corner >> 1 & 1u, corner >> 2 & 1u) * 2.0 - 1.0;
     vec3 object = sphere.xyz + outward * (sphere.w * BOX_MARGIN);
-    vec3 world = affine_point(instances[instance_index].world_from_object, object);
+    vec3 world = affine_point(instance_at(instance_index).world_from_object, object);
 #else
     disc d = discs[first_primitive + uint(gl_VertexID) / 6u];
     uint corner = uint[6](0u, 1u, 2u, 2u, 1u, 3u)[gl_VertexID % 6];

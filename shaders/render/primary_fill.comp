@@ -27,7 +27,7 @@ void main()
     if (instance_index == HIT_NO_PRIMITIVE)
         found = candidate_disc(primitive, origin, direction);
 #ifdef HAS_SPHERES
-    else if (geometries[instances[instance_index].geometry].kind == GEOMETRY_SPHERES)
+    else if (geometry_at(instance_at(instance_index).geometry).kind == GEOMETRY_SPHERES)
         found = candidate_sphere(instance_index, primitive, origin, direction, rays[k].origin_t_min.w);
 #endif
     else

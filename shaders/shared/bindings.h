@@ -8,8 +8,6 @@
 #define BIND_HITS 1
 #define BIND_VISIBILITY 2 /* any-hit waves: unorm 4x8 transmittance, 0: occluded */
 #define BIND_WAVE 3       /* struct wave_state */
-#define BIND_INSTANCES 4
-#define BIND_GEOMETRIES 5
 #define BIND_MATERIALS 6
 #define BIND_TEXTURE_SLOTS 7
 #define BIND_TEXTURES 8
@@ -22,6 +20,9 @@
 #define BIND_PASS_2 13
 #define BIND_PASS_3 14
 #define BIND_PASS_4 15
+
+/* image units */
+#define IMAGE_HITS 0
 
 /* texture units */
 #define UNIT_TRIANGLES 0
@@ -40,7 +41,11 @@
 #define UNIT_TRACER_3 13
 #define UNIT_TRACER_4 14
 #define UNIT_TRACER_5 15
+
 #define UNIT_PASS_0 16
 #define UNIT_PASS_1 17
+#define UNIT_RAYS 18
+#define UNIT_INSTANCES 19
+#define UNIT_GEOMETRIES 20
 
 #endif

@@ -14,6 +14,7 @@ struct instance {
     uint pad;
 };
 SHARED_SIZE(instance, 112)
+#define INSTANCE_TEXELS 7 /* RGBA32UI */
 #define INSTANCE_MIRRORED 1u /* negative determinant: winding is reversed */
 
 /* A mesh or a set of spheres, stored once however many instances show it. */
@@ -27,6 +28,7 @@ struct geometry {
     uint pad0, pad1;
 };
 SHARED_SIZE(geometry, 32)
+#define GEOMETRY_TEXELS 2 /* RGBA32UI */
 #define GEOMETRY_MESH 0u
 #define GEOMETRY_SPHERES 1u
 #define GEOMETRY_HAS_NORMALS 1u

@@ -229,7 +229,7 @@ static void *trace(struct arena *arena, struct tracer *tracer, const struct ray 
                               .rays = &arena->ray_buffer,
                               .hits = &arena->answer_buffer,
                               .visibility = &arena->answer_buffer,
-                              .coherent = kind == RAYS_PRIMARY || kind == RAYS_SHADOW};
+                              .shared_origin = kind == RAYS_PRIMARY};
     scene_gpu_bind(&arena->gpu);
     expect_ok(tracer_trace(tracer, &arena->gpu, &wave, &error), &error);
     void *answers = malloc(bytes);

@@ -29,7 +29,9 @@ struct tracer_row {
 };
 static const struct tracer_row tracers[] = {
     {"naive", 1, {0}},
-    {"bvh", 0, {0}}, /* one ray alone, and eight together where a wave is coherent */
+    {"bvh", 0, {0}},
+    {"bvh, one ray alone", 0, {.bvh_rays_together = 1}},
+    {"bvh, eight rays together", 0, {.bvh_rays_together = 8}},
     {"bvh in the plain form", 0, {.bvh_layout = BVH_LAYOUT_PLAIN}},
     {"bvh, two rays together", 0, {.bvh_rays_together = 2}},
     {"bvh with spheres, four rays together", 0, {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 4}},
@@ -133,7 +135,7 @@ static void fixture_finish(struct fixture *fixture)
 /* What no answer looks like: shows that an answer was written, and that none was where none is due. */
 #define UNTOUCHED 0xdeadbeefu
 
-static void *trace(struct fixture *fixture, enum wave_kind kind, uint32_t ray_count, bool coherent)
+static void *trace(struct fixture *fixture, enum wave_kind kind, uint32_t ray_count)
 {
     struct error error = {0};
     size_t size_bytes = RAY_COUNT * (kind == WAVE_ANY ? sizeof(uint32_t) : sizeof(struct hit));
@@ -143,8 +145,7 @@ static void *trace(struct fixture *fixture, enum wave_kind kind, uint32_t ray_co
                               .ray_count = ray_count,
                               .rays = &fixture->rays,
                               .hits = &fixture->answers,
-                              .visibility = &fixture->answers,
-                              .coherent = coherent};
+                              .visibility = &fixture->answers};
     scene_gpu_bind(&fixture->gpu);
     expect_ok(tracer_trace(fixture->tracer, &fixture->gpu, &wave, &error), &error);
     void *answers = malloc(size_bytes);
@@ -214,9 +215,9 @@ static void expect_hit(const struct fixture *fixture, uint32_t ray, const struct
                     0);
 }
 
-static void compare_closest(struct fixture *fixture, bool coherent)
+static void compare_closest(struct fixture *fixture)
 {
-    struct hit *hits = trace(fixture, WAVE_CLOSEST, RAY_COUNT, coherent);
+    struct hit *hits = trace(fixture, WAVE_CLOSEST, RAY_COUNT);
     uint32_t close_calls = 0, hit_count = 0;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         struct twin_walk walk;
@@ -231,9 +232,9 @@ static void compare_closest(struct fixture *fixture, bool coherent)
     assert_in_range(hit_count, RAY_COUNT / 10, RAY_COUNT); /* else the rays test nothing */
 }
 
-static void compare_any(struct fixture *fixture, bool coherent)
+static void compare_any(struct fixture *fixture)
 {
-    uint32_t *visibilities = trace(fixture, WAVE_ANY, RAY_COUNT, coherent);
+    uint32_t *visibilities = trace(fixture, WAVE_ANY, RAY_COUNT);
     uint32_t close_calls = 0;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         struct twin_walk walk;
@@ -257,8 +258,7 @@ static void closest_hits_are_those_of_the_plain_tracer(void **state)
     const struct case_state *row = *state;
     struct fixture fixture;
     fixture_init(&fixture, row->tracer, row->scene);
-    compare_closest(&fixture, false);
-    compare_closest(&fixture, true);
+    compare_closest(&fixture);
     fixture_finish(&fixture);
 }
 
@@ -267,8 +267,7 @@ static void any_hits_are_those_of_the_plain_tracer(void **state)
     const struct case_state *row = *state;
     struct fixture fixture;
     fixture_init(&fixture, row->tracer, row->scene);
-    compare_any(&fixture, false);
-    compare_any(&fixture, true);
+    compare_any(&fixture);
     fixture_finish(&fixture);
 }
 
@@ -292,8 +291,8 @@ static void answers_follow_the_edits(void **state)
     update(&fixture);
     twin_finish(&fixture.twin);
     twin_init(&fixture.twin, fixture.scene);
-    compare_closest(&fixture, false);
-    compare_any(&fixture, false);
+    compare_closest(&fixture);
+    compare_any(&fixture);
     fixture_finish(&fixture);
 }
 
@@ -310,8 +309,8 @@ static void answers_follow_a_changed_shape(void **state)
     update(&fixture);
     twin_finish(&fixture.twin);
     twin_init(&fixture.twin, fixture.scene);
-    compare_closest(&fixture, false);
-    compare_any(&fixture, false);
+    compare_closest(&fixture);
+    compare_any(&fixture);
     fixture_finish(&fixture);
 }
 
@@ -324,7 +323,7 @@ static void a_wave_in_parts_has_the_answers_of_the_whole(void **state)
     fixture_init(&fixture, &tracers[0], &scenes[1]);
     const struct trace_program_source parts = {.traverse = "naive/traverse.glsl", .rays_a_dispatch = 192};
     const struct wave wave = {.ray_count = 777, .rays = &fixture.rays, .hits = &fixture.answers};
-    struct hit *whole = trace(&fixture, WAVE_CLOSEST, wave.ray_count, false);
+    struct hit *whole = trace(&fixture, WAVE_CLOSEST, wave.ray_count);
     struct hit *hits = malloc(RAY_COUNT * sizeof(struct hit));
     const struct gpu_program *program = trace_program_get(&fixture.gpu, WAVE_CLOSEST, &parts, &error);
     expect_ok(program != NULL, &error);
@@ -343,8 +342,8 @@ static void rays_beyond_the_wave_get_no_answer(void **state)
     struct fixture fixture;
     fixture_init(&fixture, row->tracer, row->scene);
     const uint32_t count = 777; /* no multiple of anything */
-    struct hit *hits = trace(&fixture, WAVE_CLOSEST, count, true);
-    uint32_t *visibilities = trace(&fixture, WAVE_ANY, count, true);
+    struct hit *hits = trace(&fixture, WAVE_CLOSEST, count);
+    uint32_t *visibilities = trace(&fixture, WAVE_ANY, count);
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         if (i < count) {
             assert_int_not_equal(hits[i].primitive, UNTOUCHED);
@@ -370,8 +369,8 @@ static void a_scene_with_nothing_in_it_is_missed(void **state)
     static const struct scene_row empty = {"nothing", empty_scene};
     struct fixture fixture;
     fixture_init(&fixture, row->tracer, &empty);
-    struct hit *hits = trace(&fixture, WAVE_CLOSEST, RAY_COUNT, false);
-    uint32_t *visibilities = trace(&fixture, WAVE_ANY, RAY_COUNT, false);
+    struct hit *hits = trace(&fixture, WAVE_CLOSEST, RAY_COUNT);
+    uint32_t *visibilities = trace(&fixture, WAVE_ANY, RAY_COUNT);
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         assert_float_equal(hits[i].distance, -1.0f, 0.0f);
         assert_int_equal(visibilities[i], 0xffffffff);

@@ -33,7 +33,7 @@ static struct {
 
 static enum ray_kind kind_of(const struct wave *wave)
 {
-    return wave->kind == WAVE_ANY ? RAY_SHADOW : wave->coherent ? RAY_PRIMARY : RAY_SECONDARY;
+    return wave->kind == WAVE_ANY ? RAY_SHADOW : wave->shared_origin ? RAY_PRIMARY : RAY_SECONDARY;
 }
 
 static void spoil_hit(struct hit *hit, uint32_t index, float diagonal)

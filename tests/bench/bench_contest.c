@@ -61,7 +61,7 @@ static bool run_tracer(struct bench_contest *contest, struct tracer *tracer, boo
                                    .rays = &contest->ray_buffer,
                                    .hits = &contest->answer_buffer,
                                    .visibility = &contest->answer_buffer,
-                                   .coherent = fact->hint,
+                                   .shared_origin = fact->shared_origin,
                                    .crossings_only = crossings_only};
     bool ok = tracer_trace(tracer, &contest->scene->gpu, &on_device, error);
     glFinish();
@@ -79,7 +79,7 @@ static bool run_once(struct bench_contest *contest, const struct bench_contender
         bench_embree_trace(contender->embree, &(struct bench_embree_wave){.rays = wave->rays,
                                                                           .ray_count = wave->ray_count,
                                                                           .packet = contender->packet,
-                                                                          .coherent = fact->hint,
+                                                                          .coherent = fact->coherent,
                                                                           .crossings = fact->is_any ? NULL : raw,
                                                                           .visibilities = raw});
     else

@@ -12,12 +12,12 @@
 #define FAR 1e30f
 
 const struct bench_wave_fact bench_wave_facts[BENCH_WAVE_KINDS] = {
-    [BENCH_PRIMARY] = {"primary", "coherent", false, true},
-    [BENCH_REFLECTION] = {"reflection", "partly", false, false},
-    [BENCH_SHADOW] = {"shadow", "coherent", true, true},
-    [BENCH_OCCLUSION] = {"occlusion", "incoherent", true, false},
-    [BENCH_BOUNCE] = {"bounce", "incoherent", false, false},
-    [BENCH_SHUFFLED] = {"shuffled", "incoherent", false, false},
+    [BENCH_PRIMARY] = {"primary", "coherent", false, true, true},
+    [BENCH_REFLECTION] = {"reflection", "partly", false, false, false},
+    [BENCH_SHADOW] = {"shadow", "coherent", true, true, false},
+    [BENCH_OCCLUSION] = {"occlusion", "incoherent", true, false, false},
+    [BENCH_BOUNCE] = {"bounce", "incoherent", false, false, false},
+    [BENCH_SHUFFLED] = {"shuffled", "incoherent", false, false, true},
 };
 
 /* The direction is made unit; *length is what it was. */

@@ -23,7 +23,8 @@ enum bench_wave_kind {
 struct bench_wave_fact {
     const char *name, *order; /* "coherent", "partly", "incoherent" */
     bool is_any;
-    bool hint; /* what an integrator would say of it, struct wave's `coherent` */
+    bool coherent;      /* what Embree is told */
+    bool shared_origin; /* as struct wave has it */
 };
 extern const struct bench_wave_fact bench_wave_facts[BENCH_WAVE_KINDS];
 

@@ -21,9 +21,10 @@ ROOT = pathlib.Path("shaders")
 TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "RAYS_TOGETHER": "1"}] + [
     {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "RAYS_TOGETHER": together, **bounds}
     for together in ("1", "8")
-    for bounds in ({}, {"BVH_SPHERES": "1"}, {"BVH_SPHERES": "1", "BVH_PLAIN": "1"})]
+    for bounds in ({"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}, {"BVH_SPHERES": "1", "BVH_PLAIN": "1"})]
 CHOICES = {
     "trace.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
+    "bvh/coherence.comp": [[{"RAYS_TOGETHER": "8"}]],
     "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
 }
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"]}

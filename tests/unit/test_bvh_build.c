@@ -8,6 +8,7 @@
 
 #include <cmocka.h>
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -68,14 +69,68 @@ static void input_finish(struct input *input)
     free(input->spheres);
 }
 
-static struct bvh_tree build(const struct input *input, enum bvh_bounds bounds, bool plain, unsigned threads)
+/* The forms that elements are stored in. */
+static const struct bvh_settings packed = {.bounds = BVH_BOUNDS_OF_BOXES, .threads = 2};
+static const struct bvh_settings whole = {.bounds = BVH_BOUNDS_OF_BOXES, .whole = true, .threads = 2};
+static const struct bvh_settings of_spheres = {.bounds = BVH_BOUNDS_OF_SPHERES, .threads = 2};
+static const struct bvh_settings plain = {.bounds = BVH_BOUNDS_OF_SPHERES, .plain = true, .threads = 2};
+static const struct bvh_settings plain_boxes = {.bounds = BVH_BOUNDS_OF_BOXES, .plain = true, .threads = 2};
+static const struct bvh_settings *const forms[] = {&packed, &whole, &of_spheres, &plain, &plain_boxes};
+
+static struct bvh_tree build(const struct input *input, const struct bvh_settings *settings)
 {
     struct bvh_tree tree;
     struct error error = {0};
-    struct bvh_settings settings = {bounds, plain, threads};
-    if (!bvh_tree_build(&tree, &input->shape, &settings, &error))
+    if (!bvh_tree_build(&tree, &input->shape, settings, &error))
         fail_msg("not built: %s", error.text);
     return tree;
+}
+
+/* ---- what the device reads ---- */
+
+struct view {
+    const struct bvh_settings *settings;
+    const uint32_t *elements;
+    uint32_t count;
+    const struct bvh_grid *grid;
+};
+
+/* A box, or a sphere: its centre in `lower`, its radius in upper[0]. */
+struct decoded {
+    double lower[3], upper[3];
+    uint32_t leaf; /* 0: an inner element */
+    uint32_t end;  /* place behind its subtree */
+};
+
+static struct view view_of(const struct bvh_tree *tree, const struct bvh_settings *settings)
+{
+    return (struct view){settings, tree->elements, tree->element_count, &tree->grid};
+}
+
+static struct decoded decode(const struct view *view, uint32_t octant, uint32_t place)
+{
+    const uint32_t *words =
+        view->elements + ((size_t)octant * view->count + place) * bvh_element_words(view->settings);
+    struct decoded decoded = {0};
+    for (uint32_t k = 0; k < 3; k++) {
+        if (bvh_is_packed(view->settings)) {
+            uint32_t near = words[k] & 0xffff, far = words[k] >> 16;
+            bool negative = octant >> k & 1;
+            double cell = 1 / (double)view->grid->cells_per_unit[k], begin = (double)view->grid->lower[k];
+            decoded.lower[k] = begin + cell * (negative ? far : near);
+            decoded.upper[k] = begin + cell * (negative ? near : far);
+        } else {
+            float lower, upper;
+            memcpy(&lower, &words[k], sizeof lower);
+            memcpy(&upper, &words[4 + k], sizeof upper);
+            decoded.lower[k] = (double)lower;
+            decoded.upper[k] = (double)upper;
+        }
+    }
+    bool is_leaf = words[3] >> BVH_LEAF_KIND_SHIFT != 0;
+    decoded.leaf = is_leaf ? words[3] : 0;
+    decoded.end = is_leaf ? place + 1 : words[3];
+    return decoded;
 }
 
 static uint32_t leaf_count(uint32_t leaf)
@@ -98,19 +153,20 @@ static uint32_t primitive_number(const struct input *input, const struct bvh_tre
     return number;
 }
 
-static void expect_each_primitive_once(const struct input *input, const struct bvh_tree *tree)
+static void expect_each_primitive_once(const struct input *input, const struct bvh_tree *tree,
+                                       const struct view *view, uint32_t octant)
 {
     uint32_t count = input->shape.primitive_count;
     uint8_t *seen = calloc(count, 1);
     uint32_t in_leaves = 0;
-    for (uint32_t e = 0; e < tree->element_count; e++) {
-        uint32_t leaf = tree->elements[e].leaf;
+    for (uint32_t e = 0; e < view->count; e++) {
+        uint32_t leaf = decode(view, octant, e).leaf;
         for (uint32_t i = 0; i < leaf_count(leaf); i++, in_leaves++) {
             assert_in_range(leaf_first(leaf) + i, 0, count - 1);
             uint32_t number = primitive_number(input, tree, leaf_first(leaf) + i);
             assert_in_range(number, 0, count - 1);
             if (seen[number]++)
-                fail_msg("primitive %u is in two leaves", number);
+                fail_msg("octant %u: primitive %u is in two leaves", octant, number);
             if (!input->spheres)
                 for (uint32_t c = 0; c < 3; c++)
                     assert_memory_equal(&tree->primitives[12 * (size_t)(leaf_first(leaf) + i) + 4 * c],
@@ -121,99 +177,159 @@ static void expect_each_primitive_once(const struct input *input, const struct b
     free(seen);
 }
 
-static bool box_contains(const struct bvh_element *box, const float point[3])
+static bool box_contains(const struct decoded *box, const double lower[3], const double upper[3])
 {
-    return box->lower_x <= point[0] && point[0] <= box->upper_x && box->lower_y <= point[1] &&
-           point[1] <= box->upper_y && box->lower_z <= point[2] && point[2] <= box->upper_z;
+    for (int k = 0; k < 3; k++)
+        if (!(box->lower[k] <= lower[k] && upper[k] <= box->upper[k]))
+            return false;
+    return true;
 }
 
-static bool sphere_contains(const struct bvh_element *sphere, const float point[3], float radius)
+/* Padded, as the traversal's arithmetic needs it: by 8 units of rounding, of which a float's own takes one. */
+static bool box_contains_padded(const struct decoded *box, const float lower[3], const float upper[3])
 {
-    double x = (double)point[0] - (double)sphere->lower_x, y = (double)point[1] - (double)sphere->lower_y;
-    double z = (double)point[2] - (double)sphere->lower_z;
-    return sqrt(x * x + y * y + z * z) + (double)radius <= (double)sphere->upper_x;
+    const double pad = 7.0 / 8 * (double)BVH_PAD_RELATIVE;
+    struct bvh_bound bound = bvh_bound_of_box(lower, upper);
+    double low[3], high[3];
+    for (int k = 0; k < 3; k++) {
+        low[k] = fmin((double)bound.lower[k], (double)lower[k] - pad * fabs((double)lower[k]));
+        high[k] = fmax((double)bound.upper[k], (double)upper[k] + pad * fabs((double)upper[k]));
+    }
+    return box_contains(box, low, high);
+}
+
+static bool sphere_contains(const struct decoded *sphere, const float point[3], float radius)
+{
+    double x = (double)point[0] - sphere->lower[0], y = (double)point[1] - sphere->lower[1];
+    double z = (double)point[2] - sphere->lower[2];
+    return sqrt(x * x + y * y + z * z) + (double)radius <= sphere->upper[0];
 }
 
 /* Whether a primitive lies within a bound. */
-static bool bound_contains(const struct input *input, const struct bvh_element *bound, uint32_t number,
-                           bool is_sphere)
+static bool bound_contains(const struct input *input, const struct decoded *bound, uint32_t number, bool is_sphere)
 {
     if (input->spheres) {
         const float *s = &input->spheres[4 * (size_t)number];
         const float low[3] = {s[0] - s[3], s[1] - s[3], s[2] - s[3]},
                     high[3] = {s[0] + s[3], s[1] + s[3], s[2] + s[3]};
-        return is_sphere ? sphere_contains(bound, s, s[3]) : box_contains(bound, low) && box_contains(bound, high);
+        return is_sphere ? sphere_contains(bound, s, s[3]) : box_contains_padded(bound, low, high);
     }
     for (uint32_t c = 0; c < 3; c++) {
         const float *v = &input->positions[3 * (size_t)input->indices[3 * (size_t)number + c]];
-        if (is_sphere ? !sphere_contains(bound, v, 0) : !box_contains(bound, v))
+        if (is_sphere ? !sphere_contains(bound, v, 0) : !box_contains_padded(bound, v, v))
             return false;
     }
     return true;
 }
 
-static uint32_t subtree_end(const struct bvh_tree *tree, uint32_t e)
-{
-    return tree->elements[e].miss == BVH_END ? tree->element_count : tree->elements[e].miss;
-}
-
 /* Every bound contains the primitives of all leaves below it, and a box its children's boxes. */
-static void expect_bounds_contain(const struct input *input, const struct bvh_tree *tree, bool is_sphere)
+static void expect_bounds_contain(const struct input *input, const struct bvh_tree *tree, const struct view *view,
+                                  uint32_t octant)
 {
-    for (uint32_t e = 0; e < tree->element_count; e++) {
-        const struct bvh_element *bound = &tree->elements[e];
-        for (uint32_t below = e; below < subtree_end(tree, e); below++) {
-            const struct bvh_element *other = &tree->elements[below];
-            for (uint32_t i = 0; i < leaf_count(other->leaf); i++)
-                if (!bound_contains(input, bound, primitive_number(input, tree, leaf_first(other->leaf) + i),
+    bool is_sphere = view->settings->bounds == BVH_BOUNDS_OF_SPHERES;
+    for (uint32_t e = 0; e < view->count; e++) {
+        const struct decoded bound = decode(view, octant, e);
+        for (uint32_t below = e; below < bound.end; below++) {
+            const struct decoded other = decode(view, octant, below);
+            for (uint32_t i = 0; i < leaf_count(other.leaf); i++)
+                if (!bound_contains(input, &bound, primitive_number(input, tree, leaf_first(other.leaf) + i),
                                     is_sphere))
-                    fail_msg("element %u does not contain a primitive of leaf %u", e, below);
-            const float low[3] = {other->lower_x, other->lower_y, other->lower_z};
-            const float high[3] = {other->upper_x, other->upper_y, other->upper_z};
-            if (!is_sphere && (!box_contains(bound, low) || !box_contains(bound, high)))
-                fail_msg("box %u does not contain box %u", e, below);
+                    fail_msg("octant %u: element %u does not contain a primitive of leaf %u", octant, e, below);
+            if (!is_sphere && !box_contains(&bound, other.lower, other.upper))
+                fail_msg("octant %u: box %u does not contain box %u", octant, e, below);
         }
     }
 }
 
-/* Walks as the shader does, with every bound hit (or none); returns the steps, and marks the leaves. */
-static uint32_t walk(const struct bvh_tree *tree, uint32_t octant, bool hit, uint8_t *visited)
+/* Walks as the shader does, with every bound hit (or none); returns the steps. */
+static uint32_t walk(const struct view *view, uint32_t octant, bool hit, uint8_t *visited)
 {
     uint32_t element = 0, steps = 0;
-    while (element != BVH_END) {
-        assert_in_range(element, 0, tree->element_count - 1);
-        assert_in_range(steps, 0, tree->element_count);
-        const struct bvh_link *link = &tree->links[(size_t)octant * tree->element_count + element];
+    while (element < view->count) {
+        const struct decoded decoded = decode(view, octant, element);
+        /* So no walk is endless. */
+        if (decoded.end <= element || decoded.end > view->count)
+            fail_msg("octant %u: element %u leads to %u of %u", octant, element, decoded.end, view->count);
         steps++;
         visited[element]++;
-        element = hit && tree->elements[element].leaf == 0 ? link->hit : link->miss;
+        element = hit ? element + 1 : decoded.end;
     }
     return steps;
 }
 
-static void expect_links_right(const struct bvh_tree *tree)
+/* Links lead forward, stay within their parent's subtree, and no element is passed over. */
+static void expect_links_right(const struct view *view, uint32_t octant)
 {
-    uint8_t *visited = malloc(tree->element_count);
-    for (uint32_t octant = 0; octant < BVH_OCTANTS; octant++) {
-        memset(visited, 0, tree->element_count);
-        assert_int_equal(walk(tree, octant, true, visited), tree->element_count);
-        for (uint32_t e = 0; e < tree->element_count; e++)
-            if (visited[e] != 1)
-                fail_msg("octant %u: element %u is visited %u times", octant, e, visited[e]);
-        assert_int_equal(walk(tree, octant, false, visited), 1);
+    uint8_t *visited = calloc(view->count, 1);
+    assert_int_equal(walk(view, octant, true, visited), view->count);
+    for (uint32_t e = 0; e < view->count; e++) {
+        if (visited[e] != 1)
+            fail_msg("octant %u: element %u is visited %u times", octant, e, visited[e]);
+        const struct decoded parent = decode(view, octant, e);
+        if (!parent.leaf && parent.end < e + 3)
+            fail_msg("octant %u: inner element %u has less than two children", octant, e);
+        uint32_t child = e + 1;
+        while (child < parent.end)
+            child = decode(view, octant, child).end;
+        assert_int_equal(child, parent.end);
     }
+    assert_int_equal(walk(view, octant, false, visited), 1);
     free(visited);
+}
+
+/* An element without its place. */
+struct placeless {
+    double lower[3], upper[3];
+    uint32_t leaf, subtree;
+};
+
+static int compare_placeless(const void *a, const void *b)
+{
+    return memcmp(a, b, sizeof(struct placeless));
+}
+
+static struct placeless *sorted_elements(const struct view *view, uint32_t octant)
+{
+    struct placeless *all = calloc(view->count, sizeof *all);
+    for (uint32_t e = 0; e < view->count; e++) {
+        const struct decoded decoded = decode(view, octant, e);
+        memcpy(all[e].lower, decoded.lower, sizeof all[e].lower);
+        memcpy(all[e].upper, decoded.upper, sizeof all[e].upper);
+        all[e].leaf = decoded.leaf;
+        all[e].subtree = decoded.end - e;
+    }
+    qsort(all, view->count, sizeof *all, compare_placeless);
+    return all;
+}
+
+static void expect_copies_alike(const struct view *view)
+{
+    struct placeless *first = sorted_elements(view, 0);
+    for (uint32_t octant = 1; octant < bvh_octants(view->settings); octant++) {
+        struct placeless *other = sorted_elements(view, octant);
+        assert_memory_equal(other, first, view->count * sizeof *first);
+        free(other);
+    }
+    free(first);
+}
+
+static void expect_sound_in_form(const struct input *input, const struct bvh_settings *settings)
+{
+    struct bvh_tree tree = build(input, settings);
+    const struct view view = view_of(&tree, settings);
+    for (uint32_t octant = 0; octant < bvh_octants(settings); octant++) {
+        expect_links_right(&view, octant);
+        expect_each_primitive_once(input, &tree, &view, octant);
+        expect_bounds_contain(input, &tree, &view, octant);
+    }
+    expect_copies_alike(&view);
+    bvh_tree_finish(&tree);
 }
 
 static void expect_sound(const struct input *input)
 {
-    for (unsigned bounds = 0; bounds < 2; bounds++) {
-        struct bvh_tree tree = build(input, (enum bvh_bounds)bounds, false, 2);
-        expect_each_primitive_once(input, &tree);
-        expect_bounds_contain(input, &tree, bounds == BVH_BOUNDS_OF_SPHERES);
-        expect_links_right(&tree);
-        bvh_tree_finish(&tree);
-    }
+    for (size_t form = 0; form < COUNT(forms); form++)
+        expect_sound_in_form(input, forms[form]);
 }
 
 static void a_tree_over_triangles_is_sound(void **state)
@@ -256,17 +372,120 @@ static void triangles_without_area_are_kept(void **state)
     input_finish(&input);
 }
 
+static void scale_and_move(struct input *input, const float scale[3], const float offset[3])
+{
+    for (uint32_t i = 0; i < 9 * input->shape.primitive_count; i++)
+        input->positions[i] = input->positions[i] * scale[i % 3] + offset[i % 3];
+}
+
 static void coordinates_at_the_end_of_the_range_do_no_harm(void **state)
 {
     (void)state;
     struct input input = triangles(300, 1, 0.1f, 7);
-    for (uint32_t i = 0; i < 2700; i++)
-        input.positions[i] *= 1e38f; /* surfaces and extents are infinite */
-    struct bvh_tree tree = build(&input, BVH_BOUNDS_OF_BOXES, false, 1);
-    expect_each_primitive_once(&input, &tree);
-    expect_bounds_contain(&input, &tree, false);
-    expect_links_right(&tree);
+    scale_and_move(&input, (float[3]){1e38f, 1e38f, 1e38f}, (float[3]){0, 0, 0});
+    /* Boxes alone: surfaces and extents are infinite, and so would the spheres be. */
+    expect_sound_in_form(&input, &packed);
+    expect_sound_in_form(&input, &whole);
+    input_finish(&input);
+}
+
+static void flat_shapes_lie_within_their_grid(void **state)
+{
+    (void)state;
+    for (int axis = 0; axis < 3; axis++) {
+        for (int offset = 0; offset < 3; offset++) {
+            struct input input = triangles(300, 1, 0.1f, 20);
+            float scale[3] = {1, 1, 1}, move[3] = {0, 0, 0};
+            scale[axis] = 0;
+            move[axis] = (float[3]){0, -1234.5f, 3e6f}[offset];
+            scale_and_move(&input, scale, move);
+            expect_sound(&input);
+            input_finish(&input);
+        }
+    }
+}
+
+static void single_points_lie_within_their_grid(void **state)
+{
+    (void)state;
+    static const float points[][3] = {{0, 0, 0}, {1, -1, 1e-30f}, {-7e5f, 0.1f, 1e20f}, {1e-38f, -1e-40f, 0}};
+    for (size_t i = 0; i < COUNT(points); i++) {
+        struct input input = triangles(20, 0, 0, 21);
+        scale_and_move(&input, (float[3]){0, 0, 0}, points[i]);
+        expect_sound_in_form(&input, &packed);
+        expect_sound_in_form(&input, &whole);
+        input_finish(&input);
+    }
+}
+
+/* Where a float is far coarser than a cell of the grid would be. */
+static void shapes_far_from_the_origin_lie_within_their_grid(void **state)
+{
+    (void)state;
+    uint32_t seed = 22;
+    for (uint32_t i = 0; i < 60; i++) {
+        struct input input = triangles(40, 1, 0.1f, 23 + i);
+        float scale[3], move[3];
+        for (int k = 0; k < 3; k++) {
+            scale[k] = ldexpf(uniform(&seed, 1, 2), (int)(random_bits(&seed) % 24) - 12);
+            move[k] = uniform(&seed, -2e6f, 2e6f);
+        }
+        scale_and_move(&input, scale, move);
+        expect_sound(&input);
+        input_finish(&input);
+    }
+}
+
+/* What bvh_grid_over promises, for boxes of all sizes at all places: flat ones as wide as others are narrow. */
+static void a_grid_holds_the_box_it_was_made_for(void **state)
+{
+    (void)state;
+    uint32_t seed = 24;
+    for (uint32_t i = 0; i < 200000; i++) {
+        float lower[3], upper[3];
+        for (int k = 0; k < 3; k++) {
+            float centre = ldexpf(uniform(&seed, -2, 2), (int)(random_bits(&seed) % 64) - 32);
+            float half = i % 3 ? ldexpf(uniform(&seed, 0, 1), (int)(random_bits(&seed) % 64) - 32) : 0;
+            lower[k] = centre - half;
+            upper[k] = centre + half;
+        }
+        bvh_pad_box(lower, upper);
+        struct bvh_grid grid = bvh_grid_over(lower, upper, 0);
+        uint32_t cells[3][2];
+        if (!bvh_grid_cells(&grid, lower, upper, cells))
+            fail_msg("box %u, x %.9g .. %.9g, y %.9g .. %.9g, z %.9g .. %.9g lies outside of its grid", i,
+                     (double)lower[0], (double)upper[0], (double)lower[1], (double)upper[1], (double)lower[2],
+                     (double)upper[2]);
+    }
+}
+
+static void an_evenly_fine_mesh_loses_nothing_to_its_grid(void **state)
+{
+    (void)state;
+    struct input input = triangles(5000, 10, 0.2f, 25);
+    struct bvh_tree tree = build(&input, &packed);
+    /* A triangle is some 800 cells across; two cells more are 0.5 % of a surface. */
+    assert_true(tree.grid_cost >= 1 && tree.grid_cost < 1.02f);
     bvh_tree_finish(&tree);
+    tree = build(&input, &whole);
+    assert_true(tree.grid_cost == 1);
+    bvh_tree_finish(&tree);
+    input_finish(&input);
+}
+
+static void fine_detail_in_a_great_extent_is_told_by_the_cost_of_its_grid(void **state)
+{
+    (void)state;
+    struct input input = triangles(2002, 1, 0.05f, 26);
+    for (uint32_t i = 0; i < 9 * 2000; i++)
+        input.positions[i] *= 1e-3f; /* 1e-6 of the extent: all of it within one cell */
+    for (uint32_t i = 9 * 2000; i < 9 * 2002; i++)
+        input.positions[i] = i / 9 % 2 ? 1000.0f + (float)(i % 3) : -1000.0f - (float)(i % 5);
+    struct bvh_tree tree = build(&input, &packed);
+    /* Each of the 2000 is a hundredth of a cell; the grid makes it some 10^4 times as large. */
+    assert_true(tree.grid_cost > 3.5f); /* each element counts 4 at most, and all but a few are lost in a cell */
+    bvh_tree_finish(&tree);
+    expect_sound(&input);
     input_finish(&input);
 }
 
@@ -286,30 +505,34 @@ static void the_tree_does_not_depend_on_the_threads(void **state)
 {
     (void)state;
     struct input input = triangles(BVH_THREADED_PRIMITIVES + 10000, 10, 0.05f, 9);
-    struct bvh_tree one = build(&input, BVH_BOUNDS_OF_BOXES, false, 1);
-    for (unsigned threads = 2; threads < 5; threads++) {
-        struct bvh_tree several = build(&input, BVH_BOUNDS_OF_BOXES, false, threads);
+    struct bvh_settings settings = packed;
+    settings.threads = 1;
+    struct bvh_tree one = build(&input, &settings);
+    for (settings.threads = 2; settings.threads < 5; settings.threads++) {
+        struct bvh_tree several = build(&input, &settings);
         assert_int_equal(several.element_count, one.element_count);
-        assert_memory_equal(several.elements, one.elements, one.element_count * sizeof *one.elements);
-        assert_memory_equal(several.links, one.links, BVH_OCTANTS * one.element_count * sizeof *one.links);
+        assert_memory_equal(several.elements, one.elements, one.element_count * bvh_element_bytes(&settings));
+        assert_memory_equal(&several.grid, &one.grid, sizeof one.grid);
         assert_int_equal(several.primitive_texels, one.primitive_texels);
         assert_memory_equal(several.primitives, one.primitives, one.primitive_texels * 4 * sizeof(float));
         bvh_tree_finish(&several);
     }
-    expect_each_primitive_once(&input, &one);
-    expect_links_right(&one);
+    const struct view view = view_of(&one, &settings);
+    for (uint32_t octant = 0; octant < BVH_OCTANTS; octant++) {
+        expect_each_primitive_once(&input, &one, &view, octant);
+        expect_links_right(&view, octant);
+    }
     bvh_tree_finish(&one);
     input_finish(&input);
 }
 
 /* The leaf that octant `octant` meets first: its lowest corner on `axis`. */
-static float first_leaf_corner(const struct bvh_tree *tree, uint32_t octant, int axis)
+static double first_leaf_corner(const struct view *view, uint32_t octant, int axis)
 {
     uint32_t e = 0;
-    while (tree->elements[e].leaf == 0)
-        e = tree->links[(size_t)octant * tree->element_count + e].hit;
-    const struct bvh_element *leaf = &tree->elements[e];
-    return axis == 0 ? leaf->lower_x : axis == 1 ? leaf->lower_y : leaf->lower_z;
+    while (decode(view, octant, e).leaf == 0)
+        e++;
+    return decode(view, octant, e).lower[axis];
 }
 
 static void each_octant_meets_the_near_side_first(void **state)
@@ -319,12 +542,13 @@ static void each_octant_meets_the_near_side_first(void **state)
         struct input input = triangles(400, 1, 0.1f, 10);
         for (uint32_t i = axis; i < 3600; i += 3)
             input.positions[i] += i / 9 % 2 ? 50.0f : -50.0f;
-        struct bvh_tree tree = build(&input, BVH_BOUNDS_OF_BOXES, false, 1);
+        struct bvh_tree tree = build(&input, &packed);
+        const struct view view = view_of(&tree, &packed);
         for (uint32_t octant = 0; octant < BVH_OCTANTS; octant++) {
-            float corner = first_leaf_corner(&tree, octant, (int)axis);
+            double corner = first_leaf_corner(&view, octant, (int)axis);
             bool goes_down = octant >> axis & 1;
             if (goes_down != (corner > 0))
-                fail_msg("octant %u, axis %u: the first leaf begins at %g", octant, axis, (double)corner);
+                fail_msg("octant %u, axis %u: the first leaf begins at %g", octant, axis, corner);
         }
         bvh_tree_finish(&tree);
         input_finish(&input);
@@ -335,14 +559,16 @@ static void elements_that_do_not_pay_are_thrown_back(void **state)
 {
     (void)state;
     struct input input = triangles(1000, 1, 2, 11); /* large and overlapping: halves are as big as the whole */
-    struct bvh_tree tree = build(&input, BVH_BOUNDS_OF_BOXES, false, 1);
+    struct bvh_tree tree = build(&input, &packed);
+    const struct view view = view_of(&tree, &packed);
     uint32_t leaves = 0, widest = 0;
     for (uint32_t e = 0; e < tree.element_count; e++) {
+        const struct decoded element = decode(&view, 0, e);
         uint32_t children = 0;
-        for (uint32_t c = e + 1; c < subtree_end(&tree, e); c = subtree_end(&tree, c))
+        for (uint32_t c = e + 1; c < element.end; c = decode(&view, 0, c).end)
             children++;
         widest = children > widest ? children : widest;
-        leaves += tree.elements[e].leaf != 0;
+        leaves += element.leaf != 0;
     }
     assert_in_range(widest, 3, tree.element_count);
     assert_in_range(tree.element_count, leaves, 2 * leaves - 2); /* a binary tree has 2 leaves - 1 */
@@ -350,18 +576,13 @@ static void elements_that_do_not_pay_are_thrown_back(void **state)
     input_finish(&input);
 }
 
-static void the_plain_form_has_one_order_and_no_links_beside(void **state)
+static void each_form_takes_the_bytes_it_promises(void **state)
 {
     (void)state;
-    struct input input = triangles(800, 5, 0.2f, 12);
-    struct bvh_tree tree = build(&input, BVH_BOUNDS_OF_SPHERES, true, 1);
-    assert_null(tree.links);
-    uint32_t visited = 0;
-    for (uint32_t e = 0; e != BVH_END && visited <= tree.element_count; visited++)
-        e = tree.elements[e].leaf ? tree.elements[e].miss : e + 1;
-    assert_int_equal(visited, tree.element_count);
-    bvh_tree_finish(&tree);
-    input_finish(&input);
+    assert_int_equal(bvh_element_bytes(&packed), BVH_OCTANTS * sizeof(struct bvh_packed_element));
+    assert_int_equal(bvh_element_bytes(&whole), BVH_OCTANTS * sizeof(struct bvh_element));
+    assert_int_equal(bvh_element_bytes(&of_spheres), BVH_OCTANTS * sizeof(struct bvh_element));
+    assert_int_equal(bvh_element_bytes(&plain), sizeof(struct bvh_element)); /* one order for all directions */
 }
 
 static void a_shape_without_primitives_is_refused(void **state)
@@ -383,15 +604,18 @@ static void several_shapes_are_built_together(void **state)
     struct error error = {0};
     for (size_t i = 0; i < COUNT(inputs); i++)
         jobs[i].shape = inputs[i].shape;
-    struct bvh_settings settings = {BVH_BOUNDS_OF_BOXES, false, 2};
-    assert_true(bvh_jobs_run(jobs, COUNT(jobs), &settings, &error));
+    assert_true(bvh_jobs_run(jobs, COUNT(jobs), &packed, &error));
     for (size_t i = 0; i < COUNT(inputs); i++) {
-        expect_each_primitive_once(&inputs[i], &jobs[i].tree);
+        const struct view view = view_of(&jobs[i].tree, &packed);
+        for (uint32_t octant = 0; octant < BVH_OCTANTS; octant++) {
+            expect_each_primitive_once(&inputs[i], &jobs[i].tree, &view, octant);
+            expect_links_right(&view, octant);
+        }
         bvh_tree_finish(&jobs[i].tree);
         input_finish(&inputs[i]);
     }
     jobs[0].shape.primitive_count = 0;
-    assert_false(bvh_jobs_run(jobs, 1, &settings, &error));
+    assert_false(bvh_jobs_run(jobs, 1, &packed, &error));
     assert_int_equal(error.kind, ERROR_LIMIT);
 }
 
@@ -411,44 +635,165 @@ static void world_boxes(struct bvh_world_box boxes[INSTANCES])
     boxes[7] = (struct bvh_world_box){{1, 1, 1}, {-1, -1, -1}}; /* shows nothing */
 }
 
+static uint32_t place_of(const struct bvh_top *top, uint32_t octant, uint32_t element)
+{
+    return top->baked.place ? top->baked.place[(size_t)octant * top->element_count + element] : element;
+}
+
+static bool top_element_contains(const struct view *view, const struct decoded *element,
+                                 const struct bvh_world_box *box)
+{
+    if (view->settings->bounds == BVH_BOUNDS_OF_BOXES)
+        return box_contains_padded(element, box->lower, box->upper);
+    return sphere_contains(element, box->lower, 0) && sphere_contains(element, box->upper, 0);
+}
+
 static void expect_top_contains(const struct bvh_top *top, const struct bvh_world_box *boxes)
 {
-    for (uint32_t i = 0; i < INSTANCES; i++) {
-        uint32_t element = top->element_of[i];
-        if (i == 7) {
-            assert_int_equal(element, BVH_END);
-            continue;
+    const struct view view = {&top->settings, top->elements, top->element_count, &top->grid};
+    for (uint32_t octant = 0; octant < bvh_octants(&top->settings); octant++) {
+        expect_links_right(&view, octant);
+        for (uint32_t i = 0; i < INSTANCES; i++) {
+            uint32_t element = top->element_of[i];
+            if (i == 7) {
+                assert_int_equal(element, BVH_NONE);
+                continue;
+            }
+            assert_int_equal(decode(&view, octant, place_of(top, octant, element)).leaf,
+                             bvh_leaf(BVH_LEAF_INSTANCE, i, 1));
+            uint32_t leaf_place = place_of(top, octant, element);
+            for (; element != BVH_NONE; element = top->baked.parent[element]) {
+                uint32_t place = place_of(top, octant, element);
+                const struct decoded decoded = decode(&view, octant, place);
+                assert_in_range(leaf_place, place, decoded.end - 1);
+                if (!top_element_contains(&view, &decoded, &boxes[i]))
+                    fail_msg("octant %u: element %u does not contain instance %u", octant, element, i);
+            }
         }
-        assert_int_equal(top->elements[element].leaf, bvh_leaf(BVH_LEAF_INSTANCE, i, 1));
-        for (; element != BVH_END; element = top->baked.parent[element])
-            if (!box_contains(&top->elements[element], boxes[i].lower) ||
-                !box_contains(&top->elements[element], boxes[i].upper))
-                fail_msg("element %u does not contain instance %u", element, i);
     }
+    expect_copies_alike(&view);
+}
+
+/* What is not marked as moved is what it was, in each copy. */
+static void expect_rest_unchanged(const struct bvh_top *top, const uint8_t *before)
+{
+    size_t bytes = bvh_element_words(&top->settings) * sizeof(uint32_t);
+    for (uint32_t octant = 0; octant < bvh_octants(&top->settings); octant++) {
+        for (uint32_t e = 0; e < top->element_count; e++) {
+            size_t at = ((size_t)octant * top->element_count + place_of(top, octant, e)) * bytes;
+            if (!top->moved[e])
+                assert_memory_equal((const uint8_t *)top->elements + at, before + at, bytes);
+        }
+    }
+}
+
+static void move_all_a_little(const struct bvh_settings *settings)
+{
+    struct bvh_world_box boxes[INSTANCES];
+    struct bvh_top top;
+    world_boxes(boxes);
+    assert_true(bvh_top_build(&top, boxes, INSTANCES, settings));
+    expect_top_contains(&top, boxes);
+    size_t bytes = top.element_count * bvh_element_bytes(settings);
+    uint8_t *before = malloc(bytes);
+    for (uint32_t i = 0; i < INSTANCES; i++) {
+        if (i == 7)
+            continue;
+        uint32_t depth = 0;
+        for (uint32_t e = top.element_of[i]; e != BVH_NONE; e = top.baked.parent[e])
+            depth++;
+        boxes[i].lower[i % 3] -= 1.5f;
+        boxes[i].upper[i % 3] -= 1.5f;
+        memcpy(before, top.elements, bytes);
+        assert_true(bvh_top_move(&top, i, &boxes[i]));
+        assert_int_equal(bvh_top_refit(&top), depth);
+        uint32_t marked = 0;
+        for (uint32_t e = 0; e < top.element_count; e++)
+            marked += top.moved[e];
+        assert_int_equal(marked, depth);
+        expect_rest_unchanged(&top, before);
+        bvh_top_settle(&top);
+        expect_top_contains(&top, boxes);
+        assert_false(top.left_grid); /* they moved by a 30th of the extent */
+    }
+    assert_int_equal(bvh_top_refit(&top), 0);
+    free(before);
+    bvh_top_finish(&top);
 }
 
 static void a_moved_instance_refits_its_path_alone(void **state)
 {
     (void)state;
+    for (size_t form = 0; form < COUNT(forms); form++)
+        move_all_a_little(forms[form]);
+}
+
+static bool is_stale_after_move(struct bvh_top *top, uint32_t instance, struct bvh_world_box box, int axis,
+                                float distance)
+{
+    box.lower[axis] += distance;
+    box.upper[axis] += distance;
+    assert_true(bvh_top_move(top, instance, &box));
+    bvh_top_refit(top);
+    bvh_top_settle(top);
+    return bvh_top_is_stale(top);
+}
+
+/* The outermost to a side moves farther out. */
+static void an_instance_that_leaves_the_grid_needs_a_new_top_tree(void **state)
+{
+    (void)state;
+    for (int side = 0; side < 6; side++) {
+        struct bvh_world_box boxes[INSTANCES];
+        struct bvh_top top;
+        world_boxes(boxes);
+        int axis = side % 3;
+        float outward = side < 3 ? 1.0f : -1.0f;
+        uint32_t outermost = 0;
+        for (uint32_t i = 0; i < INSTANCES; i++)
+            if (outward * boxes[i].lower[axis] > outward * boxes[outermost].lower[axis])
+                outermost = i;
+        assert_true(bvh_top_build(&top, boxes, INSTANCES, &packed));
+        /* The extent is 40: a tenth of it is within the room that there is, all of it is not. */
+        assert_false(is_stale_after_move(&top, outermost, boxes[outermost], axis, outward * 4));
+        assert_true(is_stale_after_move(&top, outermost, boxes[outermost], axis, outward * 40));
+        bvh_top_finish(&top);
+        /* Not because of what it costs: without a grid the same tree is kept. */
+        assert_true(bvh_top_build(&top, boxes, INSTANCES, &whole));
+        assert_false(is_stale_after_move(&top, outermost, boxes[outermost], axis, outward * 40));
+        bvh_top_finish(&top);
+    }
+}
+
+/* What overflows gets a box of all numbers (trace/bvh.c). A new tree would be no better. */
+static void a_top_tree_over_an_endless_instance_is_not_stale_when_new(void **state)
+{
+    (void)state;
     struct bvh_world_box boxes[INSTANCES];
     struct bvh_top top;
     world_boxes(boxes);
-    assert_true(bvh_top_build(&top, boxes, INSTANCES, BVH_BOUNDS_OF_BOXES, false));
-    expect_top_contains(&top, boxes);
-    for (uint32_t i = 0; i < INSTANCES; i++) {
-        if (i == 7)
-            continue;
-        uint32_t depth = 0;
-        for (uint32_t e = top.element_of[i]; e != BVH_END; e = top.baked.parent[e])
-            depth++;
-        boxes[i].lower[i % 3] -= 1.5f;
-        boxes[i].upper[i % 3] -= 1.5f;
-        assert_true(bvh_top_move(&top, i, &boxes[i]));
-        assert_int_equal(bvh_top_refit(&top), depth);
-        bvh_top_settle(&top);
-        expect_top_contains(&top, boxes);
+    for (int k = 0; k < 3; k++) {
+        boxes[5].lower[k] = -FLT_MAX;
+        boxes[5].upper[k] = FLT_MAX;
     }
-    assert_int_equal(bvh_top_refit(&top), 0);
+    assert_true(bvh_top_build(&top, boxes, INSTANCES, &packed));
+    assert_false(bvh_top_is_stale(&top));
+    const struct view view = {&packed, top.elements, top.element_count, &top.grid};
+    for (uint32_t octant = 0; octant < BVH_OCTANTS; octant++) {
+        for (uint32_t i = 0; i < INSTANCES; i++) {
+            if (i == 7)
+                continue;
+            double lower[3], upper[3];
+            for (int k = 0; k < 3; k++) {
+                lower[k] = (double)boxes[i].lower[k];
+                upper[k] = (double)boxes[i].upper[k];
+            }
+            for (uint32_t e = top.element_of[i]; e != BVH_NONE; e = top.baked.parent[e]) {
+                const struct decoded decoded = decode(&view, octant, place_of(&top, octant, e));
+                assert_true(box_contains(&decoded, lower, upper));
+            }
+        }
+    }
     bvh_top_finish(&top);
 }
 
@@ -458,7 +803,7 @@ static void an_instance_that_comes_or_goes_needs_a_new_top_tree(void **state)
     struct bvh_world_box boxes[INSTANCES];
     struct bvh_top top;
     world_boxes(boxes);
-    assert_true(bvh_top_build(&top, boxes, INSTANCES, BVH_BOUNDS_OF_BOXES, false));
+    assert_true(bvh_top_build(&top, boxes, INSTANCES, &packed));
     assert_false(bvh_top_move(&top, 7, &boxes[8]));
     assert_false(bvh_top_move(&top, 8, &boxes[7]));
     assert_true(bvh_top_move(&top, 7, &boxes[7]));
@@ -471,7 +816,7 @@ static void a_top_tree_goes_stale_when_everything_has_moved_far(void **state)
     struct bvh_world_box boxes[INSTANCES];
     struct bvh_top top;
     world_boxes(boxes);
-    assert_true(bvh_top_build(&top, boxes, INSTANCES, BVH_BOUNDS_OF_BOXES, false));
+    assert_true(bvh_top_build(&top, boxes, INSTANCES, &packed));
     assert_false(bvh_top_is_stale(&top));
     uint32_t seed = 18;
     for (uint32_t i = 0; i < INSTANCES; i++) {
@@ -489,11 +834,11 @@ static void a_top_tree_over_nothing_is_empty(void **state)
 {
     (void)state;
     struct bvh_top top;
-    assert_true(bvh_top_build(&top, NULL, 0, BVH_BOUNDS_OF_BOXES, false));
+    assert_true(bvh_top_build(&top, NULL, 0, &packed));
     assert_int_equal(top.element_count, 0);
     bvh_top_finish(&top);
     const struct bvh_world_box nothing = {{1, 1, 1}, {-1, -1, -1}};
-    assert_true(bvh_top_build(&top, &nothing, 1, BVH_BOUNDS_OF_SPHERES, false));
+    assert_true(bvh_top_build(&top, &nothing, 1, &of_spheres));
     assert_int_equal(top.element_count, 0);
     bvh_top_finish(&top);
 }
@@ -506,14 +851,22 @@ int main(void)
         cmocka_unit_test(equal_triangles_are_split_without_end),
         cmocka_unit_test(triangles_without_area_are_kept),
         cmocka_unit_test(coordinates_at_the_end_of_the_range_do_no_harm),
+        cmocka_unit_test(flat_shapes_lie_within_their_grid),
+        cmocka_unit_test(single_points_lie_within_their_grid),
+        cmocka_unit_test(shapes_far_from_the_origin_lie_within_their_grid),
+        cmocka_unit_test(a_grid_holds_the_box_it_was_made_for),
+        cmocka_unit_test(an_evenly_fine_mesh_loses_nothing_to_its_grid),
+        cmocka_unit_test(fine_detail_in_a_great_extent_is_told_by_the_cost_of_its_grid),
         cmocka_unit_test(a_tree_that_degenerates_to_a_list_is_built),
         cmocka_unit_test(the_tree_does_not_depend_on_the_threads),
         cmocka_unit_test(each_octant_meets_the_near_side_first),
         cmocka_unit_test(elements_that_do_not_pay_are_thrown_back),
-        cmocka_unit_test(the_plain_form_has_one_order_and_no_links_beside),
+        cmocka_unit_test(each_form_takes_the_bytes_it_promises),
         cmocka_unit_test(a_shape_without_primitives_is_refused),
         cmocka_unit_test(several_shapes_are_built_together),
         cmocka_unit_test(a_moved_instance_refits_its_path_alone),
+        cmocka_unit_test(an_instance_that_leaves_the_grid_needs_a_new_top_tree),
+        cmocka_unit_test(a_top_tree_over_an_endless_instance_is_not_stale_when_new),
         cmocka_unit_test(an_instance_that_comes_or_goes_needs_a_new_top_tree),
         cmocka_unit_test(a_top_tree_goes_stale_when_everything_has_moved_far),
         cmocka_unit_test(a_top_tree_over_nothing_is_empty),

@@ -92,7 +92,8 @@ static void a_moved_node_costs_its_path_in_the_top_tree(void **state)
     update(&fixture);
     assert_int_equal(stats->nodes_rebuilt, 0);
     assert_in_range(stats->nodes_refitted, 1, top_nodes / 2);
-    uint64_t expected = sizeof(struct bvh_transform) + stats->nodes_refitted * sizeof(struct bvh_element);
+    size_t element_bytes = bvh_element_bytes(&((struct bvh *)fixture.tracer)->store.settings);
+    uint64_t expected = sizeof(struct bvh_transform) + stats->nodes_refitted * element_bytes;
     assert_int_equal(stats->uploaded_bytes, expected);
     fixture_finish(&fixture);
 }
@@ -157,10 +158,9 @@ static void expect_like_brute_force(struct scene *scene, const struct ray *rays,
                                     uint32_t spurious_max)
 {
     static const struct tracer_options forms[] = {
-        {.bvh_rays_together = 1},
-        {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 1},
-        {.bvh_layout = BVH_LAYOUT_PLAIN},
-        {.bvh_rays_together = 4},
+        {.bvh_rays_together = 1},         {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 1},
+        {.bvh_layout = BVH_LAYOUT_PLAIN}, {.bvh_rays_together = 4},
+        {.bvh_rays_together = 8},
     };
     struct scene_gpu gpu;
     struct error error = {0};
@@ -287,6 +287,82 @@ static void transforms_behind_the_origin_and_around_it_are_entered(void **state)
     free(rays);
 }
 
+/* A soup of a thousandth of a millimetre on a floor of twenty metres: far below a cell of one grid over both. */
+static struct scene *scene_of_detail(void)
+{
+    enum { TRIANGLES = 400 };
+    float positions[3 * TRIANGLES + 4][3] = {{-10, 0, -10}, {10, 0, -10}, {10, 0, 10}, {-10, 0, 10}};
+    uint32_t indices[3 * TRIANGLES + 6] = {0, 1, 2, 0, 2, 3};
+    uint64_t seed = 31;
+    for (uint32_t i = 0; i < 3 * TRIANGLES; i++) {
+        for (int k = 0; k < 3; k++)
+            positions[4 + i][k] = 1e-6f * (i % 3 ? test_uniform(&seed, -0.2f, 0.2f) : test_uniform(&seed, 0, 1)) +
+                                  (i % 3 ? positions[4 + i - i % 3][k] : 0);
+        indices[6 + i] = 4 + i;
+    }
+    struct test_edits edits = {.scene = test_scene_create()};
+    test_mesh(&edits, 1, (const float(*)[3])positions, 3 * TRIANGLES + 4, indices, TRIANGLES + 2);
+    test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+static void detail_that_a_grid_cannot_tell_apart_is_walked_in_floats(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_instances(), NULL);
+    assert_false(((struct bvh *)fixture.tracer)->store.settings.whole);
+    fixture_finish(&fixture);
+    fixture_init(&fixture, scene_of_detail(), NULL);
+    assert_true(((struct bvh *)fixture.tracer)->store.settings.whole);
+    fixture_finish(&fixture);
+    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
+    uint64_t seed = 32;
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        float o[3], d[3];
+        for (int k = 0; k < 3; k++) {
+            o[k] = i % 2 ? test_uniform(&seed, -3e-6f, 3e-6f) : test_uniform(&seed, -5, 5);
+            /* From afar the detail is below what a float tells apart: the floor. */
+            d[k] =
+                i % 2 ? 1e-6f * test_uniform(&seed, 0, 1) - o[k] : (k == 1 ? 0 : test_uniform(&seed, 1, 9)) - o[k];
+        }
+        rays[i] = make_ray(o[0], o[1], o[2], d[0], d[1], d[2]);
+    }
+    expect_like_brute_force(scene_of_detail(), rays, RAY_COUNT / 4, 0);
+    free(rays);
+}
+
+/* Eight neighbours at a time are `spread` radians from one direction, and begin at one point. */
+static uint32_t rays_together(struct fixture *fixture, float spread)
+{
+    struct error error = {0};
+    struct gpu_buffer buffer = {0};
+    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
+    uint64_t seed = 33;
+    for (uint32_t i = 0; i < RAY_COUNT; i += 8)
+        for (uint32_t k = i; k < i + 8; k++)
+            rays[k] = make_ray(0, 0, 20, 0.5f + test_uniform(&seed, -spread, spread),
+                               0.5f + test_uniform(&seed, -spread, spread), -1);
+    expect_ok(gpu_buffer_upload(device, &buffer, rays, RAY_COUNT * sizeof(struct ray), &error), &error);
+    const struct wave wave = {.ray_count = RAY_COUNT, .rays = &buffer};
+    uint32_t together = bvh_rays_together((struct bvh *)fixture->tracer, &fixture->gpu, &wave, &error);
+    expect_ok(together > 0, &error);
+    gpu_buffer_finish(device, &buffer);
+    free(rays);
+    return together;
+}
+
+static void rays_walk_together_where_neighbours_go_the_same_way(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_instances(), NULL);
+    assert_int_equal(rays_together(&fixture, 0.002f), device->facts.software ? 8 : 1);
+    assert_int_equal(rays_together(&fixture, 0.4f), 1);
+    fixture_finish(&fixture);
+}
+
 static void a_number_of_rays_that_cannot_walk_together_is_refused(void **state)
 {
     (void)state;
@@ -306,6 +382,8 @@ int main(void)
         cmocka_unit_test(grazing_rays_hit_as_by_brute_force),
         cmocka_unit_test(rays_from_far_away_hit_as_by_brute_force),
         cmocka_unit_test(transforms_behind_the_origin_and_around_it_are_entered),
+        cmocka_unit_test(detail_that_a_grid_cannot_tell_apart_is_walked_in_floats),
+        cmocka_unit_test(rays_walk_together_where_neighbours_go_the_same_way),
         cmocka_unit_test(a_number_of_rays_that_cannot_walk_together_is_refused),
     };
     struct error error = {0};

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+// How coherent a wave is: of a sample of groups of consecutive rays, the rays that are alive and the walks that
+// bvh/traverse.glsl would make of them. One invocation a group.
+//
+// Defines: RAYS_TOGETHER, the rays of a group.
+#include "shared/bindings.h"
+#include "common/dispatch.glsl"
+#include "bvh/together.glsl"
+
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
+layout(std430, binding = BIND_TRACER_0) buffer count_block { uint alive_count, walk_count; };
+
+uniform uint group_count;
+uniform uint group_stride; // rays from one group to the next
+
+void main()
+{
+    if (item_index() >= group_count)
+        return;
+    int first = int(item_index() * group_stride);
+    vec3 origins[RAYS_TOGETHER], directions[RAYS_TOGETHER];
+    uint waiting = 0u, walks = 0u;
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+        vec4 origin_t_min = texelFetch(rays, 2 * (first + k)), direction_t_max = texelFetch(rays, 2 * (first + k) + 1);
+        origins[k] = origin_t_min.xyz;
+        directions[k] = direction_t_max.xyz;
+        waiting |= direction_t_max.w > origin_t_min.w ? 1u << k : 0u;
+    }
+    atomicAdd(alive_count, uint(bitCount(waiting)));
+    for (; waiting != 0u; walks++) {
+        int leading = findLSB(waiting);
+        for (int k = 0; k < RAYS_TOGETHER; k++)
+            if (go_together(origins[leading], directions[leading], origins[k], directions[k]) || k == leading)
+                waiting &= ~(1u << k);
+    }
+    atomicAdd(walk_count, walks);
+}

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+// A leaf's primitives against the rays that are walked together.
+#include "shared/bvh_node.h"
+#include "common/candidate.glsl"
+
+layout(binding = UNIT_TRACER_2) uniform usamplerBuffer bvh_primitives;
+
+#if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
+#define ASK_MATERIALS
+#endif
+
+#ifdef ANY_HIT
+#define answer vec3 // transmittance
+#else
+#define answer candidate
+#endif
+
+// What is known of the instance that is walked.
+struct entered_instance {
+    uint index; // NOT_INSIDE: the top tree is walked
+    uint first_texel;
+    uint first_primitive;
+};
+
+// Put out: no bound and no primitive is hit by it any more.
+void put_out(inout trace_ray r)
+{
+    r.t_min = 3e38;
+    r.t_max = -1.0;
+}
+
+// The end of what is left of a ray; before its beginning where it is out.
+float end_of(trace_ray r, answer found)
+{
+#ifdef ANY_HIT
+    return r.t_max;
+#else
+    return r.t_max > r.t_min ? found.distance : r.t_max;
+#endif
+}
+
+// A candidate against its ray; a ray of which nothing is left is put out.
+void offer(inout trace_ray r, candidate c, inout answer found)
+{
+#ifdef ANY_HIT
+    if (offer_any(r, c, found)) {
+        found = vec3(0.0);
+        put_out(r);
+    }
+#else
+    offer_closest(r, c, found);
+#endif
+}
+
+// Where materials have to be asked, what the rays found on a primitive is noted first and settled one by one in a
+// loop: the code that asks (textures and all) would else stand in the program once for each ray and root.
+struct noted_hits {
+    vec2 distances; // triangles have the first alone
+    vec2 barycentrics;
+};
+
+void offer_or_note(uint bit, candidate c, inout trace_ray r, inout answer found, inout noted_hits noted,
+                   inout uint noted_bits)
+{
+#ifdef ASK_MATERIALS
+    if (c.distance > r.t_min && c.distance < end_of(r, found)) {
+        noted.distances[bit & 1u] = c.distance;
+        noted.barycentrics = c.barycentrics;
+        noted_bits |= 1u << bit;
+    }
+#else
+    offer(r, c, found);
+#endif
+}
+
+#ifdef ASK_MATERIALS
+void settle(uint noted_bits, candidate common_part, noted_hits noted[RAYS_TOGETHER],
+            inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+{
+    while (noted_bits != 0u) {
+        int bit = findLSB(noted_bits), chosen = bit >> 1;
+        noted_bits &= noted_bits - 1u;
+        trace_ray ray_asking = r[0];
+        noted_hits noted_here = noted[0];
+        answer found_here = found[0];
+        for (int k = 1; k < RAYS_TOGETHER; k++) {
+            if (k == chosen) {
+                ray_asking = r[k];
+                noted_here = noted[k];
+                found_here = found[k];
+            }
+        }
+        common_part.distance = (bit & 1) == 0 ? noted_here.distances.x : noted_here.distances.y;
+        common_part.barycentrics = noted_here.barycentrics;
+        offer(ray_asking, common_part, found_here);
+        for (int k = 0; k < RAYS_TOGETHER; k++) {
+            if (k == chosen) {
+                r[k] = ray_asking;
+                found[k] = found_here;
+            }
+        }
+    }
+}
+#endif
+
+#if RAYS_TOGETHER > 1 && !defined SHARED_ORIGIN
+#define ORIGINS_DIFFER
+#endif
+
+// Rays in an instance's space, as triangles are tested against them: relative to the leading ray's origin, so that
+// what hangs on the origin alone is computed once for all.
+struct relative_rays {
+    vec3 centre;
+    vec3 direction[RAYS_TOGETHER];
+#ifdef ORIGINS_DIFFER
+    vec3 origin[RAYS_TOGETHER]; // from the centre
+    vec3 moment[RAYS_TOGETHER]; // 2 (origin x direction)
+#endif
+};
+
+relative_rays relative_to(vec3 centre, object_ray o[RAYS_TOGETHER])
+{
+    relative_rays rays;
+    rays.centre = centre;
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+        rays.direction[k] = o[k].direction;
+#ifdef ORIGINS_DIFFER
+        rays.origin[k] = o[k].origin - centre;
+        rays.moment[k] = 2.0 * cross(rays.origin[k], o[k].direction);
+#endif
+    }
+    return rays;
+}
+
+// As intersect_triangle (common/intersect.glsl), for several rays. An edge from a to b, e = b - a, s = b + a, has for a
+// ray from o along d the edge function d . (e x (s - 2 o)) = d . (e x s) - e . (2 o x d): the first cross product is the
+// same for all rays, the second for all edges. Two triangles that share an edge still get exactly opposite values.
+void test_triangle(uint i, entered_instance inside, relative_rays rays, inout trace_ray r[RAYS_TOGETHER],
+                   inout answer found[RAYS_TOGETHER])
+{
+    int texel = int(inside.first_texel + i * BVH_TRIANGLE_TEXELS);
+    uvec4 first = texelFetch(bvh_primitives, texel);
+    vec3 v0 = uintBitsToFloat(first.xyz) - rays.centre;
+    vec3 v1 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 1).xyz) - rays.centre;
+    vec3 v2 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 2).xyz) - rays.centre;
+    precise vec3 e0 = v2 - v1, e1 = v0 - v2, e2 = v1 - v0;
+    precise vec3 c0 = cross(e0, v2 + v1), c1 = cross(e1, v0 + v2), c2 = cross(e2, v1 + v0);
+    vec3 normal = cross(e2, v2 - v0);
+    candidate c = candidate(0.0, inside.first_primitive + first.w, inside.index, vec2(0.0));
+    noted_hits noted[RAYS_TOGETHER];
+    uint noted_bits = 0u;
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+        vec3 d = rays.direction[k];
+#ifdef ORIGINS_DIFFER
+        vec3 m = rays.moment[k];
+        precise float w0 = dot(c0, d) - dot(e0, m), w1 = dot(c1, d) - dot(e1, m), w2 = dot(c2, d) - dot(e2, m);
+        float above = dot(normal, v0 - rays.origin[k]);
+#else
+        precise float w0 = dot(c0, d), w1 = dot(c1, d), w2 = dot(c2, d);
+        float above = dot(normal, v0);
+#endif
+        float sum = w0 + w1 + w2, slope = dot(normal, d);
+        bool inside_edges = (w0 >= 0.0 && w1 >= 0.0 && w2 >= 0.0) || (w0 <= 0.0 && w1 <= 0.0 && w2 <= 0.0);
+        c.distance = above / slope;
+        // seen on edge, or no area: not hit
+        c.distance = inside_edges && sum != 0.0 && slope != 0.0 ? c.distance : -1.0;
+#ifdef ASK_MATERIALS
+        c.barycentrics = vec2(w1, w2) / sum;
+#endif
+        offer_or_note(uint(2 * k), c, r[k], found[k], noted[k], noted_bits);
+    }
+#ifdef ASK_MATERIALS
+    settle(noted_bits, c, noted, r, found);
+#endif
+}
+
+#ifdef HAS_SPHERES
+void test_sphere(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], inout trace_ray r[RAYS_TOGETHER],
+                 inout answer found[RAYS_TOGETHER])
+{
+    int texel = int(inside.first_texel + i * BVH_SPHERE_TEXELS);
+    vec4 sphere = uintBitsToFloat(texelFetch(bvh_primitives, texel));
+    candidate c = candidate(0.0, inside.first_primitive + texelFetch(bvh_primitives, texel + 1).x, inside.index,
+                            vec2(0.0));
+    noted_hits noted[RAYS_TOGETHER];
+    uint noted_bits = 0u;
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+        vec2 distances;
+        if (intersect_sphere(o[k].origin, o[k].direction, sphere.xyz, sphere.w, distances)) {
+            c.distance = distances.x;
+            offer_or_note(uint(2 * k), c, r[k], found[k], noted[k], noted_bits);
+            c.distance = distances.y;
+            offer_or_note(uint(2 * k + 1), c, r[k], found[k], noted[k], noted_bits);
+        }
+    }
+#ifdef ASK_MATERIALS
+    settle(noted_bits, c, noted, r, found);
+#endif
+}
+#endif
+
+void test_leaf(uint leaf, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
+               inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+{
+    uint first = leaf & BVH_LEAF_FIRST_MASK;
+    uint end = first + (leaf >> BVH_LEAF_COUNT_SHIFT & BVH_LEAF_COUNT_MASK) + 1u;
+#ifdef HAS_SPHERES
+    if (leaf >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_SPHERES) {
+        for (uint i = first; i < end; i++)
+            test_sphere(i, inside, o, r, found);
+        return;
+    }
+#endif
+    for (uint i = first; i < end; i++)
+        test_triangle(i, inside, rays, r, found);
+}
