@@ -14,7 +14,7 @@ struct instance {
     uint pad;
 };
 SHARED_SIZE(instance, 112)
-#define INSTANCE_TEXELS 7 /* RGBA32UI */
+#define INSTANCE_TEXELS 7    /* RGBA32UI */
 #define INSTANCE_MIRRORED 1u /* negative determinant: winding is reversed */
 
 /* A mesh or a set of spheres, stored once however many instances show it. */
