@@ -177,9 +177,12 @@ void cli_comparison_print(FILE *out, const struct fl_comparison *comparison, con
                 "  %-16s%" PRIu64 " pixels (%" PRIu64 " in the first, %" PRIu64
                 " in the second): beyond, and in no other figure\n",
                 "not finite", comparison->nonfinite, comparison->nonfinite_a, comparison->nonfinite_b);
-    if (comparison->picture_width > 0)
+    if (comparison->picture_width > 0 && comparison->greatest_error > 0)
         fprintf(out, "  %-16s%ux%u, errors from black, 0, to light yellow, %.4g, by the square root\n", "picture",
                 comparison->picture_width, comparison->picture_height, comparison->heat_top);
+    else if (comparison->picture_width > 0)
+        fprintf(out, "  %-16s%ux%u, black: no error\n", "picture", comparison->picture_width,
+                comparison->picture_height);
     print_limits(out, comparison, limits);
 }
 

@@ -13,7 +13,7 @@ static const struct subcommand {
     {"render", "farlight render", cli_render, "one picture of a model"},
     {"animate", "farlight animate", cli_animate, "a series of pictures along a camera's path"},
     {"info", "farlight info", cli_info, "what a model file holds"},
-    {"compare", "farlight compare", cli_compare, "how far two images are apart"},
+    {"compare", "farlight compare", cli_compare, "how far two images are apart, or two tracers"},
     {"stats", "farlight stats", cli_stats, "what a daemon has and does"},
     {"ping", "farlight ping", cli_ping, "the way to a daemon and back"},
     {"bridge", "farlight bridge", cli_bridge, "what ssh runs on the daemon's host"},
@@ -87,9 +87,9 @@ int main(int argc, char **argv)
     else
         status = unknown(argv[1]);
     /* What was printed must have arrived, or the command has failed: a full disk shows only here. */
-    if (fflush(stdout) != 0 && status == CLI_DONE) {
+    if (fflush(stdout) != 0 && (status == CLI_DONE || status == CLI_FAILED)) {
         fprintf(stderr, "farlight: standard output cannot be written: %m\n");
-        status = CLI_FAILED;
+        status = subcommand != NULL && subcommand->run == cli_compare ? CLI_TROUBLE : CLI_FAILED;
     }
     return status;
 }

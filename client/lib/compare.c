@@ -133,12 +133,14 @@ static void take(struct fl_comparison *to, const struct message_images_compared 
     to->picture_height = from->picture_height;
 }
 
-/* Counts that are not possible could not be shares. */
+/* Counts that are not possible could not be shares, nor places be looked at. */
 static bool is_sound(const struct message_images_compared *answer)
 {
     const uint64_t pixels = (uint64_t)answer->width * answer->height;
     return answer->nonfinite <= pixels && answer->nonfinite_a <= answer->nonfinite &&
-           answer->nonfinite_b <= answer->nonfinite && answer->beyond <= pixels && answer->visible <= pixels;
+           answer->nonfinite_b <= answer->nonfinite && answer->beyond <= pixels && answer->visible <= pixels &&
+           answer->greatest_x < answer->width && answer->greatest_y < answer->height &&
+           answer->greatest_channel < answer->channels;
 }
 
 static bool explain(struct judge *judge, struct fl_error *error)
@@ -194,8 +196,7 @@ bool fl_compare(const struct fl_compare_options *options, struct fl_comparison *
                                                                       : FL_THRESHOLD_DEFAULT};
     const bool done = start(&judge, error) && send_request(&judge, error) && receive(&judge, comparison, error);
     fl_stream_finish(&judge.stream);
-    if (!done)
-        fl_process_kill(&judge.process); /* it may be busy with a picture that nobody waits for */
-    fl_process_end(&judge.process, 5000);
+    /* It may be busy with a picture that nobody waits for; ended by a signal it takes unfinished files away. */
+    fl_process_end(&judge.process, done ? 5000 : 0);
     return done;
 }

@@ -72,11 +72,13 @@ bool check_alike(const struct comparison &each)
     if (each.a.width() != each.b.width() || each.a.height() != each.b.height())
         return fail(each.result, wanted.a,
                     "has " + size_text(each.a) + " pixels, but " + wanted.b + " has " + size_text(each.b));
-    if (each.a.channel_names() != each.b.channel_names())
-        return fail(each.result, wanted.a,
-                    "has the channels " + each.a.channel_names() + ", but " + wanted.b + " has " +
-                        each.b.channel_names());
-    return true;
+    if (each.a.pixels.spec().channelnames == each.b.pixels.spec().channelnames)
+        return true;
+    if ((each.a.alpha >= 0) != (each.b.alpha >= 0))
+        each.result.remedy = "without alpha they may be alike: --ignore-alpha";
+    return fail(each.result, wanted.a,
+                "has the channels " + each.a.channel_names() + ", but " + wanted.b + " has " +
+                    each.b.channel_names());
 }
 
 // Counts what is no number and makes it 0 in both, for no sum holds such a thing.
@@ -146,7 +148,10 @@ bool write_picture(struct comparison &each, const ImageBuf &screen_a, const Imag
     char reason[512] = "", scale[64];
     const ImageBuf errors = algo::maxchan(algo::absdiff(each.a.pixels, each.b.pixels));
     ImageBuf shown = heat_map(errors, answer.heat_top, each.nonfinite);
-    std::snprintf(scale, sizeof scale, "error, 0 to %.4g", static_cast<double>(answer.heat_top));
+    if (answer.greatest_error > 0)
+        std::snprintf(scale, sizeof scale, "error, 0 to %.4g", static_cast<double>(answer.heat_top));
+    else
+        std::snprintf(scale, sizeof scale, "no error");
     if (wanted.layout == PROTOCOL_COMPARISON_LAYOUT_SIDE) {
         const ImageBuf heat = shown;
         shown = side_by_side({&screen_a, &screen_b, &heat}, {wanted.label_a, wanted.label_b, scale});

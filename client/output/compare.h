@@ -22,6 +22,7 @@ struct compare_result {
     char channel_names[256];
     char field[128]; /* the end of the path of the file at fault */
     char reason[512];
+    const char *remedy; /* may be NULL */
 };
 
 /* Where fonts are, for titles; nothing else has to be read after the sandbox is entered. */

@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,17 +31,35 @@ static int write_all(int fd, const uint8_t *bytes, size_t count)
     return 0;
 }
 
+/* The name under which a file is being written: a program that is ended meanwhile takes it away. */
+static char unfinished[4200];
+static volatile sig_atomic_t is_unfinished;
+
+static void on_end(int number)
+{
+    if (is_unfinished)
+        unlink(unfinished);
+    _exit(128 + number);
+}
+
+void file_clean_up_on_end(void)
+{
+    signal(SIGTERM, on_end);
+}
+
 bool file_write(const char *path, const uint8_t *bytes, size_t count, char *reason, size_t reason_bytes)
 {
-    char temporary[4200];
     const char *slash = strrchr(path, '/');
     const size_t folder_bytes = slash != NULL ? (size_t)(slash - path) + 1 : 0;
-    const int length = snprintf(temporary, sizeof temporary, "%.*s.farlight-XXXXXX", (int)folder_bytes, path);
-    if (length < 0 || (size_t)length >= sizeof temporary)
+    const int length = snprintf(unfinished, sizeof unfinished, "%.*s.farlight-XXXXXX", (int)folder_bytes, path);
+    if (length < 0 || (size_t)length >= sizeof unfinished)
         return fail(reason, reason_bytes, ENAMETOOLONG);
-    const int fd = mkostemp(temporary, O_CLOEXEC);
-    if (fd < 0)
+    is_unfinished = 1;
+    const int fd = mkostemp(unfinished, O_CLOEXEC);
+    if (fd < 0) {
+        is_unfinished = 0;
         return fail(reason, reason_bytes, errno);
+    }
     /* mkostemp lets nobody else in; the image is an ordinary file. */
     const mode_t mask = umask(0);
     umask(mask);
@@ -50,12 +69,12 @@ bool file_write(const char *path, const uint8_t *bytes, size_t count, char *reas
     /* Some file systems say only now that they were full. */
     if (close(fd) < 0 && failure == 0)
         failure = errno;
-    if (failure == 0 && rename(temporary, path) < 0)
+    if (failure == 0 && rename(unfinished, path) < 0)
         failure = errno;
-    if (failure == 0)
-        return true;
-    unlink(temporary);
-    return fail(reason, reason_bytes, failure);
+    if (failure != 0)
+        unlink(unfinished);
+    is_unfinished = 0;
+    return failure == 0 || fail(reason, reason_bytes, failure);
 }
 
 int file_open(const char *path, char *reason, size_t reason_bytes)

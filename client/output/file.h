@@ -12,8 +12,10 @@ extern "C" {
 #endif
 
 /* Writes under a temporary name in the path's folder and renames; on failure nothing is left and `reason` says
- * why. An existing file is replaced. */
+ * why. An existing file is replaced. One at a time. */
 bool file_write(const char *path, const uint8_t *bytes, size_t count, char *reason, size_t reason_bytes);
+/* From now on SIGTERM ends the program without leaving a temporary file behind. */
+void file_clean_up_on_end(void);
 
 /* Opens an ordinary file for reading; -1, with `reason`, for anything else: a FIFO holds nobody. */
 int file_open(const char *path, char *reason, size_t reason_bytes);

@@ -18,6 +18,7 @@ namespace
 
 constexpr int edge_max = 8192; // as of frames
 constexpr int channels_max = 4;
+constexpr size_t channel_name_max = 60; // four and their commas fit into a message
 
 struct signature {
     const char *reader;
@@ -47,6 +48,18 @@ bool is_cut_off(const signature &kind, const uint8_t *file, size_t file_bytes)
         file_bytes--;
     return std::strcmp(kind.reader, "jpeg") == 0 &&
            (file_bytes < 2 || file[file_bytes - 2] != 0xff || file[file_bytes - 1] != 0xd9);
+}
+
+// A file may call its channels what it likes: nothing of it may reach a terminal, break the protocol's UTF-8 or
+// look like several names in a list.
+std::vector<std::string> harmless(std::vector<std::string> names)
+{
+    for (std::string &name : names) {
+        name.resize(std::min(name.size(), channel_name_max));
+        std::replace_if(
+            name.begin(), name.end(), [](char c) { return c <= ' ' || c == ',' || c > '~'; }, '?');
+    }
+    return names;
 }
 
 bool fail(std::string &reason, const std::string &text)
@@ -152,7 +165,7 @@ bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made
     made.linear = kind->linear;
     made.alpha = spec.nchannels > 1 ? spec.alpha_channel : -1; // alpha alone is looked at like grey
     made.pixels = make_plane(spec.width, spec.height, spec.nchannels);
-    made.pixels.specmod().channelnames = spec.channelnames;
+    made.pixels.specmod().channelnames = harmless(spec.channelnames);
     if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, made.data()))
         return fail(reason, input->geterror());
     return true;
