@@ -27,13 +27,15 @@ int cli_stats(int argc, char **argv);
 int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
 
-/* ---- talk.c: what goes to standard error ---- */
+/* ---- talk.c: what people read ---- */
 
 /* "farlight: FIELD: TEXT (REMEDY)"; returns the exit status that belongs to the error. */
 int cli_report(const struct fl_error *error);
 int cli_trouble(const struct fl_error *error); /* likewise, of `compare` (compare.c): 2 where others say 1 */
 /* A note about a model: warnings always, plain information only if `chatty`. */
 void cli_note(const struct fl_note *note, bool chatty);
+/* On standard output; names come from people and files and are made harmless for a terminal. */
+void cli_print_name(const char *name);
 bool cli_is_terminal(int fd); /* one that can move its cursor */
 
 /* ---- interrupt.c ---- */
@@ -53,6 +55,11 @@ enum cli_image cli_image_by_path(const char *path);
 const char *cli_image_name(enum cli_image image);
 /* Whether a file can be made at `path`, without making it. `folder` gets its folder. */
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error);
+/* Whether writing to `path`, named by `option`, leaves the inputs alone; NULL among them is skipped. */
+bool cli_check_not_input(const char *path, const char *option, const char *const *inputs, size_t count,
+                         struct fl_error *error);
+/* Whether a comparison of the inputs can write its picture: PNG or JPEG, and none of them. NULL: it need not. */
+bool cli_check_error_picture(const char *picture, const char *const *inputs, size_t count, struct fl_error *error);
 /* Whether `path` is a file that can be read. */
 bool cli_check_input(const char *path, struct fl_error *error);
 /* A folder in $TMPDIR for a file that goes on to standard output. */
@@ -73,6 +80,9 @@ void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uin
                          const char *what);
 /* From the first call on frames are counted. */
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total);
+/* `done` of `total` steps of unlike length are done; `what` is being done now. Without a terminal a line each,
+ * once it has taken a second. */
+void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t total, const char *what);
 /* Removes the bar, so that something else can be written. */
 void cli_progress_clear(struct cli_progress *progress);
 /* The last bar of what is done stays; any other is removed. */

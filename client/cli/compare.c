@@ -6,7 +6,6 @@
 
 #include <errno.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #define OPERANDS_MAX 2u
 
@@ -24,7 +23,7 @@ struct comparing {
 static const struct argp_option options[] = {
     {"output", 'o', "IMAGE", 0, "Write a picture of the errors, PNG or JPEG by its ending", 0},
     {"layout", KEY_LAYOUT, "NAME", 0,
-     "Of that picture: heat, the errors alone (default), or side, with both images", 0},
+     "What the picture shows: heat, the errors alone (default), or side, with both images", 0},
     {"heat-top", KEY_HEAT_TOP, "ERROR", 0,
      "The error with the brightest colour (default: the greatest error, at most 1)", 0},
     {"threshold", KEY_THRESHOLD, "ERROR", 0, "A pixel is beyond where a channel differs by more (default 0.01)",
@@ -104,46 +103,13 @@ int cli_trouble(const struct fl_error *error)
     return status == CLI_FAILED ? CLI_TROUBLE : status;
 }
 
-static bool is_same_file(const char *a, const char *b)
-{
-    struct stat first, second;
-    return stat(a, &first) == 0 && stat(b, &second) == 0 && first.st_dev == second.st_dev &&
-           first.st_ino == second.st_ino;
-}
-
-/* Everything that can be known to fail before anything is compared. */
-static bool check_picture(const struct comparing *comparing, struct fl_error *error)
-{
-    const char *picture = comparing->options.picture;
-    char folder[4097];
-    if (picture == NULL)
-        return true;
-    const enum cli_image image = cli_image_by_path(picture);
-    if (image != CLI_IMAGE_PNG && image != CLI_IMAGE_JPEG) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, picture, "a picture of errors is PNG or JPEG");
-        return fl_error_remedy(error, "known endings: .png .jpg .jpeg");
-    }
-    for (size_t i = 0; i < comparing->operand_count; i++)
-        if (is_same_file(picture, comparing->operands[i]))
-            return fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "would replace '%s'",
-                                comparing->operands[i]);
-    return cli_check_output(picture, folder, sizeof folder, error);
-}
-
 /* ---- two image files ---- */
-
-/* Names come from people and files: made harmless for a terminal. */
-static void print_name(const char *text)
-{
-    for (; *text != '\0'; text++)
-        putchar((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text);
-}
 
 static void print_figures(const struct comparing *comparing, const struct fl_comparison *comparison)
 {
-    print_name(comparing->options.a);
+    cli_print_name(comparing->options.a);
     fputs(" and ", stdout);
-    print_name(comparing->options.b);
+    cli_print_name(comparing->options.b);
     putchar('\n');
     cli_comparison_print(stdout, comparison, &comparing->limits);
 }
@@ -164,7 +130,8 @@ static int compare_images(struct comparing *comparing)
 {
     struct fl_error error = {0};
     struct fl_comparison comparison;
-    if (!check_picture(comparing, &error) || !cli_interrupt_begin(&error))
+    if (!cli_check_error_picture(comparing->options.picture, comparing->operands, OPERANDS_MAX, &error) ||
+        !cli_interrupt_begin(&error))
         return cli_trouble(&error);
     comparing->options.a = comparing->operands[0];
     comparing->options.b = comparing->operands[1];
@@ -178,12 +145,15 @@ static int compare_images(struct comparing *comparing)
     return cli_limits_hold(&comparing->limits, &comparison) ? CLI_DONE : CLI_FAILED;
 }
 
+/* Abbreviations count, as everywhere; "--tracer", too, for what is named are tracers. */
 static bool is_about_tracers(int argc, char **argv)
 {
     static const char option[] = "--tracers";
-    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++)
-        if (strncmp(argv[i], option, sizeof option - 1) == 0)
+    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
+        const size_t length = strcspn(argv[i], "=");
+        if (length >= strlen("--tr") && length < sizeof option && strncmp(argv[i], option, length) == 0)
             return true;
+    }
     return false;
 }
 
@@ -205,6 +175,7 @@ int cli_compare(int argc, char **argv)
         return cli_trouble(&comparing.job.error);
     if (comparing.operand_count < 2) {
         cli_usage(&comparing.job, "IMAGE", "two image files are needed");
+        fl_error_remedy(&comparing.job.error, "or, of a model, the tracers: --tracers bvh,reference");
         return cli_trouble(&comparing.job.error);
     }
     return compare_images(&comparing);

@@ -12,6 +12,7 @@
 
 #define FAR_DEFAULT 1e-4
 #define FAR_LEAST 1e-9
+#define STEPS 3u /* that progress is counted in */
 
 enum key {
     KEY_PICTURE = 'o',
@@ -96,16 +97,9 @@ static error_t parse_limit(struct tracer_comparison *comparison, const char *val
     if (strncmp(value, agree, sizeof agree - 1) != 0)
         return cli_limits_add(&comparison->limits, value, &comparison->job.error) ? 0
                                                                                   : name_field(comparison, field);
-    char number[64];
-    snprintf(number, sizeof number, "%s", value + sizeof agree - 1);
-    const size_t length = strlen(number);
-    const bool is_percent = length > 0 && number[length - 1] == '%';
-    if (is_percent)
-        number[length - 1] = '\0';
-    double real = 0;
-    const error_t status = parse_real(comparison, field, number, is_percent ? 100 : 1, &real);
-    comparison->least_agreement = is_percent ? real / 100 : real;
-    return status;
+    return cli_share_parse(value + sizeof agree - 1, &comparison->least_agreement, &comparison->job.error)
+               ? 0
+               : name_field(comparison, field);
 }
 
 static error_t parse_own(struct tracer_comparison *comparison, int key, char *value)
@@ -165,12 +159,6 @@ static bool complete(struct tracer_comparison *comparison)
     struct cli_job *job = &comparison->job;
     if (!comparison->has_tracers)
         return cli_usage(job, "--tracers", "no tracers are named, such as bvh,reference") == 0;
-    const char *picture = comparison->images.picture;
-    const enum cli_image image = picture != NULL ? cli_image_by_path(picture) : CLI_IMAGE_PNG;
-    if (image != CLI_IMAGE_PNG && image != CLI_IMAGE_JPEG) {
-        cli_usage(job, picture, "a picture of errors is PNG or JPEG");
-        return fl_error_remedy(&job->error, "known endings: .png .jpg .jpeg");
-    }
     job->output = "picture.exr";
     job->float_pixels = true;
     if (!cli_job_complete(job, false))
@@ -185,8 +173,8 @@ static bool complete(struct tracer_comparison *comparison)
 static bool prepare(struct tracer_comparison *comparison, struct fl_error *error)
 {
     char folder[4096];
-    const char *picture = comparison->images.picture;
-    if (picture != NULL && !cli_check_output(picture, folder, sizeof folder, error))
+    const char *const inputs[] = {comparison->job.model, comparison->job.environment};
+    if (!cli_check_error_picture(comparison->images.picture, inputs, 2, error))
         return false;
     if (!cli_temporary_folder(folder, sizeof folder, error))
         return false;
@@ -224,12 +212,18 @@ static struct fl_frame *render(struct tracer_comparison *comparison, const char 
 static bool render_both(struct tracer_comparison *comparison, struct fl_error *error)
 {
     struct fl_job_options *wanted = &comparison->job.options;
+    char what[100];
+    snprintf(what, sizeof what, "rays of %s and %s", protocol_tracer_text(comparison->tracer),
+             protocol_tracer_text(comparison->reference));
+    cli_progress_step(&comparison->progress, 0, STEPS, what);
     wanted->compare = true;
     wanted->tracer = comparison->tracer;
     wanted->compare_with = comparison->reference;
     comparison->frame = render(comparison, comparison->paths[1], error);
     if (comparison->frame == NULL)
         return false;
+    snprintf(what, sizeof what, "picture of %s", protocol_tracer_text(comparison->reference));
+    cli_progress_step(&comparison->progress, 1, STEPS, what);
     wanted->compare = false;
     wanted->tracer = comparison->reference;
     struct fl_frame *reference = render(comparison, comparison->paths[0], error);
@@ -246,6 +240,7 @@ static bool compare_pictures(struct tracer_comparison *comparison, struct fl_err
     images->label_a = protocol_tracer_text(comparison->reference);
     images->label_b = protocol_tracer_text(comparison->tracer);
     images->interrupt_fd = cli_interrupt_fd();
+    cli_progress_step(&comparison->progress, 2, STEPS, "comparing the pictures");
     return fl_compare(images, &comparison->figures, error);
 }
 
@@ -257,13 +252,6 @@ static bool is_within(const struct tracer_comparison *comparison)
            cli_limits_hold(&comparison->limits, &comparison->figures);
 }
 
-/* Names come from people: made harmless for a terminal. */
-static void print_name(const char *text)
-{
-    for (; *text != '\0'; text++)
-        putchar((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text);
-}
-
 static void print_text(const struct tracer_comparison *comparison)
 {
     const struct fl_frame *frame = comparison->frame;
@@ -271,7 +259,7 @@ static void print_text(const struct tracer_comparison *comparison)
     const char *tracer = protocol_tracer_text(comparison->tracer);
     const char *reference = protocol_tracer_text(comparison->reference);
     printf("%s against %s: ", tracer, reference);
-    print_name(comparison->job.model);
+    cli_print_name(comparison->job.model);
     printf(", %ux%u, %u sample%s a pixel, %s\n", frame->width, frame->height, frame->samples,
            frame->samples == 1 ? "" : "s", protocol_integrator_text(frame->integrator));
     cli_print_waves(frame, comparison->reference, comparison->far_share);
@@ -286,6 +274,7 @@ static void print_json(const struct tracer_comparison *comparison)
 {
     const struct fl_frame *frame = comparison->frame;
     const char *picture = comparison->images.picture;
+    char model[4097]; /* a path need not be UTF-8, which JSON is */
     json_t *object = json_pack(
         "{s:s,s:s,s:s,s:I,s:I,s:I,s:f,s:o,s:o,s:o,s:b}", "tracer", protocol_tracer_text(comparison->tracer),
         "reference", protocol_tracer_text(comparison->reference), "integrator",
@@ -293,7 +282,8 @@ static void print_json(const struct tracer_comparison *comparison)
         (json_int_t)frame->height, "samples", (json_int_t)frame->samples, "far_share", comparison->far_share,
         "waves", cli_waves_json(frame), "all", cli_wave_total_json(frame), "image",
         cli_comparison_json(&comparison->figures, &comparison->limits), "within", is_within(comparison) ? 1 : 0);
-    json_object_set_new(object, "model", json_string(comparison->job.model));
+    fl_text_utf8(comparison->job.model, model, sizeof model);
+    json_object_set_new(object, "model", json_string(model));
     json_object_set_new(object, "picture", picture != NULL ? json_string(picture) : json_null());
     json_object_set_new(object, "least_agreement",
                         comparison->least_agreement > 0 ? json_real(comparison->least_agreement) : json_null());
@@ -330,8 +320,7 @@ int cli_compare_tracers(int argc, char **argv)
         .parser = parse,
         .args_doc = "MODEL --tracers A,B",
         .doc = "Render one picture of a model with tracer A, have tracer B answer every ray of it too, and say "
-               "where the "
-               "answers differ, wave by wave; then render it with B and compare the pictures.\v"
+               "where the answers differ, wave by wave; then render it with B and compare the pictures.\v"
                "All first hits are traced. Exit status: 0 within all limits, 1 not, 2 not compared.",
         .children = children};
     struct tracer_comparison comparison = {.far_share = FAR_DEFAULT};

@@ -8,19 +8,19 @@
 
 static const struct figure {
     const char *name, *unit;
-    bool is_share;   /* of the pixels; may be typed in percent */
-    bool less_fails; /* the limit is a least value */
-    double least, greatest;
+    bool is_share;          /* of the pixels; may be typed in percent */
+    bool less_fails;        /* the limit is a least value */
+    double least, greatest; /* that a limit may be; shares are 0 to 1 */
 } figures[CLI_FIGURE_COUNT] = {
     [CLI_FIGURE_PSNR] = {.name = "psnr", .unit = " dB", .less_fails = true, .least = -1000, .greatest = 1000},
     [CLI_FIGURE_MEAN] = {.name = "mean", .unit = "", .greatest = 1e30},
     [CLI_FIGURE_RMS] = {.name = "rms", .unit = "", .greatest = 1e30},
     [CLI_FIGURE_MAX] = {.name = "max", .unit = "", .greatest = 1e30},
-    [CLI_FIGURE_BEYOND] = {.name = "beyond", .unit = "", .is_share = true, .greatest = 1},
+    [CLI_FIGURE_BEYOND] = {.name = "beyond", .unit = "", .is_share = true},
     [CLI_FIGURE_SSIM] = {.name = "ssim", .unit = "", .less_fails = true, .least = -1, .greatest = 1},
     [CLI_FIGURE_BUTTERAUGLI] = {.name = "butteraugli", .unit = "", .greatest = 1e30},
-    [CLI_FIGURE_VISIBLE] = {.name = "visible", .unit = "", .is_share = true, .greatest = 1},
-    [CLI_FIGURE_NONFINITE] = {.name = "nonfinite", .unit = "", .is_share = true, .greatest = 1}};
+    [CLI_FIGURE_VISIBLE] = {.name = "visible", .unit = "", .is_share = true},
+    [CLI_FIGURE_NONFINITE] = {.name = "nonfinite", .unit = "", .is_share = true}};
 
 /* ---- limits ---- */
 
@@ -39,6 +39,20 @@ static bool find_figure(const char *name, size_t length, enum cli_figure *found,
     return fl_error_remedy(error, "known: %s", known);
 }
 
+bool cli_share_parse(const char *text, double *share, struct fl_error *error)
+{
+    char number[64];
+    const size_t length = strlen(text);
+    if (length == 0 || length >= sizeof number || text[length - 1] != '%')
+        return fl_text_real(text, 0, 1, share, error);
+    memcpy(number, text, length - 1);
+    number[length - 1] = '\0';
+    if (!fl_text_real(number, 0, 100, share, error))
+        return false;
+    *share /= 100;
+    return true;
+}
+
 bool cli_limits_add(struct cli_limits *limits, const char *text, struct fl_error *error)
 {
     struct cli_limit limit = {.figure = CLI_FIGURE_MAX};
@@ -48,18 +62,12 @@ bool cli_limits_add(struct cli_limits *limits, const char *text, struct fl_error
     if (limits->count == CLI_LIMITS_MAX)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "at most %u limits", CLI_LIMITS_MAX);
     const struct figure *figure = &figures[limit.figure];
-    char number[64];
-    snprintf(number, sizeof number, "%s", equals != NULL ? equals + 1 : text);
-    const size_t length = strlen(number);
-    const bool is_percent = length > 0 && number[length - 1] == '%';
-    if (is_percent && !figure->is_share)
+    const char *value = equals != NULL ? equals + 1 : text;
+    if (!figure->is_share && strchr(value, '%') != NULL)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is no share of the pixels", figure->name);
-    if (is_percent)
-        number[length - 1] = '\0';
-    const double unit = is_percent ? 0.01 : 1;
-    if (!fl_text_real(number, figure->least / unit, figure->greatest / unit, &limit.value, error))
+    if (figure->is_share ? !cli_share_parse(value, &limit.value, error)
+                         : !fl_text_real(value, figure->least, figure->greatest, &limit.value, error))
         return false;
-    limit.value *= unit;
     limits->limits[limits->count++] = limit;
     return true;
 }

@@ -34,6 +34,8 @@ struct cli_limits {
     size_t count;
 };
 
+/* "0.001" or "0.1%". False: as below. */
+bool cli_share_parse(const char *text, double *share, struct fl_error *error);
 /* Adds "FIGURE=VALUE" or "VALUE"; shares may end in '%'. False: *error says what is wrong, its field empty. */
 bool cli_limits_add(struct cli_limits *limits, const char *text, struct fl_error *error);
 /* Whether nothing is worse than its limit. A figure that was not measured is; and where there are limits but none

@@ -79,6 +79,36 @@ bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struc
     return try_folder(path, folder, error);
 }
 
+static bool is_same_file(const char *a, const char *b)
+{
+    struct stat first, second;
+    return stat(a, &first) == 0 && stat(b, &second) == 0 && first.st_dev == second.st_dev &&
+           first.st_ino == second.st_ino;
+}
+
+bool cli_check_not_input(const char *path, const char *option, const char *const *inputs, size_t count,
+                         struct fl_error *error)
+{
+    for (size_t i = 0; i < count; i++)
+        if (inputs[i] != NULL && is_same_file(path, inputs[i]))
+            return fl_error_set(error, FL_ERROR_ARGUMENT, option, "would replace '%s'", inputs[i]);
+    return true;
+}
+
+bool cli_check_error_picture(const char *picture, const char *const *inputs, size_t count, struct fl_error *error)
+{
+    char folder[4097];
+    if (picture == NULL)
+        return true;
+    const enum cli_image image = cli_image_by_path(picture);
+    if (image != CLI_IMAGE_PNG && image != CLI_IMAGE_JPEG) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, picture, "a picture of errors is PNG or JPEG");
+        return fl_error_remedy(error, "known endings: .png .jpg .jpeg");
+    }
+    return cli_check_not_input(picture, "--output", inputs, count, error) &&
+           cli_check_output(picture, folder, sizeof folder, error);
+}
+
 bool cli_check_input(const char *path, struct fl_error *error)
 {
     struct stat status;

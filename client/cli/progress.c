@@ -98,6 +98,22 @@ static void draw_bar(uint32_t done, uint32_t total, const char *numbers, size_t 
     fputs(numbers, stderr);
 }
 
+void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t total, const char *what)
+{
+    const uint64_t now = now_ns();
+    if (progress->silent || (!progress->bar && now - progress->begin_ns < LINE_EVERY_NS))
+        return;
+    char text[120];
+    int length = snprintf(text, sizeof text, "%u of %u: %s", done, total, what);
+    if (!progress->bar) {
+        fprintf(stderr, "%s\n", text);
+        return;
+    }
+    cli_progress_clear(progress);
+    draw_bar(done, total, text, length > 0 && length < (int)sizeof text ? (size_t)length : sizeof text - 1);
+    progress->drawn = true;
+}
+
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total)
 {
     const uint64_t now = now_ns();

@@ -61,6 +61,18 @@ static bool prepare_output(struct session *session, struct fl_error *error)
            cli_check_output(session->path, session->folder, sizeof session->folder, error);
 }
 
+static bool begin_trace(struct session *session, struct fl_error *error)
+{
+    const struct cli_job *job = session->job;
+    const char *const others[] = {job->model, job->environment, job->keys_file};
+    if (job->trace_file == NULL)
+        return true;
+    if (!cli_check_not_input(job->trace_file, "--trace-file", others, 3, error))
+        return false;
+    session->trace = cli_trace_file_create(job->trace_file, error);
+    return session->trace != NULL;
+}
+
 static bool start_exporter(struct session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
@@ -196,9 +208,7 @@ int cli_run_job(struct cli_job *job, bool is_series)
     cli_progress_begin(&session.progress, job->quiet);
     if (job->timings != CLI_TIMINGS_NONE)
         session.timings = cli_timings_create(job->timings, strcmp(job->output, "-") == 0);
-    if (job->trace_file != NULL)
-        session.trace = cli_trace_file_create(job->trace_file, &error);
-    bool done = (session.trace != NULL || job->trace_file == NULL) && run(&session, &error);
+    bool done = begin_trace(&session, &error) && run(&session, &error);
     cli_progress_end(&session.progress, done);
     if (done)
         print_timings(&session);

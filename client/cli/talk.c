@@ -26,6 +26,12 @@ static void say(const char *kind, const char *colour, const struct fl_error *wha
     fprintf(stderr, "farlight: %s%s%s%s\n", colourful ? colour : "", kind, colourful ? "\033[0m" : "", line);
 }
 
+void cli_print_name(const char *name)
+{
+    for (; *name != '\0'; name++)
+        putchar((unsigned char)*name < 0x20 || *name == 0x7f ? '?' : *name);
+}
+
 int cli_report(const struct fl_error *error)
 {
     if (error->code == FL_ERROR_INTERRUPTED && cli_interrupt_signal() != 0) {

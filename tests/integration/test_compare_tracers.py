@@ -2,6 +2,7 @@
 """`farlight compare MODEL --tracers A,B`: rays compared wave by wave, then the pictures, on the bundled scenes."""
 import json
 import os
+import pty
 import subprocess
 
 from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, read_png
@@ -35,6 +36,26 @@ class Rays(Case):
         self.assertEqual(report["all"]["rays"], sum(w["rays"] for w in report["waves"]))
         self.assertTrue(report["image"]["identical"])
 
+    def test_bvh_agrees_with_the_reference(self):
+        """Triangles, spheres, mirrors and glass. 99.99 % of the rays that are on no edge, as issue 3 asks; half of all
+        distances within 1e-6 of their length: a few roundings of the 24 bits of a float."""
+        for model in ("teapot.glb", FLAKE):
+            with self.subTest(model=model):
+                result = compare("--json", "--fail-above", "agree=99.99%", "--fail-above", "psnr=40", model=model,
+                                 tracers="bvh,reference")
+                if "libembree-dev" in result.stderr:
+                    self.assertEqual(result.returncode, 2)
+                    self.skipTest("this farlightd was built without Embree")
+                report = json.loads(self.expect(result, 0).stdout)
+                self.assertEqual((report["tracer"], report["reference"], report["within"]), ("bvh", "reference", True))
+                self.assertGreaterEqual(report["all"]["agree"], 0.9999)
+                self.assertIn("secondary", {wave["kind"] for wave in report["waves"]})
+                self.assertGreater(report["waves"][0]["both_hit"], 0)
+                for wave in report["waves"]:
+                    self.assertLessEqual(wave["edges"], wave["only_tracer"] + wave["only_reference"] + wave["far"])
+                    if wave["kind"] != "shadow":
+                        self.assertLess(wave["relative_median"], 1e-6)
+
     def test_the_table_names_waves_tracers_and_what_its_columns_mean(self):
         result = self.expect(compare(), 0)
         for word in ("bvh against naive", "0 primary", "0 shadow", "1 secondary", "agree %", "edges", "Mray/s",
@@ -53,6 +74,32 @@ class Rays(Case):
     def test_options_of_render_are_taken(self):
         result = self.expect(compare("--depth", "0", "--eye", "3,3,3", "--look-at", "0,0,0", "--up", "0,0,1", "--json"), 0)
         self.assertEqual({w["wave"] for w in json.loads(result.stdout)["waves"]}, {0})
+
+
+class Talk(Case):
+    def compare_on_a_terminal(self, *options):
+        """What a terminal shows of it (standard error alone), and the exit status."""
+        ours, theirs = pty.openpty()
+        with subprocess.Popen([BIN / "farlight", "compare", bundled_scenes() / FLAKE, "--tracers", "bvh,naive", *SIZE,
+                               *options], stdout=subprocess.DEVNULL, stderr=theirs,
+                              env={**os.environ, "TERM": "xterm"}) as process:
+            os.close(theirs)
+            shown = b""
+            try:
+                while piece := os.read(ours, 4096):
+                    shown += piece
+            except OSError:  # how Linux says that the other side is closed
+                pass
+            os.close(ours)
+            return shown.decode(), process.wait(TIMEOUT_S)
+
+    def test_a_bar_says_what_is_done_and_goes_away(self):
+        shown, status = self.compare_on_a_terminal()
+        self.assertEqual(status, 0, shown)
+        for step in ("0 of 3: rays of bvh and naive", "1 of 3: picture of naive", "2 of 3: comparing the pictures"):
+            self.assertIn(step, shown)
+        self.assertTrue(shown.endswith("\r\x1b[K"), shown)
+        self.assertEqual(self.compare_on_a_terminal("--quiet"), ("", 0))
 
 
 class Picture(Case):
@@ -98,7 +145,7 @@ class Limits(Case):
                  (["--tracers", "bvh,naive", "--fail-above", "agree=nan"], "--fail-above"),
                  (["--tracers", "bvh,naive", "--fail-above", "nothing=1"], "nothing"),
                  (["--tracers", "bvh,naive", "--far", "0"], "--far"),
-                 (["--tracers", "bvh,naive", "--tracer", "bvh"], "--tracer"),
+                 (["--tracers", "bvh,naive", "--tracer", "bvh"], "--tracer"), (["--tracer", "bvh"], "two tracers"),
                  (["--tracers", "bvh,naive", "-o", self.folder / "x.exr"], "PNG"),
                  (["--tracers", "bvh,naive", "-o", self.folder / "no" / "x.png"], "no"),
                  (["--tracers", "bvh,naive", "--encoding", "jpeg"], "jpeg"))
@@ -108,6 +155,7 @@ class Limits(Case):
                 self.assertIn(word, result.stderr)
         self.assertIn("missing.glb", self.expect(farlight("compare", self.folder / "missing.glb", "--tracers",
                                                           "bvh,naive"), 2).stderr)
+        self.assertIn("--tracers", self.expect(farlight("compare", bundled_scenes() / FLAKE), 2).stderr)
         self.assertIn("MODEL", self.expect(farlight("compare", "--tracers", "bvh,naive"), 2).stderr)
         self.assertEqual(self.leftovers(), [])
 

@@ -116,6 +116,11 @@ class OfTheClient(Traced):
         self.assertIn("no/trace.json", self.expect(self.render("--trace-file", self.folder / "no" / "trace.json"),
                                                    1).stderr)
         self.assertEqual(self.leftovers(), [])
+        model = self.folder / "model.nff"
+        model.write_text("v\n")
+        self.assertIn("would replace", self.expect(farlight("render", model, "-o", self.folder / "a.png", "--trace-file",
+                                                            model), 2).stderr)
+        self.assertEqual(model.read_text(), "v\n")
         self.assertIn("No space left", self.expect(self.render("--trace-file", "/dev/full"), 1).stderr)
 
 
