@@ -30,6 +30,12 @@ bool reference_check(struct reference *reference, const char *what, struct error
     pthread_mutex_unlock(&reference->failure_mutex);
     if (code == RTC_ERROR_NONE)
         return true;
+    const struct gpu_device *gpu = reference->base.device;
+    if (code == RTC_ERROR_OUT_OF_MEMORY && gpu && gpu->memory_limit_bytes > 0)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL,
+                         "Embree's structures, %s; %llu of %llu bytes of device memory are in use without them",
+                         what, (unsigned long long)(gpu->memory_used_bytes - reference->taken_bytes),
+                         (unsigned long long)gpu->memory_limit_bytes);
     enum error_kind kind = code == RTC_ERROR_OUT_OF_MEMORY     ? ERROR_OUT_OF_MEMORY
                            : code == RTC_ERROR_UNSUPPORTED_CPU ? ERROR_UNSUPPORTED
                                                                : ERROR_INTERNAL;
