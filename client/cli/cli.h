@@ -96,7 +96,7 @@ struct cli_job {
     const char *model, *server, *environment, *output, *camera, *keys_file, *trace_file;
     enum cli_image image;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
-    bool float_pixels, half_pixels, has_encoding, has_quality, quiet, is_orbit;
+    bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, quiet, is_orbit;
     unsigned file_quality; /* of JPEG files; 0: default */
     enum cli_timings_form timings;
     struct record_camera_key key;

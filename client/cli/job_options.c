@@ -66,7 +66,8 @@ static const struct argp_option options[] = {
     {"tracer", KEY_TRACER, "NAME", 0, "bvh (default), naive, reference", 0},
     {"bvh-bounds", KEY_BVH_BOUNDS, "NAME", 0, "auto (default), box, sphere", 0},
     {"integrator", KEY_INTEGRATOR, "NAME", 0, "whitted", 0},
-    {"primary", KEY_PRIMARY, "NAME", 0, "First hits: raster (default), trace", 0},
+    {"primary", KEY_PRIMARY, "NAME", 0,
+     "First hits: raster, trace (default: raster, but trace for the tracer reference)", 0},
     {"encoding", KEY_ENCODING, "NAME", 0,
      "How pixels travel: raw, zstd, jpeg (default: raw on this machine, zstd over a network)", 0},
     {"quality", KEY_QUALITY, "N", 0, "JPEG quality 1 to 100, or zstd level 1 to 19", 0},
@@ -136,6 +137,7 @@ static error_t set_name(struct cli_job *job, int key, const char *field, const c
                    ? 0
                    : unknown_value(job, field, "integrator", value);
     case KEY_PRIMARY:
+        job->has_primary = true;
         return protocol_primary_parse(value, &wanted->primary) ? 0 : unknown_value(job, field, "primary", value);
     case KEY_TONE_MAP:
         return protocol_tone_map_parse(value, &wanted->tone_map) ? 0
@@ -398,5 +400,8 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (job->model == NULL)
         return cli_usage(job, "MODEL", "no model file is named") == 0;
+    /* Else most of the "truth" would be the rasteriser's. */
+    if (!job->has_primary && job->options.tracer == PROTOCOL_TRACER_REFERENCE)
+        job->options.primary = PROTOCOL_PRIMARY_TRACE;
     return complete_image(job, is_series) && complete_encoding(job) && complete_camera(job);
 }

@@ -114,6 +114,7 @@ static void accept(struct timeline *timeline, const char *block, size_t count)
         timeline->full = true;
     } else if (separator_bytes + count > WAITING_MAX_BYTES - timeline->waiting_bytes) {
         timeline->left_out++;
+        memset(timeline->jobs, 0, sizeof timeline->jobs); /* the names of new tracks may be lost with it */
     } else {
         memcpy(timeline->waiting + timeline->waiting_bytes, separator, separator_bytes);
         memcpy(timeline->waiting + timeline->waiting_bytes + separator_bytes, block, count);

@@ -39,7 +39,7 @@ struct gpu_device {
     struct gpu_registry *registry;      /* every GL object that lives, see registry.h */
     struct gpu_program_cache *programs; /* private to program.c */
     unsigned empty_buffer;              /* 256 zero bytes: what an empty buffer is bound as */
-    uint64_t memory_used_bytes;         /* sum of buffers and textures made through gpu/ */
+    uint64_t memory_used_bytes;         /* what gpu_memory_take counted: buffers, textures, Embree */
     uint64_t memory_limit_bytes;        /* 0: none; facts.memory_bytes at first */
     bool lost;                          /* the context; nothing works any more, see gpu_note_loss */
 };

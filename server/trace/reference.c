@@ -30,22 +30,50 @@ bool reference_check(struct reference *reference, const char *what, struct error
     pthread_mutex_unlock(&reference->failure_mutex);
     if (code == RTC_ERROR_NONE)
         return true;
+    const struct gpu_device *gpu = reference->base.device;
+    if (code == RTC_ERROR_OUT_OF_MEMORY && gpu && gpu->memory_limit_bytes > 0)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL,
+                         "Embree's structures, %s; %llu of %llu bytes of device memory are in use without them",
+                         what, (unsigned long long)(gpu->memory_used_bytes - reference->taken_bytes),
+                         (unsigned long long)gpu->memory_limit_bytes);
     enum error_kind kind = code == RTC_ERROR_OUT_OF_MEMORY     ? ERROR_OUT_OF_MEMORY
                            : code == RTC_ERROR_UNSUPPORTED_CPU ? ERROR_UNSUPPORTED
                                                                : ERROR_INTERNAL;
     return error_set(error, kind, NULL, "Embree, %s: %s (error %d)", what, reference->failure_text, (int)code);
 }
 
-/* Embree's memory counts as the device's: it is what this tracer keeps in place of buffers. */
+/* Embree's memory counts as the device's: it is what this tracer keeps in place of buffers. Asked before (or,
+ * `post`, told after) memory is allocated. While it is, the device's thread waits, and nobody changes its books.
+ */
 static bool count_memory(void *context, ssize_t bytes, bool post)
 {
-    (void)post;
     struct reference *reference = context;
     long long sum = atomic_fetch_add(&reference->device_bytes, bytes) + bytes;
     const struct gpu_device *gpu = reference->base.device;
     if (bytes <= 0 || !gpu || gpu->memory_limit_bytes == 0)
         return true;
-    return sum < 0 || gpu->memory_used_bytes + (uint64_t)sum <= gpu->memory_limit_bytes;
+    uint64_t of_others = gpu->memory_used_bytes - reference->taken_bytes;
+    bool fits = sum < 0 || of_others + (uint64_t)sum <= gpu->memory_limit_bytes;
+    if (!fits && !post) /* it will not be allocated */
+        atomic_fetch_sub(&reference->device_bytes, bytes);
+    return fits;
+}
+
+/* Brings the device's books to what Embree has now. */
+static bool book_memory(struct reference *reference, struct error *error)
+{
+    struct gpu_device *gpu = reference->base.device;
+    long long counted = atomic_load(&reference->device_bytes);
+    uint64_t bytes = counted > 0 ? (uint64_t)counted : 0;
+    reference->base.stats.device_bytes = bytes;
+    if (!gpu)
+        return true;
+    gpu_memory_give(gpu, reference->taken_bytes);
+    reference->taken_bytes = 0;
+    if (!gpu_memory_take(gpu, bytes, "Embree's structures", error))
+        return false;
+    reference->taken_bytes = bytes;
+    return true;
 }
 
 /* ---- life ---- */
@@ -78,6 +106,8 @@ static void reference_destroy(struct tracer *tracer)
 {
     struct reference *reference = (struct reference *)tracer;
     reference_scene_finish(reference);
+    if (reference->base.device)
+        gpu_memory_give(reference->base.device, reference->taken_bytes);
     if (reference->device)
         rtcReleaseDevice(reference->device);
     pthread_mutex_destroy(&reference->failure_mutex);
@@ -125,11 +155,12 @@ static bool reference_update(struct tracer *tracer, struct scene_gpu *scene, con
     struct reference *reference = (struct reference *)tracer;
     uint64_t start_ns = clock_now_ns();
     tracer->stats.uploaded_bytes = tracer->stats.nodes_rebuilt = 0;
-    bool ok = reference_scene_update(reference, scene, changes, error);
-    if (!ok)
+    bool ok = reference_scene_update(reference, scene, changes, error) && book_memory(reference, error);
+    if (!ok) {
+        struct error second = {0}; /* says nothing that *error does not */
         reference_scene_finish(reference);
-    long long bytes = atomic_load(&reference->device_bytes);
-    tracer->stats.device_bytes = bytes > 0 ? (uint64_t)bytes : 0;
+        book_memory(reference, &second);
+    }
     stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return ok;
 }

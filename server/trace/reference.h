@@ -58,7 +58,8 @@ struct reference {
     float coordinate_max;      /* of a ray's origin and direction; what lies beyond hits nothing */
     RTCGeometry disc_geometry; /* NULL: no discs */
     struct opacity_surface disc_surface;
-    unsigned width; /* rays a call */
+    unsigned width;       /* rays a call */
+    uint64_t taken_bytes; /* of the device's memory, in its books */
     /* What Embree's callbacks write, from any thread. */
     atomic_llong device_bytes;
     pthread_mutex_t failure_mutex;

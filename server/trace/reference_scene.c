@@ -396,6 +396,16 @@ static bool find_reach(struct reference *reference, const struct scene_gpu *scen
         }
         reference->coordinate_max = fminf(reference->coordinate_max, reach);
     }
+    /* Of what lies beyond, Embree would leave out whole instances without a word. */
+    for (int k = 0; k < 3; k++) {
+        const double farthest = fmax(-(double)scene->lower_world[k], (double)scene->upper_world[k]);
+        if (scene->instance_count > 0 && farthest > (double)reference->coordinate_max) {
+            error_set(error, ERROR_UNSUPPORTED, "tracer",
+                      "reference: the scene reaches out to %g, and it sees up to %g", farthest,
+                      (double)reference->coordinate_max);
+            return error_remedy(error, "choose bvh, or make the scene smaller");
+        }
+    }
     return true;
 }
 

@@ -484,6 +484,57 @@ static void a_transform_that_embree_cannot_invert_is_refused_by_name(void **stat
     arena_finish(&arena);
 }
 
+static void a_scene_beyond_what_embree_sees_is_refused(void **state)
+{
+    (void)state;
+    const struct scene_changes all = {.geometry = true, .instances = true};
+    struct arena arena;
+    struct test_edits edits = {.scene = bumpy_scene()};
+    struct scene_changes changes;
+    struct error error = {0};
+    float m[12];
+    arena_init(&arena, edits.scene);
+    /* In the space of what is small, what is large lies beyond Embree's numbers. */
+    test_transform(m, 1e-8f, 1e-8f, 1e-8f, 1, 0.3f, 0, 0, 0);
+    test_node(&edits, 4, 0, NODE_MESH, 1, m);
+    test_transform(m, 5e9f, 5e9f, 5e9f, 1, 0.3f, 0, 0, 0);
+    test_node(&edits, 3, 0, NODE_MESH, 1, m);
+    test_commit(&edits);
+    expect_ok(scene_gpu_update(&arena.gpu, arena.scene, &changes, NULL, &error), &error);
+    assert_false(tracer_update(arena.reference, &arena.gpu, &all, NULL, &error));
+    assert_int_equal(error.kind, ERROR_UNSUPPORTED);
+    assert_string_equal(error.field, "tracer");
+    arena_finish(&arena);
+}
+
+/* Whatever Embree had allocated by then: from nothing to almost all of it. */
+static void embree_keeps_to_the_memory_limit_and_its_books_are_right_afterwards(void **state)
+{
+    (void)state;
+    const struct scene_changes all = {.geometry = true, .instances = true, .shading = true, .lights = true};
+    const uint64_t limit = device->memory_limit_bytes;
+    struct arena arena;
+    struct error error = {0};
+    arena_init(&arena, bumpy_scene());
+    const uint64_t needed = arena.reference->stats.device_bytes, used = device->memory_used_bytes;
+    assert_true(needed > 0);
+    tracer_destroy(arena.reference);
+    assert_true(device->memory_used_bytes == used - needed);
+    arena.reference = tracer_create(tracer_impl_by_number(REFERENCE), device, NULL, &error);
+    for (uint64_t part = 0; part < 8; part++) {
+        error = (struct error){0};
+        device->memory_limit_bytes = used - needed + part * needed / 8;
+        assert_false(tracer_update(arena.reference, &arena.gpu, &all, NULL, &error));
+        assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
+        assert_int_equal(arena.reference->stats.device_bytes, 0);
+        assert_true(device->memory_used_bytes == used - needed);
+    }
+    device->memory_limit_bytes = limit;
+    expect_ok(tracer_update(arena.reference, &arena.gpu, &all, NULL, &error), &error);
+    assert_true(device->memory_used_bytes == used - needed + arena.reference->stats.device_bytes);
+    arena_finish(&arena);
+}
+
 int main(void)
 {
     static struct scene *(*create[])(void) = {test_scene_soup, test_scene_spheres, test_scene_translucent,
@@ -500,6 +551,8 @@ int main(void)
         cmocka_unit_test(a_wrong_answer_within_a_surface_is_no_edge),
         cmocka_unit_test(rays_that_embree_would_end_the_process_at_hit_nothing),
         cmocka_unit_test(a_transform_that_embree_cannot_invert_is_refused_by_name),
+        cmocka_unit_test(a_scene_beyond_what_embree_sees_is_refused),
+        cmocka_unit_test(embree_keeps_to_the_memory_limit_and_its_books_are_right_afterwards),
     };
     const struct gpu_options options = {.index = -1};
     struct error error = {0};

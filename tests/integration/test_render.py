@@ -80,6 +80,10 @@ class Pictures(Case):
                 for got, want in zip(grid_means(paths["reference"]), grid_means(paths["bvh"])):
                     for channel in range(3):
                         self.assertAlmostEqual(got[channel], want[channel], delta=0.5, msg=name)
+                unasked = self.folder / f"{name}-unasked.png"
+                self.expect(render_picture(name, unasked, "--tracer", "reference"), 0)
+                self.assertEqual(read_png(unasked), read_png(paths["reference"]),
+                                 "the reference traces first hits, too, unless it is told to rasterise them")
 
     def test_the_same_seed_gives_the_same_bytes(self):
         paths = [self.folder / "a.png", self.folder / "b.png"]
