@@ -15,6 +15,7 @@ struct bvh {
     struct bvh_transform *transforms; /* mirror of the buffer, one an instance of the scene */
     uint32_t transform_count;
     struct gpu_buffer transform_buffer;
+    float leaf_extent_world;     /* diagonal of a leaf's box, in the mean over what the instances show */
     struct gpu_buffer coherence; /* what bvh/coherence.comp counts */
 };
 

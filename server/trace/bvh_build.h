@@ -87,6 +87,7 @@ struct bvh_tree {
     uint32_t element_count;
     struct bvh_grid grid;
     float grid_cost;   /* how much larger the grid makes a box's surface, in the mean: 1 .. 4; 1: not packed */
+    float leaf_extent; /* diagonal of a leaf's box, in the mean */
     float *primitives; /* 4 x primitive_texels floats, see shared/bvh_node.h */
     size_t primitive_texels;
     float lower[3], upper[3]; /* of everything, padded */

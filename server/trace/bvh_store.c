@@ -217,6 +217,7 @@ static void upload_tree(struct bvh_store *store, const struct scene_gpu_geometry
     memcpy(entry->upper, tree->upper, sizeof entry->upper);
     entry->grid = tree->grid;
     entry->grid_cost = tree->grid_cost;
+    entry->leaf_extent = tree->leaf_extent;
     size_t each_bytes = bvh_element_bytes(&store->settings), element_bytes = tree->element_count * each_bytes;
     size_t texel_bytes = tree->primitive_texels * TEXEL_BYTES;
     gpu_buffer_write(store->device, &store->elements, element * each_bytes, tree->elements, element_bytes);

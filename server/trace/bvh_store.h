@@ -26,7 +26,7 @@ struct bvh_entry {
     uint32_t first_texel, texel_count;
     float lower[3], upper[3]; /* object space, padded */
     struct bvh_grid grid;
-    float grid_cost;
+    float grid_cost, leaf_extent; /* as struct bvh_tree has them */
 };
 
 struct bvh_store {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// How coherent a wave is: of a sample of groups of consecutive rays, the rays that are alive and the walks that
-// bvh/traverse.glsl would make of them. One invocation a group.
+// How coherent a wave is: of a sample of groups of consecutive rays, the rays that are alive and the walks that it would
+// be good to make of them: as bvh/traverse.glsl does, but none of rays so far apart that each meets leaves of its own.
+// One invocation a group.
 //
 // Defines: RAYS_TOGETHER, the rays of a group.
 #include "shared/bindings.h"
@@ -11,7 +12,17 @@ layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 layout(std430, binding = BIND_TRACER_0) buffer count_block { uint alive_count, walk_count; };
 
 uniform uint group_count;
-uniform uint group_stride; // rays from one group to the next
+uniform uint group_stride;    // rays from one group to the next
+uniform vec3 scene_centre;
+uniform float width_together; // no farther apart at the scene's centre; 0: any
+
+// How far apart two rays are once they have come as far as the scene's centre.
+bool stay_close(vec3 origin_a, vec3 direction_a, vec3 origin_b, vec3 direction_b)
+{
+    float far = length(scene_centre - origin_a);
+    float apart = distance(origin_a, origin_b) + far * distance(normalize(direction_a), normalize(direction_b));
+    return width_together == 0.0 || apart <= width_together;
+}
 
 void main()
 {
@@ -30,7 +41,9 @@ void main()
     for (; waiting != 0u; walks++) {
         int leading = findLSB(waiting);
         for (int k = 0; k < RAYS_TOGETHER; k++)
-            if (go_together(origins[leading], directions[leading], origins[k], directions[k]) || k == leading)
+            if (k == leading ||
+                (go_together(origins[leading], directions[leading], origins[k], directions[k]) &&
+                 stay_close(origins[leading], directions[leading], origins[k], directions[k])))
                 waiting &= ~(1u << k);
     }
     atomicAdd(walk_count, walks);
