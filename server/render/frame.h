@@ -48,9 +48,10 @@ struct frame_request {
  *   linear formats  mean radiance of the samples times 2^exposure_stops, premultiplied by alpha
  *   RGBA8           the same divided by alpha, tone-mapped, sRGB
  *   alpha           1 where there is a surface (what blended surfaces leave open goes on to what lies behind) and
- * where the environment is seen; 0 where there is neither A scene with no light and a black environment is lit by
- * the default of shaders/shared/sky.h. The same request on the same revision and device gives the same bytes,
- * however the frame was cut into slices. */
+ *                   where the environment is seen; 0 where there is neither
+ * A scene with no light and a black environment is lit by the default of shaders/shared/sky.h. The same request on
+ * the same revision and device gives the same bytes. Cut into other slices a frame may differ in rays within
+ * rounding of an edge: how many rays `bvh` walks together follows the coherence of the slice's wave. */
 struct frame_result {
     uint8_t *pixels; /* owned; free() */
     size_t size_bytes;
