@@ -231,21 +231,53 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 
 #endif
 
-#if RAYS_TOGETHER > 1
-// In each walk all that go the way of the first one left.
-void trace_in_groups(trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+// What trace.comp calls.
+#if RAYS_TOGETHER == 1
+
+#ifdef ANY_HIT
+bool trace_any(trace_ray r, inout vec3 transmittance)
+{
+    trace_ray walked[RAYS_TOGETHER] = trace_ray[RAYS_TOGETHER](r);
+    vec3 found[RAYS_TOGETHER] = vec3[RAYS_TOGETHER](transmittance);
+    trace_together(walked, found);
+    transmittance = found[0];
+    return greatest(transmittance) == 0.0;
+}
+#else
+void trace_closest(trace_ray r, inout candidate best)
+{
+    trace_ray walked[RAYS_TOGETHER] = trace_ray[RAYS_TOGETHER](r);
+    candidate found[RAYS_TOGETHER] = candidate[RAYS_TOGETHER](best);
+    trace_together(walked, found);
+    best = found[0];
+}
+#endif
+
+#else
+
+#ifdef ANY_HIT
+#define TRACE_GROUP trace_any_together
+#else
+#define TRACE_GROUP trace_closest_together
+#endif
+
+// In each walk all that go the way of the first one left; that one in any case, also if its way is no number.
+void TRACE_GROUP(trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
 {
     uint waiting = 0u;
     for (int k = 0; k < RAYS_TOGETHER; k++)
         waiting |= r[k].t_max > r[k].t_min ? 1u << k : 0u;
     while (waiting != 0u) {
+        int first = findLSB(waiting);
         trace_ray leading = r[0], walked[RAYS_TOGETHER];
-        for (int k = RAYS_TOGETHER - 1; k >= 0; k--)
-            if ((waiting >> k & 1u) != 0u)
+        for (int k = 1; k < RAYS_TOGETHER; k++)
+            if (k == first)
                 leading = r[k];
         for (int k = 0; k < RAYS_TOGETHER; k++) {
             walked[k] = r[k];
-            if ((waiting >> k & 1u) != 0u && go_together(leading.origin, leading.direction, r[k].origin, r[k].direction))
+            bool goes = k == first ||
+                        go_together(leading.origin, leading.direction, r[k].origin, r[k].direction);
+            if (goes && (waiting >> k & 1u) != 0u)
                 waiting &= ~(1u << k);
             else
                 put_out(walked[k]);
@@ -253,46 +285,5 @@ void trace_in_groups(trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHE
         trace_together(walked, found);
     }
 }
-#endif
 
-// What trace.comp calls.
-#ifdef ANY_HIT
-bool trace_any(trace_ray r, inout vec3 transmittance)
-{
-    trace_ray rays_walked[RAYS_TOGETHER];
-    vec3 found[RAYS_TOGETHER];
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
-        rays_walked[k] = r;
-        found[k] = transmittance;
-    }
-    trace_together(rays_walked, found);
-    transmittance = found[0];
-    return greatest(transmittance) == 0.0;
-}
-
-void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 transmittance[RAYS_TOGETHER])
-{
-#if RAYS_TOGETHER > 1
-    trace_in_groups(r, transmittance);
-#endif
-}
-#else
-void trace_closest(trace_ray r, inout candidate best)
-{
-    trace_ray rays_walked[RAYS_TOGETHER];
-    candidate found[RAYS_TOGETHER];
-    for (int k = 0; k < RAYS_TOGETHER; k++) {
-        rays_walked[k] = r;
-        found[k] = best;
-    }
-    trace_together(rays_walked, found);
-    best = found[0];
-}
-
-void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER])
-{
-#if RAYS_TOGETHER > 1
-    trace_in_groups(r, best);
-#endif
-}
 #endif

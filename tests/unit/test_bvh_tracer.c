@@ -363,6 +363,19 @@ static void rays_walk_together_where_neighbours_go_the_same_way(void **state)
     fixture_finish(&fixture);
 }
 
+/* The first of each eight goes nowhere; the others must neither wait for it nor be lost with it. */
+static void rays_beside_one_that_is_no_number_hit_as_by_brute_force(void **state)
+{
+    (void)state;
+    struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
+    uint64_t seed = 34;
+    for (uint32_t i = 0; i < RAY_COUNT; i++)
+        rays[i] = make_ray(0, 0.5f, 6, i % 8 ? test_uniform(&seed, -0.3f, 0.3f) : NAN,
+                           test_uniform(&seed, -0.3f, 0.3f), -1);
+    expect_like_brute_force(test_scene_soup(), rays, RAY_COUNT / 10, 0);
+    free(rays);
+}
+
 static void a_number_of_rays_that_cannot_walk_together_is_refused(void **state)
 {
     (void)state;
@@ -384,6 +397,7 @@ int main(void)
         cmocka_unit_test(transforms_behind_the_origin_and_around_it_are_entered),
         cmocka_unit_test(detail_that_a_grid_cannot_tell_apart_is_walked_in_floats),
         cmocka_unit_test(rays_walk_together_where_neighbours_go_the_same_way),
+        cmocka_unit_test(rays_beside_one_that_is_no_number_hit_as_by_brute_force),
         cmocka_unit_test(a_number_of_rays_that_cannot_walk_together_is_refused),
     };
     struct error error = {0};
