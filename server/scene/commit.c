@@ -46,6 +46,9 @@ static bool content_check(struct scene_edit *edit, const struct edit_place *plac
         return disc_check(&edit->set.disc, place);
     case SCENE_NODE:
     case SCENE_MATERIAL:
+    case SCENE_SKIN:
+    case SCENE_CLIP:
+    case SCENE_CHANNEL:
     case SCENE_OBJECT_KIND_COUNT:
         break;
     }

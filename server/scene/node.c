@@ -64,9 +64,10 @@ static void fill_instance(struct scene_instance *instance, const struct scene_no
         *instance = (struct scene_instance){.node = node, .singular = true};
 }
 
-bool scene_flatten(const struct scene *scene, enum scene_node_kind kind, struct scene_instance **instances,
-                   size_t *count)
+bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enum scene_node_kind kind,
+                   struct scene_instance **instances, size_t *count)
 {
+    (void)pose; /* nothing makes poses yet */
     *instances = NULL;
     *count = 0;
     struct hierarchy hierarchy;
@@ -101,8 +102,10 @@ bool scene_flatten(const struct scene *scene, enum scene_node_kind kind, struct 
     return complete;
 }
 
-bool scene_world_from_node(const struct scene *scene, uint32_t node, float world_from_node[12])
+bool scene_world_from_node(const struct scene *scene, const struct scene_pose *pose, uint32_t node,
+                           float world_from_node[12])
 {
+    (void)pose;
     const struct scene_node *chain[SCENE_DEPTH_MAX];
     size_t length = 0;
     const struct scene_node *above = scene_node(scene, node);
@@ -132,7 +135,7 @@ static bool extend_by_kind(const struct scene *scene, enum scene_node_kind kind,
 {
     struct scene_instance *instances;
     size_t count;
-    if (!scene_flatten(scene, kind, &instances, &count))
+    if (!scene_flatten(scene, NULL, kind, &instances, &count))
         return false;
     bool found = false;
     for (size_t i = 0; i < count; i++) {
@@ -176,8 +179,9 @@ static bool extend_by_discs(const struct scene *scene, float lower[3], float upp
     return found;
 }
 
-bool scene_bounds(const struct scene *scene, float lower[3], float upper[3])
+bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, float lower[3], float upper[3])
 {
+    (void)pose;
     for (int axis = 0; axis < 3; axis++) {
         lower[axis] = FLT_MAX;
         upper[axis] = -FLT_MAX;

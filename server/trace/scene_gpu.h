@@ -8,6 +8,7 @@
 #include "gpu/buffer.h"
 #include "gpu/device.h"
 #include "gpu/texture.h"
+#include "scene/pose.h"
 #include "scene/scene.h"
 #include "shared/geometry.h"
 
@@ -47,6 +48,7 @@ struct scene_gpu {
     bool has_cutout;      /* some material in use is alpha mode mask: tracers must ask for alpha */
     bool has_translucent; /* some material lets shadow rays pass: blend or transmission */
     bool has_transmission;
+    bool has_motion; /* something moves while the shutter is open: tracers must look at the rays' times */
     bool has_environment_image;
     float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */
     float diagonal;                       /* of these bounds */
@@ -62,10 +64,11 @@ struct scene_gpu {
 
 void scene_gpu_init(struct scene_gpu *gpu, struct gpu_device *device);
 void scene_gpu_finish(struct scene_gpu *gpu);
-/* Brings the copy to the scene's revision; *changes says what moved. On failure the copy is empty and will be
+/* Brings the copy to the scene's revision and to where things are in it while the shutter is open (NULL: as they
+ * were committed); *changes says what moved. On failure the copy is empty and will be
  * made anew by the next update. */
-bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
-                      struct stage_times *times, struct error *error);
+bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
+                      struct scene_changes *changes, struct stage_times *times, struct error *error);
 /* Binds every buffer and texture at its place of shared/bindings.h. */
 void scene_gpu_bind(struct scene_gpu *gpu);
 uint64_t scene_gpu_device_bytes(const struct scene_gpu *gpu);
