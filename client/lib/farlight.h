@@ -336,6 +336,35 @@ FL_API void fl_video_set_interrupt(struct fl_video *video, int interrupt_fd);
 /* Ends the program; of a video that was not finished nothing is left. */
 FL_API void fl_video_destroy(struct fl_video *video);
 
+/* ---- raw video ----------------------------------------------------------------------------------- */
+
+/* A YUV4MPEG2 stream (.y4m), which ffmpeg, mpv and x264 read from a pipe; written by the library itself. */
+struct fl_y4m;
+
+enum fl_y4m_chroma {
+    FL_Y4M_444, /* C444: every pixel's colour */
+    FL_Y4M_420, /* C420mpeg2: half the columns and rows, (width + 1) / 2 by (height + 1) / 2 */
+};
+
+struct fl_y4m_options {
+    int fd;                  /* pipe, socket or file; stays the caller's */
+    float frames_per_second; /* as of fl_video_options */
+    enum fl_y4m_chroma chroma;
+    int interrupt_fd; /* as of fl_connect_options */
+};
+
+/* Nothing is written before the first frame. The samples are 8-bit Y'CbCr by BT.709 in limited range (said in the
+ * header: XCOLORRANGE=LIMITED) of the frame's sRGB values; the format has no word for matrix, primaries and
+ * transfer curve, so a tool must be told (ffmpeg: -colorspace bt709 -color_primaries bt709 -color_trc
+ * iec61966-2-1). */
+FL_API struct fl_y4m *fl_y4m_begin(const struct fl_y4m_options *options, struct fl_error *error);
+/* Writes the whole frame; pixel format rgba8, all of one size; what is transparent lies over black. A reader that
+ * has gone away is FL_ERROR_FILE, "Broken pipe", without a signal. After a failure on the way the stream ends
+ * within a frame and takes no more. */
+FL_API bool fl_y4m_write(struct fl_y4m *y4m, const struct fl_frame *frame, struct fl_error *error);
+/* The stream needs no end of its own: this frees memory. */
+FL_API void fl_y4m_end(struct fl_y4m *y4m);
+
 /* ---- comparison of images ------------------------------------------------------------------------ */
 
 #define FL_THRESHOLD_NONE (-1.0f)

@@ -123,6 +123,9 @@ struct fl_video *fl_video_start(const struct fl_video_options *options, struct f
 
 bool fl_video_write(struct fl_video *video, const struct fl_frame *frame, struct fl_error *error)
 {
+    if (frame->pixels_bytes != (size_t)frame->width * frame->height * fl_bytes_per_pixel(frame->format))
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "size", "%ux%u pixels are not %zu bytes", frame->width,
+                            frame->height, frame->pixels_bytes);
     if (!check(video, error) || !fl_helper_send_frame(&video->helper, frame, error))
         return false;
     video->frames++; /* it arrives whole, even if we are interrupted now */

@@ -14,9 +14,10 @@
 #include <string.h>
 
 #define THREADS_MAX 16
+/* There is nothing to gain from dividing smaller pictures, and libavcodec 59 stores those of one or two rows or
+ * columns wrongly in version 3 of FFV1. */
+#define FFV1_SLICED_EDGE_MIN 64
 #define KEY_FRAME_SECONDS 2 /* how far a player has to go back to begin anywhere */
-/* H.264 (ITU-T H.264, table A-1): level 6.2 allows 139,264 macroblocks of 16x16. */
-#define H264_MACROBLOCKS_MAX 139264u
 
 struct video_encoder {
     const struct video_plan *plan;
@@ -31,17 +32,6 @@ struct video_encoder {
 };
 
 /* ---- beginning ---- */
-
-static bool check_size(const struct video_plan *plan, const struct video_source *source,
-                       struct video_failure *failure)
-{
-    const uint32_t macroblocks = ((source->width + 15) / 16) * ((source->height + 15) / 16);
-    if (strcmp(plan->encoder, "libx264") == 0 && macroblocks > H264_MACROBLOCKS_MAX)
-        return video_fail(failure, "size", "render smaller frames, or a lossless .mkv",
-                          "H.264 has no pictures of %ux%u: 35,651,584 pixels are the most", source->width,
-                          source->height);
-    return true;
-}
 
 /* Pictures are what a screen shows: sRGB's curve over BT.709's primaries, and the video says so. */
 static void describe_pictures(AVCodecContext *codec, const struct video_plan *plan,
@@ -71,12 +61,12 @@ static void set_quality(AVCodecContext *codec, const struct video_plan *plan, AV
         const double scale = exp2(((double)plan->quality - 4) / 6) / 2;
         codec->flags |= AV_CODEC_FLAG_QSCALE;
         codec->global_quality = (int)lround(FF_QP2LAMBDA * (scale < 1 ? 1 : scale > 31 ? 31 : scale));
+    } else if (codec->width < FFV1_SLICED_EDGE_MIN || codec->height < FFV1_SLICED_EDGE_MIN) {
+        codec->level = 1;
     } else {
-        codec->level = 3; /* FFV1 version 3: slices with checksums (RFC 9043) */
+        codec->level = 3;  /* version 3: slices with checksums (RFC 9043) */
+        codec->slices = 4; /* whatever the machine has, so that the file is the same */
         av_dict_set_int(options, "slicecrc", 1, 0);
-        /* As many whatever the machine has, so that the file is the same; a tiny picture cannot be divided. */
-        if (codec->width >= 64 && codec->height >= 64)
-            codec->slices = 4;
     }
 }
 
@@ -155,8 +145,6 @@ static bool begin_file(struct video_encoder *encoder, const struct video_source 
 struct video_encoder *video_encoder_create(const struct video_plan *plan, const struct video_source *source,
                                            struct video_failure *failure)
 {
-    if (!check_size(plan, source, failure))
-        return NULL;
     struct video_encoder *encoder = calloc(1, sizeof *encoder);
     bool good = encoder != NULL && fl_ycbcr_init(&encoder->converter, source->width, source->height);
     if (good) {

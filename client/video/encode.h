@@ -25,6 +25,9 @@ struct video_plan {
 };
 /* Chooses container and encoder. False: what is asked for cannot be had. */
 bool video_plan(struct video_plan *plan, const struct message_video_begin *wanted, struct video_failure *failure);
+/* Whether the encoder's format has pictures of this size. */
+bool video_plan_allows(const struct video_plan *plan, uint32_t width, uint32_t height,
+                       struct video_failure *failure);
 
 struct video_encoder;
 

@@ -9,6 +9,9 @@
 
 #define DEFAULT_QUALITY 18 /* of x264's constant rate factor: hardly to be told from the original */
 
+/* H.264 (ITU-T H.264, table A-1): level 6.2 allows 139,264 macroblocks of 16x16. */
+#define H264_MACROBLOCKS_MAX 139264u
+
 /* In order of preference. No other encoder of the library's is ever used: some open devices. */
 static const struct choice {
     const char *codec;   /* as people ask for it */
@@ -71,4 +74,13 @@ bool video_plan(struct video_plan *plan, const struct message_video_begin *wante
     plan->quality = wanted->quality > 0 ? wanted->quality : DEFAULT_QUALITY;
     fl_rate_exact(wanted->frames_per_second, &plan->rate_numerator, &plan->rate_denominator);
     return true;
+}
+
+bool video_plan_allows(const struct video_plan *plan, uint32_t width, uint32_t height,
+                       struct video_failure *failure)
+{
+    const uint32_t macroblocks = ((width + 15) / 16) * ((height + 15) / 16);
+    return strcmp(plan->encoder, "libx264") != 0 || macroblocks <= H264_MACROBLOCKS_MAX ||
+           video_fail(failure, "size", "render smaller frames, or a lossless .mkv",
+                      "H.264 has no pictures of %ux%u: 35,651,584 pixels are the most", width, height);
 }

@@ -85,7 +85,7 @@ static bool check_frame(const struct session *session, const struct message_fram
         return video_fail(failure, "size", "all frames of a video have the size of its first",
                           "frame %u has %ux%u pixels, but the video has %ux%u", begin->frame, begin->width,
                           begin->height, session->width, session->height);
-    return true;
+    return video_plan_allows(&session->plan, begin->width, begin->height, failure);
 }
 
 static bool begin_frame(struct session *session, const struct message_frame_begin *begin)
