@@ -121,7 +121,7 @@ static void auto_camera(const struct engine_job *job, const struct scene *scene,
                         float centre_world[3])
 {
     float lower[3], upper[3];
-    if (!scene_bounds(scene, lower, upper)) {
+    if (!scene_bounds(scene, NULL, lower, upper)) {
         /* Nothing but the environment to see: any place will do. */
         for (int axis = 0; axis < 3; axis++) {
             lower[axis] = -1.0f;
@@ -198,7 +198,7 @@ static bool node_camera(const struct engine_job *job, const struct scene *scene,
     if (!shown)
         return error_set(error, ERROR_INVALID, field, "node %u shows no camera", job->camera_node);
     *camera = (struct frame_camera){.fov_y = shown->fov_y, .ortho_height = shown->height, .near = shown->near};
-    if (scene_world_from_node(scene, node->base.id, camera->world_from_view) &&
+    if (scene_world_from_node(scene, NULL, node->base.id, camera->world_from_view) &&
         make_rigid(camera->world_from_view))
         return true;
     return error_set(error, ERROR_INVALID, field, "the transform of node %u flattens its camera",

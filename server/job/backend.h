@@ -12,8 +12,8 @@ struct engine_backend {
     void (*device_destroy)(struct gpu_device *device);
     struct frame_renderer *(*renderer_create)(struct gpu_device *device, struct error *error);
     void (*renderer_destroy)(struct frame_renderer *renderer);
-    bool (*begin)(struct frame_renderer *renderer, const struct scene *scene, const struct frame_request *request,
-                  struct error *error);
+    bool (*begin)(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
+                  const struct frame_request *request, struct error *error);
     enum frame_progress (*step)(struct frame_renderer *renderer, struct frame_result *result, struct error *error);
     void (*abandon)(struct frame_renderer *renderer);
     uint64_t (*device_bytes)(const struct frame_renderer *renderer);

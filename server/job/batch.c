@@ -207,7 +207,7 @@ static bool frame_take_up(struct engine *engine, struct job *job, struct error *
         return false;
     if (!scene->renderer)
         scene->renderer = engine->backend->renderer_create(engine->device, error);
-    if (!scene->renderer || !engine->backend->begin(scene->renderer, scene->scene, &job->frame, error))
+    if (!scene->renderer || !engine->backend->begin(scene->renderer, scene->scene, NULL, &job->frame, error))
         return false;
     job->rendering = true;
     scene->frame_of = job;

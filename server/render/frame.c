@@ -165,12 +165,13 @@ static bool check_request(const struct frame_renderer *renderer, const struct fr
     return true;
 }
 
-static bool update_scene(struct frame_renderer *renderer, const struct scene *scene, struct error *error)
+static bool update_scene(struct frame_renderer *renderer, const struct scene *scene,
+                         const struct scene_motion *motion, struct error *error)
 {
     struct render_context *context = &renderer->context;
     const struct frame_request *request = &context->request;
     struct scene_changes changes = {0};
-    bool updated = scene_gpu_update(&renderer->scene, scene, &changes, &context->times, error);
+    bool updated = scene_gpu_update(&renderer->scene, scene, motion, &changes, &context->times, error);
     tracer_set_note(&renderer->tracers, updated ? &changes : NULL);
     if (!updated)
         return false;
@@ -254,8 +255,8 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     return true;
 }
 
-bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct frame_request *request,
-                 struct error *error)
+bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
+                 const struct frame_request *request, struct error *error)
 {
     struct render_context *context = &renderer->context;
     frame_abandon(renderer);
@@ -264,7 +265,7 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
     context->request = *request;
     renderer->result = (struct frame_result){0};
     stage_times_begin(&context->times);
-    if (!update_scene(renderer, scene, error) || !begin_comparison(renderer, error))
+    if (!update_scene(renderer, scene, motion, error) || !begin_comparison(renderer, error))
         return false;
     camera_fill_uniforms(&context->uniforms, request, &renderer->scene);
     environment_fill_uniforms(&context->environment, &context->uniforms, &renderer->scene);
@@ -408,6 +409,7 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     result->width = request->width;
     result->height = request->height;
     result->format = request->format;
+    result->samples = request->samples;
     result->primary_rays = (uint64_t)request->width * request->height * request->samples;
     result->times = context->times;
     renderer->phase = PHASE_IDLE;

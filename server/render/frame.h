@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/stage_times.h"
 #include "gpu/device.h"
+#include "scene/pose.h"
 #include "scene/scene.h"
 #include "trace/tracer.h"
 #include "trace/wave_compare.h"
@@ -16,7 +17,8 @@
 enum frame_format { FRAME_RGBA8, FRAME_RGBA16F, FRAME_RGBA32F }; /* protocol's numbers, here to FRAME_RASTER */
 enum frame_tone_map { TONE_NEUTRAL, TONE_ACES, TONE_NONE };
 enum frame_primary { PRIMARY_RASTER, PRIMARY_TRACE };
-enum frame_integrator { INTEGRATOR_WHITTED };
+enum frame_integrator { INTEGRATOR_WHITTED, INTEGRATOR_DISTRIBUTED };
+enum frame_filter { FILTER_BLACKMAN_HARRIS, FILTER_GAUSSIAN, FILTER_TENT, FILTER_BOX }; /* of pixels */
 
 struct frame_camera {
     float world_from_view[12]; /* rigid; looks along -z, y up */
@@ -37,6 +39,12 @@ struct frame_request {
     enum frame_tone_map tone_map;
     enum frame_format format;
     float exposure_stops;
+    float aperture; /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
+    float focus;    /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
+    enum frame_filter filter;
+    /* The frame goes on where the one before it ended, if that showed the same: scene, motion and request alike
+     * but for `samples`; it adds its samples to those. */
+    bool accumulate;
     /* Every wave is traced by a second tracer too, primary rays included (`primary` is taken to be PRIMARY_TRACE),
      * and the result has what came of it. The picture is that of `tracer`. */
     bool compare;
@@ -56,6 +64,7 @@ struct frame_result {
     uint8_t *pixels; /* owned; free() */
     size_t size_bytes;
     uint32_t width, height;
+    uint32_t samples; /* held per pixel, with those of the frames before that it goes on from */
     enum frame_format format;
     uint64_t revision;
     uint64_t primary_rays, shadow_rays, secondary_rays, splits;
@@ -74,9 +83,10 @@ void frame_renderer_destroy(struct frame_renderer *renderer); /* accepts NULL */
 
 /* A frame in slices, so that others get their turn and a cancel is served: begin, then step until it is done
  * (or abandon). Between the two the scene must not be edited. A step takes a few milliseconds where the
- * device allows. `result` is filled by the last step. */
-bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct frame_request *request,
-                 struct error *error);
+ * device allows. `result` is filled by the last step. `motion`: where things are while the shutter is open; NULL:
+ * as they were committed. It is not needed after frame_begin. */
+bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
+                 const struct frame_request *request, struct error *error);
 enum frame_progress { FRAME_FAILED, FRAME_MORE, FRAME_DONE };
 enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_result *result, struct error *error);
 void frame_abandon(struct frame_renderer *renderer);

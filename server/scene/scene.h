@@ -14,6 +14,9 @@
 
 #define SCENE_NAME_MAX 128
 #define SCENE_DEPTH_MAX 256 /* of the node hierarchy */
+#define MESH_INFLUENCES_MAX 16
+#define MESH_TARGETS_MAX 1024
+#define SKIN_JOINTS_MAX 65536
 
 /* The enums have the protocol's numbers (session asserts it). */
 enum scene_object_kind {
@@ -25,6 +28,9 @@ enum scene_object_kind {
     SCENE_LIGHT,
     SCENE_CAMERA,
     SCENE_DISC,
+    SCENE_SKIN,
+    SCENE_CLIP,
+    SCENE_CHANNEL,
     SCENE_OBJECT_KIND_COUNT
 };
 enum scene_node_kind { NODE_GROUP, NODE_MESH, NODE_SPHERES, NODE_LIGHT, NODE_CAMERA };
@@ -40,7 +46,12 @@ enum mesh_array {
     MESH_TANGENTS,    /* 4 f32, the last is the handedness */
     MESH_TEXCOORDS_0, /* 2 f32 */
     MESH_TEXCOORDS_1,
-    MESH_COLOURS, /* 4 u8, linear */
+    MESH_COLOURS,          /* 4 u8, linear */
+    MESH_JOINTS,           /* influence_count u16, places in the skin */
+    MESH_WEIGHTS,          /* influence_count f32, not negative; their sum counts as 1 */
+    MESH_TARGET_POSITIONS, /* what the morph targets add: 3 f32 a vertex, target after target */
+    MESH_TARGET_NORMALS,
+    MESH_TARGET_TANGENTS,
     MESH_ARRAY_COUNT
 };
 enum material_texture {
@@ -73,7 +84,11 @@ struct scene_node {
     uint32_t object; /* mesh, spheres, light, camera */
     bool hidden;
     float parent_from_node[12]; /* 3x4 row-major */
-    uint32_t child_count;       /* kept by the scene: how many nodes hang directly below */
+    uint32_t skin;              /* of a mesh with joints; 0: none. With one, the vertices are where the joints put
+                                   them in world space, whatever the node's transform */
+    float *weights;             /* of the mesh's morph targets, owned; NULL: the mesh's own */
+    uint32_t weight_count;
+    uint32_t child_count; /* kept by the scene: how many nodes hang directly below */
 };
 
 struct scene_mesh {
@@ -81,9 +96,14 @@ struct scene_mesh {
     uint32_t vertex_count, triangle_count;
     struct blob *arrays[MESH_ARRAY_COUNT]; /* NULL: missing. Checked: sizes fit the counts, indices are in range,
                                               positions finite */
+    uint32_t influence_count;              /* joints that move one vertex, 0 .. MESH_INFLUENCES_MAX */
+    uint32_t joint_places;                 /* places in a skin that MESH_JOINTS reaches; filled by the check */
+    uint32_t target_count;                 /* morph targets, 0 .. MESH_TARGETS_MAX */
+    float *weights;                        /* of the targets, where a node has none; owned; missing ones are 0 */
+    uint32_t weight_count;
     struct material_range *ranges;
     uint32_t range_count;
-    float lower[3], upper[3]; /* bounds in object space */
+    float lower[3], upper[3]; /* bounds in object space, of the mesh as its vertices are given */
 };
 
 struct scene_spheres {
@@ -142,6 +162,60 @@ struct scene_disc {
     float centre_world[3], normal_world[3], radius;
 };
 
+struct scene_skin {
+    struct scene_object base;
+    uint32_t joint_count;
+    struct blob *joints;          /* u32 node ids; checked: the nodes exist */
+    struct blob *joint_from_mesh; /* 12 f32 each, 3x4 row-major; NULL: identity */
+};
+
+struct scene_clip {
+    struct scene_object base;
+    struct blob *floats; /* times and values of its channels; checked: finite */
+};
+
+/* The enums have the protocol's numbers. */
+enum channel_path {
+    CHANNEL_NODE_TRANSLATION,
+    CHANNEL_NODE_ROTATION, /* unit quaternion x y z w */
+    CHANNEL_NODE_SCALE,
+    CHANNEL_NODE_WEIGHTS,
+    CHANNEL_NODE_HIDDEN,
+    CHANNEL_LIGHT_COLOUR = 16,
+    CHANNEL_LIGHT_SIZE,
+    CHANNEL_MATERIAL_BASE_COLOUR = 32,
+    CHANNEL_MATERIAL_EMISSION,
+    CHANNEL_MATERIAL_METALLIC,
+    CHANNEL_MATERIAL_ROUGHNESS,
+    CHANNEL_MATERIAL_TRANSMISSION,
+    CHANNEL_MATERIAL_IOR,
+    CHANNEL_VIEW_EYE = 48,
+    CHANNEL_VIEW_LOOK_AT,
+    CHANNEL_VIEW_UP,
+    CHANNEL_VIEW_FOV_Y,
+    CHANNEL_VIEW_APERTURE,
+    CHANNEL_VIEW_FOCUS,
+    CHANNEL_VIEW_EXPOSURE
+};
+enum interpolation {
+    INTERPOLATION_STEP,
+    INTERPOLATION_LINEAR,       /* rotations: slerp */
+    INTERPOLATION_CUBIC_SPLINE, /* Hermite; a key has in-tangent, value, out-tangent (glTF 2.0, appendix C) */
+    INTERPOLATION_CATMULL_ROM,
+    INTERPOLATION_BEZIER /* a key has the control value before it, its own, the control value after it */
+};
+
+struct scene_channel {
+    struct scene_object base;
+    uint32_t clip;
+    enum channel_path path;
+    uint32_t object; /* node, light, material; 0: the view */
+    enum interpolation interpolation;
+    uint32_t width; /* numbers of a value */
+    uint32_t key_count;
+    uint32_t first_time, first_value; /* in the clip's floats; checked: all of it is there, times ascend */
+};
+
 struct scene_environment {
     uint64_t revision;
     float colour[3];
@@ -167,6 +241,9 @@ struct scene_edit {
         struct scene_light light;
         struct scene_camera camera;
         struct scene_disc disc;
+        struct scene_skin skin;
+        struct scene_clip clip;
+        struct scene_channel channel;
         struct scene_environment environment;
     } set;
 };
@@ -210,21 +287,28 @@ const struct scene_material *scene_material(const struct scene *scene, uint32_t 
 const struct scene_texture *scene_texture(const struct scene *scene, uint32_t id);
 const struct scene_light *scene_light(const struct scene *scene, uint32_t id);
 const struct scene_camera *scene_camera(const struct scene *scene, uint32_t id);
+const struct scene_skin *scene_skin(const struct scene *scene, uint32_t id);
+const struct scene_clip *scene_clip(const struct scene *scene, uint32_t id);
 
-/* The hierarchy, flattened: every visible node with its transform. */
+struct scene_pose; /* scene/pose.h */
+
+/* The hierarchy, flattened: every visible node with its transform. That of a mesh that a skin moves is the
+ * identity, as its vertices are in world space (scene_deform). */
 struct scene_instance {
     const struct scene_node *node;
     float world_from_object[12];
     float object_from_world[12]; /* zero where `singular` */
     bool singular;               /* the transform flattens: geometry there is skipped */
 };
+/* Below, `pose` says where things are; NULL: as they were committed. */
 /* Instances of one kind in the order of node ids; an array to free(). False: out of memory. */
-bool scene_flatten(const struct scene *scene, enum scene_node_kind kind, struct scene_instance **instances,
-                   size_t *count);
+bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enum scene_node_kind kind,
+                   struct scene_instance **instances, size_t *count);
 /* World transform of one node (hidden or not); false if there is no such node. */
-bool scene_world_from_node(const struct scene *scene, uint32_t node, float world_from_node[12]);
+bool scene_world_from_node(const struct scene *scene, const struct scene_pose *pose, uint32_t node,
+                           float world_from_node[12]);
 /* Bounds in world space of everything visible, discs left out unless there is nothing else;
  * false: nothing there. */
-bool scene_bounds(const struct scene *scene, float lower[3], float upper[3]);
+bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, float lower[3], float upper[3]);
 
 #endif

@@ -91,9 +91,10 @@ static bool update_parts(struct scene_gpu *gpu, const struct scene *scene, struc
     return gpu_check(gpu->device, "scene upload", error);
 }
 
-bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
-                      struct stage_times *times, struct error *error)
+bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
+                      struct scene_changes *changes, struct stage_times *times, struct error *error)
 {
+    (void)motion;
     uint64_t start_ns = clock_now_ns();
     *changes = (struct scene_changes){0};
     gpu->scene = scene;

@@ -8,6 +8,7 @@
 #include "gpu/buffer.h"
 #include "gpu/device.h"
 #include "gpu/texture.h"
+#include "scene/pose.h"
 #include "scene/scene.h"
 #include "shared/geometry.h"
 
@@ -17,6 +18,8 @@
 /* What one update changed; a tracer does no more than that needs. */
 struct scene_changes {
     bool geometry;  /* primitives were added, removed or changed */
+    bool deformed;  /* vertices of geometries that deform are elsewhere, of the same primitives: which ones, their
+                       deformed_revision tells. Not set beside `geometry` alone for those that are new */
     bool instances; /* transforms, or which instances there are */
     bool shading;   /* materials, textures; alpha too */
     bool lights;
@@ -28,8 +31,15 @@ struct scene_gpu_geometry {
     struct geometry device;
     const struct scene_mesh *mesh; /* one of these two; valid until the scene is edited */
     const struct scene_spheres *spheres;
-    uint64_t revision; /* of the object: unchanged means the same shape */
-    uint32_t id;       /* the object's id; with `mesh` or `spheres` being set it is unique */
+    uint64_t revision; /* of the object: unchanged means the same primitives, and the same shape where node is 0 */
+    uint32_t id;       /* the object's id; unique together with `node` and which of the two is set */
+    uint32_t node;     /* deforms the mesh, and is the only one that shows this geometry; 0: the mesh as it is, or a
+                          set of spheres. With a skin its vertices are in world space, and the transform of its
+                          instance is the identity */
+    uint64_t deformed_revision; /* counts up whenever its vertices, or those as the shutter closes, are others; 0:
+                                   they are those of the mesh */
+    float lower[3], upper[3];   /* bounds in object space while the shutter is open; of what deforms conservative:
+                                   from its joints and weights, to rounding */
 };
 
 struct scene_gpu {
@@ -47,6 +57,7 @@ struct scene_gpu {
     bool has_cutout;      /* some material in use is alpha mode mask: tracers must ask for alpha */
     bool has_translucent; /* some material lets shadow rays pass: blend or transmission */
     bool has_transmission;
+    bool has_motion; /* something moves while the shutter is open: tracers must look at the rays' times */
     bool has_environment_image;
     float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */
     float diagonal;                       /* of these bounds */
@@ -62,10 +73,11 @@ struct scene_gpu {
 
 void scene_gpu_init(struct scene_gpu *gpu, struct gpu_device *device);
 void scene_gpu_finish(struct scene_gpu *gpu);
-/* Brings the copy to the scene's revision; *changes says what moved. On failure the copy is empty and will be
+/* Brings the copy to the scene's revision and to where things are in it while the shutter is open (NULL: as they
+ * were committed); *changes says what moved. On failure the copy is empty and will be
  * made anew by the next update. */
-bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
-                      struct stage_times *times, struct error *error);
+bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
+                      struct scene_changes *changes, struct stage_times *times, struct error *error);
 /* Binds every buffer and texture at its place of shared/bindings.h. */
 void scene_gpu_bind(struct scene_gpu *gpu);
 uint64_t scene_gpu_device_bytes(const struct scene_gpu *gpu);

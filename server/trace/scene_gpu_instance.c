@@ -97,8 +97,8 @@ static bool flatten(struct scene_gpu *gpu, const struct scene *scene, struct ins
     struct scene_instance *meshes = NULL, *sets = NULL;
     size_t mesh_count = 0, set_count = 0;
     *fresh = NULL;
-    if (scene_flatten(scene, NODE_MESH, &meshes, &mesh_count) &&
-        scene_flatten(scene, NODE_SPHERES, &sets, &set_count))
+    if (scene_flatten(scene, NULL, NODE_MESH, &meshes, &mesh_count) &&
+        scene_flatten(scene, NULL, NODE_SPHERES, &sets, &set_count))
         *fresh = calloc(mesh_count + set_count + 1, sizeof(**fresh));
     if (*fresh) {
         *count = pack_instances(gpu, meshes, mesh_count, true, *fresh);

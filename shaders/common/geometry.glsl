@@ -30,7 +30,7 @@ instance instance_at(uint index)
     i.geometry = last.x;
     i.node = last.y;
     i.flags = last.z;
-    i.pad = last.w;
+    i.motion = last.w;
     return i;
 }
 

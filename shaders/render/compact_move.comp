@@ -31,6 +31,6 @@ void main()
         child c = children[j * CHILDREN_MAX + i];
         rays[place + i] = ray(c.origin_t_min, c.direction_t_max);
         paths[place + i] =
-            path(c.weight_r, c.weight_g, c.weight_b, c.pixel, c.cone_width, c.cone_spread, c.flags, 0u);
+            path(c.weight_r, c.weight_g, c.weight_b, c.pixel, c.cone_width, c.cone_spread, c.flags, c.time);
     }
 }

@@ -65,7 +65,7 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     c.cone_width = parent.cone_width + parent.cone_spread * distance_;
     c.cone_spread = parent.cone_spread;
     c.flags = bounces | (straight ? parent.flags & PATH_STRAIGHT : 0u);
-    c.pad = 0u;
+    c.time = parent.time;
     children[j * CHILDREN_MAX + child_count] = c;
     child_count++;
 }

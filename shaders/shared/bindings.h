@@ -47,5 +47,7 @@
 #define UNIT_RAYS 18
 #define UNIT_INSTANCES 19
 #define UNIT_GEOMETRIES 20
+#define UNIT_MOTIONS 21
+#define UNIT_RAY_TIMES 22 /* R32F, one a ray: 0 the shutter opens .. 1 it closes */
 
 #endif

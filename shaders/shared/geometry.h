@@ -11,11 +11,14 @@ struct instance {
     uint geometry; /* index into the geometries */
     uint node;     /* the client's node id */
     uint flags;    /* INSTANCE_* */
-    uint pad;
+    uint motion;   /* where its matrices over the shutter's time begin in `motions`, plus 1; 0: it stands still.
+                      Those above are the first of them then */
 };
 SHARED_SIZE(instance, 112)
-#define INSTANCE_TEXELS 7    /* RGBA32UI */
-#define INSTANCE_MIRRORED 1u /* negative determinant: winding is reversed */
+#define INSTANCE_TEXELS 7       /* RGBA32UI */
+#define INSTANCE_MIRRORED 1u    /* negative determinant: winding is reversed */
+#define INSTANCE_POSES_SHIFT 8u /* bits 8..11: number of those matrices, at even distances of time */
+#define INSTANCE_POSES_MASK 15u
 
 /* A mesh or a set of spheres, stored once however many instances show it. */
 struct geometry {
@@ -24,8 +27,9 @@ struct geometry {
     uint primitive_count;
     uint first_vertex; /* meshes; indices in `triangles` are already scene-wide */
     uint vertex_count;
-    uint flags; /* GEOMETRY_HAS_* */
-    uint pad0, pad1;
+    uint flags;        /* GEOMETRY_HAS_* */
+    uint close_offset; /* from a vertex as the shutter opens to the same one as it closes; 0: the shape stays */
+    uint pad0;
 };
 SHARED_SIZE(geometry, 32)
 #define GEOMETRY_TEXELS 2 /* RGBA32UI */
@@ -47,6 +51,7 @@ SHARED_SIZE(geometry, 32)
  *   colours     RGBA8     unorm, linear
  *   spheres     RGBA32F   centre xyz, radius, object space
  *   sphere_materials R32UI
+ *   motions     RGBA32F   world_from_object of moving instances, 3 texels a pose; between poses entry by entry
  * Vertex attributes that no mesh has keep an empty buffer; those that a mesh lacks are zero there and not read. */
 
 /* Geometry outside every tree (the paper's PERFORMGLOBALGEOMETRYTESTS), world space. */

@@ -15,11 +15,12 @@ struct path {
     uint pixel;                         /* in the slice */
     float cone_width, cone_spread;      /* ray cone: width at the origin, growth per unit of length */
     uint flags;                         /* PATH_* */
-    uint pad;
+    float time;                         /* 0: the shutter opens .. 1: it closes */
 };
 SHARED_SIZE(path, 32)
 #define PATH_BOUNCES_MASK 0xffu
-#define PATH_STRAIGHT 0x100u /* nothing but alpha lies between it and the eye: counts for the picture's alpha */
+#define PATH_SAMPLE_SHIFT 16u /* bits 16..31: which sample of its pixel, counted from the frame's sample_index */
+#define PATH_STRAIGHT 0x100u  /* nothing but alpha lies between it and the eye: counts for the picture's alpha */
 
 /* A ray of the next wave at its parent's place, before it is moved to its own. */
 struct child {
@@ -29,7 +30,7 @@ struct child {
     uint pixel;
     float cone_width, cone_spread;
     uint flags;
-    uint pad;
+    float time;
 };
 SHARED_SIZE(child, 64)
 #define CHILDREN_MAX 3u      /* straight on, reflected, refracted */

@@ -53,8 +53,8 @@ struct twin_walk {
 static inline void twin_init(struct twin *twin, const struct scene *scene)
 {
     twin->scene = scene;
-    if (!scene_flatten(scene, NODE_MESH, &twin->instances[0], &twin->instance_counts[0]) ||
-        !scene_flatten(scene, NODE_SPHERES, &twin->instances[1], &twin->instance_counts[1]))
+    if (!scene_flatten(scene, NULL, NODE_MESH, &twin->instances[0], &twin->instance_counts[0]) ||
+        !scene_flatten(scene, NULL, NODE_SPHERES, &twin->instances[1], &twin->instance_counts[1]))
         exit(1);
 }
 

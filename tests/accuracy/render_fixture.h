@@ -202,7 +202,7 @@ static inline struct frame_result fixture_render(struct fixture *fixture)
     struct frame_result result = {0};
     if (fixture->edit_count > 0)
         fixture_commit(fixture);
-    if (!frame_begin(fixture->renderer, fixture->scene, &fixture->request, &error))
+    if (!frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error))
         fail_msg("frame_begin: %s: %s", error.field, error.text);
     enum frame_progress progress;
     do {

@@ -252,7 +252,7 @@ static void arena_init(struct arena *arena, struct scene *scene)
     struct scene_changes changes;
     *arena = (struct arena){.scene = scene, .rays = malloc(RAY_COUNT * sizeof(struct ray))};
     scene_gpu_init(&arena->gpu, device);
-    expect_ok(scene_gpu_update(&arena->gpu, scene, &changes, NULL, &error), &error);
+    expect_ok(scene_gpu_update(&arena->gpu, scene, NULL, &changes, NULL, &error), &error);
     arena->bvh = make_tracer(arena, BVH);
     arena->reference = make_tracer(arena, REFERENCE);
     make_primary(arena);
@@ -474,7 +474,7 @@ static void a_transform_that_embree_cannot_invert_is_refused_by_name(void **stat
         test_transform(m, scale, scale, scale, 1, 0.3f, 0, 0, 0);
         test_node(&edits, 4, 0, NODE_MESH, 1, m);
         test_commit(&edits);
-        expect_ok(scene_gpu_update(&arena.gpu, arena.scene, &changes, NULL, &error), &error);
+        expect_ok(scene_gpu_update(&arena.gpu, arena.scene, NULL, &changes, NULL, &error), &error);
         bool ok = tracer_update(arena.reference, &arena.gpu, &all, NULL, &error);
         assert_int_equal(ok, round == 1);
         assert_int_equal(error.kind, round == 0 ? ERROR_UNSUPPORTED : ERROR_NONE);
@@ -500,7 +500,7 @@ static void a_scene_beyond_what_embree_sees_is_refused(void **state)
     test_transform(m, 5e9f, 5e9f, 5e9f, 1, 0.3f, 0, 0, 0);
     test_node(&edits, 3, 0, NODE_MESH, 1, m);
     test_commit(&edits);
-    expect_ok(scene_gpu_update(&arena.gpu, arena.scene, &changes, NULL, &error), &error);
+    expect_ok(scene_gpu_update(&arena.gpu, arena.scene, NULL, &changes, NULL, &error), &error);
     assert_false(tracer_update(arena.reference, &arena.gpu, &all, NULL, &error));
     assert_int_equal(error.kind, ERROR_UNSUPPORTED);
     assert_string_equal(error.field, "tracer");

@@ -253,7 +253,7 @@ static void an_abandoned_frame_leaves_the_next_one_whole(void **state)
     struct frame_result dropped = {0};
     build_mixture(fixture);
     struct frame_result expected = fixture_render(fixture);
-    assert_true(frame_begin(fixture->renderer, fixture->scene, &fixture->request, &error));
+    assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     for (int i = 0; i < 3; i++)
         assert_int_equal(frame_step(fixture->renderer, &dropped, &error), FRAME_MORE);
     frame_abandon(fixture->renderer);
@@ -319,17 +319,17 @@ static void impossible_requests_are_refused_with_the_field(void **state)
     const struct frame_request good = fixture->request;
     struct error error = {0};
     fixture->request.width = 0;
-    assert_false(frame_begin(fixture->renderer, fixture->scene, &fixture->request, &error));
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_string_equal(error.field, "width");
     error = (struct error){0};
     fixture->request = good;
     fixture->request.tracer = 4711;
-    assert_false(frame_begin(fixture->renderer, fixture->scene, &fixture->request, &error));
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_string_equal(error.field, "tracer");
     error = (struct error){0};
     fixture->request = good;
     fixture->request.camera.world_from_view[3] = NAN;
-    assert_false(frame_begin(fixture->renderer, fixture->scene, &fixture->request, &error));
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_string_equal(error.field, "camera");
 }
 

@@ -100,7 +100,7 @@ static void update(struct fixture *fixture)
 {
     struct error error = {0};
     struct scene_changes changes;
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, &changes, NULL, &error), &error);
+    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, NULL, &changes, NULL, &error), &error);
     expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &changes, NULL, &error), &error);
     fixture->materials = realloc(fixture->materials, fixture->gpu.materials.size_bytes);
     gpu_buffer_read(device, &fixture->gpu.materials, 0, fixture->materials, fixture->gpu.materials.size_bytes);

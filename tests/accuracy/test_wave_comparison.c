@@ -411,11 +411,11 @@ static void an_unknown_reference_is_refused_by_name(void **state)
     build_scene(fixture);
     fixture_commit(fixture);
     fixture->request.compare_with = 60;
-    assert_false(frame_begin(fixture->renderer, fixture->scene, &fixture->request, &error));
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_int_equal(error.kind, ERROR_UNSUPPORTED);
     assert_string_equal(error.field, "compare_with");
     fixture->request.compare = false; /* nobody asks for it */
-    assert_true(frame_begin(fixture->renderer, fixture->scene, &fixture->request, &error));
+    assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     frame_abandon(fixture->renderer);
 }
 

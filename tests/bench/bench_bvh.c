@@ -233,7 +233,7 @@ static bool bench_scene(struct gpu_device *device, uint32_t triangles)
     struct scene_changes changes;
     bench.scene = bench_family_scene(triangles);
     scene_gpu_init(&bench.gpu, device);
-    require(scene_gpu_update(&bench.gpu, bench.scene, &changes, NULL, &error), &error);
+    require(scene_gpu_update(&bench.gpu, bench.scene, NULL, &changes, NULL, &error), &error);
     for (int kind = 0; kind < WAVE_KINDS; kind++)
         bench.rays[kind] = malloc(RAY_COUNT * sizeof(struct ray));
     make_camera_rays(bench.rays[WAVE_PRIMARY]);

@@ -65,7 +65,7 @@ static bool own_camera(struct bench_scene *scene)
     const struct scene_node *node = scene_node(scene->loaded.scene, scene->loaded.camera);
     const struct scene_camera *camera = node ? scene_camera(scene->loaded.scene, node->object) : NULL;
     float m[12], eye[3], look_at[3], up[3];
-    if (!camera || camera->fov_y <= 0 || !scene_world_from_node(scene->loaded.scene, node->base.id, m))
+    if (!camera || camera->fov_y <= 0 || !scene_world_from_node(scene->loaded.scene, NULL, node->base.id, m))
         return false;
     for (int k = 0; k < 3; k++) {
         eye[k] = m[4 * k + 3];
@@ -125,7 +125,7 @@ bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
     } else if (!(scene->loaded.scene = bench_family_scene(options->family_triangles))) {
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the scene");
     }
-    if (!scene_gpu_update(&scene->gpu, scene->loaded.scene, &changes, NULL, error) ||
+    if (!scene_gpu_update(&scene->gpu, scene->loaded.scene, NULL, &changes, NULL, error) ||
         !choose_camera(scene, options, error))
         return false;
     choose_light(scene);

@@ -80,10 +80,12 @@ static inline void fake_renderer_destroy(struct frame_renderer *renderer)
 }
 
 static inline bool fake_begin(struct frame_renderer *renderer, const struct scene *scene,
-                              const struct frame_request *request, struct error *error)
+                              const struct scene_motion *motion, const struct frame_request *request,
+                              struct error *error)
 {
     if (renderer->busy)
         return error_set(error, ERROR_INTERNAL, "fake", "a frame is in progress already");
+    (void)motion;
     renderer->busy = true;
     renderer->scene = scene;
     renderer->request = *request;

@@ -39,7 +39,7 @@ static void update(struct fixture *fixture)
     struct scene_changes changes;
     if (fixture->edits.count > 0)
         test_commit(&fixture->edits);
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, &changes, NULL, &error), &error);
+    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, NULL, &changes, NULL, &error), &error);
     expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &changes, NULL, &error), &error);
 }
 
@@ -166,7 +166,7 @@ static void expect_like_brute_force(struct scene *scene, const struct ray *rays,
     struct error error = {0};
     struct scene_changes changes;
     scene_gpu_init(&gpu, device);
-    expect_ok(scene_gpu_update(&gpu, scene, &changes, NULL, &error), &error);
+    expect_ok(scene_gpu_update(&gpu, scene, NULL, &changes, NULL, &error), &error);
     struct hit *expected = trace(&gpu, &tracer_naive_impl, NULL, rays);
     uint32_t hit_count = 0;
     for (uint32_t i = 0; i < RAY_COUNT; i++)

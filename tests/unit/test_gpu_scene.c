@@ -25,7 +25,7 @@ struct fixture {
 static void update(struct fixture *fixture)
 {
     struct error error = {0};
-    bool ok = scene_gpu_update(&fixture->gpu, fixture->scene, &fixture->changes, NULL, &error);
+    bool ok = scene_gpu_update(&fixture->gpu, fixture->scene, NULL, &fixture->changes, NULL, &error);
     assert_string_equal(error.text, "");
     assert_true(ok);
 }
@@ -251,7 +251,7 @@ static void a_scene_beyond_the_device_is_refused_and_the_next_update_starts_anew
     test_soup_mesh(&fixture.edits, 10, 200, 0.1f, 3);
     test_commit(&fixture.edits);
     device->facts.texture_buffer_texels_max = 300;
-    assert_false(scene_gpu_update(&fixture.gpu, fixture.scene, &fixture.changes, NULL, &error));
+    assert_false(scene_gpu_update(&fixture.gpu, fixture.scene, NULL, &fixture.changes, NULL, &error));
     device->facts.texture_buffer_texels_max = max;
     assert_int_equal(error.kind, ERROR_LIMIT);
     assert_string_equal(error.text, "600 vertices; this device's texel buffers hold at most 300");
@@ -269,7 +269,7 @@ static void bounds_hold_all_that_is_visible(void **state)
     struct fixture fixture;
     float lower[3], upper[3];
     fixture_init(&fixture, test_scene_soup());
-    assert_true(scene_bounds(fixture.scene, lower, upper));
+    assert_true(scene_bounds(fixture.scene, NULL, lower, upper));
     for (int k = 0; k < 3; k++) {
         assert_float_equal(fixture.gpu.lower_world[k], lower[k], 1e-4);
         assert_float_equal(fixture.gpu.upper_world[k], upper[k], 1e-4);

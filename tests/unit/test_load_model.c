@@ -131,7 +131,7 @@ static void spheres_and_the_camera_arrive(void **state)
     assert_true(load_model(&model, path, &error));
     assert_int_equal(spheres_of(model.scene), 2);
     assert_int_not_equal(model.camera, 0);
-    assert_true(scene_world_from_node(model.scene, model.camera, m));
+    assert_true(scene_world_from_node(model.scene, NULL, model.camera, m));
     assert_float_equal(m[11], 5.0f, 1e-5f); /* `from` */
     load_model_finish(&model);
     expect_what_the_importer_counts(path);

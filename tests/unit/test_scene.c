@@ -466,7 +466,7 @@ static void the_hierarchy_has_a_greatest_depth(void **state)
     add_node(&list, 1, 2000);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).parent");
     float world[12];
-    assert_true(scene_world_from_node(scene, SCENE_DEPTH_MAX, world));
+    assert_true(scene_world_from_node(scene, NULL, SCENE_DEPTH_MAX, world));
     scene_destroy(scene);
 }
 

@@ -108,13 +108,13 @@ static void instances_agree_with_the_plain_recursion_in_the_order_of_ids(void **
     free(edits);
     struct scene_instance *instances;
     size_t count, expected_count = 0, mirrored = 0;
-    assert_true(scene_flatten(scene, NODE_CAMERA, &instances, &count));
+    assert_true(scene_flatten(scene, NULL, NODE_CAMERA, &instances, &count));
     for (uint32_t i = 0; i < NODES; i++) {
         double world[12];
         bool visible = plain_world(scene, ids[i], world);
         expected_count += visible && scene_node(scene, ids[i])->kind == NODE_CAMERA;
         float got[12];
-        assert_true(scene_world_from_node(scene, ids[i], got));
+        assert_true(scene_world_from_node(scene, NULL, ids[i], got));
         expect_matrix(got, world, ids[i]);
     }
     assert_int_equal(count, expected_count);
@@ -161,16 +161,16 @@ static void a_hidden_node_hides_everything_below(void **state)
     commit(scene, edits, 4);
     struct scene_instance *instances;
     size_t count;
-    assert_true(scene_flatten(scene, NODE_CAMERA, &instances, &count));
+    assert_true(scene_flatten(scene, NULL, NODE_CAMERA, &instances, &count));
     assert_int_equal(count, 1);
     assert_int_equal(instances[0].node->base.id, 4);
     free(instances);
-    assert_true(scene_flatten(scene, NODE_LIGHT, &instances, &count));
+    assert_true(scene_flatten(scene, NULL, NODE_LIGHT, &instances, &count));
     assert_int_equal(count, 0);
     assert_null(instances);
     float world[12];
-    assert_true(scene_world_from_node(scene, 3, world));
-    assert_false(scene_world_from_node(scene, 9, world));
+    assert_true(scene_world_from_node(scene, NULL, 3, world));
+    assert_false(scene_world_from_node(scene, NULL, 9, world));
     scene_destroy(scene);
 }
 
@@ -188,7 +188,7 @@ static void flattening_and_overflowing_transforms_are_marked(void **state)
     commit(scene, edits, 5);
     struct scene_instance *instances;
     size_t count;
-    assert_true(scene_flatten(scene, NODE_CAMERA, &instances, &count));
+    assert_true(scene_flatten(scene, NULL, NODE_CAMERA, &instances, &count));
     assert_int_equal(count, 5);
     const bool singular[] = {true, false, false, false, true}; /* 1e48 is beyond a float */
     for (size_t i = 0; i < 5; i++) {
@@ -209,13 +209,13 @@ static void the_bounds_are_those_of_visible_geometry_and_discs_stand_in(void **s
     (void)state;
     struct scene *scene = scene_with_camera();
     float lower[3], upper[3];
-    assert_false(scene_bounds(scene, lower, upper));
+    assert_false(scene_bounds(scene, NULL, lower, upper));
     struct scene_edit disc = {.kind = EDIT_SET, .object = SCENE_DISC};
     disc.set.disc.base.id = 1;
     disc.set.disc.normal_world[1] = 1;
     disc.set.disc.radius = 9;
     commit(scene, &disc, 1);
-    assert_true(scene_bounds(scene, lower, upper));
+    assert_true(scene_bounds(scene, NULL, lower, upper));
     assert_memory_equal(lower, ((float[]){-9, 0, -9}), 12);
     assert_memory_equal(upper, ((float[]){9, 0, 9}), 12);
     const float moved[12] = {0, -2, 0, 10, 2, 0, 0, 0, 0, 0, 2, 0},
@@ -231,7 +231,7 @@ static void the_bounds_are_those_of_visible_geometry_and_discs_stand_in(void **s
     memcpy(edits[0].set.spheres.centres_radii->data, ((float[]){3, 0, 0, 1}), 16);
     edits[2].set.node.hidden = true;
     commit(scene, edits, 3);
-    assert_true(scene_bounds(scene, lower, upper));
+    assert_true(scene_bounds(scene, NULL, lower, upper));
     assert_memory_equal(lower, ((float[]){8, 4, -2}), 12);
     assert_memory_equal(upper, ((float[]){12, 8, 2}), 12);
     scene_destroy(scene);

@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: MIT */
+/* Where and what things are at one time, as the clips that a job plays have it: a layer over the scene, which
+ * stays as it was committed. */
+#ifndef FARLIGHT_SCENE_POSE_H
+#define FARLIGHT_SCENE_POSE_H
+
+#include "scene/scene.h"
+
+struct pose_node {
+    uint32_t node;
+    float parent_from_node[12];
+    bool hidden;
+};
+
+struct pose_weights {
+    uint32_t node;
+    uint32_t first, count; /* in scene_pose.weights */
+};
+
+enum pose_view_value { /* bits of pose_view.given */
+                       POSE_VIEW_EYE = 1,
+                       POSE_VIEW_LOOK_AT = 2,
+                       POSE_VIEW_UP = 4,
+                       POSE_VIEW_FOV_Y = 8,
+                       POSE_VIEW_APERTURE = 16,
+                       POSE_VIEW_FOCUS = 32,
+                       POSE_VIEW_EXPOSURE = 64,
+};
+struct pose_view {
+    unsigned given;
+    float eye_world[3], look_at_world[3], up_world[3], fov_y, aperture, focus, exposure_stops;
+};
+
+/* Only what clips change is listed; lists ascend by identifier. */
+struct scene_pose {
+    struct pose_node *nodes;
+    uint32_t node_count;
+    struct pose_weights *morphs;
+    uint32_t morph_count;
+    float *weights;
+    uint32_t weight_count;
+    struct scene_light *lights; /* as they are now, all of each; own no blobs */
+    uint32_t light_count;
+    struct scene_material *materials;
+    uint32_t material_count;
+    struct pose_view view;
+};
+void scene_pose_finish(struct scene_pose *pose);
+
+/* Poses at even distances of time from where the shutter opens to where it closes, both included; between two of
+ * them matrices, and vertices of deformed meshes between the first and the last, are interpolated linearly. One
+ * pose: nothing moves. */
+#define MOTION_POSES_MAX 9
+struct scene_motion {
+    struct scene_pose *poses;
+    uint32_t pose_count; /* 1 .. MOTION_POSES_MAX */
+};
+void scene_motion_finish(struct scene_motion *motion);
+
+struct clip_use {
+    uint32_t clip;
+    float start_s; /* time at which the clip begins; before it its first pose holds */
+    float speed;
+    bool loop;
+};
+
+/* Evaluates clips at a time; of two that change the same, the later one counts. Rotations are made unit, values
+ * brought into the range that the protocol allows. ERROR_OUT_OF_MEMORY, ERROR_UNKNOWN_ID ("clips[2].clip"). */
+bool scene_pose_evaluate(struct scene_pose *pose, const struct scene *scene, const struct clip_use *uses,
+                         uint32_t use_count, double time_s, struct error *error);
+/* Length of a clip in seconds: its last key. 0: no clip, or no channel. */
+double scene_clip_duration_s(const struct scene *scene, uint32_t clip);
+
+/* What a pose says, or the scene where the pose has nothing or is NULL. */
+const float *scene_pose_parent_from_node(const struct scene_pose *pose, const struct scene_node *node);
+bool scene_pose_hidden(const struct scene_pose *pose, const struct scene_node *node);
+const struct scene_light *scene_pose_light(const struct scene_pose *pose, const struct scene_light *light);
+const struct scene_material *scene_pose_material(const struct scene_pose *pose,
+                                                 const struct scene_material *material);
+/* Weights of the morph targets of the mesh that a node shows: target_count floats into `weights`. */
+void scene_pose_weights(const struct scene_pose *pose, const struct scene_node *node,
+                        const struct scene_mesh *mesh, float *weights);
+
+/* Whether a node's mesh changes its shape: it has a skin and the mesh has joints, or the mesh has morph targets.
+ */
+bool scene_node_deforms(const struct scene_node *node, const struct scene_mesh *mesh);
+/* For each joint of the skin: world_from_mesh, 3x4 row-major; joint_count x 12 floats. */
+bool scene_skin_matrices(const struct scene *scene, const struct scene_pose *pose, const struct scene_skin *skin,
+                         float *world_from_mesh, struct error *error);
+/* The vertices that a node shows, worked out on the CPU: 3 floats a vertex into `positions`, and into `normals`
+ * where that is not NULL and the mesh has some. In world space with a skin, else in the node's. The GPU's twin is
+ * shaders/deform.comp. */
+bool scene_deform(const struct scene *scene, const struct scene_pose *pose, const struct scene_node *node,
+                  float *positions, float *normals, struct error *error);
+
+#endif
