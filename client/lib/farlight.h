@@ -156,12 +156,33 @@ FL_API const struct fl_camera_info *fl_scene_camera(const struct fl_scene *scene
 FL_API bool fl_scene_find_camera(const struct fl_scene *scene, const char *which, uint32_t *node,
                                  struct fl_error *error);
 
-/* What a model file holds, without a daemon. */
 struct fl_clip_info {
+    uint32_t clip; /* its identifier; 0: nothing of it can be played */
     uint32_t channels;
-    float duration_s;
+    float duration_s; /* time of its last key */
     char name[129];
 };
+FL_API size_t fl_scene_clip_count(const struct fl_scene *scene); /* at most 65536 are remembered */
+/* NULL beyond the last; valid until the scene is destroyed. */
+FL_API const struct fl_clip_info *fl_scene_clip(const struct fl_scene *scene, size_t index);
+/* `which` is a clip's name, or its number counted from 0; a name goes before a number. *info (may be NULL) as of
+ * fl_scene_clip. FL_ERROR_ARGUMENT, field "--clip": no such clip, or nothing of it can be played; the remedy lists
+ * what there is, as far as it fits. */
+FL_API bool fl_scene_find_clip(const struct fl_scene *scene, const char *which, uint32_t *clip,
+                               const struct fl_clip_info **info, struct fl_error *error);
+
+/* The identifier of a node, a material or a light. `which` is its name, or its number counted from 0 in the order
+ * of the import; a name goes before a number, and of several of one name the first is meant. A light is known by
+ * its own name and by those of the nodes that show it. The first 1 Mi of each kind are remembered.
+ * FL_ERROR_ARGUMENT, field "node", "material" or "light": there is none, and the remedy lists what there is, as
+ * far as it fits; other kinds are not known by name. */
+FL_API bool fl_scene_find_object(const struct fl_scene *scene, enum protocol_object_kind kind, const char *which,
+                                 uint32_t *id, struct fl_error *error);
+/* An identifier that nothing in the scene has, for an edit of one's own: another one at each call; 0: none left.
+ */
+FL_API uint32_t fl_scene_new_id(struct fl_scene *scene, enum protocol_object_kind kind);
+
+/* What a model file holds, without a daemon. */
 struct fl_model_note {
     enum protocol_severity severity;
     char where[257];
@@ -169,6 +190,7 @@ struct fl_model_note {
 };
 struct fl_model_info {
     uint64_t nodes, meshes, triangles, sphere_sets, spheres, discs, materials, textures, lights;
+    uint64_t skins, joints, morph_targets; /* joints of all skins, targets of all meshes */
     struct fl_import_stats import;
     size_t camera_count, clip_count, note_count;
     struct fl_camera_info *cameras;
