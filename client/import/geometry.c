@@ -15,6 +15,10 @@ void import_mesh_finish(struct import_mesh *mesh)
     free(mesh->texcoords[0]);
     free(mesh->texcoords[1]);
     free(mesh->colours);
+    free(mesh->joints);
+    free(mesh->joint_weights);
+    for (int i = 0; i < 3; i++)
+        free(mesh->target_offsets[i]);
     free(mesh->ranges);
     memset(mesh, 0, sizeof *mesh);
 }
@@ -201,6 +205,10 @@ static bool mesh_valid(struct import_scene *scene, struct import_mesh *mesh)
         if (mesh->triangle_count == 0)
             return import_fail(scene, where, "every triangle has corners that are NaN or infinite");
     }
+    if (mesh->influence_count > IMPORT_INFLUENCES_MAX || mesh->target_count > IMPORT_TARGETS_MAX ||
+        (mesh->influence_count > 0) != (mesh->joints && mesh->joint_weights) ||
+        (mesh->target_count > 0) != (mesh->target_offsets[0] != NULL))
+        return import_fail(scene, where, "joints or morph targets do not fit their number");
     return !mesh->normals || mend_normals(scene, where, mesh);
 }
 
@@ -223,6 +231,8 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     mend(scene, where, mesh->tangents, (size_t)vertices * 4, "tangents");
     mend(scene, where, mesh->texcoords[0], (size_t)vertices * 2, "texture coordinates");
     mend(scene, where, mesh->texcoords[1], (size_t)vertices * 2, "texture coordinates");
+    for (int i = 0; i < 3; i++)
+        mend(scene, where, mesh->target_offsets[i], (size_t)(vertices * mesh->target_count) * 3, "morph targets");
     edit = import_append(scene, MESSAGE_SET_MESH);
     if (!edit) {
         import_mesh_finish(mesh);
@@ -233,6 +243,10 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     edit->message.set_mesh.name = import_copy_name(scene, mesh->name);
     edit->message.set_mesh.ranges = mesh->ranges;
     edit->message.set_mesh.ranges_count = mesh->range_count;
+    edit->message.set_mesh.influence_count = mesh->influence_count;
+    edit->message.set_mesh.target_count = mesh->target_count;
+    edit->message.set_mesh.weights = import_copy_weights(scene, mesh->weights, mesh->weight_count);
+    edit->message.set_mesh.weights_count = mesh->weight_count;
     edit->blobs[0] = add_array(scene, mesh->positions, vertices, 12);
     edit->blobs[1] = add_array(scene, mesh->indices, mesh->triangle_count, 12);
     edit->blobs[2] = add_array(scene, mesh->normals, vertices, 12);
@@ -240,7 +254,11 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     edit->blobs[4] = add_array(scene, mesh->texcoords[0], vertices, 8);
     edit->blobs[5] = add_array(scene, mesh->texcoords[1], vertices, 8);
     edit->blobs[6] = add_array(scene, mesh->colours, vertices, 4);
-    for (uint32_t i = 0; i < 7; i++)
+    edit->blobs[7] = add_array(scene, mesh->joints, vertices * mesh->influence_count, 2);
+    edit->blobs[8] = add_array(scene, mesh->joint_weights, vertices * mesh->influence_count, 4);
+    for (uint32_t i = 0; i < 3; i++)
+        edit->blobs[9 + i] = add_array(scene, mesh->target_offsets[i], vertices * mesh->target_count, 12);
+    for (uint32_t i = 0; i < IMPORT_ARRAYS_MAX; i++)
         if (edit->blobs[i] != 0)
             count = i + 1;
     edit->message.set_mesh.arrays_count = count;

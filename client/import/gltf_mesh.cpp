@@ -30,9 +30,10 @@ struct builder {
     reader &r;
     std::string where;
     const tinygltf::Mesh &source;
-    int skin;
-    const std::vector<double> &weights;
+    bool skinned; // some node wants it moved by a skin
+    shown_mesh shown = {};
     import_mesh mesh = {};
+    std::vector<record_morph_weight> weights = {};
     std::vector<vertex_lot> lots = {};
     std::vector<uint32_t> indices = {};
     std::vector<record_material_range> ranges = {};
@@ -45,6 +46,7 @@ struct builder {
 
 template <typename type> type *allocate(builder &b, uint64_t count)
 {
+    check_room(b.r, b.where, count, sizeof(type));
     void *memory = calloc(count > 0 ? size_t(count) : 1, sizeof(type));
     if (!memory)
         fail(b.r, b.where, "out of memory");
@@ -209,36 +211,6 @@ void read_colours(builder &b, const vertex_lot &lot, const std::string &where)
     }
 }
 
-// Adds weight times the target's displacements.
-void apply_target(builder &b, const vertex_lot &lot, size_t target, const char *name, float weight, float *out,
-                  size_t out_stride)
-{
-    const int accessor = attribute(lot.primitive->targets[target], name);
-    if (accessor < 0 || !out)
-        return;
-    std::vector<float> offsets(size_t(lot.count) * 3);
-    read_floats(b.r, accessor, 3, 0, offsets.data(), b.where + ".targets." + name);
-    out += size_t(lot.first) * out_stride;
-    for (size_t v = 0; v < lot.count; v++)
-        for (size_t c = 0; c < 3; c++)
-            out[v * out_stride + c] += weight * offsets[v * 3 + c];
-}
-
-void apply_targets(builder &b, const vertex_lot &lot)
-{
-    for (size_t target = 0; target < lot.primitive->targets.size(); target++) {
-        const double weight = target < b.weights.size() ? b.weights[target] : 0;
-        if (weight == 0 || !std::isfinite(weight))
-            continue;
-        apply_target(b, lot, target, "POSITION", float(weight), b.mesh.positions, 3);
-        apply_target(b, lot, target, "NORMAL", float(weight), b.mesh.normals, 3);
-        apply_target(b, lot, target, "TANGENT", float(weight), b.mesh.tangents, 4);
-    }
-    if (!lot.primitive->targets.empty())
-        import_note(b.r.scene, PROTOCOL_SEVERITY_INFO, b.where.c_str(),
-                    "morph targets stand at their default weights");
-}
-
 void read_lot(builder &b, const vertex_lot &lot)
 {
     const vertex_attributes &a = lot.attributes;
@@ -256,12 +228,6 @@ void read_lot(builder &b, const vertex_lot &lot)
         read_colours(b, lot, b.where + ".COLOR_0");
     else if (b.mesh.colours)
         memset(b.mesh.colours + first * 4, 255, size_t(lot.count) * 4);
-    apply_targets(b, lot);
-    if (b.skin >= 0)
-        apply_skin(b.r, *lot.primitive, b.skin,
-                   {b.mesh.positions + first * 3, a.normal >= 0 ? b.mesh.normals + first * 3 : nullptr,
-                    a.tangent >= 0 ? b.mesh.tangents + first * 4 : nullptr, lot.count},
-                   b.where);
 }
 
 bool any(const builder &b, int vertex_attributes::*member)
@@ -293,6 +259,57 @@ void read_vertices(builder &b)
         read_lot(b, lot);
 }
 
+// Joints of all vertices; of lots that name none, all vertices follow the first one.
+void read_joints(builder &b)
+{
+    std::vector<influences> of_lots;
+    size_t used = 0, without = 0;
+
+    for (const vertex_lot &lot : b.lots) {
+        of_lots.push_back(read_influences(b.r, *lot.primitive, lot.count, b.where));
+        used = std::max(used, of_lots.back().used);
+        without += of_lots.back().stride == 0;
+        b.shown.greatest_joint = std::max(b.shown.greatest_joint, of_lots.back().greatest_joint);
+    }
+    if (without > 0)
+        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
+                    "a skinned mesh has no joints or weights");
+    if (used == 0)
+        return;
+    b.shown.has_joints = true;
+    b.mesh.influence_count = uint32_t(used);
+    b.mesh.joints = allocate<uint16_t>(b, uint64_t(b.mesh.vertex_count) * used);
+    b.mesh.joint_weights = allocate<float>(b, uint64_t(b.mesh.vertex_count) * used);
+    for (size_t i = 0; i < b.lots.size(); i++) {
+        const influences &from = of_lots[i];
+        for (size_t v = 0; v < b.lots[i].count; v++) {
+            const size_t to = (b.lots[i].first + v) * used;
+            if (from.stride == 0)
+                b.mesh.joint_weights[to] = 1;
+            for (size_t k = 0; k < std::min(from.stride, used); k++) {
+                b.mesh.joints[to + k] = from.joints[v * from.stride + k];
+                b.mesh.joint_weights[to + k] = from.weights[v * from.stride + k];
+            }
+        }
+    }
+}
+
+void read_morphs(builder &b)
+{
+    std::vector<morph_lot> lots;
+
+    for (const vertex_lot &lot : b.lots)
+        lots.push_back({lot.primitive, lot.first, lot.count});
+    b.shown.file_targets = read_targets(b.r, lots, b.mesh, b.where);
+    b.shown.target_count = b.mesh.target_count;
+    if (b.mesh.target_count == 0)
+        return;
+    b.weights = morph_weights(b.r, b.source.weights,
+                              std::min<size_t>(b.source.weights.size(), b.mesh.target_count), b.where);
+    b.mesh.weights = b.weights.data();
+    b.mesh.weight_count = uint32_t(b.weights.size());
+}
+
 template <typename type> type *copy_of(builder &b, const std::vector<type> &from)
 {
     type *copy = allocate<type>(b, from.size());
@@ -301,39 +318,46 @@ template <typename type> type *copy_of(builder &b, const std::vector<type> &from
     return copy;
 }
 
-uint32_t build(builder &b)
+void build(builder &b)
 {
-    if (b.skin >= 0 && size_t(b.skin) >= b.r.model.skins.size())
-        fail(b.r, b.where, "skin %d does not exist", b.skin);
     for (size_t i = 0; i < b.source.primitives.size(); i++)
         add_primitive(b, b.source.primitives[i], i);
     if (b.indices.empty())
-        return 0;
+        return;
     read_vertices(b);
+    if (b.skinned)
+        read_joints(b);
+    read_morphs(b);
     b.mesh.name = b.source.name.c_str();
     b.mesh.where = b.where.c_str();
     b.mesh.triangle_count = uint32_t(b.indices.size() / 3);
     b.mesh.indices = copy_of(b, b.indices);
     b.mesh.range_count = uint32_t(b.ranges.size());
     b.mesh.ranges = copy_of(b, b.ranges);
-    const uint32_t id = import_add_mesh(b.r.scene, &b.mesh);
+    b.shown.id = import_add_mesh(b.r.scene, &b.mesh);
     if (b.r.scene->failed)
         throw failed();
-    return id;
 }
 } // namespace
 
-uint32_t mesh_id(reader &r, int mesh, int skin, int node)
+void check_room(reader &r, const std::string &where, uint64_t count, uint64_t element_bytes)
+{
+    const uint64_t room = IMPORT_BYTES_MAX - r.scene->blob_bytes;
+    if (count > room / element_bytes)
+        fail(r, where, "the scene would take more than %llu GiB",
+             static_cast<unsigned long long>(IMPORT_BYTES_MAX >> 30));
+}
+
+const shown_mesh &mesh_of(reader &r, int mesh)
 {
     if (size_t(mesh) >= r.model.meshes.size())
         fail(r, "nodes", "mesh %d does not exist; there are %zu", mesh, r.model.meshes.size());
-    const auto key = std::make_tuple(mesh, skin, node);
-    const auto found = r.mesh_ids.find(key);
-    if (found != r.mesh_ids.end())
+    const auto found = r.meshes.find(mesh);
+    if (found != r.meshes.end())
         return found->second;
     const tinygltf::Mesh &source = r.model.meshes[size_t(mesh)];
-    builder b = {r, place("meshes", size_t(mesh)), source, skin,
-                 node >= 0 ? r.model.nodes[size_t(node)].weights : source.weights};
-    return r.mesh_ids[key] = build(b);
+    builder b = {r, place("meshes", size_t(mesh)), source, r.skinned_meshes.count(mesh) > 0};
+    build(b);
+    return r.meshes[mesh] = b.shown;
 }
 } // namespace gltf

@@ -12,43 +12,6 @@ namespace
 // One less than the server's limit, since a node with a mesh and a camera needs one below it.
 constexpr int depth_max = 255;
 
-using matrix = std::array<double, 16>;
-
-matrix identity()
-{
-    matrix m = {};
-    m[0] = m[5] = m[10] = m[15] = 1;
-    return m;
-}
-
-matrix from_parts(const std::vector<double> &t, const std::vector<double> &q, const std::vector<double> &s)
-{
-    matrix m = identity();
-
-    if (q.size() == 4) {
-        const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-        if (length > 0) {
-            const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
-            m[0] = 1 - 2 * (y * y + z * z), m[4] = 2 * (x * y - z * w), m[8] = 2 * (x * z + y * w);
-            m[1] = 2 * (x * y + z * w), m[5] = 1 - 2 * (x * x + z * z), m[9] = 2 * (y * z - x * w);
-            m[2] = 2 * (x * z - y * w), m[6] = 2 * (y * z + x * w), m[10] = 1 - 2 * (x * x + y * y);
-        }
-    }
-    for (size_t column = 0; column < 3 && s.size() == 3; column++)
-        for (size_t row = 0; row < 3; row++)
-            m[column * 4 + row] *= s[column];
-    for (size_t row = 0; row < 3 && t.size() == 3; row++)
-        m[12 + row] = t[row];
-    return m;
-}
-
-void to_rows(const matrix &m, float out[12])
-{
-    for (size_t row = 0; row < 3; row++)
-        for (size_t column = 0; column < 4; column++)
-            out[row * 4 + column] = float(m[column * 4 + row]);
-}
-
 std::string name_of(const reader &r, const tinygltf::Node &node)
 {
     if (!node.name.empty())
@@ -118,7 +81,22 @@ struct attachment {
     protocol_node_kind kind;
     uint32_t object;
     const char *suffix;
+    uint32_t skin;
+    std::vector<record_morph_weight> weights;
 };
+
+void attach_mesh(reader &r, const tinygltf::Node &node, const std::string &where, std::vector<attachment> &found)
+{
+    const shown_mesh &mesh = mesh_of(r, node.mesh);
+    if (mesh.id == 0)
+        return;
+    attachment one = {PROTOCOL_NODE_KIND_MESH, mesh.id, " mesh", 0, {}};
+    if (node.skin >= 0 && mesh.has_joints)
+        one.skin = skin_id(r, node.skin, mesh, where);
+    if (!node.weights.empty())
+        one.weights = morph_weights(r, node.weights, mesh.target_count, where);
+    found.push_back(std::move(one));
+}
 
 std::vector<attachment> attachments_of(reader &r, size_t index)
 {
@@ -126,32 +104,39 @@ std::vector<attachment> attachments_of(reader &r, size_t index)
     const std::string where = place("nodes", index);
     std::vector<attachment> found;
 
-    if (node.mesh >= 0 && node.skin < 0) {
-        const uint32_t mesh = mesh_id(r, node.mesh, -1, node.weights.empty() ? -1 : int(index));
-        if (mesh != 0)
-            found.push_back({PROTOCOL_NODE_KIND_MESH, mesh, " mesh"});
-    }
+    if (node.mesh >= 0)
+        attach_mesh(r, node, where, found);
     if (node.camera >= 0)
-        found.push_back({PROTOCOL_NODE_KIND_CAMERA, camera_id(r, node.camera, where), " camera"});
+        found.push_back({PROTOCOL_NODE_KIND_CAMERA, camera_id(r, node.camera, where), " camera", 0, {}});
     if (const tinygltf::Value *lights = extension(node.extensions, "KHR_lights_punctual")) {
         const uint32_t light = light_id(r, int(number(*lights, "light", -1)), where);
         if (light != 0)
-            found.push_back({PROTOCOL_NODE_KIND_LIGHT, light, " light"});
+            found.push_back({PROTOCOL_NODE_KIND_LIGHT, light, " light", 0, {}});
     }
     return found;
 }
 
-uint32_t add_node(reader &r, uint32_t parent, const matrix &m, protocol_node_kind kind, uint32_t object,
-                  const std::string &name)
+// `what` may be null: a group.
+uint32_t add_node(reader &r, uint32_t parent, const matrix &m, const attachment *what, const std::string &name,
+                  bool hidden)
 {
     message_set_node set = {};
 
     set.parent = parent;
-    set.kind = kind;
-    set.object = object;
+    set.hidden = hidden;
     set.name = name.c_str();
     to_rows(m, set.parent_from_node);
-    return import_add_node(r.scene, &set);
+    if (what) {
+        set.kind = what->kind;
+        set.object = what->object;
+        set.skin = what->skin;
+        set.weights = const_cast<record_morph_weight *>(what->weights.data()); // copied
+        set.weights_count = uint32_t(what->weights.size());
+    }
+    const uint32_t id = import_add_node(r.scene, &set);
+    if (r.scene->failed)
+        throw failed();
+    return id;
 }
 
 // A node may hold a mesh, a camera and a light at once; ours hold one thing, so the others hang below it.
@@ -161,20 +146,14 @@ uint32_t add_one(reader &r, size_t index, uint32_t parent)
     const std::string name = name_of(r, node);
     const std::vector<attachment> found = attachments_of(r, index);
     const bool single = found.size() == 1;
-    const uint32_t id =
-        add_node(r, parent, node_matrix(r, index), single ? found[0].kind : PROTOCOL_NODE_KIND_GROUP,
-                 single ? found[0].object : 0, name);
+    const uint32_t id = add_node(r, parent, node_matrix(r, index), single ? &found[0] : nullptr, name, false);
 
-    for (size_t i = 0; i < found.size() && !single; i++)
-        add_node(r, id, identity(), found[i].kind, found[i].object, name + found[i].suffix);
-    // A skin places its mesh by the joints alone: what the node and its ancestors do to it does not count.
-    if (node.mesh >= 0 && node.skin >= 0) {
-        const uint32_t mesh = mesh_id(r, node.mesh, node.skin, node.weights.empty() ? -1 : int(index));
-        if (mesh != 0)
-            add_node(r, 0, identity(), PROTOCOL_NODE_KIND_MESH, mesh, name + " (skinned)");
+    r.node_ids[index] = id;
+    for (const attachment &one : found) {
+        const uint32_t holder = single ? id : add_node(r, id, identity(), &one, name + one.suffix, false);
+        if (one.kind == PROTOCOL_NODE_KIND_MESH)
+            r.mesh_nodes[index] = holder;
     }
-    if (r.scene->failed)
-        throw failed();
     return id;
 }
 
@@ -217,13 +196,15 @@ struct pending {
     int depth;
 };
 
-void use_materials(reader &r, const tinygltf::Node &node, std::set<int> &used)
+void note_uses(reader &r, const tinygltf::Node &node, std::set<int> &used)
 {
     if (node.mesh < 0 || size_t(node.mesh) >= r.model.meshes.size())
         return;
     for (const tinygltf::Primitive &primitive : r.model.meshes[size_t(node.mesh)].primitives)
         if (primitive.material >= 0)
             used.insert(primitive.material);
+    if (node.skin >= 0)
+        r.skinned_meshes.insert(node.mesh);
 }
 
 // Calls `visit(node, parent's result)` for all nodes below the roots, parents first.
@@ -245,23 +226,6 @@ template <typename visitor> void walk(reader &r, const std::vector<int> &roots, 
     }
 }
 } // namespace
-
-std::array<double, 16> node_matrix(reader &r, size_t index)
-{
-    const tinygltf::Node &node = r.model.nodes[index];
-    matrix m = identity();
-
-    if (node.matrix.size() == 16)
-        std::copy(node.matrix.begin(), node.matrix.end(), m.begin());
-    else if (!node.matrix.empty())
-        fail(r, place("nodes", index), "a matrix of %zu numbers", node.matrix.size());
-    else
-        m = from_parts(node.translation, node.rotation, node.scale);
-    for (double value : m)
-        if (!std::isfinite(value) || std::fabs(value) > 1e12)
-            fail(r, place("nodes", index), "a transform that is not finite or beyond 1e12");
-    return m;
-}
 
 void check_hierarchy(reader &r)
 {
@@ -297,26 +261,35 @@ void add_scene(reader &r)
     std::set<int> used;
 
     walk(r, roots, [&](size_t node, uint32_t) {
-        use_materials(r, r.model.nodes[node], used);
+        note_uses(r, r.model.nodes[node], used);
         return 0u;
     });
     add_materials(r, used);
+    r.node_ids.assign(r.model.nodes.size(), 0);
     walk(r, roots, [&](size_t node, uint32_t parent) { return add_one(r, node, parent); });
+    add_skins(r);
 }
 
-void add_clips(reader &r)
+uint32_t add_hidden_node(reader &r, size_t node)
 {
-    for (const tinygltf::Animation &animation : r.model.animations) {
-        double duration = 0;
-        for (const tinygltf::AnimationSampler &sampler : animation.samplers)
-            if (sampler.input >= 0 && size_t(sampler.input) < r.model.accessors.size())
-                for (double end : r.model.accessors[size_t(sampler.input)].maxValues)
-                    duration = std::max(duration, end);
-        const size_t channels = std::min<size_t>(animation.channels.size(), UINT32_MAX);
-        import_add_clip(r.scene, animation.name.c_str(), uint32_t(channels), duration);
+    std::vector<size_t> chain;
+    uint32_t parent = 0;
+
+    for (int at = int(node); at >= 0; at = r.parents[size_t(at)]) {
+        if (r.node_ids[size_t(at)] != 0) {
+            parent = r.node_ids[size_t(at)];
+            break;
+        }
+        chain.push_back(size_t(at));
+        if (chain.size() > depth_max)
+            fail(r, place("nodes", node), "nodes are nested more than %d deep", depth_max);
     }
-    if (!r.model.animations.empty())
-        import_note(r.scene, PROTOCOL_SEVERITY_INFO, "", "%zu animation clips are listed but not played",
-                    r.model.animations.size());
+    for (; !chain.empty(); chain.pop_back()) {
+        const size_t at = chain.back();
+        import_note(r.scene, PROTOCOL_SEVERITY_INFO, place("nodes", at).c_str(),
+                    "joints that are not part of the scene are kept, hidden");
+        parent = r.node_ids[at] = add_node(r, parent, node_matrix(r, at), nullptr, r.model.nodes[at].name, true);
+    }
+    return parent;
 }
 } // namespace gltf

@@ -1,160 +1,183 @@
 // SPDX-License-Identifier: MIT
-// Skinning, once, in the pose in which the file's nodes stand.
+// Skins, and which of their joints move a vertex. Nothing is moved here: the server does that.
 #include "gltf.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 namespace gltf
 {
 namespace
 {
-using matrix = std::array<double, 16>;
+struct influence {
+    uint32_t joint;
+    float weight;
+};
 
-matrix multiply(const matrix &a, const matrix &b)
-{
-    matrix m = {};
-    for (size_t column = 0; column < 4; column++)
-        for (size_t row = 0; row < 4; row++)
-            for (size_t k = 0; k < 4; k++)
-                m[column * 4 + row] += a[k * 4 + row] * b[column * 4 + k];
-    return m;
-}
-
-// World matrices of all nodes. Parents may come after their children in the file, so each chain is followed up
-// to what is known and done downwards.
-void fill_world(reader &r)
-{
-    const size_t count = r.model.nodes.size();
-    std::vector<char> known(count, 0);
-    std::vector<size_t> chain;
-
-    r.world.resize(count);
-    for (size_t i = 0; i < count; i++) {
-        for (int at = int(i); at >= 0 && !known[size_t(at)]; at = r.parents[size_t(at)])
-            chain.push_back(size_t(at));
-        for (; !chain.empty(); chain.pop_back()) {
-            const size_t node = chain.back();
-            const matrix own = node_matrix(r, node);
-            r.world[node] = r.parents[node] < 0 ? own : multiply(r.world[size_t(r.parents[node])], own);
-            known[node] = 1;
-        }
-    }
-}
-
-std::vector<matrix> joint_matrices(reader &r, int index)
-{
-    const tinygltf::Skin &skin = r.model.skins[size_t(index)];
-    const std::string where = place("skins", size_t(index));
-    std::vector<matrix> joints(skin.joints.size());
-    std::vector<float> inverse(skin.joints.size() * 16);
-
-    if (skin.inverseBindMatrices >= 0) {
-        if (accessor_count(r, skin.inverseBindMatrices, TINYGLTF_TYPE_MAT4, where) < skin.joints.size())
-            fail(r, where, "fewer inverse bind matrices than joints");
-        inverse.resize(accessor_count(r, skin.inverseBindMatrices, TINYGLTF_TYPE_MAT4, where) * 16);
-        read_floats(r, skin.inverseBindMatrices, 16, 0, inverse.data(), where);
-    }
-    for (size_t j = 0; j < joints.size(); j++) {
-        const int node = skin.joints[j];
-        if (node < 0 || size_t(node) >= r.model.nodes.size())
-            fail(r, where, "joint node %d does not exist", node);
-        matrix bind = {};
-        for (size_t i = 0; i < 16; i++)
-            bind[i] = skin.inverseBindMatrices >= 0 ? double(inverse[j * 16 + i]) : (i % 5 == 0 ? 1.0 : 0.0);
-        joints[j] = multiply(r.world[size_t(node)], bind);
-    }
-    return joints;
-}
-
-struct influences {
+// One accessor of joints and one of weights: four of each a vertex.
+struct influence_set {
     std::vector<uint32_t> joints;
     std::vector<float> weights;
 };
 
-std::vector<influences> influences_of(reader &r, const tinygltf::Primitive &primitive, size_t vertices,
-                                      const std::string &where)
+std::vector<influence_set> read_sets(reader &r, const tinygltf::Primitive &primitive, size_t vertices,
+                                     const std::string &where)
 {
-    std::vector<influences> sets;
+    std::vector<influence_set> sets;
 
-    for (int set = 0; set < 4; set++) {
-        const auto joints = primitive.attributes.find("JOINTS_" + std::to_string(set));
-        const auto weights = primitive.attributes.find("WEIGHTS_" + std::to_string(set));
+    for (;;) {
+        const std::string number = std::to_string(sets.size());
+        const auto joints = primitive.attributes.find("JOINTS_" + number);
+        const auto weights = primitive.attributes.find("WEIGHTS_" + number);
         if (joints == primitive.attributes.end() || weights == primitive.attributes.end())
-            break;
-        influences one;
+            return sets;
+        check_room(r, where, vertices, 32);
+        influence_set one;
         one.joints = read_integers(r, joints->second, 4, where + "." + joints->first);
         one.weights.resize(vertices * 4);
         accessor_count(r, weights->second, TINYGLTF_TYPE_VEC4, where + "." + weights->first);
         read_floats(r, weights->second, 4, 0, one.weights.data(), where + "." + weights->first);
         sets.push_back(std::move(one));
     }
-    return sets;
 }
 
-void transform(const matrix &m, float *vector, double w)
+// What moves a vertex, at most as many as may be.
+void collect(reader &r, const std::vector<influence_set> &sets, size_t vertex, std::vector<influence> &found,
+             const std::string &where)
 {
-    const double x = double(vector[0]), y = double(vector[1]), z = double(vector[2]);
-    for (size_t row = 0; row < 3; row++)
-        vector[row] = float(m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row] * w);
-}
-
-// Normals want the inverse transpose; its direction is that of the cofactors, which exist for flat matrices, too.
-void transform_normal(const matrix &m, float *normal)
-{
-    const double n[3] = {double(normal[0]), double(normal[1]), double(normal[2])};
-    double out[3];
-    for (size_t row = 0; row < 3; row++) {
-        const size_t a = (row + 1) % 3, b = (row + 2) % 3;
-        out[row] = 0;
-        for (size_t column = 0; column < 3; column++) {
-            const size_t c = (column + 1) % 3, d = (column + 2) % 3;
-            out[row] += (m[c * 4 + a] * m[d * 4 + b] - m[c * 4 + b] * m[d * 4 + a]) * n[column];
-        }
+    found.clear();
+    for (const influence_set &set : sets)
+        for (size_t i = vertex * 4; i < vertex * 4 + 4; i++)
+            if (set.weights[i] > 0 && std::isfinite(set.weights[i]))
+                found.push_back({set.joints[i], set.weights[i]});
+    if (found.size() > IMPORT_INFLUENCES_MAX) {
+        std::stable_sort(found.begin(), found.end(),
+                         [](const influence &a, const influence &b) { return a.weight > b.weight; });
+        found.resize(IMPORT_INFLUENCES_MAX);
+        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
+                    "of the joints that move a vertex the %d with the greatest weights were kept",
+                    IMPORT_INFLUENCES_MAX);
     }
-    const double length = std::sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]);
-    for (size_t i = 0; i < 3; i++)
-        normal[i] = length > 0 ? float(out[i] / length) : 0;
+    if (found.empty()) { // held by nothing: as other programs do
+        found.push_back({0, 1});
+        import_note(r.scene, PROTOCOL_SEVERITY_INFO, where.c_str(),
+                    "vertices without weights follow the first joint of the skin");
+    }
+}
+
+struct skin_arrays {
+    uint32_t *joints = nullptr;
+    float *joint_from_mesh = nullptr;
+
+    ~skin_arrays()
+    {
+        free(joints);
+        free(joint_from_mesh);
+    }
+};
+
+void read_bind_matrices(reader &r, const tinygltf::Skin &skin, float *joint_from_mesh, const std::string &where)
+{
+    const size_t present = accessor_count(r, skin.inverseBindMatrices, TINYGLTF_TYPE_MAT4, where);
+    if (present < skin.joints.size())
+        fail(r, where, "fewer inverse bind matrices than joints");
+    check_room(r, where, present, 64);
+    std::vector<float> columns(present * 16);
+    read_floats(r, skin.inverseBindMatrices, 16, 0, columns.data(), where);
+    for (size_t j = 0; j < skin.joints.size(); j++) {
+        const float *from = columns.data() + j * 16;
+        const bool usable = std::all_of(from, from + 16, [](float value) { return std::fabs(value) <= 1e12f; });
+        if (!usable)
+            import_note(r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
+                        "an inverse bind matrix is not finite or beyond 1e12 and is taken as none");
+        for (size_t row = 0; row < 3; row++)
+            for (size_t column = 0; column < 4; column++)
+                joint_from_mesh[j * 12 + row * 4 + column] = usable          ? from[column * 4 + row]
+                                                             : row == column ? 1.0f
+                                                                             : 0.0f;
+    }
+}
+
+template <typename type> type *allocate(reader &r, size_t count, const std::string &where)
+{
+    void *memory = calloc(count, sizeof(type));
+    if (!memory)
+        fail(r, where, "out of memory");
+    return static_cast<type *>(memory);
+}
+
+void add_skin(reader &r, int index, uint32_t id)
+{
+    const tinygltf::Skin &skin = r.model.skins[size_t(index)];
+    const std::string where = place("skins", size_t(index));
+    skin_arrays arrays;
+
+    arrays.joints = allocate<uint32_t>(r, skin.joints.size(), where);
+    for (size_t j = 0; j < skin.joints.size(); j++)
+        arrays.joints[j] = add_hidden_node(r, size_t(skin.joints[j]));
+    if (skin.inverseBindMatrices >= 0) {
+        arrays.joint_from_mesh = allocate<float>(r, skin.joints.size() * 12, where);
+        read_bind_matrices(r, skin, arrays.joint_from_mesh, where);
+    }
+    uint32_t *joints = arrays.joints;
+    float *joint_from_mesh = arrays.joint_from_mesh;
+    arrays.joints = nullptr;
+    arrays.joint_from_mesh = nullptr;
+    if (!import_add_skin(r.scene, id, skin.name.c_str(), uint32_t(skin.joints.size()), joints, joint_from_mesh))
+        throw failed();
 }
 } // namespace
 
-void apply_skin(reader &r, const tinygltf::Primitive &primitive, int skin, const skinned_arrays &arrays,
-                const std::string &where)
+influences read_influences(reader &r, const tinygltf::Primitive &primitive, size_t vertices,
+                           const std::string &where)
 {
-    const std::vector<influences> sets = influences_of(r, primitive, arrays.vertex_count, where);
+    const std::vector<influence_set> sets = read_sets(r, primitive, vertices, where);
+    std::vector<influence> found;
+    influences result;
 
-    if (sets.empty()) {
-        import_note(r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(), "a skinned mesh has no joints or weights");
-        return;
-    }
-    if (r.world.empty())
-        fill_world(r);
-    const std::vector<matrix> joints = joint_matrices(r, skin);
-    for (size_t v = 0; v < arrays.vertex_count; v++) {
-        matrix m = {};
-        double sum = 0;
-        for (const influences &set : sets) {
-            for (size_t i = v * 4; i < v * 4 + 4; i++) {
-                const double weight = double(set.weights[i]);
-                if (!(weight > 0) || !std::isfinite(weight))
-                    continue;
-                if (set.joints[i] >= joints.size())
-                    fail(r, where, "vertex %zu names joint %u of %zu", v, set.joints[i], joints.size());
-                for (size_t k = 0; k < 16; k++)
-                    m[k] += weight * joints[set.joints[i]][k];
-                sum += weight;
-            }
+    if (sets.empty())
+        return result;
+    result.stride = std::min<size_t>(sets.size() * 4, IMPORT_INFLUENCES_MAX);
+    check_room(r, where, vertices, result.stride * 6);
+    result.joints.assign(vertices * result.stride, 0);
+    result.weights.assign(vertices * result.stride, 0);
+    for (size_t v = 0; v < vertices; v++) {
+        collect(r, sets, v, found, where);
+        result.used = std::max(result.used, found.size());
+        for (size_t i = 0; i < found.size(); i++) {
+            if (found[i].joint >= IMPORT_JOINTS_MAX)
+                fail(r, where, "vertex %zu names joint %u", v, found[i].joint);
+            result.joints[v * result.stride + i] = uint16_t(found[i].joint);
+            result.weights[v * result.stride + i] = found[i].weight;
+            result.greatest_joint = std::max(result.greatest_joint, found[i].joint);
         }
-        if (!(sum > 0))
-            continue; // held by nothing: stays where it is
-        for (double &value : m)
-            value /= sum;
-        transform(m, arrays.positions + v * 3, 1);
-        if (arrays.normals)
-            transform_normal(m, arrays.normals + v * 3);
-        if (arrays.tangents)
-            transform(m, arrays.tangents + v * 4, 0);
     }
-    import_note(r.scene, PROTOCOL_SEVERITY_INFO, where.c_str(),
-                "skinned meshes stand in the pose of the file's nodes");
+    return result;
+}
+
+uint32_t skin_id(reader &r, int index, const shown_mesh &mesh, const std::string &where)
+{
+    if (size_t(index) >= r.model.skins.size())
+        fail(r, where, "skin %d does not exist", index);
+    const tinygltf::Skin &skin = r.model.skins[size_t(index)];
+    if (skin.joints.empty() || skin.joints.size() > IMPORT_JOINTS_MAX)
+        fail(r, place("skins", size_t(index)), "%zu joints; 1 to %d are allowed", skin.joints.size(),
+             IMPORT_JOINTS_MAX);
+    for (int joint : skin.joints)
+        if (joint < 0 || size_t(joint) >= r.model.nodes.size())
+            fail(r, place("skins", size_t(index)), "joint node %d does not exist", joint);
+    if (mesh.greatest_joint >= skin.joints.size())
+        fail(r, where, "a vertex of the mesh names joint %u of %zu", mesh.greatest_joint, skin.joints.size());
+    uint32_t &id = r.skin_ids[index];
+    if (id == 0)
+        id = import_reserve_id(r.scene, PROTOCOL_OBJECT_KIND_SKIN);
+    return id;
+}
+
+void add_skins(reader &r)
+{
+    for (const auto &skin : r.skin_ids)
+        add_skin(r, skin.first, skin.second);
 }
 } // namespace gltf

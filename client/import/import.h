@@ -21,7 +21,10 @@ extern "C" {
 #define IMPORT_NOTES_MAX 200
 #define IMPORT_NAME_MAX 128
 #define IMPORT_RANGES_MAX 4096 /* of one SET_MESH or SET_SPHERES */
-#define IMPORT_ARRAYS_MAX 8
+#define IMPORT_ARRAYS_MAX 12
+#define IMPORT_INFLUENCES_MAX 16 /* joints that move one vertex */
+#define IMPORT_JOINTS_MAX 65536  /* of one skin */
+#define IMPORT_TARGETS_MAX 1024  /* morph targets of one mesh */
 /* Sum of all blobs: keeps a small file that asks for much from filling the memory of three programs. */
 #define IMPORT_BYTES_MAX (6ULL << 30)
 
@@ -47,6 +50,7 @@ struct import_notice {
 
 struct import_clip {
     char name[IMPORT_NAME_MAX + 1];
+    uint32_t clip; /* 0: nothing to play */
     uint32_t channels;
     float duration_s;
 };
@@ -95,7 +99,21 @@ uint32_t import_add_texture(struct import_scene *scene, const struct message_set
                             uint32_t texels);
 void import_set_environment(struct import_scene *scene, const struct message_set_environment *environment,
                             uint32_t texels);
-void import_add_clip(struct import_scene *scene, const char *name, uint32_t channels, double duration_s);
+
+/* An identifier for an object that is added later, so that others can name it before. */
+uint32_t import_reserve_id(struct import_scene *scene, enum protocol_object_kind kind);
+/* A skin of a reserved identifier. `joints` (node identifiers) and `joint_from_mesh` (12 floats each, 3x4
+ * row-major; NULL: identity) are malloc'd and taken whether it succeeds or not. */
+bool import_add_skin(struct import_scene *scene, uint32_t skin, const char *name, uint32_t joint_count,
+                     uint32_t *joints, float *joint_from_mesh);
+/* A clip of a reserved identifier; `floats` are malloc'd and taken whether it succeeds or not. */
+bool import_add_clip(struct import_scene *scene, uint32_t clip, const char *name, float *floats, uint32_t count);
+/* The clip may be added before or after its channels; that all of it lies within the clip's floats and that times
+ * ascend is the caller's promise. */
+uint32_t import_add_channel(struct import_scene *scene, const struct message_set_channel *channel);
+/* Tells people of a clip; `clip` 0: nothing of it can be played. */
+void import_list_clip(struct import_scene *scene, uint32_t clip, const char *name, uint32_t channels,
+                      double duration_s);
 
 /* Arrays are malloc'd and taken whether it succeeds or not; those but positions and indices may be NULL. */
 struct import_mesh {
@@ -108,6 +126,12 @@ struct import_mesh {
     float *tangents;     /* 4 */
     float *texcoords[2]; /* 2 */
     uint8_t *colours;    /* 4, linear */
+    uint32_t influence_count, target_count;
+    uint16_t *joints;         /* influence_count a vertex: places in the skin, which are checked by the caller */
+    float *joint_weights;     /* influence_count a vertex */
+    float *target_offsets[3]; /* to positions, normals, tangents: 3 a vertex, target after target */
+    const struct record_morph_weight *weights; /* of the morph targets; copied */
+    uint32_t weight_count;
     struct record_material_range *ranges;
     uint32_t range_count;
 };

@@ -89,10 +89,12 @@ static void edit_finish(struct import_edit *edit)
     switch (edit->message.type) {
     case MESSAGE_SET_NODE:
         free((char *)(uintptr_t)edit->message.set_node.name);
+        free(edit->message.set_node.weights);
         break;
     case MESSAGE_SET_MESH:
         free((char *)(uintptr_t)edit->message.set_mesh.name);
         free(edit->message.set_mesh.ranges);
+        free(edit->message.set_mesh.weights);
         break;
     case MESSAGE_SET_SPHERES:
         free((char *)(uintptr_t)edit->message.set_spheres.name);
@@ -110,6 +112,12 @@ static void edit_finish(struct import_edit *edit)
         break;
     case MESSAGE_SET_CAMERA:
         free((char *)(uintptr_t)edit->message.set_camera.name);
+        break;
+    case MESSAGE_SET_SKIN:
+        free((char *)(uintptr_t)edit->message.set_skin.name);
+        break;
+    case MESSAGE_SET_CLIP:
+        free((char *)(uintptr_t)edit->message.set_clip.name);
         break;
     default:
         break; /* nothing owned */
@@ -166,8 +174,7 @@ void import_note(struct import_scene *scene, enum protocol_severity severity, co
         scene->notes_lost += scene->notes_lost < UINT32_MAX;
 }
 
-/* Room for one more element; grows by half. */
-static void *grow(struct import_scene *scene, void *array, size_t count, size_t *capacity, size_t element_bytes)
+void *import_grow(struct import_scene *scene, void *array, size_t count, size_t *capacity, size_t element_bytes)
 {
     size_t wanted = *capacity + *capacity / 2 + 16;
     void *grown;
@@ -195,7 +202,7 @@ uint32_t import_add_blob(struct import_scene *scene, void *bytes, uint64_t size_
                     (unsigned long long)(IMPORT_BYTES_MAX >> 30));
         goto release;
     }
-    grown = grow(scene, scene->blobs, scene->blob_count, &scene->blob_capacity, sizeof *scene->blobs);
+    grown = import_grow(scene, scene->blobs, scene->blob_count, &scene->blob_capacity, sizeof *scene->blobs);
     if (!grown)
         goto release;
     scene->blobs = grown;
@@ -213,7 +220,7 @@ struct import_edit *import_append(struct import_scene *scene, enum message_type 
 
     if (scene->failed)
         return NULL;
-    grown = grow(scene, scene->edits, scene->edit_count, &scene->edit_capacity, sizeof *scene->edits);
+    grown = import_grow(scene, scene->edits, scene->edit_count, &scene->edit_capacity, sizeof *scene->edits);
     if (!grown)
         return NULL;
     scene->edits = grown;
@@ -231,6 +238,28 @@ char *import_copy_name(struct import_scene *scene, const char *name)
     copy = strdup(text);
     if (!copy)
         import_fail(scene, NULL, "out of memory");
+    return copy;
+}
+
+struct record_morph_weight *import_copy_weights(struct import_scene *scene, const struct record_morph_weight *from,
+                                                uint32_t count)
+{
+    struct record_morph_weight *copy;
+
+    if (scene->failed || count == 0)
+        return NULL;
+    copy = malloc(count * sizeof *copy);
+    if (!copy) {
+        import_fail(scene, NULL, "out of memory");
+        return NULL;
+    }
+    memcpy(copy, from, count * sizeof *copy);
+    for (uint32_t i = 0; i < count; i++) {
+        if (!(fabsf(copy[i].weight) <= 1e6f)) { /* NaN, too */
+            import_fail(scene, NULL, "a weight of a morph target is not finite or beyond 1e6");
+            break;
+        }
+    }
     return copy;
 }
 
@@ -262,6 +291,7 @@ uint32_t import_add_node(struct import_scene *scene, const struct message_set_no
         return 0;
     edit->message.set_node = *node;
     edit->message.set_node.name = import_copy_name(scene, node->name);
+    edit->message.set_node.weights = import_copy_weights(scene, node->weights, node->weights_count);
     return edit->message.set_node.node = import_next_id(scene, PROTOCOL_OBJECT_KIND_NODE);
 }
 
@@ -375,20 +405,6 @@ void import_set_environment(struct import_scene *scene, const struct message_set
     edit->message.set_environment = *environment;
     edit->message.set_environment.arrays_count = texels != 0;
     edit->blobs[0] = texels;
-}
-
-void import_add_clip(struct import_scene *scene, const char *name, uint32_t channels, double duration_s)
-{
-    struct import_clip *grown = grow(scene, scene->clips, scene->clip_count, &scene->clip_capacity, sizeof *grown);
-    struct import_clip *clip;
-
-    if (!grown)
-        return;
-    scene->clips = grown;
-    clip = &grown[scene->clip_count++];
-    import_copy_text(clip->name, sizeof clip->name, name);
-    clip->channels = channels;
-    clip->duration_s = duration_s >= 0 && duration_s <= 1e9 ? (float)duration_s : 0;
 }
 
 /* ---- defaults ---- */

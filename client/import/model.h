@@ -9,6 +9,13 @@
 struct import_edit *import_append(struct import_scene *scene, enum message_type type);
 /* A mended copy that the edit owns; NULL: out of memory, and the scene has failed. */
 char *import_copy_name(struct import_scene *scene, const char *name);
+/* A copy that the edit owns; NULL: none, or the scene has failed: out of memory, or a weight that is not allowed.
+ */
+struct record_morph_weight *import_copy_weights(struct import_scene *scene, const struct record_morph_weight *from,
+                                                uint32_t count);
+/* The array, moved where it has no room for one more element; it grows by half. NULL: out of memory, and the scene
+ * has failed. */
+void *import_grow(struct import_scene *scene, void *array, size_t count, size_t *capacity, size_t element_bytes);
 uint32_t import_next_id(struct import_scene *scene, enum protocol_object_kind kind);
 /* The same, at most out_bytes - 1 bytes long. */
 void import_copy_text(char *out, size_t out_bytes, const char *text);

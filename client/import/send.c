@@ -249,6 +249,7 @@ bool sender_notes(struct sender *sender)
         struct message message;
 
         message_init(&message, MESSAGE_IMPORT_CLIP);
+        message.import_clip.clip = scene->clips[i].clip;
         message.import_clip.name = scene->clips[i].name;
         message.import_clip.channels = scene->clips[i].channels;
         message.import_clip.duration_s = scene->clips[i].duration_s;
@@ -391,6 +392,12 @@ static bool put_edit(struct sender *sender, uint32_t request, const struct impor
         break;
     case MESSAGE_SET_TEXTURE:
         message.set_texture.arrays = refs;
+        break;
+    case MESSAGE_SET_SKIN:
+        message.set_skin.arrays = refs;
+        break;
+    case MESSAGE_SET_CLIP:
+        message.set_clip.arrays = refs;
         break;
     case MESSAGE_SET_ENVIRONMENT:
         message.set_environment.arrays = refs;

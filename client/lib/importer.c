@@ -9,22 +9,8 @@
 #include <unistd.h>
 
 #define DEFAULT_TIMEOUT_MS 600000u
-#define ITEMS_MAX (16u << 20)
 /* Further cameras cannot be chosen by name; bounds the work that a hostile model can cause here. */
 #define CAMERAS_MAX 4096u
-
-bool fl_grow(void **items, size_t *capacity, size_t count, size_t item_bytes, struct fl_error *error)
-{
-    if (count < *capacity)
-        return true;
-    const size_t more = *capacity > 0 ? *capacity * 2 : 16;
-    void *grown = more <= ITEMS_MAX ? realloc(*items, more * item_bytes) : NULL;
-    if (grown == NULL)
-        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
-    *items = grown;
-    *capacity = more;
-    return true;
-}
 
 /* Named here, before a program is started for it. */
 static bool check_file(const char *path, struct fl_error *error)
@@ -114,6 +100,8 @@ static void take_note(struct fl_importer *importer, const struct message_import_
 
 bool fl_importer_observe(struct fl_importer *importer, const struct message *message, struct fl_error *error)
 {
+    if (!fl_catalogue_observe(&importer->catalogue, message, error))
+        return false;
     switch (message->type) {
     case MESSAGE_SET_NODE:
         return message->set_node.kind != PROTOCOL_NODE_KIND_CAMERA ||
@@ -183,5 +171,6 @@ void fl_importer_finish(struct fl_importer *importer)
     free(importer->cameras);
     free(importer->camera_objects);
     free(importer->objects);
+    fl_catalogue_finish(&importer->catalogue);
     *importer = (struct fl_importer){.stream = {.fd = -1}, .process = {.talk_fd = -1}};
 }

@@ -3,6 +3,7 @@
 #ifndef FARLIGHT_CLIENT_LIB_IMPORTER_H
 #define FARLIGHT_CLIENT_LIB_IMPORTER_H
 
+#include "lib/catalogue.h"
 #include "lib/process.h"
 #include "lib/stream.h"
 
@@ -24,21 +25,19 @@ struct fl_importer {
     size_t camera_count, camera_capacity;
     struct fl_camera_object *objects;
     size_t object_count, object_capacity;
+    struct fl_catalogue catalogue;
     struct fl_error complaint; /* of its last note of severity error */
 };
 
 /* Starts the program; it begins to read at once and waits for answers only where it needs some. */
 bool fl_importer_start(struct fl_importer *importer, const struct fl_load_options *options,
                        struct fl_error *error);
-/* Remembers what concerns us: cameras; notes and progress go to the options' callbacks. */
+/* Remembers what concerns us: cameras, clips, names; notes and progress go to the options' callbacks. */
 bool fl_importer_observe(struct fl_importer *importer, const struct message *message, struct fl_error *error);
 /* Why it ended without `done`: its own complaint, else how it ended. Returns false. */
 bool fl_importer_explain(struct fl_importer *importer, struct fl_error *error);
 /* Ends the program (at once unless it is done) and completes names and stats. */
 void fl_importer_stop(struct fl_importer *importer);
 void fl_importer_finish(struct fl_importer *importer);
-
-/* Grows *items to hold one more than `count`; at most 16 M. */
-bool fl_grow(void **items, size_t *capacity, size_t count, size_t item_bytes, struct fl_error *error);
 
 #endif

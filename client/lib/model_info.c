@@ -12,21 +12,10 @@
 struct listing {
     struct fl_importer importer;
     struct fl_model_info *info;
-    size_t clip_capacity, note_capacity;
+    size_t note_capacity;
     struct fl_relay relay; /* the same rules as towards a daemon */
     uint64_t revision;
 };
-
-static bool add_clip(struct listing *listing, const struct message_import_clip *clip, struct fl_error *error)
-{
-    struct fl_model_info *info = listing->info;
-    if (!fl_grow((void **)&info->clips, &listing->clip_capacity, info->clip_count, sizeof *info->clips, error))
-        return false;
-    struct fl_clip_info *made = &info->clips[info->clip_count++];
-    *made = (struct fl_clip_info){.channels = clip->channels, .duration_s = clip->duration_s};
-    snprintf(made->name, sizeof made->name, "%s", clip->name);
-    return true;
-}
 
 static bool add_note(struct listing *listing, const struct message_import_note *note, struct fl_error *error)
 {
@@ -54,6 +43,11 @@ static bool list(struct listing *listing, const struct message *message, struct 
     case MESSAGE_SET_MESH:
         info->meshes++;
         info->triangles += message->set_mesh.triangle_count;
+        info->morph_targets += message->set_mesh.target_count;
+        break;
+    case MESSAGE_SET_SKIN:
+        info->skins++;
+        info->joints += message->set_skin.joint_count;
         break;
     case MESSAGE_SET_SPHERES:
         info->sphere_sets++;
@@ -71,8 +65,6 @@ static bool list(struct listing *listing, const struct message *message, struct 
     case MESSAGE_SET_LIGHT:
         info->lights++;
         break;
-    case MESSAGE_IMPORT_CLIP:
-        return add_clip(listing, &message->import_clip, error);
     case MESSAGE_IMPORT_NOTE:
         return add_note(listing, &message->import_note, error);
     default:
@@ -162,6 +154,9 @@ struct fl_model_info *fl_model_info(const struct fl_load_options *options, int i
     listing.info->camera_count = listing.importer.camera_count;
     listing.importer.cameras = NULL;
     listing.importer.camera_count = 0;
+    listing.info->clips = listing.importer.catalogue.clips;
+    listing.info->clip_count = listing.importer.catalogue.clip_count;
+    listing.importer.catalogue.clips = NULL;
     fl_importer_finish(&listing.importer);
     if (complete)
         return listing.info;

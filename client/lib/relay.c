@@ -21,6 +21,9 @@ static enum fl_relay_verdict kind_of(enum message_type type)
     case MESSAGE_SET_LIGHT:
     case MESSAGE_SET_CAMERA:
     case MESSAGE_SET_ENVIRONMENT:
+    case MESSAGE_SET_SKIN:
+    case MESSAGE_SET_CLIP:
+    case MESSAGE_SET_CHANNEL:
     case MESSAGE_REMOVE:
         return FL_RELAY_FORWARD;
     case MESSAGE_IMPORT_NOTE:

@@ -252,6 +252,8 @@ static struct fl_scene *load_started(struct fl_connection *connection, struct fl
     scene->camera_count = importer->camera_count;
     importer->cameras = NULL;
     importer->camera_count = 0;
+    scene->catalogue = importer->catalogue;
+    importer->catalogue = (struct fl_catalogue){0};
     return scene;
 }
 
@@ -281,6 +283,7 @@ void fl_scene_destroy(struct fl_scene *scene)
     close.scene_close.scene = scene->scene;
     fl_connection_send(scene->connection, fl_connection_next_request(scene->connection), 0, &close, &ignored);
     free(scene->cameras);
+    fl_catalogue_finish(&scene->catalogue);
     free(scene);
 }
 
@@ -315,4 +318,31 @@ bool fl_scene_find_camera(const struct fl_scene *scene, const char *which, uint3
     if (scene->camera_count == 0)
         return fl_error_remedy(error, "it has none at all; use --eye and --look-at");
     return fl_error_remedy(error, "it has %zu; 'farlight info' lists them", scene->camera_count);
+}
+
+size_t fl_scene_clip_count(const struct fl_scene *scene)
+{
+    return scene->catalogue.clip_count;
+}
+
+const struct fl_clip_info *fl_scene_clip(const struct fl_scene *scene, size_t index)
+{
+    return index < scene->catalogue.clip_count ? &scene->catalogue.clips[index] : NULL;
+}
+
+bool fl_scene_find_clip(const struct fl_scene *scene, const char *which, uint32_t *clip,
+                        const struct fl_clip_info **info, struct fl_error *error)
+{
+    return fl_catalogue_find_clip(&scene->catalogue, which, clip, info, error);
+}
+
+bool fl_scene_find_object(const struct fl_scene *scene, enum protocol_object_kind kind, const char *which,
+                          uint32_t *id, struct fl_error *error)
+{
+    return fl_catalogue_find(&scene->catalogue, kind, which, id, error);
+}
+
+uint32_t fl_scene_new_id(struct fl_scene *scene, enum protocol_object_kind kind)
+{
+    return fl_catalogue_new_id(&scene->catalogue, kind);
 }

@@ -2,6 +2,7 @@
 #ifndef FARLIGHT_CLIENT_LIB_SCENE_H
 #define FARLIGHT_CLIENT_LIB_SCENE_H
 
+#include "lib/catalogue.h"
 #include "lib/connection.h"
 
 struct fl_scene {
@@ -10,6 +11,7 @@ struct fl_scene {
     struct fl_import_stats stats;
     struct fl_camera_info *cameras;
     size_t camera_count;
+    struct fl_catalogue catalogue;
 };
 
 #endif

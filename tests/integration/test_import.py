@@ -39,6 +39,9 @@ BLOB_OFFER, BLOB_NEED, BLOB_DATA = 0x0110, 0x0111, 0x0112
 EDIT_BEGIN, EDIT_COMMIT = 0x0120, 0x0121
 SET_NODE, SET_MESH, SET_SPHERES, SET_MATERIAL = 0x0130, 0x0131, 0x0132, 0x0134
 SET_TEXTURE, SET_LIGHT, SET_CAMERA, SET_ENVIRONMENT = 0x0135, 0x0136, 0x0137, 0x0138
+SET_SKIN, SET_CLIP, SET_CHANNEL = 0x0139, 0x013a, 0x013b
+TRANSLATION, ROTATION, SCALE, WEIGHTS = 0, 1, 2, 3
+STEP, LINEAR, CUBIC = 0, 1, 2
 IMPORT_NOTE, IMPORT_CLIP, IMPORT_PROGRESS, IMPORT_DONE = 0x8301, 0x8302, 0x8303, 0x8304
 UPLOAD_CHANNEL = 1
 CHUNK = 1 << 20
@@ -75,11 +78,11 @@ def decode(kind, payload):
     if kind == SET_NODE:
         node, parent, node_kind, thing, hidden = f.take("5I")
         return dict(id=node, parent=parent, kind=node_kind, object=thing, hidden=hidden, matrix=f.take("12f"),
-                    name=f.string())
+                    skin=f.take("I"), weights=f.array("f"), name=f.string())
     if kind == SET_MESH:
-        mesh, vertices, triangles = f.take("3I")
-        return dict(id=mesh, vertices=vertices, triangles=triangles, arrays=blob_refs(f), ranges=f.array("3I"),
-                    name=f.string())
+        mesh, vertices, triangles, influences, targets = f.take("5I")
+        return dict(id=mesh, vertices=vertices, triangles=triangles, influences=influences, targets=targets,
+                    arrays=blob_refs(f), ranges=f.array("3I"), weights=f.array("f"), name=f.string())
     if kind == SET_SPHERES:
         spheres, count = f.take("2I")
         return dict(id=spheres, count=count, arrays=blob_refs(f), ranges=f.array("3I"), name=f.string())
@@ -103,6 +106,13 @@ def decode(kind, payload):
         return dict(id=f.take("I"), fov_y=f.take("f"), height=f.take("f"), near=f.take("f"), name=f.string())
     if kind == SET_ENVIRONMENT:
         return dict(id=0, colour=f.take("3f"), rotation=f.take("f"), size=f.take("2I"), arrays=blob_refs(f))
+    if kind == SET_SKIN:
+        return dict(id=f.take("I"), joints=f.take("I"), arrays=blob_refs(f), name=f.string())
+    if kind == SET_CLIP:
+        return dict(id=f.take("I"), arrays=blob_refs(f), name=f.string())
+    if kind == SET_CHANNEL:
+        names = ("id", "clip", "path", "object", "interpolation", "width", "keys", "first_time", "first_value")
+        return dict(zip(names, f.take("9I")))
     raise AssertionError("unexpected edit 0x%04x" % kind)
 
 
@@ -201,7 +211,8 @@ class Peer:
             result.notes.append((fields.take("I"), fields.string(), fields.string()))
         elif kind == IMPORT_CLIP:
             fields = Fields(payload)
-            result.clips.append((fields.take("I"), fields.take("f"), fields.string()))
+            result.clips.append(dict(id=fields.take("I"), channels=fields.take("I"), duration=fields.take("f"),
+                                     name=fields.string()))
         elif kind == BLOB_OFFER:
             self.on_offer(request, payload)
         elif kind == BLOB_DATA:
@@ -298,13 +309,64 @@ def import_files(paths, **options):
         return list(zip(paths, pool.map(lambda path: import_file(path, **options), paths)))
 
 
-def array_widths():
-    return (12, None, 12, 16, 8, 8, 4)
+def array_widths(mesh):
+    """Bytes of a vertex in each array; the second one has 12 a triangle."""
+    influences, targets = mesh["influences"], mesh["targets"]
+    return (12, None, 12, 16, 8, 8, 4, 2 * influences, 4 * influences) + (12 * targets,) * 3
+
+
+def animation_inconsistencies(result):
+    found = []
+    nodes = {e["id"]: e for e in result.of(SET_NODE)}
+    meshes = {e["id"]: e for e in result.of(SET_MESH)}
+    skins = {e["id"]: e for e in result.of(SET_SKIN)}
+    clips = {e["id"]: memoryview(result.data(e["arrays"][0])).cast("f") for e in result.of(SET_CLIP)}
+    order = [(kind, edit["id"]) for kind, edit in result.edits]
+    for skin in skins.values():
+        joints = memoryview(result.data(skin["arrays"][0])).cast("I")
+        if len(joints) != skin["joints"] or any(joint not in nodes for joint in joints):
+            found.append("skin %d: joints" % skin["id"])
+        if any(order.index((SET_NODE, joint)) > order.index((SET_SKIN, skin["id"])) for joint in joints):
+            found.append("skin %d: a joint comes after it" % skin["id"])
+        if len(skin["arrays"]) == 2 and skin["arrays"][1][0] != skin["joints"] * 48:
+            found.append("skin %d: matrices" % skin["id"])
+    for node in nodes.values():
+        mesh = meshes[node["object"]] if node["kind"] == 1 else None
+        if node["skin"]:
+            if not mesh or not mesh["influences"] or node["skin"] not in skins:
+                found.append("node %d: skin" % node["id"])
+            elif max(memoryview(result.data(mesh["arrays"][7])).cast("H")) >= skins[node["skin"]]["joints"]:
+                found.append("node %d: its mesh names joints that its skin has not" % node["id"])
+        if len(node["weights"]) > (mesh["targets"] if mesh else 0):
+            found.append("node %d: weights" % node["id"])
+    moved = {}
+    for channel in result.of(SET_CHANNEL):
+        floats, path, node = clips.get(channel["clip"], ()), channel["path"], nodes.get(channel["object"])
+        count = channel["keys"] * channel["width"] * (3 if channel["interpolation"] == CUBIC else 1)
+        times = list(floats[channel["first_time"]:channel["first_time"] + channel["keys"]])
+        width = {TRANSLATION: 3, ROTATION: 4, SCALE: 3}.get(path)
+        if path == WEIGHTS and node and node["kind"] == 1:
+            width = meshes[node["object"]]["targets"]
+        if (len(times) != channel["keys"] or times != sorted(set(times)) or channel["width"] != width or
+                channel["first_value"] + count > len(floats)):
+            found.append("channel %d" % channel["id"])
+        key = (channel["clip"], channel["object"])
+        if path in moved.setdefault(key, set()):
+            found.append("channel %d: a second one of its property" % channel["id"])
+        moved[key].add(path)
+    found += ["node %d of clip %d: paths %s" % (node, clip, paths) for (clip, node), paths in moved.items()
+              if paths - {WEIGHTS} not in (set(), {TRANSLATION, ROTATION, SCALE})]
+    listed = [clip["id"] for clip in result.clips if clip["id"]]
+    if sorted(listed) != sorted(clips) or len(set(listed)) != len(listed):
+        found.append("the clips %s are told as %s" % (sorted(clips), listed))
+    if any(value - value != 0 for floats in clips.values() for value in floats):
+        found.append("a clip with numbers that are not finite")
+    return found
 
 
 def inconsistencies(result):
     """What a server would refuse, and a little more."""
-    found = []
+    found = animation_inconsistencies(result)
     meshes = {e["id"]: e for e in result.of(SET_MESH)}
     spheres = {e["id"]: e for e in result.of(SET_SPHERES)}
     materials = {e["id"] for e in result.of(SET_MATERIAL)} | {0}
@@ -313,10 +375,13 @@ def inconsistencies(result):
     things = [None, meshes, spheres, {e["id"] for e in result.of(SET_LIGHT)}, {e["id"] for e in result.of(SET_CAMERA)}]
     for mesh in meshes.values():
         for number, (size, name) in enumerate(mesh["arrays"]):
-            width = array_widths()[number]
-            wanted = mesh["triangles"] * 12 if number == 1 else mesh["vertices"] * width
+            wanted = mesh["triangles"] * 12 if number == 1 else mesh["vertices"] * array_widths(mesh)[number]
             if size != wanted and not (size == 0 and number > 1):
                 found.append("mesh %d array %d has %d bytes, not %d" % (mesh["id"], number, size, wanted))
+        if (mesh["influences"] > 0) != (len(mesh["arrays"]) > 8 and mesh["arrays"][8][0] > 0):
+            found.append("mesh %d: %d influences" % (mesh["id"], mesh["influences"]))
+        if (mesh["targets"] > 0) != (len(mesh["arrays"]) > 9) or len(mesh["weights"]) > mesh["targets"]:
+            found.append("mesh %d: %d morph targets" % (mesh["id"], mesh["targets"]))
         if max(memoryview(result.data(mesh["arrays"][1])).cast("I")) >= mesh["vertices"]:
             found.append("mesh %d: index out of range" % mesh["id"])
         positions = memoryview(result.data(mesh["arrays"][0])).cast("f")
@@ -685,7 +750,7 @@ class Written(unittest.TestCase):
         self.assertEqual(result.of(SET_MESH)[0]["triangles"], 1)
         self.assertIn("NaN", result.text())
 
-    def test_gltf_morph_targets_have_their_default_weights(self):
+    def test_gltf_morph_targets_and_their_default_weights(self):
         data = TRIANGLE + struct.pack("<9f", 0, 0, 2, 0, 0, 2, 0, 0, 2)
         views = [{"buffer": 0, "byteOffset": at, "byteLength": 36} for at in (0, 36)]
         result = self.run_gltf(
@@ -694,8 +759,11 @@ class Written(unittest.TestCase):
                                                             "targets": [{"POSITION": 1}]}]}]},
             data=data, views=views,
             accessors=[{"bufferView": i, "componentType": 5126, "count": 3, "type": "VEC3"} for i in (0, 1)])
-        heights = [self.floats(result, mesh, 0)[2] for mesh in result.of(SET_MESH)]
-        self.assertEqual(heights, [1, 2])
+        mesh, = result.of(SET_MESH)
+        self.assertEqual((mesh["targets"], mesh["weights"]), (1, [0.5]))
+        self.assertEqual(self.floats(result, mesh, 0)[2], 0, "as the file has it")
+        self.assertEqual(self.floats(result, mesh, 9), [0, 0, 2] * 3)
+        self.assertEqual([node["weights"] for node in result.of(SET_NODE)], [[], [1]])
 
     def test_obj_faces_and_materials(self):
         with open(os.path.join(self.folder.name, "m.mtl"), "w", encoding="utf-8") as file:

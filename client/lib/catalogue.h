@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: MIT */
+/* What an import made, by name: remembered while its messages pass, asked by those who write scripts. Knows no
+ * I/O. The importer is not trusted: memory is bounded, what comes beyond is only counted. */
+#ifndef FARLIGHT_CLIENT_LIB_CATALOGUE_H
+#define FARLIGHT_CLIENT_LIB_CATALOGUE_H
+
+#include "lib/farlight.h"
+
+enum fl_catalogue_list {
+    FL_CATALOGUE_NODES,
+    FL_CATALOGUE_MATERIALS,
+    FL_CATALOGUE_LIGHTS,
+    FL_CATALOGUE_LIGHT_NODES, /* lights by the names of the nodes that show them */
+    FL_CATALOGUE_LIST_COUNT
+};
+
+struct fl_catalogue_entry {
+    uint32_t id;
+    uint32_t name; /* where it begins in `text` */
+};
+
+struct fl_catalogue {
+    struct {
+        struct fl_catalogue_entry *entries;
+        size_t count, capacity;
+        uint64_t left_out;
+    } lists[FL_CATALOGUE_LIST_COUNT];
+    char *text; /* names behind each other, each with its NUL */
+    size_t text_bytes, text_capacity;
+    struct fl_clip_info *clips;
+    size_t clip_count, clip_capacity;
+    uint32_t greatest_id[PROTOCOL_OBJECT_KIND_COUNT];
+};
+
+/* Looks at one message of an importer's. */
+bool fl_catalogue_observe(struct fl_catalogue *catalogue, const struct message *message, struct fl_error *error);
+void fl_catalogue_finish(struct fl_catalogue *catalogue);
+
+/* As fl_scene_find_object() and fl_scene_find_clip(). */
+bool fl_catalogue_find(const struct fl_catalogue *catalogue, enum protocol_object_kind kind, const char *which,
+                       uint32_t *id, struct fl_error *error);
+bool fl_catalogue_find_clip(const struct fl_catalogue *catalogue, const char *which, uint32_t *clip,
+                            const struct fl_clip_info **info, struct fl_error *error);
+/* As fl_scene_new_id(). */
+uint32_t fl_catalogue_new_id(struct fl_catalogue *catalogue, enum protocol_object_kind kind);
+
+/* Grows *items to hold one more than `count`; at most 16 M. */
+bool fl_grow(void **items, size_t *capacity, size_t count, size_t item_bytes, struct fl_error *error);
+
+#endif
