@@ -79,6 +79,18 @@ static bool set_folder(struct fl_video *video, const char *path, struct fl_error
     return true;
 }
 
+/* What no message can hold is named after the message's field, which has the option's name. Returns false. */
+static bool name_option(struct fl_error *error)
+{
+    static const char prefix[] = "video_begin.";
+    const size_t skipped = sizeof prefix - 1;
+    if (error != NULL && strncmp(error->field, prefix, skipped) == 0) {
+        memmove(error->field, error->field + skipped, strlen(error->field) - skipped + 1);
+        error->code = FL_ERROR_ARGUMENT;
+    }
+    return false;
+}
+
 static bool send_begin(struct fl_video *video, const struct fl_video_options *options, struct fl_error *error)
 {
     char model[4096];
@@ -92,8 +104,9 @@ static bool send_begin(struct fl_video *video, const struct fl_video_options *op
     begin->format = options->format != NULL ? options->format : "";
     begin->codec = options->codec != NULL ? options->codec : "";
     begin->model = model;
-    return fl_helper_send(&video->helper, &message, error) && fl_helper_flush(&video->helper, error) &&
-           await_begun(video, error);
+    if (!fl_helper_send(&video->helper, &message, error))
+        return name_option(error);
+    return fl_helper_flush(&video->helper, error) && await_begun(video, error);
 }
 
 struct fl_video *fl_video_start(const struct fl_video_options *options, struct fl_error *error)

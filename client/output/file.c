@@ -67,6 +67,12 @@ int file_begin(const char *path, char *reason, size_t reason_bytes)
         fail(reason, reason_bytes, ENAMETOOLONG);
         return -1;
     }
+    /* A folder of that name would only be in the way of the rename. */
+    struct stat status;
+    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
+        fail(reason, reason_bytes, EISDIR);
+        return -1;
+    }
     is_unfinished = 1;
     const int fd = mkostemp(unfinished, O_CLOEXEC);
     if (fd < 0) {

@@ -406,14 +406,18 @@ static void what_cannot_be_written_is_said_before_the_first_frame(void **state)
     static const struct {
         const char *name;
         struct fl_video_options options;
-        const char *text, *remedy;
+        const char *text, *remedy, *field; /* NULL: the path */
     } rows[] = {
-        {"missing/a.mp4", {0}, "No such file", ""},
-        {"a.avi", {0}, "the ending names no format", ".mp4 or .mkv"},
-        {"a.mp4", {.lossless = true}, "an MP4 file does not hold FFV1", ".mkv"},
-        {"a.mkv", {.lossless = true, .codec = "h264"}, "h264 is not lossless, which is asked for", "leave"},
-        {"a.mkv", {.codec = "ffv1"}, "ffv1 is lossless, which is not asked for", "ask for lossless"},
-        {"a.mp4", {.codec = "h264_v4l2m2m"}, "is no codec that can be written", "h264, mpeg4 and ffv1"}};
+        {"missing/a.mp4", {0}, "No such file", "", NULL},
+        {"", {.format = "mp4"}, "Is a directory", "", NULL},
+        {"a.avi", {0}, "the ending names no format", ".mp4 or .mkv", NULL},
+        {"a.mp4", {.lossless = true}, "an MP4 file does not hold FFV1", ".mkv", NULL},
+        {"a.mkv", {.lossless = true, .codec = "h264"}, "h264 is not lossless, which is asked", "leave", NULL},
+        {"a.mkv", {.codec = "ffv1"}, "ffv1 is lossless, which is not asked for", "ask for lossless", NULL},
+        {"a.mp4", {.codec = "h264_v4l2m2m"}, "is no codec that can be written", "h264, mpeg4", NULL},
+        {"a.mp4", {.frames_per_second = 2000}, "not within 0.001 .. 1000", "", "frames_per_second"},
+        {"a.mp4", {.quality = 52}, "not within 0 .. 51", "", "quality"},
+        {"\xff.mp4", {0}, "no UTF-8", "", "path"}};
     need(false);
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct fl_video_options options = rows[i].options;
@@ -421,11 +425,25 @@ static void what_cannot_be_written_is_said_before_the_first_frame(void **state)
         error = (struct fl_error){0};
         if (fl_video_start(&options, &error) != NULL)
             fail_msg("%s was begun", video_path);
-        assert_int_equal(error.code, FL_ERROR_FILE);
-        assert_string_equal(error.field, video_path);
+        assert_int_equal(error.code, rows[i].field == NULL ? FL_ERROR_FILE : FL_ERROR_ARGUMENT);
+        assert_string_equal(error.field, rows[i].field == NULL ? video_path : rows[i].field);
         if (strstr(error.text, rows[i].text) == NULL || strstr(error.remedy, rows[i].remedy) == NULL)
             fail_msg("%s: %s (%s)", error.field, error.text, error.remedy);
         assert_int_equal(count_files(), 0);
+    }
+}
+
+static void the_smallest_picture_makes_a_video(void **state)
+{
+    (void)state;
+    static const char *const codecs[] = {"h264", "mpeg4"};
+    uint8_t *decoded;
+    need(true);
+    for (size_t i = 0; i < 2; i++) {
+        write_video(&(struct fl_video_options){.path = path_of("a.mp4"), .codec = codecs[i]}, 2, 1, 1);
+        assert_int_equal(decode(video_path, "yuv420p", &decoded), 2 * 2 * 2 * 3 / 2);
+        free(decoded);
+        unlink(video_path);
     }
 }
 
@@ -782,6 +800,7 @@ int main(void)
         cmocka_unit_test(a_lossless_video_gives_every_pixel_back),
         cmocka_unit_test(an_odd_picture_repeats_its_last_column_and_row),
         cmocka_unit_test(mpeg4_is_there_for_those_who_ask),
+        cmocka_unit_test(the_smallest_picture_makes_a_video),
         cmocka_unit_test(lower_quality_makes_smaller_files),
         cmocka_unit_test(what_cannot_be_written_is_said_before_the_first_frame),
         cmocka_unit_test(a_frame_that_does_not_fit_ends_the_video_and_nothing_is_left),
