@@ -68,16 +68,22 @@ bool blend(uint vertex, out vec4 rows[3])
     return sum > 0.0;
 }
 
+// What has no direction stays as it is. (The square of small numbers would be none.)
+vec3 unit_or_same(vec3 v)
+{
+    float scale = greatest(abs(v));
+    return scale > 0.0 && scale <= FLOAT_MAX ? normalize(v / scale) : v;
+}
+
 // By the cofactors, which are the inverse transpose but for a factor; its sign keeps a mirrored normal outside.
 vec3 moved_normal(vec4 rows[3], vec3 normal, float determinant)
 {
     vec3 moved = vec3(dot(cross(rows[1].xyz, rows[2].xyz), normal), dot(cross(rows[2].xyz, rows[0].xyz), normal),
                       dot(cross(rows[0].xyz, rows[1].xyz), normal));
-    float scale = greatest(abs(moved)); // the square of small numbers would be none
+    float scale = greatest(abs(moved));
     if (!(scale > 0.0 && scale <= FLOAT_MAX))
         return normal;
-    moved = normalize(moved / scale);
-    return determinant < 0.0 ? -moved : moved;
+    return determinant < 0.0 ? -unit_or_same(moved) : unit_or_same(moved);
 }
 
 uint pack_unit_or_zero(vec3 v)
@@ -113,6 +119,9 @@ void main()
             tangent.xyz += weight_target.x * texelFetch(target_tangents, target).xyz;
 #endif
     }
+#ifdef HAS_NORMALS
+    normal = unit_or_same(normal);
+#endif
     float handedness = 0.0;
 #ifdef HAS_TANGENTS
     handedness = tangent.w < 0.0 ? -1.0 : 1.0;
