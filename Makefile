@@ -305,7 +305,9 @@ FUZZ_SEED := $(B)/tests/fuzz/seed
 $(FUZZ_SEED): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
-	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ -o $@
+	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
+$(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ))
+$(B)/tests/fuzz/fuzz_scene: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
 .PHONY: fuzz $(addprefix run-fuzz-,$(FUZZERS))
 ifeq ($(config),fuzz)
 fuzz: $(addprefix run-fuzz-,$(FUZZERS))
