@@ -7,26 +7,6 @@
 
 #define NODES_MAX_DEFAULT (4u << 20)
 
-const void *draft_find(const struct draft *draft, enum scene_object_kind kind, uint32_t id)
-{
-    const struct scene_edit *edit = hashmap_get(&draft->last[kind], id);
-    if (edit)
-        return edit->kind == EDIT_SET ? &edit->set : NULL;
-    return hashmap_get(&draft->scene->objects[kind], id);
-}
-
-bool draft_counts(const struct draft *draft, const struct scene_edit *edit)
-{
-    if (edit->kind == EDIT_SET_ENVIRONMENT)
-        return draft->last_environment == edit;
-    return hashmap_get(&draft->last[edit->object], edit_object_id(edit)) == edit;
-}
-
-struct edit_place draft_place(const struct draft *draft, const struct scene_edit *edit)
-{
-    return (struct edit_place){(size_t)(edit - draft->edits), edit, draft->error};
-}
-
 /* ---- checks ------------------------------------------------------------------------------------- */
 
 static bool content_check(struct scene_edit *edit, const struct edit_place *place)
@@ -45,10 +25,14 @@ static bool content_check(struct scene_edit *edit, const struct edit_place *plac
     case SCENE_DISC:
         return disc_check(&edit->set.disc, place);
     case SCENE_NODE:
-    case SCENE_MATERIAL:
+        return node_check(&edit->set.node, place);
     case SCENE_SKIN:
+        return skin_check(&edit->set.skin, place);
     case SCENE_CLIP:
+        return clip_check(&edit->set.clip, place);
     case SCENE_CHANNEL:
+        return channel_check(&edit->set.channel, place);
+    case SCENE_MATERIAL:
     case SCENE_OBJECT_KIND_COUNT:
         break;
     }
@@ -115,8 +99,11 @@ static struct size draft_size(const struct draft *draft)
                 take_object(&size, kind, now);
         }
     }
-    for (size_t i = 0; i < draft->fallen_count; i++)
-        take_object(&size, SCENE_NODE, scene_node(scene, draft->fallen[i]));
+    for (int k = 0; k < SCENE_OBJECT_KIND_COUNT; k++) {
+        for (size_t i = 0; i < draft->fallen[k].count; i++)
+            take_object(&size, (enum scene_object_kind)k,
+                        hashmap_get(&scene->objects[k], draft->fallen[k].ids[i]));
+    }
     if (draft->last_environment)
         size.host_bytes +=
             environment_bytes(&draft->last_environment->set.environment) - environment_bytes(&scene->environment);
@@ -190,11 +177,11 @@ static void give_room_back(struct draft *draft)
 }
 
 /* Notes that a node of that kind appears, moves or goes. What moves with it is not known when others hang
- * below: then everything may have. */
+ * below: then everything may have. Any node may be the joint of a skin, which moves meshes. */
 static void touch_node(struct scene *scene, const struct scene_node *node)
 {
     bool alone = node->child_count == 0;
-    if (!alone || node->kind == NODE_MESH || node->kind == NODE_SPHERES)
+    if (!alone || scene->objects[SCENE_SKIN].count || node->kind == NODE_MESH || node->kind == NODE_SPHERES)
         scene->instances_revision = scene->revision;
     if (!alone || node->kind == NODE_LIGHT)
         scene->lights_revision = scene->revision;
@@ -208,6 +195,8 @@ static void touch_kind(struct scene *scene, enum scene_object_kind kind)
         scene->shading_revision = scene->revision;
     else if (kind == SCENE_LIGHT)
         scene->lights_revision = scene->revision;
+    else if (kind == SCENE_SKIN)
+        scene->instances_revision = scene->revision;
 }
 
 static void count_child(struct scene *scene, uint32_t parent, int change)
@@ -274,8 +263,10 @@ static void apply(struct draft *draft, const struct size *size)
             memset(&edit->set, 0, sizeof edit->set);
         }
     }
-    for (size_t i = 0; i < draft->fallen_count; i++)
-        apply_remove(scene, SCENE_NODE, draft->fallen[i]);
+    for (int k = 0; k < SCENE_OBJECT_KIND_COUNT; k++) {
+        for (size_t i = 0; i < draft->fallen[k].count; i++)
+            apply_remove(scene, (enum scene_object_kind)k, draft->fallen[k].ids[i]);
+    }
 }
 
 bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_count, struct error *error)
@@ -285,7 +276,8 @@ bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_cou
     bool sound = true;
     for (size_t i = 0; sound && i < edit_count; i++)
         sound = take_edit(&draft, &edits[i]);
-    sound = sound && structure_check(&draft) && references_check(&draft);
+    sound = sound && structure_check(&draft) && companions_check(&draft) && references_check(&draft) &&
+            links_check(&draft);
     if (sound) {
         size = draft_size(&draft);
         sound = limits_check(&draft, &size);
@@ -296,8 +288,6 @@ bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_cou
     }
     if (sound)
         apply(&draft, &size);
-    for (int kind = 0; kind < SCENE_OBJECT_KIND_COUNT; kind++)
-        hashmap_finish(&draft.last[kind]);
-    free(draft.fallen);
+    draft_finish(&draft);
     return sound;
 }

@@ -9,24 +9,43 @@
 #include "scene/edit.h"
 #include "scene/hierarchy.h"
 
+struct draft_list {
+    uint32_t *ids; /* owned */
+    size_t count, capacity;
+};
+
 struct draft {
     struct scene *scene;
     struct scene_edit *edits;
     size_t edit_count;
-    struct hashmap last[SCENE_OBJECT_KIND_COUNT]; /* struct scene_edit *, by object id */
-    struct scene_edit *last_environment;          /* NULL: unchanged */
-    uint32_t *fallen;                             /* owned: nodes that go because one above them is removed */
-    size_t fallen_count;
+    struct hashmap last[SCENE_OBJECT_KIND_COUNT];      /* struct scene_edit *, by object id */
+    struct scene_edit *last_environment;               /* NULL: unchanged */
+    struct draft_list fallen[SCENE_OBJECT_KIND_COUNT]; /* what goes along with what is removed */
+    struct hashmap fallen_nodes;                       /* the same of nodes, by id; NULL is never stored */
     struct error *error;
 };
+void draft_finish(struct draft *draft);
 
 /* The object after all edits, or NULL. Nodes that fall with a removed one are still found. */
 const void *draft_find(const struct draft *draft, enum scene_object_kind kind, uint32_t id);
+/* The same, where those that fall are not found any more. */
+const void *draft_remaining(const struct draft *draft, enum scene_object_kind kind, uint32_t id);
+/* Goes through all objects of a kind that this transaction neither sets nor removes and that do not fall; *cursor
+ * starts at 0. NULL: no more. */
+const void *draft_next_untouched(const struct draft *draft, enum scene_object_kind kind, size_t *cursor);
+bool draft_removes_any(const struct draft *draft, enum scene_object_kind kind);
+/* False: out of memory, which *draft->error says. */
+bool draft_note_fallen(struct draft *draft, enum scene_object_kind kind, uint32_t id);
 /* Whether an edit is the one that counts for its object. */
 bool draft_counts(const struct draft *draft, const struct scene_edit *edit);
 /* Where an error about this edit belongs. */
 struct edit_place draft_place(const struct draft *draft, const struct scene_edit *edit);
 
+/* Channels fall with their clip or with what they change, skins with a joint; finds them. A skin that a remaining
+ * node has does not fall: then the transaction is refused. */
+bool companions_check(struct draft *draft);
+/* Channels have their numbers in their clips, joints of meshes their places in skins. */
+bool links_check(struct draft *draft);
 /* Everything that set objects refer to is there, nothing that is removed is still in use. */
 bool references_check(struct draft *draft);
 /* Parents, circles, depth; finds the fallen nodes. */

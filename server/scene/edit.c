@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "scene/edit.h"
 
+#include "scene/channel.h"
+#include "scene/pose.h"
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -11,7 +14,8 @@ const char *object_kind_name(enum scene_object_kind kind)
     static const char *const names[SCENE_OBJECT_KIND_COUNT] = {
         [SCENE_NODE] = "node",         [SCENE_MESH] = "mesh",       [SCENE_SPHERES] = "spheres",
         [SCENE_MATERIAL] = "material", [SCENE_TEXTURE] = "texture", [SCENE_LIGHT] = "light",
-        [SCENE_CAMERA] = "camera",     [SCENE_DISC] = "disc",
+        [SCENE_CAMERA] = "camera",     [SCENE_DISC] = "disc",       [SCENE_SKIN] = "skin",
+        [SCENE_CLIP] = "clip",         [SCENE_CHANNEL] = "channel",
     };
     return (unsigned)kind < SCENE_OBJECT_KIND_COUNT ? names[kind] : "object";
 }
@@ -100,6 +104,8 @@ size_t object_struct_bytes(enum scene_object_kind kind)
         [SCENE_SPHERES] = sizeof(struct scene_spheres), [SCENE_MATERIAL] = sizeof(struct scene_material),
         [SCENE_TEXTURE] = sizeof(struct scene_texture), [SCENE_LIGHT] = sizeof(struct scene_light),
         [SCENE_CAMERA] = sizeof(struct scene_camera),   [SCENE_DISC] = sizeof(struct scene_disc),
+        [SCENE_SKIN] = sizeof(struct scene_skin),       [SCENE_CLIP] = sizeof(struct scene_clip),
+        [SCENE_CHANNEL] = sizeof(struct scene_channel),
     };
     return sizes[kind];
 }
@@ -109,16 +115,50 @@ static uint64_t blob_bytes(const struct blob *blob)
     return blob ? blob->size_bytes : 0;
 }
 
+/* A channel counts with what it takes in the poses of a frame, which many channels may make much of: they may all
+ * read the same few numbers of a clip. */
+static uint64_t channel_pose_bytes(const struct scene_channel *channel)
+{
+    const struct channel_row *row = channel_row(channel->path);
+    uint64_t bytes = 0;
+    if (!row)
+        return 0;
+    switch (row->target) {
+    case TARGET_NODE:
+        bytes = sizeof(struct pose_node);
+        break;
+    case TARGET_WEIGHTS:
+        bytes = sizeof(struct pose_weights) + channel->width * sizeof(float);
+        break;
+    case TARGET_LIGHT:
+        bytes = sizeof(struct scene_light);
+        break;
+    case TARGET_MATERIAL:
+        bytes = sizeof(struct scene_material);
+        break;
+    case TARGET_VIEW:
+        break;
+    }
+    return bytes * MOTION_POSES_MAX;
+}
+
 uint64_t object_table_bytes(enum scene_object_kind kind, const void *object)
 {
     /* Its slot in the table, at the table's usual load. */
     const uint64_t slot_bytes = 32;
-    uint64_t range_count = 0;
-    if (kind == SCENE_MESH)
+    uint64_t range_count = 0, weight_count = 0, pose_bytes = 0;
+    if (kind == SCENE_MESH) {
         range_count = ((const struct scene_mesh *)object)->range_count;
-    else if (kind == SCENE_SPHERES)
+        weight_count = ((const struct scene_mesh *)object)->weight_count;
+    } else if (kind == SCENE_SPHERES) {
         range_count = ((const struct scene_spheres *)object)->range_count;
-    return object_struct_bytes(kind) + slot_bytes + range_count * sizeof(struct material_range);
+    } else if (kind == SCENE_NODE) {
+        weight_count = ((const struct scene_node *)object)->weight_count;
+    } else if (kind == SCENE_CHANNEL) {
+        pose_bytes = channel_pose_bytes(object);
+    }
+    return object_struct_bytes(kind) + slot_bytes + range_count * sizeof(struct material_range) +
+           weight_count * sizeof(float) + pose_bytes;
 }
 
 uint64_t object_bytes(enum scene_object_kind kind, const void *object)
@@ -132,6 +172,11 @@ uint64_t object_bytes(enum scene_object_kind kind, const void *object)
         bytes += blob_bytes(((const struct scene_spheres *)object)->centres_radii);
     } else if (kind == SCENE_TEXTURE) {
         bytes += blob_bytes(((const struct scene_texture *)object)->texels);
+    } else if (kind == SCENE_SKIN) {
+        const struct scene_skin *skin = object;
+        bytes += blob_bytes(skin->joints) + blob_bytes(skin->joint_from_mesh);
+    } else if (kind == SCENE_CLIP) {
+        bytes += blob_bytes(((const struct scene_clip *)object)->floats);
     }
     return bytes;
 }
@@ -141,17 +186,28 @@ uint64_t environment_bytes(const struct scene_environment *environment)
     return blob_bytes(environment->texels);
 }
 
+static void release_mesh(struct scene_mesh *mesh)
+{
+    for (int i = 0; i < MESH_ARRAY_COUNT; i++) {
+        blob_unref(mesh->arrays[i]);
+        mesh->arrays[i] = NULL;
+    }
+    free(mesh->ranges);
+    free(mesh->weights);
+    mesh->ranges = NULL;
+    mesh->weights = NULL;
+    mesh->range_count = mesh->weight_count = 0;
+}
+
 void object_release(enum scene_object_kind kind, void *object)
 {
-    if (kind == SCENE_MESH) {
-        struct scene_mesh *mesh = object;
-        for (int i = 0; i < MESH_ARRAY_COUNT; i++) {
-            blob_unref(mesh->arrays[i]);
-            mesh->arrays[i] = NULL;
-        }
-        free(mesh->ranges);
-        mesh->ranges = NULL;
-        mesh->range_count = 0;
+    if (kind == SCENE_NODE) {
+        struct scene_node *node = object;
+        free(node->weights);
+        node->weights = NULL;
+        node->weight_count = 0;
+    } else if (kind == SCENE_MESH) {
+        release_mesh(object);
     } else if (kind == SCENE_SPHERES) {
         struct scene_spheres *spheres = object;
         blob_unref(spheres->centres_radii);
@@ -163,6 +219,15 @@ void object_release(enum scene_object_kind kind, void *object)
         struct scene_texture *texture = object;
         blob_unref(texture->texels);
         texture->texels = NULL;
+    } else if (kind == SCENE_SKIN) {
+        struct scene_skin *skin = object;
+        blob_unref(skin->joints);
+        blob_unref(skin->joint_from_mesh);
+        skin->joints = skin->joint_from_mesh = NULL;
+    } else if (kind == SCENE_CLIP) {
+        struct scene_clip *clip = object;
+        blob_unref(clip->floats);
+        clip->floats = NULL;
     }
 }
 

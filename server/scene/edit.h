@@ -26,12 +26,18 @@ bool texture_check(const struct scene_texture *texture, const struct edit_place 
 bool light_check(const struct scene_light *light, const struct edit_place *place);
 bool camera_check(const struct scene_camera *camera, const struct edit_place *place);
 bool disc_check(const struct scene_disc *disc, const struct edit_place *place);
+bool node_check(const struct scene_node *node, const struct edit_place *place);
+bool skin_check(const struct scene_skin *skin, const struct edit_place *place);
+bool clip_check(const struct scene_clip *clip, const struct edit_place *place);
+bool channel_check(const struct scene_channel *channel, const struct edit_place *place);
 bool environment_check(const struct scene_environment *environment, const struct edit_place *place);
 
 /* Pieces that several of them use. */
 #define COORDINATE_MAX 1e18f /* beyond it, squares leave the range of floats */
 bool ranges_check(const struct material_range *ranges, uint32_t range_count, uint32_t primitive_count,
                   const struct edit_place *place);
+/* Weights of morph targets. */
+bool weights_check(const float *weights, uint32_t count, const struct edit_place *place);
 /* The blob holds `count` elements of `element_bytes`, neither more nor less. */
 bool array_size_check(const struct blob *blob, uint64_t count, uint64_t element_bytes, const char *path,
                       const struct edit_place *place);

@@ -4,21 +4,88 @@
 #include "scene/edit.h"
 
 #include <float.h>
+#include <stdio.h>
+
+/* What there is a number of elements of. */
+enum array_of { PER_VERTEX, PER_TRIANGLE, PER_INFLUENCE, PER_TARGET };
 
 struct array_row {
     const char *path;
-    unsigned components; /* 4 bytes each; 0: 4 bytes a vertex that need no check */
-    bool per_triangle, required;
+    unsigned components; /* 4 bytes each, floats but for the indices; 0: `bytes` an element, no floats */
+    unsigned bytes;
+    enum array_of of;
+    bool required;
+    float greatest; /* 0: any finite number */
 };
 static const struct array_row array_rows[MESH_ARRAY_COUNT] = {
-    [MESH_POSITIONS] = {.path = ".arrays[0] (positions)", .components = 3, .required = true},
-    [MESH_INDICES] = {.path = ".arrays[1] (indices)", .components = 3, .per_triangle = true, .required = true},
+    [MESH_POSITIONS] = {.path = ".arrays[0] (positions)",
+                        .components = 3,
+                        .required = true,
+                        .greatest = COORDINATE_MAX},
+    [MESH_INDICES] = {.path = ".arrays[1] (indices)", .components = 3, .of = PER_TRIANGLE, .required = true},
     [MESH_NORMALS] = {.path = ".arrays[2] (normals)", .components = 3},
     [MESH_TANGENTS] = {.path = ".arrays[3] (tangents)", .components = 4},
     [MESH_TEXCOORDS_0] = {.path = ".arrays[4] (texture coordinates 0)", .components = 2},
     [MESH_TEXCOORDS_1] = {.path = ".arrays[5] (texture coordinates 1)", .components = 2},
-    [MESH_COLOURS] = {.path = ".arrays[6] (colours)", .components = 0},
+    [MESH_COLOURS] = {.path = ".arrays[6] (colours)", .bytes = 4},
+    [MESH_JOINTS] = {.path = ".arrays[7] (joints)", .bytes = 2, .of = PER_INFLUENCE},
+    [MESH_WEIGHTS] = {.path = ".arrays[8] (joint weights)",
+                      .components = 1,
+                      .of = PER_INFLUENCE,
+                      .greatest = COORDINATE_MAX},
+    [MESH_TARGET_POSITIONS] = {.path = ".arrays[9] (target positions)",
+                               .components = 3,
+                               .of = PER_TARGET,
+                               .greatest = COORDINATE_MAX},
+    [MESH_TARGET_NORMALS] = {.path = ".arrays[10] (target normals)",
+                             .components = 3,
+                             .of = PER_TARGET,
+                             .greatest = COORDINATE_MAX},
+    [MESH_TARGET_TANGENTS] = {.path = ".arrays[11] (target tangents)",
+                              .components = 3,
+                              .of = PER_TARGET,
+                              .greatest = COORDINATE_MAX},
 };
+
+/* Elements of an array; neither product leaves 64 bits. */
+static uint64_t element_count(const struct scene_mesh *mesh, const struct array_row *row)
+{
+    switch (row->of) {
+    case PER_TRIANGLE:
+        return mesh->triangle_count;
+    case PER_INFLUENCE:
+        return (uint64_t)mesh->vertex_count * mesh->influence_count;
+    case PER_TARGET:
+        return (uint64_t)mesh->vertex_count * mesh->target_count;
+    case PER_VERTEX:
+        break;
+    }
+    return mesh->vertex_count;
+}
+
+/* Whether arrays and counts speak of the same: joints come with their weights, targets with what they add. */
+static bool company_check(const struct scene_mesh *mesh, const struct edit_place *place)
+{
+    for (int i = MESH_JOINTS; i < MESH_ARRAY_COUNT; i++) {
+        bool of_joints = i == MESH_JOINTS || i == MESH_WEIGHTS;
+        const char *count_name = of_joints ? "influence_count" : "target_count";
+        uint32_t count = of_joints ? mesh->influence_count : mesh->target_count;
+        bool needed = of_joints || i == MESH_TARGET_POSITIONS;
+        if (count && needed && !mesh->arrays[i])
+            return edit_error(place, ERROR_INVALID, array_rows[i].path, "%s is %u, so a mesh needs this array",
+                              count_name, count);
+        if (!count && mesh->arrays[i])
+            return edit_error(place, ERROR_INVALID, array_rows[i].path, "%s is 0, so this array must be missing",
+                              count_name);
+    }
+    if (mesh->influence_count > MESH_INFLUENCES_MAX)
+        return edit_error(place, ERROR_INVALID, ".influence_count", "%u is more than %d", mesh->influence_count,
+                          MESH_INFLUENCES_MAX);
+    if (mesh->target_count > MESH_TARGETS_MAX)
+        return edit_error(place, ERROR_INVALID, ".target_count", "%u is more than %d", mesh->target_count,
+                          MESH_TARGETS_MAX);
+    return true;
+}
 
 static bool sizes_check(const struct scene_mesh *mesh, const struct edit_place *place)
 {
@@ -29,12 +96,20 @@ static bool sizes_check(const struct scene_mesh *mesh, const struct edit_place *
                 return edit_error(place, ERROR_INVALID, row->path, "a mesh needs this array");
             continue;
         }
-        uint64_t element_bytes = row->components ? row->components * 4u : 4u;
-        uint32_t count = row->per_triangle ? mesh->triangle_count : mesh->vertex_count;
-        if (!array_size_check(mesh->arrays[i], count, element_bytes, row->path, place))
+        uint64_t element_bytes = row->components ? row->components * 4u : row->bytes;
+        if (!array_size_check(mesh->arrays[i], element_count(mesh, row), element_bytes, row->path, place))
             return false;
     }
     return true;
+}
+
+/* "vertex 7", of a target "vertex 7 of target 2" */
+static void name_element(const struct scene_mesh *mesh, const struct array_row *row, size_t element, char name[64])
+{
+    if (row->of == PER_TARGET)
+        snprintf(name, 64, "vertex %zu of target %zu", element % mesh->vertex_count, element / mesh->vertex_count);
+    else
+        snprintf(name, 64, "vertex %zu", row->of == PER_INFLUENCE ? element / mesh->influence_count : element);
 }
 
 static bool floats_check(const struct scene_mesh *mesh, const struct edit_place *place)
@@ -44,17 +119,43 @@ static bool floats_check(const struct scene_mesh *mesh, const struct edit_place 
         if (!mesh->arrays[i] || !row->components || i == MESH_INDICES)
             continue;
         const float *values = (const float *)(const void *)mesh->arrays[i]->data;
-        size_t count = (size_t)mesh->vertex_count * row->components;
-        float greatest = i == MESH_POSITIONS ? COORDINATE_MAX : FLT_MAX;
-        size_t bad = first_bad_float(values, count, greatest);
+        size_t count = (size_t)element_count(mesh, row) * row->components;
+        size_t bad = first_bad_float(values, count, row->greatest > 0.0f ? row->greatest : FLT_MAX);
         if (bad == count)
             continue;
-        edit_error(place, ERROR_INVALID, row->path, "vertex %zu has %g as component %zu", bad / row->components,
-                   (double)values[bad], bad % row->components);
+        char name[64];
+        name_element(mesh, row, bad / row->components, name);
+        edit_error(place, ERROR_INVALID, row->path, "%s has %g as component %zu", name, (double)values[bad],
+                   row->of == PER_INFLUENCE ? bad % mesh->influence_count : bad % row->components);
         return error_remedy(place->error, "numbers must be finite%s",
-                            i == MESH_POSITIONS ? " and not beyond 1e18" : "");
+                            row->greatest > 0.0f ? " and not beyond 1e18" : "");
     }
     return true;
+}
+
+/* Weights are not negative; how far the joints reach is noted, as a skin must have that many. */
+static bool influences_check(struct scene_mesh *mesh, const struct edit_place *place)
+{
+    mesh->joint_places = 0;
+    if (!mesh->influence_count)
+        return true;
+    const uint16_t *joints = (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data;
+    const float *weights = (const float *)(const void *)mesh->arrays[MESH_WEIGHTS]->data;
+    size_t count = (size_t)mesh->vertex_count * mesh->influence_count;
+    uint16_t greatest = 0;
+    float least = 0.0f;
+    for (size_t i = 0; i < count; i++)
+        greatest = joints[i] > greatest ? joints[i] : greatest;
+    for (size_t i = 0; i < count; i++)
+        least = weights[i] < least ? weights[i] : least;
+    mesh->joint_places = greatest + 1u;
+    if (least >= 0.0f)
+        return true;
+    size_t bad = 0;
+    while (weights[bad] >= 0.0f)
+        bad++;
+    return edit_error(place, ERROR_INVALID, array_rows[MESH_WEIGHTS].path, "vertex %zu has the weight %g",
+                      bad / mesh->influence_count, (double)weights[bad]);
 }
 
 /* A block has a constant length, so that the compiler does several indices at a time. */
@@ -121,6 +222,8 @@ bool mesh_check(struct scene_mesh *mesh, const struct edit_place *place)
     if (!mesh->vertex_count || !mesh->triangle_count)
         return edit_error(place, ERROR_INVALID, mesh->vertex_count ? ".triangle_count" : ".vertex_count",
                           "a mesh has at least one triangle");
-    return sizes_check(mesh, place) && floats_check(mesh, place) && indices_check(mesh, place) &&
+    return company_check(mesh, place) && sizes_check(mesh, place) && floats_check(mesh, place) &&
+           influences_check(mesh, place) && indices_check(mesh, place) &&
+           weights_check(mesh->weights, mesh->weight_count, place) &&
            ranges_check(mesh->ranges, mesh->range_count, mesh->triangle_count, place);
 }

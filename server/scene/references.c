@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Who refers to whom: nodes to what hangs there, primitives to materials, materials to textures. */
+/* Who refers to whom: nodes to what hangs there, primitives to materials, materials to textures,
+ * skins to nodes, channels to what they change. */
+#include "scene/channel.h"
 #include "scene/draft.h"
 
 #include <stdio.h>
@@ -59,31 +61,71 @@ static bool next_in_material(const struct scene_material *material, uint32_t *cu
     return false;
 }
 
+static bool next_in_node(const struct scene_node *node, uint32_t *cursor, struct reference *reference)
+{
+    if ((*cursor)++ == 0) {
+        *reference = (struct reference){.id = node->object, .path = ".object"};
+        if (node_kind_object(node->kind, &reference->kind))
+            return true;
+        (*cursor)++;
+    }
+    *reference = (struct reference){.kind = SCENE_SKIN, .id = node->skin, .path = ".skin"};
+    return *cursor == 2 && node->skin;
+}
+
+static bool next_in_skin(const struct scene_skin *skin, uint32_t *cursor, struct reference *reference)
+{
+    if (*cursor >= skin->joint_count)
+        return false;
+    uint32_t i = (*cursor)++;
+    const uint32_t *joints = (const uint32_t *)(const void *)skin->joints->data;
+    *reference = (struct reference){.kind = SCENE_NODE, .id = joints[i]};
+    snprintf(reference->path, sizeof reference->path, ".arrays[0] (joints)[%u]", i);
+    return true;
+}
+
+static bool next_in_channel(const struct scene_channel *channel, uint32_t *cursor, struct reference *reference)
+{
+    const struct channel_row *row = channel_row(channel->path);
+    if ((*cursor)++ == 0) {
+        *reference = (struct reference){.kind = SCENE_CLIP, .id = channel->clip, .path = ".clip"};
+        return true;
+    }
+    *reference = (struct reference){.id = channel->object, .path = ".object"};
+    return *cursor == 2 && row && channel_object_kind(row->target, &reference->kind);
+}
+
 /* *cursor starts at 0. False: no more references. */
 static bool next_reference(enum scene_object_kind kind, const void *object, uint32_t *cursor,
                            struct reference *reference)
 {
-    if (kind == SCENE_MESH) {
+    switch (kind) {
+    case SCENE_NODE:
+        return next_in_node(object, cursor, reference);
+    case SCENE_MESH: {
         const struct scene_mesh *mesh = object;
         return next_in_ranges(mesh->ranges, mesh->range_count, cursor, reference);
     }
-    if (kind == SCENE_SPHERES) {
+    case SCENE_SPHERES: {
         const struct scene_spheres *spheres = object;
         return next_in_ranges(spheres->ranges, spheres->range_count, cursor, reference);
     }
-    if (kind == SCENE_MATERIAL)
+    case SCENE_MATERIAL:
         return next_in_material(object, cursor, reference);
-    if ((*cursor)++)
-        return false;
-    if (kind == SCENE_NODE) {
-        const struct scene_node *node = object;
-        *reference = (struct reference){.id = node->object, .path = ".object"};
-        return node_kind_object(node->kind, &reference->kind);
-    }
-    if (kind == SCENE_DISC) {
+    case SCENE_DISC:
         *reference =
             (struct reference){SCENE_MATERIAL, ((const struct scene_disc *)object)->material, ".material"};
-        return reference->id != 0;
+        return (*cursor)++ == 0 && reference->id;
+    case SCENE_SKIN:
+        return next_in_skin(object, cursor, reference);
+    case SCENE_CHANNEL:
+        return next_in_channel(object, cursor, reference);
+    case SCENE_TEXTURE:
+    case SCENE_LIGHT:
+    case SCENE_CAMERA:
+    case SCENE_CLIP:
+    case SCENE_OBJECT_KIND_COUNT:
+        break;
     }
     return false;
 }
@@ -96,7 +138,7 @@ static bool set_check(struct draft *draft, const struct scene_edit *edit)
     struct reference reference;
     uint32_t cursor = 0;
     while (next_reference(edit->object, &edit->set, &cursor, &reference)) {
-        if (reference.id && draft_find(draft, reference.kind, reference.id))
+        if (reference.id && draft_remaining(draft, reference.kind, reference.id))
             continue;
         const char *kind = object_kind_name(reference.kind);
         edit_error(&place, ERROR_UNKNOWN_ID, reference.path, "there is no %s %u", kind, reference.id);
@@ -106,23 +148,20 @@ static bool set_check(struct draft *draft, const struct scene_edit *edit)
 }
 
 /* All remaining objects of `user` are asked whether they refer to something that this transaction removes. */
-static bool users_check(struct draft *draft, enum scene_object_kind user, const struct hashmap *fallen)
+static bool users_check(struct draft *draft, enum scene_object_kind user)
 {
-    size_t map_cursor = 0;
-    uint64_t id;
-    void *object;
-    while (hashmap_next(&draft->scene->objects[user], &map_cursor, &id, &object)) {
-        /* What is set or removed itself has been looked at. */
-        if (hashmap_get(&draft->last[user], id) || (user == SCENE_NODE && hashmap_get(fallen, id)))
-            continue;
+    size_t cursor = 0;
+    const struct scene_object *object;
+    /* What is set or removed itself has been looked at. */
+    while ((object = draft_next_untouched(draft, user, &cursor))) {
         struct reference reference;
-        uint32_t cursor = 0;
-        while (next_reference(user, object, &cursor, &reference)) {
+        uint32_t reference_cursor = 0;
+        while (next_reference(user, object, &reference_cursor, &reference)) {
             const struct scene_edit *edit = hashmap_get(&draft->last[reference.kind], reference.id);
             if (!edit || edit->kind != EDIT_REMOVE)
                 continue;
             struct edit_place place = draft_place(draft, edit);
-            edit_error(&place, ERROR_INVALID, "", "%s %u still uses it (%s)", object_kind_name(user), (uint32_t)id,
+            edit_error(&place, ERROR_INVALID, "", "%s %u still uses it (%s)", object_kind_name(user), object->id,
                        reference.path + 1);
             return error_remedy(draft->error, "change or remove that %s in the same transaction",
                                 object_kind_name(user));
@@ -131,35 +170,17 @@ static bool users_check(struct draft *draft, enum scene_object_kind user, const 
     return true;
 }
 
-static bool removes_any(const struct draft *draft, enum scene_object_kind kind)
-{
-    size_t cursor = 0;
-    void *value;
-    while (hashmap_next(&draft->last[kind], &cursor, NULL, &value)) {
-        if (((const struct scene_edit *)value)->kind == EDIT_REMOVE)
-            return true;
-    }
-    return false;
-}
-
 static bool removals_check(struct draft *draft)
 {
-    struct hashmap fallen = {0};
-    bool removes_shown = removes_any(draft, SCENE_MESH) || removes_any(draft, SCENE_SPHERES) ||
-                         removes_any(draft, SCENE_LIGHT) || removes_any(draft, SCENE_CAMERA);
-    bool fine = true;
-    for (size_t i = 0; fine && removes_shown && i < draft->fallen_count; i++)
-        fine = hashmap_put(&fallen, draft->fallen[i], draft) ||
-               error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory for a table of removed nodes");
-    if (fine && removes_shown)
-        fine = users_check(draft, SCENE_NODE, &fallen);
-    if (fine && removes_any(draft, SCENE_MATERIAL))
-        fine = users_check(draft, SCENE_MESH, NULL) && users_check(draft, SCENE_SPHERES, NULL) &&
-               users_check(draft, SCENE_DISC, NULL);
-    if (fine && removes_any(draft, SCENE_TEXTURE))
-        fine = users_check(draft, SCENE_MATERIAL, NULL);
-    hashmap_finish(&fallen);
-    return fine;
+    bool removes_shown = draft_removes_any(draft, SCENE_MESH) || draft_removes_any(draft, SCENE_SPHERES) ||
+                         draft_removes_any(draft, SCENE_LIGHT) || draft_removes_any(draft, SCENE_CAMERA) ||
+                         draft_removes_any(draft, SCENE_SKIN);
+    if (removes_shown && !users_check(draft, SCENE_NODE))
+        return false;
+    if (draft_removes_any(draft, SCENE_MATERIAL) &&
+        !(users_check(draft, SCENE_MESH) && users_check(draft, SCENE_SPHERES) && users_check(draft, SCENE_DISC)))
+        return false;
+    return !draft_removes_any(draft, SCENE_TEXTURE) || users_check(draft, SCENE_MATERIAL);
 }
 
 bool references_check(struct draft *draft)

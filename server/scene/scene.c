@@ -68,3 +68,13 @@ const struct scene_camera *scene_camera(const struct scene *scene, uint32_t id)
 {
     return hashmap_get(&scene->objects[SCENE_CAMERA], id);
 }
+
+const struct scene_skin *scene_skin(const struct scene *scene, uint32_t id)
+{
+    return hashmap_get(&scene->objects[SCENE_SKIN], id);
+}
+
+const struct scene_clip *scene_clip(const struct scene *scene, uint32_t id)
+{
+    return hashmap_get(&scene->objects[SCENE_CLIP], id);
+}

@@ -14,6 +14,9 @@
 
 #define SCENE_NAME_MAX 128
 #define SCENE_DEPTH_MAX 256 /* of the node hierarchy */
+#define MESH_INFLUENCES_MAX 16
+#define MESH_TARGETS_MAX 1024
+#define SKIN_JOINTS_MAX 65536
 
 /* The enums have the protocol's numbers (session asserts it). */
 enum scene_object_kind {
@@ -93,8 +96,9 @@ struct scene_mesh {
     uint32_t vertex_count, triangle_count;
     struct blob *arrays[MESH_ARRAY_COUNT]; /* NULL: missing. Checked: sizes fit the counts, indices are in range,
                                               positions finite */
-    uint32_t influence_count;              /* joints that move one vertex, 0 .. 16 */
-    uint32_t target_count;                 /* morph targets */
+    uint32_t influence_count;              /* joints that move one vertex, 0 .. MESH_INFLUENCES_MAX */
+    uint32_t joint_places;                 /* places in a skin that MESH_JOINTS reaches; filled by the check */
+    uint32_t target_count;                 /* morph targets, 0 .. MESH_TARGETS_MAX */
     float *weights;                        /* of the targets, where a node has none; owned; missing ones are 0 */
     uint32_t weight_count;
     struct material_range *ranges;
@@ -283,10 +287,13 @@ const struct scene_material *scene_material(const struct scene *scene, uint32_t 
 const struct scene_texture *scene_texture(const struct scene *scene, uint32_t id);
 const struct scene_light *scene_light(const struct scene *scene, uint32_t id);
 const struct scene_camera *scene_camera(const struct scene *scene, uint32_t id);
+const struct scene_skin *scene_skin(const struct scene *scene, uint32_t id);
+const struct scene_clip *scene_clip(const struct scene *scene, uint32_t id);
 
 struct scene_pose; /* scene/pose.h */
 
-/* The hierarchy, flattened: every visible node with its transform. */
+/* The hierarchy, flattened: every visible node with its transform. That of a mesh that a skin moves is the
+ * identity, as its vertices are in world space (scene_deform). */
 struct scene_instance {
     const struct scene_node *node;
     float world_from_object[12];

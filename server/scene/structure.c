@@ -140,18 +140,10 @@ static bool resolve(struct walk *walk, uint32_t start)
 
 static bool note_fallen(struct walk *walk)
 {
-    size_t count = 0;
-    for (size_t i = 0; i < walk->hierarchy.count; i++)
-        count += walk->state[i] == FALLEN;
-    if (!count)
-        return true;
-    struct draft *draft = walk->draft;
-    draft->fallen = malloc(count * sizeof *draft->fallen);
-    if (!draft->fallen)
-        return error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory for a list of %zu nodes", count);
     for (size_t i = 0; i < walk->hierarchy.count; i++) {
-        if (walk->state[i] == FALLEN)
-            draft->fallen[draft->fallen_count++] = walk->hierarchy.nodes[i]->base.id;
+        if (walk->state[i] == FALLEN &&
+            !draft_note_fallen(walk->draft, SCENE_NODE, walk->hierarchy.nodes[i]->base.id))
+            return false;
     }
     return true;
 }

@@ -35,6 +35,20 @@ static bool take_ranges(struct material_range **ranges, uint32_t *range_count,
     return true;
 }
 
+static bool take_weights(float **weights, uint32_t *weight_count, const struct record_morph_weight *from,
+                         uint32_t count, struct error *error)
+{
+    if (!count)
+        return true;
+    *weights = malloc(count * sizeof **weights);
+    if (!*weights)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "weights", "no memory");
+    for (uint32_t i = 0; i < count; i++)
+        (*weights)[i] = from[i].weight;
+    *weight_count = count;
+    return true;
+}
+
 /* "set_mesh 7.arrays[2]" */
 static bool take_blob(const struct session *session, const struct record_blob_ref *arrays, uint32_t array_count,
                       uint32_t index, const char *what, uint32_t id, struct blob **blob, struct error *error)
@@ -46,7 +60,7 @@ static bool take_blob(const struct session *session, const struct record_blob_re
     return upload_resolve(session, &arrays[index], field, blob, error);
 }
 
-static void from_node(const struct message_set_node *message, struct scene_edit *edit)
+static bool from_node(const struct message_set_node *message, struct scene_edit *edit, struct error *error)
 {
     struct scene_node *node = &edit->set.node;
     begin_set(edit, SCENE_NODE, &node->base, message->node, message->name);
@@ -55,6 +69,8 @@ static void from_node(const struct message_set_node *message, struct scene_edit 
     node->object = message->object;
     node->hidden = message->hidden;
     memcpy(node->parent_from_node, message->parent_from_node, sizeof node->parent_from_node);
+    node->skin = message->skin;
+    return take_weights(&node->weights, &node->weight_count, message->weights, message->weights_count, error);
 }
 
 static bool from_mesh(const struct session *session, const struct message_set_mesh *message,
@@ -64,12 +80,15 @@ static bool from_mesh(const struct session *session, const struct message_set_me
     begin_set(edit, SCENE_MESH, &mesh->base, message->mesh, message->name);
     mesh->vertex_count = message->vertex_count;
     mesh->triangle_count = message->triangle_count;
+    mesh->influence_count = message->influence_count;
+    mesh->target_count = message->target_count;
     for (uint32_t i = 0; i < MESH_ARRAY_COUNT; i++) {
         if (!take_blob(session, message->arrays, message->arrays_count, i, "set_mesh", message->mesh,
                        &mesh->arrays[i], error))
             return false;
     }
-    return take_ranges(&mesh->ranges, &mesh->range_count, message->ranges, message->ranges_count, error);
+    return take_ranges(&mesh->ranges, &mesh->range_count, message->ranges, message->ranges_count, error) &&
+           take_weights(&mesh->weights, &mesh->weight_count, message->weights, message->weights_count, error);
 }
 
 static bool from_spheres(const struct session *session, const struct message_set_spheres *message,
@@ -175,14 +194,48 @@ static bool from_environment(const struct session *session, const struct message
                      &environment->texels, error);
 }
 
+static bool from_skin(const struct session *session, const struct message_set_skin *message,
+                      struct scene_edit *edit, struct error *error)
+{
+    struct scene_skin *skin = &edit->set.skin;
+    begin_set(edit, SCENE_SKIN, &skin->base, message->skin, message->name);
+    skin->joint_count = message->joint_count;
+    return take_blob(session, message->arrays, message->arrays_count, 0, "set_skin", message->skin, &skin->joints,
+                     error) &&
+           take_blob(session, message->arrays, message->arrays_count, 1, "set_skin", message->skin,
+                     &skin->joint_from_mesh, error);
+}
+
+static bool from_clip(const struct session *session, const struct message_set_clip *message,
+                      struct scene_edit *edit, struct error *error)
+{
+    struct scene_clip *clip = &edit->set.clip;
+    begin_set(edit, SCENE_CLIP, &clip->base, message->clip, message->name);
+    return take_blob(session, message->arrays, message->arrays_count, 0, "set_clip", message->clip, &clip->floats,
+                     error);
+}
+
+static void from_channel(const struct message_set_channel *message, struct scene_edit *edit)
+{
+    struct scene_channel *channel = &edit->set.channel;
+    begin_set(edit, SCENE_CHANNEL, &channel->base, message->channel, "");
+    channel->clip = message->clip;
+    channel->path = (enum channel_path)message->path;
+    channel->object = message->object;
+    channel->interpolation = (enum interpolation)message->interpolation;
+    channel->width = message->width;
+    channel->key_count = message->key_count;
+    channel->first_time = message->first_time;
+    channel->first_value = message->first_value;
+}
+
 bool edit_from_message(const struct session *session, const struct message *message, struct scene_edit *edit,
                        struct error *error)
 {
     memset(edit, 0, sizeof *edit);
     switch (message->type) {
     case MESSAGE_SET_NODE:
-        from_node(&message->set_node, edit);
-        return true;
+        return from_node(&message->set_node, edit, error);
     case MESSAGE_SET_MESH:
         return from_mesh(session, &message->set_mesh, edit, error);
     case MESSAGE_SET_SPHERES:
@@ -203,6 +256,13 @@ bool edit_from_message(const struct session *session, const struct message *mess
         return true;
     case MESSAGE_SET_ENVIRONMENT:
         return from_environment(session, &message->set_environment, edit, error);
+    case MESSAGE_SET_SKIN:
+        return from_skin(session, &message->set_skin, edit, error);
+    case MESSAGE_SET_CLIP:
+        return from_clip(session, &message->set_clip, edit, error);
+    case MESSAGE_SET_CHANNEL:
+        from_channel(&message->set_channel, edit);
+        return true;
     case MESSAGE_REMOVE:
         edit->kind = EDIT_REMOVE;
         edit->object = (enum scene_object_kind)message->remove.kind;

@@ -69,8 +69,11 @@ static bool account(struct session *session, struct transaction *transaction, co
 {
     uint64_t limit_bytes = session->hub->options.limits.transaction_bytes;
     uint64_t bytes = sizeof *edit;
+    if (edit->kind == EDIT_SET && edit->object == SCENE_NODE)
+        bytes += edit->set.node.weight_count * sizeof *edit->set.node.weights;
     if (edit->kind == EDIT_SET && edit->object == SCENE_MESH)
-        bytes += edit->set.mesh.range_count * sizeof *edit->set.mesh.ranges;
+        bytes += edit->set.mesh.range_count * sizeof *edit->set.mesh.ranges +
+                 edit->set.mesh.weight_count * sizeof *edit->set.mesh.weights;
     if (edit->kind == EDIT_SET && edit->object == SCENE_SPHERES)
         bytes += edit->set.spheres.range_count * sizeof *edit->set.spheres.ranges;
     if (bytes > limit_bytes || session->transaction_bytes > limit_bytes - bytes) {

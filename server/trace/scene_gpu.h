@@ -18,6 +18,8 @@
 /* What one update changed; a tracer does no more than that needs. */
 struct scene_changes {
     bool geometry;  /* primitives were added, removed or changed */
+    bool deformed;  /* vertices of geometries that deform are elsewhere, of the same primitives: which ones, their
+                       deformed_revision tells. Not set beside `geometry` alone for those that are new */
     bool instances; /* transforms, or which instances there are */
     bool shading;   /* materials, textures; alpha too */
     bool lights;
@@ -29,8 +31,15 @@ struct scene_gpu_geometry {
     struct geometry device;
     const struct scene_mesh *mesh; /* one of these two; valid until the scene is edited */
     const struct scene_spheres *spheres;
-    uint64_t revision; /* of the object: unchanged means the same shape */
-    uint32_t id;       /* the object's id; with `mesh` or `spheres` being set it is unique */
+    uint64_t revision; /* of the object: unchanged means the same primitives, and the same shape where node is 0 */
+    uint32_t id;       /* the object's id; unique together with `node` and which of the two is set */
+    uint32_t node;     /* deforms the mesh, and is the only one that shows this geometry; 0: the mesh as it is, or a
+                          set of spheres. With a skin its vertices are in world space, and the transform of its
+                          instance is the identity */
+    uint64_t deformed_revision; /* counts up whenever its vertices, or those as the shutter closes, are others; 0:
+                                   they are those of the mesh */
+    float lower[3], upper[3];   /* bounds in object space while the shutter is open; of what deforms conservative:
+                                   from its joints and weights, to rounding */
 };
 
 struct scene_gpu {

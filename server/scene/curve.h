@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* Numbers over time through keys: what channels of clips and the keys of a camera have in common. Pure. */
+#ifndef FARLIGHT_SCENE_CURVE_H
+#define FARLIGHT_SCENE_CURVE_H
+
+#include "scene/scene.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define CURVE_WIDTH_MAX 1024
+
+/* Borrowed arrays. Times ascend strictly; everything is finite. With cubic spline and bezier a key has three
+ * values of `width` numbers, one after the other: what comes in, its own, what goes out. */
+struct curve {
+    const float *times, *values;
+    size_t time_stride, key_stride; /* floats from one key to the next */
+    uint32_t key_count;             /* at least 1 */
+    uint32_t width;                 /* numbers of a value, at most CURVE_WIDTH_MAX */
+    enum interpolation interpolation;
+};
+
+/* Before the first key and after the last it stands still. */
+void curve_at(const struct curve *curve, double time_s, double *value);
+/* The same for a unit quaternion x y z w (width 4): linear is slerp along the shorter arc, Catmull-Rom takes of
+ * each key the sign that is nearer to its neighbour; the result is made unit. */
+void curve_rotation_at(const struct curve *curve, double time_s, double rotation[4]);
+
+#endif

@@ -1,0 +1,315 @@
+/* SPDX-License-Identifier: MIT */
+#include "scene/player.h"
+
+#include "scene/local_transform.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A light that has a size keeps one: without, its area is 0 and what divides by it is no number. */
+#define LIGHT_SIZE_MIN 1e-6f
+
+/* ---- which channels play ------------------------------------------------------------------------ */
+
+static int compare_tracks(const void *a, const void *b)
+{
+    const struct player_track *x = a, *y = b;
+    if (x->target != y->target)
+        return x->target < y->target ? -1 : 1;
+    if (x->channel->object != y->channel->object)
+        return x->channel->object < y->channel->object ? -1 : 1;
+    if (x->use != y->use)
+        return x->use < y->use ? -1 : 1;
+    uint32_t id_x = x->channel->base.id, id_y = y->channel->base.id;
+    return (id_x > id_y) - (id_x < id_y);
+}
+
+static double last_key_s(const struct scene_channel *channel, const struct scene_clip *clip)
+{
+    const float *floats = (const float *)(const void *)clip->floats->data;
+    return (double)floats[(size_t)channel->first_time + channel->key_count - 1];
+}
+
+/* Of the uses of a clip the last one, as it changes all that the ones before it change. */
+static bool last_use(const struct player *player, uint32_t clip, uint32_t *use)
+{
+    for (uint32_t i = player->use_count; i-- > 0;) {
+        if (player->uses[i].clip != clip)
+            continue;
+        *use = i;
+        return true;
+    }
+    return false;
+}
+
+static void take_channel(struct player *player, const struct scene_channel *channel)
+{
+    uint32_t use;
+    const struct channel_row *row = channel_row(channel->path);
+    const struct scene_clip *clip = scene_clip(player->scene, channel->clip);
+    if (!row || !clip || !last_use(player, channel->clip, &use))
+        return;
+    player->durations_s[use] = fmax(player->durations_s[use], last_key_s(channel, clip));
+    player->tracks[player->track_count++] = (struct player_track){channel, clip, row->target, use};
+    player->target_tracks[row->target]++;
+    if (row->target == TARGET_WEIGHTS)
+        player->weight_count += channel->width;
+}
+
+static bool uses_check(const struct scene *scene, const struct clip_use *uses, uint32_t use_count,
+                       struct error *error)
+{
+    for (uint32_t i = 0; i < use_count; i++) {
+        if (scene_clip(scene, uses[i].clip))
+            continue;
+        char field[48];
+        snprintf(field, sizeof field, "clips[%u].clip", i);
+        return error_set(error, ERROR_UNKNOWN_ID, field, "there is no clip %u", uses[i].clip);
+    }
+    return true;
+}
+
+bool player_init(struct player *player, const struct scene *scene, const struct clip_use *uses, uint32_t use_count,
+                 struct error *error)
+{
+    *player = (struct player){.scene = scene, .uses = uses, .use_count = use_count};
+    if (!uses_check(scene, uses, use_count, error))
+        return false;
+    const struct hashmap *channels = &scene->objects[SCENE_CHANNEL];
+    if (!use_count || !channels->count)
+        return true;
+    player->durations_s = calloc(use_count, sizeof *player->durations_s);
+    player->times_s = calloc(use_count, sizeof *player->times_s);
+    player->tracks = malloc(channels->count * sizeof *player->tracks);
+    if (!player->durations_s || !player->times_s || !player->tracks)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for %zu channels", channels->count);
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(channels, &cursor, NULL, &value))
+        take_channel(player, value);
+    qsort(player->tracks, player->track_count, sizeof *player->tracks, compare_tracks);
+    return true;
+}
+
+void player_finish(struct player *player)
+{
+    free(player->durations_s);
+    free(player->times_s);
+    free(player->tracks);
+    *player = (struct player){0};
+}
+
+double scene_clip_duration_s(const struct scene *scene, uint32_t clip_id)
+{
+    const struct scene_clip *clip = scene_clip(scene, clip_id);
+    double duration_s = 0.0;
+    size_t cursor = 0;
+    void *value;
+    while (clip && hashmap_next(&scene->objects[SCENE_CHANNEL], &cursor, NULL, &value)) {
+        const struct scene_channel *channel = value;
+        if (channel->clip == clip_id)
+            duration_s = fmax(duration_s, last_key_s(channel, clip));
+    }
+    return duration_s;
+}
+
+/* ---- one pose ----------------------------------------------------------------------------------- */
+
+static void set_times(struct player *player, double time_s)
+{
+    for (uint32_t i = 0; player->times_s && i < player->use_count; i++) {
+        const struct clip_use *use = &player->uses[i];
+        double clip_s = fmax((time_s - (double)use->start_s) * (double)use->speed, 0.0);
+        if (use->loop)
+            clip_s = player->durations_s[i] > 0.0 ? fmod(clip_s, player->durations_s[i]) : 0.0;
+        player->times_s[i] = clip_s;
+    }
+}
+
+/* The value of a track, within what the protocol allows. */
+static void evaluate(const struct player *player, const struct player_track *track, float *out)
+{
+    const struct channel_row *row = channel_row(track->channel->path);
+    struct curve curve = channel_curve(track->channel, track->clip);
+    double value[CURVE_WIDTH_MAX];
+    curve_at(&curve, player->times_s[track->use], value);
+    for (uint32_t i = 0; i < curve.width; i++)
+        out[i] = (float)fmin(fmax(value[i], row->least), row->greatest);
+}
+
+static void change_transform(const struct player *player, const struct player_track *track,
+                             struct local_transform *transform)
+{
+    struct curve curve = channel_curve(track->channel, track->clip);
+    double value[CURVE_WIDTH_MAX], time_s = player->times_s[track->use];
+    if (track->channel->path == CHANNEL_NODE_ROTATION) {
+        curve_rotation_at(&curve, time_s, value);
+        local_transform_set_rotation(transform, value);
+        return;
+    }
+    curve_at(&curve, time_s, value);
+    memcpy(track->channel->path == CHANNEL_NODE_TRANSLATION ? transform->translation : transform->scale, value,
+           3 * sizeof *value);
+}
+
+/* `tracks` to `count` are those of one object. */
+static void pose_node(const struct player *player, const struct player_track *tracks, size_t count,
+                      struct scene_pose *pose)
+{
+    const struct scene_node *node = scene_node(player->scene, tracks->channel->object);
+    if (!node)
+        return;
+    struct pose_node *posed = &pose->nodes[pose->node_count++];
+    struct local_transform transform;
+    bool moves = false;
+    *posed = (struct pose_node){.node = node->base.id, .hidden = node->hidden};
+    memcpy(posed->parent_from_node, node->parent_from_node, sizeof posed->parent_from_node);
+    for (size_t i = 0; i < count; i++) {
+        if (tracks[i].channel->path == CHANNEL_NODE_HIDDEN) {
+            float hidden;
+            evaluate(player, &tracks[i], &hidden);
+            posed->hidden = hidden >= 0.5f;
+            continue;
+        }
+        if (!moves)
+            local_transform_from_matrix(&transform, node->parent_from_node);
+        moves = true;
+        change_transform(player, &tracks[i], &transform);
+    }
+    if (moves)
+        local_transform_to_matrix(&transform, posed->parent_from_node);
+}
+
+static void pose_weights(const struct player *player, const struct player_track *tracks, size_t count,
+                         struct scene_pose *pose)
+{
+    const struct player_track *track = &tracks[count - 1];
+    struct pose_weights *posed = &pose->morphs[pose->morph_count++];
+    *posed = (struct pose_weights){track->channel->object, pose->weight_count, track->channel->width};
+    evaluate(player, track, pose->weights + pose->weight_count);
+    pose->weight_count += track->channel->width;
+}
+
+static void pose_light(const struct player *player, const struct player_track *tracks, size_t count,
+                       struct scene_pose *pose)
+{
+    const struct scene_light *light = scene_light(player->scene, tracks->channel->object);
+    if (!light)
+        return;
+    struct scene_light *posed = &pose->lights[pose->light_count++];
+    *posed = *light;
+    for (size_t i = 0; i < count; i++)
+        evaluate(player, &tracks[i],
+                 tracks[i].channel->path == CHANNEL_LIGHT_COLOUR ? posed->colour : posed->size);
+    for (int i = 0; i < 2 && (light->kind == LIGHT_RECTANGLE || light->kind == LIGHT_SPHERE); i++)
+        posed->size[i] = fmaxf(posed->size[i], LIGHT_SIZE_MIN);
+}
+
+static float *material_value(struct scene_material *material, enum channel_path path)
+{
+    switch (path) {
+    case CHANNEL_MATERIAL_BASE_COLOUR:
+        return material->base_colour;
+    case CHANNEL_MATERIAL_EMISSION:
+        return material->emission;
+    case CHANNEL_MATERIAL_METALLIC:
+        return &material->metallic;
+    case CHANNEL_MATERIAL_ROUGHNESS:
+        return &material->roughness;
+    case CHANNEL_MATERIAL_TRANSMISSION:
+        return &material->transmission;
+    default:
+        return &material->ior;
+    }
+}
+
+static void pose_material(const struct player *player, const struct player_track *tracks, size_t count,
+                          struct scene_pose *pose)
+{
+    const struct scene_material *material = scene_material(player->scene, tracks->channel->object);
+    if (!material)
+        return;
+    struct scene_material *posed = &pose->materials[pose->material_count++];
+    *posed = *material;
+    for (size_t i = 0; i < count; i++)
+        evaluate(player, &tracks[i], material_value(posed, tracks[i].channel->path));
+}
+
+static float *view_value(struct pose_view *view, enum channel_path path, unsigned *given)
+{
+    switch (path) {
+    case CHANNEL_VIEW_EYE:
+        *given = POSE_VIEW_EYE;
+        return view->eye_world;
+    case CHANNEL_VIEW_LOOK_AT:
+        *given = POSE_VIEW_LOOK_AT;
+        return view->look_at_world;
+    case CHANNEL_VIEW_UP:
+        *given = POSE_VIEW_UP;
+        return view->up_world;
+    case CHANNEL_VIEW_FOV_Y:
+        *given = POSE_VIEW_FOV_Y;
+        return &view->fov_y;
+    case CHANNEL_VIEW_APERTURE:
+        *given = POSE_VIEW_APERTURE;
+        return &view->aperture;
+    case CHANNEL_VIEW_FOCUS:
+        *given = POSE_VIEW_FOCUS;
+        return &view->focus;
+    default:
+        *given = POSE_VIEW_EXPOSURE;
+        return &view->exposure_stops;
+    }
+}
+
+static void pose_view(const struct player *player, const struct player_track *tracks, size_t count,
+                      struct scene_pose *pose)
+{
+    for (size_t i = 0; i < count; i++) {
+        unsigned given;
+        evaluate(player, &tracks[i], view_value(&pose->view, tracks[i].channel->path, &given));
+        pose->view.given |= given;
+    }
+}
+
+static bool pose_reserve(const struct player *player, struct scene_pose *pose, struct error *error)
+{
+    const size_t *tracks = player->target_tracks;
+    pose->nodes = calloc(tracks[TARGET_NODE] + 1, sizeof *pose->nodes);
+    pose->morphs = calloc(tracks[TARGET_WEIGHTS] + 1, sizeof *pose->morphs);
+    pose->weights = calloc(player->weight_count + 1, sizeof *pose->weights);
+    pose->lights = calloc(tracks[TARGET_LIGHT] + 1, sizeof *pose->lights);
+    pose->materials = calloc(tracks[TARGET_MATERIAL] + 1, sizeof *pose->materials);
+    if (pose->nodes && pose->morphs && pose->weights && pose->lights && pose->materials)
+        return true;
+    scene_pose_finish(pose);
+    return error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for the pose of %zu channels",
+                     player->track_count);
+}
+
+bool player_pose(struct player *player, double time_s, struct scene_pose *pose, struct error *error)
+{
+    static void (*const makers[])(const struct player *, const struct player_track *, size_t,
+                                  struct scene_pose *) = {
+        [TARGET_NODE] = pose_node,         [TARGET_WEIGHTS] = pose_weights, [TARGET_LIGHT] = pose_light,
+        [TARGET_MATERIAL] = pose_material, [TARGET_VIEW] = pose_view,
+    };
+    *pose = (struct scene_pose){0};
+    if (!player->track_count)
+        return true;
+    if (!pose_reserve(player, pose, error))
+        return false;
+    set_times(player, time_s);
+    for (size_t first = 0, end; first < player->track_count; first = end) {
+        const struct player_track *track = &player->tracks[first];
+        for (end = first + 1; end < player->track_count; end++) {
+            const struct player_track *next = &player->tracks[end];
+            if (next->target != track->target || next->channel->object != track->channel->object)
+                break;
+        }
+        makers[track->target](player, track, end - first, pose);
+    }
+    return true;
+}
