@@ -47,6 +47,7 @@ SERVER_PKGS := epoxy egl libzstd libsodium libxxhash libturbojpeg inih cglm
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
 IMPORT_PKGS := OpenImageIO tinygltf tinyobjloader libsodium libseccomp
 EXPORT_PKGS := OpenImageIO libjxl libseccomp
+VIDEO_PKGS := libavformat libavcodec libavutil libseccomp
 TEST_PKGS := cmocka
 # pkg-config is only asked when something is built.
 pkg_cflags = $(shell $(PKG_CONFIG) --cflags $(1) 2>/dev/null)
@@ -64,6 +65,7 @@ IMPORT_C := $(wildcard client/import/*.c)
 IMPORT_CXX := $(wildcard client/import/*.cpp)
 EXPORT_C := $(wildcard client/output/*.c)
 EXPORT_CXX := $(wildcard client/output/*.cpp)
+VIDEO_C := $(wildcard client/video/*.c)
 SHADERS := $(sort $(patsubst shaders/%,%,$(wildcard shaders/*/*.h shaders/*/*.glsl shaders/*/*.comp shaders/*/*.vert \
            shaders/*/*.geom shaders/*/*.frag shaders/*.comp)))
 
@@ -82,12 +84,14 @@ CLI_OBJ := $(call obj,$(CLI_SRC))
 # Helper programs share the importer's sandbox and the protocol.
 IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX))
 EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/client/import/sandbox.o
+VIDEO_OBJ := $(call obj,$(VIDEO_C) $(addprefix client/output/,channel.c file.c incoming.c) \
+    $(addprefix client/lib/,rate.c ycbcr.c)) $(B)/client/import/sandbox.o
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.0
 LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC))
 
-PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export
+PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video
 
 .PHONY: all
 all: $(PROGRAMS) $(B)/$(SONAME) $(B)/protocol.md
@@ -108,12 +112,14 @@ $(B)/shader_sources.o: INCLUDES = -Iserver
 $(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
 $(B)/client/import/%.opp $(B)/client/import/%.o: INCLUDES = -Iclient $(IMPORT_CFLAGS)
 $(B)/client/output/%.opp $(B)/client/output/%.o: INCLUDES = -Iclient $(EXPORT_CFLAGS)
+$(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
 $(B)/tests/%.o: INCLUDES = -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS) $(TEST_CFLAGS)
 SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS)))$(SERVER_CFLAGS)
 CLIENT_CFLAGS = $(eval CLIENT_CFLAGS := $(call pkg_cflags,$(CLIENT_PKGS)))$(CLIENT_CFLAGS)
 TEST_CFLAGS = $(eval TEST_CFLAGS := $(call pkg_cflags,$(TEST_PKGS)))$(TEST_CFLAGS)
 # Others' C++ headers are system headers: our warnings are for our own files.
 IMPORT_CFLAGS = $(eval IMPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(IMPORT_PKGS))))$(IMPORT_CFLAGS)
+VIDEO_CFLAGS = $(eval VIDEO_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(VIDEO_PKGS))))$(VIDEO_CFLAGS)
 EXPORT_CFLAGS = $(eval EXPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(EXPORT_PKGS))))$(EXPORT_CFLAGS)
 
 $(B)/%.o: %.c
@@ -143,6 +149,7 @@ SERVER_LIBS = $(call pkg_libs,$(SERVER_PKGS)) $(EMBREE_LIBS) -lm
 CLIENT_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 IMPORT_LIBS = $(call pkg_libs,$(IMPORT_PKGS)) -lm
 EXPORT_LIBS = $(call pkg_libs,$(EXPORT_PKGS)) -lm
+VIDEO_LIBS = $(call pkg_libs,$(VIDEO_PKGS)) -lm
 
 $(B)/farlightd: $(B)/server/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(SERVER_LIBS) -o $@
@@ -152,6 +159,8 @@ $(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) -o $@
 $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
+$(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
 $(B)/protocol-docgen: $(B)/protocol/docgen.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
 $(B)/protocol.md: $(B)/protocol-docgen
@@ -197,8 +206,8 @@ $(B)/tests/tools/pose_dump: $(B)/tests/tools/pose_dump.o $(MODEL_OBJ) $(SERVER_O
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libembree-dev libegl1 libgl1-mesa-dri
-TEST_PACKAGES := libcmocka-dev python3
+    libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libegl1 libgl1-mesa-dri
+TEST_PACKAGES := libcmocka-dev python3 ffmpeg
 PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES := clang clang-format glslang-tools python3
 

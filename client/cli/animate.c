@@ -7,14 +7,13 @@
 #include <stdlib.h>
 
 #define TURN_DEGREES 360.0
-#define RADIANS_PER_DEGREE 0.017453292519943295
 
-enum key { KEY_FRAMES = 0x300, KEY_FPS, KEY_ORBIT, KEY_KEYS };
+enum key { KEY_FRAMES = 0x300, KEY_FPS, KEY_ORBIT, KEY_KEYS, KEY_SHARD, KEY_RESUME, KEY_RETRIES };
+
+#define DEFAULT_RETRIES 5u
 
 struct animation {
     struct cli_job job;
-    bool has_frames;
-    double orbit_degrees;
     const char *keys_path;
     struct record_camera_key *keys;
 };
@@ -28,47 +27,65 @@ static const struct argp_option options[] = {
      0},
     {"keys", KEY_KEYS, "FILE.json", 0,
      "Camera keys: array of {\"time\", \"eye\", \"look_at\", \"up\", \"fov\"}; seconds, degrees", 0},
+    {NULL, 0, NULL, 0, "Parts, and what goes wrong:", -1},
+    {"shard", KEY_SHARD, "K/N", 0, "Only every N-th frame of the range, beginning with the K-th", 0},
+    {"resume", KEY_RESUME, NULL, 0, "Leave out frames whose files are there, complete and of the wanted size", 0},
+    {"retries", KEY_RETRIES, "N", 0,
+     "How often in a row a lost daemon is sought again, 0 to 1000 (default 5); nothing is lost by it", 0},
     {0}};
 
-static error_t parse_frames(struct animation *animation, const char *value)
+/* An error of lib/text.h gets the option's name. */
+static error_t named(struct cli_job *job, bool good, const char *field)
 {
-    struct fl_job_options *wanted = &animation->job.options;
-    animation->has_frames = true;
-    if (fl_text_range(value, &wanted->first_frame, &wanted->last_frame, &wanted->frame_step,
-                      &animation->job.error))
+    if (good)
         return 0;
-    snprintf(animation->job.error.field, sizeof animation->job.error.field, "--frames");
+    snprintf(job->error.field, sizeof job->error.field, "%s", field);
     return EINVAL;
 }
 
-static error_t parse_real(struct animation *animation, const char *field, const char *value, double least,
-                          double greatest, double *number)
+static error_t parse_series(struct cli_job *job, int key, const char *value)
 {
-    if (fl_text_real(value, least, greatest, number, &animation->job.error))
+    struct cli_series *series = &job->series;
+    uint64_t number = 0;
+    double real = 0;
+    error_t status = 0;
+    switch (key) {
+    case KEY_FRAMES:
+        series->has_range = true;
+        return named(
+            job, fl_text_range(value, &series->range.first, &series->range.last, &series->range.step, &job->error),
+            "--frames");
+    case KEY_FPS:
+        status = named(job, fl_text_real(value, 0.001, 100000, &real, &job->error), "--fps");
+        job->options.frames_per_second = (float)real;
+        return status;
+    case KEY_ORBIT:
+        job->is_orbit = true;
+        return value == NULL
+                   ? 0
+                   : named(job, fl_text_real(value, -1e6, 1e6, &series->orbit_degrees, &job->error), "--orbit");
+    case KEY_SHARD:
+        return named(job, fl_text_shard(value, &series->shard_part, &series->shard_parts, &job->error), "--shard");
+    case KEY_RESUME:
+        series->resume = true;
         return 0;
-    snprintf(animation->job.error.field, sizeof animation->job.error.field, "%s", field);
-    return EINVAL;
+    case KEY_RETRIES:
+        status = named(job, fl_text_integer(value, 0, 1000, &number, &job->error), "--retries");
+        series->retries = (unsigned)number;
+        return status;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
 }
 
 static error_t parse(int key, char *value, struct argp_state *state)
 {
     struct animation *animation = state->input;
     struct cli_job *job = &animation->job;
-    double fps = 0;
-    error_t status = 0;
     switch (key) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = job;
         return 0;
-    case KEY_FRAMES:
-        return parse_frames(animation, value);
-    case KEY_FPS:
-        status = parse_real(animation, "--fps", value, 0.001, 100000, &fps);
-        job->options.frames_per_second = (float)fps;
-        return status;
-    case KEY_ORBIT:
-        job->is_orbit = true;
-        return value != NULL ? parse_real(animation, "--orbit", value, -1e6, 1e6, &animation->orbit_degrees) : 0;
     case KEY_KEYS:
         animation->keys_path = value;
         return 0;
@@ -78,18 +95,8 @@ static error_t parse(int key, char *value, struct argp_state *state)
         job->model = value;
         return 0;
     default:
-        return ARGP_ERR_UNKNOWN;
+        return parse_series(job, key, value);
     }
-}
-
-/* The turn is reached one frame after the last, so that a full turn repeats without a doubled frame. */
-static void complete_orbit(struct animation *animation)
-{
-    struct fl_job_options *wanted = &animation->job.options;
-    const uint32_t frames = (wanted->last_frame - wanted->first_frame) / wanted->frame_step + 1;
-    wanted->camera_path = PROTOCOL_CAMERA_PATH_ORBIT;
-    wanted->orbit_turn = (float)(animation->orbit_degrees * RADIANS_PER_DEGREE);
-    wanted->orbit_seconds = (float)frames * (float)wanted->frame_step / wanted->frames_per_second;
 }
 
 static bool complete_keys(struct animation *animation)
@@ -108,11 +115,10 @@ static bool complete(struct animation *animation)
 {
     struct cli_job *job = &animation->job;
     const bool has_keys = animation->keys_path != NULL;
-    if (!animation->has_frames)
+    if (!job->series.has_range)
         return cli_usage(job, "--frames", "no range of frames is given, such as 1-120") == 0;
     if (job->options.frames_per_second <= 0)
         job->options.frames_per_second = 24;
-    job->options.time_origin_frame = job->options.first_frame;
     if (!cli_job_complete(job, true))
         return false;
     if (has_keys && (job->is_orbit || job->camera != NULL || job->has_eye))
@@ -124,7 +130,7 @@ static bool complete(struct animation *animation)
     /* Frames of a camera that stands still would all be alike. */
     job->is_orbit = job->is_orbit || job->camera == NULL;
     if (job->is_orbit)
-        complete_orbit(animation);
+        job->options.camera_path = PROTOCOL_CAMERA_PATH_ORBIT;
     return true;
 }
 
@@ -138,9 +144,11 @@ int cli_animate(int argc, char **argv)
         .doc = "Render a series of pictures along a camera's path (default: an orbit).\v"
                "In the name of the images %d or %04d stands for the frame's number, %% for a percent sign.",
         .children = children};
-    struct animation animation = {.orbit_degrees = TURN_DEGREES};
-    const bool good = cli_job_begin(&animation.job) && argp_parse(&argp, argc, argv, 0, NULL, &animation) == 0 &&
-                      complete(&animation);
+    struct animation animation = {0};
+    const bool begun = cli_job_begin(&animation.job);
+    animation.job.series.orbit_degrees = TURN_DEGREES;
+    animation.job.series.retries = DEFAULT_RETRIES;
+    const bool good = begun && argp_parse(&argp, argc, argv, 0, NULL, &animation) == 0 && complete(&animation);
     const int status = good ? cli_run_job(&animation.job, true) : cli_report(&animation.job.error);
     free(animation.keys);
     return status;

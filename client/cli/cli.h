@@ -4,6 +4,7 @@
 #define FARLIGHT_CLIENT_CLI_CLI_H
 
 #include "lib/farlight.h"
+#include "lib/frame_set.h"
 
 #include <argp.h>
 #include <jansson.h>
@@ -47,7 +48,7 @@ int cli_interrupt_signal(void); /* which one came; 0: none */
 
 /* ---- image_path.c: where pictures go ---- */
 
-enum cli_image { CLI_IMAGE_UNKNOWN, CLI_IMAGE_PNG, CLI_IMAGE_JPEG, CLI_IMAGE_EXR, CLI_IMAGE_HDR };
+enum cli_image { CLI_IMAGE_UNKNOWN, CLI_IMAGE_PNG, CLI_IMAGE_JPEG, CLI_IMAGE_EXR, CLI_IMAGE_HDR, CLI_IMAGE_COUNT };
 
 /* By name ("png", ..) or by a path's ending; letter case does not matter. */
 enum cli_image cli_image_by_name(const char *name);
@@ -92,9 +93,29 @@ void cli_progress_end(struct cli_progress *progress, bool done);
 
 enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
 
+#define CLI_OUTPUTS_MAX 8
+
+struct cli_output {
+    const char *path;
+    enum cli_image image;
+};
+
+/* Of an animation: which frames, and what happens when something goes wrong. */
+struct cli_series {
+    bool has_range;
+    struct fl_frame_run range;
+    uint32_t shard_part, shard_parts; /* 0 parts: all frames */
+    bool resume;                      /* frames whose files are there are left alone */
+    unsigned retries;                 /* in a row, without a frame between them */
+    double orbit_degrees;             /* over the range in all */
+};
+
 struct cli_job {
     const char *model, *server, *environment, *output, *camera, *keys_file, *trace_file;
     enum cli_image image;
+    struct cli_output outputs[CLI_OUTPUTS_MAX]; /* where the pictures go: `output`, or several of a script */
+    size_t output_count;
+    struct cli_series series;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, quiet, is_orbit;
     unsigned file_quality; /* of JPEG files; 0: default */
@@ -116,12 +137,17 @@ error_t cli_usage(struct cli_job *job, const char *field, const char *format, ..
 /* After the command line: what depends on several options. `is_series`: output is a pattern. */
 bool cli_job_complete(struct cli_job *job, bool is_series);
 
+/* What can only be said once the scene is there: the range of frames, and what goes by it. */
+bool cli_settle_range(struct cli_job *job, struct fl_error *error);
+bool cli_writes_to_stdout(const struct cli_job *job);
+
 /* ---- loading.c: from what the command line named to a scene on a daemon ---- */
 
 /* `job` and `progress` are the caller's; the rest is zero at first. */
 struct cli_loading {
     const struct cli_job *job;
     struct cli_progress *progress;
+    bool again; /* what there is to say about the model has been said */
     struct fl_load_options load;
     struct fl_connection *connection;
     struct fl_scene *scene;
@@ -160,7 +186,7 @@ void cli_timings_destroy(struct cli_timings *timings);
 
 /* ---- session.c: from a model to image files ---- */
 
-/* Renders the job's frames into `job->output`: a path, "-", or a pattern if `is_series`. */
+/* Renders the job's frames into its outputs: paths or "-", patterns if `is_series`. */
 int cli_run_job(struct cli_job *job, bool is_series);
 
 #endif

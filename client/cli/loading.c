@@ -17,7 +17,8 @@ static uint64_t now_ns(void)
 static void on_note(void *user, const struct fl_note *note)
 {
     struct cli_loading *loading = user;
-    if (loading->job->quiet || note->severity != PROTOCOL_SEVERITY_WARNING || loading->warnings++ >= NOTES_SHOWN)
+    if (loading->job->quiet || loading->again || note->severity != PROTOCOL_SEVERITY_WARNING ||
+        loading->warnings++ >= NOTES_SHOWN)
         return;
     cli_progress_clear(loading->progress);
     cli_note(note, false);

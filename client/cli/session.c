@@ -1,24 +1,34 @@
 /* SPDX-License-Identifier: MIT */
-/* From a model to image files, once: the scene handed over, frames taken and written. */
-#include "cli/cli.h"
+/* From a model to pictures: the scene handed over, frames taken and written. An animation survives the loss of its
+ * daemon: the scene is loaded again, and the first frame that is not written is the next one. */
+#include "cli/sink.h"
 #include "cli/trace_file.h"
-#include "lib/text.h"
 
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
 
+#define FIRST_PAUSE_MS 500u
+#define LONGEST_PAUSE_MS 30000u
+
 struct session {
     struct cli_job *job;
-    bool is_series, to_stdout;
-    struct fl_pattern pattern;
-    char folder[4096], path[4352]; /* where the image goes; of a series, for each frame anew */
-    char temporary[4096];          /* a folder to be removed; empty: none */
-    struct fl_exporter *exporter;
+    bool is_series;
+    struct cli_sinks sinks;
+    bool sinks_started, sink_failed;
     struct cli_loading loading;
     struct fl_job *rendering;
+    bool was_loaded; /* the daemon was there and took the scene, at least once */
+    bool has_set;    /* which frames are wanted is known */
+    struct fl_frame_set set;
+    size_t run;        /* of the set, the one that is being rendered */
+    bool begun;        /* of this run a frame has been written */
+    uint64_t next;     /* once begun: its first frame that has not */
+    uint32_t done;     /* frames written */
+    unsigned failures; /* lost connections since the last frame */
     struct cli_timings *timings;
     struct cli_trace_file *trace; /* NULL: none is wanted */
     struct cli_progress progress;
@@ -34,33 +44,6 @@ static uint64_t now_ns(void)
 
 /* ---- beginning ---- */
 
-/* Everything that can be known to fail before anything is rendered. */
-static bool prepare_output(struct session *session, struct fl_error *error)
-{
-    struct cli_job *job = session->job;
-    session->to_stdout = strcmp(job->output, "-") == 0;
-    if (session->to_stdout) {
-        if (isatty(STDOUT_FILENO) == 1) {
-            fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "an image would be written to the terminal");
-            return fl_error_remedy(error, "redirect it, or name a file");
-        }
-        if (!cli_temporary_folder(session->folder, sizeof session->folder, error))
-            return false;
-        memcpy(session->temporary, session->folder, sizeof session->temporary);
-        snprintf(session->path, sizeof session->path, "%s/image.%s", session->folder, cli_image_name(job->image));
-        return true;
-    }
-    if (!session->is_series)
-        return cli_check_output(job->output, session->folder, sizeof session->folder, error) &&
-               snprintf(session->path, sizeof session->path, "%s", job->output) > 0;
-    if (!fl_pattern_parse(job->output, &session->pattern, error)) {
-        snprintf(error->field, sizeof error->field, "--output");
-        return false;
-    }
-    return fl_pattern_path(&session->pattern, job->options.last_frame, session->path, sizeof session->path) &&
-           cli_check_output(session->path, session->folder, sizeof session->folder, error);
-}
-
 static bool begin_trace(struct session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
@@ -73,16 +56,13 @@ static bool begin_trace(struct session *session, struct fl_error *error)
     return session->trace != NULL;
 }
 
-static bool start_exporter(struct session *session, struct fl_error *error)
+static bool start_sinks(struct session *session, struct fl_error *error)
 {
-    const struct cli_job *job = session->job;
-    const struct fl_exporter_options export = {.folder = session->folder,
-                                               .model = job->model,
-                                               .frames_per_second =
-                                                   session->is_series ? job->options.frames_per_second : 0,
-                                               .interrupt_fd = cli_interrupt_fd()};
-    session->exporter = fl_exporter_start(&export, error);
-    return session->exporter != NULL;
+    if (session->sinks_started)
+        return true;
+    session->sinks_started = true;
+    session->sink_failed = !cli_sinks_start(&session->sinks, error);
+    return !session->sink_failed;
 }
 
 /* The importer loads its libraries beside the daemon's start, and the exporter beside the importer: once the scene
@@ -90,13 +70,51 @@ static bool start_exporter(struct session *session, struct fl_error *error)
 static bool load_scene(struct session *session, struct fl_error *error)
 {
     struct cli_loading *loading = &session->loading;
+    *loading =
+        (struct cli_loading){.job = session->job, .progress = &session->progress, .again = session->was_loaded};
     if (!cli_loading_begin(loading, error))
         return false;
     cli_trace_span(session->trace, CLI_TRACE_CLIENT, "start", -1, loading->connect_begin_ns,
                    fl_connection_start_ns(loading->connection));
-    if (!start_exporter(session, error) || !cli_loading_end(loading, error))
+    if (!start_sinks(session, error) || !cli_loading_end(loading, error))
         return false;
     cli_trace_import(session->trace, fl_scene_import_stats(loading->scene), loading->import_begin_ns, now_ns());
+    session->was_loaded = true;
+    return cli_choose_camera(session->job, loading->scene, error);
+}
+
+/* ---- which frames ---- */
+
+static bool is_there(void *user, uint32_t frame)
+{
+    struct session *session = user;
+    return cli_sinks_have(&session->sinks, frame);
+}
+
+static bool choose_frames(struct session *session, struct fl_error *error)
+{
+    struct cli_job *job = session->job;
+    const struct cli_series *series = &job->series;
+    struct fl_frame_run wanted = {.step = 1};
+    if (session->has_set)
+        return true;
+    session->has_set = true;
+    if (session->is_series && !cli_settle_range(job, error))
+        return false;
+    if (session->is_series && series->shard_parts > 0 &&
+        !fl_frame_run_shard(&series->range, series->shard_part, series->shard_parts, &wanted)) {
+        if (!job->quiet)
+            fprintf(stderr, "farlight: there are fewer frames than parts: none falls to part %u\n",
+                    series->shard_part);
+        return true;
+    }
+    if (session->is_series && series->shard_parts == 0)
+        wanted = series->range;
+    if (!fl_frame_set_missing(&wanted, series->resume ? is_there : NULL, session, &session->set, error))
+        return false;
+    const uint32_t there = fl_frame_run_count(&wanted) - session->set.frame_count;
+    if (series->resume && !job->quiet && there > 0)
+        fprintf(stderr, "farlight: %u of %u frames are there already\n", there, fl_frame_run_count(&wanted));
     return true;
 }
 
@@ -109,67 +127,141 @@ static void add_export(struct session *session, int64_t frame, uint64_t begin_ns
     cli_trace_span(session->trace, CLI_TRACE_CLIENT, "export", frame, begin_ns, duration_ns);
 }
 
-static bool export_frame(struct session *session, const struct fl_frame *frame, struct fl_error *error)
+static bool write_frame(struct session *session, const struct fl_frame *frame, struct fl_error *error)
 {
-    const struct cli_job *job = session->job;
-    if (session->is_series &&
-        !fl_pattern_path(&session->pattern, frame->frame, session->path, sizeof session->path))
-        return fl_error_set(error, FL_ERROR_FILE, job->output, "the path of frame %u is too long", frame->frame);
-    const struct fl_export_options options = {.path = session->path,
-                                              .format = cli_image_name(job->image),
-                                              .half = !job->float_pixels && job->image == CLI_IMAGE_EXR,
-                                              .quality = job->image == CLI_IMAGE_JPEG ? job->file_quality : 0};
     const uint64_t begin_ns = now_ns();
-    const bool written = fl_exporter_write(session->exporter, frame, &options, error);
+    cli_trace_frame(session->trace, frame, begin_ns);
+    cli_timings_frame(session->timings, frame);
+    const bool written = cli_sinks_write(&session->sinks, frame, error);
     add_export(session, frame->frame, begin_ns);
+    session->sink_failed = !written;
     return written;
 }
 
-static bool finish_export(struct session *session, struct fl_error *error)
+static bool finish_sinks(struct session *session, struct fl_error *error)
 {
     const uint64_t begin_ns = now_ns();
-    const bool written = fl_exporter_wait(session->exporter, error) &&
-                         (!session->to_stdout || cli_copy_to_stdout(session->path, error));
+    session->sink_failed = !cli_sinks_finish(&session->sinks, error);
     add_export(session, -1, begin_ns);
-    return written;
+    return !session->sink_failed;
 }
 
-static bool take_frames(struct session *session, struct fl_error *error)
+static void show_progress(struct session *session)
 {
-    const struct fl_job_options *options = &session->job->options;
-    const uint32_t step = options->frame_step > 0 ? options->frame_step : 1;
-    const uint32_t total = (options->last_frame - options->first_frame) / step + 1;
-    struct fl_frame *frame = NULL;
-    uint32_t done = 0;
     if (session->is_series)
-        cli_progress_frames(&session->progress, 0, total);
+        cli_progress_frames(&session->progress, session->done, session->set.frame_count);
+}
+
+static bool take_frames(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
+{
+    struct fl_frame *frame = NULL;
     while ((frame = fl_render_next(session->rendering, error)) != NULL) {
-        cli_trace_frame(session->trace, frame, now_ns());
-        cli_timings_frame(session->timings, frame);
-        const bool written = export_frame(session, frame, error);
+        const uint64_t next = (uint64_t)frame->frame + run->step;
+        const bool written = write_frame(session, frame, error);
         fl_frame_destroy(frame);
         if (!written)
             return false;
         /* The file before is complete by now; this one is being written. */
-        if (session->is_series && done > 0)
-            cli_progress_frames(&session->progress, done, total);
-        done++;
+        if (session->done > 0)
+            show_progress(session);
+        session->next = next;
+        session->begun = true;
+        session->done++;
+        session->failures = 0;
     }
-    if (error->code != FL_ERROR_NONE || !finish_export(session, error))
-        return false;
-    if (session->is_series)
-        cli_progress_frames(&session->progress, total, total);
+    return error->code == FL_ERROR_NONE;
+}
+
+/* What is left of one run, as one job. */
+static bool render_run(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
+{
+    struct fl_job_options options = session->job->options;
+    options.first_frame = session->begun ? (uint32_t)session->next : run->first;
+    options.last_frame = run->last;
+    options.frame_step = run->step;
+    session->rendering = fl_render_start(session->loading.scene, &options, error);
+    const bool done = session->rendering != NULL && take_frames(session, run, error);
+    if (done) {
+        fl_render_destroy(session->rendering);
+        session->rendering = NULL;
+    }
+    return done;
+}
+
+static bool render(struct session *session, struct fl_error *error)
+{
+    const struct fl_frame_set *set = &session->set;
+    show_progress(session);
+    for (; session->run < set->run_count; session->run++, session->begun = false) {
+        const struct fl_frame_run *run = &set->runs[session->run];
+        if ((!session->begun || session->next <= run->last) && !render_run(session, run, error))
+            return false;
+    }
     return true;
+}
+
+/* ---- lost daemons ---- */
+
+static void close_connection(struct session *session)
+{
+    /* After an interruption the daemon is still told in order. */
+    if (session->loading.connection != NULL)
+        fl_connection_set_interrupt(session->loading.connection, 0);
+    fl_render_destroy(session->rendering);
+    session->rendering = NULL;
+    cli_loading_close(&session->loading);
+}
+
+/* Of a daemon that was there once: one that never was is a mistake in its address. */
+static bool is_lost(const struct session *session, const struct fl_error *error)
+{
+    return session->is_series && session->was_loaded && !session->sink_failed &&
+           (error->code == FL_ERROR_CONNECTION || (error->code == FL_ERROR_REFUSED && error->retryable));
+}
+
+/* Twice as long each time. False: interrupted. */
+static bool pause_before_retry(const struct session *session, uint32_t least_ms, struct fl_error *error)
+{
+    const unsigned doublings = session->failures < 7 ? session->failures - 1 : 6;
+    uint32_t pause_ms = FIRST_PAUSE_MS << doublings;
+    pause_ms = pause_ms > least_ms ? pause_ms : least_ms;
+    pause_ms = pause_ms < LONGEST_PAUSE_MS ? pause_ms : LONGEST_PAUSE_MS;
+    struct pollfd polled = {.fd = cli_interrupt_fd(), .events = POLLIN};
+    if (!session->job->quiet)
+        fprintf(stderr, "farlight: trying again in %.1f s (%u of %u); %u of %u frames are written\n",
+                pause_ms * 1e-3, session->failures, session->job->series.retries, session->done,
+                session->set.frame_count);
+    return poll(&polled, 1, (int)pause_ms) <= 0 || fl_error_set(error, FL_ERROR_INTERRUPTED, "", "interrupted");
+}
+
+/* Whether the session goes on after this error, which is told. */
+static bool recover(struct session *session, struct fl_error *error)
+{
+    if (!is_lost(session, error) || session->failures >= session->job->series.retries)
+        return false;
+    session->failures++;
+    cli_progress_clear(&session->progress);
+    cli_report(error);
+    close_connection(session);
+    return pause_before_retry(session, error->retry_after_ms, error);
 }
 
 static bool run(struct session *session, struct fl_error *error)
 {
-    struct cli_job *job = session->job;
-    if (!prepare_output(session, error) || !load_scene(session, error) ||
-        !cli_choose_camera(job, session->loading.scene, error))
+    if (!cli_sinks_prepare(&session->sinks, session->job, session->is_series, error))
         return false;
-    session->rendering = fl_render_start(session->loading.scene, &job->options, error);
-    return session->rendering != NULL && take_frames(session, error);
+    /* Nothing left to do needs no daemon. */
+    if (session->is_series && session->job->series.has_range && !choose_frames(session, error))
+        return false;
+    if (session->has_set && session->set.frame_count == 0)
+        return true;
+    while (!load_scene(session, error) || !choose_frames(session, error) || !render(session, error))
+        if (!recover(session, error))
+            return false;
+    if (!finish_sinks(session, error))
+        return false;
+    show_progress(session);
+    return true;
 }
 
 /* ---- end ---- */
@@ -185,17 +277,10 @@ static void print_timings(struct session *session)
 
 static void close_session(struct session *session)
 {
-    /* After an interruption the daemon is still told in order. */
-    if (session->loading.connection != NULL)
-        fl_connection_set_interrupt(session->loading.connection, 0);
-    fl_render_destroy(session->rendering);
-    fl_exporter_destroy(session->exporter);
-    cli_loading_close(&session->loading);
+    close_connection(session);
+    cli_sinks_close(&session->sinks);
+    fl_frame_set_finish(&session->set);
     cli_timings_destroy(session->timings);
-    if (session->temporary[0] != '\0') {
-        unlink(session->path);
-        rmdir(session->temporary);
-    }
 }
 
 int cli_run_job(struct cli_job *job, bool is_series)
@@ -204,13 +289,12 @@ int cli_run_job(struct cli_job *job, bool is_series)
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    session.loading = (struct cli_loading){.job = job, .progress = &session.progress};
     cli_progress_begin(&session.progress, job->quiet);
     if (job->timings != CLI_TIMINGS_NONE)
-        session.timings = cli_timings_create(job->timings, strcmp(job->output, "-") == 0);
+        session.timings = cli_timings_create(job->timings, cli_writes_to_stdout(job));
     bool done = begin_trace(&session, &error) && run(&session, &error);
     cli_progress_end(&session.progress, done);
-    if (done)
+    if (done && session.was_loaded)
         print_timings(&session);
     close_session(&session);
     cli_trace_span(session.trace, CLI_TRACE_COMMAND, is_series ? "animate" : "render", -1, session.begin_ns,

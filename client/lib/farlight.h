@@ -314,6 +314,79 @@ FL_API bool fl_exporter_wait(struct fl_exporter *exporter, struct fl_error *erro
 /* Ends the program; an unfinished file is removed. */
 FL_API void fl_exporter_destroy(struct fl_exporter *exporter);
 
+/* ---- videos -------------------------------------------------------------------------------------- */
+
+/* The video writer: a helper program that writes one video, from frames of pixel format rgba8 and one size. */
+struct fl_video;
+
+struct fl_video_options {
+    const char *path;        /* its folder is the only one that the program can write to */
+    const char *format;      /* "mp4" or "mkv" where the path's ending does not say; may be NULL */
+    const char *codec;       /* "h264", "mpeg4", "ffv1"; NULL: H.264 where libavcodec has an encoder for it, else
+                                MPEG-4; lossless: FFV1 */
+    const char *model;       /* named in the file; may be NULL */
+    float frames_per_second; /* 0: 24; 23.976, 29.97 and so on mean 24000/1001, 30000/1001 and so on */
+    unsigned quality;        /* constant rate factor as x264 has it, 1 (best) to 51; 0: 18 */
+    bool lossless;           /* every pixel as it is, .mkv only */
+    int interrupt_fd;        /* as of fl_connect_options */
+};
+
+struct fl_video_info {
+    char encoder[33];       /* libavcodec's name: "libx264"; known from the start on */
+    uint32_t frames;        /* this and what follows: once fl_video_finish has returned true */
+    uint32_t width, height; /* even, unless lossless: an odd picture repeats its last column, its last row */
+    uint64_t size_bytes;
+};
+
+/* Fails early: when this returns, the folder can be written to and there is an encoder. The video is 8-bit 4:2:0,
+ * tagged as what it is: primaries and matrix of BT.709, the transfer curve of sRGB, limited range; lossless: RGB.
+ * What is transparent lies over black. The same frames and options make the same file on the same machine (x264
+ * encodes a little differently with another number of processors). */
+FL_API struct fl_video *fl_video_start(const struct fl_video_options *options, struct fl_error *error);
+/* Hands the frame over and returns; the frame may be destroyed at once. Frames are shown in the order in which
+ * they come, whatever their numbers. What the program cannot do with a frame is told by a later call of this or by
+ * fl_video_finish; then nothing is left of the video, and nothing can be written any more. */
+FL_API bool fl_video_write(struct fl_video *video, const struct fl_frame *frame, struct fl_error *error);
+/* Makes the file complete: it appears under its name, in place of one that was there. At least one frame must have
+ * been written. After FL_ERROR_INTERRUPTED from fl_video_write (and with fl_video_set_interrupt, since the
+ * descriptor is still readable) this keeps the frames before the one that was interrupted. */
+FL_API bool fl_video_finish(struct fl_video *video, struct fl_error *error);
+/* Valid until the video is destroyed. */
+FL_API const struct fl_video_info *fl_video_info(const struct fl_video *video);
+/* From now on; 0: nothing interrupts. */
+FL_API void fl_video_set_interrupt(struct fl_video *video, int interrupt_fd);
+/* Ends the program; of a video that was not finished nothing is left. */
+FL_API void fl_video_destroy(struct fl_video *video);
+
+/* ---- raw video ----------------------------------------------------------------------------------- */
+
+/* A YUV4MPEG2 stream (.y4m), which ffmpeg, mpv and x264 read from a pipe; written by the library itself. */
+struct fl_y4m;
+
+enum fl_y4m_chroma {
+    FL_Y4M_444, /* C444: every pixel's colour */
+    FL_Y4M_420, /* C420mpeg2: half the columns and rows, (width + 1) / 2 by (height + 1) / 2 */
+};
+
+struct fl_y4m_options {
+    int fd;                  /* pipe, socket or file; stays the caller's */
+    float frames_per_second; /* as of fl_video_options */
+    enum fl_y4m_chroma chroma;
+    int interrupt_fd; /* as of fl_connect_options */
+};
+
+/* Nothing is written before the first frame. The samples are 8-bit Y'CbCr by BT.709 in limited range (said in the
+ * header: XCOLORRANGE=LIMITED) of the frame's sRGB values; the format has no word for matrix, primaries and
+ * transfer curve, so a tool must be told (ffmpeg: -colorspace bt709 -color_primaries bt709 -color_trc
+ * iec61966-2-1). */
+FL_API struct fl_y4m *fl_y4m_begin(const struct fl_y4m_options *options, struct fl_error *error);
+/* Writes the whole frame; pixel format rgba8, all of one size; what is transparent lies over black. A reader that
+ * has gone away is FL_ERROR_FILE, "Broken pipe", without a signal. After a failure on the way the stream ends
+ * within a frame and takes no more. */
+FL_API bool fl_y4m_write(struct fl_y4m *y4m, const struct fl_frame *frame, struct fl_error *error);
+/* The stream needs no end of its own: this frees memory. */
+FL_API void fl_y4m_end(struct fl_y4m *y4m);
+
 /* ---- comparison of images ------------------------------------------------------------------------ */
 
 #define FL_THRESHOLD_NONE (-1.0f)

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Camera keys from JSON: [{"time": 0, "eye": [x,y,z], "look_at": [x,y,z], "up": [x,y,z], "fov": 45}, ..].
  * `time` in seconds, ascending; `fov` vertical, in degrees; `up` (0,1,0) and `fov` 45 may be left out. */
-#include "lib/farlight.h"
+#include "lib/json_text.h"
 
-#include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,13 +14,16 @@
 
 struct place {
     const char *path;
+    const struct fl_json *json;
     size_t key;
     struct fl_error *error;
 };
 
 static bool wrong(const struct place *place, const char *field, const char *what)
 {
-    return fl_error_set(place->error, FL_ERROR_FILE, place->path, "key %zu, \"%s\": %s", place->key, field, what);
+    const struct fl_json_place key = {.index = place->key}, at = {.outer = &key, .key = field};
+    return fl_error_set(place->error, FL_ERROR_FILE, place->path, "line %u: key %zu, \"%s\": %s",
+                        fl_json_line(place->json, &at), place->key, field, what);
 }
 
 /* Missing values keep their default; `needed` ones may not be missing. */
@@ -78,7 +80,8 @@ static bool check_names(const struct place *place, json_t *object)
 static bool read_key(const struct place *place, json_t *object, struct record_camera_key *key)
 {
     if (!json_is_object(object))
-        return fl_error_set(place->error, FL_ERROR_FILE, place->path, "key %zu is not an object", place->key);
+        return fl_error_set(place->error, FL_ERROR_FILE, place->path, "line %u: key %zu is not an object",
+                            fl_json_line(place->json, &(struct fl_json_place){.index = place->key}), place->key);
     double time_s = 0, fov = 45;
     *key = (struct record_camera_key){.up_world = {0, 1, 0}};
     if (!check_names(place, object) || !read_number(place, object, "time", true, 0, 1e6, &time_s) ||
@@ -94,12 +97,13 @@ static bool read_key(const struct place *place, json_t *object, struct record_ca
     return true;
 }
 
-static bool read_all(const char *path, json_t *root, struct record_camera_key *keys, struct fl_error *error)
+static bool read_all(const char *path, const struct fl_json *json, struct record_camera_key *keys,
+                     struct fl_error *error)
 {
-    const size_t count = json_array_size(root);
+    const size_t count = json_array_size(json->root);
     for (size_t i = 0; i < count; i++) {
-        const struct place place = {.path = path, .key = i, .error = error};
-        if (!read_key(&place, json_array_get(root, i), &keys[i]))
+        const struct place place = {.path = path, .json = json, .key = i, .error = error};
+        if (!read_key(&place, json_array_get(json->root, i), &keys[i]))
             return false;
         if (i > 0 && keys[i].time_s <= keys[i - 1].time_s)
             return wrong(&place, "time", "does not come after the key before");
@@ -107,47 +111,23 @@ static bool read_all(const char *path, json_t *root, struct record_camera_key *k
     return true;
 }
 
-static json_t *load(const char *path, struct fl_error *error)
-{
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %m");
-        return NULL;
-    }
-    char *text = malloc(FILE_BYTES_MAX);
-    const size_t length = text != NULL ? fread(text, 1, FILE_BYTES_MAX, file) : 0;
-    json_error_t why;
-    json_t *root = NULL;
-    if (text == NULL)
-        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
-    else if (ferror(file) != 0)
-        fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %m");
-    else if (length == FILE_BYTES_MAX)
-        fl_error_set(error, FL_ERROR_FILE, path, "is too large for camera keys");
-    else if ((root = json_loadb(text, length, JSON_REJECT_DUPLICATES, &why)) == NULL)
-        fl_error_set(error, FL_ERROR_FILE, path, "line %d, column %d: %s", why.line, why.column, why.text);
-    free(text);
-    fclose(file);
-    return root;
-}
-
 bool fl_camera_keys_load(const char *path, struct record_camera_key **keys, size_t *key_count,
                          struct fl_error *error)
 {
-    json_t *root = load(path, error);
-    if (root == NULL)
+    struct fl_json json;
+    if (!fl_json_load(&json, path, FILE_BYTES_MAX, error))
         return false;
-    const size_t count = json_is_array(root) ? json_array_size(root) : 0;
+    const size_t count = json_is_array(json.root) ? json_array_size(json.root) : 0;
     struct record_camera_key *made = NULL;
     bool good = false;
     if (count == 0 || count > KEYS_MAX) {
         fl_error_set(error, FL_ERROR_FILE, path, "must be an array of 1 to %u camera keys", KEYS_MAX);
     } else {
         made = calloc(count, sizeof *made);
-        good = made != NULL ? read_all(path, root, made, error)
+        good = made != NULL ? read_all(path, &json, made, error)
                             : fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     }
-    json_decref(root);
+    fl_json_finish(&json);
     if (!good) {
         free(made);
         return false;

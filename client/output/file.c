@@ -7,8 +7,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#define FILE_BYTES_MAX (UINT64_C(1) << 36)
 
 static bool fail(char *reason, size_t reason_bytes, int number)
 {
@@ -47,34 +50,81 @@ void file_clean_up_on_end(void)
     signal(SIGTERM, on_end);
 }
 
-bool file_write(const char *path, const uint8_t *bytes, size_t count, char *reason, size_t reason_bytes)
+uint64_t file_bytes_limit(void)
+{
+    struct rlimit limit = {0};
+    if (getrlimit(RLIMIT_FSIZE, &limit) < 0 || limit.rlim_cur > FILE_BYTES_MAX)
+        return FILE_BYTES_MAX;
+    return limit.rlim_cur;
+}
+
+int file_begin(const char *path, char *reason, size_t reason_bytes)
 {
     const char *slash = strrchr(path, '/');
     const size_t folder_bytes = slash != NULL ? (size_t)(slash - path) + 1 : 0;
     const int length = snprintf(unfinished, sizeof unfinished, "%.*s.farlight-XXXXXX", (int)folder_bytes, path);
-    if (length < 0 || (size_t)length >= sizeof unfinished)
-        return fail(reason, reason_bytes, ENAMETOOLONG);
+    if (length < 0 || (size_t)length >= sizeof unfinished) {
+        fail(reason, reason_bytes, ENAMETOOLONG);
+        return -1;
+    }
+    /* A folder of that name would only be in the way of the rename. */
+    struct stat status;
+    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
+        fail(reason, reason_bytes, EISDIR);
+        return -1;
+    }
     is_unfinished = 1;
     const int fd = mkostemp(unfinished, O_CLOEXEC);
     if (fd < 0) {
         is_unfinished = 0;
-        return fail(reason, reason_bytes, errno);
+        fail(reason, reason_bytes, errno);
+        return -1;
     }
-    /* mkostemp lets nobody else in; the image is an ordinary file. */
+    /* mkostemp lets nobody else in; this is an ordinary file. */
     const mode_t mask = umask(0);
     umask(mask);
-    int failure = fchmod(fd, 0666 & ~mask) < 0 ? errno : 0;
-    if (failure == 0)
-        failure = write_all(fd, bytes, count);
+    if (fchmod(fd, 0666 & ~mask) == 0)
+        return fd;
+    fail(reason, reason_bytes, errno);
+    file_abandon(fd);
+    return -1;
+}
+
+const char *file_temporary_name(void)
+{
+    const char *slash = strrchr(unfinished, '/');
+    return slash != NULL ? slash + 1 : unfinished;
+}
+
+bool file_finish(int fd, const char *path, char *reason, size_t reason_bytes)
+{
     /* Some file systems say only now that they were full. */
-    if (close(fd) < 0 && failure == 0)
-        failure = errno;
+    int failure = close(fd) < 0 ? errno : 0;
     if (failure == 0 && rename(unfinished, path) < 0)
         failure = errno;
     if (failure != 0)
         unlink(unfinished);
     is_unfinished = 0;
     return failure == 0 || fail(reason, reason_bytes, failure);
+}
+
+void file_abandon(int fd)
+{
+    close(fd);
+    unlink(unfinished);
+    is_unfinished = 0;
+}
+
+bool file_write(const char *path, const uint8_t *bytes, size_t count, char *reason, size_t reason_bytes)
+{
+    const int fd = file_begin(path, reason, reason_bytes);
+    if (fd < 0)
+        return false;
+    const int failure = write_all(fd, bytes, count);
+    if (failure == 0)
+        return file_finish(fd, path, reason, reason_bytes);
+    file_abandon(fd);
+    return fail(reason, reason_bytes, failure);
 }
 
 int file_open(const char *path, char *reason, size_t reason_bytes)

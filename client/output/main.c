@@ -11,12 +11,10 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #define EXIT_USAGE 2
 #define TEXT_MAX 512
-#define FILE_BYTES_MAX (UINT64_C(1) << 36)
 
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-export " FARLIGHT_VERSION;
@@ -63,15 +61,6 @@ static error_t parse(int key, char *value, struct argp_state *state)
     default:
         return ARGP_ERR_UNKNOWN;
     }
-}
-
-/* A limit that was there is kept: the sandbox would set ours over it. */
-static uint64_t file_bytes_limit(void)
-{
-    struct rlimit limit = {0};
-    if (getrlimit(RLIMIT_FSIZE, &limit) < 0 || limit.rlim_cur > FILE_BYTES_MAX)
-        return FILE_BYTES_MAX;
-    return limit.rlim_cur;
 }
 
 /* What is wrong with a file is said when somebody asks for it. */

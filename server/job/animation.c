@@ -1,8 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 #include "job/animation.h"
 
+#include "scene/curve.h"
+
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
+#include <string.h>
 
 /* What the protocol lets a key have; a spline through keys near the ends may leave it. */
 #define FOV_MIN 0.001f
@@ -18,56 +22,30 @@ double animation_time_s(const struct engine_job *job, uint32_t frame)
 
 /* ---- keys --------------------------------------------------------------------------------------- */
 
-/* One number of every key, reached by its offset. */
-static double number_at(const struct camera_key *key, size_t offset)
-{
-    return (double)*(const float *)(const void *)((const char *)key + offset);
-}
-
-/* Slope at a key: that of the line between its neighbours, at the ends of that to the only one. With keys at
- * equal distances this is the spline of Catmull and Rom (1974). */
-static double slope_at(const struct camera_key *keys, uint32_t count, uint32_t i, size_t offset)
-{
-    const struct camera_key *before = &keys[i ? i - 1 : i], *after = &keys[i + 1 < count ? i + 1 : i];
-    double seconds = (double)after->time_s - (double)before->time_s;
-    return (number_at(after, offset) - number_at(before, offset)) / seconds;
-}
-
-static float hermite(const struct camera_key *keys, uint32_t count, uint32_t i, double time_s, size_t offset)
-{
-    double seconds = (double)keys[i + 1].time_s - (double)keys[i].time_s;
-    double t = (time_s - (double)keys[i].time_s) / seconds, t2 = t * t, t3 = t2 * t;
-    double from = number_at(&keys[i], offset), to = number_at(&keys[i + 1], offset);
-    double slope_from = slope_at(keys, count, i, offset) * seconds;
-    double slope_to = slope_at(keys, count, i + 1, offset) * seconds;
-    return (float)((2 * t3 - 3 * t2 + 1) * from + (t3 - 2 * t2 + t) * slope_from + (3 * t2 - 2 * t3) * to +
-                   (t3 - t2) * slope_to);
-}
+/* The numbers of a key follow its time. */
+#define KEY_FLOATS (sizeof(struct camera_key) / sizeof(float))
+_Static_assert(offsetof(struct camera_key, eye_world) == sizeof(float) &&
+                   offsetof(struct camera_key, fov_y) == (KEY_FLOATS - 1) * sizeof(float),
+               "a curve goes through the numbers of a key as through an array");
 
 void animation_key_at(const struct camera_key *keys, uint32_t key_count, double time_s, struct camera_key *key)
 {
-    uint32_t last = key_count - 1;
-    if (!(time_s > (double)keys[0].time_s)) {
-        *key = keys[0];
-        return;
-    }
-    if (!(time_s < (double)keys[last].time_s)) {
-        *key = keys[last];
-        return;
-    }
-    uint32_t i = 0;
-    while (time_s >= (double)keys[i + 1].time_s)
-        i++;
-    *key = (struct camera_key){.time_s = (float)time_s};
-    for (size_t axis = 0; axis < 3; axis++) {
-        size_t step = axis * sizeof(float);
-        key->eye_world[axis] = hermite(keys, key_count, i, time_s, offsetof(struct camera_key, eye_world) + step);
-        key->look_at_world[axis] =
-            hermite(keys, key_count, i, time_s, offsetof(struct camera_key, look_at_world) + step);
-        key->up_world[axis] = hermite(keys, key_count, i, time_s, offsetof(struct camera_key, up_world) + step);
-    }
-    float fov_y = hermite(keys, key_count, i, time_s, offsetof(struct camera_key, fov_y));
-    key->fov_y = fminf(fmaxf(fov_y, FOV_MIN), FOV_MAX);
+    const struct curve curve = {
+        .times = &keys[0].time_s,
+        .values = keys[0].eye_world,
+        .time_stride = KEY_FLOATS,
+        .key_stride = KEY_FLOATS,
+        .key_count = key_count,
+        .width = KEY_FLOATS - 1,
+        .interpolation = INTERPOLATION_CATMULL_ROM,
+    };
+    double value[KEY_FLOATS - 1];
+    curve_at(&curve, time_s, value);
+    float numbers[KEY_FLOATS] = {(float)time_s};
+    for (size_t i = 0; i < KEY_FLOATS - 1; i++)
+        numbers[i + 1] = (float)value[i];
+    memcpy(key, numbers, sizeof numbers);
+    key->fov_y = fminf(fmaxf(key->fov_y, FOV_MIN), FOV_MAX);
 }
 
 static bool camera_from_key(const struct camera_key *key, const char *field, struct frame_camera *camera,
@@ -117,24 +95,53 @@ bool animation_turn(struct frame_camera *camera, const float axis_world[3], cons
     return true;
 }
 
-static void auto_camera(const struct engine_job *job, const struct scene *scene, struct frame_camera *camera,
-                        float centre_world[3])
+/* Of everything at time 0 of the job. */
+static bool find_bounds(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
+                        struct error *error)
 {
-    float lower[3], upper[3];
-    if (!scene_bounds(scene, NULL, lower, upper)) {
+    if (bounds->known && bounds->revision == scene->revision)
+        return true;
+    struct scene_pose pose;
+    if (!scene_pose_evaluate(&pose, scene, job->clips, job->clip_count, 0.0, error))
+        return false;
+    *bounds = (struct animation_bounds){.known = true, .revision = scene->revision};
+    bool any = scene_bounds(scene, &pose, bounds->lower, bounds->upper);
+    scene_pose_finish(&pose);
+    for (int axis = 0; axis < 3 && !any; axis++) {
         /* Nothing but the environment to see: any place will do. */
-        for (int axis = 0; axis < 3; axis++) {
-            lower[axis] = -1.0f;
-            upper[axis] = 1.0f;
-        }
+        bounds->lower[axis] = -1.0f;
+        bounds->upper[axis] = 1.0f;
     }
+    return true;
+}
+
+static void middle(const struct animation_bounds *bounds, float centre_world[3])
+{
     for (int axis = 0; axis < 3; axis++)
-        centre_world[axis] = (float)(((double)lower[axis] + (double)upper[axis]) / 2);
-    frame_camera_auto(camera, lower, upper, (float)job->frame.width / (float)job->frame.height);
+        centre_world[axis] = (float)(((double)bounds->lower[axis] + (double)bounds->upper[axis]) / 2);
+}
+
+/* Along the view; 0 where the point is not in front. */
+static float distance_to(const struct frame_camera *camera, const float point_world[3])
+{
+    const float *m = camera->world_from_view;
+    double distance = 0.0;
+    for (int row = 0; row < 3; row++)
+        distance -= ((double)point_world[row] - (double)m[4 * row + 3]) * (double)m[4 * row + 2];
+    return distance > 0.0 ? (float)fmin(distance, (double)PLACE_MAX) : 0.0f;
+}
+
+static bool auto_camera(const struct engine_job *job, const struct scene *scene, struct animation_bounds *bounds,
+                        struct frame_camera *camera, struct error *error)
+{
+    if (!find_bounds(job, scene, bounds, error))
+        return false;
+    frame_camera_auto(camera, bounds->lower, bounds->upper, (float)job->frame.width / (float)job->frame.height);
+    return true;
 }
 
 static bool orbit_camera(const struct engine_job *job, const struct scene *scene, double time_s,
-                         struct frame_camera *camera, struct error *error)
+                         struct animation_bounds *bounds, struct frame_camera *camera, struct error *error)
 {
     float centre_world[3], axis_world[3] = {0.0f, 1.0f, 0.0f};
     if (job->key_count) {
@@ -145,7 +152,9 @@ static bool orbit_camera(const struct engine_job *job, const struct scene *scene
             axis_world[i] = job->keys[0].up_world[i];
         }
     } else {
-        auto_camera(job, scene, camera, centre_world);
+        if (!auto_camera(job, scene, bounds, camera, error))
+            return false;
+        middle(bounds, centre_world);
     }
     double turns = job->orbit_turn != 0.0f ? time_s / (double)job->orbit_seconds : 0.0;
     if (animation_turn(camera, axis_world, centre_world, (double)job->orbit_turn * turns))
@@ -187,8 +196,8 @@ static bool make_rigid(float m[12])
     return true;
 }
 
-static bool node_camera(const struct engine_job *job, const struct scene *scene, struct frame_camera *camera,
-                        struct error *error)
+static bool node_camera(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
+                        struct frame_camera *camera, struct error *error)
 {
     const char *field = "render.camera_node";
     const struct scene_node *node = scene_node(scene, job->camera_node);
@@ -198,7 +207,7 @@ static bool node_camera(const struct engine_job *job, const struct scene *scene,
     if (!shown)
         return error_set(error, ERROR_INVALID, field, "node %u shows no camera", job->camera_node);
     *camera = (struct frame_camera){.fov_y = shown->fov_y, .ortho_height = shown->height, .near = shown->near};
-    if (scene_world_from_node(scene, NULL, node->base.id, camera->world_from_view) &&
+    if (scene_world_from_node(scene, pose, node->base.id, camera->world_from_view) &&
         make_rigid(camera->world_from_view))
         return true;
     return error_set(error, ERROR_INVALID, field, "the transform of node %u flattens its camera",
@@ -207,7 +216,7 @@ static bool node_camera(const struct engine_job *job, const struct scene *scene,
 
 /* ---- all paths ---------------------------------------------------------------------------------- */
 
-bool animation_check(const struct engine_job *job, const struct scene *scene, struct error *error)
+bool animation_check(const struct engine_job *job, struct error *error)
 {
     if (!(job->frames_per_second > 0.0f))
         return error_set(error, ERROR_INVALID, "render.frames_per_second", "%g is not above 0",
@@ -227,42 +236,96 @@ bool animation_check(const struct engine_job *job, const struct scene *scene, st
     if (job->path == CAMERA_ORBIT && job->orbit_turn != 0.0f && !(job->orbit_seconds > 0.0f))
         return error_set(error, ERROR_INVALID, "render.orbit_seconds", "%g is not above 0",
                          (double)job->orbit_seconds);
-    struct frame_camera camera;
-    return animation_camera(job, scene, job->first_frame, &camera, error);
+    return true;
 }
 
-static bool camera_at(const struct engine_job *job, const struct scene *scene, uint32_t frame,
-                      struct frame_camera *camera, struct error *error)
+/* A key of the path with what clips say instead. */
+static bool keys_camera(const struct engine_job *job, const struct pose_view *given, double time_s,
+                        struct frame_camera *camera, float *focus, struct error *error)
+{
+    struct camera_key key;
+    animation_key_at(job->keys, job->key_count, time_s, &key);
+    key.time_s = (float)time_s;
+    if (given->given & POSE_VIEW_EYE)
+        memcpy(key.eye_world, given->eye_world, sizeof key.eye_world);
+    if (given->given & POSE_VIEW_LOOK_AT)
+        memcpy(key.look_at_world, given->look_at_world, sizeof key.look_at_world);
+    if (given->given & POSE_VIEW_UP)
+        memcpy(key.up_world, given->up_world, sizeof key.up_world);
+    if (!camera_from_key(&key, "render.keys", camera, error))
+        return false;
+    *focus = distance_to(camera, key.look_at_world);
+    return true;
+}
+
+static bool path_allows(const struct engine_job *job, const struct pose_view *given, struct error *error)
+{
+    if (job->path == CAMERA_KEYS || !(given->given & (POSE_VIEW_EYE | POSE_VIEW_LOOK_AT | POSE_VIEW_UP)))
+        return true;
+    error_set(error, ERROR_INVALID, "render.camera_path",
+              "a clip moves the view's eye, look_at or up, which this camera path does not have");
+    return error_remedy(error, "use the camera path keys with one key, or leave that clip out");
+}
+
+static bool camera_at(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
+                      double time_s, struct animation_bounds *bounds, struct animation_view *view,
+                      struct error *error)
+{
+    static const struct pose_view nothing = {0};
+    const struct pose_view *given = pose ? &pose->view : &nothing;
+    struct frame_camera *camera = &view->camera;
+    float centre_world[3];
+    if (!path_allows(job, given, error))
+        return false;
+    switch (job->path) {
+    case CAMERA_KEYS:
+        return keys_camera(job, given, time_s, camera, &view->focus, error);
+    case CAMERA_AUTO:
+        if (!auto_camera(job, scene, bounds, camera, error))
+            return false;
+        break;
+    case CAMERA_NODE:
+        if (!node_camera(job, scene, pose, camera, error))
+            return false;
+        break;
+    case CAMERA_ORBIT:
+        if (!orbit_camera(job, scene, time_s, bounds, camera, error))
+            return false;
+        break;
+    default:
+        return error_set(error, ERROR_INVALID, "render.camera_path", "%u is no camera path", (unsigned)job->path);
+    }
+    if (job->path == CAMERA_ORBIT && job->key_count) {
+        view->focus = distance_to(camera, job->keys[0].look_at_world);
+        return true;
+    }
+    /* The bounds cost something: only a lens asks for them. */
+    if (!(job->frame.aperture > 0.0f) && !(given->given & POSE_VIEW_APERTURE))
+        return true;
+    if (!find_bounds(job, scene, bounds, error))
+        return false;
+    middle(bounds, centre_world);
+    view->focus = distance_to(camera, centre_world);
+    return true;
+}
+
+bool animation_view(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
+                    uint32_t frame, struct animation_bounds *bounds, struct animation_view *view,
+                    struct error *error)
 {
     double time_s = animation_time_s(job, frame);
-    float centre_world[3];
-    struct camera_key key;
-    *camera = (struct frame_camera){0};
-    switch (job->path) {
-    case CAMERA_AUTO:
-        auto_camera(job, scene, camera, centre_world);
-        return true;
-    case CAMERA_NODE:
-        return node_camera(job, scene, camera, error);
-    case CAMERA_KEYS:
-        animation_key_at(job->keys, job->key_count, time_s, &key);
-        return camera_from_key(&key, "render.keys", camera, error);
-    case CAMERA_ORBIT:
-        return orbit_camera(job, scene, time_s, camera, error);
-    }
-    return error_set(error, ERROR_INVALID, "render.camera_path", "%u is no camera path", (unsigned)job->path);
-}
-
-bool animation_camera(const struct engine_job *job, const struct scene *scene, uint32_t frame,
-                      struct frame_camera *camera, struct error *error)
-{
-    if (!(fabs(animation_time_s(job, frame)) <= TIME_MAX_S)) {
+    if (!(fabs(time_s) <= TIME_MAX_S)) {
         error_set(error, ERROR_INVALID, "render.frames_per_second", "frame %u is at %g s, beyond %g s", frame,
-                  animation_time_s(job, frame), TIME_MAX_S);
+                  time_s, TIME_MAX_S);
         return error_remedy(error, "use more frames a second, or smaller frame numbers");
     }
-    if (!camera_at(job, scene, frame, camera, error))
+    struct animation_bounds own = {0};
+    *view = (struct animation_view){0};
+    if (!camera_at(job, scene, pose, time_s, bounds ? bounds : &own, view, error))
         return false;
+    struct frame_camera *camera = &view->camera;
+    if (pose && (pose->view.given & POSE_VIEW_FOV_Y) && camera->fov_y > 0.0f)
+        camera->fov_y = pose->view.fov_y;
     for (int i = 0; i < 12; i++) {
         if (fabsf(camera->world_from_view[i]) <= PLACE_MAX) /* false for a NaN too */
             continue;

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Where a job's camera is in a frame. Pure: the same scene, job and frame give the same camera. */
+/* Where a job's camera is in a frame. Pure: the same scene, job and frame give the same camera, whatever frames
+ * came before. */
 #ifndef FARLIGHT_JOB_ANIMATION_H
 #define FARLIGHT_JOB_ANIMATION_H
 
 #include "base/error.h"
 #include "job/engine.h"
+#include "scene/pose.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -16,9 +18,23 @@ void animation_key_at(const struct camera_key *keys, uint32_t key_count, double 
 /* Turns a camera about an axis through a point, counterclockwise seen against the axis; false: the axis is 0. */
 bool animation_turn(struct frame_camera *camera, const float axis_world[3], const float centre_world[3],
                     double angle);
-/* Errors that do not depend on the frame. */
-bool animation_check(const struct engine_job *job, const struct scene *scene, struct error *error);
-bool animation_camera(const struct engine_job *job, const struct scene *scene, uint32_t frame,
-                      struct frame_camera *camera, struct error *error);
+/* Errors that depend on neither the frame nor the scene. */
+bool animation_check(const struct engine_job *job, struct error *error);
+/* The scene's bounds at the job's time 0, which is what cameras that see all of it stand still for. They may be
+ * kept from frame to frame, as they follow from the scene's revision alone. */
+struct animation_bounds {
+    bool known;
+    uint64_t revision;
+    float lower[3], upper[3];
+};
+struct animation_view {
+    struct frame_camera camera;
+    float focus; /* distance along the view to what is looked at, or to the middle of the scene; metres */
+};
+/* `pose`: at the frame's time, NULL: the scene as it was committed; its view counts, as far as it is given.
+ * `bounds` may be NULL. */
+bool animation_view(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
+                    uint32_t frame, struct animation_bounds *bounds, struct animation_view *view,
+                    struct error *error);
 
 #endif

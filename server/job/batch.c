@@ -4,7 +4,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
-#include "job/animation.h"
+#include "job/shot.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -35,7 +35,7 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
     }
     return tracer_find(spec->frame.tracer, "render.tracer", error) &&
            (!spec->frame.compare || tracer_find(spec->frame.compare_with, "render.compare_with", error)) &&
-           animation_check(spec, scene, error);
+           shot_check(spec, scene, error);
 }
 
 static bool jobs_reserve(struct engine *engine)
@@ -83,6 +83,7 @@ bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_
     job->request = command->request;
     job->spec = command->job;
     command->job.keys = NULL;
+    command->job.clips = NULL;
     job->scene = scene;
     job->output = output;
     job->next_frame = job->spec.first_frame;
@@ -122,6 +123,7 @@ static void job_remove(struct engine *engine, struct job *job)
     memmove(&engine->jobs[i], &engine->jobs[i + 1], (--engine->job_count - i) * sizeof(struct job *));
     job_output_unref(job->output);
     free(job->spec.keys);
+    free(job->spec.clips);
     free(job);
 }
 
@@ -194,20 +196,30 @@ static void frame_failed(struct engine *engine, struct job *job, const struct er
     job_finish(job, error);
 }
 
-static bool frame_take_up(struct engine *engine, struct job *job, struct error *error)
+static bool frame_begin_shot(struct engine *engine, struct job *job, const struct shot *shot, struct error *error)
 {
     struct engine_scene *scene = job->scene;
-    uint32_t frame = (uint32_t)job->next_frame;
-    job->begin_ns = clock_now_ns();
-    job->frame = job->spec.frame;
-    job->time_s = (float)animation_time_s(&job->spec, frame);
-    if (!animation_camera(&job->spec, scene->scene, frame, &job->frame.camera, error))
-        return false;
+    const struct scene_motion *motion = shot->motion.pose_count ? &shot->motion : NULL;
     if (!engine_need_device(engine, error))
         return false;
     if (!scene->renderer)
         scene->renderer = engine->backend->renderer_create(engine->device, error);
-    if (!scene->renderer || !engine->backend->begin(scene->renderer, scene->scene, NULL, &job->frame, error))
+    return scene->renderer && engine->backend->begin(scene->renderer, scene->scene, motion, &shot->request, error);
+}
+
+static bool frame_take_up(struct engine *engine, struct job *job, struct error *error)
+{
+    struct engine_scene *scene = job->scene;
+    struct shot shot;
+    job->begin_ns = clock_now_ns();
+    if (!shot_make(&shot, &job->spec, scene->scene, (uint32_t)job->next_frame, &job->bounds, error))
+        return false;
+    job->frame = shot.request;
+    job->time_s = shot.time_s;
+    job->shutter_s = shot.shutter_s;
+    bool begun = frame_begin_shot(engine, job, &shot, error);
+    shot_finish(&shot);
+    if (!begun)
         return false;
     job->rendering = true;
     scene->frame_of = job;
@@ -237,6 +249,7 @@ static void frame_done(struct engine *engine, struct job *job, struct engine_fra
     frame->request = job->frame;
     frame->encoding = job->spec.encoding;
     frame->time_s = job->time_s;
+    frame->shutter_s = job->shutter_s;
     job->next_frame += job->spec.frame_step;
     uint64_t position = job_output_reserve(job->output);
     if (!encode_pool_submit(engine->pool, job->output, position, frame, job->spec.quality)) {

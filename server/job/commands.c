@@ -18,6 +18,7 @@ void engine_command_destroy(struct engine_command *command)
         scene_edit_finish(&command->edits[i]);
     free(command->edits);
     free(command->job.keys);
+    free(command->job.clips);
     free(command);
 }
 

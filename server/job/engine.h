@@ -12,6 +12,7 @@
 #include "encode/encoder.h"
 #include "gpu/device.h"
 #include "render/frame.h"
+#include "scene/pose.h"
 #include "scene/scene.h"
 
 #include <stdbool.h>
@@ -34,7 +35,8 @@ struct engine_options {
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
 };
 
-/* Camera of a job over time; enums have the protocol's numbers. */
+/* Camera of a job over time, `time_s` and ten numbers that a spline goes through; enums have the protocol's
+ * numbers. */
 enum camera_path { CAMERA_AUTO, CAMERA_NODE, CAMERA_KEYS, CAMERA_ORBIT };
 struct camera_key {
     float time_s;
@@ -42,12 +44,14 @@ struct camera_key {
     float fov_y;
 };
 
+/* What a job asks for; per frame job/shot.h makes a request and poses of it. */
 struct engine_job {
     uint32_t scene; /* that of the command, which is the one that counts */
     uint32_t first_frame, last_frame, frame_step;
     float frames_per_second;
     uint32_t time_origin_frame;
-    struct frame_request frame; /* camera is filled per frame */
+    struct frame_request frame; /* camera, focus and seed are filled per frame */
+    float shutter;              /* how long it is open from the frame's time on, in frames */
     enum encoding encoding;
     unsigned quality;
     enum camera_path path;
@@ -55,6 +59,8 @@ struct engine_job {
     float orbit_turn, orbit_seconds;
     struct camera_key *keys; /* owned */
     uint32_t key_count;
+    struct clip_use *clips; /* owned */
+    uint32_t clip_count;
     /* Frames that may be handed out so far, absolute. Beyond it, frames are rendered as far as frames_in_flight
      * goes, and kept. */
     uint64_t credit;
@@ -116,7 +122,7 @@ struct engine_frame {
     uint8_t *bytes; /* owned, malloc'ed */
     size_t size_bytes;
     uint64_t digest; /* XXH3-64 of the pixels before encoding */
-    float time_s;
+    float time_s, shutter_s;
     uint64_t encoded_ns; /* clock_now_ns() when it was ready to be sent */
 };
 

@@ -6,6 +6,7 @@
 
 #include "base/hashmap.h"
 #include "base/queue.h"
+#include "job/animation.h"
 #include "job/backend.h"
 #include "job/encode_pool.h"
 #include "job/engine.h"
@@ -47,11 +48,12 @@ struct job {
     struct job_output *output;
     uint64_t next_frame; /* number in the range; beyond its end: all rendered */
     uint64_t served;
+    struct animation_bounds bounds;
     /* of the frame in progress */
     bool rendering;
     bool evicted; /* others gave way once already for its memory */
     struct frame_request frame;
-    float time_s;
+    float time_s, shutter_s;
     uint64_t begin_ns;
 };
 

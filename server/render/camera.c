@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/camera.h"
 
+#include "render/pixel_filter.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -113,6 +115,18 @@ static float far_distance(const struct frame_camera *camera, const struct scene_
     return far * 1.001f;
 }
 
+/* Of the middle of the scene; where that is not in front of the camera, of half the scene's size. */
+static float focus_distance(const struct frame_camera *camera, const struct scene_gpu *scene)
+{
+    float middle[3];
+    for (int i = 0; i < 3; i++)
+        middle[i] = scene->lower_world[i] / 2.0f + scene->upper_world[i] / 2.0f;
+    float distance = distance_along_view(camera, middle), least = scene->diagonal / 2.0f;
+    if (!(distance > 0.0f) || !isfinite(distance))
+        distance = least > 0.0f && isfinite(least) ? least : 1.0f;
+    return distance;
+}
+
 void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_request *request,
                           const struct scene_gpu *scene)
 {
@@ -130,20 +144,12 @@ void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_re
     uniforms->extent_near[2] = near;
     uniforms->extent_near[3] = orthographic ? 1.0f : 0.0f;
     uniforms->jitter_pixel[2] = far_distance(camera, scene, near);
+    uniforms->lens[0] = request->aperture / 2.0f;
+    uniforms->lens[1] = request->focus > 0.0f ? request->focus : focus_distance(camera, scene);
+    _Static_assert(sizeof(uniforms->filter_places) / sizeof(float) > PIXEL_FILTER_INTERVALS,
+                   "room for all places");
+    pixel_filter_places((float *)uniforms->filter_places, request->filter);
     uniforms->width = request->width;
     uniforms->height = request->height;
     uniforms->tiles_across = (request->width + 7) / 8;
-}
-
-/* The R2 lattice (see shaders/common/rng.glsl) in 32-bit fixed point, shifted by the seed. */
-void camera_jitter(float jitter_pixel[2], uint64_t seed, uint32_t index, uint32_t samples)
-{
-    jitter_pixel[0] = jitter_pixel[1] = 0.5f;
-    if (samples <= 1)
-        return;
-    uint64_t shift = (seed + 1) * 0x9e3779b97f4a7c15u;
-    uint32_t x = (uint32_t)(shift >> 32) + index * 3242174889u;
-    uint32_t y = (uint32_t)shift + index * 2447445413u;
-    jitter_pixel[0] = (float)(x >> 8) * 0x1p-24f;
-    jitter_pixel[1] = (float)(y >> 8) * 0x1p-24f;
 }

@@ -71,40 +71,48 @@ bool context_upload_uniforms(struct render_context *context, struct error *error
                              sizeof(context->uniforms), error);
 }
 
-bool context_reserve(struct render_context *context, uint32_t slice_slots, struct error *error)
+bool context_reserve(struct render_context *context, uint32_t slice_samples, struct error *error)
 {
     struct gpu_device *device = context->device;
     size_t capacity = context->wave_capacity;
+    size_t times = context->scene->has_motion ? capacity : 0;
     size_t blocks = (capacity + COMPACT_BLOCK - 1) / COMPACT_BLOCK;
     return gpu_buffer_reserve(device, &context->rays, capacity * sizeof(struct ray), error) &&
+           gpu_buffer_reserve(device, &context->ray_times, times * sizeof(float), error) &&
            gpu_buffer_reserve(device, &context->paths, capacity * sizeof(struct path), error) &&
            gpu_buffer_reserve(device, &context->hits, capacity * sizeof(struct hit), error) &&
            gpu_buffer_reserve(device, &context->hit_list, capacity * sizeof(uint), error) &&
            gpu_buffer_reserve(device, &context->hit_places, capacity * sizeof(uint), error) &&
            gpu_buffer_reserve(device, &context->block_offsets, blocks * 2 * sizeof(uint), error) &&
            gpu_buffer_reserve(device, &context->wave_state, sizeof(struct wave_state), error) &&
-           gpu_buffer_reserve(device, &context->slice_pixels, slice_slots * sizeof(vec4), error);
+           gpu_buffer_reserve(device, &context->slice_sums, slice_samples * sizeof(vec4), error);
+}
+
+struct gpu_buffer *context_ray_times(struct render_context *context)
+{
+    return context->scene->has_motion ? &context->ray_times : NULL;
 }
 
 uint64_t context_device_bytes(const struct render_context *context)
 {
-    return context->rays.capacity_bytes + context->paths.capacity_bytes + context->hits.capacity_bytes +
-           context->hit_list.capacity_bytes + context->hit_places.capacity_bytes +
+    return context->rays.capacity_bytes + context->ray_times.capacity_bytes + context->paths.capacity_bytes +
+           context->hits.capacity_bytes + context->hit_list.capacity_bytes + context->hit_places.capacity_bytes +
            context->block_offsets.capacity_bytes + context->wave_state.capacity_bytes +
-           context->slice_pixels.capacity_bytes;
+           context->slice_sums.capacity_bytes;
 }
 
 void context_finish(struct render_context *context)
 {
     struct gpu_device *device = context->device;
     gpu_buffer_finish(device, &context->rays);
+    gpu_buffer_finish(device, &context->ray_times);
     gpu_buffer_finish(device, &context->paths);
     gpu_buffer_finish(device, &context->hits);
     gpu_buffer_finish(device, &context->hit_list);
     gpu_buffer_finish(device, &context->hit_places);
     gpu_buffer_finish(device, &context->block_offsets);
     gpu_buffer_finish(device, &context->wave_state);
-    gpu_buffer_finish(device, &context->slice_pixels);
+    gpu_buffer_finish(device, &context->slice_sums);
     gpu_buffer_finish(device, &context->uniform_buffer);
     environment_finish(&context->environment, device);
 }

@@ -13,7 +13,8 @@
 #include "trace/scene_gpu.h"
 #include "trace/tracer.h"
 
-/* Some pixels of one sample: slots of shared/frame.h's order, all in one band. */
+/* Some pixels: slots of shared/frame.h's order, all in one band. Of each as many samples as are in hand together,
+ * uniforms.sample_shift. */
 struct slice {
     uint32_t first_slot, slot_count;
 };
@@ -31,15 +32,17 @@ struct render_context {
     struct scene_features features;
     struct frame_uniforms uniforms;
     struct gpu_buffer uniform_buffer;
+    bool spread;            /* each pixel has its samples in places of its own; else jitter_pixel's */
     uint32_t wave_capacity; /* rays that the buffers below hold */
     /* The wave in hand: ray, path and, once traced, hit of each. */
     struct gpu_buffer rays, paths, hits;
-    struct slice slice; /* in hand */
+    struct gpu_buffer ray_times; /* float a ray; empty where nothing moves */
+    struct slice slice;          /* in hand */
     uint32_t ray_count, wave_number;
     struct gpu_buffer hit_list, hit_places; /* of those paths that hit something, see compact.h */
     uint32_t hit_count;
     struct gpu_buffer block_offsets, wave_state; /* of the compaction */
-    struct gpu_buffer slice_pixels;              /* vec4 a pixel of the slice: radiance so far, coverage */
+    struct gpu_buffer slice_sums;                /* vec4 a sample of the slice: radiance so far, coverage */
     uint64_t shadow_rays, secondary_rays;        /* of the slice in hand */
     uint32_t span_count;                         /* since the timer was collected */
 };
@@ -54,7 +57,10 @@ const struct gpu_program *context_use(struct render_context *context, const char
 void context_bind(struct render_context *context);
 bool context_upload_uniforms(struct render_context *context, struct error *error);
 uint64_t context_device_bytes(const struct render_context *context);
-bool context_reserve(struct render_context *context, uint32_t slice_slots, struct error *error);
+/* For slices of so many samples and waves of wave_capacity rays. */
+bool context_reserve(struct render_context *context, uint32_t slice_samples, struct error *error);
+/* When the rays of the wave in hand are; NULL: nothing moves. */
+struct gpu_buffer *context_ray_times(struct render_context *context);
 void context_finish(struct render_context *context);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The order of a frame: update; for each sample the raster pass, then slice by slice primary hits and waves; at
- * last band by band resolve and readback. */
+/* The order of a frame: update; for each sample, or for some together, the raster pass, then slice by slice
+ * primary hits and waves; at last band by band resolve and readback. */
 #include "render/frame.h"
 
 #include "base/clock.h"
@@ -8,9 +8,13 @@
 #include "render/compact.h"
 #include "render/comparison.h"
 #include "render/context.h"
+#include "render/frame_request.h"
 #include "render/integrator.h"
 #include "render/picture.h"
+#include "render/pixel_filter.h"
 #include "render/primary.h"
+#include "render/sequence.h"
+#include "render/slices.h"
 #include "render/tracer_set.h"
 #include "render/wave_trace.h"
 #include "shared/path.h"
@@ -18,13 +22,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Pixels of a slice. Software GL has no latency to hide, and its caches are the CPU's; a GPU wants enough rays to
+/* Rays of a slice. Software GL has no latency to hide, and its caches are the CPU's; a GPU wants enough rays to
  * fill itself. Waves have room for twice as many: mirrors and glass rarely fill a slice. */
-#define SLICE_PIXELS_SOFTWARE (1u << 16)
-#define SLICE_PIXELS_HARDWARE (1u << 18)
+#define SLICE_RAYS_SOFTWARE (1u << 16)
+#define SLICE_RAYS_HARDWARE (1u << 18)
 #define WAVE_PER_SLICE 2
-#define SIZE_MAX_PIXELS 16384u /* width and height; keeps the number of a pixel in 32 bits */
-#define SPLITS_WAITING_MAX 32  /* halves of halves of at most 2^32 pixels */
+/* Textures of a picture that goes on and on are taken as if it had so many samples. */
+#define SAMPLES_GOING_ON 16
 
 enum frame_phase { PHASE_IDLE, PHASE_SAMPLE, PHASE_SLICE, PHASE_WAVE, PHASE_RESOLVE };
 
@@ -43,11 +47,12 @@ struct frame_renderer {
     /* the frame in hand */
     enum frame_phase phase;
     bool rasterise;
-    uint32_t slice_pixels;
-    uint32_t sample, band;
-    uint32_t next_slot;
-    struct slice waiting[SPLITS_WAITING_MAX]; /* halves of a slice that overflowed */
-    uint32_t waiting_count;
+    uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
+    uint32_t sample, band;   /* samples of this frame that are done */
+    struct slices slices;
+    /* the last frame that was finished, whose sum the picture holds */
+    struct frame_request kept_request;
+    uint32_t kept_samples;      /* 0: there is none */
     struct frame_result result; /* counts, until the last step hands it out */
 };
 
@@ -133,36 +138,18 @@ uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer)
     return sum;
 }
 
-/* The session has checked what a client sent; this is what would go wrong here all the same. */
 static bool check_request(const struct frame_renderer *renderer, const struct frame_request *request,
                           struct error *error)
 {
-    if (request->width == 0 || request->height == 0 || request->width > SIZE_MAX_PIXELS ||
-        request->height > SIZE_MAX_PIXELS)
-        return error_set(error, ERROR_INVALID, "width", "a picture of %ux%u pixels; 1 to %u are possible",
-                         request->width, request->height, SIZE_MAX_PIXELS);
-    if (request->samples == 0)
-        return error_set(error, ERROR_INVALID, "samples", "a picture of no samples");
-    if (!find_tracer(renderer, request->tracer, "tracer", error) ||
-        (request->compare && !find_tracer(renderer, request->compare_with, "compare_with", error)))
-        return false;
-    if (!integrator_impl_by_number(request->integrator))
-        return error_set(error, ERROR_UNSUPPORTED, "integrator", "there is no integrator number %u",
-                         (unsigned)request->integrator);
-    if (picture_pixel_bytes(request->format) == 0)
-        return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
-                         (unsigned)request->format);
-    for (int i = 0; i < 12; i++)
-        if (!isfinite(request->camera.world_from_view[i]))
-            return error_set(error, ERROR_INVALID, "camera", "its transform is not finite");
-    if (!(request->camera.fov_y >= 0.0f && request->camera.fov_y < 3.14159f))
-        return error_set(error, ERROR_INVALID, "camera.fov_y", "%g radians; 0 to below pi are possible",
-                         (double)request->camera.fov_y);
-    if (request->camera.fov_y == 0.0f &&
-        !(request->camera.ortho_height > 0.0f && isfinite(request->camera.ortho_height)))
-        return error_set(error, ERROR_INVALID, "camera.height", "an orthographic camera of height %g",
-                         (double)request->camera.ortho_height);
-    return true;
+    return frame_request_check(request, error) && find_tracer(renderer, request->tracer, "tracer", error) &&
+           (!request->compare || find_tracer(renderer, request->compare_with, "compare_with", error));
+}
+
+/* Whether the picture that is kept shows what this frame will, once the scene has been updated. */
+static bool may_go_on(const struct frame_renderer *renderer, const struct frame_request *request)
+{
+    return renderer->kept_samples > 0 && request->samples <= UINT32_MAX - renderer->kept_samples &&
+           frame_request_adds_to(&renderer->kept_request, request);
 }
 
 static bool update_scene(struct frame_renderer *renderer, const struct scene *scene,
@@ -171,10 +158,14 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     struct render_context *context = &renderer->context;
     const struct frame_request *request = &context->request;
     struct scene_changes changes = {0};
+    uint64_t revision_before = renderer->scene.revision;
     bool updated = scene_gpu_update(&renderer->scene, scene, motion, &changes, &context->times, error);
     tracer_set_note(&renderer->tracers, updated ? &changes : NULL);
     if (!updated)
         return false;
+    if (renderer->scene.revision != revision_before || changes.geometry || changes.instances || changes.shading ||
+        changes.lights)
+        renderer->samples_before = 0;
     renderer->result.uploaded_bytes = changes.uploaded_bytes;
     context->tracer = tracer_set_get(&renderer->tracers, &renderer->scene,
                                      find_tracer(renderer, request->tracer, "tracer", error),
@@ -223,7 +214,7 @@ static uint32_t at_least(uint32_t value, uint32_t least)
 static bool reserve_waves(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->context;
-    return context_reserve(context, renderer->slice_pixels, error) &&
+    return context_reserve(context, renderer->slices.slice_rays, error) &&
            renderer->integrator->impl->reserve(renderer->integrator, context, error);
 }
 
@@ -237,22 +228,24 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
         if (!renderer->integrator)
             return false;
     }
-    if (!picture_begin(&renderer->picture, context, error))
+    if (!picture_begin(&renderer->picture, context, renderer->samples_before, error))
         return false;
-    uint32_t slice = renderer->device->facts.software ? SLICE_PIXELS_SOFTWARE : SLICE_PIXELS_HARDWARE;
-    if (renderer->wanted_slice_pixels)
-        slice = renderer->wanted_slice_pixels;
-    uint32_t slots = picture_slot_count(&renderer->picture);
-    renderer->slice_pixels = slice < slots ? slice : slots;
-    context->wave_capacity =
-        at_least(renderer->wanted_wave_rays ? renderer->wanted_wave_rays : renderer->slice_pixels * WAVE_PER_SLICE,
-                 renderer->slice_pixels);
-    if (!reserve_waves(renderer, error))
-        return false;
+    const struct frame_request *request = &context->request;
+    bool flat = !(request->aperture > 0.0f) && !renderer->scene.has_motion;
     /* A picture too large for the visibility buffer is traced from the first ray: the same hits, another way. */
-    renderer->rasterise = context->request.primary == PRIMARY_RASTER && !context->request.compare &&
+    renderer->rasterise = flat && request->primary == PRIMARY_RASTER && !request->compare &&
                           primary_reserve(&renderer->primary, context, NULL);
-    return true;
+    uint32_t rays = renderer->device->facts.software ? SLICE_RAYS_SOFTWARE : SLICE_RAYS_HARDWARE;
+    if (renderer->wanted_slice_pixels)
+        rays = renderer->wanted_slice_pixels;
+    uint64_t all = picture_slot_count(&renderer->picture);
+    all *= renderer->rasterise ? 1 : SLICES_SAMPLES_TOGETHER;
+    renderer->slices.slice_rays = rays < all ? rays : (uint32_t)all;
+    uint32_t wave_rays = renderer->slices.slice_rays * WAVE_PER_SLICE;
+    if (renderer->wanted_wave_rays)
+        wave_rays = renderer->wanted_wave_rays;
+    context->wave_capacity = at_least(wave_rays, renderer->slices.slice_rays);
+    return reserve_waves(renderer, error);
 }
 
 bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
@@ -264,12 +257,17 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
         return false;
     context->request = *request;
     renderer->result = (struct frame_result){0};
+    renderer->samples_before = may_go_on(renderer, request) ? renderer->kept_samples : 0;
+    renderer->kept_samples = 0; /* until this one is finished */
     stage_times_begin(&context->times);
     if (!update_scene(renderer, scene, motion, error) || !begin_comparison(renderer, error))
         return false;
     camera_fill_uniforms(&context->uniforms, request, &renderer->scene);
     environment_fill_uniforms(&context->environment, &context->uniforms, &renderer->scene);
     context->uniforms.depth = request->depth;
+    context->uniforms.jitter_pixel[3] =
+        1.0f / sqrtf(request->accumulate ? SAMPLES_GOING_ON : (float)request->samples);
+    context->spread = request->samples > 1 || request->accumulate;
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
     if (!reserve_frame(renderer, error) || !gpu_check(renderer->device, "beginning a frame", error))
         return false;
@@ -284,51 +282,48 @@ void frame_abandon(struct frame_renderer *renderer)
     if (renderer->phase != PHASE_IDLE)
         gpu_timer_collect(renderer->context.timer, NULL);
     renderer->context.span_count = 0;
-    renderer->waiting_count = 0;
     picture_drop_pixels(&renderer->picture);
     renderer->phase = PHASE_IDLE;
+}
+
+/* Where all pixels have the sample in hand, if each does not have a place of its own. */
+static void place_sample(struct frame_renderer *renderer)
+{
+    struct frame_uniforms *uniforms = &renderer->context.uniforms;
+    uniforms->jitter_pixel[0] = uniforms->jitter_pixel[1] = 0.5f;
+    if (!renderer->context.spread)
+        return;
+    float numbers[2];
+    sequence_pair(numbers, sequence_seed(UINT32_MAX, uniforms->seed), SEQUENCE_PIXEL, uniforms->sample_index);
+    for (int i = 0; i < 2; i++)
+        uniforms->jitter_pixel[i] += pixel_filter_offset((const float *)uniforms->filter_places, numbers[i]);
 }
 
 static bool begin_sample(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->context;
-    const struct frame_request *request = &context->request;
-    camera_jitter(context->uniforms.jitter_pixel, request->seed, renderer->sample, request->samples);
-    context->uniforms.jitter_pixel[3] = 1.0f / sqrtf((float)request->samples);
-    context->uniforms.sample_index = renderer->sample;
+    uint32_t left = context->request.samples - renderer->sample;
+    context->uniforms.sample_index = renderer->samples_before + renderer->sample;
+    context->uniforms.sample_shift = renderer->rasterise ? 0 : slices_sample_shift(&renderer->slices, left);
+    place_sample(renderer);
     context->wave_number = 0;
-    renderer->next_slot = 0;
+    slices_restart(&renderer->slices);
     renderer->phase = PHASE_SLICE;
     return context_upload_uniforms(context, error) &&
            (!renderer->rasterise || primary_rasterise(&renderer->primary, context, error));
 }
 
-/* The next slice of this sample; false: there is none. */
-static bool take_slice(struct frame_renderer *renderer)
-{
-    struct slice *slice = &renderer->context.slice;
-    if (renderer->waiting_count > 0) {
-        *slice = renderer->waiting[--renderer->waiting_count];
-        return true;
-    }
-    if (renderer->next_slot >= picture_slot_count(&renderer->picture))
-        return false;
-    uint32_t band_left = picture_band_end(&renderer->picture, renderer->next_slot) - renderer->next_slot;
-    slice->first_slot = renderer->next_slot;
-    slice->slot_count = band_left < renderer->slice_pixels ? band_left : renderer->slice_pixels;
-    renderer->next_slot += slice->slot_count;
-    return true;
-}
-
 static bool begin_slice(struct frame_renderer *renderer, struct error *error)
 {
-    if (!take_slice(renderer)) {
-        renderer->sample++;
-        renderer->phase = renderer->sample < renderer->context.request.samples ? PHASE_SAMPLE : PHASE_RESOLVE;
+    struct render_context *context = &renderer->context;
+    uint32_t sample_shift = context->uniforms.sample_shift;
+    if (!slices_take(&renderer->slices, &renderer->picture, sample_shift, &context->slice)) {
+        renderer->sample += 1u << sample_shift;
+        renderer->phase = renderer->sample < context->request.samples ? PHASE_SAMPLE : PHASE_RESOLVE;
         return true;
     }
     renderer->phase = PHASE_WAVE;
-    return primary_slice(renderer->rasterise ? &renderer->primary : NULL, &renderer->context, error) &&
+    return primary_slice(renderer->rasterise ? &renderer->primary : NULL, context, error) &&
            gpu_check(renderer->device, "primary hits", error);
 }
 
@@ -337,23 +332,17 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
 static bool split_slice(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->context;
-    struct slice *slice = &context->slice;
     renderer->result.splits++;
     if (context->comparison)
         comparison_drop_slice(context->comparison);
     renderer->phase = PHASE_SLICE;
-    if (slice->slot_count == 1) {
-        if (context->wave_capacity > renderer->device->facts.storage_block_bytes_max / sizeof(struct child) / 8)
-            return error_set(error, ERROR_LIMIT, "depth", "the rays of one pixel are more than the device holds");
-        context->wave_capacity *= 2;
-        renderer->waiting[renderer->waiting_count++] = *slice;
-        return reserve_waves(renderer, error);
-    }
-    uint32_t half = slice->slot_count / 2;
-    renderer->waiting[renderer->waiting_count++] =
-        (struct slice){slice->first_slot + half, slice->slot_count - half};
-    renderer->waiting[renderer->waiting_count++] = (struct slice){slice->first_slot, half};
-    return true;
+    if (slices_split(&renderer->slices, &context->slice))
+        return true;
+    if (context->wave_capacity > renderer->device->facts.storage_block_bytes_max / sizeof(struct child) / 8)
+        return error_set(error, ERROR_LIMIT, "depth", "the rays of one pixel are more than the device holds");
+    context->wave_capacity *= 2;
+    slices_put_back(&renderer->slices, &context->slice);
+    return reserve_waves(renderer, error);
 }
 
 static bool trace_wave(struct render_context *context, struct error *error)
@@ -363,6 +352,7 @@ static bool trace_wave(struct render_context *context, struct error *error)
         .ray_count = context->ray_count,
         .rays = &context->rays,
         .hits = &context->hits,
+        .times = context_ray_times(context),
     };
     if (!wave_trace(context, RAY_SECONDARY, &wave, error))
         return false;
@@ -409,9 +399,11 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     result->width = request->width;
     result->height = request->height;
     result->format = request->format;
-    result->samples = request->samples;
+    result->samples = renderer->picture.samples;
     result->primary_rays = (uint64_t)request->width * request->height * request->samples;
     result->times = context->times;
+    renderer->kept_request = *request;
+    renderer->kept_samples = result->samples;
     renderer->phase = PHASE_IDLE;
     return true;
 }

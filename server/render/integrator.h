@@ -24,13 +24,13 @@ struct integrator_impl {
     /* Makes the buffers fit context->wave_capacity; at the start of a frame and when the capacity grows. */
     bool (*reserve)(struct integrator *integrator, struct render_context *context, struct error *error);
     uint64_t (*device_bytes)(const struct integrator *integrator);
-    /* Shades the wave whose hits the context holds and adds it to slice_pixels. Shadow rays that it needs it has
+    /* Shades the wave whose hits the context holds and adds it to slice_sums. Shadow rays that it needs it has
      * traced itself; their number goes to context->shadow_rays. */
     enum integrator_progress (*shade)(struct integrator *integrator, struct render_context *context,
                                       struct error *error);
 };
 
-extern const struct integrator_impl integrator_whitted_impl;
+extern const struct integrator_impl integrator_whitted_impl, integrator_distributed_impl;
 
 /* By frame_request's number; NULL: there is none. */
 const struct integrator_impl *integrator_impl_by_number(unsigned number);

@@ -67,7 +67,8 @@ static bool make_bands(struct picture *picture, struct gpu_device *device, struc
     return true;
 }
 
-bool picture_begin(struct picture *picture, struct render_context *context, struct error *error)
+bool picture_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
+                   struct error *error)
 {
     const struct frame_request *request = &context->request;
     picture_drop_pixels(picture);
@@ -81,7 +82,8 @@ bool picture_begin(struct picture *picture, struct render_context *context, stru
             return false;
         }
     }
-    for (uint32_t i = 0; i < picture->band_count; i++)
+    picture->samples = samples_before + request->samples;
+    for (uint32_t i = 0; i < picture->band_count && samples_before == 0; i++)
         gpu_buffer_clear(context->device, &picture->bands[i], 0);
     return true;
 }
@@ -93,9 +95,10 @@ bool picture_accumulate(struct picture *picture, struct render_context *context,
         return false;
     uint32_t band = context->slice.first_slot / band_slots(picture);
     gpu_buffer_bind_storage(&picture->bands[band], BIND_ACCUMULATION);
-    gpu_buffer_bind_storage(&context->slice_pixels, BIND_SLICE_PIXELS);
+    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot - band * band_slots(picture));
     gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
+    gpu_uniform_uint(program, "sample_shift", context->uniforms.sample_shift);
     context_span_begin(context, STAGE_SHADE);
     gpu_dispatch(context->device, program, context->slice.slot_count);
     context_span_end(context);

@@ -9,6 +9,7 @@
 struct picture {
     uint32_t width, height;
     uint32_t tiles_across;
+    uint32_t samples;   /* of every pixel that the sums hold, or will when the frame in hand is done */
     uint32_t band_rows; /* pixel rows of every band but the last; a multiple of 8 */
     uint32_t band_count;
     struct gpu_buffer *bands;   /* vec4 a slot: radiance and coverage, summed */
@@ -17,8 +18,10 @@ struct picture {
     size_t size_bytes;
 };
 
-/* Makes room for the request's picture and sets it to zero. */
-bool picture_begin(struct picture *picture, struct render_context *context, struct error *error);
+/* Makes room for the request's picture and sets it to zero; or, where it holds `samples_before` samples of each
+ * pixel that the request's are to be added to, leaves it. */
+bool picture_begin(struct picture *picture, struct render_context *context, uint32_t samples_before,
+                   struct error *error);
 uint32_t picture_slot_count(const struct picture *picture);
 /* First slot of the band after the one that `slot` is in. */
 uint32_t picture_band_end(const struct picture *picture, uint32_t slot);

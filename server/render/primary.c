@@ -143,9 +143,17 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
 /* Rays, paths, and what the rasteriser saw. */
 static bool make_rays(const struct primary *primary, struct render_context *context, struct error *error)
 {
-    static const struct gpu_define defines[] = {{"VISIBILITY", "1"}, {NULL, NULL}};
-    const struct gpu_program_source source = {.compute = "render/primary.comp",
-                                              .defines = primary ? defines : NULL};
+    struct gpu_define defines[5] = {0};
+    size_t n = 0;
+    if (primary)
+        defines[n++] = (struct gpu_define){"VISIBILITY", "1"};
+    else if (context->spread)
+        defines[n++] = (struct gpu_define){"SPREAD", "1"};
+    if (context->uniforms.lens[0] > 0.0f)
+        defines[n++] = (struct gpu_define){"HAS_LENS", "1"};
+    if (context->scene->has_motion)
+        defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
+    const struct gpu_program_source source = {.compute = "render/primary.comp", .defines = defines};
     const struct gpu_program *program = gpu_program_get(context->device, &source, error);
     if (!program)
         return false;
@@ -156,10 +164,12 @@ static bool make_rays(const struct primary *primary, struct render_context *cont
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
     gpu_buffer_bind_storage(&context->hits, BIND_HITS);
     gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
-    gpu_buffer_bind_storage(&context->slice_pixels, BIND_SLICE_PIXELS);
+    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
+    if (context->scene->has_motion)
+        gpu_buffer_bind_storage(&context->ray_times, BIND_RAY_TIMES);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
     gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
-    gpu_dispatch(context->device, program, context->slice.slot_count);
+    gpu_dispatch(context->device, program, context->ray_count);
     return true;
 }
 
@@ -192,7 +202,8 @@ static bool trace_hits(struct render_context *context, struct error *error)
         .ray_count = context->ray_count,
         .rays = &context->rays,
         .hits = &context->hits,
-        .shared_origin = context->request.camera.fov_y > 0.0f, /* a perspective camera's eye */
+        .times = context_ray_times(context),
+        .shared_origin = context->request.camera.fov_y > 0.0f && !(context->uniforms.lens[0] > 0.0f), /* an eye */
     };
     context_span_end(context);
     bool traced = wave_trace(context, RAY_PRIMARY, &wave, error);
@@ -202,7 +213,7 @@ static bool trace_hits(struct render_context *context, struct error *error)
 
 bool primary_slice(const struct primary *primary, struct render_context *context, struct error *error)
 {
-    context->ray_count = context->slice.slot_count;
+    context->ray_count = context->slice.slot_count << context->uniforms.sample_shift;
     context->wave_number = 0;
     context->shadow_rays = context->secondary_rays = 0;
     context_span_begin(context, STAGE_PRIMARY);

@@ -31,7 +31,7 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
     context_bind(context);
     const struct gpu_program *program = context_use(context, "render/resolve.comp", error);
     if (program) {
-        float coverage_scale = 1.0f / (float)request->samples;
+        float coverage_scale = 1.0f / (float)picture->samples;
         gpu_buffer_bind_storage(&picture->bands[band], BIND_ACCUMULATION);
         gpu_buffer_bind_storage(&picture->resolved, BIND_RESOLVED);
         gpu_uniform_uint(program, "pixel_count", pixel_count);

@@ -199,6 +199,13 @@ static void touch_kind(struct scene *scene, enum scene_object_kind kind)
         scene->instances_revision = scene->revision;
 }
 
+/* Nodes that show a mesh may deform from now on, or no more. */
+static void touch_mesh(struct scene *scene, const struct scene_mesh *mesh)
+{
+    if (mesh->influence_count || mesh->target_count)
+        scene->instances_revision = scene->revision;
+}
+
 static void count_child(struct scene *scene, uint32_t parent, int change)
 {
     struct scene_node *node = parent ? hashmap_get(&scene->objects[SCENE_NODE], parent) : NULL;
@@ -218,6 +225,10 @@ static void apply_set(struct scene *scene, struct scene_edit *edit)
         }
         count_child(scene, next->parent, +1);
         touch_node(scene, next);
+    }
+    if (edit->object == SCENE_MESH) {
+        touch_mesh(scene, (const struct scene_mesh *)object);
+        touch_mesh(scene, &edit->set.mesh);
     }
     object_release(edit->object, object);
     memcpy(object, &edit->set, object_struct_bytes(edit->object));

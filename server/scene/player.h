@@ -29,6 +29,8 @@ struct player {
 bool player_init(struct player *player, const struct scene *scene, const struct clip_use *uses, uint32_t use_count,
                  struct error *error);
 void player_finish(struct player *player);
+/* What a pose has of a node; NULL: nothing, or no pose. */
+const struct pose_node *scene_pose_node(const struct scene_pose *pose, uint32_t id);
 bool player_pose(struct player *player, double time_s, struct scene_pose *pose, struct error *error);
 
 #endif

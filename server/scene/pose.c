@@ -52,7 +52,7 @@ STARTS_WITH_ID(pose_weights, node);
 STARTS_WITH_ID(scene_light, base.id);
 STARTS_WITH_ID(scene_material, base.id);
 
-static const struct pose_node *posed_node(const struct scene_pose *pose, uint32_t id)
+const struct pose_node *scene_pose_node(const struct scene_pose *pose, uint32_t id)
 {
     size_t i = pose ? find(pose->nodes, pose->node_count, sizeof *pose->nodes, id) : 0;
     return pose && i < pose->node_count ? &pose->nodes[i] : NULL;
@@ -60,13 +60,13 @@ static const struct pose_node *posed_node(const struct scene_pose *pose, uint32_
 
 const float *scene_pose_parent_from_node(const struct scene_pose *pose, const struct scene_node *node)
 {
-    const struct pose_node *posed = posed_node(pose, node->base.id);
+    const struct pose_node *posed = scene_pose_node(pose, node->base.id);
     return posed ? posed->parent_from_node : node->parent_from_node;
 }
 
 bool scene_pose_hidden(const struct scene_pose *pose, const struct scene_node *node)
 {
-    const struct pose_node *posed = posed_node(pose, node->base.id);
+    const struct pose_node *posed = scene_pose_node(pose, node->base.id);
     return posed ? posed->hidden : node->hidden;
 }
 

@@ -68,6 +68,12 @@ struct clip_use {
  * brought into the range that the protocol allows. ERROR_OUT_OF_MEMORY, ERROR_UNKNOWN_ID ("clips[2].clip"). */
 bool scene_pose_evaluate(struct scene_pose *pose, const struct scene *scene, const struct clip_use *uses,
                          uint32_t use_count, double time_s, struct error *error);
+/* The poses from `open_s` on for `shutter_s`; 0 s: one pose. There is one too if nothing moves meanwhile, else as
+ * many as keep every mesh that is not skinned, and every set of spheres, from turning by more than MOTION_TURN_MAX
+ * between two, if MOTION_POSES_MAX can: 2, 3, 5 or 9. Errors as above. */
+#define MOTION_TURN_MAX 0.1745 /* radians, 10 degrees: a chord is 0.4 % of the radius inside its arc */
+bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scene, const struct clip_use *uses,
+                           uint32_t use_count, double open_s, double shutter_s, struct error *error);
 /* Length of a clip in seconds: its last key. 0: no clip, or no channel. */
 double scene_clip_duration_s(const struct scene *scene, uint32_t clip);
 

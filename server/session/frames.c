@@ -106,7 +106,7 @@ static void fill_begin(struct message_frame_begin *begin, const struct engine_fr
     begin->frame = frame->frame;
     begin->width = frame->request.width;
     begin->height = frame->request.height;
-    begin->samples = frame->request.samples;
+    begin->samples = frame->result.samples;
     begin->revision = frame->result.revision;
     begin->size_bytes = frame->size_bytes;
     begin->format = (enum protocol_pixel_format)frame->request.format;
@@ -119,6 +119,9 @@ static void fill_begin(struct message_frame_begin *begin, const struct engine_fr
     begin->fov_y = frame->request.camera.fov_y;
     begin->ortho_height = frame->request.camera.ortho_height;
     begin->time_s = frame->time_s;
+    begin->aperture = frame->request.aperture;
+    begin->focus = frame->request.focus;
+    begin->shutter_s = frame->shutter_s;
 }
 
 static uint32_t fill_comparisons(struct record_wave_comparison *records, const struct frame_result *result)

@@ -127,11 +127,29 @@ static bool check(const struct session *session, const struct message_render *re
     if (render->encoding == PROTOCOL_ENCODING_ZSTD && render->quality > ZSTD_LEVEL_MAX)
         return error_set(error, ERROR_INVALID, "render.quality", "zstd has levels up to %u, not %u",
                          ZSTD_LEVEL_MAX, render->quality);
+    if (render->bvh_rays_together > 4 && render->bvh_rays_together != 8)
+        return error_set(error, ERROR_INVALID, "render.bvh_rays_together",
+                         "1, 2, 3, 4 or 8 rays walk as one, not %u", render->bvh_rays_together);
     return check_limits(session, render, error) && check_camera(render, error) &&
            check_room(session, render, error);
 }
 
 /* ---- start ------------------------------------------------------------------------------------------- */
+
+static bool fill_clips(struct engine_job *job, const struct message_render *render)
+{
+    if (!render->clips_count)
+        return true;
+    job->clips = calloc(render->clips_count, sizeof *job->clips);
+    if (!job->clips)
+        return false;
+    job->clip_count = render->clips_count;
+    for (uint32_t i = 0; i < render->clips_count; i++) {
+        const struct record_clip_use *from = &render->clips[i];
+        job->clips[i] = (struct clip_use){from->clip, from->start_s, from->speed, from->loop != 0};
+    }
+    return true;
+}
 
 static bool fill_keys(struct engine_job *job, const struct message_render *render)
 {
@@ -153,9 +171,14 @@ static bool fill_keys(struct engine_job *job, const struct message_render *rende
     return true;
 }
 
+/* All but keys and clips, which are there already. */
 static void fill_job(struct engine_job *job, const struct message_render *render, uint64_t credit)
 {
     *job = (struct engine_job){
+        .keys = job->keys,
+        .key_count = job->key_count,
+        .clips = job->clips,
+        .clip_count = job->clip_count,
         .scene = render->scene,
         .first_frame = render->first_frame,
         .last_frame = render->last_frame,
@@ -170,16 +193,22 @@ static void fill_job(struct engine_job *job, const struct message_render *render
                 .depth = render->depth,
                 .seed = render->seed,
                 .tracer = render->tracer,
-                .tracer_options = {.bvh_bounds = (unsigned)render->bvh_bounds},
+                .tracer_options = {.bvh_bounds = (unsigned)render->bvh_bounds,
+                                   .bvh_rays_together = render->bvh_rays_together},
                 .integrator = (enum frame_integrator)render->integrator,
                 .primary = (enum frame_primary)render->primary,
                 .tone_map = (enum frame_tone_map)render->tone_map,
                 .format = (enum frame_format)render->format,
                 .exposure_stops = render->exposure_stops,
+                .aperture = render->aperture,
+                .focus = render->focus,
+                .filter = (enum frame_filter)render->pixel_filter,
+                .accumulate = render->accumulate != 0,
                 .compare = render->compare != 0,
                 .compare_with = render->compare_with,
                 .compare_far_share = render->compare_far,
             },
+        .shutter = render->shutter,
         .encoding = (enum encoding)render->encoding,
         .quality = render->quality,
         .path = (enum camera_path)render->camera_path,
@@ -205,7 +234,7 @@ void jobs_start(struct session *session, struct request *request, const struct m
     }
     struct job *job = calloc(1, sizeof *job);
     struct engine_command *command = hub_command(ENGINE_JOB_START, session->number, request->id);
-    if (!job || !command || !fill_keys(&command->job, render)) {
+    if (!job || !command || !fill_keys(&command->job, render) || !fill_clips(&command->job, render)) {
         free(job);
         engine_command_destroy(command);
         session_submit(session, request, NULL);
@@ -228,11 +257,7 @@ void jobs_start(struct session *session, struct request *request, const struct m
     session->job_count++;
     session->hub->frame_bytes += job->frame_bytes;
     request->object = job;
-    struct camera_key *keys = command->job.keys;
-    uint32_t key_count = command->job.key_count;
     fill_job(&command->job, render, job->engine_credit);
-    command->job.keys = keys;
-    command->job.key_count = key_count;
     command->scene = render->scene;
     session_submit(session, request, command);
 }

@@ -2,6 +2,7 @@
 // The frame's camera and the order of its pixels (shared/frame.h).
 
 #include "shared/frame.h"
+#include "common/math.glsl"
 
 layout(std140, binding = UNIFORM_FRAME) uniform frame_block
 {
@@ -42,10 +43,11 @@ vec3 view_from_world_point(vec3 p)
            d.z * vec3(frame.world_from_view[2].x, frame.world_from_view[2].y, frame.world_from_view[2].z);
 }
 
-// The ray through a pixel at this sample's place in it; unit direction, t_min at the near plane.
-void camera_ray(uvec2 pixel, out vec3 origin, out vec3 direction, out float t_min)
+// The ray through a place of the picture, in pixels from its top left, from the middle of the lens; unit direction,
+// t_min at the near plane.
+void camera_ray_through(vec2 picture_place, out vec3 origin, out vec3 direction, out float t_min)
 {
-    vec2 place = (vec2(pixel) + frame.jitter_pixel.xy) / vec2(frame.width, frame.height) * 2.0 - 1.0;
+    vec2 place = picture_place / vec2(frame.width, frame.height) * 2.0 - 1.0;
     place *= vec2(frame.extent_near.x, -frame.extent_near.y);
     if (frame.extent_near.w != 0.0) {
         origin = eye_world() + world_from_view_vector(vec3(place, 0.0));
@@ -58,6 +60,55 @@ void camera_ray(uvec2 pixel, out vec3 origin, out vec3 direction, out float t_mi
         direction = world_from_view_vector(towards / stretch);
         t_min = frame.extent_near.z * stretch;
     }
+}
+
+// The same where all pixels have their sample in one place.
+void camera_ray(uvec2 pixel, out vec3 origin, out vec3 direction, out float t_min)
+{
+    camera_ray_through(vec2(pixel) + frame.jitter_pixel.xy, origin, direction, t_min);
+}
+
+// Shirley and Chiu. A Low Distortion Map Between Disk and Square. 1997. From [0, 1)^2 to the unit disc.
+vec2 disc_from_square(vec2 u)
+{
+    vec2 p = 2.0 * u - 1.0;
+    if (p.x == 0.0 && p.y == 0.0)
+        return vec2(0.0);
+    bool wide = abs(p.x) > abs(p.y);
+    float radius = wide ? p.x : p.y;
+    float angle = wide ? PI / 4.0 * (p.y / p.x) : PI / 2.0 - PI / 4.0 * (p.x / p.y);
+    return radius * vec2(cos(angle), sin(angle));
+}
+
+// Through a thin lens, which leads all rays of one place of the picture through one point of the plane in focus
+// (Cook, Porter, Carpenter. Distributed Ray Tracing. 1984). `on_lens`: where they meet it, on the unit disc.
+void camera_ray_lens(vec2 picture_place, vec2 on_lens, out vec3 origin, out vec3 direction, out float t_min)
+{
+    vec2 place = picture_place / vec2(frame.width, frame.height) * 2.0 - 1.0;
+    place *= vec2(frame.extent_near.x, -frame.extent_near.y);
+    float focus = frame.lens.y;
+    bool orthographic = frame.extent_near.w != 0.0;
+    vec3 on_view = vec3(frame.lens.x * on_lens + (orthographic ? place : vec2(0.0)), 0.0);
+    // towards the point in focus, as far as distance 1 along the view
+    vec3 towards = vec3((orthographic ? vec2(0.0) : place) - frame.lens.x * on_lens / focus, -1.0);
+    float stretch = length(towards);
+    origin = eye_world() + world_from_view_vector(on_view);
+    direction = world_from_view_vector(towards / stretch);
+    t_min = frame.extent_near.z * stretch;
+}
+
+float filter_place(int i)
+{
+    return frame.filter_places[i >> 2][i & 3];
+}
+
+// Where a sample lies about its pixel's centre, in pixels: server/render/pixel_filter.h.
+float filter_offset(float number)
+{
+    float side = 2.0 * number - 1.0, at = sqrt(1.0 - abs(side)) * 32.0;
+    int i = min(int(at), 31);
+    float place = mix(filter_place(i), filter_place(i + 1), at - float(i));
+    return side < 0.0 ? -place : place;
 }
 
 // Clip coordinates of a point so that a pixel's centre shows what camera_ray() sees through it. Row 0 of the

@@ -94,3 +94,51 @@ light_sample light_sample_at(uint index, vec3 position, vec2 u)
         irradiance *= light_cone(l, direction);
     return light_sample(direction, distance_, irradiance);
 }
+
+// About how much of a light arrives at a surface there: more than 0 wherever any of it does. `normal`: of shading.
+float light_estimate(uint index, vec3 position, vec3 normal)
+{
+    light l = lights[index];
+    int kind = int(l.position_kind.w);
+    bool directional = kind == LIGHT_KIND_DIRECTIONAL;
+    vec3 to_light = directional ? -l.direction_range.xyz : l.position_kind.xyz - position;
+    float squared = max(dot(to_light, to_light), 1e-12), inverse = inversesqrt(squared);
+    float power = l.colour.r + l.colour.g + l.colour.b, cosine = dot(normal, to_light) * inverse;
+    if (!directional)
+        power *= light_falloff(squared * inverse, l.direction_range.w);
+    if (kind == LIGHT_KIND_SPOT)
+        power *= light_cone(l, to_light * inverse);
+#ifdef HAS_AREA_LIGHTS
+    // What of it is highest above the horizon may be so much higher than its middle.
+    float radius = 0.0;
+    if (kind == LIGHT_KIND_RECTANGLE) {
+        radius = length(l.half_u_inner.xyz) + length(l.half_v_outer.xyz);
+        power *= max(-dot(l.direction_range.xyz, to_light) * inverse, 0.0) * radius * radius;
+    } else if (kind == LIGHT_KIND_SPHERE) {
+        radius = l.colour.w;
+        power *= PI * radius * radius;
+    }
+    cosine += radius * inverse;
+#endif
+    return power * clamp(cosine, 0.0, 1.0);
+}
+
+// One of all lights, as probable as its estimate. `number` in [0, 1) chooses it and comes back stretched to [0, 1)
+// again. Probability 0: none shines here.
+uint light_choose(vec3 position, vec3 normal, uint light_count, inout float number, out float probability)
+{
+    uint chosen = 0u;
+    float sum = 0.0, own = 0.0;
+    // Each light takes the lower end of what is left of the interval from those before it.
+    for (uint i = 0u; i < light_count; i++) {
+        float estimate = light_estimate(i, position, normal);
+        sum += estimate;
+        float share = estimate > 0.0 ? estimate / sum : 0.0;
+        bool taken = number < share;
+        number = min(taken ? number / share : (number - share) / (1.0 - share), 0.99999994);
+        chosen = taken ? i : chosen;
+        own = taken ? estimate : own;
+    }
+    probability = own > 0.0 ? own / sum : 0.0;
+    return chosen;
+}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Adds a finished slice to the picture.
+// Adds a finished slice to the picture: the samples of each pixel in their order.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
@@ -8,13 +8,19 @@ layout(local_size_x = 64) in;
 
 uniform uint slot_count;
 uniform uint first_slot; // of the slice, in its band
+uniform uint sample_shift;
 
-layout(std430, binding = BIND_SLICE_PIXELS) readonly buffer pixel_block { vec4 slice_pixels[]; };
+layout(std430, binding = BIND_SLICE_SUMS) readonly buffer sum_block { vec4 slice_sums[]; };
 layout(std430, binding = BIND_ACCUMULATION) buffer accumulation_block { vec4 accumulation[]; };
 
 void main()
 {
     uint k = item_index();
-    if (k < slot_count)
-        accumulation[first_slot + k] += slice_pixels[k];
+    if (k >= slot_count)
+        return;
+    vec4 sum = accumulation[first_slot + k];
+    uint end = (k + 1u) << sample_shift;
+    for (uint i = k << sample_shift; i < end; i++)
+        sum += slice_sums[i];
+    accumulation[first_slot + k] = sum;
 }

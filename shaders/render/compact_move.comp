@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Third: the children go to their places as rays and paths of the next wave, in the order of their parents. The
 // host has made sure that there is room.
+// Defines: HAS_TIMES something moves: rays have a time.
 
 #include "shared/path.h"
 #include "shared/ray.h"
@@ -9,12 +10,16 @@
 layout(local_size_x = 64) in;
 
 uniform uint hit_count;
+uniform uint children_a_hit; // room for so many
 
 layout(std430, binding = BIND_CHILD_COUNTS) readonly buffer count_block { uint child_counts[]; };
 layout(std430, binding = BIND_BLOCK_OFFSETS) readonly buffer offset_block { uvec2 block_offsets[]; };
 layout(std430, binding = BIND_CHILDREN) readonly buffer child_block { child children[]; };
 layout(std430, binding = BIND_RAYS) writeonly buffer ray_block { ray rays[]; };
 layout(std430, binding = BIND_PATHS) writeonly buffer path_block { path paths[]; };
+#ifdef HAS_TIMES
+layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float times[]; };
+#endif
 
 void main()
 {
@@ -28,9 +33,12 @@ void main()
     for (uint before = block * COMPACT_BLOCK; before < j; before++)
         place += child_counts[before] & 3u;
     for (uint i = 0u; i < count; i++) {
-        child c = children[j * CHILDREN_MAX + i];
+        child c = children[j * children_a_hit + i];
         rays[place + i] = ray(c.origin_t_min, c.direction_t_max);
         paths[place + i] =
-            path(c.weight_r, c.weight_g, c.weight_b, c.pixel, c.cone_width, c.cone_spread, c.flags, c.time);
+            path(c.weight_r, c.weight_g, c.weight_b, c.sample_slot, c.cone_width, c.cone_spread, c.flags, c.time);
+#ifdef HAS_TIMES
+        times[place + i] = c.time;
+#endif
     }
 }

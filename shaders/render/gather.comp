@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Adds a wave's radiance and the light that its shadow rays let through to the pixels of the slice. The paths of a
-// pixel lie side by side; the first of them adds for all, in their order, so no two invocations share a pixel and
+// Adds a wave's radiance and the light that its shadow rays let through to the samples of the slice. The paths of a
+// sample lie side by side; the first of them adds for all, in their order, so no two invocations share a sample and
 // the sum is the same to the bit every time.
 
 #include "shared/path.h"
@@ -17,7 +17,7 @@ layout(std430, binding = BIND_HIT_PLACES) readonly buffer place_block { uint hit
 layout(std430, binding = BIND_RADIANCE) readonly buffer radiance_block { vec4 radiance[]; };
 layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uint visibility[]; };
 layout(std430, binding = BIND_LIGHT_SAMPLES) readonly buffer sample_block { vec4 light_samples[]; };
-layout(std430, binding = BIND_SLICE_PIXELS) buffer pixel_block { vec4 slice_pixels[]; };
+layout(std430, binding = BIND_SLICE_SUMS) buffer sum_block { vec4 slice_sums[]; };
 
 // The greatest radiance that reaches a pixel: half floats hold 65504, and what is brighter is white at any
 // exposure of a scene lit for the eye. Also what is not a number must not spread.
@@ -48,15 +48,15 @@ void main()
     uint k = item_index();
     if (k >= ray_count)
         return;
-    uint pixel = paths[k].pixel;
-    if (k > 0u && paths[k - 1u].pixel == pixel)
+    uint slot = paths[k].sample_slot;
+    if (k > 0u && paths[k - 1u].sample_slot == slot)
         return;
-    vec4 sum = slice_pixels[pixel];
-    for (; k < ray_count && paths[k].pixel == pixel; k++) {
+    vec4 sum = slice_sums[slot];
+    for (; k < ray_count && paths[k].sample_slot == slot; k++) {
         vec4 arriving = vec4(lights_of(k), 0.0);
         if (first_batch != 0u)
             arriving += radiance[k];
         sum += finite(arriving);
     }
-    slice_pixels[pixel] = sum;
+    slice_sums[slot] = sum;
 }

@@ -1,20 +1,27 @@
 // SPDX-License-Identifier: MIT
-// Rays and paths of a slice's pixels; the slice's pixels are set to black.
-// VISIBILITY defined: what the rasteriser saw is noted in the hits, for primary_fill.comp; else they are left to a
-// tracer.
+// Rays and paths of a slice's samples, those of one pixel side by side; the slice's sums are set to black.
+// Defines:
+//   VISIBILITY  what the rasteriser saw is noted in the hits, for primary_fill.comp; else they are left to a tracer
+//   SPREAD      each pixel has its samples where its own numbers say; else all have them where frame.jitter_pixel says
+//   HAS_LENS    rays start on a lens and meet in the plane in focus
+//   HAS_TIMES   something moves: rays have a time
 
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "shared/hit.h"
 #include "common/camera.glsl"
 #include "common/dispatch.glsl"
+#include "common/sequence.glsl"
 layout(local_size_x = 64) in;
 
 uniform uint first_slot, slot_count;
 
 layout(std430, binding = BIND_RAYS) writeonly buffer ray_block { ray rays[]; };
 layout(std430, binding = BIND_PATHS) writeonly buffer path_block { path paths[]; };
-layout(std430, binding = BIND_SLICE_PIXELS) writeonly buffer pixel_block { vec4 slice_pixels[]; };
+layout(std430, binding = BIND_SLICE_SUMS) writeonly buffer sum_block { vec4 slice_sums[]; };
+#ifdef HAS_TIMES
+layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float times[]; };
+#endif
 #ifdef VISIBILITY
 layout(std430, binding = BIND_HITS) writeonly buffer hit_block { hit hits[]; };
 layout(binding = UNIT_PASS_0) uniform usampler2D visible_primitives;
@@ -23,19 +30,35 @@ layout(binding = UNIT_PASS_0) uniform usampler2D visible_primitives;
 void main()
 {
     uint k = item_index();
-    if (k >= slot_count)
+    if (k >= slot_count << frame.sample_shift)
         return;
-    uvec2 pixel = pixel_of_slot(first_slot + k);
+    uvec2 pixel = pixel_of_slot(first_slot + (k >> frame.sample_shift));
     bool in_picture = pixel.x < frame.width && pixel.y < frame.height;
+    uint seed = sequence_seed(pixel.y * frame.width + pixel.x, frame.seed);
+    uint index = frame.sample_index + (k & (1u << frame.sample_shift) - 1u);
+#ifdef SPREAD
+    vec2 u = sequence_pair(seed, SEQUENCE_PIXEL, index);
+    vec2 place = vec2(pixel) + 0.5 + vec2(filter_offset(u.x), filter_offset(u.y));
+#else
+    vec2 place = vec2(pixel) + frame.jitter_pixel.xy;
+#endif
     vec3 origin, direction;
-    float t_min;
-    camera_ray(pixel, origin, direction, t_min);
+    float t_min, time = 0.0;
+#ifdef HAS_LENS
+    camera_ray_lens(place, disc_from_square(sequence_pair(seed, SEQUENCE_LENS, index)), origin, direction, t_min);
+#else
+    camera_ray_through(place, origin, direction, t_min);
+#endif
+#ifdef HAS_TIMES
+    time = sequence_number(seed, SEQUENCE_TIME, index);
+    times[k] = time;
+#endif
     vec2 cone = camera_cone();
     float weight = in_picture ? 1.0 : 0.0;
     // Dead beyond the picture's edge.
     rays[k] = ray(vec4(origin, t_min), vec4(direction, in_picture ? 1e30 : -1.0));
-    paths[k] = path(weight, weight, weight, k, cone.x, cone.y, PATH_STRAIGHT, 0.0);
-    slice_pixels[k] = vec4(0.0);
+    paths[k] = path(weight, weight, weight, k, cone.x, cone.y, PATH_STRAIGHT, time);
+    slice_sums[k] = vec4(0.0);
 #ifdef VISIBILITY
     uvec2 visible = in_picture ? texelFetch(visible_primitives, ivec2(pixel), 0).xy : uvec2(0u);
     hits[k].distance = visible.x != VISIBLE_NOTHING ? 0.0 : -1.0;

@@ -8,6 +8,7 @@
 #define BIND_HITS 1
 #define BIND_VISIBILITY 2 /* any-hit waves: unorm 4x8 transmittance, 0: occluded */
 #define BIND_WAVE 3       /* struct wave_state */
+#define BIND_RAY_TIMES 4  /* in passes that make rays; tracers have UNIT_RAY_TIMES */
 #define BIND_MATERIALS 6
 #define BIND_TEXTURE_SLOTS 7
 #define BIND_TEXTURES 8

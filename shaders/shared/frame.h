@@ -11,23 +11,41 @@ struct frame_uniforms {
     vec4 world_from_view[3]; /* rows; rigid; looks along -z, y up */
     vec4 extent_near;        /* xy: half width and half height of the view at distance 1 (perspective) or of
                                 the view itself (orthographic), z: near distance, w: 1 if orthographic */
-    vec4 jitter_pixel;       /* xy: where in each pixel this sample lies, 0..1, from the top left;
-                                z: far distance of an orthographic view; w: width of a sample in pixels */
+    vec4 jitter_pixel;       /* xy: where in each pixel this sample lies, from the pixel's top left, where all
+                                pixels have it in one place; z: far distance of an orthographic view;
+                                w: width of a sample in pixels */
+    vec4 lens; /* x: radius, 0: a pinhole; y: distance along the view of what is in focus; z, w unused */
     vec4 environment_colour; /* radiance, or what the image is multiplied by; w: rotation about +y, radians */
     vec4 irradiance[9];      /* rgb: of the environment, divided by pi: harmonics of a world-space normal */
+    vec4 filter_places[9];   /* of the pixel filter, see server/render/pixel_filter.h */
     uint width, height;      /* pixels */
     uint tiles_across;
-    uint sample_index;
+    uint sample_index;     /* the first of those in hand */
+    uint sample_shift;     /* 2 to its power samples of each pixel are in hand, side by side */
     uint environment_kind; /* ENVIRONMENT_* */
     uint light_count;
     uint depth; /* bounces after the first hit */
     uint seed;
+    uint pad0, pad1, pad2;
 };
-SHARED_SIZE(frame_uniforms, 272)
+SHARED_SIZE(frame_uniforms, 448)
 
 #define ENVIRONMENT_NONE 0u /* black; leaves the picture transparent */
 #define ENVIRONMENT_CONSTANT 1u
 #define ENVIRONMENT_IMAGE 2u
 #define ENVIRONMENT_SKY 3u /* the default of a scene without any light */
+
+/* Dimensions of a sample, see common/sequence.glsl. Those from SEQUENCE_WAVE on come again for each wave of its
+ * path, SEQUENCE_WAVE_SIZE later. */
+#define SEQUENCE_PIXEL 0u /* 2: where in the pixel */
+#define SEQUENCE_LENS 1u  /* 2: where on the lens */
+#define SEQUENCE_TIME 2u  /* 1 */
+#define SEQUENCE_WAVE 3u
+#define SEQUENCE_WAVE_SIZE 4u
+#define SEQUENCE_LIGHT 0u          /* 2: which light and where on it */
+#define SEQUENCE_LOBE 1u           /* 1: what the surface does with the ray */
+#define SEQUENCE_LOBE_DIRECTION 2u /* 2 */
+#define SEQUENCE_EVERY_LIGHT                                                                                      \
+    0x10000u /* plus wave number * 0x10000 + light number, 2: for every light at every hit */
 
 #endif

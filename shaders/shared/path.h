@@ -6,34 +6,34 @@
 
 /* What belongs to ray k of a closest-hit wave beside the ray itself.
  *
- * The paths of a wave are in the order of their pixels, and those of one pixel lie side by side: children take
- * their places by a prefix sum over their parents, never by an atomic counter. So the pass that adds radiance to
- * the pixels gives each pixel to one invocation, which adds in that order, and a picture is the same to the bit
- * however its slices were cut. */
+ * A slice holds one sample of each of its pixels, or several (frame.sample_shift), those of a pixel side by side.
+ * The paths of a wave are in the order of their samples, and those of one sample lie side by side: children take
+ * their places by a prefix sum over their parents, never by an atomic counter. So the pass that sums up radiance
+ * gives each sample to one invocation, which adds in that order; samples are added to their pixel in their order,
+ * too, and a picture is the same to the bit however its slices were cut. */
 struct path {
     float weight_r, weight_g, weight_b; /* share of this ray's radiance that reaches the eye */
-    uint pixel;                         /* in the slice */
+    uint sample_slot;                   /* in the slice: pixel times the samples that are together, plus sample */
     float cone_width, cone_spread;      /* ray cone: width at the origin, growth per unit of length */
     uint flags;                         /* PATH_* */
     float time;                         /* 0: the shutter opens .. 1: it closes */
 };
 SHARED_SIZE(path, 32)
 #define PATH_BOUNCES_MASK 0xffu
-#define PATH_SAMPLE_SHIFT 16u /* bits 16..31: which sample of its pixel, counted from the frame's sample_index */
-#define PATH_STRAIGHT 0x100u  /* nothing but alpha lies between it and the eye: counts for the picture's alpha */
+#define PATH_STRAIGHT 0x100u /* nothing but alpha lies between it and the eye: counts for the picture's alpha */
 
 /* A ray of the next wave at its parent's place, before it is moved to its own. */
 struct child {
     vec4 origin_t_min;
     vec4 direction_t_max;
     float weight_r, weight_g, weight_b;
-    uint pixel;
+    uint sample_slot;
     float cone_width, cone_spread;
     uint flags;
     float time;
 };
 SHARED_SIZE(child, 64)
-#define CHILDREN_MAX 3u      /* straight on, reflected, refracted */
+#define CHILDREN_MAX 3u      /* of whitted: straight on, reflected, refracted */
 #define COMPACT_BLOCK 16u    /* paths whose hits, and then children, are counted together */
 #define COMPACT_SCAN_SIZE 64 /* invocations of the one group that scans the counts */
 
@@ -46,13 +46,13 @@ SHARED_SIZE(child, 64)
 /* Storage buffers of the passes of a wave. */
 #define BIND_PATHS BIND_PASS_0
 #define BIND_RADIANCE BIND_PASS_1         /* vec4 a path: what it adds to its pixel, coverage in w */
-#define BIND_CHILDREN BIND_PASS_2         /* struct child, CHILDREN_MAX a hit */
+#define BIND_CHILDREN BIND_PASS_2         /* struct child, as many a hit as the integrator says */
 #define BIND_CHILD_COUNTS BIND_PASS_3     /* uint a hit: children, and times 4 shadow rays */
 #define BIND_LIGHT_SAMPLES BIND_PASS_4    /* vec4 a shadow ray: what arrives if nothing is in the way */
 #define BIND_SHADOW_RAYS BIND_VISIBILITY  /* struct ray; no pass both makes them and reads the answers */
 #define BIND_HIT_LIST BIND_WAVE           /* uint a hit: its path; in order */
 #define BIND_HIT_PLACES BIND_CHILD_COUNTS /* uint a path: its place in the list; where children are not used */
-#define BIND_SLICE_PIXELS BIND_PASS_2     /* vec4 a pixel of the slice; where children are not used */
+#define BIND_SLICE_SUMS BIND_PASS_2       /* vec4 a sample of the slice; where children are not used */
 #define BIND_BLOCK_OFFSETS BIND_PASS_4    /* uvec2 a block of COMPACT_BLOCK; where light samples are not used */
 #define BIND_ACCUMULATION BIND_PASS_0     /* vec4 a pixel slot of the picture's band; sum of the samples */
 #define BIND_RESOLVED BIND_PASS_1         /* pixels of the output's format, rows from the top */

@@ -119,6 +119,7 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         .size_bytes = (size_t)renderer->request.width * renderer->request.height * 4,
         .format = renderer->request.format,
         .revision = renderer->scene->revision,
+        .samples = renderer->request.samples,
         .primary_rays = 10,
         .shadow_rays = 5,
         .secondary_rays = 1,

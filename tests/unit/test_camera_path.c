@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The camera of a frame, against what geometry says about it. */
-#include "job/animation.h"
+#include "job/shot.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -66,11 +66,23 @@ static struct engine_job job_of(enum camera_path path, struct camera_key *keys, 
     };
 }
 
+/* Without clips. */
+static bool make_camera(const struct engine_job *job, const struct scene *scene, uint32_t frame,
+                        struct frame_camera *camera, struct error *error)
+{
+    struct shot shot;
+    if (!shot_make(&shot, job, scene, frame, NULL, error))
+        return false;
+    *camera = shot.request.camera;
+    shot_finish(&shot);
+    return true;
+}
+
 static struct frame_camera camera_at(const struct engine_job *job, const struct scene *scene, uint32_t frame)
 {
     struct frame_camera camera;
     struct error error = {0};
-    if (!animation_camera(job, scene, frame, &camera, &error))
+    if (!make_camera(job, scene, frame, &camera, &error))
         fail_msg("%s: %s", error.field, error.text);
     expect_rigid(&camera);
     return camera;
@@ -195,18 +207,18 @@ static void keys_that_span_no_view_are_errors(void **state)
     struct camera_key keys[] = {key_at(1, 0, 0, 0), key_at(1, 5, 1, 0)};
     struct engine_job job = job_of(CAMERA_KEYS, keys, 2);
     struct error error = {0};
-    assert_false(animation_check(&job, scene, &error));
+    assert_false(shot_check(&job, scene, &error));
     assert_string_equal(error.field, "render.keys[1].time_s");
     memcpy(keys[0].look_at_world, keys[0].eye_world, sizeof keys[0].eye_world);
     job.key_count = 1;
     error = (struct error){0};
-    assert_false(animation_check(&job, scene, &error));
+    assert_false(shot_check(&job, scene, &error));
     assert_string_equal(error.field, "render.keys");
     keys[0] = key_at(0, 0, 0, 0);
     keys[0].up_world[1] = 0;
     keys[0].up_world[2] = 1;
     error = (struct error){0};
-    assert_false(animation_check(&job, scene, &error));
+    assert_false(shot_check(&job, scene, &error));
     assert_string_equal(error.field, "render.keys");
     scene_destroy(scene);
 }
@@ -261,7 +273,7 @@ static void an_orbit_turns_about_its_own_up_axis(void **state)
     expect_near("eye", eye, (double[]){0, 3, 1}, 3, 1e-5);
     job.orbit_seconds = 0;
     struct error error = {0};
-    assert_false(animation_check(&job, scene, &error));
+    assert_false(shot_check(&job, scene, &error));
     assert_string_equal(error.field, "render.orbit_seconds");
     scene_destroy(scene);
 }
@@ -338,7 +350,7 @@ static void a_camera_node_gives_its_place_without_its_scale_or_mirror(void **sta
     expect_near("up", (float[]){m[1], m[5], m[9]}, (double[]){0, 1, 0}, 3, 1e-6);
     assert_true(camera.fov_y == 0.9f && camera.near == 0.25f);
     job.camera_node = 1;
-    assert_false(animation_check(&job, scene, &error));
+    assert_false(shot_check(&job, scene, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "render.camera_node");
     scene_destroy(scene);
@@ -353,8 +365,8 @@ static void what_a_frame_could_not_tell_is_an_error_before_it_is_rendered(void *
     struct error error = {0};
     struct engine_job job = job_of(CAMERA_AUTO, NULL, 0);
     job.frames_per_second = 0.001f;
-    assert_true(animation_camera(&job, scene, 900000, &camera, &error));
-    assert_false(animation_camera(&job, scene, 10000000, &camera, &error));
+    assert_true(make_camera(&job, scene, 900000, &camera, &error));
+    assert_false(make_camera(&job, scene, 10000000, &camera, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "render.frames_per_second");
 
@@ -364,8 +376,8 @@ static void what_a_frame_could_not_tell_is_an_error_before_it_is_rendered(void *
     for (int i = 0; i < 4; i++)
         keys[i].look_at_world[2] = -1e12f;
     job = job_of(CAMERA_KEYS, keys, 4);
-    assert_true(animation_camera(&job, scene, 10, &camera, &error));
-    assert_false(animation_camera(&job, scene, 15, &camera, &error)); /* the spline goes beyond its keys */
+    assert_true(make_camera(&job, scene, 10, &camera, &error));
+    assert_false(make_camera(&job, scene, 15, &camera, &error)); /* the spline goes beyond its keys */
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "render.camera_path");
     assert_string_not_equal(error.remedy, "");

@@ -102,6 +102,7 @@ static void render(const struct engine_command *command)
         struct engine_frame *frame = made->frame;
         frame->frame = engine.next_frame;
         frame->request.width = frame->request.height = frame->request.samples = 1;
+        frame->result.samples = 1;
         frame->size_bytes = FRAME_BYTES;
         frame->bytes = malloc(FRAME_BYTES);
         for (size_t i = 0; i < FRAME_BYTES; i++)

@@ -1,0 +1,156 @@
+/* SPDX-License-Identifier: MIT */
+/* What depends on several options: defaults that follow from others, and what cannot go together. */
+#include "cli/cli.h"
+
+#include <string.h>
+
+#define RADIANS_PER_DEGREE 0.017453292519943295
+
+/* ---- where pictures go ---- */
+
+bool cli_writes_to_stdout(const struct cli_job *job)
+{
+    for (size_t i = 0; i < job->output_count; i++)
+        if (strcmp(job->outputs[i].path, "-") == 0)
+            return true;
+    return false;
+}
+
+static bool complete_output(struct cli_job *job, struct cli_output *output, bool is_series)
+{
+    const bool to_stdout = strcmp(output->path, "-") == 0;
+    if (to_stdout && is_series)
+        return cli_usage(job, "--output", "a series of images cannot go to standard output") == 0;
+    if (output->image == CLI_IMAGE_UNKNOWN)
+        output->image = to_stdout ? CLI_IMAGE_PNG : cli_image_by_path(output->path);
+    if (output->image == CLI_IMAGE_UNKNOWN) {
+        cli_usage(job, output->path, "its ending names no image format");
+        return fl_error_remedy(&job->error, "known: .png .jpg .jpeg .exr .hdr, or --format");
+    }
+    return true;
+}
+
+static bool is_linear(enum cli_image image)
+{
+    return image == CLI_IMAGE_EXR || image == CLI_IMAGE_HDR;
+}
+
+/* All outputs are made of the same frames. */
+static bool complete_pixels(struct cli_job *job)
+{
+    bool has[CLI_IMAGE_COUNT] = {false};
+    for (size_t i = 0; i < job->output_count; i++) {
+        has[job->outputs[i].image] = true;
+        if (is_linear(job->outputs[i].image) != is_linear(job->outputs[0].image)) {
+            cli_usage(job, job->outputs[i].path, "8-bit pictures and linear light cannot come of one rendering");
+            return fl_error_remedy(&job->error, "render once for EXR and HDR, and once for all else");
+        }
+    }
+    if (job->float_pixels && job->half_pixels)
+        return cli_usage(job, "--float", "cannot go with --half") == 0;
+    if ((job->float_pixels && !has[CLI_IMAGE_EXR] && !has[CLI_IMAGE_HDR]) ||
+        (job->half_pixels && !has[CLI_IMAGE_EXR]))
+        return cli_usage(job, job->float_pixels ? "--float" : "--half", "%s files do not have such pixels",
+                         cli_image_name(job->outputs[0].image)) == 0;
+    if (has[CLI_IMAGE_HDR] || job->float_pixels)
+        job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    else if (has[CLI_IMAGE_EXR])
+        job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
+    return true;
+}
+
+static bool complete_outputs(struct cli_job *job, bool is_series)
+{
+    if (job->output != NULL) {
+        job->outputs[0] = (struct cli_output){.path = job->output, .image = job->image};
+        job->output_count = 1;
+    }
+    if (job->output_count == 0) {
+        cli_usage(job, "--output", "no image file is named");
+        return fl_error_remedy(&job->error, is_series ? "-o 'frames/%%04d.exr'" : "-o picture.png, or '-'");
+    }
+    for (size_t i = 0; i < job->output_count; i++)
+        if (!complete_output(job, &job->outputs[i], is_series))
+            return false;
+    return complete_pixels(job);
+}
+
+static bool complete_encoding(struct cli_job *job)
+{
+    if (!job->has_encoding && job->server != NULL && strncmp(job->server, "unix:", 5) != 0)
+        job->options.encoding = PROTOCOL_ENCODING_ZSTD;
+    if (job->options.encoding == PROTOCOL_ENCODING_JPEG && job->options.format != PROTOCOL_PIXEL_FORMAT_RGBA8)
+        return cli_usage(job, "--encoding", "jpeg carries 8-bit pictures only, %s files need more",
+                         cli_image_name(job->outputs[0].image)) == 0;
+    for (size_t i = 0; i < job->output_count; i++)
+        if (job->outputs[i].image == CLI_IMAGE_JPEG) {
+            job->file_quality = job->options.quality;
+            if (job->options.encoding != PROTOCOL_ENCODING_JPEG)
+                job->options.quality = 0; /* the number is meant for the file */
+            break;
+        }
+    if (job->options.encoding == PROTOCOL_ENCODING_ZSTD && job->options.quality > 19)
+        return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
+    return true;
+}
+
+/* ---- camera ---- */
+
+static bool is_zero(const float vector[3])
+{
+    return vector[0] == 0 && vector[1] == 0 && vector[2] == 0;
+}
+
+/* Whether `up` and the view direction leave the picture's upright undefined. */
+static bool is_degenerate(const struct record_camera_key *key)
+{
+    double view[3], cross = 0, lengths = 0, view2 = 0, up2 = 0;
+    for (unsigned i = 0; i < 3; i++) {
+        view[i] = (double)key->look_at_world[i] - (double)key->eye_world[i];
+        view2 += view[i] * view[i];
+        up2 += (double)key->up_world[i] * (double)key->up_world[i];
+    }
+    lengths = view2 * up2;
+    for (unsigned i = 0; i < 3; i++) {
+        const unsigned j = (i + 1) % 3, k = (i + 2) % 3;
+        const double part = view[j] * (double)key->up_world[k] - view[k] * (double)key->up_world[j];
+        cross += part * part;
+    }
+    return !(cross > lengths * 1e-12);
+}
+
+static bool complete_camera(struct cli_job *job)
+{
+    const bool has_key = job->has_eye || job->has_look_at;
+    if (job->has_eye != job->has_look_at)
+        return cli_usage(job, job->has_eye ? "--eye" : "--look-at", "needs %s as well",
+                         job->has_eye ? "--look-at" : "--eye") == 0;
+    if (has_key && job->camera != NULL)
+        return cli_usage(job, "--camera", "cannot go with --eye and --look-at") == 0;
+    if (!has_key && (job->has_up || job->has_fov))
+        return cli_usage(job, job->has_up ? "--up" : "--fov", "needs --eye and --look-at") == 0;
+    if (!has_key)
+        return true;
+    if (memcmp(job->key.eye_world, job->key.look_at_world, sizeof job->key.eye_world) == 0)
+        return cli_usage(job, "--look-at", "is where --eye is") == 0;
+    if (is_zero(job->key.up_world) || is_degenerate(&job->key))
+        return cli_usage(job, "--up", "must not be parallel to the view direction") == 0;
+    job->options.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
+    job->options.keys = &job->key;
+    job->options.key_count = 1;
+    return true;
+}
+
+bool cli_job_complete(struct cli_job *job, bool is_series)
+{
+    if (job->model == NULL)
+        return cli_usage(job, "MODEL", "no model file is named") == 0;
+    /* Else most of the "truth" would be the rasteriser's. */
+    if (!job->has_primary && job->options.tracer == PROTOCOL_TRACER_REFERENCE)
+        job->options.primary = PROTOCOL_PRIMARY_TRACE;
+    if (job->options.width == 0) {
+        job->options.width = 1280;
+        job->options.height = 720;
+    }
+    return complete_outputs(job, is_series) && complete_encoding(job) && complete_camera(job);
+}

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/* Where a job's frames go: image files, one for all or one for each frame. */
+#ifndef FARLIGHT_CLIENT_CLI_SINK_H
+#define FARLIGHT_CLIENT_CLI_SINK_H
+
+#include "cli/cli.h"
+#include "lib/text.h"
+
+struct cli_sink {
+    const struct cli_job *job;
+    struct cli_output output;
+    bool is_series, to_stdout;
+    struct fl_pattern pattern;     /* of a series */
+    char folder[4096], path[4352]; /* where the image goes; of a series, for each frame anew */
+    bool has_temporary;            /* `folder` is to be removed */
+    struct fl_exporter *exporter;
+};
+
+/* All zero at first. */
+struct cli_sinks {
+    struct cli_sink *items;
+    size_t count;
+};
+
+/* Everything that can be known to fail before anything is rendered. */
+bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool is_series, struct fl_error *error);
+/* Starts the programs that write. */
+bool cli_sinks_start(struct cli_sinks *sinks, struct fl_error *error);
+/* Whether the frame's picture is there already, complete and of the wanted size, in every sink. */
+bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame);
+/* Hands the frame over; the files of the frame before are complete when this returns true. */
+bool cli_sinks_write(struct cli_sinks *sinks, const struct fl_frame *frame, struct fl_error *error);
+/* Waits until all is written. */
+bool cli_sinks_finish(struct cli_sinks *sinks, struct fl_error *error);
+/* Ends the programs; what is not complete is removed. */
+void cli_sinks_close(struct cli_sinks *sinks);
+
+#endif

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT */
+/* Which frames of an animation are to be rendered: of a range one part of several, and of that what is not there
+ * yet. Nothing here knows files or daemons. Any thread. */
+#ifndef FARLIGHT_CLIENT_LIB_FRAME_SET_H
+#define FARLIGHT_CLIENT_LIB_FRAME_SET_H
+
+#include "lib/farlight.h"
+
+/* first, first + step, .., last. Frames are at most 10,000,000, as in the protocol. */
+struct fl_frame_run {
+    uint32_t first, last, step;
+};
+/* Ascending; no frame is in two runs. */
+struct fl_frame_set {
+    struct fl_frame_run *runs;
+    size_t run_count;
+    uint32_t frame_count; /* of all runs */
+};
+
+/* "K/N": part K of N, counted from 1; N at most 1,000,000. */
+bool fl_text_shard(const char *text, uint32_t *part, uint32_t *parts, struct fl_error *error);
+
+/* The step is at least 1; `last` may lie between two frames. */
+uint32_t fl_frame_run_count(const struct fl_frame_run *run);
+/* Of the range every `parts`-th frame, beginning with the `part`-th (from 1); so that all parts take about as
+ * long, and together they are the range. False: nothing falls to this part. */
+bool fl_frame_run_shard(const struct fl_frame_run *range, uint32_t part, uint32_t parts, struct fl_frame_run *run);
+
+/* The frames of `range` that `is_there` (NULL: none is) does not know, as few runs. False: no memory. */
+bool fl_frame_set_missing(const struct fl_frame_run *range, bool (*is_there)(void *user, uint32_t frame),
+                          void *user, struct fl_frame_set *set, struct fl_error *error);
+void fl_frame_set_finish(struct fl_frame_set *set);
+
+#endif

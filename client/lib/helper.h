@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: MIT */
+/* A helper program that takes frames: what the image writer and the video writer have in common as seen from here.
+ */
+#ifndef FARLIGHT_CLIENT_LIB_HELPER_H
+#define FARLIGHT_CLIENT_LIB_HELPER_H
+
+#include "lib/connection.h"
+
+struct fl_helper {
+    struct fl_stream stream;
+    struct fl_process process;
+    const char *program; /* "farlight-export" */
+    const char *what;    /* "the image writer" */
+    int interrupt_fd;    /* 0: nothing interrupts */
+    uint32_t request;    /* of what is sent */
+    bool lost;           /* the program has ended */
+};
+
+/* `program`, `what` and `interrupt_fd` are set by the caller. fl_helper_finish must follow, also after a failure.
+ */
+bool fl_helper_start(struct fl_helper *helper, const char *const *arguments, struct fl_error *error);
+/* Closes the socket, upon which the program ends; killed when it does not. */
+void fl_helper_finish(struct fl_helper *helper);
+
+/* Puts the message behind what waits to be written. */
+bool fl_helper_send(struct fl_helper *helper, const struct message *message, struct fl_error *error);
+/* The same for a whole frame, raw. */
+bool fl_helper_send_frame(struct fl_helper *helper, const struct fl_frame *frame, struct fl_error *error);
+/* Until the kernel has everything: what lies in our buffer must reach the program while we do other things. */
+bool fl_helper_flush(struct fl_helper *helper, struct fl_error *error);
+/* The next answer to the present request that is there already. */
+enum fl_stream_result fl_helper_poll(struct fl_helper *helper, struct message *message, struct fl_error *error);
+/* Waits for the next answer to the present request. */
+bool fl_helper_receive(struct fl_helper *helper, struct message *message, struct fl_error *error);
+
+/* The path, or its end where it is long: names the file at fault. */
+void fl_shorten_path(const char *path, char *out, size_t out_bytes);
+
+#endif

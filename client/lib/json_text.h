@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+/* A JSON file together with its text, so that an error can name the line: Jansson knows lines only of what is not
+ * JSON at all. Any thread. */
+#ifndef FARLIGHT_CLIENT_LIB_JSON_TEXT_H
+#define FARLIGHT_CLIENT_LIB_JSON_TEXT_H
+
+#include "lib/farlight.h"
+
+#include <jansson.h>
+
+struct fl_json {
+    char *text; /* as it was read */
+    size_t length;
+    json_t *root;
+};
+
+/* Reads a file of at most `max_bytes`. An error names the file, the line and the column. */
+bool fl_json_load(struct fl_json *json, const char *path, size_t max_bytes, struct fl_error *error);
+void fl_json_finish(struct fl_json *json);
+
+/* One step on the way from the root to a value: a member of an object or an element of an array. NULL: the root.
+ */
+struct fl_json_place {
+    const struct fl_json_place *outer;
+    const char *key; /* NULL: an element */
+    size_t index;
+};
+
+/* The line, counted from 1, in which the member's key or the element begins; of what is not there, that of the
+ * innermost place that is. */
+unsigned fl_json_line(const struct fl_json *json, const struct fl_json_place *place);
+/* "lights[2].colour"; cut off where it does not fit. Empty for the root. */
+void fl_json_path(const struct fl_json_place *place, char *path, size_t path_bytes);
+
+#endif

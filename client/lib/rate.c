@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+#include "lib/rate.h"
+
+#include <math.h>
+#include <stdbool.h>
+
+/* NTSC rates have these whole numbers as nominal ones; 23.98 for 24000/1001 is off by 1.7e-4 of it. */
+static bool is_ntsc(double rate, uint32_t *nominal)
+{
+    static const uint32_t known[] = {24, 30, 48, 60, 120, 240};
+    for (unsigned i = 0; i < sizeof known / sizeof known[0]; i++) {
+        const double exact = known[i] * 1000.0 / 1001.0;
+        *nominal = known[i];
+        if (fabs(rate - exact) < 2e-4 * exact)
+            return true;
+    }
+    return false;
+}
+
+void fl_rate_exact(float frames_per_second, uint32_t *numerator, uint32_t *denominator)
+{
+    const double rate = frames_per_second > 0.001f ? (double)frames_per_second : 0.001;
+    uint32_t nominal;
+    if (is_ntsc(rate, &nominal)) {
+        /* 24, 30, .. have factors in common with 1000 but none with 1001, which is 7 * 11 * 13. */
+        *numerator = nominal * 1000;
+        *denominator = 1001;
+        return;
+    }
+    for (*denominator = 1; *denominator < 1000; ++*denominator) {
+        *numerator = (uint32_t)lround(rate * *denominator);
+        if (*numerator > 0 && (float)((double)*numerator / *denominator) == (float)rate)
+            return;
+    }
+    /* As near as thousandths come: no float with few digits gets here. */
+    *numerator = (uint32_t)lround(rate * *denominator);
+    *numerator += *numerator == 0;
+}

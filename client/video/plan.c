@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: MIT */
+/* Which container and which encoder. */
+#include "encode.h"
+#include "lib/rate.h"
+
+#include <libavcodec/avcodec.h>
+#include <string.h>
+#include <strings.h>
+
+#define DEFAULT_QUALITY 18 /* of x264's constant rate factor: hardly to be told from the original */
+
+/* H.264 (ITU-T H.264, table A-1): level 6.2 allows 139,264 macroblocks of 16x16. */
+#define H264_MACROBLOCKS_MAX 139264u
+
+/* In order of preference. No other encoder of the library's is ever used: some open devices. */
+static const struct choice {
+    const char *codec;   /* as people ask for it */
+    const char *encoder; /* as the library calls it */
+    bool lossless;
+} choices[] = {{"h264", "libx264", false}, {"mpeg4", "mpeg4", false}, {"ffv1", "ffv1", true}};
+
+static const char *container_by_ending(const char *ending)
+{
+    return strcasecmp(ending, "mp4") == 0 ? "mp4" : strcasecmp(ending, "mkv") == 0 ? "matroska" : NULL;
+}
+
+static const char *container_of(const char *path, const char *fallback)
+{
+    const char *slash = strrchr(path, '/'), *dot = strrchr(path, '.');
+    const bool has_ending = dot != NULL && (slash == NULL || dot > slash);
+    const char *container = has_ending ? container_by_ending(dot + 1) : NULL;
+    return container != NULL ? container : container_by_ending(fallback);
+}
+
+static const struct choice *choose(const struct message_video_begin *wanted, struct video_failure *failure)
+{
+    bool known = wanted->codec[0] == '\0';
+    for (size_t i = 0; i < sizeof choices / sizeof choices[0]; i++) {
+        const struct choice *each = &choices[i];
+        const bool named = strcmp(each->codec, wanted->codec) == 0;
+        known = known || named;
+        if ((wanted->codec[0] == '\0' || named) && each->lossless == (wanted->lossless != 0) &&
+            avcodec_find_encoder_by_name(each->encoder) != NULL)
+            return each;
+        if (named && each->lossless != (wanted->lossless != 0)) {
+            video_fail(failure, "codec", NULL, "%s is %slossless, which is %s", each->codec,
+                       each->lossless ? "" : "not ", each->lossless ? "not asked for" : "asked for");
+            failure->remedy = each->lossless ? "ask for lossless, too" : "for lossless leave the codec out";
+            return NULL;
+        }
+    }
+    if (!known)
+        video_fail(failure, "codec", "h264, mpeg4 and ffv1 are known", "'%s' is no codec that can be written",
+                   wanted->codec);
+    else
+        video_fail(failure, "codec", "install a libavcodec with libx264", "this libavcodec has no encoder for %s",
+                   wanted->codec[0] != '\0' ? wanted->codec : "such a video");
+    return NULL;
+}
+
+bool video_plan(struct video_plan *plan, const struct message_video_begin *wanted, struct video_failure *failure)
+{
+    *plan = (struct video_plan){.container = container_of(wanted->path, wanted->format)};
+    if (plan->container == NULL)
+        return video_fail(failure, "path", "let it end in .mp4 or .mkv",
+                          "the ending names no format of videos that can be written");
+    const struct choice *chosen = choose(wanted, failure);
+    if (chosen == NULL)
+        return false;
+    if (chosen->lossless && strcmp(plan->container, "mp4") == 0)
+        return video_fail(failure, "lossless", "let the file end in .mkv", "an MP4 file does not hold FFV1");
+    plan->encoder = chosen->encoder;
+    plan->rgb = chosen->lossless;
+    plan->quality = wanted->quality > 0 ? wanted->quality : DEFAULT_QUALITY;
+    fl_rate_exact(wanted->frames_per_second, &plan->rate_numerator, &plan->rate_denominator);
+    return true;
+}
+
+bool video_plan_allows(const struct video_plan *plan, uint32_t width, uint32_t height,
+                       struct video_failure *failure)
+{
+    const uint32_t macroblocks = ((width + 15) / 16) * ((height + 15) / 16);
+    return strcmp(plan->encoder, "libx264") != 0 || macroblocks <= H264_MACROBLOCKS_MAX ||
+           video_fail(failure, "size", "render smaller frames, or a lossless .mkv",
+                      "H.264 has no pictures of %ux%u: 35,651,584 pixels are the most", width, height);
+}

@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: MIT */
+/* An open file as the library's input and output. The library opens nothing by itself. */
+#ifndef FARLIGHT_CLIENT_VIDEO_SINK_H
+#define FARLIGHT_CLIENT_VIDEO_SINK_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct AVFormatContext;
+
+struct video_sink {
+    int fd;
+    int failure;        /* errno of the first write that failed; 0: none */
+    int64_t size_bytes; /* of what was written */
+};
+
+/* Makes *format write to the sink, which must outlive it. False: no memory. */
+bool video_sink_attach(struct video_sink *sink, struct AVFormatContext *format);
+/* Takes it away again, before the format is freed. */
+void video_sink_detach(struct AVFormatContext *format);
+
+#endif

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: MIT */
+#include "render/frame_request.h"
+
+#include "render/integrator.h"
+#include "render/picture.h"
+
+#include <math.h>
+#include <string.h>
+
+#define SIZE_MAX_PIXELS 16384u /* width and height; keeps the number of a pixel in 32 bits */
+
+static bool check_camera(const struct frame_request *request, struct error *error)
+{
+    const struct frame_camera *camera = &request->camera;
+    for (int i = 0; i < 12; i++)
+        if (!isfinite(camera->world_from_view[i]))
+            return error_set(error, ERROR_INVALID, "camera", "its transform is not finite");
+    if (!(camera->fov_y >= 0.0f && camera->fov_y < 3.14159f))
+        return error_set(error, ERROR_INVALID, "camera.fov_y", "%g radians; 0 to below pi are possible",
+                         (double)camera->fov_y);
+    if (camera->fov_y == 0.0f && !(camera->ortho_height > 0.0f && isfinite(camera->ortho_height)))
+        return error_set(error, ERROR_INVALID, "camera.height", "an orthographic camera of height %g",
+                         (double)camera->ortho_height);
+    if (!(request->aperture >= 0.0f && isfinite(request->aperture)))
+        return error_set(error, ERROR_INVALID, "aperture", "a lens of %g metres", (double)request->aperture);
+    if (!(request->focus >= 0.0f && isfinite(request->focus)))
+        return error_set(error, ERROR_INVALID, "focus", "%g metres; 0 and more are possible",
+                         (double)request->focus);
+    return true;
+}
+
+bool frame_request_check(const struct frame_request *request, struct error *error)
+{
+    if (request->width == 0 || request->height == 0 || request->width > SIZE_MAX_PIXELS ||
+        request->height > SIZE_MAX_PIXELS)
+        return error_set(error, ERROR_INVALID, "width", "a picture of %ux%u pixels; 1 to %u are possible",
+                         request->width, request->height, SIZE_MAX_PIXELS);
+    if (request->samples == 0)
+        return error_set(error, ERROR_INVALID, "samples", "a picture of no samples");
+    if (!integrator_impl_by_number(request->integrator))
+        return error_set(error, ERROR_UNSUPPORTED, "integrator", "there is no integrator number %u",
+                         (unsigned)request->integrator);
+    if (request->filter > FILTER_BOX)
+        return error_set(error, ERROR_UNSUPPORTED, "pixel_filter", "there is no pixel filter number %u",
+                         (unsigned)request->filter);
+    if (picture_pixel_bytes(request->format) == 0)
+        return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
+                         (unsigned)request->format);
+    return check_camera(request, error);
+}
+
+static bool same_camera(const struct frame_camera *a, const struct frame_camera *b)
+{
+    return memcmp(a->world_from_view, b->world_from_view, sizeof(a->world_from_view)) == 0 &&
+           a->fov_y == b->fov_y && a->ortho_height == b->ortho_height && a->near == b->near;
+}
+
+static bool same_tracer(const struct frame_request *a, const struct frame_request *b)
+{
+    const struct tracer_options *x = &a->tracer_options, *y = &b->tracer_options;
+    return a->tracer == b->tracer && x->bvh_bounds == y->bvh_bounds && x->bvh_layout == y->bvh_layout &&
+           x->bvh_rays_together == y->bvh_rays_together && x->reference_rays_a_call == y->reference_rays_a_call &&
+           a->primary == b->primary && a->compare == b->compare;
+}
+
+bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)
+{
+    return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height &&
+           a->depth == b->depth && a->seed == b->seed && a->integrator == b->integrator &&
+           a->aperture == b->aperture && a->focus == b->focus && a->filter == b->filter &&
+           same_camera(&a->camera, &b->camera) && same_tracer(a, b);
+}

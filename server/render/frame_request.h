@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: MIT */
+/* What a request of a frame may say, and whether two say the same. */
+#ifndef FARLIGHT_RENDER_FRAME_REQUEST_H
+#define FARLIGHT_RENDER_FRAME_REQUEST_H
+
+#include "render/frame.h"
+
+/* The session has checked what a client sent; this is what would go wrong here all the same. Tracers are left out.
+ */
+bool frame_request_check(const struct frame_request *request, struct error *error);
+/* Whether their samples may be added up: they are alike but for their number and for what becomes of the sum. */
+bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b);
+
+#endif

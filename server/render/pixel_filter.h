@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: MIT */
+/* How samples are spread about a pixel's centre. Ernst, Stamminger, Greiner. Filter Importance Sampling. 2006:
+ * they are as dense as the filter is high and all weigh the same, so a pixel needs nothing of its neighbours.
+ *
+ * The filters are products of one function of x and the same of y. Its distribution is kept as places: place i is
+ * how far from the centre, in pixels, a share of (i / 32)^2 of one side's samples lies or farther; between places
+ * it is linear in i, which is true to 1/1000 of a pixel. shaders/common/camera.glsl looks up the same. */
+#ifndef FARLIGHT_RENDER_PIXEL_FILTER_H
+#define FARLIGHT_RENDER_PIXEL_FILTER_H
+
+#include "render/frame.h"
+
+#define PIXEL_FILTER_INTERVALS 32
+
+/* From the centre to where the filter ends, pixels. */
+double pixel_filter_radius(enum frame_filter filter);
+/* The share of samples whose x lies within `distance` of the centre, 0..1. */
+double pixel_filter_share(enum frame_filter filter, double distance);
+/* PIXEL_FILTER_INTERVALS + 1 places. */
+void pixel_filter_places(float *places, enum frame_filter filter);
+/* From a number in [0, 1) to an offset from the centre, pixels; ascending. */
+float pixel_filter_offset(const float *places, float number);
+
+#endif

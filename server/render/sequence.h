@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: MIT */
+/* The numbers that a sample chooses by, as shaders/common/sequence.glsl makes them, to the bit; what they are and
+ * how evenly they are spread stands there. */
+#ifndef FARLIGHT_RENDER_SEQUENCE_H
+#define FARLIGHT_RENDER_SEQUENCE_H
+
+#include <stdint.h>
+
+uint32_t sequence_hash(uint32_t v);
+uint32_t sequence_seed(uint32_t number, uint32_t seed);
+/* In [0, 1). `dimension`: SEQUENCE_* of shared/frame.h. */
+float sequence_number(uint32_t pixel_seed, uint32_t dimension, uint32_t index);
+void sequence_pair(float pair[2], uint32_t pixel_seed, uint32_t dimension, uint32_t index);
+
+#endif

@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: MIT */
+/* How a picture's samples are cut into slices, so that waves fit their buffers and others get their turn. */
+#ifndef FARLIGHT_RENDER_SLICES_H
+#define FARLIGHT_RENDER_SLICES_H
+
+#include "render/context.h"
+#include "render/picture.h"
+
+#define SLICES_SAMPLES_TOGETHER 16 /* at most; a power of two */
+#define SLICES_WAITING_MAX 32      /* halves of halves of at most 2^32 pixels */
+
+struct slices {
+    uint32_t slice_rays; /* primary rays of a slice: pixels times samples */
+    uint32_t next_slot;
+    struct slice waiting[SLICES_WAITING_MAX]; /* halves of a slice that overflowed */
+    uint32_t waiting_count;
+};
+
+/* Of `samples` that are left to do how many are done together, as a power of two: as the rays of a pixel walk
+ * together, they lie side by side where they are traced. The picture is the same whatever it is. */
+uint32_t slices_sample_shift(const struct slices *slices, uint32_t samples);
+/* From the first pixel on. */
+void slices_restart(struct slices *slices);
+/* The next slice for so many samples; false: there is none. */
+bool slices_take(struct slices *slices, const struct picture *picture, uint32_t sample_shift, struct slice *slice);
+/* The slice is done again as two halves; false: it is a single pixel. */
+bool slices_split(struct slices *slices, const struct slice *slice);
+/* The slice is done again. */
+void slices_put_back(struct slices *slices, const struct slice *slice);
+
+#endif

@@ -1,0 +1,240 @@
+/* SPDX-License-Identifier: MIT */
+#include "render/wave_passes.h"
+
+#include "render/compact.h"
+#include "render/wave_trace.h"
+
+#include "shared/bindings.h"
+#include "shared/hit.h"
+#include "shared/path.h"
+#include "shared/ray.h"
+#include "shared/wave.h"
+
+#include <epoxy/gl.h>
+#include <stdlib.h>
+
+/* Waves beyond the depth that are left to rays which go straight on through blended surfaces: those do not
+ * count as bounces. */
+#define BLEND_LAYERS_MAX 16
+/* What the scan over the blocks leaves in the wave state's free words. */
+#define WAVE_STATE_SHADOW_RAYS pad0
+#define DEFINES_MAX 12
+
+struct integrator *wave_passes_create(const struct integrator_impl *impl, struct gpu_device *device,
+                                      uint32_t children_a_hit, uint32_t shadow_waves, struct error *error)
+{
+    struct wave_passes *passes = calloc(1, sizeof(*passes));
+    if (!passes) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the integrator");
+        return NULL;
+    }
+    *passes = (struct wave_passes){{impl, device}, .children_a_hit = children_a_hit, .shadow_waves = shadow_waves};
+    return &passes->base;
+}
+
+bool wave_passes_reserve(struct integrator *integrator, struct render_context *context, struct error *error)
+{
+    struct wave_passes *passes = (struct wave_passes *)integrator;
+    struct gpu_device *device = context->device;
+    size_t waves = context->wave_capacity, children = waves * passes->children_a_hit;
+    size_t shadows = context->uniforms.light_count > 0 ? waves * passes->shadow_waves : 0;
+    size_t shadow_times = context->scene->has_motion ? shadows : 0;
+    return gpu_buffer_reserve(device, &passes->radiance, waves * sizeof(vec4), error) &&
+           gpu_buffer_reserve(device, &passes->children, children * sizeof(struct child), error) &&
+           gpu_buffer_reserve(device, &passes->child_counts, waves * sizeof(uint), error) &&
+           gpu_buffer_reserve(device, &passes->shadow_rays, shadows * sizeof(struct ray), error) &&
+           gpu_buffer_reserve(device, &passes->shadow_times, shadow_times * sizeof(float), error) &&
+           gpu_buffer_reserve(device, &passes->visibility, shadows * sizeof(uint), error) &&
+           gpu_buffer_reserve(device, &passes->light_samples, shadows * sizeof(vec4), error);
+}
+
+void wave_passes_destroy(struct integrator *integrator)
+{
+    struct wave_passes *passes = (struct wave_passes *)integrator;
+    if (!passes)
+        return;
+    struct gpu_device *device = integrator->device;
+    gpu_buffer_finish(device, &passes->radiance);
+    gpu_buffer_finish(device, &passes->children);
+    gpu_buffer_finish(device, &passes->child_counts);
+    gpu_buffer_finish(device, &passes->shadow_rays);
+    gpu_buffer_finish(device, &passes->shadow_times);
+    gpu_buffer_finish(device, &passes->visibility);
+    gpu_buffer_finish(device, &passes->light_samples);
+    free(passes);
+}
+
+uint64_t wave_passes_device_bytes(const struct integrator *integrator)
+{
+    const struct wave_passes *passes = (const struct wave_passes *)integrator;
+    return passes->radiance.capacity_bytes + passes->children.capacity_bytes +
+           passes->child_counts.capacity_bytes + passes->shadow_rays.capacity_bytes +
+           passes->shadow_times.capacity_bytes + passes->visibility.capacity_bytes +
+           passes->light_samples.capacity_bytes;
+}
+
+static const struct gpu_program *use(struct render_context *context, const char *compute,
+                                     const struct gpu_define *defines, struct error *error)
+{
+    const struct gpu_program_source source = {.compute = compute, .defines = defines};
+    const struct gpu_program *program = gpu_program_get(context->device, &source, error);
+    if (program)
+        glUseProgram(program->name);
+    return program;
+}
+
+static void bind_shading(struct wave_passes *passes, struct render_context *context)
+{
+    context_bind(context);
+    gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
+    gpu_buffer_bind_storage(&context->hits, BIND_HITS);
+    gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
+    gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
+    gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
+    gpu_buffer_bind_storage(&passes->children, BIND_CHILDREN);
+    gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
+    gpu_buffer_bind_storage(&passes->light_samples, BIND_LIGHT_SAMPLES);
+    gpu_buffer_bind_storage(&passes->shadow_rays, BIND_SHADOW_RAYS);
+    if (context->scene->has_motion)
+        gpu_buffer_bind_storage(&passes->shadow_times, BIND_RAY_TIMES);
+}
+
+const struct gpu_program *wave_passes_shade_program(struct wave_passes *passes, struct render_context *context,
+                                                    const char *compute, const struct gpu_define *own,
+                                                    struct error *error)
+{
+    struct gpu_define defines[DEFINES_MAX] = {0};
+    size_t n = 0;
+    for (; own && own->name; own++)
+        defines[n++] = *own;
+    if (context->features.textures)
+        defines[n++] = (struct gpu_define){"HAS_TEXTURES", "1"};
+    if (context->features.bump)
+        defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
+    if (context->features.area_lights)
+        defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
+    if (context->scene->has_motion)
+        defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
+    const struct gpu_program *program = use(context, compute, defines, error);
+    if (!program)
+        return NULL;
+    bool last = context->wave_number >= context->request.depth + BLEND_LAYERS_MAX;
+    gpu_uniform_uint(program, "hit_count", context->hit_count);
+    gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
+    gpu_uniform_uint(program, "wave_number", context->wave_number);
+    gpu_uniform_uint(program, "last_wave", last);
+    gpu_uniform_uint(program, "children_a_hit", passes->children_a_hit);
+    bind_shading(passes, context);
+    return program;
+}
+
+bool wave_passes_left_scene(struct wave_passes *passes, struct render_context *context, struct error *error)
+{
+    static const struct gpu_define image[] = {{"HAS_ENVIRONMENT_IMAGE", "1"}, {NULL, NULL}};
+    if (context->hit_count == context->ray_count)
+        return true;
+    context_bind(context);
+    const struct gpu_program *program = use(context, "render/left_scene.comp",
+                                            context->environment.kind == ENVIRONMENT_IMAGE ? image : NULL, error);
+    if (!program)
+        return false;
+    gpu_uniform_uint(program, "ray_count", context->ray_count);
+    gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
+    gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
+    gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
+    gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
+    context_span_begin(context, STAGE_SHADE);
+    gpu_dispatch(context->device, program, context->ray_count);
+    context_span_end(context);
+    return true;
+}
+
+bool wave_passes_trace_shadows(struct wave_passes *passes, struct render_context *context, uint32_t rays_a_hit,
+                               struct error *error)
+{
+    struct wave wave = {
+        .kind = WAVE_ANY,
+        .ray_count = context->hit_count * rays_a_hit,
+        .rays = &passes->shadow_rays,
+        .visibility = &passes->visibility,
+        .times = context->scene->has_motion ? &passes->shadow_times : NULL,
+    };
+    return wave_trace(context, RAY_SHADOW, &wave, error);
+}
+
+bool wave_passes_gather(struct wave_passes *passes, struct render_context *context, bool first,
+                        uint32_t rays_a_hit, struct error *error)
+{
+    const struct gpu_program *program = context_use(context, "render/gather.comp", error);
+    if (!program)
+        return false;
+    gpu_uniform_uint(program, "ray_count", context->ray_count);
+    gpu_uniform_uint(program, "hit_count", context->hit_count);
+    gpu_uniform_uint(program, "batch_lights", rays_a_hit);
+    gpu_uniform_uint(program, "first_batch", first);
+    gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
+    gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
+    gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
+    gpu_buffer_bind_storage(&passes->visibility, BIND_VISIBILITY);
+    gpu_buffer_bind_storage(&passes->light_samples, BIND_LIGHT_SAMPLES);
+    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
+    context_span_begin(context, STAGE_SHADE);
+    gpu_dispatch(context->device, program, context->ray_count);
+    context_span_end(context);
+    return true;
+}
+
+static bool move_children(struct wave_passes *passes, struct render_context *context, struct error *error)
+{
+    static const struct gpu_define times[] = {{"HAS_TIMES", "1"}, {NULL, NULL}};
+    const struct gpu_program *program =
+        use(context, "render/compact_move.comp", context->scene->has_motion ? times : NULL, error);
+    if (!program)
+        return false;
+    gpu_uniform_uint(program, "hit_count", context->hit_count);
+    gpu_uniform_uint(program, "children_a_hit", passes->children_a_hit);
+    gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
+    gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
+    gpu_buffer_bind_storage(&passes->children, BIND_CHILDREN);
+    gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
+    gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
+    if (context->scene->has_motion)
+        gpu_buffer_bind_storage(&context->ray_times, BIND_RAY_TIMES);
+    gpu_dispatch(context->device, program, context->hit_count);
+    return true;
+}
+
+static enum integrator_progress make_wave(struct wave_passes *passes, struct render_context *context,
+                                          struct error *error)
+{
+    struct wave_state state = {0};
+    if (context->hit_count == 0)
+        return INTEGRATOR_DONE;
+    const struct gpu_program *count = context_use(context, "render/compact_count.comp", error);
+    if (!count)
+        return INTEGRATOR_FAILED;
+    gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
+    gpu_uniform_uint(count, "hit_count", context->hit_count);
+    if (!compact_scan(context, count, context->hit_count, &state, error))
+        return INTEGRATOR_FAILED;
+    context->shadow_rays += state.WAVE_STATE_SHADOW_RAYS;
+    if (state.ray_count == 0)
+        return INTEGRATOR_DONE;
+    if (state.ray_count > context->wave_capacity)
+        return INTEGRATOR_OVERFLOW;
+    if (!move_children(passes, context, error))
+        return INTEGRATOR_FAILED;
+    context->ray_count = state.ray_count;
+    context->secondary_rays += state.ray_count;
+    return INTEGRATOR_MORE;
+}
+
+enum integrator_progress wave_passes_next_wave(struct wave_passes *passes, struct render_context *context,
+                                               struct error *error)
+{
+    context_span_begin(context, STAGE_SHADE);
+    enum integrator_progress progress = make_wave(passes, context, error);
+    context_span_end(context);
+    context->wave_number++;
+    return progress;
+}

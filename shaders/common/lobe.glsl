@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// One ray for all that a surface mirrors and refracts: a facet as the view meets them, and what it does.
+//
+// Facets are distributed as in brdf(): GGX, each a smooth mirror or window by Fresnel's equations (metal: Schlick), with
+// the alpha that glTF has, the square of the roughness. Where the surface is smooth, the ray goes where and weighs what
+// whitted's do in the mean.
+
+#include "common/scattering.glsl"
+
+// Below this the facets are the surface itself.
+const float LOBE_ALPHA_MIN = 1e-4;
+
+struct lobe {
+    vec3 direction; // unit
+    vec3 weight;    // of what comes from there; 0: there is no ray
+};
+
+// A facet's normal in the frame of the surface (normal z), as probable as it is large seen from there. Dupuy, Benyoub.
+// Sampling Visible GGX Normals with Spherical Caps. 2023.
+vec3 visible_facet(vec3 view, float alpha, vec2 u)
+{
+    vec3 stretched = normalize(vec3(view.xy * alpha, view.z));
+    float phi = TWO_PI * u.x, z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
+    float sine = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
+    vec3 facet = vec3(sine * cos(phi), sine * sin(phi), z) + stretched;
+    return normalize(vec3(facet.xy * alpha, facet.z));
+}
+
+// Of the facets that the view sees the share that the light reaches. Heitz. Understanding the Masking-Shadowing
+// Function. 2014: height-correlated as in V_SmithGGXCorrelated() on the view's side, on the other independent.
+float lit_share(float NoV, float NoL, float alpha)
+{
+    float a2 = alpha * alpha, v = sqrt(a2 + (1.0 - a2) * NoV * NoV), l = sqrt(a2 + (1.0 - a2) * NoL * NoL);
+    if (NoL < 0.0)
+        return -2.0 * NoL / (l - NoL);
+    return NoL * (NoV + v) / max(NoV * l + NoL * v, 1e-7);
+}
+
+// `choice` chooses between mirror and window and comes back stretched; `u` chooses the facet.
+lobe lobe_choose(surface s, float NoV, vec3 direction, inout float choice, vec2 u)
+{
+    float alpha = square(s.roughness);
+    bool rough = alpha > LOBE_ALPHA_MIN;
+    vec3 facet = s.normal;
+    if (rough) {
+        vec3 x, y;
+        tangent_frame(s.normal, x, y);
+        vec3 view = normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
+        vec3 found = visible_facet(view, alpha, u);
+        facet = found.x * x + found.y * y + found.z * s.normal;
+    }
+    bool leaves = s.inside && s.transmission > 0.0;
+    float VoH = rough ? clamp(-dot(direction, facet), 1e-4, 1.0) : NoV;
+    float dielectric = fresnel_dielectric(VoH, leaves ? 1.0 / s.ior : s.ior);
+    vec3 mirror = mix(vec3(dielectric), fresnel_schlick(s.base, VoH), s.metallic);
+    // Glass is tinted once, where light enters it.
+    vec3 window = (leaves ? vec3(1.0) : s.base) * ((1.0 - dielectric) * (1.0 - s.metallic) * s.transmission);
+    vec3 bent = refract(direction, facet, s.inside ? s.ior : 1.0 / s.ior);
+    if (dot(bent, s.geometric) >= 0.0) { // totally reflected, or a tilted normal would send it back
+        mirror += window;
+        window = vec3(0.0);
+    }
+    float mirror_size = greatest(mirror), both = mirror_size + greatest(window);
+    if (!(both > 0.0))
+        return lobe(s.normal, vec3(0.0));
+    float share = mirror_size / both;
+    bool mirrored = choice < share;
+    choice = min(mirrored ? choice / share : (choice - share) / (1.0 - share), 0.99999994);
+    lobe result;
+    if (mirrored) {
+        vec3 reflected = reflect(direction, facet);
+        bool out_ = dot(reflected, s.geometric) > 0.0;
+        result.direction = out_ || rough ? reflected : reflect(direction, s.geometric);
+        result.weight = out_ || !rough ? mirror / share : vec3(0.0);
+    } else {
+        result.direction = bent;
+        result.weight = window / (1.0 - share);
+    }
+    if (rough)
+        result.weight *= lit_share(NoV, dot(result.direction, s.normal), alpha);
+    return result;
+}

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+// What each hit of a wave sends towards the eye, and the rays that it asks for: Cook, Porter, Carpenter. Distributed
+// Ray Tracing. 1984. Of all that a hit could ask for one of each kind is chosen, and weighs as much more as it was
+// unlikely, so the mean of the samples is right however few rays each has.
+//
+//   radiance    emission, and a constant ambient term as in whitted.comp
+//   shadow ray  one, to one point of one light
+//   child       at most one: straight on (alpha blending), mirrored or refracted, in a direction that a facet of the
+//               rough surface sends it
+//
+// Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and render/shade.glsl.
+
+#include "common/environment.glsl"
+#include "common/light.glsl"
+#include "common/lobe.glsl"
+#include "render/shade.glsl"
+
+// A child that would carry less than this to its pixel is followed only as often as its weight is of it, with this
+// weight.
+const float ROULETTE = 1.0 / 8.0;
+
+void add_lobe(uint j, path p, surface s, float NoV, float distance_, vec3 direction, vec3 weight, float choice, vec2 u)
+{
+    lobe chosen = lobe_choose(s, NoV, direction, choice, u);
+    vec3 carried = weight * chosen.weight;
+    float survival = greatest(carried) / ROULETTE;
+    if (!(choice < survival)) // not a number: likewise
+        return;
+    add_child(j, p, s, distance_, chosen.direction, carried / min(survival, 1.0), false);
+}
+
+bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV, vec3 weight, float distance_, vec2 u)
+{
+    vec3 origin = off_surface(s, distance_, s.geometric);
+    float probability;
+    uint index = light_choose(origin, s.normal, frame.light_count, u.x, probability);
+    if (probability <= 0.0) {
+        no_shadow_ray(j);
+        return false;
+    }
+    light_sample lamp = light_sample_at(index, origin, u);
+    float NoL = dot(s.normal, lamp.direction);
+    vec3 arriving = weight * (brdf(s, parts, view, NoV, lamp.direction) * lamp.irradiance * (NoL / probability));
+    return add_shadow_ray(j, p, origin, lamp.direction, lamp.distance_, arriving);
+}
+
+void main()
+{
+    uint j = item_index();
+    if (j >= hit_count)
+        return;
+    uint k = hit_list[j];
+    path p = paths[k];
+    vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
+    ray r = rays[k];
+    hit h = hits[k];
+    vec3 direction = r.direction_t_max.xyz, view = -direction;
+    surface s = surface_at(h, r.origin_t_min.xyz, direction, p.cone_width + p.cone_spread * h.distance);
+    float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
+    split parts = split_light(s, NoV);
+    uint seed = path_seed(p), index = path_sample(p), dimension = SEQUENCE_WAVE + wave_number * SEQUENCE_WAVE_SIZE;
+    float choice = sequence_number(seed, dimension + SEQUENCE_LOBE, index);
+    vec3 sent = vec3(0.0);
+    bool straight = choice >= s.alpha, asked = false;
+    if (straight) {
+        add_child(j, p, s, h.distance, direction, weight, true);
+        no_shadow_ray(j);
+    } else if (s.unlit) {
+        sent = s.base;
+        no_shadow_ray(j);
+    } else {
+        sent = s.emission + s.occlusion * parts.scattered * environment_irradiance(s.normal);
+        choice = min(choice / s.alpha, 0.99999994);
+        add_lobe(j, p, s, NoV, h.distance, direction, weight, choice,
+                 sequence_pair(seed, dimension + SEQUENCE_LOBE_DIRECTION, index));
+        if (s.inside && s.transmission > 0.0)
+            no_shadow_ray(j);
+        else
+            asked = ask_for_light(j, p, s, parts, view, NoV, weight, h.distance,
+                                  sequence_pair(seed, dimension + SEQUENCE_LIGHT, index));
+    }
+    bool seen = !straight && (p.flags & PATH_STRAIGHT) != 0u;
+    radiance[k] = vec4(weight * sent, seen ? p.weight_r : 0.0);
+    child_counts[j] = child_count + (asked ? 4u : 0u);
+}

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// What the integrators' shading passes share: a hit of the wave in, and what it asks for out: shadow rays with the
+// light that they bring if nothing is in the way, and children. Hits are in the order of the list, j is the place in it.
+//
+// Defines: HAS_TIMES something moves: rays have a time.
+
+#include "shared/path.h"
+#include "shared/ray.h"
+#include "common/camera.glsl"
+#include "common/dispatch.glsl"
+#include "common/material.glsl"
+#include "common/sequence.glsl"
+
+layout(local_size_x = 64) in;
+
+uniform uint hit_count;
+uniform uint first_slot; // of the slice
+uniform uint wave_number;
+uniform uint last_wave;  // 1: no children
+uniform uint children_a_hit; // room for so many
+
+layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
+layout(std430, binding = BIND_HITS) readonly buffer hit_block { hit hits[]; };
+layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
+layout(std430, binding = BIND_PATHS) readonly buffer path_block { path paths[]; };
+layout(std430, binding = BIND_RADIANCE) writeonly buffer radiance_block { vec4 radiance[]; };
+layout(std430, binding = BIND_CHILDREN) writeonly buffer child_block { child children[]; };
+layout(std430, binding = BIND_CHILD_COUNTS) buffer count_block { uint child_counts[]; };
+layout(std430, binding = BIND_SHADOW_RAYS) writeonly buffer shadow_block { ray shadow_rays[]; };
+layout(std430, binding = BIND_LIGHT_SAMPLES) writeonly buffer sample_block { vec4 light_samples[]; };
+#ifdef HAS_TIMES
+layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float shadow_times[]; };
+#endif
+
+// Rays start this share of their place's coordinates (and of the way to it) off the surface: some hundred times
+// what rounding may be off.
+const float OFFSET = 1.0 / 65536.0;
+const float FAR = 1e30;
+
+// Of which pixel and sample a path is: for common/sequence.glsl.
+uint path_seed(path p)
+{
+    uvec2 pixel = pixel_of_slot(first_slot + (p.sample_slot >> frame.sample_shift));
+    return sequence_seed(pixel.y * frame.width + pixel.x, frame.seed);
+}
+
+uint path_sample(path p)
+{
+    return frame.sample_index + (p.sample_slot & (1u << frame.sample_shift) - 1u);
+}
+
+vec3 off_surface(surface s, float distance_, vec3 side)
+{
+    return s.position + OFFSET * max(greatest(abs(s.position)), distance_) * side;
+}
+
+uint child_count = 0u;
+
+// One that leads nowhere, has no direction or is beyond the depth is left out.
+void add_child(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
+{
+    uint bounces = (parent.flags & PATH_BOUNCES_MASK) + (straight ? 0u : 1u);
+    if (!(dot(direction, direction) > 0.5) || last_wave != 0u || bounces > frame.depth)
+        return;
+    vec3 side = dot(direction, s.geometric) > 0.0 ? s.geometric : -s.geometric;
+    child c;
+    c.origin_t_min = vec4(off_surface(s, distance_, side), 0.0);
+    c.direction_t_max = vec4(direction, FAR);
+    c.weight_r = weight.r;
+    c.weight_g = weight.g;
+    c.weight_b = weight.b;
+    c.sample_slot = parent.sample_slot;
+    c.cone_width = parent.cone_width + parent.cone_spread * distance_;
+    c.cone_spread = parent.cone_spread;
+    c.flags = bounces | (straight ? parent.flags & PATH_STRAIGHT : 0u);
+    c.time = parent.time;
+    children[j * children_a_hit + child_count] = c;
+    child_count++;
+}
+
+void no_shadow_ray(uint place)
+{
+    if (frame.light_count == 0u) // nor room for one
+        return;
+    shadow_rays[place] = ray(vec4(0.0), vec4(0.0, 0.0, 1.0, -1.0));
+    light_samples[place] = vec4(0.0); // a dead ray meets nothing, and so lets everything through
+#ifdef HAS_TIMES
+    shadow_times[place] = 0.0;
+#endif
+}
+
+// `arriving`: what reaches the eye if the ray reaches the lamp. False if that is nothing.
+bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float distance_, vec3 arriving)
+{
+    if (!(greatest(arriving) > 0.0)) { // not a number: likewise
+        no_shadow_ray(place);
+        return false;
+    }
+    // Short of the lamp, as a model may have a surface just there.
+    shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, distance_ * (1.0 - 4.0 * OFFSET)));
+    light_samples[place] = vec4(arriving, 0.0);
+#ifdef HAS_TIMES
+    shadow_times[place] = p.time;
+#endif
+    return true;
+}
