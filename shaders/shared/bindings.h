@@ -24,6 +24,7 @@
 
 /* image units */
 #define IMAGE_HITS 0
+#define IMAGE_TRACER_0 1 /* the tracer's own */
 
 /* texture units */
 #define UNIT_TRIANGLES 0
