@@ -86,7 +86,8 @@ struct bvh_tree {
     uint32_t *elements; /* as the device has them: octants x element_count x words */
     uint32_t element_count;
     struct bvh_grid grid;
-    float grid_cost;   /* how much larger the grid makes a box's surface, in the mean: 1 .. 4; 1: not packed */
+    float grid_cost;   /* how much larger the grid makes a box's surface, in the mean: 1 .. 4, also where it is
+                          not used since `whole` is set; 1: never used */
     float leaf_extent; /* diagonal of a leaf's box, in the mean */
     float *primitives; /* 4 x primitive_texels floats, see shared/bvh_node.h */
     size_t primitive_texels;

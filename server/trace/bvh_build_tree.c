@@ -182,7 +182,7 @@ static void survey(struct work *work)
 {
     const struct bvh_baked *baked = &work->baked;
     struct bvh_tree *tree = work->tree;
-    bool is_packed = bvh_is_packed(work->settings);
+    bool has_grid = work->settings->bounds == BVH_BOUNDS_OF_BOXES && !work->settings->plain;
     uint32_t step = baked->element_count / SURVEYED_ELEMENTS + 1, count = 0, leaf_count = 0;
     float cost_sum = 0, extent_sum = 0;
     for (uint32_t e = 0; e < baked->element_count; e += step, count++) {
@@ -191,7 +191,7 @@ static void survey(struct work *work)
             extent_sum += distance(node->lower, node->upper);
             leaf_count++;
         }
-        if (!is_packed)
+        if (!has_grid)
             continue;
         struct bvh_bound bound = bvh_bound_of_box(node->lower, node->upper);
         uint32_t cells[3][2];
@@ -200,7 +200,7 @@ static void survey(struct work *work)
         /* Not a number where surfaces are 0 or overflow. */
         cost_sum += cost > 1 ? fminf(cost, GRID_COST_EACH_MAX) : 1;
     }
-    tree->grid_cost = is_packed ? cost_sum / (float)count : 1;
+    tree->grid_cost = has_grid ? cost_sum / (float)count : 1;
     tree->leaf_extent = leaf_count > 0 ? extent_sum / (float)leaf_count : 0;
 }
 

@@ -9,6 +9,10 @@
 
 #define TEXEL_BYTES (4 * sizeof(float))
 #define TOP_CAPACITY_MIN 64u
+/* Where more than one in so many of its elements have moved, or more than so many, the top tree goes to the device
+ * in one piece: a call costs as much as some thousand bytes. */
+#define WRITE_WHOLE 4u
+#define WRITE_RUNS_MAX 64u
 
 void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_settings *settings)
 {
@@ -334,8 +338,18 @@ static uint64_t write_top_copy(struct bvh_store *store, const struct bvh_top *to
 uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all)
 {
     uint64_t bytes = 0;
-    uint32_t count = top->element_count;
-    bool *moved = all || count == 0 ? NULL : malloc(count);
+    uint32_t count = top->element_count, moved_count = 0;
+    for (uint32_t e = 0; !all && e < count; e++)
+        moved_count += top->moved[e];
+    if (all || moved_count * WRITE_WHOLE > count || moved_count > WRITE_RUNS_MAX) {
+        size_t whole_bytes = count * bvh_element_bytes(&store->settings);
+        if (count > 0)
+            gpu_buffer_write(store->device, &store->elements, 0, top->elements, whole_bytes);
+        return whole_bytes;
+    }
+    bool *moved = moved_count == 0 ? NULL : malloc(count);
+    if (moved_count == 0)
+        return 0;
     for (uint32_t octant = 0; octant < bvh_octants(&store->settings); octant++) {
         for (uint32_t e = 0; moved && e < count; e++)
             moved[top->baked.place ? top->baked.place[(size_t)octant * count + e] : e] = top->moved[e];
