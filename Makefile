@@ -185,6 +185,10 @@ $(B)/tests/bench/bench_changes: $(B)/tests/bench/bench_stats.o
 $(B)/tests/bench/bench_bvh: $(MODEL_OBJ) $(B)/tests/bench/bench_scene.o $(B)/tests/bench/bench_waves.o
 $(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3
 BENCH_PROGRAMS := $(BENCHES) $(B)/tests/bench/embree_build
+# Whole frames, beside nothing of Embree's.
+BENCH_DISTRIBUTED := $(B)/tests/bench/bench_distributed
+$(BENCH_DISTRIBUTED): %: %.o $(B)/tests/bench/paper_scene.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 # EMBREE=0 leaves out what cannot be built without it.
 ifeq ($(EMBREE),0)
 UNIT_TESTS := $(filter-out $(B)/tests/unit/test_bench_contest,$(UNIT_TESTS))
@@ -229,7 +233,7 @@ demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out
 # The programs that are measured, and those that measure.
-BENCHED = all $(BENCHES) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
+BENCHED = all $(BENCHES) $(BENCH_DISTRIBUTED) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
 bench: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench.py $(B) $(BENCH)

@@ -1,32 +1,51 @@
 /* SPDX-License-Identifier: MIT */
-#include "cli/cli.h"
+#include "cli/shot.h"
 #include "lib/text.h"
 
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define TURN_DEGREES 360.0
 
-enum key { KEY_FRAMES = 0x300, KEY_FPS, KEY_ORBIT, KEY_KEYS, KEY_SHARD, KEY_RESUME, KEY_RETRIES };
+enum key {
+    KEY_FRAMES = 0x300,
+    KEY_FPS,
+    KEY_ORBIT,
+    KEY_KEYS,
+    KEY_SHARD,
+    KEY_RESUME,
+    KEY_RETRIES,
+    KEY_SCRIPT,
+    KEY_LOSSLESS,
+    KEY_DRY_RUN
+};
 
 #define DEFAULT_RETRIES 5u
 
 struct animation {
     struct cli_job job;
+    const char *script_path;
+    struct cli_shot shot;
+    bool dry_run;
     const char *keys_path;
     struct record_camera_key *keys;
 };
 
 static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Animation:", -2},
-    {"frames", KEY_FRAMES, "A-B[:STEP]", 0, "Which frames", 0},
+    {"script", KEY_SCRIPT, "SHOT.json", 0,
+     "What to render, from a file (farlight-shot(5)); options of the command line go before it", 0},
+    {"dry-run", KEY_DRY_RUN, NULL, 0, "Check options and script, and render nothing", 0},
+    {"frames", KEY_FRAMES, "A-B[:STEP]", 0, "Which frames (default: once through the clips)", 0},
     {"fps", KEY_FPS, "N", 0, "Frames per second (default 24); frame A is at time 0", 0},
     {"orbit", KEY_ORBIT, "DEGREES", OPTION_ARG_OPTIONAL,
      "Turn about the scene, or about --look-at; over the range in all (default 360; --orbit=180 with the sign =)",
      0},
     {"keys", KEY_KEYS, "FILE.json", 0,
      "Camera keys: array of {\"time\", \"eye\", \"look_at\", \"up\", \"fov\"}; seconds, degrees", 0},
+    {"lossless", KEY_LOSSLESS, NULL, 0, "Every pixel as it is, for .mkv", 0},
     {NULL, 0, NULL, 0, "Parts, and what goes wrong:", -1},
     {"shard", KEY_SHARD, "K/N", 0, "Only every N-th frame of the range, beginning with the K-th", 0},
     {"resume", KEY_RESUME, NULL, 0, "Leave out frames whose files are there, complete and of the wanted size", 0},
@@ -69,6 +88,9 @@ static error_t parse_series(struct cli_job *job, int key, const char *value)
     case KEY_RESUME:
         series->resume = true;
         return 0;
+    case KEY_LOSSLESS:
+        job->lossless = true;
+        return 0;
     case KEY_RETRIES:
         status = named(job, fl_text_integer(value, 0, 1000, &number, &job->error), "--retries");
         series->retries = (unsigned)number;
@@ -88,6 +110,12 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_KEYS:
         animation->keys_path = value;
+        return 0;
+    case KEY_SCRIPT:
+        animation->script_path = value;
+        return 0;
+    case KEY_DRY_RUN:
+        animation->dry_run = true;
         return 0;
     case ARGP_KEY_ARG:
         if (job->model != NULL)
@@ -115,8 +143,10 @@ static bool complete(struct animation *animation)
 {
     struct cli_job *job = &animation->job;
     const bool has_keys = animation->keys_path != NULL;
-    if (!job->series.has_range)
-        return cli_usage(job, "--frames", "no range of frames is given, such as 1-120") == 0;
+    if (!job->series.has_range && job->clip_count == 0 && job->script == NULL) {
+        cli_usage(job, "--frames", "no range of frames is given");
+        return fl_error_remedy(&job->error, "such as --frames 1-120; a clip or a script need none");
+    }
     if (job->options.frames_per_second <= 0)
         job->options.frames_per_second = 24;
     if (!cli_job_complete(job, true))
@@ -127,29 +157,89 @@ static bool complete(struct animation *animation)
         return cli_usage(job, "--orbit", "cannot go with --camera; it can begin at --eye and --look-at") == 0;
     if (has_keys)
         return complete_keys(animation);
-    /* Frames of a camera that stands still would all be alike. */
-    job->is_orbit = job->is_orbit || job->camera == NULL;
+    /* Frames of a camera that stands still would all be alike, where nothing else moves. */
+    job->is_orbit = job->is_orbit || (job->camera == NULL && job->script == NULL && job->clip_count == 0);
     if (job->is_orbit)
         job->options.camera_path = PROTOCOL_CAMERA_PATH_ORBIT;
     return true;
 }
 
-int cli_animate(int argc, char **argv)
+static bool begin(struct animation *animation)
+{
+    const bool begun = cli_job_begin(&animation->job);
+    animation->job.series.orbit_degrees = TURN_DEGREES;
+    animation->job.series.retries = DEFAULT_RETRIES;
+    return begun;
+}
+
+/* For the script, what only animations have. */
+static error_t set_series(void *user, const char *name, const char *value)
+{
+    struct animation *animation = user;
+    for (const struct argp_option *option = options; option->name != NULL || option->doc != NULL; option++)
+        if (option->name != NULL && strcmp(option->name, name) == 0)
+            return parse_series(&animation->job, option->key, value);
+    return ARGP_ERR_UNKNOWN;
+}
+
+/* The script says what the command line does not. `typed` was read from the command line alone. */
+static bool apply_script(struct animation *animation, const struct animation *typed)
+{
+    const struct cli_job *job = &typed->job;
+    const struct cli_shot_given given = {.camera = job->camera != NULL || job->has_eye || job->has_look_at ||
+                                                   job->is_orbit || typed->keys_path != NULL,
+                                         .clips = job->clip_count > 0,
+                                         .output = job->output != NULL,
+                                         .aperture = job->has_aperture,
+                                         .focus = job->has_focus,
+                                         .up = job->has_up,
+                                         .fov = job->has_fov};
+    return cli_shot_load(&animation->shot, typed->script_path, &animation->job.error) &&
+           cli_shot_apply(&animation->shot, &animation->job, &given, set_series, animation);
+}
+
+static bool read_all(struct animation *animation, int argc, char **argv)
 {
     static const struct argp_child children[] = {{&cli_job_argp, 0, NULL, 0}, {0}};
     static const struct argp argp = {
         .options = options,
         .parser = parse,
-        .args_doc = "MODEL --frames A-B -o 'DIR/%04d.exr'",
-        .doc = "Render a series of pictures along a camera's path (default: an orbit).\v"
-               "In the name of the images %d or %04d stands for the frame's number, %% for a percent sign.",
+        .args_doc = "MODEL --frames A-B -o 'DIR/%04d.exr'\nMODEL --clip NAME -o MOVIE.mp4\n--script SHOT.json",
+        .doc = "Render a series of pictures, or a video, of a model that moves or that a camera moves about.\v"
+               "In the name of the images %d or %04d stands for the frame's number, %% for a percent sign. Videos "
+               "end "
+               "in .mp4, .mkv or .y4m; '-' is standard output, as y4m.",
         .children = children};
+    struct animation typed = {0};
+    bool good = begin(&typed) && argp_parse(&argp, argc, argv, 0, NULL, &typed) == 0;
+    if (!good || typed.script_path == NULL) {
+        *animation = typed;
+        return good;
+    }
+    /* The command line once more, over the script. */
+    good = begin(animation) && apply_script(animation, &typed);
+    const char *model = animation->job.model;
+    animation->job.model = NULL;
+    good = good && argp_parse(&argp, argc, argv, 0, NULL, animation) == 0;
+    if (animation->job.model == NULL)
+        animation->job.model = model;
+    return good;
+}
+
+static int run(struct animation *animation)
+{
+    struct cli_job *job = &animation->job;
+    if (!animation->dry_run)
+        return cli_run_job(job, true);
+    return cli_dry_run(job);
+}
+
+int cli_animate(int argc, char **argv)
+{
     struct animation animation = {0};
-    const bool begun = cli_job_begin(&animation.job);
-    animation.job.series.orbit_degrees = TURN_DEGREES;
-    animation.job.series.retries = DEFAULT_RETRIES;
-    const bool good = begun && argp_parse(&argp, argc, argv, 0, NULL, &animation) == 0 && complete(&animation);
-    const int status = good ? cli_run_job(&animation.job, true) : cli_report(&animation.job.error);
+    const bool good = read_all(&animation, argc, argv) && complete(&animation);
+    const int status = good ? run(&animation) : cli_report(&animation.job.error);
     free(animation.keys);
+    cli_shot_finish(&animation.shot);
     return status;
 }

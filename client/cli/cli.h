@@ -48,12 +48,23 @@ int cli_interrupt_signal(void); /* which one came; 0: none */
 
 /* ---- image_path.c: where pictures go ---- */
 
-enum cli_image { CLI_IMAGE_UNKNOWN, CLI_IMAGE_PNG, CLI_IMAGE_JPEG, CLI_IMAGE_EXR, CLI_IMAGE_HDR, CLI_IMAGE_COUNT };
+enum cli_image {
+    CLI_IMAGE_UNKNOWN,
+    CLI_IMAGE_PNG,
+    CLI_IMAGE_JPEG,
+    CLI_IMAGE_EXR,
+    CLI_IMAGE_HDR,
+    CLI_IMAGE_MP4, /* from here on videos, of animations only */
+    CLI_IMAGE_MKV,
+    CLI_IMAGE_Y4M,
+    CLI_IMAGE_COUNT
+};
 
 /* By name ("png", ..) or by a path's ending; letter case does not matter. */
 enum cli_image cli_image_by_name(const char *name);
 enum cli_image cli_image_by_path(const char *path);
 const char *cli_image_name(enum cli_image image);
+bool cli_image_is_video(enum cli_image image);
 /* Whether a file can be made at `path`, without making it. `folder` gets its folder. */
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error);
 /* Whether writing to `path`, named by `option`, leaves the inputs alone; NULL among them is skipped. */
@@ -107,7 +118,28 @@ struct cli_series {
     uint32_t shard_part, shard_parts; /* 0 parts: all frames */
     bool resume;                      /* frames whose files are there are left alone */
     unsigned retries;                 /* in a row, without a frame between them */
-    double orbit_degrees;             /* over the range in all */
+    double orbit_degrees;
+    double orbit_seconds; /* for these degrees; 0: the range */
+    float *dolly_times;   /* two keys of the camera's way, the second one at: */
+    double dolly_seconds; /* 0: the last frame */
+};
+
+/* A clip of the model's that is played. */
+struct cli_clip {
+    const char *which; /* name or number */
+    float start_s, speed;
+    bool loop;
+    unsigned line; /* of the script; 0: the command line */
+};
+#define CLI_CLIPS_MAX 15 /* the protocol's, and one of our own */
+
+/* A value that the script changes over time, or sets. */
+struct cli_channel {
+    struct fl_channel channel; /* its object is found once the scene is there */
+    enum protocol_object_kind kind;
+    const char *target; /* name or number; NULL: the view */
+    unsigned line;
+    char path[96]; /* in the script, for people */
 };
 
 struct cli_job {
@@ -116,8 +148,23 @@ struct cli_job {
     struct cli_output outputs[CLI_OUTPUTS_MAX]; /* where the pictures go: `output`, or several of a script */
     size_t output_count;
     struct cli_series series;
+    const char *script; /* path; NULL: none */
+    struct cli_clip clips[CLI_CLIPS_MAX];
+    size_t clip_count;
+    struct cli_channel *channels; /* the script's */
+    size_t channel_count;
+    struct record_clip_use clip_uses[CLI_CLIPS_MAX + 1];
+    bool clip_once;      /* of the command line's clips, as is: */
+    double clip_start_s; /* time at which they begin */
+    double clip_speed;
+    double time_s;         /* of `render`: the moment of the clips that is shown */
+    bool progressive;      /* of `render`: the picture is written again and again, with more samples */
+    uint32_t pass_samples; /* more each time; 0: as many as there are */
+    bool lens_changes;     /* clips open it: the integrator must know lenses */
+    bool lossless;         /* of a video */
+    bool has_aperture, has_focus;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
-    bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, quiet, is_orbit;
+    bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, quiet, is_orbit;
     unsigned file_quality; /* of JPEG files; 0: default */
     enum cli_timings_form timings;
     struct record_camera_key key;
@@ -131,14 +178,17 @@ extern const struct argp cli_job_argp;
 const struct argp *cli_picture_argp(void);
 /* Defaults, then FARLIGHT_*; before the command line is read. */
 bool cli_job_begin(struct cli_job *job);
+/* As if "--OPTION VALUE" had been typed; NULL for an option without a value. ARGP_ERR_UNKNOWN: there is none. */
+error_t cli_job_set(struct cli_job *job, const char *option, const char *value);
 /* Sets the job's error and returns EINVAL. */
 error_t cli_usage(struct cli_job *job, const char *field, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 /* After the command line: what depends on several options. `is_series`: output is a pattern. */
 bool cli_job_complete(struct cli_job *job, bool is_series);
 
-/* What can only be said once the scene is there: the range of frames, and what goes by it. */
-bool cli_settle_range(struct cli_job *job, struct fl_error *error);
+/* What can only be said once the scene is there: clips, what the script keys, the range of frames where none is
+ * given, and what goes by it. For each scene anew. */
+bool cli_settle(struct cli_job *job, struct fl_scene *scene, bool is_series, struct fl_error *error);
 bool cli_writes_to_stdout(const struct cli_job *job);
 
 /* ---- loading.c: from what the command line named to a scene on a daemon ---- */
@@ -188,5 +238,7 @@ void cli_timings_destroy(struct cli_timings *timings);
 
 /* Renders the job's frames into its outputs: paths or "-", patterns if `is_series`. */
 int cli_run_job(struct cli_job *job, bool is_series);
+/* Checks what can be checked of an animation without a daemon. */
+int cli_dry_run(struct cli_job *job);
 
 #endif

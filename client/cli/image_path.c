@@ -16,11 +16,9 @@ enum cli_image cli_image_by_name(const char *name)
     static const struct {
         const char *name;
         enum cli_image image;
-    } known[] = {{"png", CLI_IMAGE_PNG},
-                 {"jpg", CLI_IMAGE_JPEG},
-                 {"jpeg", CLI_IMAGE_JPEG},
-                 {"exr", CLI_IMAGE_EXR},
-                 {"hdr", CLI_IMAGE_HDR}};
+    } known[] = {{"png", CLI_IMAGE_PNG}, {"jpg", CLI_IMAGE_JPEG}, {"jpeg", CLI_IMAGE_JPEG},
+                 {"exr", CLI_IMAGE_EXR}, {"hdr", CLI_IMAGE_HDR},  {"mp4", CLI_IMAGE_MP4},
+                 {"mkv", CLI_IMAGE_MKV}, {"y4m", CLI_IMAGE_Y4M}};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
         if (strcasecmp(known[i].name, name) == 0)
             return known[i].image;
@@ -38,8 +36,13 @@ enum cli_image cli_image_by_path(const char *path)
 
 const char *cli_image_name(enum cli_image image)
 {
-    static const char *const names[] = {"", "png", "jpeg", "exr", "hdr"};
+    static const char *const names[] = {"", "png", "jpeg", "exr", "hdr", "mp4", "mkv", "y4m"};
     return names[image];
+}
+
+bool cli_image_is_video(enum cli_image image)
+{
+    return image >= CLI_IMAGE_MP4 && image < CLI_IMAGE_COUNT;
 }
 
 /* Rights, read-only file systems, quotas: only an attempt tells. */

@@ -19,13 +19,35 @@ bool cli_writes_to_stdout(const struct cli_job *job)
 static bool complete_output(struct cli_job *job, struct cli_output *output, bool is_series)
 {
     const bool to_stdout = strcmp(output->path, "-") == 0;
-    if (to_stdout && is_series)
-        return cli_usage(job, "--output", "a series of images cannot go to standard output") == 0;
+    if (output->image == CLI_IMAGE_UNKNOWN && to_stdout)
+        output->image = is_series ? CLI_IMAGE_Y4M : CLI_IMAGE_PNG;
     if (output->image == CLI_IMAGE_UNKNOWN)
-        output->image = to_stdout ? CLI_IMAGE_PNG : cli_image_by_path(output->path);
+        output->image = cli_image_by_path(output->path);
     if (output->image == CLI_IMAGE_UNKNOWN) {
-        cli_usage(job, output->path, "its ending names no image format");
-        return fl_error_remedy(&job->error, "known: .png .jpg .jpeg .exr .hdr, or --format");
+        cli_usage(job, output->path, "its ending names no %sformat", is_series ? "" : "image ");
+        return fl_error_remedy(&job->error, "known: .png .jpg .jpeg .exr .hdr%s, or --format",
+                               is_series ? " .mp4 .mkv .y4m" : "");
+    }
+    if (!is_series && cli_image_is_video(output->image)) {
+        cli_usage(job, output->path, "one picture is no video");
+        return fl_error_remedy(&job->error, "use 'farlight animate'");
+    }
+    if (to_stdout && is_series && output->image != CLI_IMAGE_Y4M) {
+        cli_usage(job, "--output", "a series of %s files cannot go to standard output",
+                  cli_image_name(output->image));
+        return fl_error_remedy(&job->error, "-o - writes raw video (y4m); -o 'frames/%%04d.%s' writes files",
+                               cli_image_name(output->image));
+    }
+    if (!cli_image_is_video(output->image))
+        return true;
+    if (job->series.resume || job->series.shard_parts > 1) {
+        cli_usage(job, job->series.resume ? "--resume" : "--shard", "a video is made of all frames at once");
+        return fl_error_remedy(&job->error,
+                               "write images, such as 'frames/%%04d.png', and a video of all of them");
+    }
+    if (job->lossless && output->image != CLI_IMAGE_MKV) {
+        cli_usage(job, "--lossless", "%s files are not lossless", cli_image_name(output->image));
+        return fl_error_remedy(&job->error, "write an .mkv file");
     }
     return true;
 }
@@ -82,13 +104,17 @@ static bool complete_encoding(struct cli_job *job)
     if (job->options.encoding == PROTOCOL_ENCODING_JPEG && job->options.format != PROTOCOL_PIXEL_FORMAT_RGBA8)
         return cli_usage(job, "--encoding", "jpeg carries 8-bit pictures only, %s files need more",
                          cli_image_name(job->outputs[0].image)) == 0;
-    for (size_t i = 0; i < job->output_count; i++)
-        if (job->outputs[i].image == CLI_IMAGE_JPEG) {
-            job->file_quality = job->options.quality;
-            if (job->options.encoding != PROTOCOL_ENCODING_JPEG)
-                job->options.quality = 0; /* the number is meant for the file */
-            break;
-        }
+    for (size_t i = 0; i < job->output_count; i++) {
+        const enum cli_image image = job->outputs[i].image;
+        const unsigned quality = job->file_quality > 0 ? job->file_quality : job->options.quality;
+        if (image != CLI_IMAGE_JPEG && !cli_image_is_video(image))
+            continue;
+        if (cli_image_is_video(image) && quality > 51)
+            return cli_usage(job, "--quality", "a video has 1 (best) to 51") == 0;
+        job->file_quality = quality;
+        if (job->options.encoding != PROTOCOL_ENCODING_JPEG)
+            job->options.quality = 0; /* the number is meant for the file */
+    }
     if (job->options.encoding == PROTOCOL_ENCODING_ZSTD && job->options.quality > 19)
         return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
     return true;
@@ -141,6 +167,37 @@ static bool complete_camera(struct cli_job *job)
     return true;
 }
 
+/* Lenses, shutters and several samples are what the integrator distributed is for; one sharp sample has nothing to
+ * choose, and whitted makes no noise. */
+static void complete_integrator(struct cli_job *job)
+{
+    const struct fl_job_options *wanted = &job->options;
+    const bool spreads = wanted->samples > 1 || wanted->aperture > 0 || wanted->shutter > 0 || job->lens_changes;
+    if (!job->has_integrator)
+        job->options.integrator = spreads ? PROTOCOL_INTEGRATOR_DISTRIBUTED : PROTOCOL_INTEGRATOR_WHITTED;
+}
+
+static bool complete_clips(struct cli_job *job)
+{
+    for (size_t i = 0; i < job->clip_count; i++) {
+        struct cli_clip *clip = &job->clips[i];
+        if (clip->line == 0) {
+            clip->start_s = (float)job->clip_start_s;
+            clip->speed = job->clip_speed > 0 ? (float)job->clip_speed : 1;
+            clip->loop = !job->clip_once;
+        }
+    }
+    if (job->clip_count == 0 && (job->clip_once || job->clip_start_s != 0 || job->clip_speed > 0)) {
+        cli_usage(job,
+                  job->clip_once        ? "--clip-once"
+                  : job->clip_speed > 0 ? "--clip-speed"
+                                        : "--clip-start",
+                  "no clip is played");
+        return fl_error_remedy(&job->error, "add --clip NAME");
+    }
+    return true;
+}
+
 bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (job->model == NULL)
@@ -152,5 +209,7 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
         job->options.width = 1280;
         job->options.height = 720;
     }
-    return complete_outputs(job, is_series) && complete_encoding(job) && complete_camera(job);
+    complete_integrator(job);
+    return complete_clips(job) && complete_outputs(job, is_series) && complete_encoding(job) &&
+           complete_camera(job);
 }

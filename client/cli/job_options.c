@@ -38,12 +38,21 @@ enum key {
     KEY_HALF,
     KEY_FLOAT,
     KEY_TIMINGS,
-    KEY_TRACE_FILE
+    KEY_TRACE_FILE,
+    KEY_APERTURE,
+    KEY_FOCUS,
+    KEY_SHUTTER,
+    KEY_FILTER,
+    KEY_BVH_RAYS,
+    KEY_CLIP,
+    KEY_CLIP_ONCE,
+    KEY_CLIP_START,
+    KEY_CLIP_SPEED
 };
 
 static const struct argp_option options[] = {
     {"output", KEY_OUTPUT, "IMAGE", 0, "Image file; its ending is its format. '-' is standard output", 0},
-    {"format", KEY_FORMAT, "FORMAT", 0, "png, jpeg, exr or hdr, where the ending does not say it", 0},
+    {"format", KEY_FORMAT, "FORMAT", 0, "png, jpeg, exr, hdr, where the ending does not say it", 0},
     {"half", KEY_HALF, NULL, 0, "EXR of half floats (default)", 0},
     {"float", KEY_FLOAT, NULL, 0, "EXR of 32-bit floats", 0},
     {"server", KEY_SERVER, "ADDRESS", 0,
@@ -51,6 +60,8 @@ static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Picture:", 1},
     {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x720)", 0},
     {"samples", KEY_SAMPLES, "N", 0, "Samples per pixel (default 1)", 0},
+    {"filter", KEY_FILTER, "NAME", 0,
+     "How samples are spread about a pixel: blackman-harris (default), gaussian, tent, box", 0},
     {"depth", KEY_DEPTH, "N", 0, "Bounces after the first hit, 0 to 32 (default 8)", 0},
     {"seed", KEY_SEED, "N", 0, "Same seed, same picture (default 0)", 0},
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Equirectangular image (HDR or EXR) that lights the scene", 0},
@@ -62,16 +73,31 @@ static const struct argp_option options[] = {
     {"look-at", KEY_LOOK_AT, "X,Y,Z", 0, "What is in the middle of the picture", 0},
     {"up", KEY_UP, "X,Y,Z", 0, "Upward direction (default 0,1,0)", 0},
     {"fov", KEY_FOV, "DEGREES", 0, "Vertical field of view (default 45)", 0},
-    {NULL, 0, NULL, 0, "Method:", 3},
+    {"aperture", KEY_APERTURE, "METRES", 0,
+     "Diameter of the lens: what is not at --focus is out of focus (default 0: all is sharp)", 0},
+    {"focus", KEY_FOCUS, "METRES", 0, "Distance that is sharp (default: that of what is looked at)", 0},
+    {"shutter", KEY_SHUTTER, "FRAMES", 0,
+     "How long the shutter is open; 0.5 is a film camera's 180 degrees (default 0: nothing moves in a frame)", 0},
+    {NULL, 0, NULL, 0, "Clips of the model ('farlight info' lists them):", 3},
+    {"clip", KEY_CLIP, "NAME|INDEX", 0,
+     "Play it; may be repeated, the later one counts where both change the same", 0},
+    {"clip-once", KEY_CLIP_ONCE, NULL, 0, "Stop at the clips' end (default: begin again)", 0},
+    {"clip-start", KEY_CLIP_START, "SECONDS", 0, "When they begin (default 0; negative: they run already)", 0},
+    {"clip-speed", KEY_CLIP_SPEED, "FACTOR", 0, "How fast they run (default 1)", 0},
+    {NULL, 0, NULL, 0, "Method:", 4},
     {"tracer", KEY_TRACER, "NAME", 0, "bvh (default), naive, reference", 0},
     {"bvh-bounds", KEY_BVH_BOUNDS, "NAME", 0, "auto (default), box, sphere", 0},
-    {"integrator", KEY_INTEGRATOR, "NAME", 0, "whitted", 0},
+    {"bvh-rays", KEY_BVH_RAYS, "N", 0,
+     "Rays that walk the bvh as one: 1, 2, 3, 4, 8 (default 0: chosen for each wave)", 0},
+    {"integrator", KEY_INTEGRATOR, "NAME", 0,
+     "whitted, distributed (default: distributed for several samples, a lens or a shutter)", 0},
     {"primary", KEY_PRIMARY, "NAME", 0,
      "First hits: raster, trace (default: raster, but trace for the tracer reference)", 0},
     {"encoding", KEY_ENCODING, "NAME", 0,
      "How pixels travel: raw, zstd, jpeg (default: raw on this machine, zstd over a network)", 0},
-    {"quality", KEY_QUALITY, "N", 0, "JPEG quality 1 to 100, or zstd level 1 to 19", 0},
-    {NULL, 0, NULL, 0, "Talk:", 4},
+    {"quality", KEY_QUALITY, "N", 0,
+     "JPEG quality 1 to 100, zstd level 1 to 19, or rate factor of a video, 1 (best) to 51", 0},
+    {NULL, 0, NULL, 0, "Talk:", 5},
     {"timings", KEY_TIMINGS, "json", OPTION_ARG_OPTIONAL,
      "Print the time of every stage, as a table or as JSON, one object a line", 0},
     {"trace-file", KEY_TRACE_FILE, "FILE", 0,
@@ -133,6 +159,7 @@ static error_t set_name(struct cli_job *job, int key, const char *field, const c
                    ? 0
                    : unknown_value(job, field, "bvh_bounds", value);
     case KEY_INTEGRATOR:
+        job->has_integrator = true;
         return protocol_integrator_parse(value, &wanted->integrator)
                    ? 0
                    : unknown_value(job, field, "integrator", value);
@@ -146,11 +173,59 @@ static error_t set_name(struct cli_job *job, int key, const char *field, const c
         job->has_encoding = true;
         return protocol_encoding_parse(value, &wanted->encoding) ? 0
                                                                  : unknown_value(job, field, "encoding", value);
+    case KEY_FILTER:
+        return protocol_pixel_filter_parse(value, &wanted->pixel_filter)
+                   ? 0
+                   : unknown_value(job, field, "pixel_filter", value);
     case KEY_FORMAT:
         job->image = cli_image_by_name(value);
         return job->image != CLI_IMAGE_UNKNOWN
                    ? 0
-                   : cli_usage(job, field, "unknown format '%s' (known: png, jpeg, exr, hdr)", value);
+                   : cli_usage(job, field, "unknown format '%s' (known: png, jpeg, exr, hdr, mp4, mkv, y4m)",
+                               value);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static error_t set_real(struct cli_job *job, const char *field, const char *value, double least, double greatest,
+                        double *number)
+{
+    return fl_text_real(value, least, greatest, number, &job->error) ? 0 : name_field(job, field);
+}
+
+/* Options of lens, shutter and clips whose value is a number. */
+static error_t set_motion_number(struct cli_job *job, int key, const char *field, const char *value)
+{
+    struct fl_job_options *wanted = &job->options;
+    uint64_t rays = 0;
+    double real = 0;
+    error_t status = 0;
+    switch (key) {
+    case KEY_APERTURE:
+        job->has_aperture = true;
+        status = set_real(job, field, value, 0, 1e6, &real);
+        wanted->aperture = (float)real;
+        return status;
+    case KEY_FOCUS:
+        job->has_focus = true;
+        status = set_real(job, field, value, 0, 1e12, &real);
+        wanted->focus = (float)real;
+        return status;
+    case KEY_SHUTTER:
+        status = set_real(job, field, value, 0, 64, &real);
+        wanted->shutter = (float)real;
+        return status;
+    case KEY_CLIP_START:
+        return set_real(job, field, value, -1e6, 1e6, &job->clip_start_s);
+    case KEY_CLIP_SPEED:
+        return set_real(job, field, value, 0.001, 1000, &job->clip_speed);
+    case KEY_BVH_RAYS:
+        status = set_integer(job, field, value, 0, 8, &rays);
+        if (status == 0 && (rays > 4 && rays < 8))
+            return cli_usage(job, field, "%s rays cannot walk together (known: 0, 1, 2, 3, 4, 8)", value);
+        wanted->bvh_rays_together = (unsigned)rays;
+        return status;
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -193,7 +268,7 @@ static error_t set_number(struct cli_job *job, int key, const char *field, const
         job->has_fov = true;
         return 0;
     default:
-        return ARGP_ERR_UNKNOWN;
+        return set_motion_number(job, key, field, value);
     }
 }
 
@@ -223,6 +298,14 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         return 0;
     case KEY_FLOAT:
         job->float_pixels = true;
+        return 0;
+    case KEY_CLIP:
+        if (job->clip_count == CLI_CLIPS_MAX)
+            return cli_usage(job, field, "more than %d clips cannot be played at once", CLI_CLIPS_MAX);
+        job->clips[job->clip_count++] = (struct cli_clip){.which = value};
+        return 0;
+    case KEY_CLIP_ONCE:
+        job->clip_once = true;
         return 0;
     case KEY_QUIET:
         job->quiet = true;
@@ -260,12 +343,21 @@ static error_t parse(int key, char *value, struct argp_state *state)
     return set_option(state->input, key, field, value);
 }
 
+error_t cli_job_set(struct cli_job *job, const char *name, const char *value)
+{
+    for (const struct argp_option *option = options; option->name != NULL || option->doc != NULL; option++)
+        if (option->name != NULL && strcmp(option->name, name) == 0)
+            return set_option(job, option->key, name, value);
+    return ARGP_ERR_UNKNOWN;
+}
+
 const struct argp cli_job_argp = {.options = options, .parser = parse};
 
 const struct argp *cli_picture_argp(void)
 {
-    static const int left_out[] = {KEY_OUTPUT, KEY_FORMAT,  KEY_HALF,    KEY_FLOAT,     KEY_TONE_MAP,
-                                   KEY_TRACER, KEY_PRIMARY, KEY_TIMINGS, KEY_TRACE_FILE};
+    static const int left_out[] = {KEY_OUTPUT,    KEY_FORMAT,     KEY_HALF,      KEY_FLOAT,      KEY_TONE_MAP,
+                                   KEY_TRACER,    KEY_PRIMARY,    KEY_TIMINGS,   KEY_TRACE_FILE, KEY_CLIP,
+                                   KEY_CLIP_ONCE, KEY_CLIP_START, KEY_CLIP_SPEED};
     static struct argp_option kept[sizeof options / sizeof options[0]];
     static const struct argp argp = {.options = kept, .parser = parse};
     size_t count = 0;
@@ -282,9 +374,10 @@ const struct argp *cli_picture_argp(void)
 /* FARLIGHT_SIZE for --size, and so on. */
 static bool read_environment(struct cli_job *job)
 {
-    static const int keys[] = {KEY_SERVER,   KEY_SIZE,     KEY_SAMPLES, KEY_DEPTH,      KEY_SEED,
-                               KEY_EXPOSURE, KEY_TONE_MAP, KEY_TRACER,  KEY_BVH_BOUNDS, KEY_INTEGRATOR,
-                               KEY_PRIMARY,  KEY_ENCODING, KEY_QUALITY, KEY_ENVIRONMENT};
+    static const int keys[] = {KEY_SERVER,   KEY_SIZE,     KEY_SAMPLES, KEY_DEPTH,       KEY_SEED,
+                               KEY_EXPOSURE, KEY_TONE_MAP, KEY_TRACER,  KEY_BVH_BOUNDS,  KEY_INTEGRATOR,
+                               KEY_PRIMARY,  KEY_ENCODING, KEY_QUALITY, KEY_ENVIRONMENT, KEY_APERTURE,
+                               KEY_FOCUS,    KEY_SHUTTER,  KEY_FILTER,  KEY_BVH_RAYS};
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
         char field[40] = "FARLIGHT_";
         size_t length = strlen(field);

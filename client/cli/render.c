@@ -1,15 +1,37 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
+#include "lib/text.h"
 
+#include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
+
+enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE };
+
+static const struct argp_option options[] = {
+    {"time", KEY_TIME, "SECONDS", 0, "The moment of the clips that is shown (default 0)", -1},
+    {"progressive", KEY_PROGRESSIVE, "N", OPTION_ARG_OPTIONAL,
+     "Write the picture again after every N samples (default: after 1, 2, 4, 8 ..) until --samples are reached",
+     -1},
+    {0}};
 
 static error_t parse(int key, char *value, struct argp_state *state)
 {
     struct cli_job *job = state->input;
+    uint64_t number = 0;
+    bool good = true;
     switch (key) {
     case ARGP_KEY_INIT:
         state->child_inputs[0] = job;
         return 0;
+    case KEY_TIME:
+        good = fl_text_real(value, -1e6, 1e6, &job->time_s, &job->error);
+        break;
+    case KEY_PROGRESSIVE:
+        job->progressive = true;
+        good = value == NULL || fl_text_integer(value, 1, 65536, &number, &job->error);
+        job->pass_samples = (uint32_t)number;
+        break;
     case ARGP_KEY_ARG:
         if (job->model != NULL)
             return cli_usage(job, value, "only one model can be rendered");
@@ -18,20 +40,39 @@ static error_t parse(int key, char *value, struct argp_state *state)
     default:
         return ARGP_ERR_UNKNOWN;
     }
+    if (good)
+        return 0;
+    snprintf(job->error.field, sizeof job->error.field, "%s", key == KEY_TIME ? "--time" : "--progressive");
+    return EINVAL;
+}
+
+static bool complete(struct cli_job *job)
+{
+    if (!cli_job_complete(job, false))
+        return false;
+    if (job->progressive && cli_writes_to_stdout(job)) {
+        cli_usage(job, "--progressive", "standard output can be written only once");
+        return fl_error_remedy(&job->error, "name a file: it is replaced after each pass");
+    }
+    if (job->time_s != 0 && job->clip_count == 0) {
+        cli_usage(job, "--time", "no clip is played");
+        return fl_error_remedy(&job->error, "add --clip NAME");
+    }
+    return true;
 }
 
 int cli_render(int argc, char **argv)
 {
     static const struct argp_child children[] = {{&cli_job_argp, 0, NULL, 0}, {0}};
-    static const struct argp argp = {.parser = parse,
+    static const struct argp argp = {.options = options,
+                                     .parser = parse,
                                      .args_doc = "MODEL -o IMAGE",
                                      .doc = "Render one picture of a model.\v"
                                             "MODEL is glTF, GLB, OBJ or NFF. FARLIGHT_SERVER, FARLIGHT_SIZE, "
                                             "FARLIGHT_SAMPLES and so on give defaults.",
                                      .children = children};
     struct cli_job job;
-    if (!cli_job_begin(&job) || argp_parse(&argp, argc, argv, 0, NULL, &job) != 0 ||
-        !cli_job_complete(&job, false))
+    if (!cli_job_begin(&job) || argp_parse(&argp, argc, argv, 0, NULL, &job) != 0 || !complete(&job))
         return cli_report(&job.error);
     return cli_run_job(&job, false);
 }

@@ -80,7 +80,8 @@ static bool load_scene(struct session *session, struct fl_error *error)
         return false;
     cli_trace_import(session->trace, fl_scene_import_stats(loading->scene), loading->import_begin_ns, now_ns());
     session->was_loaded = true;
-    return cli_choose_camera(session->job, loading->scene, error);
+    return cli_choose_camera(session->job, loading->scene, error) &&
+           cli_settle(session->job, loading->scene, session->is_series, error);
 }
 
 /* ---- which frames ---- */
@@ -99,8 +100,6 @@ static bool choose_frames(struct session *session, struct fl_error *error)
     if (session->has_set)
         return true;
     session->has_set = true;
-    if (session->is_series && !cli_settle_range(job, error))
-        return false;
     if (session->is_series && series->shard_parts > 0 &&
         !fl_frame_run_shard(&series->range, series->shard_part, series->shard_parts, &wanted)) {
         if (!job->quiet)
@@ -172,10 +171,36 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
     return error->code == FL_ERROR_NONE;
 }
 
+/* One picture with more and more samples: a job for each pass, which the daemon adds to those before. */
+static bool render_passes(struct session *session, struct fl_error *error)
+{
+    const struct cli_job *job = session->job;
+    struct fl_job_options options = job->options;
+    const uint32_t samples = options.samples > 0 ? options.samples : 1;
+    const struct fl_frame_run still = {.step = 1};
+    bool done = true;
+    options.accumulate = true;
+    for (uint32_t held = 0; held < samples && done; held += options.samples) {
+        options.samples = job->pass_samples > 0 ? job->pass_samples : held > 0 ? held : 1;
+        if (options.samples > samples - held)
+            options.samples = samples - held;
+        session->rendering = fl_render_start(session->loading.scene, &options, error);
+        done = session->rendering != NULL && take_frames(session, &still, error);
+        if (!done)
+            break;
+        fl_render_destroy(session->rendering);
+        session->rendering = NULL;
+        cli_progress_step(&session->progress, held + options.samples, samples, "samples");
+    }
+    return done;
+}
+
 /* What is left of one run, as one job. */
 static bool render_run(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
 {
     struct fl_job_options options = session->job->options;
+    if (session->job->progressive)
+        return render_passes(session, error);
     options.first_frame = session->begun ? (uint32_t)session->next : run->first;
     options.last_frame = run->last;
     options.frame_step = run->step;
@@ -302,5 +327,22 @@ int cli_run_job(struct cli_job *job, bool is_series)
     /* An interruption or failure before it is what the command ended for. */
     if (!cli_trace_file_destroy(session.trace, done ? &error : NULL))
         done = false;
+    return done ? CLI_DONE : cli_report(&error);
+}
+
+int cli_dry_run(struct cli_job *job)
+{
+    struct session session = {.job = job, .is_series = true};
+    struct fl_error error = {0};
+    const bool done = (job->model == NULL || cli_check_input(job->model, &error)) &&
+                      (job->environment == NULL || cli_check_input(job->environment, &error)) &&
+                      cli_sinks_prepare(&session.sinks, job, true, &error) &&
+                      (!job->series.has_range || choose_frames(&session, &error));
+    if (done && session.has_set)
+        printf("%u frames would be rendered\n", session.set.frame_count);
+    else if (done)
+        puts("how many frames would be rendered only the model can tell");
+    cli_sinks_close(&session.sinks);
+    fl_frame_set_finish(&session.set);
     return done ? CLI_DONE : cli_report(&error);
 }

@@ -2,9 +2,12 @@
 #include "cli/sink.h"
 #include "lib/image_size.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* ---- what can be known before ---- */
@@ -13,9 +16,14 @@ static bool prepare_stdout(struct cli_sink *sink, struct fl_error *error)
 {
     sink->to_stdout = true;
     if (isatty(STDOUT_FILENO) == 1) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "an image would be written to the terminal");
-        return fl_error_remedy(error, "redirect it, or name a file");
+        const bool is_video = cli_image_is_video(sink->output.image);
+        fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "%s would be written to the terminal",
+                     is_video ? "a video" : "an image");
+        return fl_error_remedy(error, is_video ? "pipe it into a program, such as 'ffmpeg -i - movie.webm'"
+                                               : "redirect it, or name a file");
     }
+    if (cli_image_is_video(sink->output.image))
+        return true;
     if (!cli_temporary_folder(sink->folder, sizeof sink->folder, error))
         return false;
     sink->has_temporary = true;
@@ -28,7 +36,7 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
     const char *path = sink->output.path;
     if (strcmp(path, "-") == 0)
         return prepare_stdout(sink, error);
-    if (!sink->is_series)
+    if (!sink->is_series || cli_image_is_video(sink->output.image))
         return cli_check_output(path, sink->folder, sizeof sink->folder, error) &&
                snprintf(sink->path, sizeof sink->path, "%s", path) > 0;
     if (!fl_pattern_parse(path, &sink->pattern, error)) {
@@ -57,8 +65,45 @@ bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool 
 
 /* ---- frames ---- */
 
+/* A .y4m file: written under a temporary name. */
+static bool open_y4m(struct cli_sink *sink, struct fl_error *error)
+{
+    const int length = snprintf(sink->path, sizeof sink->path, "%s/.farlight-XXXXXX", sink->folder);
+    sink->y4m_fd = length > 0 && (size_t)length < sizeof sink->path ? mkostemp(sink->path, O_CLOEXEC) : -1;
+    if (sink->y4m_fd >= 0)
+        return true;
+    sink->y4m_fd = 0;
+    return fl_error_set(error, FL_ERROR_FILE, sink->output.path, "cannot be written: %s", strerror(errno));
+}
+
+static bool start_video(struct cli_sink *sink, struct fl_error *error)
+{
+    const struct cli_job *job = sink->job;
+    if (sink->output.image == CLI_IMAGE_Y4M) {
+        if (!sink->to_stdout && !open_y4m(sink, error))
+            return false;
+        const struct fl_y4m_options options = {.fd = sink->to_stdout ? STDOUT_FILENO : sink->y4m_fd,
+                                               .frames_per_second = job->options.frames_per_second,
+                                               .chroma = FL_Y4M_420,
+                                               .interrupt_fd = cli_interrupt_fd()};
+        sink->y4m = fl_y4m_begin(&options, error);
+        return sink->y4m != NULL;
+    }
+    const struct fl_video_options options = {.path = sink->path,
+                                             .format = cli_image_name(sink->output.image),
+                                             .model = job->model,
+                                             .frames_per_second = job->options.frames_per_second,
+                                             .quality = job->file_quality,
+                                             .lossless = job->lossless,
+                                             .interrupt_fd = cli_interrupt_fd()};
+    sink->video = fl_video_start(&options, error);
+    return sink->video != NULL;
+}
+
 static bool start(struct cli_sink *sink, struct fl_error *error)
 {
+    if (cli_image_is_video(sink->output.image))
+        return start_video(sink, error);
     const struct cli_job *job = sink->job;
     const struct fl_exporter_options options = {.folder = sink->folder,
                                                 .model = job->model,
@@ -109,20 +154,47 @@ static bool write_image(struct cli_sink *sink, const struct fl_frame *frame, str
 
 bool cli_sinks_write(struct cli_sinks *sinks, const struct fl_frame *frame, struct fl_error *error)
 {
-    for (size_t i = 0; i < sinks->count; i++)
-        if (!write_image(&sinks->items[i], frame, error))
+    for (size_t i = 0; i < sinks->count; i++) {
+        struct cli_sink *sink = &sinks->items[i];
+        const bool written = sink->y4m != NULL     ? fl_y4m_write(sink->y4m, frame, error)
+                             : sink->video != NULL ? fl_video_write(sink->video, frame, error)
+                                                   : write_image(sink, frame, error);
+        if (!written)
             return false;
+    }
     return true;
+}
+
+/* Gives the file its name, with the rights that a new file has. */
+static bool finish_y4m(struct cli_sink *sink, struct fl_error *error)
+{
+    const mode_t mask = umask(0);
+    umask(mask);
+    const bool good = fchmod(sink->y4m_fd, 0666 & ~mask) == 0 && fsync(sink->y4m_fd) == 0 &&
+                      rename(sink->path, sink->output.path) == 0;
+    const int failure = errno;
+    if (!good)
+        unlink(sink->path);
+    close(sink->y4m_fd);
+    sink->y4m_fd = 0;
+    return good ||
+           fl_error_set(error, FL_ERROR_FILE, sink->output.path, "cannot be written: %s", strerror(failure));
+}
+
+static bool finish(struct cli_sink *sink, struct fl_error *error)
+{
+    if (sink->video != NULL)
+        return fl_video_finish(sink->video, error);
+    if (sink->y4m != NULL)
+        return sink->to_stdout || finish_y4m(sink, error);
+    return fl_exporter_wait(sink->exporter, error) && (!sink->to_stdout || cli_copy_to_stdout(sink->path, error));
 }
 
 bool cli_sinks_finish(struct cli_sinks *sinks, struct fl_error *error)
 {
-    for (size_t i = 0; i < sinks->count; i++) {
-        struct cli_sink *sink = &sinks->items[i];
-        if (!fl_exporter_wait(sink->exporter, error) ||
-            (sink->to_stdout && !cli_copy_to_stdout(sink->path, error)))
+    for (size_t i = 0; i < sinks->count; i++)
+        if (!finish(&sinks->items[i], error))
             return false;
-    }
     return true;
 }
 
@@ -131,6 +203,12 @@ void cli_sinks_close(struct cli_sinks *sinks)
     for (size_t i = 0; i < sinks->count; i++) {
         struct cli_sink *sink = &sinks->items[i];
         fl_exporter_destroy(sink->exporter);
+        fl_video_destroy(sink->video);
+        fl_y4m_end(sink->y4m);
+        if (sink->y4m_fd > 0) {
+            unlink(sink->path);
+            close(sink->y4m_fd);
+        }
         if (sink->has_temporary) {
             unlink(sink->path);
             rmdir(sink->folder);

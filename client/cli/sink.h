@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Where a job's frames go: image files, one for all or one for each frame. */
+/* Where a job's frames go: image files, one for all or one for each frame, or a video. */
 #ifndef FARLIGHT_CLIENT_CLI_SINK_H
 #define FARLIGHT_CLIENT_CLI_SINK_H
 
@@ -13,7 +13,10 @@ struct cli_sink {
     struct fl_pattern pattern;     /* of a series */
     char folder[4096], path[4352]; /* where the image goes; of a series, for each frame anew */
     bool has_temporary;            /* `folder` is to be removed */
-    struct fl_exporter *exporter;
+    struct fl_exporter *exporter;  /* of images */
+    struct fl_video *video;
+    struct fl_y4m *y4m;
+    int y4m_fd; /* of a file under a temporary name, `path`; 0: none */
 };
 
 /* All zero at first. */

@@ -153,6 +153,34 @@ bool fl_connection_receive(struct fl_connection *connection, struct fl_received 
     }
 }
 
+bool fl_connection_wait_upload(struct fl_connection *connection, uint32_t request, uint64_t total,
+                               uint64_t deadline_ns, struct fl_error *error)
+{
+    struct fl_stream *stream = &connection->stream;
+    if (!fl_connection_check(connection, error))
+        return false;
+    while (connection->upload_credit < total || !fl_stream_has_room(stream)) {
+        struct frame frame;
+        struct message message;
+        const enum fl_stream_result result = fl_stream_next(stream, &frame, &message, error);
+        if (result == FL_STREAM_ERROR)
+            return fl_connection_break(connection, error);
+        if (result == FL_STREAM_MESSAGE) {
+            const int consumed = fl_connection_consume(connection, &frame.header, &message, error);
+            if (consumed < 0)
+                return false;
+            if (consumed == 0 && frame.header.request == request && message.type == MESSAGE_ERROR)
+                return fl_error_from_message(error, &message.error);
+            continue;
+        }
+        if (stream->ended)
+            return fail_ended(connection, error);
+        if (!serve(connection, deadline_ns, error))
+            return false;
+    }
+    return true;
+}
+
 bool fl_connection_answer(struct fl_connection *connection, uint32_t request, enum message_type expected,
                           struct fl_received *received, uint64_t deadline_ns, struct fl_error *error)
 {

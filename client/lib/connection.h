@@ -49,6 +49,10 @@ int fl_connection_consume(struct fl_connection *connection, const struct framing
 /* The next message that is for the caller. */
 bool fl_connection_receive(struct fl_connection *connection, struct fl_received *received, uint64_t deadline_ns,
                            struct fl_error *error);
+/* Serves the connection until the daemon lets `total` bytes in all be uploaded and a message fits into the buffer.
+ * An ERROR that answers `request` is FL_ERROR_REFUSED; other messages are dropped. */
+bool fl_connection_wait_upload(struct fl_connection *connection, uint32_t request, uint64_t total,
+                               uint64_t deadline_ns, struct fl_error *error);
 /* The answer to `request`; other messages are dropped. An ERROR is FL_ERROR_REFUSED. */
 bool fl_connection_answer(struct fl_connection *connection, uint32_t request, enum message_type expected,
                           struct fl_received *received, uint64_t deadline_ns, struct fl_error *error);

@@ -182,6 +182,20 @@ FL_API bool fl_scene_find_object(const struct fl_scene *scene, enum protocol_obj
  */
 FL_API uint32_t fl_scene_new_id(struct fl_scene *scene, enum protocol_object_kind kind);
 
+/* One property of one object over time; the numbers are the caller's and only read. */
+struct fl_channel {
+    enum protocol_channel_path path;
+    uint32_t object; /* node, light or material; 0 for the view */
+    enum protocol_interpolation interpolation;
+    uint32_t width, key_count; /* as of set_channel in messages.def */
+    const float *times;        /* seconds, ascending */
+    const float *values;       /* width numbers a key, three times that for cubic spline and bezier */
+};
+/* Adds a clip of one's own to the scene, for jobs that are started from then on; *clip is its identifier. Sends
+ * what the daemon does not have yet, and waits until the edit is applied. */
+FL_API bool fl_scene_add_clip(struct fl_scene *scene, const char *name, const struct fl_channel *channels,
+                              size_t channel_count, uint32_t *clip, struct fl_error *error);
+
 /* What a model file holds, without a daemon. */
 struct fl_model_note {
     enum protocol_severity severity;
@@ -238,6 +252,14 @@ struct fl_job_options {
     bool compare;
     enum protocol_tracer compare_with;
     float compare_far; /* two hits are far from each other beyond this share of the scene's diagonal; 0: 1/10000 */
+    float aperture;    /* diameter of the lens, metres; 0: everything is sharp */
+    float focus;       /* distance of the plane that is sharp, metres; 0: that of what is looked at */
+    float shutter;     /* how long it is open, in frames; 0: nothing moves within a frame */
+    enum protocol_pixel_filter pixel_filter;
+    unsigned bvh_rays_together; /* that walk as one: 1, 2, 3, 4, 8; 0: chosen for each wave */
+    bool accumulate;            /* frames add to those before as long as nothing changes: see fl_frame.samples */
+    const struct record_clip_use *clips; /* that are played, at most 16 */
+    size_t clip_count;
 };
 
 /* One picture and what it cost. */
@@ -251,6 +273,8 @@ struct fl_frame {
     bool digest_checked; /* lossless: the pixels have the digest that the daemon computed */
     uint64_t digest;
     float exposure_stops, world_from_view[12], fov_y, ortho_height, time_s;
+    float aperture, focus; /* of the lens, metres; focus 0: there is none */
+    float shutter_s;       /* how long the shutter was open, seconds */
     uint64_t primary_rays, shadow_rays, secondary_rays, splits, uploaded_bytes, structure_bytes;
     uint64_t wire_bytes;            /* of the encoded pixels */
     uint64_t receive_ns, decode_ns; /* first byte to last; decoding and checking */

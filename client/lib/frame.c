@@ -105,6 +105,9 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->fov_y = begin->fov_y;
     frame->ortho_height = begin->ortho_height;
     frame->time_s = begin->time_s;
+    frame->aperture = begin->aperture;
+    frame->focus = begin->focus;
+    frame->shutter_s = begin->shutter_s;
     frame->wire_bytes = begin->size_bytes;
     frame->pixels_bytes = (size_t)begin->width * begin->height * fl_bytes_per_pixel(begin->format);
     frame->pixels = malloc(frame->pixels_bytes);

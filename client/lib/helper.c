@@ -99,6 +99,9 @@ static void describe(struct message_frame_begin *begin, const struct fl_frame *f
     begin->fov_y = frame->fov_y;
     begin->ortho_height = frame->ortho_height;
     begin->time_s = frame->time_s;
+    begin->aperture = frame->aperture;
+    begin->focus = frame->focus;
+    begin->shutter_s = frame->shutter_s;
 }
 
 static void describe_costs(struct message_frame_end *end, const struct fl_frame *frame)

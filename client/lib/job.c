@@ -48,6 +48,14 @@ static void fill_render(struct message_render *render, const struct fl_job_optio
     render->compare = options->compare ? 1 : 0;
     render->compare_with = options->compare_with;
     render->compare_far = options->compare_far;
+    render->aperture = options->aperture;
+    render->focus = options->focus;
+    render->shutter = options->shutter;
+    render->pixel_filter = options->pixel_filter;
+    render->bvh_rays_together = options->bvh_rays_together;
+    render->accumulate = options->accumulate ? 1 : 0;
+    render->clips = (struct record_clip_use *)(uintptr_t)options->clips; /* only read */
+    render->clips_count = (uint32_t)options->clip_count;
     render->keys = (struct record_camera_key *)(uintptr_t)options->keys; /* only read */
     render->keys_count = (uint32_t)options->key_count;
     render->credit = options->frames_in_flight > 0 ? options->frames_in_flight : DEFAULT_FRAMES_IN_FLIGHT;

@@ -345,7 +345,7 @@ static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const stru
         .rays_together = together,
         .rays_a_dispatch = DISPATCH_RAYS_MAX / together * together,
     };
-    const struct gpu_program *program = trace_program_get(scene, wave->kind, &source, error);
+    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)
         return false;
     bind(bvh);

@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: MIT */
+/* What can only be said once the scene is there. */
+#include "cli/cli.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define RADIANS_PER_DEGREE 0.017453292519943295
+#define FRAME_MAX 10000000u
+
+/* An error of a script's value is told as the script's. */
+static bool in_script(const struct cli_job *job, unsigned line, const char *path, struct fl_error *error)
+{
+    const struct fl_error why = *error;
+    const size_t length = strlen(job->script);
+    fl_error_set(error, why.code, job->script + (length > 150 ? length - 150 : 0), "line %u: %s: %s", line, path,
+                 why.text);
+    return fl_error_remedy(error, "%s",
+                           why.remedy[0] != '\0' ? why.remedy : "'farlight info' lists what there is");
+}
+
+/* ---- clips ---- */
+
+/* *longest_s: how long they take once, at their speeds. */
+static bool settle_clips(struct cli_job *job, struct fl_scene *scene, double *longest_s, struct fl_error *error)
+{
+    for (size_t i = 0; i < job->clip_count; i++) {
+        const struct cli_clip *clip = &job->clips[i];
+        struct record_clip_use *use = &job->clip_uses[i];
+        const struct fl_clip_info *info = NULL;
+        if (!fl_scene_find_clip(scene, clip->which, &use->clip, &info, error))
+            return clip->line > 0 ? in_script(job, clip->line, "clips", error) : false;
+        /* What is rendered has its first frame at time 0. */
+        use->start_s = (float)((double)clip->start_s - job->time_s);
+        use->speed = clip->speed;
+        use->loop = clip->loop ? 1 : 0;
+        *longest_s = fmax(*longest_s, (double)info->duration_s / (double)clip->speed);
+    }
+    return true;
+}
+
+/* The script's values, as a clip of our own that is played last. */
+static bool settle_channels(struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
+{
+    struct record_clip_use *use = &job->clip_uses[job->clip_count];
+    struct fl_channel *channels = calloc(job->channel_count + 1, sizeof *channels);
+    if (channels == NULL)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    bool good = true;
+    for (size_t i = 0; i < job->channel_count && good; i++) {
+        const struct cli_channel *given = &job->channels[i];
+        channels[i] = given->channel;
+        if (given->target != NULL &&
+            !fl_scene_find_object(scene, given->kind, given->target, &channels[i].object, error))
+            good = in_script(job, given->line, given->path, error);
+    }
+    *use = (struct record_clip_use){.speed = 1};
+    good = good && fl_scene_add_clip(scene, "script", channels, job->channel_count, &use->clip, error);
+    free(channels);
+    return good;
+}
+
+/* ---- the range ---- */
+
+static double last_key_s(const struct cli_job *job)
+{
+    double last_s = 0;
+    for (size_t i = 0; i < job->channel_count; i++) {
+        const struct fl_channel *channel = &job->channels[i].channel;
+        if (channel->times != job->series.dolly_times)
+            last_s = fmax(last_s, (double)channel->times[channel->key_count - 1]);
+    }
+    return fmax(last_s, job->series.dolly_seconds);
+}
+
+/* Without a range: once through the clips, or through the script's keys. A clip that begins again does so one
+ * frame after the last. */
+static bool choose_range(struct cli_job *job, double clips_s, struct fl_error *error)
+{
+    struct cli_series *series = &job->series;
+    const double fps = (double)job->options.frames_per_second, keys_s = last_key_s(job);
+    const bool by_clips = clips_s > 0;
+    bool loops = false;
+    for (size_t i = 0; i < job->clip_count; i++)
+        loops = loops || job->clips[i].loop;
+    const double frames = floor((by_clips ? clips_s : keys_s) * fps + 0.5) + (by_clips && loops ? 0 : 1);
+    if (series->has_range)
+        return true;
+    if (!by_clips && keys_s <= 0) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, "--frames",
+                     "no range of frames is given, and nothing says how long "
+                     "this takes");
+        return fl_error_remedy(error, "--frames 1-120");
+    }
+    if (!(frames < FRAME_MAX)) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, "--frames", "to go through once takes more than %u frames",
+                     FRAME_MAX);
+        return fl_error_remedy(error, "give a range of frames, such as --frames 1-120");
+    }
+    series->has_range = true;
+    series->range = (struct fl_frame_run){.first = 1, .last = frames > 1 ? (uint32_t)frames : 1, .step = 1};
+    return true;
+}
+
+/* What lasts as long as the range. An orbit ends one frame after the last, so that a full turn repeats without a
+ * doubled frame; a dolly arrives with the last. */
+static void settle_camera(struct cli_job *job)
+{
+    struct fl_job_options *wanted = &job->options;
+    const struct cli_series *series = &job->series;
+    const double step_s = (double)series->range.step / (double)wanted->frames_per_second;
+    const uint32_t frames = fl_frame_run_count(&series->range);
+    wanted->time_origin_frame = series->range.first;
+    if (job->is_orbit) {
+        wanted->orbit_turn = (float)(series->orbit_degrees * RADIANS_PER_DEGREE);
+        wanted->orbit_seconds = (float)(series->orbit_seconds > 0 ? series->orbit_seconds : frames * step_s);
+    }
+    if (series->dolly_times != NULL)
+        series->dolly_times[1] = (float)(series->dolly_seconds > 0 ? series->dolly_seconds
+                                         : frames > 1              ? (frames - 1) * step_s
+                                                                   : step_s);
+}
+
+bool cli_settle(struct cli_job *job, struct fl_scene *scene, bool is_series, struct fl_error *error)
+{
+    double clips_s = 0;
+    if (!settle_clips(job, scene, &clips_s, error))
+        return false;
+    if (is_series) {
+        if (!choose_range(job, clips_s, error))
+            return false;
+        settle_camera(job);
+    }
+    if (job->channel_count > 0 && !settle_channels(job, scene, error))
+        return false;
+    job->options.clips = job->clip_uses;
+    job->options.clip_count = job->clip_count + (job->channel_count > 0 ? 1 : 0);
+    return true;
+}

@@ -1,0 +1,333 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/shot.h"
+#include "cli/shot_read.h"
+#include "lib/text.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define FILE_BYTES_MAX (16u << 20)
+#define OBJECTS_MAX 4096u
+
+/* ---- settings: what the command line has, too ---- */
+
+enum type { WORD, WHOLE, REAL, SIZE, FLAG };
+
+static const struct setting {
+    const char *name, *option;
+    enum type type;
+    const char *example;
+} settings[] = {
+    {"frames", "frames", WORD, "\"1-240\""},
+    {"fps", "fps", REAL, "24"},
+    {"shard", "shard", WORD, "\"3/8\""},
+    {"size", "size", SIZE, "[1920, 1080]"},
+    {"samples", "samples", WHOLE, "16"},
+    {"depth", "depth", WHOLE, "8"},
+    {"seed", "seed", WHOLE, "1"},
+    {"exposure", "exposure", REAL, "0.5"},
+    {"tone_map", "tone-map", WORD, "\"neutral\""},
+    {"shutter", "shutter", REAL, "0.5"},
+    {"filter", "filter", WORD, "\"gaussian\""},
+    {"tracer", "tracer", WORD, "\"bvh\""},
+    {"bvh_bounds", "bvh-bounds", WORD, "\"box\""},
+    {"bvh_rays", "bvh-rays", WHOLE, "2"},
+    {"integrator", "integrator", WORD, "\"distributed\""},
+    {"primary", "primary", WORD, "\"raster\""},
+    {"encoding", "encoding", WORD, "\"zstd\""},
+    {"quality", "quality", WHOLE, "90"},
+    {"format", "format", WORD, "\"exr\""},
+    {"half", "half", FLAG, "true"},
+    {"float", "float", FLAG, "true"},
+    {"lossless", "lossless", FLAG, "true"},
+};
+#define SETTING_COUNT (sizeof settings / sizeof settings[0])
+
+static bool wrong_type(const struct shot_reader *reader, const struct shot_value *at,
+                       const struct setting *setting)
+{
+    static const char *const wanted[] = {[WORD] = "a string",
+                                         [WHOLE] = "a whole number, not less than 0",
+                                         [REAL] = "a number",
+                                         [SIZE] = "an array of two whole numbers",
+                                         [FLAG] = "true or false"};
+    char remedy[80];
+    snprintf(remedy, sizeof remedy, "such as \"%s\": %s", setting->name, setting->example);
+    return shot_wrong(reader, at, remedy, "must be %s", wanted[setting->type]);
+}
+
+static bool is_whole(const json_t *value)
+{
+    return json_is_integer(value) && json_integer_value(value) >= 0;
+}
+
+/* As it would be typed; NULL: it has the wrong type. */
+static const char *typed(const struct setting *setting, const json_t *value, char *text, size_t text_bytes)
+{
+    const json_t *width = json_array_get(value, 0), *height = json_array_get(value, 1);
+    switch (setting->type) {
+    case WORD:
+        return json_string_value(value);
+    case WHOLE:
+        snprintf(text, text_bytes, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
+        return is_whole(value) ? text : NULL;
+    case REAL:
+        snprintf(text, text_bytes, "%.17g", json_number_value(value));
+        return json_is_number(value) ? text : NULL;
+    case SIZE:
+        snprintf(text, text_bytes, "%" JSON_INTEGER_FORMAT "x%" JSON_INTEGER_FORMAT, json_integer_value(width),
+                 json_integer_value(height));
+        return json_array_size(value) == 2 && is_whole(width) && is_whole(height) ? text : NULL;
+    default:
+        return json_is_boolean(value) ? "" : NULL;
+    }
+}
+
+static bool apply_setting(const struct shot_reader *reader, const struct shot_value *at,
+                          const struct setting *setting)
+{
+    char text[64], remedy[sizeof reader->job->error.remedy];
+    const char *value = typed(setting, at->value, text, sizeof text);
+    if (value == NULL)
+        return wrong_type(reader, at, setting);
+    if (json_is_false(at->value))
+        return true;
+    value = setting->type == FLAG ? NULL : value;
+    error_t status = reader->set(reader->user, setting->option, value);
+    if (status == ARGP_ERR_UNKNOWN)
+        status = cli_job_set(reader->job, setting->option, value);
+    if (status == 0)
+        return true;
+    const struct fl_error why = reader->job->error;
+    snprintf(remedy, sizeof remedy, "such as \"%s\": %s", setting->name, setting->example);
+    return shot_wrong(reader, at, why.remedy[0] != '\0' ? why.remedy : remedy, "%s", why.text);
+}
+
+/* ---- what the scene has ---- */
+
+static const struct shot_property light_properties[] = {
+    {"colour", PROTOCOL_CHANNEL_PATH_LIGHT_COLOUR, SHOT_NUMBERS, 3, 0, 1e12, 1, "[10, 9, 8]"},
+    {"size", PROTOCOL_CHANNEL_PATH_LIGHT_SIZE, SHOT_SIZE, 2, 0, 1e12, 1, "[0.5, 0.5]"},
+    {0}};
+static const struct shot_property material_properties[] = {
+    {"base_colour", PROTOCOL_CHANNEL_PATH_MATERIAL_BASE_COLOUR, SHOT_COLOUR, 4, 0, 1, 1, "[1, 0.5, 0.2]"},
+    {"emission", PROTOCOL_CHANNEL_PATH_MATERIAL_EMISSION, SHOT_NUMBERS, 3, 0, 1e6, 1, "[1, 1, 1]"},
+    {"metallic", PROTOCOL_CHANNEL_PATH_MATERIAL_METALLIC, SHOT_NUMBERS, 1, 0, 1, 1, "1"},
+    {"roughness", PROTOCOL_CHANNEL_PATH_MATERIAL_ROUGHNESS, SHOT_NUMBERS, 1, 0, 1, 1, "0.3"},
+    {"transmission", PROTOCOL_CHANNEL_PATH_MATERIAL_TRANSMISSION, SHOT_NUMBERS, 1, 0, 1, 1, "1"},
+    {"ior", PROTOCOL_CHANNEL_PATH_MATERIAL_IOR, SHOT_NUMBERS, 1, 1, 10, 1, "1.5"},
+    {0}};
+static const struct shot_property node_properties[] = {
+    {"translation", PROTOCOL_CHANNEL_PATH_NODE_TRANSLATION, SHOT_NUMBERS, 3, -1e12, 1e12, 1, "[0, 1, 0]"},
+    {"rotation", PROTOCOL_CHANNEL_PATH_NODE_ROTATION, SHOT_TURN, 4, -1, 1, 1, "[0, 0, 0, 1]"},
+    {"rotation_degrees", PROTOCOL_CHANNEL_PATH_NODE_ROTATION, SHOT_ANGLES, 3, -3.6e6, 3.6e6, 1, "[0, 90, 0]"},
+    {"scale", PROTOCOL_CHANNEL_PATH_NODE_SCALE, SHOT_NUMBERS, 3, -1e6, 1e6, 1, "[1, 1, 1]"},
+    {"hidden", PROTOCOL_CHANNEL_PATH_NODE_HIDDEN, SHOT_FLAG, 1, 0, 1, 1, "true"},
+    {0}};
+
+static const struct group {
+    const char *name;
+    enum protocol_object_kind kind;
+    const struct shot_property *properties;
+} groups[] = {
+    {"lights", PROTOCOL_OBJECT_KIND_LIGHT, light_properties},
+    {"materials", PROTOCOL_OBJECT_KIND_MATERIAL, material_properties},
+    {"nodes", PROTOCOL_OBJECT_KIND_NODE, node_properties},
+};
+#define GROUP_COUNT (sizeof groups / sizeof groups[0])
+
+static bool apply_object(const struct shot_reader *reader, const struct shot_value *at, const struct group *group)
+{
+    const char *known[8] = {"target"}, *target = NULL;
+    for (size_t i = 0; group->properties[i].name != NULL; i++)
+        known[i + 1] = group->properties[i].name;
+    if (!shot_is_object(reader, at, known))
+        return false;
+    const struct shot_value name = shot_member(at, "target");
+    if (name.value == NULL)
+        return shot_wrong(reader, at, "\"target\": a name or a number; 'farlight info' lists them",
+                          "\"target\" is missing");
+    if (!shot_name(reader, &name, &target))
+        return false;
+    if (json_object_get(at->value, "rotation") != NULL && json_object_get(at->value, "rotation_degrees") != NULL)
+        return shot_wrong(reader, at, "leave one of them out",
+                          "\"rotation\" and \"rotation_degrees\" say the same");
+    for (const struct shot_property *property = group->properties; property->name != NULL; property++) {
+        const struct shot_value value = shot_member(at, property->name);
+        struct fl_channel channel;
+        if (value.value != NULL && (!shot_channel(reader, &value, property, &channel) ||
+                                    !shot_add_channel(reader, &value, &channel, group->kind, target)))
+            return false;
+    }
+    return true;
+}
+
+static bool apply_group(const struct shot_reader *reader, const struct shot_value *at, const struct group *group)
+{
+    if (!shot_is_array(reader, at, OBJECTS_MAX))
+        return false;
+    for (size_t i = 0; i < json_array_size(at->value); i++) {
+        const struct shot_value object = shot_element(at, i);
+        if (!apply_object(reader, &object, group))
+            return false;
+    }
+    return true;
+}
+
+/* ---- clips ---- */
+
+static bool apply_clip(const struct shot_reader *reader, const struct shot_value *at, struct cli_clip *clip)
+{
+    static const char *const known[] = {"clip", "start", "speed", "loop", NULL};
+    const struct shot_value which = shot_member(at, "clip"), start = shot_member(at, "start"),
+                            speed = shot_member(at, "speed"), loop = shot_member(at, "loop");
+    double start_s = 0, factor = 1;
+    *clip = (struct cli_clip){.speed = 1, .loop = true, .line = fl_json_line(&reader->shot->json, &at->place)};
+    if (!json_is_object(at->value))
+        return shot_name(reader, at, &clip->which);
+    if (!shot_is_object(reader, at, known))
+        return false;
+    if (which.value == NULL)
+        return shot_wrong(reader, at, "\"clip\": a name or a number; 'farlight info' lists them",
+                          "\"clip\" is missing");
+    if (!shot_name(reader, &which, &clip->which) ||
+        (start.value != NULL && !shot_number(reader, &start, -1e6, 1e6, &start_s)) ||
+        (speed.value != NULL && !shot_number(reader, &speed, 0.001, 1000, &factor)))
+        return false;
+    if (loop.value != NULL && !json_is_boolean(loop.value))
+        return shot_wrong(reader, &loop, "\"loop\": false", "must be true or false");
+    clip->start_s = (float)start_s;
+    clip->speed = (float)factor;
+    clip->loop = !json_is_false(loop.value);
+    return true;
+}
+
+static bool apply_clips(const struct shot_reader *reader, const struct shot_value *at)
+{
+    struct cli_job *job = reader->job;
+    if (!shot_is_array(reader, at, CLI_CLIPS_MAX))
+        return false;
+    for (size_t i = 0; i < json_array_size(at->value); i++) {
+        const struct shot_value clip = shot_element(at, i);
+        if (!apply_clip(reader, &clip, &job->clips[job->clip_count++]))
+            return false;
+    }
+    return true;
+}
+
+/* ---- outputs ---- */
+
+static bool apply_output(const struct shot_reader *reader, const struct shot_value *at)
+{
+    struct cli_job *job = reader->job;
+    struct cli_output *output = &job->outputs[job->output_count];
+    struct fl_pattern pattern;
+    struct fl_error why = {0};
+    if (!shot_path(reader, at, &output->path))
+        return false;
+    output->image = cli_image_by_path(output->path);
+    if (output->image == CLI_IMAGE_UNKNOWN)
+        output->image = job->image;
+    const bool to_stdout = strcmp(output->path, "-") == 0;
+    if (output->image == CLI_IMAGE_UNKNOWN && !to_stdout)
+        return shot_wrong(reader, at, "known: .png .jpg .jpeg .exr .hdr .mp4 .mkv .y4m, or say \"format\"",
+                          "its ending names no format");
+    if (!to_stdout && !cli_image_is_video(output->image) && !fl_pattern_parse(output->path, &pattern, &why))
+        return shot_wrong(reader, at, why.remedy[0] != '\0' ? why.remedy : "write it like 'frames/%04d.exr'", "%s",
+                          why.text);
+    job->output_count++;
+    return true;
+}
+
+static bool apply_outputs(const struct shot_reader *reader, const struct shot_value *at)
+{
+    if (!shot_is_array(reader, at, CLI_OUTPUTS_MAX))
+        return false;
+    for (size_t i = 0; i < json_array_size(at->value); i++) {
+        const struct shot_value output = shot_element(at, i);
+        if (!apply_output(reader, &output))
+            return false;
+    }
+    return true;
+}
+
+/* ---- all of it ---- */
+
+static bool apply_members(const struct shot_reader *reader, const struct shot_value *root)
+{
+    const struct cli_shot_given *given = reader->given;
+    struct cli_job *job = reader->job;
+    const struct shot_value model = shot_member(root, "model"), environment = shot_member(root, "environment"),
+                            camera = shot_member(root, "camera"), clips = shot_member(root, "clips"),
+                            output = shot_member(root, "output"), outputs = shot_member(root, "outputs"),
+                            about = shot_member(root, "description"), schema = shot_member(root, "$schema");
+    const struct shot_value *const texts[] = {&about, &schema};
+    for (size_t i = 0; i < 2; i++)
+        if (texts[i]->value != NULL && !json_is_string(texts[i]->value))
+            return shot_wrong(reader, texts[i], "leave it out", "must be a string");
+    if ((model.value != NULL && !shot_path(reader, &model, &job->model)) ||
+        (environment.value != NULL && !shot_path(reader, &environment, &job->environment)) ||
+        (camera.value != NULL && !shot_camera(reader, &camera)) ||
+        (clips.value != NULL && !given->clips && !apply_clips(reader, &clips)))
+        return false;
+    for (size_t i = 0; i < GROUP_COUNT; i++) {
+        const struct shot_value group = shot_member(root, groups[i].name);
+        if (group.value != NULL && !apply_group(reader, &group, &groups[i]))
+            return false;
+    }
+    if (output.value != NULL && outputs.value != NULL)
+        return shot_wrong(reader, &output, "leave one of them out", "\"outputs\" is there, too");
+    if (given->output)
+        return true;
+    return (output.value == NULL || apply_output(reader, &output)) &&
+           (outputs.value == NULL || apply_outputs(reader, &outputs));
+}
+
+bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli_shot_given *given,
+                    cli_shot_set *set, void *user)
+{
+    static const char *const others[] = {"$schema", "description", "model", "environment", "camera",  "clips",
+                                         "lights",  "materials",   "nodes", "output",      "outputs", NULL};
+    const struct shot_reader reader = {.shot = shot, .job = job, .given = given, .set = set, .user = user};
+    const struct shot_value root = {.value = shot->json.root};
+    const char *known[SETTING_COUNT + sizeof others / sizeof others[0]];
+    size_t count = 0;
+    for (size_t i = 0; others[i] != NULL; i++)
+        known[count++] = others[i];
+    for (size_t i = 0; i < SETTING_COUNT; i++)
+        known[count++] = settings[i].name;
+    known[count] = NULL;
+    job->script = shot->path;
+    if (!shot_is_object(&reader, &root, known))
+        return false;
+    for (size_t i = 0; i < SETTING_COUNT; i++) {
+        const struct shot_value at = shot_member(&root, settings[i].name);
+        if (at.value != NULL && !apply_setting(&reader, &at, &settings[i]))
+            return false;
+    }
+    return apply_members(&reader, &root);
+}
+
+bool cli_shot_load(struct cli_shot *shot, const char *path, struct fl_error *error)
+{
+    const char *slash = strrchr(path, '/');
+    const size_t folder_bytes = slash != NULL ? (size_t)(slash - path) + 1 : 0;
+    *shot = (struct cli_shot){.path = path};
+    if (folder_bytes >= sizeof shot->folder)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "--script", "the path of the script is too long");
+    memcpy(shot->folder, path, folder_bytes);
+    if (fl_json_load(&shot->json, path, FILE_BYTES_MAX, error))
+        return true;
+    return error->remedy[0] != '\0' ? false : fl_error_remedy(error, "see farlight-shot(5)");
+}
+
+void cli_shot_finish(struct cli_shot *shot)
+{
+    for (size_t i = 0; i < shot->owned_count; i++)
+        free(shot->owned[i]);
+    free(shot->owned);
+    fl_json_finish(&shot->json);
+    *shot = (struct cli_shot){0};
+}

@@ -1,0 +1,201 @@
+/* SPDX-License-Identifier: MIT */
+/* The camera of a request file: one of the model's, or eye, look_at, up and fov, each of them still or keyed; an
+ * orbit or a dolly; the lens. */
+#include "cli/shot_read.h"
+
+#include <string.h>
+
+#define RADIANS_PER_DEGREE 0.017453292519943295
+
+enum view { EYE, LOOK_AT, UP, FOV, APERTURE, FOCUS, EXPOSURE, VIEW_COUNT };
+
+static const struct shot_property properties[VIEW_COUNT] = {
+    {"eye", PROTOCOL_CHANNEL_PATH_VIEW_EYE, SHOT_NUMBERS, 3, -1e12, 1e12, 1, "[3, 2, 4]"},
+    {"look_at", PROTOCOL_CHANNEL_PATH_VIEW_LOOK_AT, SHOT_NUMBERS, 3, -1e12, 1e12, 1, "[0, 1, 0]"},
+    {"up", PROTOCOL_CHANNEL_PATH_VIEW_UP, SHOT_NUMBERS, 3, -1e6, 1e6, 1, "[0, 1, 0]"},
+    {"fov", PROTOCOL_CHANNEL_PATH_VIEW_FOV_Y, SHOT_NUMBERS, 1, 0.1, 177, RADIANS_PER_DEGREE, "40"},
+    {"aperture", PROTOCOL_CHANNEL_PATH_VIEW_APERTURE, SHOT_NUMBERS, 1, 0, 1e6, 1, "0.05"},
+    {"focus", PROTOCOL_CHANNEL_PATH_VIEW_FOCUS, SHOT_NUMBERS, 1, 0, 1e12, 1, "3.2"},
+    {"exposure", PROTOCOL_CHANNEL_PATH_VIEW_EXPOSURE, SHOT_NUMBERS, 1, -64, 64, 1, "-0.5"}};
+
+/* The value of the first key. */
+static const float *first_value(const struct fl_channel *channel)
+{
+    const bool has_handles = channel->interpolation == PROTOCOL_INTERPOLATION_CUBIC_SPLINE ||
+                             channel->interpolation == PROTOCOL_INTERPOLATION_BEZIER;
+    return channel->values + (has_handles ? channel->width : 0);
+}
+
+/* Reads one property: its first value, and a channel if it changes. */
+static bool read_view(const struct shot_reader *reader, const struct shot_value *at, enum view which, float *first)
+{
+    struct fl_channel channel;
+    if (!shot_channel(reader, at, &properties[which], &channel))
+        return false;
+    memcpy(first, first_value(&channel), channel.width * sizeof *first);
+    return (!shot_is_keyed(at) && which != EXPOSURE) ||
+           shot_add_channel(reader, at, &channel, PROTOCOL_OBJECT_KIND_CAMERA, NULL);
+}
+
+/* ---- where it is ---- */
+
+static bool read_orbit(const struct shot_reader *reader, const struct shot_value *at)
+{
+    static const char *const known[] = {"degrees", "seconds", NULL};
+    struct cli_series *series = &reader->job->series;
+    const struct shot_value degrees = shot_member(at, "degrees"), seconds = shot_member(at, "seconds");
+    reader->job->is_orbit = !json_is_false(at->value);
+    if (json_is_boolean(at->value))
+        return true;
+    if (json_is_number(at->value))
+        return shot_number(reader, at, -1e6, 1e6, &series->orbit_degrees);
+    if (!json_is_object(at->value))
+        return shot_wrong(reader, at, "\"orbit\": {\"degrees\": 360, \"seconds\": 10}",
+                          "must be true, degrees, or an object");
+    return shot_is_object(reader, at, known) &&
+           (degrees.value == NULL || shot_number(reader, &degrees, -1e6, 1e6, &series->orbit_degrees)) &&
+           (seconds.value == NULL || shot_number(reader, &seconds, 1e-3, 1e6, &series->orbit_seconds));
+}
+
+/* Where it ends: a place, or so much nearer to what is looked at. */
+static bool dolly_end(const struct shot_reader *reader, const struct shot_value *at, float to[3])
+{
+    const struct record_camera_key *key = &reader->job->key;
+    const struct shot_value place = shot_member(at, "to"), by = shot_member(at, "by");
+    double metres = 0, length2 = 0;
+    if ((place.value != NULL) == (by.value != NULL))
+        return shot_wrong(reader, at, "\"dolly\": {\"to\": [1, 2, 3]}, or {\"by\": 2}",
+                          "needs either \"to\" or \"by\"");
+    if (place.value != NULL) {
+        struct fl_channel channel;
+        if (shot_is_keyed(&place))
+            return shot_wrong(reader, &place, "key \"eye\" instead", "must be one place");
+        if (!shot_channel(reader, &place, &properties[EYE], &channel))
+            return false;
+        memcpy(to, channel.values, 3 * sizeof *to);
+        return true;
+    }
+    if (!shot_number(reader, &by, -1e12, 1e12, &metres))
+        return false;
+    for (unsigned i = 0; i < 3; i++) {
+        const double part = (double)key->look_at_world[i] - (double)key->eye_world[i];
+        length2 += part * part;
+    }
+    if (!(length2 > 0))
+        return shot_wrong(reader, at, "move one of them", "\"look_at\" is where \"eye\" is");
+    for (unsigned i = 0; i < 3; i++) {
+        const double part = (double)key->look_at_world[i] - (double)key->eye_world[i];
+        to[i] = (float)((double)key->eye_world[i] + metres * part / __builtin_sqrt(length2));
+    }
+    return true;
+}
+
+/* Two keys of the eye; when the second one is, may only be known with the range of frames. */
+static bool read_dolly(const struct shot_reader *reader, const struct shot_value *at)
+{
+    static const char *const known[] = {"to", "by", "seconds", "ease", NULL};
+    struct cli_series *series = &reader->job->series;
+    const struct shot_value seconds = shot_member(at, "seconds"), ease = shot_member(at, "ease");
+    float to[3];
+    if (!shot_is_object(reader, at, known) || !dolly_end(reader, at, to) ||
+        (seconds.value != NULL && !shot_number(reader, &seconds, 1e-3, 1e6, &series->dolly_seconds)))
+        return false;
+    if (ease.value != NULL && !json_is_boolean(ease.value))
+        return shot_wrong(reader, &ease, "\"ease\": true", "must be true or false");
+    float *times = shot_allocate(reader, 2, sizeof *times);
+    float(*values)[3] = times != NULL ? shot_allocate(reader, 6, sizeof *values) : NULL;
+    if (values == NULL)
+        return false;
+    series->dolly_times = times;
+    times[1] = 1; /* until it is settled */
+    const bool eases = json_is_true(ease.value);
+    const size_t parts =
+        eases ? 3 : 1; /* of a Bezier key: before, itself, after, all alike: it stands still there */
+    for (size_t i = 0; i < parts; i++) {
+        memcpy(values[i], reader->job->key.eye_world, sizeof *values);
+        memcpy(values[parts + i], to, sizeof *values);
+    }
+    const struct fl_channel channel = {.path = PROTOCOL_CHANNEL_PATH_VIEW_EYE,
+                                       .interpolation =
+                                           eases ? PROTOCOL_INTERPOLATION_BEZIER : PROTOCOL_INTERPOLATION_LINEAR,
+                                       .width = 3,
+                                       .key_count = 2,
+                                       .times = times,
+                                       .values = values[0]};
+    return shot_add_channel(reader, at, &channel, PROTOCOL_OBJECT_KIND_CAMERA, NULL);
+}
+
+/* What cannot go together. */
+static bool check_place(const struct shot_reader *reader, const struct shot_value *at,
+                        const struct shot_value view[VIEW_COUNT])
+{
+    const struct shot_value name = shot_member(at, "name"), orbit = shot_member(at, "orbit"),
+                            dolly = shot_member(at, "dolly");
+    const bool has_place = view[EYE].value != NULL || view[LOOK_AT].value != NULL;
+    const bool orbits = orbit.value != NULL && !json_is_false(orbit.value);
+    if (name.value != NULL &&
+        (has_place || view[UP].value != NULL || view[FOV].value != NULL || orbits || dolly.value != NULL))
+        return shot_wrong(reader, &name, "leave \"name\" out, or eye, look_at, up, fov, orbit and dolly",
+                          "a camera of the model has its own place and view");
+    if ((view[EYE].value != NULL) != (view[LOOK_AT].value != NULL))
+        return shot_wrong(reader, at, "\"eye\" and \"look_at\" go together", "\"%s\" is missing",
+                          view[EYE].value == NULL ? "eye" : "look_at");
+    if (!has_place && (view[UP].value != NULL || view[FOV].value != NULL || dolly.value != NULL))
+        return shot_wrong(reader, at, "say where the camera is", "\"eye\" and \"look_at\" are missing");
+    for (enum view which = EYE; which <= FOV; which++)
+        if (orbits && shot_is_keyed(&view[which]))
+            return shot_wrong(reader, &view[which], "key all of the way, or none of it",
+                              "cannot change on an orbit");
+    if (dolly.value != NULL && (orbits || shot_is_keyed(&view[EYE])))
+        return shot_wrong(reader, &dolly, "leave one of them out", "cannot go with an orbit or a keyed eye");
+    return true;
+}
+
+static bool read_place(const struct shot_reader *reader, const struct shot_value *at,
+                       const struct shot_value view[VIEW_COUNT])
+{
+    struct cli_job *job = reader->job;
+    const struct shot_value name = shot_member(at, "name"), orbit = shot_member(at, "orbit"),
+                            dolly = shot_member(at, "dolly");
+    if (!check_place(reader, at, view))
+        return false;
+    if (name.value != NULL && !shot_name(reader, &name, &job->camera))
+        return false;
+    if (view[EYE].value != NULL) {
+        job->has_eye = job->has_look_at = true;
+        if (!read_view(reader, &view[EYE], EYE, job->key.eye_world) ||
+            !read_view(reader, &view[LOOK_AT], LOOK_AT, job->key.look_at_world))
+            return false;
+    }
+    if (view[UP].value != NULL && !reader->given->up && !read_view(reader, &view[UP], UP, job->key.up_world))
+        return false;
+    if (view[FOV].value != NULL && !reader->given->fov && !read_view(reader, &view[FOV], FOV, &job->key.fov_y))
+        return false;
+    return (orbit.value == NULL || read_orbit(reader, &orbit)) &&
+           (dolly.value == NULL || read_dolly(reader, &dolly));
+}
+
+bool shot_camera(const struct shot_reader *reader, const struct shot_value *at)
+{
+    static const char *const known[] = {"name",  "eye",      "look_at", "up",    "fov", "aperture",
+                                        "focus", "exposure", "orbit",   "dolly", NULL};
+    struct cli_job *job = reader->job;
+    struct shot_value view[VIEW_COUNT];
+    float exposure = 0;
+    if (json_is_string(at->value) || json_is_integer(at->value))
+        return reader->given->camera || shot_name(reader, at, &job->camera);
+    if (!shot_is_object(reader, at, known))
+        return false;
+    for (enum view which = EYE; which < VIEW_COUNT; which++)
+        view[which] = shot_member(at, properties[which].name);
+    if (!reader->given->camera && !read_place(reader, at, view))
+        return false;
+    if (view[APERTURE].value != NULL && !reader->given->aperture &&
+        !read_view(reader, &view[APERTURE], APERTURE, &job->options.aperture))
+        return false;
+    job->lens_changes = shot_is_keyed(&view[APERTURE]) && !reader->given->aperture;
+    if (view[FOCUS].value != NULL && !reader->given->focus &&
+        !read_view(reader, &view[FOCUS], FOCUS, &job->options.focus))
+        return false;
+    return view[EXPOSURE].value == NULL || read_view(reader, &view[EXPOSURE], EXPOSURE, &exposure);
+}

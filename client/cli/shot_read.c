@@ -1,0 +1,186 @@
+/* SPDX-License-Identifier: MIT */
+/* Reading a request file: members, names, paths, and mistakes told with their line. */
+#include "cli/shot_read.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct shot_value shot_member(const struct shot_value *object, const char *key)
+{
+    return (struct shot_value){
+        .place = {.outer = object->place.outer == NULL && object->place.key == NULL ? NULL : &object->place,
+                  .key = key},
+        .value = json_object_get(object->value, key)};
+}
+
+struct shot_value shot_element(const struct shot_value *array, size_t index)
+{
+    return (struct shot_value){.place = {.outer = &array->place, .index = index},
+                               .value = json_array_get(array->value, index)};
+}
+
+static bool is_root(const struct shot_value *at)
+{
+    return at->place.outer == NULL && at->place.key == NULL;
+}
+
+bool shot_wrong(const struct shot_reader *reader, const struct shot_value *at, const char *remedy,
+                const char *format, ...)
+{
+    char text[500], path[100];
+    const struct fl_json_place *place = is_root(at) ? NULL : &at->place;
+    const size_t length = strlen(reader->shot->path);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    fl_json_path(place, path, sizeof path);
+    fl_error_set(&reader->job->error, FL_ERROR_ARGUMENT, reader->shot->path + (length > 150 ? length - 150 : 0),
+                 "line %u: %s%s%s", fl_json_line(&reader->shot->json, place), path, path[0] != '\0' ? ": " : "",
+                 text);
+    return fl_error_remedy(&reader->job->error, "%s", remedy != NULL ? remedy : "see farlight-shot(5)");
+}
+
+/* ---- members ---- */
+
+/* Number of letters to change, put in or leave out (Levenshtein 1965). */
+static unsigned distance(const char *a, const char *b)
+{
+    unsigned row[32];
+    const size_t columns = strlen(b);
+    if (columns + 1 > sizeof row / sizeof row[0])
+        return 99;
+    for (unsigned i = 0; i <= columns; i++)
+        row[i] = i;
+    for (unsigned y = 1; a[y - 1] != '\0'; y++) {
+        unsigned corner = row[0];
+        row[0] = y;
+        for (size_t x = 1; x <= columns; x++) {
+            const unsigned change = corner + (a[y - 1] != b[x - 1] ? 1 : 0);
+            const unsigned shorter = row[x] < row[x - 1] ? row[x] : row[x - 1];
+            corner = row[x];
+            row[x] = change < shorter + 1 ? change : shorter + 1;
+        }
+    }
+    return row[columns];
+}
+
+static bool unknown_member(const struct shot_reader *reader, const struct shot_value *object, const char *name,
+                           const char *const *known)
+{
+    char list[420] = "", remedy[80];
+    const char *nearest = NULL;
+    unsigned least = 3; /* further off it is another word */
+    for (size_t i = 0; known[i] != NULL; i++) {
+        const size_t used = strlen(list);
+        const unsigned off = strlen(name) < 32 ? distance(name, known[i]) : 99;
+        snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", known[i]);
+        if (off < least) {
+            least = off;
+            nearest = known[i];
+        }
+    }
+    struct shot_value member = shot_member(object, name);
+    snprintf(remedy, sizeof remedy, "did you mean '%s'?", nearest != NULL ? nearest : "");
+    return shot_wrong(reader, &member, nearest != NULL ? remedy : NULL, "is not known; known: %s", list);
+}
+
+bool shot_is_object(const struct shot_reader *reader, const struct shot_value *at, const char *const *known)
+{
+    const char *name = NULL;
+    json_t *value = NULL;
+    if (!json_is_object(at->value))
+        return shot_wrong(reader, at, NULL, "must be an object {..}");
+    json_object_foreach((json_t *)(uintptr_t)at->value, name, value)
+    {
+        bool found = false;
+        for (size_t i = 0; known[i] != NULL && !found; i++)
+            found = strcmp(name, known[i]) == 0;
+        if (!found)
+            return unknown_member(reader, at, name, known);
+    }
+    return true;
+}
+
+bool shot_is_array(const struct shot_reader *reader, const struct shot_value *at, size_t most)
+{
+    if (!json_is_array(at->value))
+        return shot_wrong(reader, at, NULL, "must be an array [..]");
+    return json_array_size(at->value) <= most ||
+           shot_wrong(reader, at, "leave some out", "has more than %zu elements", most);
+}
+
+/* ---- values ---- */
+
+bool shot_number(const struct shot_reader *reader, const struct shot_value *at, double least, double greatest,
+                 double *number)
+{
+    const double read = json_is_number(at->value) ? json_number_value(at->value) : NAN;
+    if (!(read >= least && read <= greatest)) {
+        char remedy[80];
+        snprintf(remedy, sizeof remedy, "give a number from %.7g to %.7g", least, greatest);
+        return shot_wrong(reader, at, remedy, json_is_number(at->value) ? "is out of range" : "must be a number");
+    }
+    *number = read;
+    return true;
+}
+
+void *shot_allocate(const struct shot_reader *reader, size_t count, size_t item_bytes)
+{
+    struct cli_shot *shot = reader->shot;
+    if (shot->owned_count == shot->owned_capacity) {
+        const size_t capacity = shot->owned_capacity > 0 ? shot->owned_capacity * 2 : 32;
+        void **owned = realloc(shot->owned, capacity * sizeof *owned);
+        if (owned == NULL) {
+            fl_error_set(&reader->job->error, FL_ERROR_MEMORY, "", "out of memory");
+            return NULL;
+        }
+        shot->owned = owned;
+        shot->owned_capacity = capacity;
+    }
+    void *made = calloc(count > 0 ? count : 1, item_bytes);
+    if (made == NULL) {
+        fl_error_set(&reader->job->error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    shot->owned[shot->owned_count++] = made;
+    return made;
+}
+
+bool shot_name(const struct shot_reader *reader, const struct shot_value *at, const char **name)
+{
+    if (json_is_string(at->value) && json_string_length(at->value) > 0) {
+        *name = json_string_value(at->value);
+        return true;
+    }
+    if (!json_is_integer(at->value) || json_integer_value(at->value) < 0)
+        return shot_wrong(reader, at, "'farlight info' lists what a model has",
+                          "must be a name, or a number counted from 0");
+    char *text = shot_allocate(reader, 24, 1);
+    if (text == NULL)
+        return false;
+    snprintf(text, 24, "%" JSON_INTEGER_FORMAT, json_integer_value(at->value));
+    *name = text;
+    return true;
+}
+
+bool shot_path(const struct shot_reader *reader, const struct shot_value *at, const char **path)
+{
+    const char *read = json_string_value(at->value);
+    if (read == NULL || read[0] == '\0')
+        return shot_wrong(reader, at, "name a file, from the folder of this one", "must be the path of a file");
+    if (read[0] == '/' || strcmp(read, "-") == 0) {
+        *path = read;
+        return true;
+    }
+    const size_t bytes = strlen(reader->shot->folder) + strlen(read) + 1;
+    char *joined = shot_allocate(reader, bytes, 1);
+    if (joined == NULL)
+        return false;
+    snprintf(joined, bytes, "%s%s", reader->shot->folder, read);
+    *path = joined;
+    return true;
+}

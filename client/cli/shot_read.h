@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: MIT */
+/* What the readers of a request file share. All but the first return false with the job's error set. */
+#ifndef FARLIGHT_CLIENT_CLI_SHOT_READ_H
+#define FARLIGHT_CLIENT_CLI_SHOT_READ_H
+
+#include "cli/shot.h"
+
+struct shot_reader {
+    struct cli_shot *shot;
+    struct cli_job *job;
+    const struct cli_shot_given *given;
+    cli_shot_set *set;
+    void *user;
+};
+
+/* A value and where it stands. `value` is NULL where it is missing. */
+struct shot_value {
+    struct fl_json_place place;
+    const json_t *value;
+};
+struct shot_value shot_member(const struct shot_value *object, const char *key);
+struct shot_value shot_element(const struct shot_value *array, size_t index);
+
+/* A remedy that is NULL: see the manual. */
+bool shot_wrong(const struct shot_reader *reader, const struct shot_value *at, const char *remedy,
+                const char *format, ...) __attribute__((format(printf, 4, 5)));
+/* An object that has no other members than those listed (NULL-terminated). */
+bool shot_is_object(const struct shot_reader *reader, const struct shot_value *at, const char *const *known);
+/* An array of at most `most` elements. */
+bool shot_is_array(const struct shot_reader *reader, const struct shot_value *at, size_t most);
+/* A number in [least, greatest]. */
+bool shot_number(const struct shot_reader *reader, const struct shot_value *at, double least, double greatest,
+                 double *number);
+/* A name, or a whole number that is then written out: "Lamp", "0". Lives as long as the shot. */
+bool shot_name(const struct shot_reader *reader, const struct shot_value *at, const char **name);
+/* A path, sought from the file's folder. Likewise. */
+bool shot_path(const struct shot_reader *reader, const struct shot_value *at, const char **path);
+/* Memory that lives as long as the shot. */
+void *shot_allocate(const struct shot_reader *reader, size_t count, size_t item_bytes);
+
+/* ---- shot_value.c: one value, or one that changes ---- */
+
+enum shot_kind {
+    SHOT_NUMBERS,
+    SHOT_COLOUR, /* three numbers, and alpha, which is 1 if left out */
+    SHOT_SIZE,   /* two numbers, or one for both */
+    SHOT_TURN,   /* quaternion */
+    SHOT_ANGLES, /* degrees about x, then y, then z; becomes a quaternion */
+    SHOT_FLAG    /* true and false; becomes 1 and 0 */
+};
+struct shot_property {
+    const char *name;
+    enum protocol_channel_path path;
+    enum shot_kind kind;
+    unsigned width; /* numbers of a value, as they are written */
+    double least, greatest;
+    double scale; /* from what is written to what the protocol has */
+    const char *example;
+};
+/* Whether it is {"times": .., "values": ..}. */
+bool shot_is_keyed(const struct shot_value *at);
+/* A single value is one key at time 0. The channel has no object yet. */
+bool shot_channel(const struct shot_reader *reader, const struct shot_value *at,
+                  const struct shot_property *property, struct fl_channel *channel);
+/* Appends it to the job's. `target`: NULL for the view; `at` is what an unknown name is told by. */
+bool shot_add_channel(const struct shot_reader *reader, const struct shot_value *at,
+                      const struct fl_channel *channel, enum protocol_object_kind kind, const char *target);
+
+/* ---- shot_camera.c ---- */
+
+bool shot_camera(const struct shot_reader *reader, const struct shot_value *at);
+
+#endif

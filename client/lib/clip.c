@@ -1,0 +1,179 @@
+/* SPDX-License-Identifier: MIT */
+/* A clip of the client's own: one blob of times and values, and one transaction. */
+#include "lib/scene.h"
+#include "lib/text.h"
+
+#include <sodium.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ANSWER_NS 60000000000ull
+#define CHUNK_BYTES (1u << 20) /* of the hash; see blob_ref in messages.def */
+#define PIECE_BYTES 262144u
+#define HASH_BYTES 32
+/* 256 MiB: far beyond what anyone types, far below what sizes can hold. */
+#define NUMBERS_MAX (1u << 26)
+
+struct clip {
+    struct fl_scene *scene;
+    float *numbers;
+    size_t count;
+    struct record_blob_ref blob;
+};
+
+static size_t numbers_per_key(const struct fl_channel *channel)
+{
+    const bool has_handles = channel->interpolation == PROTOCOL_INTERPOLATION_CUBIC_SPLINE ||
+                             channel->interpolation == PROTOCOL_INTERPOLATION_BEZIER;
+    return (size_t)channel->width * (has_handles ? 3 : 1);
+}
+
+/* Of each channel its times, then its values. */
+static bool gather(struct clip *clip, const struct fl_channel *channels, size_t channel_count,
+                   struct fl_error *error)
+{
+    uint64_t total = 0;
+    for (size_t i = 0; i < channel_count; i++) {
+        const struct fl_channel *channel = &channels[i];
+        if (channel->key_count == 0 || channel->key_count > NUMBERS_MAX || channel->width == 0 ||
+            channel->width > 1024)
+            return fl_error_set(error, FL_ERROR_ARGUMENT, "clip", "channel %zu has no keys, or too many", i);
+        total += (uint64_t)channel->key_count * (1 + numbers_per_key(channel));
+        if (total > NUMBERS_MAX)
+            return fl_error_set(error, FL_ERROR_ARGUMENT, "clip", "it has more than %u numbers", NUMBERS_MAX);
+    }
+    clip->numbers = calloc((size_t)total + 1, sizeof *clip->numbers);
+    if (clip->numbers == NULL)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    for (size_t i = 0; i < channel_count; i++) {
+        const size_t values = channels[i].key_count * numbers_per_key(&channels[i]);
+        memcpy(clip->numbers + clip->count, channels[i].times, channels[i].key_count * sizeof(float));
+        memcpy(clip->numbers + clip->count + channels[i].key_count, channels[i].values, values * sizeof(float));
+        clip->count += channels[i].key_count + values;
+    }
+    return true;
+}
+
+static bool hash(struct clip *clip, struct fl_error *error)
+{
+    const uint8_t *bytes = (const uint8_t *)clip->numbers;
+    crypto_generichash_state state;
+    uint8_t chunk[HASH_BYTES];
+    if (sodium_init() < 0)
+        return fl_error_set(error, FL_ERROR_SYSTEM, "", "libsodium could not be initialised");
+    clip->blob.size_bytes = clip->count * sizeof(float);
+    crypto_generichash_init(&state, NULL, 0, HASH_BYTES);
+    for (uint64_t at = 0; at < clip->blob.size_bytes; at += CHUNK_BYTES) {
+        const uint64_t left = clip->blob.size_bytes - at;
+        crypto_generichash(chunk, HASH_BYTES, bytes + at, left < CHUNK_BYTES ? left : CHUNK_BYTES, NULL, 0);
+        crypto_generichash_update(&state, chunk, HASH_BYTES);
+    }
+    crypto_generichash_final(&state, clip->blob.hash, HASH_BYTES);
+    return true;
+}
+
+/* All pieces of a blob carry one request, which is answered once. */
+static bool send_blob(const struct clip *clip, uint64_t deadline_ns, struct fl_error *error)
+{
+    struct fl_connection *connection = clip->scene->connection;
+    const uint32_t request = fl_connection_next_request(connection);
+    struct message message = {.type = MESSAGE_BLOB_DATA};
+    struct message_blob_data *data = &message.blob_data;
+    memcpy(data->hash, clip->blob.hash, HASH_BYTES);
+    for (uint64_t at = 0; at < clip->blob.size_bytes; at += data->data_bytes) {
+        const uint64_t left = clip->blob.size_bytes - at;
+        data->offset_bytes = at;
+        data->data = (const uint8_t *)clip->numbers + at;
+        data->data_bytes = left < PIECE_BYTES ? (uint32_t)left : PIECE_BYTES;
+        if (!fl_connection_wait_upload(connection, request, connection->upload_sent + data->data_bytes,
+                                       deadline_ns, error) ||
+            !fl_connection_send(connection, request, FL_UPLOAD_CHANNEL, &message, error))
+            return false;
+        connection->upload_sent += data->data_bytes;
+    }
+    struct fl_received received;
+    return fl_connection_answer(connection, request, MESSAGE_OK, &received, deadline_ns, error);
+}
+
+static bool upload(const struct clip *clip, uint64_t deadline_ns, struct fl_error *error)
+{
+    struct fl_connection *connection = clip->scene->connection;
+    const uint32_t request = fl_connection_next_request(connection);
+    struct record_blob_ref offered = clip->blob;
+    struct message offer = {.type = MESSAGE_BLOB_OFFER};
+    struct fl_received received;
+    offer.blob_offer.blobs = &offered;
+    offer.blob_offer.blobs_count = 1;
+    return fl_connection_send(connection, request, 0, &offer, error) &&
+           fl_connection_answer(connection, request, MESSAGE_BLOB_NEED, &received, deadline_ns, error) &&
+           (received.message.blob_need.needed_count == 0 || send_blob(clip, deadline_ns, error));
+}
+
+/* One edit of the transaction. */
+static bool edit(const struct clip *clip, uint32_t request, const struct message *message, uint64_t deadline_ns,
+                 struct fl_error *error)
+{
+    struct fl_connection *connection = clip->scene->connection;
+    return fl_connection_wait_upload(connection, request, 0, deadline_ns, error) &&
+           fl_connection_send(connection, request, 0, message, error);
+}
+
+static bool send_channels(const struct clip *clip, uint32_t request, uint32_t id,
+                          const struct fl_channel *channels, size_t channel_count, uint64_t deadline_ns,
+                          struct fl_error *error)
+{
+    size_t at = 0;
+    for (size_t i = 0; i < channel_count; i++) {
+        struct message message = {.type = MESSAGE_SET_CHANNEL};
+        struct message_set_channel *channel = &message.set_channel;
+        channel->channel = fl_scene_new_id(clip->scene, PROTOCOL_OBJECT_KIND_CHANNEL);
+        channel->clip = id;
+        channel->path = channels[i].path;
+        channel->object = channels[i].object;
+        channel->interpolation = channels[i].interpolation;
+        channel->width = channels[i].width;
+        channel->key_count = channels[i].key_count;
+        channel->first_time = (uint32_t)at;
+        channel->first_value = (uint32_t)at + channels[i].key_count;
+        at += channels[i].key_count * (1 + numbers_per_key(&channels[i]));
+        if (!edit(clip, request, &message, deadline_ns, error))
+            return false;
+    }
+    return true;
+}
+
+static bool commit(const struct clip *clip, const char *name, uint32_t id, const struct fl_channel *channels,
+                   size_t channel_count, uint64_t deadline_ns, struct fl_error *error)
+{
+    struct fl_connection *connection = clip->scene->connection;
+    const uint32_t request = fl_connection_next_request(connection);
+    struct record_blob_ref blob = clip->blob;
+    struct message begin = {.type = MESSAGE_EDIT_BEGIN}, set = {.type = MESSAGE_SET_CLIP},
+                   end = {.type = MESSAGE_EDIT_COMMIT};
+    struct fl_received received;
+    char short_name[129];
+    fl_text_utf8(name, short_name, sizeof short_name);
+    begin.edit_begin.scene = clip->scene->scene;
+    set.set_clip.clip = id;
+    set.set_clip.arrays = &blob;
+    set.set_clip.arrays_count = 1;
+    set.set_clip.name = short_name;
+    return edit(clip, request, &begin, deadline_ns, error) && edit(clip, request, &set, deadline_ns, error) &&
+           send_channels(clip, request, id, channels, channel_count, deadline_ns, error) &&
+           edit(clip, request, &end, deadline_ns, error) &&
+           fl_connection_answer(connection, request, MESSAGE_OK, &received, deadline_ns, error);
+}
+
+bool fl_scene_add_clip(struct fl_scene *scene, const char *name, const struct fl_channel *channels,
+                       size_t channel_count, uint32_t *clip, struct fl_error *error)
+{
+    struct clip made = {.scene = scene};
+    const uint64_t deadline_ns = fl_now_ns() + ANSWER_NS;
+    const uint32_t id = fl_scene_new_id(scene, PROTOCOL_OBJECT_KIND_CLIP);
+    const bool added = gather(&made, channels, channel_count, error) && hash(&made, error) &&
+                       upload(&made, deadline_ns, error) &&
+                       commit(&made, name, id, channels, channel_count, deadline_ns, error);
+    free(made.numbers);
+    *clip = added ? id : 0;
+    return added;
+}
