@@ -122,7 +122,6 @@ static bool refit(struct bvh_store *store, struct scene_gpu *scene, struct defor
         entry->grid = bvh_grid_over(entry->lower, entry->upper, 0);
         ok = bvh_refit_write(&entry->refit, store->device, &place, &store->settings, &entry->grid, error);
         entry->deformed_revision = scene->geometries[moved->geometry].deformed_revision;
-        entry->is_fresh = true;
         report->refitted_elements += entry->element_count;
     }
     free(roots);
@@ -187,6 +186,11 @@ bool bvh_store_deform(struct bvh_store *store, struct scene_gpu *scene, struct b
 {
     struct deforming deforming = {0};
     uint64_t start_ns = clock_now_ns();
+    store->deforms = store->deforms_in_shutter = false;
+    for (uint32_t g = 0; g < scene->geometry_count; g++) {
+        store->deforms = store->deforms || scene->geometries[g].node != 0;
+        store->deforms_in_shutter = store->deforms_in_shutter || scene->geometries[g].device.close_offset != 0;
+    }
     if (!list_moved(&deforming, store, scene))
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
                          scene->geometry_count);
