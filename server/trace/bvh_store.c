@@ -232,7 +232,7 @@ static bool upload_tree(struct bvh_store *store, const struct scene_gpu_geometry
     *entry = (struct bvh_entry){.is_mesh = geometry->mesh != NULL,
                                 .id = geometry->id,
                                 .node = geometry->node,
-                                .built_cost = tree->cost,
+                                .built_wear = tree->wear,
                                 .revision = geometry->revision,
                                 .is_wanted = true,
                                 .first_element = element,

@@ -24,7 +24,7 @@ struct bvh_entry {
     uint64_t revision;
     uint64_t deformed_revision; /* of the vertices that it was built or refitted for */
     struct bvh_refit refit;
-    float built_cost; /* of the tree when it was built, as struct bvh_tree has it */
+    float built_wear; /* as struct bvh_tree has it */
     bool is_wanted;   /* the scene still has it, in this revision */
     uint32_t first_element, element_count;
     uint32_t first_texel, texel_count;
@@ -56,7 +56,7 @@ void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const st
 void bvh_store_finish(struct bvh_store *store);
 /* Trees for all geometries of the scene, building those that are new or changed. What is kept is not uploaded
  * again, though the device may move it. Trees of geometries whose vertices have moved are refitted on the device,
- * and built anew from where these are now where refitting has made one worse than BVH_REFIT_COST_MAX; their
+ * and built anew from where these are now where refitting has made one worse than BVH_REFIT_WEAR_MAX; their
  * leaf_extent and grid_cost stay those of the mesh as it is given, so that what is chosen by them does not depend
  * on earlier poses. `all`: deformed_revision of what is there says nothing. After a failure the store is empty. */
 bool bvh_store_update(struct bvh_store *store, struct scene_gpu *scene, bool all, struct bvh_store_report *report,

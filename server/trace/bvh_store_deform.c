@@ -100,8 +100,7 @@ static void take_box(struct bvh_entry *entry, const struct bvh_refit_root *root)
 
 static bool has_worn_out(const struct bvh_entry *entry, const struct bvh_refit_root *root)
 {
-    float surface = bvh_box_area(root->lower, root->upper);
-    return root->surfaces > BVH_REFIT_COST_MAX * entry->built_cost * surface;
+    return root->surfaces > BVH_REFIT_WEAR_MAX * entry->built_wear * root->triangle_surfaces;
 }
 
 static bool refit(struct bvh_store *store, struct scene_gpu *scene, struct deforming *deforming,

@@ -81,8 +81,9 @@ struct bvh_refit_record {
 };
 SHARED_SIZE(bvh_refit_record, 48)
 #define BVH_REFIT_TEXELS 3
-/* The box of each element while it is refitted: two texels of an RGBA32UI buffer, by the order of octant 0: lower
- * corner and the size of its subtree; upper corner and (a float) the surfaces of all boxes of its subtree. */
-#define BVH_REFIT_BOX_TEXELS 2
+/* The box of each element while it is refitted: texels of an RGBA32UI buffer, by the order of octant 0: lower
+ * corner and the size of its subtree; upper corner; (floats) surfaces of all boxes of its subtree, and of each of
+ * its triangles' own box. */
+#define BVH_REFIT_BOX_TEXELS 3
 
 #endif
