@@ -7,6 +7,7 @@
 //   ANY_HIT              the wave asks for transmittance, not for the closest surface
 //   HAS_SPHERES          some geometry is made of spheres
 //   HAS_DISCS            there are discs
+//   HAS_MOTION           something moves while the shutter is open, and rays have times
 //   HAS_CUTOUT           some material is alpha mode mask
 //   HAS_TRANSLUCENT      some material lets shadow rays pass
 //   HAS_TRANSMISSION     and tints them on the way
@@ -39,6 +40,9 @@
 #endif
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each: software GL fetches those faster
+#ifdef HAS_MOTION
+layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
+#endif
 #ifdef ANY_HIT
 layout(std430, binding = BIND_VISIBILITY) writeonly buffer visibility_block { uint visibilities[]; };
 #else
@@ -60,12 +64,21 @@ bool is_alive(trace_ray r)
 
 trace_ray load_ray(uint ray_index)
 {
+#ifdef HAS_MOTION
+    float time = ray_index < ray_count ? texelFetch(ray_times, int(ray_index)).x : 0.0;
+    trace_ray dead = trace_ray(vec3(0.0), vec3(1.0, 0.0, 0.0), 0.0, -1.0, time);
+#else
     trace_ray dead = trace_ray(vec3(0.0), vec3(1.0, 0.0, 0.0), 0.0, -1.0);
+#endif
     if (ray_index >= ray_count)
         return dead;
     vec4 origin_t_min = texelFetch(rays, int(2u * ray_index));
     vec4 direction_t_max = texelFetch(rays, int(2u * ray_index + 1u));
-    trace_ray r = trace_ray(origin_t_min.xyz, direction_t_max.xyz, origin_t_min.w, direction_t_max.w);
+    trace_ray r = dead;
+    r.origin = origin_t_min.xyz;
+    r.direction = direction_t_max.xyz;
+    r.t_min = origin_t_min.w;
+    r.t_max = direction_t_max.w;
     if (is_alive(r))
         return r;
     return dead;

@@ -110,7 +110,7 @@ static struct bvh_transform describe(const struct bvh *bvh, const struct scene_g
     memcpy(transform.object_from_world, instance->object_from_world, sizeof transform.object_from_world);
     *box = (struct bvh_world_box){{1, 1, 1}, {-1, -1, -1}};
     *is_fresh = entry && entry->is_fresh;
-    if (!entry)
+    if (!entry || !(entry->lower[0] <= entry->upper[0]))
         return transform;
     transform.first_element = entry->first_element;
     transform.element_count = entry->element_count;
@@ -250,7 +250,7 @@ static bool has_coarse_grid(const struct bvh *bvh)
     return false;
 }
 
-static bool update_geometries(struct bvh *bvh, const struct scene_gpu *scene, struct stage_times *times,
+static bool update_geometries(struct bvh *bvh, struct scene_gpu *scene, struct stage_times *times,
                               struct error *error)
 {
     struct tracer_stats *stats = &bvh->base.stats;
@@ -258,6 +258,7 @@ static bool update_geometries(struct bvh *bvh, const struct scene_gpu *scene, st
     bool ok = bvh_store_update(&bvh->store, scene, &report, times, error);
     stats->uploaded_bytes += report.uploaded_bytes;
     stats->nodes_rebuilt += report.built_elements;
+    stats->nodes_refitted += report.refitted_elements;
     if (!ok || bvh->store.settings.whole == has_coarse_grid(bvh))
         return ok;
     /* All trees again, with boxes in floats or no longer: a scene is walked in one form however it came about. */
@@ -272,9 +273,9 @@ static bool bvh_update(struct tracer *tracer, struct scene_gpu *scene, const str
     struct bvh *bvh = (struct bvh *)tracer;
     struct tracer_stats *stats = &tracer->stats;
     stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
-    if (!changes->geometry && !changes->instances)
+    if (!changes->geometry && !changes->deformed && !changes->instances)
         return true;
-    bool ok = (!changes->geometry || update_geometries(bvh, scene, times, error)) &&
+    bool ok = ((!changes->geometry && !changes->deformed) || update_geometries(bvh, scene, times, error)) &&
               update_instances(bvh, scene, times, error);
     if (!ok)
         bvh_reset(bvh);
@@ -344,7 +345,7 @@ static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const stru
         .rays_together = together,
         .rays_a_dispatch = DISPATCH_RAYS_MAX / together * together,
     };
-    const struct gpu_program *program = trace_program_get(scene, wave->kind, &source, error);
+    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)
         return false;
     bind(bvh);

@@ -9,7 +9,20 @@ struct trace_ray {
     vec3 direction;
     float t_min;
     float t_max;
+#ifdef HAS_MOTION
+    float time;
+#endif
 };
+
+// Where nothing moves no ray carries its time along.
+float time_of(trace_ray r)
+{
+#ifdef HAS_MOTION
+    return r.time;
+#else
+    return 0.0;
+#endif
+}
 
 // The same ray in an instance's space: the direction is not made unit, so distances stay those of the world.
 struct object_ray {
@@ -19,7 +32,7 @@ struct object_ray {
 
 object_ray object_from_world_ray(trace_ray r, uint instance_index)
 {
-    vec4 rows[3] = instance_at(instance_index).object_from_world;
+    vec4 rows[3] = instance_at_time(instance_index, time_of(r)).object_from_world;
     return object_ray(affine_point(rows, r.origin), affine_vector(rows, r.direction));
 }
 
@@ -32,7 +45,7 @@ candidate candidate_none(float t_max)
 void offer_closest(trace_ray r, candidate found, inout candidate best)
 {
     if (found.distance > r.t_min && found.distance < best.distance &&
-        !is_cut_out(found, r.origin, r.direction))
+        !is_cut_out(found, r.origin, r.direction, time_of(r)))
         best = found;
 }
 
@@ -69,7 +82,7 @@ bool offer_any(trace_ray r, candidate found, inout vec3 taken)
     if (!(found.distance > r.t_min && found.distance < r.t_max))
         return false;
 #if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
-    taken = min(taken + taken_by(transmittance_of(found, r.origin, r.direction)), vec3(TAKEN_ALL));
+    taken = min(taken + taken_by(transmittance_of(found, r.origin, r.direction, time_of(r))), vec3(TAKEN_ALL));
     return least(taken) >= TAKEN_BLACK;
 #else
     taken = vec3(TAKEN_ALL);
@@ -77,27 +90,33 @@ bool offer_any(trace_ray r, candidate found, inout vec3 taken)
 #endif
 }
 
+bool cross_triangle(trace_ray r, object_ray o, uint primitive, uint instance_index, out candidate found)
+{
+    uint close_offset = 0u;
+#ifdef HAS_MOTION
+    close_offset = close_offset_of(instance_at(instance_index).geometry);
+#endif
+    float time = time_of(r);
+    uvec4 triangle = texelFetch(triangles, int(primitive));
+    found = candidate(0.0, primitive, instance_index, vec2(0.0));
+    return intersect_triangle(o.direction, position_at_time(triangle.x, close_offset, time) - o.origin,
+                              position_at_time(triangle.y, close_offset, time) - o.origin,
+                              position_at_time(triangle.z, close_offset, time) - o.origin, found.distance,
+                              found.barycentrics);
+}
+
 // The triangle or sphere against the ray in the instance's space `o`.
 void visit_triangle_closest(trace_ray r, object_ray o, uint primitive, uint instance_index, inout candidate best)
 {
-    uvec4 triangle = texelFetch(triangles, int(primitive));
-    candidate found = candidate(0.0, primitive, instance_index, vec2(0.0));
-    if (intersect_triangle(o.direction, texelFetch(positions, int(triangle.x)).xyz - o.origin,
-                           texelFetch(positions, int(triangle.y)).xyz - o.origin,
-                           texelFetch(positions, int(triangle.z)).xyz - o.origin, found.distance,
-                           found.barycentrics))
+    candidate found;
+    if (cross_triangle(r, o, primitive, instance_index, found))
         offer_closest(r, found, best);
 }
 
 bool visit_triangle_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 taken)
 {
-    uvec4 triangle = texelFetch(triangles, int(primitive));
-    candidate found = candidate(0.0, primitive, instance_index, vec2(0.0));
-    return intersect_triangle(o.direction, texelFetch(positions, int(triangle.x)).xyz - o.origin,
-                              texelFetch(positions, int(triangle.y)).xyz - o.origin,
-                              texelFetch(positions, int(triangle.z)).xyz - o.origin, found.distance,
-                              found.barycentrics) &&
-           offer_any(r, found, taken);
+    candidate found;
+    return cross_triangle(r, o, primitive, instance_index, found) && offer_any(r, found, taken);
 }
 
 void visit_sphere_closest(trace_ray r, object_ray o, uint primitive, uint instance_index, inout candidate best)
