@@ -218,7 +218,7 @@ PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
 .PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help
-tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump
+tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)

@@ -67,7 +67,8 @@ void sequence_pair(float pair[2], uint32_t pixel_seed, uint32_t dimension, uint3
     pair_at(pair, reverse(scramble_reversed(reverse(index), own)), own);
 }
 
-void sequence_pair_sorted(float pair[2], uint32_t pixel_seed, uint32_t dimension, uint32_t index, uint32_t group_shift)
+void sequence_pair_sorted(float pair[2], uint32_t pixel_seed, uint32_t dimension, uint32_t index,
+                          uint32_t group_shift)
 {
     uint32_t own = sequence_hash(pixel_seed + dimension * 0x9e3779b9u), mask = (1u << group_shift) - 1u;
     uint32_t group = reverse(scramble_reversed(reverse(index), own)) & ~mask;

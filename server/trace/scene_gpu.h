@@ -60,6 +60,7 @@ struct scene_gpu {
     bool has_cutout;      /* some material in use is alpha mode mask: tracers must ask for alpha */
     bool has_translucent; /* some material lets shadow rays pass: blend or transmission */
     bool has_transmission;
+    bool has_varied_alpha; /* what one of these lets pass differs from place to place: texture or vertex colours */
     bool has_motion; /* something moves while the shutter is open: tracers must look at the rays' times */
     bool has_environment_image;
     float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */

@@ -14,11 +14,12 @@ from farlight_test import BIN, ROOT, TIMEOUT_S
 BENCH = ROOT / "tests" / "bench"
 sys.path.insert(0, str(BENCH))
 import bench_common  # noqa: E402  pylint: disable=wrong-import-position
+import bench_frames  # noqa: E402  pylint: disable=wrong-import-position
 import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
 import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 
-PARTS = ("frames", "tracers", "family", "pixels", "rays", "reach")
+PARTS = ("frames", "distributed", "tracers", "family", "pixels", "rays", "reach")
 
 
 class Figures(unittest.TestCase):
@@ -91,7 +92,7 @@ class Benchmark(unittest.TestCase):
         self.assertEqual(set(self.document["parts"]), {*PARTS, "wanted"})
 
     def test_every_result_has_structures_and_waves_that_agree_with_the_reference(self):
-        results = [r for part in PARTS[1:] for r in self.document["parts"][part]["results"]]
+        results = [r for part in PARTS[2:] for r in self.document["parts"][part]["results"]]
         self.assertGreaterEqual(len(results), 11)
         for result in results:
             self.assertGreater(result["triangles"] + result["spheres"], 0)
@@ -105,6 +106,19 @@ class Benchmark(unittest.TestCase):
                     self.assertGreater(measure["rays_per_s"], 0)
                     self.assertEqual(len(measure["time"]["runs_ns"]), 1)
                     self.assertFalse(measure.get("agreement", {}).get("failed"), (result["title"], wave["kind"], measure))
+
+    def test_distributed_frames_stand_beside_a_plain_one(self):
+        data = self.document["parts"]["distributed"]
+        self.assertEqual(data["scene"], {"primitives": 1767, "width": 64, "height": 48})
+        forms = {form["name"]: form for form in data["forms"]}
+        pixels = 64 * 48
+        self.assertEqual(forms[bench_frames.PLAIN]["primary_rays"], pixels)
+        self.assertEqual(forms[bench_frames.WHOLE]["primary_rays"], 16 * pixels)
+        for form in data["forms"]:
+            self.assertEqual(len(form["frame_ns"]), 1)
+            self.assertGreater(form["shadow_rays"], 0)
+            self.assertGreater(form["stages_ns"]["shade"][0], 0)
+        self.assertLess(forms[bench_frames.WHOLE]["shadow_rays"], 16 * forms[bench_frames.PLAIN]["shadow_rays"])
 
     def test_embree_is_there_with_1_8_and_16_rays_a_call_beside_the_walk(self):
         result = self.document["parts"]["reach"]["results"][0]
