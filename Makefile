@@ -173,7 +173,7 @@ TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) $(EMBREE
 $(UNIT_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 # Programs of the benchmark; the rest of its folder is what they share. They hold us against Embree itself.
-BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_tracers)
+BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_changes bench_tracers)
 $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -lembree3 -o $@
 MODEL_OBJ := $(B)/tests/bench/load_model.o
@@ -181,9 +181,14 @@ CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c 
 $(B)/tests/unit/test_load_model: $(MODEL_OBJ)
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
+$(B)/tests/bench/bench_changes: $(B)/tests/bench/bench_stats.o
 $(B)/tests/bench/bench_bvh: $(MODEL_OBJ) $(B)/tests/bench/bench_scene.o $(B)/tests/bench/bench_waves.o
 $(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3
 BENCH_PROGRAMS := $(BENCHES) $(B)/tests/bench/embree_build
+# Whole frames, beside nothing of Embree's.
+BENCH_DISTRIBUTED := $(B)/tests/bench/bench_distributed
+$(BENCH_DISTRIBUTED): %: %.o $(B)/tests/bench/paper_scene.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 # EMBREE=0 leaves out what cannot be built without it.
 ifeq ($(EMBREE),0)
 UNIT_TESTS := $(filter-out $(B)/tests/unit/test_bench_contest,$(UNIT_TESTS))
@@ -199,6 +204,10 @@ TOOLS_OBJ := $(B)/tests/tools/make_scenes.o $(B)/tests/tools/glb.o $(B)/tests/to
 $(B)/tests/tools/make_scenes: $(TOOLS_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -lm -o $@
 
+# Where a model is at a time of a clip, as the daemon has it.
+$(B)/tests/tools/pose_dump: $(B)/tests/tools/pose_dump.o $(MODEL_OBJ) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libjxl-dev libtinygltf-dev \
@@ -208,7 +217,7 @@ PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
 .PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help
-tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(B)/tests/tools/make_scenes
+tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
@@ -228,7 +237,7 @@ demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out
 # The programs that are measured, and those that measure.
-BENCHED = all $(BENCHES) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
+BENCHED = all $(BENCHES) $(BENCH_DISTRIBUTED) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
 bench: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench.py $(B) $(BENCH)
@@ -305,7 +314,9 @@ FUZZ_SEED := $(B)/tests/fuzz/seed
 $(FUZZ_SEED): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
-	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ -o $@
+	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
+$(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ))
+$(B)/tests/fuzz/fuzz_scene: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
 .PHONY: fuzz $(addprefix run-fuzz-,$(FUZZERS))
 ifeq ($(config),fuzz)
 fuzz: $(addprefix run-fuzz-,$(FUZZERS))

@@ -2,11 +2,14 @@
 // From the crossings of a closest-hit wave to hits: the second half of every exact tracer. Apart from the walk, whose
 // program stays small by it; and the walk need not carry barycentrics along.
 //
-// Defines: HAS_SPHERES as the scene has them.
+// Defines: HAS_SPHERES, HAS_MOTION as the scene has them.
 #include "common/dispatch.glsl"
 #include "common/crossing.glsl"
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
+#ifdef HAS_MOTION
+layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
+#endif
 layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; a crossing is the first
 
 uniform uint ray_count;
@@ -29,11 +32,15 @@ void main()
         return;
     uvec4 crossing = imageLoad(hits, int(3u * k));
     vec3 origin = texelFetch(rays, int(2u * k)).xyz, direction = texelFetch(rays, int(2u * k + 1u)).xyz;
+    float time = 0.0;
+#ifdef HAS_MOTION
+    time = texelFetch(ray_times, int(k)).x;
+#endif
     candidate found = candidate(uintBitsToFloat(crossing.x), crossing.z, crossing.w, vec2(0.0));
     if (is_triangle(found))
         found.barycentrics =
-            candidate_triangle(found.instance_index, found.primitive, origin, direction).barycentrics;
-    hit h = surface_of(found, origin, direction);
+            candidate_triangle(found.instance_index, found.primitive, origin, direction, time).barycentrics;
+    hit h = surface_of(found, origin, direction, time);
     imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material, h.primitive, h.instance));
     imageStore(hits, int(3u * k + 1u), floatBitsToUint(vec4(h.u0, h.v0, h.u1, h.v1)));
     imageStore(hits, int(3u * k + 2u), uvec4(h.normal_geometric, h.normal_shading, h.tangent, h.colour));

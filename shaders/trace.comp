@@ -7,21 +7,23 @@
 //   ANY_HIT              the wave asks for transmittance, not for the closest surface
 //   HAS_SPHERES          some geometry is made of spheres
 //   HAS_DISCS            there are discs
+//   HAS_MOTION           something moves while the shutter is open, and rays have times
 //   HAS_CUTOUT           some material is alpha mode mask
 //   HAS_TRANSLUCENT      some material lets shadow rays pass
 //   HAS_TRANSMISSION     and tints them on the way
-//   RAYS_TOGETHER        how many consecutive rays one invocation walks together: 1, 2, 4, 8
+//   RAYS_TOGETHER        how many consecutive rays one invocation walks together: 1, 2, 3, 4, 8
 //
 // A traverse.glsl defines one of these, for ANY_HIT or not, and for RAYS_TOGETHER 1 or more:
 //   void trace_closest(trace_ray r, inout candidate best);
-//   bool trace_any(trace_ray r, inout vec3 transmittance);
+//   bool trace_any(trace_ray r, inout vec3 taken);
 //   void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER]);
-//   void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 transmittance[RAYS_TOGETHER]);
+//   void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 taken[RAYS_TOGETHER]);
 // It does not include this file; it includes common/candidate.glsl, whose visit_* and offer_* functions take a
 // primitive against a ray with cutouts and tints accounted for. A walk that intersects by its own means calls
 // offer_closest / offer_any with what it found, or where the scene has neither cutouts nor translucent surfaces
 // (no define) may compare distances itself. `best.distance` starts at the ray's end, or at the nearest disc.
-// trace_any returns true, and may stop, once offer_any did: nothing is left of the light.
+// `taken` is what offer_any adds to; trace_any returns true, and may stop, once offer_any did: nothing is left of the
+// light.
 //
 // This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the
 // answer: a visibility, or a crossing (shared/hit.h) of which surface.comp makes a hit. Of rays walked together some
@@ -38,6 +40,9 @@
 #endif
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each: software GL fetches those faster
+#ifdef HAS_MOTION
+layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
+#endif
 #ifdef ANY_HIT
 layout(std430, binding = BIND_VISIBILITY) writeonly buffer visibility_block { uint visibilities[]; };
 #else
@@ -59,12 +64,21 @@ bool is_alive(trace_ray r)
 
 trace_ray load_ray(uint ray_index)
 {
+#ifdef HAS_MOTION
+    float time = ray_index < ray_count ? texelFetch(ray_times, int(ray_index)).x : 0.0;
+    trace_ray dead = trace_ray(vec3(0.0), vec3(1.0, 0.0, 0.0), 0.0, -1.0, time);
+#else
     trace_ray dead = trace_ray(vec3(0.0), vec3(1.0, 0.0, 0.0), 0.0, -1.0);
+#endif
     if (ray_index >= ray_count)
         return dead;
     vec4 origin_t_min = texelFetch(rays, int(2u * ray_index));
     vec4 direction_t_max = texelFetch(rays, int(2u * ray_index + 1u));
-    trace_ray r = trace_ray(origin_t_min.xyz, direction_t_max.xyz, origin_t_min.w, direction_t_max.w);
+    trace_ray r = dead;
+    r.origin = origin_t_min.xyz;
+    r.direction = direction_t_max.xyz;
+    r.t_min = origin_t_min.w;
+    r.t_max = direction_t_max.w;
     if (is_alive(r))
         return r;
     return dead;
@@ -72,24 +86,25 @@ trace_ray load_ray(uint ray_index)
 
 #ifdef ANY_HIT
 
-bool discs_any(trace_ray r, inout vec3 transmittance)
+bool discs_any(trace_ray r, inout vec3 taken)
 {
     for (uint i = 0u; i < disc_count; i++) {
         candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
         disc d = discs[i];
         if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
                            found.distance) &&
-            offer_any(r, found, transmittance))
+            offer_any(r, found, taken))
             return true;
     }
     return false;
 }
 
 // A dead ray is stopped by nothing.
-void store_visibility(uint ray_index, vec3 transmittance)
+void store_visibility(uint ray_index, vec3 taken)
 {
+    vec3 left = transmittance_left(taken);
     if (ray_index < ray_count)
-        visibilities[ray_index] = packUnorm4x8(vec4(transmittance, greatest(transmittance) > 0.0 ? 1.0 : 0.0));
+        visibilities[ray_index] = packUnorm4x8(vec4(left, greatest(left) > 0.0 ? 1.0 : 0.0));
 }
 
 #else
@@ -124,10 +139,10 @@ void main()
         return;
     trace_ray r = load_ray(ray_index);
 #ifdef ANY_HIT
-    vec3 transmittance = vec3(1.0);
-    if (is_alive(r) && (discs_any(r, transmittance) || trace_any(r, transmittance)))
-        transmittance = vec3(0.0);
-    store_visibility(ray_index, transmittance);
+    vec3 taken = vec3(0.0);
+    if (is_alive(r) && (discs_any(r, taken) || trace_any(r, taken)))
+        taken = vec3(TAKEN_ALL);
+    store_visibility(ray_index, taken);
 #else
     candidate best = candidate_none(r.t_max);
     if (is_alive(r)) {
@@ -143,7 +158,7 @@ void main()
 // What is done ray by ray is done in a loop that picks its ray by comparing numbers: indexing the arrays by the
 // loop's number would have the compiler lay all of it (discs, textures, surfaces) out RAYS_TOGETHER times.
 #ifdef ANY_HIT
-#define found_type vec3 // transmittance
+#define found_type vec3 // taken of the light
 #else
 #define found_type candidate
 #endif
@@ -162,7 +177,7 @@ void look_at_discs(inout trace_ray r[RAYS_TOGETHER], inout found_type found[RAYS
         if (is_alive(r_i)) {
 #ifdef ANY_HIT
             if (discs_any(r_i, found_i)) {
-                found_i = vec3(0.0);
+                found_i = vec3(TAKEN_ALL);
                 r_i.t_max = -1.0; // nothing is left to find
                 r_i.t_min = 0.0;
             }
@@ -191,7 +206,7 @@ void main()
         r[k] = load_ray(first + uint(k));
         any_alive = any_alive || is_alive(r[k]);
 #ifdef ANY_HIT
-        found[k] = vec3(1.0);
+        found[k] = vec3(0.0);
 #else
         found[k] = candidate_none(r[k].t_max);
 #endif

@@ -14,6 +14,7 @@ struct fl_video {
     char path[160];     /* of the file, or its end */
     char temporary[65]; /* name of the unfinished file in the folder; empty: none */
     uint32_t frames;    /* sent whole */
+    bool ending;        /* video_end is sent */
     bool answered;      /* the writer has said its last: nothing more can be sent */
     struct fl_video_info info;
 };
@@ -139,6 +140,8 @@ bool fl_video_write(struct fl_video *video, const struct fl_frame *frame, struct
     if (frame->pixels_bytes != (size_t)frame->width * frame->height * fl_bytes_per_pixel(frame->format))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "size", "%ux%u pixels are not %zu bytes", frame->width,
                             frame->height, frame->pixels_bytes);
+    if (video->ending)
+        return fl_error_set(error, FL_ERROR_ARGUMENT, video->path, "this video has ended");
     if (!check(video, error) || !fl_helper_send_frame(&video->helper, frame, error))
         return false;
     video->frames++; /* it arrives whole, even if we are interrupted now */
@@ -148,10 +151,17 @@ bool fl_video_write(struct fl_video *video, const struct fl_frame *frame, struct
 bool fl_video_finish(struct fl_video *video, struct fl_error *error)
 {
     struct message message = {.type = MESSAGE_VIDEO_END};
-    if (!check(video, error))
-        return false;
-    message.video_end.frames = video->frames;
-    if (!fl_helper_send(&video->helper, &message, error) || !fl_helper_receive(&video->helper, &message, error))
+    if (!video->ending) {
+        if (!check(video, error))
+            return false;
+        message.video_end.frames = video->frames;
+        if (!fl_helper_send(&video->helper, &message, error))
+            return false;
+        video->ending = true; /* also if the wait is interrupted: it can be taken up again */
+    } else if (video->answered) {
+        return check(video, error);
+    }
+    if (!fl_helper_receive(&video->helper, &message, error))
         return false;
     if (message.type != MESSAGE_VIDEO_WRITTEN)
         return take_failure(video, &message, error);

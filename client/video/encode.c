@@ -4,6 +4,7 @@
 #include "log.h"
 #include "sink.h"
 
+#include <errno.h>
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/cpu.h>
@@ -70,6 +71,15 @@ static void set_quality(AVCodecContext *codec, const struct video_plan *plan, AV
     }
 }
 
+/* x264 does not say why it fails; where it was this thread that got no memory, errno does (0 before the call). */
+static bool fail_codec(const struct video_encoder *encoder, int number, struct video_failure *failure)
+{
+    const bool no_memory = number == AVERROR(ENOMEM) || (number == AVERROR_EXTERNAL && errno == ENOMEM);
+    video_fail_library(failure, "codec", encoder->plan->encoder, no_memory ? AVERROR(ENOMEM) : number);
+    failure->remedy = no_memory ? "smaller frames need less" : NULL;
+    return false;
+}
+
 static bool open_codec(struct video_encoder *encoder, const struct video_source *source,
                        struct video_failure *failure)
 {
@@ -88,9 +98,12 @@ static bool open_codec(struct video_encoder *encoder, const struct video_source 
     if ((encoder->format->oformat->flags & AVFMT_GLOBALHEADER) != 0)
         context->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
     set_quality(context, plan, &options);
+    errno = 0;
     const int result = avcodec_open2(context, codec, &options);
+    if (result < 0)
+        fail_codec(encoder, result, failure);
     av_dict_free(&options);
-    return result >= 0 || video_fail_library(failure, "codec", plan->encoder, result);
+    return result >= 0;
 }
 
 static bool open_picture(struct video_encoder *encoder, struct video_failure *failure)
@@ -196,6 +209,7 @@ static void fill_ycbcr(struct video_encoder *encoder, const uint8_t *pixels)
 /* Writes what the encoder has ready; with `picture` NULL all of it. */
 static bool encode(struct video_encoder *encoder, const AVFrame *picture, struct video_failure *failure)
 {
+    errno = 0;
     int result = avcodec_send_frame(encoder->codec, picture);
     while (result >= 0) {
         result = avcodec_receive_packet(encoder->codec, encoder->packet);
@@ -210,7 +224,7 @@ static bool encode(struct video_encoder *encoder, const AVFrame *picture, struct
         if (written < 0 || encoder->sink.failure != 0)
             return fail_file(encoder, written, failure);
     }
-    return video_fail_library(failure, "codec", encoder->plan->encoder, result);
+    return fail_codec(encoder, result, failure);
 }
 
 bool video_encoder_write(struct video_encoder *encoder, const uint8_t *pixels, struct video_failure *failure)

@@ -29,6 +29,14 @@ bool scene_skin_matrices(const struct scene *scene, const struct scene_pose *pos
     return true;
 }
 
+static bool normalise(double v[3])
+{
+    double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    for (int i = 0; i < 3 && length > 0.0; i++)
+        v[i] /= length;
+    return length > 0.0 && isfinite(length);
+}
+
 /* Adds the targets' share to the vertices that the mesh has. */
 static void morph(const struct scene_mesh *mesh, enum mesh_array base, enum mesh_array added, const float *weights,
                   float *out)
@@ -62,19 +70,22 @@ static bool blend(const struct scene_mesh *mesh, const float *world_from_mesh, s
     return sum > 0.0;
 }
 
+static void make_unit(float *normals, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        double n[3] = {(double)normals[3 * i], (double)normals[3 * i + 1], (double)normals[3 * i + 2]};
+        if (normalise(n)) {
+            for (int k = 0; k < 3; k++)
+                normals[3 * i + (size_t)k] = (float)n[k];
+        }
+    }
+}
+
 static void move_point(const double m[12], float point[3])
 {
     double x = (double)point[0], y = (double)point[1], z = (double)point[2];
     for (int row = 0; row < 3; row++)
         point[row] = (float)(m[4 * row] * x + m[4 * row + 1] * y + m[4 * row + 2] * z + m[4 * row + 3]);
-}
-
-static bool normalise(double v[3])
-{
-    double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    for (int i = 0; i < 3 && length > 0.0; i++)
-        v[i] /= length;
-    return length > 0.0 && isfinite(length);
 }
 
 /* By the cofactors, which are the inverse transpose but for a factor; its sign keeps a mirrored normal outside. */
@@ -128,8 +139,10 @@ bool scene_deform(const struct scene *scene, const struct scene_pose *pose, cons
         float *moved_normals = mesh->arrays[MESH_NORMALS] ? normals : NULL;
         scene_pose_weights(pose, node, mesh, weights);
         morph(mesh, MESH_POSITIONS, MESH_TARGET_POSITIONS, weights, positions);
-        if (moved_normals)
+        if (moved_normals) {
             morph(mesh, MESH_NORMALS, MESH_TARGET_NORMALS, weights, moved_normals);
+            make_unit(moved_normals, mesh->vertex_count);
+        }
         if (skin)
             skin_vertices(mesh, matrices, positions, moved_normals);
     }

@@ -93,9 +93,9 @@ bool scene_node_deforms(const struct scene_node *node, const struct scene_mesh *
 /* For each joint of the skin: world_from_mesh, 3x4 row-major; joint_count x 12 floats. */
 bool scene_skin_matrices(const struct scene *scene, const struct scene_pose *pose, const struct scene_skin *skin,
                          float *world_from_mesh, struct error *error);
-/* The vertices that a node shows, worked out on the CPU: 3 floats a vertex into `positions`, and into `normals`
- * where that is not NULL and the mesh has some. In world space with a skin, else in the node's. The GPU's twin is
- * shaders/deform.comp. */
+/* The vertices that a node shows, worked out on the CPU: 3 floats a vertex into `positions`, and into `normals`,
+ * of unit length, where that is not NULL and the mesh has some. In world space with a skin, else in the node's.
+ * The GPU's twin is shaders/deform.comp. */
 bool scene_deform(const struct scene *scene, const struct scene_pose *pose, const struct scene_node *node,
                   float *positions, float *normals, struct error *error);
 

@@ -41,8 +41,8 @@ static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_
                                  struct error *error)
 {
     uint32_t together = options->bvh_rays_together;
-    if (together != 0 && together != 1 && together != 2 && together != 4 && together != 8) {
-        error_set(error, ERROR_INVALID, "options.bvh_rays_together", "1, 2, 4 or 8 rays walk together, not %u",
+    if (together > 8 || (together > 4 && together < 8)) {
+        error_set(error, ERROR_INVALID, "options.bvh_rays_together", "1, 2, 3, 4 or 8 rays walk together, not %u",
                   together);
         return NULL;
     }
@@ -110,7 +110,7 @@ static struct bvh_transform describe(const struct bvh *bvh, const struct scene_g
     memcpy(transform.object_from_world, instance->object_from_world, sizeof transform.object_from_world);
     *box = (struct bvh_world_box){{1, 1, 1}, {-1, -1, -1}};
     *is_fresh = entry && entry->is_fresh;
-    if (!entry)
+    if (!entry || !(entry->lower[0] <= entry->upper[0]))
         return transform;
     transform.first_element = entry->first_element;
     transform.element_count = entry->element_count;
@@ -170,6 +170,7 @@ static bool rebuild_top(struct bvh *bvh, const struct scene_gpu *scene, struct e
 /* Writes the transforms that changed and moves their elements. False: the top tree has to be made anew. */
 static bool refit_top(struct bvh *bvh, const struct scene_gpu *scene)
 {
+    uint32_t first = scene->instance_count, end = 0; /* of the transforms that changed */
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         struct bvh_world_box box;
         bool is_fresh;
@@ -182,9 +183,14 @@ static bool refit_top(struct bvh *bvh, const struct scene_gpu *scene)
         if (memcmp(old, &transform, sizeof transform) == 0)
             continue;
         *old = transform;
-        gpu_buffer_write(bvh->store.device, &bvh->transform_buffer, i * sizeof transform, &transform,
-                         sizeof transform);
-        bvh->base.stats.uploaded_bytes += sizeof transform;
+        first = i < first ? i : first;
+        end = i + 1;
+    }
+    if (first < end) {
+        size_t bytes = (end - first) * sizeof *bvh->transforms;
+        gpu_buffer_write(bvh->store.device, &bvh->transform_buffer, first * sizeof *bvh->transforms,
+                         &bvh->transforms[first], bytes);
+        bvh->base.stats.uploaded_bytes += bytes;
     }
     bvh->base.stats.nodes_refitted += bvh_top_refit(&bvh->top);
     return !bvh_top_is_stale(&bvh->top);
@@ -244,7 +250,7 @@ static bool has_coarse_grid(const struct bvh *bvh)
     return false;
 }
 
-static bool update_geometries(struct bvh *bvh, const struct scene_gpu *scene, struct stage_times *times,
+static bool update_geometries(struct bvh *bvh, struct scene_gpu *scene, struct stage_times *times,
                               struct error *error)
 {
     struct tracer_stats *stats = &bvh->base.stats;
@@ -252,11 +258,12 @@ static bool update_geometries(struct bvh *bvh, const struct scene_gpu *scene, st
     bool ok = bvh_store_update(&bvh->store, scene, &report, times, error);
     stats->uploaded_bytes += report.uploaded_bytes;
     stats->nodes_rebuilt += report.built_elements;
-    if (!ok || !has_coarse_grid(bvh))
+    stats->nodes_refitted += report.refitted_elements;
+    if (!ok || bvh->store.settings.whole == has_coarse_grid(bvh))
         return ok;
-    /* All trees again with boxes in floats, and so from now on. */
+    /* All trees again, with boxes in floats or no longer: a scene is walked in one form however it came about. */
     bvh_reset(bvh);
-    bvh->store.settings.whole = true;
+    bvh->store.settings.whole = !bvh->store.settings.whole;
     return update_geometries(bvh, scene, times, error);
 }
 
@@ -266,9 +273,9 @@ static bool bvh_update(struct tracer *tracer, struct scene_gpu *scene, const str
     struct bvh *bvh = (struct bvh *)tracer;
     struct tracer_stats *stats = &tracer->stats;
     stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
-    if (!changes->geometry && !changes->instances)
+    if (!changes->geometry && !changes->deformed && !changes->instances)
         return true;
-    bool ok = (!changes->geometry || update_geometries(bvh, scene, times, error)) &&
+    bool ok = ((!changes->geometry && !changes->deformed) || update_geometries(bvh, scene, times, error)) &&
               update_instances(bvh, scene, times, error);
     if (!ok)
         bvh_reset(bvh);
@@ -336,9 +343,9 @@ static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const stru
         .traverse = "bvh/traverse.glsl",
         .defines = defines,
         .rays_together = together,
-        .rays_a_dispatch = DISPATCH_RAYS_MAX,
+        .rays_a_dispatch = DISPATCH_RAYS_MAX / together * together,
     };
-    const struct gpu_program *program = trace_program_get(scene, wave->kind, &source, error);
+    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)
         return false;
     bind(bvh);

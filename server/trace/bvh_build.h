@@ -59,10 +59,28 @@ uint32_t bvh_binary_next(const struct bvh_binary_node *nodes, uint32_t i);
 
 /* Object space. Either triangles or spheres. Read by builder threads, not changed. */
 struct bvh_shape {
-    const float *positions;     /* 3 a vertex */
-    const uint32_t *indices;    /* 3 a triangle, in range (the scene has checked it) */
-    const float *centres_radii; /* 4 a sphere */
-    uint32_t primitive_count;   /* at least 1 */
+    const float *positions;       /* position_floats a vertex */
+    const float *positions_close; /* likewise, as the shutter closes; NULL: the same */
+    uint32_t position_floats;     /* 0: 3 */
+    const uint32_t *indices;      /* 3 a triangle, in range (the scene has checked it) */
+    const float *centres_radii;   /* 4 a sphere */
+    uint32_t primitive_count;     /* at least 1 */
+    bool deforms; /* the tree is to be refitted: it gets a plan, and room for where its triangles are as the
+                     shutter closes, behind where they are as it opens */
+};
+
+/* How a tree is refitted, bottom-up in steps; within a step elements need none of the others. */
+struct bvh_refit_step {
+    uint32_t first, count; /* records */
+    bool in_order;         /* too few at each height: one after the other */
+};
+struct bvh_refit_plan {
+    uint32_t *corners; /* 4 a triangle, in the tree's order: its vertices and its number in the mesh */
+    uint32_t triangle_count;
+    struct bvh_refit_record *records; /* one an element, leaves first */
+    uint32_t record_count, leaf_count;
+    struct bvh_refit_step *steps; /* above the leaves */
+    uint32_t step_count;
 };
 
 enum bvh_bounds { BVH_BOUNDS_OF_BOXES, BVH_BOUNDS_OF_SPHERES };
@@ -86,11 +104,14 @@ struct bvh_tree {
     uint32_t *elements; /* as the device has them: octants x element_count x words */
     uint32_t element_count;
     struct bvh_grid grid;
-    float grid_cost;   /* how much larger the grid makes a box's surface, in the mean: 1 .. 4; 1: not packed */
+    float grid_cost;   /* how much larger the grid makes a box's surface, in the mean: 1 .. 4, also where it is
+                          not used since `whole` is set; 1: never used */
     float leaf_extent; /* diagonal of a leaf's box, in the mean */
     float *primitives; /* 4 x primitive_texels floats, see shared/bvh_node.h */
     size_t primitive_texels;
     float lower[3], upper[3]; /* of everything, padded */
+    float cost; /* surfaces of all elements' boxes over that of the root's: tests that a ray through it makes */
+    struct bvh_refit_plan plan; /* empty: the shape does not deform, or the tree is not one that can be refitted */
     uint64_t build_ns;
 };
 
@@ -130,6 +151,11 @@ struct bvh_baked {
     uint32_t *parent; /* BVH_NONE at the root */
     uint32_t *place;  /* octants x element_count: where the octant's order has it; NULL: one octant */
 };
+
+/* leaves[e]: link of a leaf, 0: an inner element. False: out of memory. The plan stays empty (record_count 0)
+ * where an element has more children than a shader's loop looks at. */
+bool bvh_refit_plan_make(struct bvh_refit_plan *plan, const struct bvh_baked *baked, const uint32_t *leaves);
+void bvh_refit_plan_finish(struct bvh_refit_plan *plan);
 
 /* Chooses which inner nodes stay, and orders them. areas[n]: surface of the bound of binary node n, up to a
  * factor. False: out of memory. */

@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "base/parallel.h"
+#include "trace/bvh_build_split.h"
 
 #include <assert.h>
 #include <math.h>
@@ -28,9 +29,29 @@ struct work {
     float (*spheres)[4]; /* per place of the binary tree: centre, radius; NULL with boxes */
 };
 
+static const float *corner_of(const struct bvh_shape *shape, const float *positions, uint32_t triangle,
+                              unsigned corner)
+{
+    uint32_t floats = shape->position_floats ? shape->position_floats : 3;
+    return positions + floats * (size_t)shape->indices[3 * (size_t)triangle + corner];
+}
+
 static const float *triangle_corner(const struct bvh_shape *shape, uint32_t triangle, unsigned corner)
 {
-    return shape->positions + 3 * (size_t)shape->indices[3 * (size_t)triangle + corner];
+    return corner_of(shape, shape->positions, triangle, corner);
+}
+
+static struct bvh_box triangle_box(const struct bvh_shape *shape, const float *positions, uint32_t triangle)
+{
+    struct bvh_box box = {{0}, {0}};
+    const float *a = corner_of(shape, positions, triangle, 0), *b = corner_of(shape, positions, triangle, 1);
+    const float *c = corner_of(shape, positions, triangle, 2);
+    for (int i = 0; i < 3; i++) {
+        float low = a[i] < b[i] ? a[i] : b[i], high = a[i] < b[i] ? b[i] : a[i];
+        box.lower[i] = low < c[i] ? low : c[i];
+        box.upper[i] = high > c[i] ? high : c[i];
+    }
+    return box;
 }
 
 static struct bvh_box primitive_box(const struct bvh_shape *shape, uint32_t primitive)
@@ -42,13 +63,10 @@ static struct bvh_box primitive_box(const struct bvh_shape *shape, uint32_t prim
         box.upper = (bvh_vec4){s[0] + s[3], s[1] + s[3], s[2] + s[3], 0};
         return box;
     }
-    const float *a = triangle_corner(shape, primitive, 0), *b = triangle_corner(shape, primitive, 1);
-    const float *c = triangle_corner(shape, primitive, 2);
-    box.lower = box.upper = (bvh_vec4){0};
-    for (int i = 0; i < 3; i++) {
-        float low = a[i] < b[i] ? a[i] : b[i], high = a[i] < b[i] ? b[i] : a[i];
-        box.lower[i] = low < c[i] ? low : c[i];
-        box.upper[i] = high > c[i] ? high : c[i];
+    box = triangle_box(shape, shape->positions, primitive);
+    if (shape->positions_close) {
+        const struct bvh_box close = triangle_box(shape, shape->positions_close, primitive);
+        bvh_box_add(&box, &close);
     }
     return box;
 }
@@ -61,6 +79,15 @@ static void chunk_boxes(void *context, uint32_t chunk)
         end = work->shape->primitive_count;
     for (uint32_t i = begin; i < end; i++)
         work->boxes[i] = primitive_box(work->shape, i);
+}
+
+static void write_triangle(const struct bvh_shape *shape, const float *positions, uint32_t number, float *out)
+{
+    for (unsigned corner = 0; corner < 3; corner++) {
+        memcpy(out + 4 * corner, corner_of(shape, positions, number, corner), 3 * sizeof *out);
+        out[4 * corner + 3] = 0;
+    }
+    memcpy(out + 3, &number, sizeof number);
 }
 
 /* Primitives as the shader reads them, in the order of the leaves. */
@@ -81,11 +108,10 @@ static void chunk_primitives(void *context, uint32_t chunk)
             continue;
         }
         float *out = work->tree->primitives + (size_t)i * 4 * BVH_TRIANGLE_TEXELS;
-        for (unsigned corner = 0; corner < 3; corner++) {
-            memcpy(out + 4 * corner, triangle_corner(shape, number, corner), 3 * sizeof *out);
-            out[4 * corner + 3] = 0;
-        }
-        memcpy(out + 3, &number, sizeof number);
+        write_triangle(shape, shape->positions, number, out);
+        if (shape->deforms)
+            write_triangle(shape, shape->positions_close ? shape->positions_close : shape->positions, number,
+                           out + (size_t)shape->primitive_count * 4 * BVH_TRIANGLE_TEXELS);
     }
 }
 
@@ -107,8 +133,12 @@ static float leaf_radius(const struct work *work, const struct bvh_binary_node *
             const float *s = shape->centres_radii + 4 * (size_t)number;
             radius = fmaxf(radius, distance(centre, s) + s[3]);
         } else {
-            for (unsigned corner = 0; corner < 3; corner++)
+            for (unsigned corner = 0; corner < 3; corner++) {
                 radius = fmaxf(radius, distance(centre, triangle_corner(shape, number, corner)));
+                if (shape->positions_close)
+                    radius =
+                        fmaxf(radius, distance(centre, corner_of(shape, shape->positions_close, number, corner)));
+            }
         }
     }
     return radius;
@@ -182,7 +212,7 @@ static void survey(struct work *work)
 {
     const struct bvh_baked *baked = &work->baked;
     struct bvh_tree *tree = work->tree;
-    bool is_packed = bvh_is_packed(work->settings);
+    bool has_grid = work->settings->bounds == BVH_BOUNDS_OF_BOXES && !work->settings->plain;
     uint32_t step = baked->element_count / SURVEYED_ELEMENTS + 1, count = 0, leaf_count = 0;
     float cost_sum = 0, extent_sum = 0;
     for (uint32_t e = 0; e < baked->element_count; e += step, count++) {
@@ -191,7 +221,7 @@ static void survey(struct work *work)
             extent_sum += distance(node->lower, node->upper);
             leaf_count++;
         }
-        if (!is_packed)
+        if (!has_grid)
             continue;
         struct bvh_bound bound = bvh_bound_of_box(node->lower, node->upper);
         uint32_t cells[3][2];
@@ -200,8 +230,50 @@ static void survey(struct work *work)
         /* Not a number where surfaces are 0 or overflow. */
         cost_sum += cost > 1 ? fminf(cost, GRID_COST_EACH_MAX) : 1;
     }
-    tree->grid_cost = is_packed ? cost_sum / (float)count : 1;
+    tree->grid_cost = has_grid ? cost_sum / (float)count : 1;
     tree->leaf_extent = leaf_count > 0 ? extent_sum / (float)leaf_count : 0;
+}
+
+static float tree_cost(const struct work *work)
+{
+    double sum = 0;
+    for (uint32_t e = 0; e < work->baked.element_count; e++) {
+        const struct bvh_binary_node *node = &work->binary.nodes[work->baked.node[e]];
+        sum += (double)bvh_box_area(node->lower, node->upper);
+    }
+    float root = bvh_box_area(work->binary.nodes[0].lower, work->binary.nodes[0].upper);
+    return root > 0 ? (float)(sum / (double)root) : 0;
+}
+
+static bool list_corners(struct work *work)
+{
+    const struct bvh_shape *shape = work->shape;
+    struct bvh_refit_plan *plan = &work->tree->plan;
+    plan->triangle_count = shape->primitive_count;
+    plan->corners = malloc(shape->primitive_count * 4 * sizeof *plan->corners);
+    for (uint32_t i = 0; plan->corners && i < shape->primitive_count; i++) {
+        uint32_t number = work->binary.order[i];
+        memcpy(plan->corners + 4 * (size_t)i, shape->indices + 3 * (size_t)number, 3 * sizeof *plan->corners);
+        plan->corners[4 * (size_t)i + 3] = number;
+    }
+    return plan->corners != NULL;
+}
+
+static bool make_plan(struct work *work)
+{
+    const struct bvh_baked *baked = &work->baked;
+    uint32_t kind = work->shape->centres_radii ? BVH_LEAF_SPHERES : BVH_LEAF_TRIANGLES;
+    uint32_t *leaves = calloc(baked->element_count, sizeof *leaves);
+    bool ok = leaves != NULL;
+    for (uint32_t e = 0; ok && e < baked->element_count; e++) {
+        const struct bvh_binary_node *node = &work->binary.nodes[baked->node[e]];
+        uint32_t count = node->count_axis >> 2;
+        leaves[e] = count > 0 ? bvh_leaf(kind, node->link, count) : 0;
+    }
+    ok = ok && bvh_refit_plan_make(&work->tree->plan, baked, leaves);
+    free(leaves);
+    work->tree->cost = tree_cost(work);
+    return ok && (work->tree->plan.record_count == 0 || list_corners(work));
 }
 
 static uint32_t chunk_count(uint32_t count)
@@ -216,8 +288,8 @@ static bool alloc_primitives(struct work *work)
     size_t count = work->shape->primitive_count;
     size_t texels = work->shape->centres_radii ? BVH_SPHERE_TEXELS : BVH_TRIANGLE_TEXELS;
     static_assert(BVH_SPHERE_TEXELS * 4 * sizeof(float) >= sizeof(struct bvh_box), "a box fits in any primitive");
-    work->tree->primitive_texels = count * texels;
-    work->tree->primitives = aligned_alloc(16, count * texels * 4 * sizeof(float));
+    work->tree->primitive_texels = count * texels * (work->shape->deforms ? 2 : 1);
+    work->tree->primitives = aligned_alloc(16, work->tree->primitive_texels * 4 * sizeof(float));
     work->boxes = (struct bvh_box *)(void *)work->tree->primitives;
     return work->boxes != NULL;
 }
@@ -247,6 +319,8 @@ static bool build(struct work *work)
         return false;
     parallel_run(threads, chunk_count(tree->element_count), chunk_elements, work);
     parallel_run(threads, chunk_count(count), chunk_primitives, work);
+    if (work->shape->deforms && bvh_octants(work->settings) == BVH_OCTANTS)
+        return make_plan(work);
     return true;
 }
 
@@ -278,5 +352,6 @@ void bvh_tree_finish(struct bvh_tree *tree)
 {
     free(tree->elements);
     free(tree->primitives);
+    bvh_refit_plan_finish(&tree->plan);
     *tree = (struct bvh_tree){0};
 }

@@ -9,6 +9,11 @@
 
 #define TEXEL_BYTES (4 * sizeof(float))
 #define TOP_CAPACITY_MIN 64u
+#define PART_SLACK 256u
+/* Where more than one in so many of its elements have moved, or more than so many, the top tree goes to the device
+ * in one piece: a call costs as much as some thousand bytes. */
+#define WRITE_WHOLE 4u
+#define WRITE_RUNS_MAX 64u
 
 void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_settings *settings)
 {
@@ -19,6 +24,10 @@ void bvh_store_finish(struct bvh_store *store)
 {
     gpu_buffer_finish(store->device, &store->elements);
     gpu_buffer_finish(store->device, &store->primitives);
+    gpu_buffer_finish(store->device, &store->boxes);
+    gpu_buffer_finish(store->device, &store->roots);
+    for (uint32_t i = 0; i < store->entry_count; i++)
+        bvh_refit_finish(&store->entries[i].refit, store->device);
     free(store->entries);
     free(store->entry_of);
     const struct bvh_settings settings = store->settings;
@@ -33,7 +42,11 @@ const struct bvh_entry *bvh_store_entry(const struct bvh_store *store, uint32_t 
 
 uint64_t bvh_store_bytes(const struct bvh_store *store)
 {
-    return store->elements.capacity_bytes + store->primitives.capacity_bytes;
+    uint64_t bytes = store->elements.capacity_bytes + store->primitives.capacity_bytes;
+    bytes += store->boxes.capacity_bytes + store->roots.capacity_bytes;
+    for (uint32_t i = 0; i < store->entry_count; i++)
+        bytes += store->entries[i].refit.records.capacity_bytes + store->entries[i].refit.corners.capacity_bytes;
+    return bytes;
 }
 
 /* ---- room ---- */
@@ -139,13 +152,14 @@ bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, stru
 
 static bool entry_is_of(const struct bvh_entry *entry, const struct scene_gpu_geometry *geometry)
 {
-    return entry->id == geometry->id && entry->revision == geometry->revision &&
+    return entry->id == geometry->id && entry->revision == geometry->revision && entry->node == geometry->node &&
            entry->is_mesh == (geometry->mesh != NULL);
 }
 
-static uint64_t entry_key(bool is_mesh, uint32_t id)
+/* A node that deforms shows one geometry, which nobody else shows. */
+static uint64_t entry_key(bool is_mesh, uint32_t id, uint32_t node)
 {
-    return (uint64_t)id << 1 | is_mesh;
+    return node != 0 ? (uint64_t)node << 2 | 2 : (uint64_t)id << 2 | is_mesh;
 }
 
 static struct bvh_shape shape_of(const struct scene_gpu_geometry *geometry)
@@ -155,11 +169,24 @@ static struct bvh_shape shape_of(const struct scene_gpu_geometry *geometry)
         shape.positions = (const float *)(const void *)geometry->mesh->arrays[MESH_POSITIONS]->data;
         shape.indices = (const uint32_t *)(const void *)geometry->mesh->arrays[MESH_INDICES]->data;
         shape.primitive_count = geometry->mesh->triangle_count;
+        shape.deforms = geometry->node != 0;
     } else {
         shape.centres_radii = (const float *)(const void *)geometry->spheres->centres_radii->data;
         shape.primitive_count = geometry->spheres->sphere_count;
     }
     return shape;
+}
+
+static void drop_unwanted(struct bvh_store *store)
+{
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < store->entry_count; i++) {
+        if (store->entries[i].is_wanted)
+            store->entries[kept++] = store->entries[i];
+        else
+            bvh_refit_finish(&store->entries[i].refit, store->device);
+    }
+    store->entry_count = kept;
 }
 
 /* Drops entries that the scene no longer has and lists the geometries without one. False: out of memory. */
@@ -172,30 +199,28 @@ static bool find_missing(struct bvh_store *store, const struct scene_gpu *scene,
     for (uint32_t i = 0; ok && i < store->entry_count; i++) {
         struct bvh_entry *entry = &store->entries[i];
         entry->is_wanted = entry->is_fresh = false;
-        ok = hashmap_put(&by_key, entry_key(entry->is_mesh, entry->id), entry);
+        ok = hashmap_put(&by_key, entry_key(entry->is_mesh, entry->id, entry->node), entry);
     }
     *missing_count = 0;
     for (uint32_t g = 0; ok && g < scene->geometry_count; g++) {
         const struct scene_gpu_geometry *geometry = &scene->geometries[g];
         if (geometry->device.primitive_count == 0)
             continue;
-        struct bvh_entry *entry = hashmap_get(&by_key, entry_key(geometry->mesh != NULL, geometry->id));
+        struct bvh_entry *entry =
+            hashmap_get(&by_key, entry_key(geometry->mesh != NULL, geometry->id, geometry->node));
         if (entry && entry_is_of(entry, geometry))
             entry->is_wanted = true;
         else
             missing[(*missing_count)++] = g;
     }
     hashmap_finish(&by_key);
-    uint32_t kept = 0;
-    for (uint32_t i = 0; ok && i < store->entry_count; i++)
-        if (store->entries[i].is_wanted)
-            store->entries[kept++] = store->entries[i];
-    store->entry_count = ok ? kept : store->entry_count;
+    if (ok)
+        drop_unwanted(store);
     return ok;
 }
 
-static void upload_tree(struct bvh_store *store, const struct scene_gpu_geometry *geometry,
-                        const struct bvh_tree *tree, struct bvh_store_report *report)
+static bool upload_tree(struct bvh_store *store, const struct scene_gpu_geometry *geometry, struct bvh_tree *tree,
+                        struct bvh_store_report *report, struct error *error)
 {
     uint32_t element = store->top_capacity, texel = 0;
     if (store->entry_count > 0) {
@@ -206,6 +231,8 @@ static void upload_tree(struct bvh_store *store, const struct scene_gpu_geometry
     struct bvh_entry *entry = &store->entries[store->entry_count++];
     *entry = (struct bvh_entry){.is_mesh = geometry->mesh != NULL,
                                 .id = geometry->id,
+                                .node = geometry->node,
+                                .built_cost = tree->cost,
                                 .revision = geometry->revision,
                                 .is_wanted = true,
                                 .is_fresh = true,
@@ -224,25 +251,29 @@ static void upload_tree(struct bvh_store *store, const struct scene_gpu_geometry
     gpu_buffer_write(store->device, &store->primitives, texel * TEXEL_BYTES, tree->primitives, texel_bytes);
     report->uploaded_bytes += element_bytes + texel_bytes;
     report->built_elements += tree->element_count;
+    const struct bvh_refit_plan *plan = &tree->plan;
+    report->uploaded_bytes += plan->record_count * sizeof *plan->records;
+    report->uploaded_bytes += plan->triangle_count * 4 * sizeof *plan->corners;
+    /* The refit writes to parts of the buffers, and what a shader can write to is limited. */
+    uint64_t part_max = store->device->facts.storage_block_bytes_max - PART_SLACK;
+    if (element_bytes > part_max || texel_bytes > part_max)
+        bvh_refit_plan_finish(&tree->plan);
+    return bvh_refit_init(&entry->refit, store->device, &tree->plan, error);
 }
 
-static bool build_missing(struct bvh_store *store, const struct scene_gpu *scene, const uint32_t *missing,
-                          uint32_t missing_count, struct bvh_store_report *report, struct stage_times *times,
-                          struct error *error)
+/* jobs[i]: of geometry which[i], its shape is given. */
+static bool build(struct bvh_store *store, const struct scene_gpu *scene, struct bvh_job *jobs,
+                  const uint32_t *which, uint32_t missing_count, struct bvh_store_report *report,
+                  struct stage_times *times, struct error *error)
 {
-    struct bvh_job *jobs = calloc((size_t)missing_count + 1, sizeof *jobs);
     struct bvh_entry *entries =
         realloc(store->entries, ((size_t)store->entry_count + missing_count + 1) * sizeof *entries);
     if (entries)
         store->entries = entries;
-    if (!jobs || !entries) {
-        free(jobs);
+    if (!entries)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
                          scene->geometry_count);
-    }
     uint64_t start_ns = clock_now_ns();
-    for (uint32_t i = 0; i < missing_count; i++)
-        jobs[i].shape = shape_of(&scene->geometries[missing[i]]);
     bool ok = bvh_jobs_run(jobs, missing_count, &store->settings, error);
     uint64_t built_ns = clock_now_ns(), elements = 0, texels = 0;
     stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, built_ns - start_ns);
@@ -253,11 +284,24 @@ static bool build_missing(struct bvh_store *store, const struct scene_gpu *scene
     uint32_t top_capacity = store->top_capacity < TOP_CAPACITY_MIN ? TOP_CAPACITY_MIN : store->top_capacity;
     ok = ok && pack(store, top_capacity, elements, texels, error);
     for (uint32_t i = 0; i < missing_count; i++) {
-        if (ok)
-            upload_tree(store, &scene->geometries[missing[i]], &jobs[i].tree, report);
+        ok = ok && upload_tree(store, &scene->geometries[which[i]], &jobs[i].tree, report, error);
         bvh_tree_finish(&jobs[i].tree);
     }
     stage_times_add(times, STAGE_UPLOAD, STAGE_CPU, 0, built_ns, clock_now_ns() - built_ns);
+    return ok;
+}
+
+static bool build_missing(struct bvh_store *store, const struct scene_gpu *scene, const uint32_t *missing,
+                          uint32_t missing_count, struct bvh_store_report *report, struct stage_times *times,
+                          struct error *error)
+{
+    struct bvh_job *jobs = calloc((size_t)missing_count + 1, sizeof *jobs);
+    if (!jobs)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
+                         scene->geometry_count);
+    for (uint32_t i = 0; i < missing_count; i++)
+        jobs[i].shape = shape_of(&scene->geometries[missing[i]]);
+    bool ok = build(store, scene, jobs, missing, missing_count, report, times, error);
     free(jobs);
     return ok;
 }
@@ -270,10 +314,13 @@ static bool index_entries(struct bvh_store *store, const struct scene_gpu *scene
     uint32_t *entry_of = malloc(((size_t)scene->geometry_count + 1) * sizeof *entry_of);
     bool ok = entry_of != NULL;
     for (uint32_t i = 0; ok && i < store->entry_count; i++)
-        ok = hashmap_put(&by_key, entry_key(store->entries[i].is_mesh, store->entries[i].id), &store->entries[i]);
+        ok = hashmap_put(&by_key,
+                         entry_key(store->entries[i].is_mesh, store->entries[i].id, store->entries[i].node),
+                         &store->entries[i]);
     for (uint32_t g = 0; ok && g < scene->geometry_count; g++) {
         const struct scene_gpu_geometry *geometry = &scene->geometries[g];
-        const struct bvh_entry *entry = hashmap_get(&by_key, entry_key(geometry->mesh != NULL, geometry->id));
+        const struct bvh_entry *entry =
+            hashmap_get(&by_key, entry_key(geometry->mesh != NULL, geometry->id, geometry->node));
         bool has_one = entry && geometry->device.primitive_count > 0;
         entry_of[g] = has_one ? (uint32_t)(entry - store->entries) : BVH_NONE;
     }
@@ -288,7 +335,34 @@ static bool index_entries(struct bvh_store *store, const struct scene_gpu *scene
     return true;
 }
 
-bool bvh_store_update(struct bvh_store *store, const struct scene_gpu *scene, struct bvh_store_report *report,
+bool bvh_store_rebuild(struct bvh_store *store, const struct scene_gpu *scene, struct bvh_job *jobs,
+                       const uint32_t *which, uint32_t count, struct bvh_store_report *report,
+                       struct stage_times *times, struct error *error)
+{
+    struct bvh_entry *old = malloc(((size_t)count + 1) * sizeof *old);
+    if (!old)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u trees", count);
+    for (uint32_t i = 0; i < count; i++) {
+        struct bvh_entry *entry = &store->entries[store->entry_of[which[i]]];
+        entry->is_wanted = false;
+        old[i] = *entry;
+    }
+    drop_unwanted(store);
+    bool ok = build(store, scene, jobs, which, count, report, times, error);
+    for (uint32_t i = 0; ok && i < count; i++) {
+        struct bvh_entry *entry = &store->entries[store->entry_count - count + i];
+        entry->leaf_extent = old[i].leaf_extent;
+        entry->grid_cost = old[i].grid_cost;
+        entry->deformed_revision = scene->geometries[which[i]].deformed_revision;
+    }
+    free(old);
+    if (ok && !index_entries(store, scene))
+        ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
+                       scene->geometry_count);
+    return ok;
+}
+
+bool bvh_store_update(struct bvh_store *store, struct scene_gpu *scene, struct bvh_store_report *report,
                       struct stage_times *times, struct error *error)
 {
     *report = (struct bvh_store_report){0};
@@ -303,6 +377,7 @@ bool bvh_store_update(struct bvh_store *store, const struct scene_gpu *scene, st
     if (ok && !index_entries(store, scene))
         ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
                        scene->geometry_count);
+    ok = ok && bvh_store_deform(store, scene, report, times, error);
     if (!ok)
         bvh_store_finish(store);
     return ok;
@@ -334,8 +409,18 @@ static uint64_t write_top_copy(struct bvh_store *store, const struct bvh_top *to
 uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all)
 {
     uint64_t bytes = 0;
-    uint32_t count = top->element_count;
-    bool *moved = all || count == 0 ? NULL : malloc(count);
+    uint32_t count = top->element_count, moved_count = 0;
+    for (uint32_t e = 0; !all && e < count; e++)
+        moved_count += top->moved[e];
+    if (all || moved_count * WRITE_WHOLE > count || moved_count > WRITE_RUNS_MAX) {
+        size_t whole_bytes = count * bvh_element_bytes(&store->settings);
+        if (count > 0)
+            gpu_buffer_write(store->device, &store->elements, 0, top->elements, whole_bytes);
+        return whole_bytes;
+    }
+    bool *moved = moved_count == 0 ? NULL : malloc(count);
+    if (moved_count == 0)
+        return 0;
     for (uint32_t octant = 0; octant < bvh_octants(&store->settings); octant++) {
         for (uint32_t e = 0; moved && e < count; e++)
             moved[top->baked.place ? top->baked.place[(size_t)octant * count + e] : e] = top->moved[e];

@@ -10,6 +10,7 @@
 #include "gpu/device.h"
 #include "trace/bvh_build.h"
 #include "trace/bvh_build_top.h"
+#include "trace/bvh_refit.h"
 #include "trace/scene_gpu.h"
 
 #include <stdbool.h>
@@ -19,9 +20,13 @@
 struct bvh_entry {
     bool is_mesh;
     uint32_t id;
+    uint32_t node; /* as struct scene_gpu_geometry has it */
     uint64_t revision;
-    bool is_wanted; /* the scene still has it, in this revision */
-    bool is_fresh;  /* built by the last update */
+    uint64_t deformed_revision; /* of the vertices that it was built or refitted for */
+    struct bvh_refit refit;
+    float built_cost; /* of the tree when it was built, as struct bvh_tree has it */
+    bool is_wanted;   /* the scene still has it, in this revision */
+    bool is_fresh;    /* built or refitted by the last update */
     uint32_t first_element, element_count;
     uint32_t first_texel, texel_count;
     float lower[3], upper[3]; /* object space, padded */
@@ -39,18 +44,29 @@ struct bvh_store {
     uint32_t top_capacity; /* elements before the first entry */
     bool top_lost;         /* the top tree has to be written again; cleared by who does */
     struct gpu_buffer elements, primitives;
+    struct gpu_buffer boxes, roots; /* of refits */
 };
 
 struct bvh_store_report {
-    uint64_t built_elements, uploaded_bytes;
+    uint64_t built_elements, refitted_elements, uploaded_bytes;
 };
 
 void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_settings *settings);
 void bvh_store_finish(struct bvh_store *store);
 /* Trees for all geometries of the scene, building those that are new or changed. What is kept is not uploaded
- * again, though the device may move it. After a failure the store is empty. */
-bool bvh_store_update(struct bvh_store *store, const struct scene_gpu *scene, struct bvh_store_report *report,
+ * again, though the device may move it. Trees of geometries whose vertices have moved are refitted on the device,
+ * and built anew from where these are now where refitting has made one worse than BVH_REFIT_COST_MAX; their
+ * leaf_extent and grid_cost stay those of the mesh as it is given, so that what is chosen by them does not depend
+ * on earlier poses. After a failure the store is empty. */
+bool bvh_store_update(struct bvh_store *store, struct scene_gpu *scene, struct bvh_store_report *report,
                       struct stage_times *times, struct error *error);
+/* The second half of it: trees of geometries whose vertices are others than those that they were made for. */
+bool bvh_store_deform(struct bvh_store *store, struct scene_gpu *scene, struct bvh_store_report *report,
+                      struct stage_times *times, struct error *error);
+/* Trees over the shapes of jobs[i] for the geometries which[i], in place of those that they have. */
+bool bvh_store_rebuild(struct bvh_store *store, const struct scene_gpu *scene, struct bvh_job *jobs,
+                       const uint32_t *which, uint32_t count, struct bvh_store_report *report,
+                       struct stage_times *times, struct error *error);
 /* Room for a top tree of so many elements. */
 bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, struct error *error);
 /* Writes elements of the top tree: all, or those marked in `moved`. Returns the bytes. */

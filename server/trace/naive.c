@@ -67,7 +67,7 @@ static bool naive_trace(struct tracer *tracer, struct scene_gpu *scene, const st
         .defines = naive_defines,
         .rays_a_dispatch = ((struct naive *)tracer)->rays_a_dispatch,
     };
-    const struct gpu_program *program = trace_program_get(scene, wave->kind, &source, error);
+    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)
         return false;
     return trace_program_run(program, scene, wave, &source, error);

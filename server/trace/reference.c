@@ -112,6 +112,7 @@ static void reference_destroy(struct tracer *tracer)
         rtcReleaseDevice(reference->device);
     pthread_mutex_destroy(&reference->failure_mutex);
     free(reference->rays);
+    free(reference->times);
     free(reference->answers);
     free(reference);
 }
@@ -172,10 +173,12 @@ static bool reserve_host(struct reference *reference, uint32_t ray_count, struct
     if (ray_count <= reference->ray_capacity)
         return true;
     free(reference->rays);
+    free(reference->times);
     free(reference->answers);
     reference->rays = malloc((size_t)ray_count * sizeof(*reference->rays));
+    reference->times = malloc((size_t)ray_count * sizeof(*reference->times));
     reference->answers = malloc((size_t)ray_count * sizeof(struct hit));
-    reference->ray_capacity = reference->rays && reference->answers ? ray_count : 0;
+    reference->ray_capacity = reference->rays && reference->times && reference->answers ? ray_count : 0;
     return reference->ray_capacity > 0 ||
            error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a wave of %u rays", ray_count);
 }
@@ -188,6 +191,8 @@ static bool reference_trace(struct tracer *tracer, struct scene_gpu *scene, cons
     if (!reserve_host(reference, wave->ray_count, error))
         return false;
     gpu_buffer_read(tracer->device, wave->rays, 0, reference->rays, wave->ray_count * sizeof(struct ray));
+    if (wave->times)
+        gpu_buffer_read(tracer->device, wave->times, 0, reference->times, wave->ray_count * sizeof(float));
     uint64_t start_ns = clock_now_ns();
     reference_walk(reference, wave);
     tracer->stats.walk_ns = clock_now_ns() - start_ns;

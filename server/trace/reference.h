@@ -23,7 +23,8 @@
 struct reference_entry {
     bool is_mesh;
     uint32_t id;
-    uint64_t revision;
+    uint32_t node; /* that deforms it; 0: it is rigid */
+    uint64_t revision, deformed_revision;
     bool is_wanted; /* the scene still has it, in this revision */
     bool is_stale;  /* its Embree scene has to be committed */
     bool is_fresh;  /* by this update: its instances have to be committed too */
@@ -31,7 +32,8 @@ struct reference_entry {
     uint32_t primitive_count;
     RTCScene scene;
     RTCGeometry geometry;
-    struct blob *shape[2];          /* what Embree reads: positions and indices, or centres and radii */
+    struct blob *shape[2];          /* what Embree reads: positions (unless it deforms) and indices, or centres and
+                                       radii */
     struct opacity_surface surface; /* what the filter functions read */
 };
 
@@ -39,7 +41,8 @@ struct reference_entry {
 struct reference_instance {
     RTCGeometry geometry;                /* NULL: none yet */
     const struct reference_entry *entry; /* what the geometry shows */
-    float world_from_object[12];
+    float (*world_from_object)[12];      /* in each pose */
+    uint32_t pose_count;
     uint32_t first_primitive; /* scene-wide */
 };
 
@@ -67,6 +70,7 @@ struct reference {
     char failure_text[256];
     /* A wave on the host; they grow and stay. */
     struct ray *rays;
+    float *times; /* of those rays */
     void *answers;
     uint32_t ray_capacity;
 };
@@ -78,8 +82,13 @@ bool reference_check(struct reference *reference, const char *what, struct error
 bool reference_scene_update(struct reference *reference, const struct scene_gpu *scene,
                             const struct scene_changes *changes, struct error *error);
 void reference_scene_finish(struct reference *reference); /* leaves it empty */
+/* reference_instance.c. `look`: some may have moved, or show what was built anew; *changed is set where they do.
+ */
+bool reference_update_instances(struct reference *reference, const struct scene_gpu *scene, bool look,
+                                bool *changed, struct error *error);
+void reference_drop_instances(struct reference *reference);
 
-/* reference_walk.c: a wave that lies in `rays`; crossings or visibilities into `answers`. */
+/* reference_walk.c: a wave that lies in `rays` and `times`; crossings or visibilities into `answers`. */
 void reference_walk(struct reference *reference, const struct wave *wave);
 /* Embree asks these about each candidate on a geometry that has cutouts (closest), or lets light pass (any). */
 void reference_filter_closest(const struct RTCFilterFunctionNArguments *arguments);

@@ -6,6 +6,7 @@
 #define FARLIGHT_TRACE_REFERENCE_OPACITY_H
 
 #include "base/hashmap.h"
+#include "scene/pose.h"
 #include "scene/scene.h"
 #include "trace/scene_gpu.h"
 
@@ -59,8 +60,9 @@ struct opacity_point {
     float origin[3], direction[3], distance;
 };
 
-/* All or nothing; false: out of memory. */
-bool opacity_materials_init(struct opacity_materials *materials, const struct scene *scene);
+/* As they are in the pose (NULL: as they were committed). All or nothing; false: out of memory. */
+bool opacity_materials_init(struct opacity_materials *materials, const struct scene *scene,
+                            const struct scene_pose *pose);
 void opacity_materials_finish(struct opacity_materials *materials); /* leaves it empty */
 
 bool opacity_surface_init_mesh(struct opacity_surface *surface, const struct scene_mesh *mesh);

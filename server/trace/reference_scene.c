@@ -8,15 +8,11 @@
 #include "base/hashmap.h"
 #include "base/parallel.h"
 
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Embree builds one scene on all cores; scenes smaller than this are built several at once instead. */
 #define ALONE_PRIMITIVES_MIN 20000u
-/* World coordinates that rays may have at least, else the scene is refused. */
-#define REACH_MIN 1e9
 /* Embree reads a vertex of 12 bytes as one of 16. */
 #define VERTEX_SLACK_BYTES 4u
 
@@ -42,9 +38,10 @@ static void entry_destroy(struct reference_entry *entry)
     free(entry);
 }
 
-static uint64_t entry_key(bool is_mesh, uint32_t id)
+/* Of what deforms by its node, which shows no other. */
+static uint64_t entry_key(bool is_mesh, uint32_t id, uint32_t node)
 {
-    return (uint64_t)id << 1 | is_mesh;
+    return (uint64_t)(node ? node : id) << 2 | (node ? 2u : 0u) | is_mesh;
 }
 
 /* The array as it lies in its blob, or a copy with room behind it where Embree would read past the end. */
@@ -65,14 +62,16 @@ static bool take_shape(struct reference_entry *entry, RTCDevice device, const st
 {
     if (entry->is_mesh) {
         const struct scene_mesh *mesh = geometry->mesh;
-        entry->shape[0] = blob_ref(mesh->arrays[MESH_POSITIONS]);
+        if (!entry->node)
+            entry->shape[0] = blob_ref(mesh->arrays[MESH_POSITIONS]);
         entry->shape[1] = blob_ref(mesh->arrays[MESH_INDICES]);
         entry->primitive_count = mesh->triangle_count;
         entry->geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
         if (!entry->geometry)
             return false;
-        set_buffer(entry->geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, entry->shape[0], 3 * sizeof(float),
-                   mesh->vertex_count);
+        if (!entry->node)
+            set_buffer(entry->geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, entry->shape[0],
+                       3 * sizeof(float), mesh->vertex_count);
         set_buffer(entry->geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, entry->shape[1], 3 * sizeof(uint32_t),
                    mesh->triangle_count);
         return opacity_surface_init_mesh(&entry->surface, mesh);
@@ -104,6 +103,7 @@ static struct reference_entry *entry_create(RTCDevice device, const struct scene
         return NULL;
     entry->is_mesh = geometry->mesh != NULL;
     entry->id = geometry->id;
+    entry->node = geometry->node;
     entry->revision = geometry->revision;
     entry->is_wanted = entry->is_stale = true;
     entry->scene = new_scene(device);
@@ -116,6 +116,37 @@ static struct reference_entry *entry_create(RTCDevice device, const struct scene
     return entry;
 }
 
+/* One step of time of a mesh that deforms, worked out here: what the device made of it is compared with this. */
+static bool take_vertices(struct reference_entry *entry, const struct scene_gpu *scene,
+                          const struct scene_pose *pose, unsigned step, struct error *error)
+{
+    const struct scene_node *node = scene_node(scene->scene, entry->node);
+    const struct scene_mesh *mesh = scene_mesh(scene->scene, entry->id);
+    float *vertices = rtcSetNewGeometryBuffer(entry->geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3,
+                                              3 * sizeof(float), mesh->vertex_count);
+    return vertices && scene_deform(scene->scene, pose, node, vertices, NULL, error);
+}
+
+/* Brings what deforms to the poses. Trees are built anew: slow rather than wrong. */
+static bool deform_entries(struct reference *reference, const struct scene_gpu *scene, struct error *error)
+{
+    const struct scene_motion *motion = scene->motion;
+    for (uint32_t g = 0; g < scene->geometry_count; g++) {
+        const struct scene_gpu_geometry *geometry = &scene->geometries[g];
+        struct reference_entry *entry = reference->entries[g];
+        if (!geometry->node || entry->deformed_revision == geometry->deformed_revision)
+            continue;
+        bool closes = geometry->device.close_offset != 0;
+        rtcSetGeometryTimeStepCount(entry->geometry, closes ? 2 : 1);
+        if (!take_vertices(entry, scene, motion ? &motion->poses[0] : NULL, 0, error) ||
+            (closes && !take_vertices(entry, scene, &motion->poses[motion->pose_count - 1], 1, error)))
+            return false;
+        entry->deformed_revision = geometry->deformed_revision;
+        entry->is_stale = true;
+    }
+    return true;
+}
+
 /* Marks the entries that the scene still has; entry_of: by geometry of the scene, NULL where there is none. */
 static bool find_kept(const struct reference *reference, const struct scene_gpu *scene,
                       struct reference_entry **entry_of)
@@ -125,12 +156,13 @@ static bool find_kept(const struct reference *reference, const struct scene_gpu 
     for (uint32_t i = 0; ok && i < reference->entry_count; i++) {
         struct reference_entry *entry = reference->entries[i];
         entry->is_wanted = false;
-        ok = hashmap_put(&by_key, entry_key(entry->is_mesh, entry->id), entry);
+        ok = hashmap_put(&by_key, entry_key(entry->is_mesh, entry->id, entry->node), entry);
     }
     for (uint32_t g = 0; ok && g < scene->geometry_count; g++) {
         const struct scene_gpu_geometry *geometry = &scene->geometries[g];
-        struct reference_entry *entry = hashmap_get(&by_key, entry_key(geometry->mesh != NULL, geometry->id));
-        if (!entry || entry->revision != geometry->revision)
+        struct reference_entry *entry =
+            hashmap_get(&by_key, entry_key(geometry->mesh != NULL, geometry->id, geometry->node));
+        if (!entry || entry->id != geometry->id || entry->revision != geometry->revision)
             continue;
         entry->is_wanted = true;
         entry_of[g] = entry;
@@ -312,128 +344,13 @@ static bool update_discs(struct reference *reference, const struct scene_gpu *sc
     return true;
 }
 
-/* ---- instances ---- */
-
-static bool resize_instances(struct reference *reference, uint32_t count)
-{
-    for (uint32_t i = count; i < reference->instance_count; i++) {
-        rtcDetachGeometry(reference->top, i + 1);
-        rtcReleaseGeometry(reference->instances[i].geometry);
-    }
-    if (count < reference->instance_count)
-        reference->instance_count = count;
-    struct reference_instance *instances =
-        realloc(reference->instances, ((size_t)count + 1) * sizeof(*reference->instances));
-    if (!instances)
-        return false;
-    reference->instances = instances;
-    for (uint32_t i = reference->instance_count; i < count; i++) {
-        instances[i] =
-            (struct reference_instance){.geometry = rtcNewGeometry(reference->device, RTC_GEOMETRY_TYPE_INSTANCE)};
-        if (!instances[i].geometry)
-            return false;
-        rtcAttachGeometryByID(reference->top, instances[i].geometry, i + 1);
-        reference->instance_count = i + 1;
-    }
-    return true;
-}
-
-/* The greatest world coordinate that Embree can take to the instance's space. It computes with coordinates up to
- * 1.844e18 and ends the process at a ray beyond (Debian's is built with its assertions); and it inverts the
- * transform by a determinant in single precision, which must neither vanish nor overflow. 0: it cannot at all. */
-static float reach_of(struct instance *instance)
-{
-    const float *m = instance->world_from_object[0], *inverse = instance->object_from_world[0];
-    double lengths = 1.0, reach = REFERENCE_COORDINATE_MAX;
-    for (size_t k = 0; k < 3; k++) {
-        const double x = m[k], y = m[4 + k], z = m[8 + k];
-        const double sum =
-            fabs((double)inverse[4 * k]) + fabs((double)inverse[4 * k + 1]) + fabs((double)inverse[4 * k + 2]);
-        lengths *= sqrt(x * x + y * y + z * z);
-        reach = fmin(reach, (REFERENCE_COORDINATE_MAX - fabs((double)inverse[4 * k + 3])) / sum);
-    }
-    const double determinant = (double)m[0] * ((double)m[5] * m[10] - (double)m[6] * m[9]) -
-                               (double)m[1] * ((double)m[4] * m[10] - (double)m[6] * m[8]) +
-                               (double)m[2] * ((double)m[4] * m[9] - (double)m[5] * m[8]);
-    bool inverts = fabs(determinant) > 1e-30 && lengths < 1e30 && fabs(determinant) >= 1e-5 * lengths;
-    return inverts && reach >= REACH_MIN ? (float)reach : 0.0f;
-}
-
-/* Tells Embree what moved, or shows something else now. True if anything did. */
-static bool place_instance(struct reference *reference, const struct scene_gpu *scene, uint32_t i)
-{
-    struct reference_instance *instance = &reference->instances[i];
-    const struct instance *now = &scene->instances[i];
-    const struct reference_entry *entry = reference->entries[now->geometry];
-    bool same_entry = instance->entry == entry && !entry->is_fresh;
-    bool same_place = instance->entry && memcmp(instance->world_from_object, now->world_from_object,
-                                                sizeof(instance->world_from_object)) == 0;
-    instance->first_primitive = scene->geometries[now->geometry].device.first_primitive;
-    if (same_entry && same_place)
-        return false;
-    if (!same_entry)
-        rtcSetGeometryInstancedScene(instance->geometry, entry->scene);
-    memcpy(instance->world_from_object, now->world_from_object, sizeof(instance->world_from_object));
-    rtcSetGeometryTransform(instance->geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, instance->world_from_object);
-    rtcCommitGeometry(instance->geometry);
-    instance->entry = entry;
-    return true;
-}
-
-static bool find_reach(struct reference *reference, const struct scene_gpu *scene, struct error *error)
-{
-    reference->coordinate_max = REFERENCE_COORDINATE_MAX;
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
-        float reach = reach_of(&scene->instances[i]);
-        if (reach == 0.0f) {
-            char field[64];
-            snprintf(field, sizeof(field), "node %u.parent_from_node", scene->instances[i].node);
-            error_set(error, ERROR_UNSUPPORTED, field,
-                      "its place in the world is scaled, sheared or moved too far");
-            return error_remedy(error,
-                                "the tracer reference computes in single precision: choose bvh, or scale by "
-                                "more than 1e-9");
-        }
-        reference->coordinate_max = fminf(reference->coordinate_max, reach);
-    }
-    /* Of what lies beyond, Embree would leave out whole instances without a word. */
-    for (int k = 0; k < 3; k++) {
-        const double farthest = fmax(-(double)scene->lower_world[k], (double)scene->upper_world[k]);
-        if (scene->instance_count > 0 && farthest > (double)reference->coordinate_max) {
-            error_set(error, ERROR_UNSUPPORTED, "tracer",
-                      "reference: the scene reaches out to %g, and it sees up to %g", farthest,
-                      (double)reference->coordinate_max);
-            return error_remedy(error, "choose bvh, or make the scene smaller");
-        }
-    }
-    return true;
-}
-
-/* `look`: some may have moved, or show what was built anew. */
-static bool update_instances(struct reference *reference, const struct scene_gpu *scene, bool look, bool *changed,
-                             struct error *error)
-{
-    struct tracer_stats *stats = &reference->base.stats;
-    if (look && !find_reach(reference, scene, error))
-        return false;
-    *changed = *changed || reference->instance_count != scene->instance_count;
-    if (!resize_instances(reference, scene->instance_count))
-        return false;
-    for (uint32_t i = 0; look && i < scene->instance_count; i++)
-        *changed = place_instance(reference, scene, i) || *changed;
-    if (*changed) {
-        rtcCommitScene(reference->top);
-        stats->nodes_rebuilt += (uint64_t)scene->instance_count + scene->disc_count;
-    }
-    return true;
-}
-
 /* ---- all of it ---- */
 
 static bool update_materials(struct reference *reference, const struct scene_gpu *scene)
 {
     opacity_materials_finish(&reference->materials);
-    if (!opacity_materials_init(&reference->materials, scene->scene))
+    if (!opacity_materials_init(&reference->materials, scene->scene,
+                                scene->motion ? &scene->motion->poses[0] : NULL))
         return false;
     for (uint32_t i = 0; i < reference->entry_count; i++) {
         opacity_surface_bind(&reference->entries[i]->surface, &reference->materials);
@@ -451,9 +368,12 @@ static bool update_parts(struct reference *reference, const struct scene_gpu *sc
     if (!reference->top || (changes->geometry && !list_entries(reference, scene)) ||
         (shading && !update_materials(reference, scene)))
         return false;
+    if ((changes->geometry || changes->deformed) && !deform_entries(reference, scene, error))
+        return false;
     commit_entries(reference);
     return update_discs(reference, scene, shading, &changed) &&
-           update_instances(reference, scene, shading || changes->instances, &changed, error);
+           reference_update_instances(reference, scene, shading || changes->instances || changes->deformed,
+                                      &changed, error);
 }
 
 bool reference_scene_update(struct reference *reference, const struct scene_gpu *scene,
@@ -474,11 +394,7 @@ bool reference_scene_update(struct reference *reference, const struct scene_gpu 
 
 void reference_scene_finish(struct reference *reference)
 {
-    for (uint32_t i = 0; i < reference->instance_count; i++)
-        rtcReleaseGeometry(reference->instances[i].geometry);
-    free(reference->instances);
-    reference->instances = NULL;
-    reference->instance_count = 0;
+    reference_drop_instances(reference);
     drop_discs(reference);
     if (reference->top)
         rtcReleaseScene(reference->top);

@@ -182,8 +182,8 @@ static float begin_of(const struct ray *ray)
 }
 
 /* What is beyond the reach of the scene's instances, or not a number, hits nothing. */
-static inline void set_lane(struct packet *packet, unsigned n, unsigned lane, const struct ray *ray, uint32_t id,
-                            float coordinate_max)
+static inline void set_lane(struct packet *packet, unsigned n, unsigned lane, const struct ray *ray, float time,
+                            uint32_t id, float coordinate_max)
 {
     union lane *rays = packet->lanes;
     float begin = begin_of(ray);
@@ -198,7 +198,7 @@ static inline void set_lane(struct packet *packet, unsigned n, unsigned lane, co
     /* The ends do not count; to Embree's spheres and discs they would. */
     float t_near = alive ? next_above(t_min) : 0.0f, t_far = alive ? next_below(t_max) : 0.0f;
     rays[RAY_T_NEAR * n + lane].f = t_near;
-    rays[RAY_TIME * n + lane].f = 0.0f;
+    rays[RAY_TIME * n + lane].f = time;
     rays[RAY_T_FAR * n + lane].f = t_far;
     rays[RAY_MASK * n + lane].u = UINT32_MAX;
     rays[RAY_ID * n + lane].u = id;
@@ -288,7 +288,9 @@ walk_packets(const struct walk *walk, struct walk_context *context, uint32_t fir
         unsigned count = end - at < n ? end - at : n;
         for (unsigned lane = 0; lane < n; lane++) {
             static const struct ray dead = {.direction_t_max = {0.0f, 0.0f, 0.0f, -1.0f}};
-            set_lane(&packet, n, lane, lane < count ? &reference->rays[at + lane] : &dead, at + lane - first,
+            bool there = lane < count;
+            float time = there && walk->wave->times ? reference->times[at + lane] : 0.0f;
+            set_lane(&packet, n, lane, there ? &reference->rays[at + lane] : &dead, time, at + lane - first,
                      reference->coordinate_max);
         }
         if (any)

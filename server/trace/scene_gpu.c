@@ -7,44 +7,59 @@
 
 #include <epoxy/gl.h>
 #include <stdlib.h>
+#include <string.h>
 
 void scene_gpu_init(struct scene_gpu *gpu, struct gpu_device *device)
 {
     *gpu = (struct scene_gpu){.device = device};
 }
 
-static void finish_buffers(struct scene_gpu *gpu)
+#define BUFFERS_MAX (17 + DEFORM_BUFFERS_MAX)
+
+/* All of them; returns how many. */
+static size_t list_buffers(struct scene_gpu *gpu, struct gpu_buffer *buffers[BUFFERS_MAX])
 {
-    struct gpu_buffer *buffers[] = {
-        &gpu->triangles,   &gpu->positions, &gpu->normals,         &gpu->tangents,
-        &gpu->texcoords,   &gpu->colours,   &gpu->spheres,         &gpu->materials,
-        &gpu->textures,    &gpu->texels,    &gpu->instance_buffer, &gpu->geometry_buffer,
-        &gpu->disc_buffer, &gpu->lights,    &gpu->texture_slots,   &gpu->sphere_materials,
+    struct gpu_buffer *own[] = {
+        &gpu->triangles,        &gpu->positions,       &gpu->normals,     &gpu->tangents, &gpu->texcoords,
+        &gpu->colours,          &gpu->spheres,         &gpu->materials,   &gpu->textures, &gpu->texels,
+        &gpu->instance_buffer,  &gpu->geometry_buffer, &gpu->disc_buffer, &gpu->lights,   &gpu->texture_slots,
+        &gpu->sphere_materials, &gpu->motion_buffer,
     };
-    for (size_t i = 0; i < sizeof(buffers) / sizeof(buffers[0]); i++)
-        gpu_buffer_finish(gpu->device, buffers[i]);
-    gpu_texture_finish(gpu->device, &gpu->environment);
+    size_t count = sizeof(own) / sizeof(own[0]);
+    memcpy(buffers, own, sizeof(own));
+    if (gpu->state)
+        count += scene_gpu_deform_buffers(&gpu->state->deform, buffers + count);
+    return count;
 }
 
 void scene_gpu_finish(struct scene_gpu *gpu)
 {
+    struct gpu_buffer *buffers[BUFFERS_MAX];
     if (!gpu->device)
         return;
-    finish_buffers(gpu);
+    size_t count = list_buffers(gpu, buffers);
+    for (size_t i = 0; i < count; i++)
+        gpu_buffer_finish(gpu->device, buffers[i]);
+    gpu_texture_finish(gpu->device, &gpu->environment);
     if (gpu->state) {
+        scene_gpu_deform_finish(&gpu->state->deform, gpu->device);
         hashmap_finish(&gpu->state->material_indices.index_by_id);
         hashmap_finish(&gpu->state->texture_index_by_id);
         free(gpu->state->material_indices.free);
+        free(gpu->state->materials);
+        free(gpu->state->texture_slots);
+        free(gpu->state->lights);
         free(gpu->state);
     }
     free(gpu->geometries);
     free(gpu->instances);
+    free(gpu->motions);
     free(gpu->discs);
     scene_gpu_init(gpu, gpu->device);
 }
 
-/* Spreads an id and a revision over 64 bits (the finaliser of splitmix64). */
-static uint64_t mix(uint64_t x)
+/* The finaliser of splitmix64. */
+uint64_t scene_gpu_mix(uint64_t x)
 {
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
     x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
@@ -58,35 +73,60 @@ uint64_t scene_gpu_signature(const struct scene *scene, enum scene_object_kind k
     void *value;
     while (hashmap_next(&scene->objects[kind], &cursor, &id, &value)) {
         const struct scene_object *object = value;
-        signature += mix(mix(id + 1) + object->revision);
+        signature += scene_gpu_mix(scene_gpu_mix(id + 1) + object->revision);
     }
     return signature;
 }
 
-static bool update_parts(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
-                         struct error *error)
+/* What poses say anything about. */
+static unsigned posed_parts(const struct scene_motion *motion)
+{
+    unsigned parts = 0;
+    for (uint32_t p = 0; motion && p < motion->pose_count; p++) {
+        const struct scene_pose *pose = &motion->poses[p];
+        parts |= (pose->node_count ? POSED_NODES : 0) | (pose->morph_count ? POSED_MORPHS : 0) |
+                 (pose->light_count ? POSED_LIGHTS : 0) | (pose->material_count ? POSED_MATERIALS : 0);
+    }
+    return parts;
+}
+
+static bool update_shading(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
+                           bool edited, struct scene_changes *changes, struct error *error)
+{
+    changes->shading = edited;
+    return (!edited || (scene_gpu_index_materials(gpu, scene, error) &&
+                        scene_gpu_upload_textures(gpu, scene, changes, error))) &&
+           scene_gpu_upload_materials(gpu, scene, motion, changes, error);
+}
+
+/* `posed`: what poses say something about, now or in the last update, and so may be elsewhere. */
+static bool update_parts(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
+                         unsigned posed, struct scene_changes *changes, struct error *error)
 {
     bool fresh = !gpu->state->any_update;
-    bool shading = fresh || gpu->shading_revision != scene->shading_revision;
+    bool shading_edited = fresh || gpu->shading_revision != scene->shading_revision;
+    bool shading = shading_edited || (posed & POSED_MATERIALS);
     bool geometry = fresh || gpu->geometry_revision != scene->geometry_revision;
-    bool instances = fresh || gpu->instances_revision != scene->instances_revision;
-    bool lights = fresh || gpu->lights_revision != scene->lights_revision;
-    if (shading && !scene_gpu_index_materials(gpu, scene, error))
-        return false;
-    if (shading && (!scene_gpu_upload_textures(gpu, scene, changes, error) ||
-                    !scene_gpu_upload_materials(gpu, scene, changes, error)))
+    bool nodes = fresh || gpu->instances_revision != scene->instances_revision || (posed & POSED_NODES);
+    bool lights = fresh || gpu->lights_revision != scene->lights_revision || (posed & POSED_LIGHTS);
+    if (shading && !update_shading(gpu, scene, motion, shading_edited, changes, error))
         return false;
     /* Always: it finds by itself whether a shape changed, and where the shapes are now. */
     if (!scene_gpu_upload_geometry(gpu, scene, changes, error))
         return false;
     if (geometry && !scene_gpu_upload_discs(gpu, scene, changes, error))
         return false;
-    if ((geometry || shading) && !scene_gpu_classify_geometry(gpu, scene, changes, error))
+    if (geometry || shading || changes->geometry)
+        scene_gpu_classify_geometry(gpu, scene, motion);
+    if ((geometry || nodes || (posed & POSED_MORPHS)) && !scene_gpu_deform(gpu, scene, motion, changes, error))
         return false;
-    if ((geometry || instances) && !scene_gpu_upload_instances(gpu, scene, changes, error))
+    if (!scene_gpu_upload_geometry_table(gpu, changes, error))
+        return false;
+    if ((geometry || nodes) && !scene_gpu_upload_instances(gpu, scene, motion, changes, error))
         return false;
     /* The bounds are of geometry, instances and lights together; lights see to them last. */
-    if ((geometry || instances || lights) && !scene_gpu_upload_lights(gpu, scene, changes, error))
+    if ((geometry || nodes || lights || changes->deformed) &&
+        !scene_gpu_upload_lights(gpu, scene, motion, changes, error))
         return false;
     return gpu_check(gpu->device, "scene upload", error);
 }
@@ -94,22 +134,26 @@ static bool update_parts(struct scene_gpu *gpu, const struct scene *scene, struc
 bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error)
 {
-    (void)motion;
     uint64_t start_ns = clock_now_ns();
+    unsigned parts = posed_parts(motion);
     *changes = (struct scene_changes){0};
     gpu->scene = scene;
+    gpu->motion = motion;
     if (!gpu->state && !(gpu->state = calloc(1, sizeof(*gpu->state))))
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the device's copy of a scene");
-    if (gpu->state->any_update && gpu->revision == scene->revision)
+    unsigned posed = parts | gpu->state->posed_parts;
+    if (gpu->state->any_update && gpu->revision == scene->revision && posed == 0)
         return true;
     gpu_push_group(gpu->device, "scene upload");
-    bool ok = update_parts(gpu, scene, changes, error);
+    bool ok = update_parts(gpu, scene, motion, posed, changes, error);
     gpu_pop_group(gpu->device);
     if (!ok) {
         scene_gpu_finish(gpu);
         return false;
     }
+    gpu->has_motion = gpu->motion_count > 0 || scene_gpu_any_closes(gpu);
     gpu->state->any_update = true;
+    gpu->state->posed_parts = parts;
     gpu->revision = scene->revision;
     gpu->geometry_revision = scene->geometry_revision;
     gpu->instances_revision = scene->instances_revision;
@@ -123,6 +167,7 @@ void scene_gpu_bind(struct scene_gpu *gpu)
 {
     struct gpu_device *device = gpu->device;
     gpu_buffer_bind_texels(gpu->device, &gpu->instance_buffer, UNIT_INSTANCES, GL_RGBA32UI);
+    gpu_buffer_bind_texels(gpu->device, &gpu->motion_buffer, UNIT_MOTIONS, GL_RGBA32F);
     gpu_buffer_bind_texels(gpu->device, &gpu->geometry_buffer, UNIT_GEOMETRIES, GL_RGBA32UI);
     gpu_buffer_bind_storage(&gpu->materials, BIND_MATERIALS);
     gpu_buffer_bind_storage(&gpu->texture_slots, BIND_TEXTURE_SLOTS);
@@ -143,14 +188,11 @@ void scene_gpu_bind(struct scene_gpu *gpu)
 
 uint64_t scene_gpu_device_bytes(const struct scene_gpu *gpu)
 {
-    const struct gpu_buffer *buffers[] = {
-        &gpu->triangles,   &gpu->positions, &gpu->normals,         &gpu->tangents,
-        &gpu->texcoords,   &gpu->colours,   &gpu->spheres,         &gpu->materials,
-        &gpu->textures,    &gpu->texels,    &gpu->instance_buffer, &gpu->geometry_buffer,
-        &gpu->disc_buffer, &gpu->lights,    &gpu->texture_slots,   &gpu->sphere_materials,
-    };
+    struct scene_gpu copy = *gpu; /* the list is one for those who change the buffers too */
+    struct gpu_buffer *buffers[BUFFERS_MAX];
+    size_t count = list_buffers(&copy, buffers);
     uint64_t bytes = gpu->environment.size_bytes;
-    for (size_t i = 0; i < sizeof(buffers) / sizeof(buffers[0]); i++)
+    for (size_t i = 0; i < count; i++)
         bytes += buffers[i]->capacity_bytes;
     return bytes;
 }

@@ -18,8 +18,7 @@
 /* What one update changed; a tracer does no more than that needs. */
 struct scene_changes {
     bool geometry;  /* primitives were added, removed or changed */
-    bool deformed;  /* vertices of geometries that deform are elsewhere, of the same primitives: which ones, their
-                       deformed_revision tells. Not set beside `geometry` alone for those that are new */
+    bool deformed;  /* vertices of deforming geometries are others; of which, their deformed_revision tells */
     bool instances; /* transforms, or which instances there are */
     bool shading;   /* materials, textures; alpha too */
     bool lights;
@@ -33,9 +32,9 @@ struct scene_gpu_geometry {
     const struct scene_spheres *spheres;
     uint64_t revision; /* of the object: unchanged means the same primitives, and the same shape where node is 0 */
     uint32_t id;       /* the object's id; unique together with `node` and which of the two is set */
-    uint32_t node;     /* deforms the mesh, and is the only one that shows this geometry; 0: the mesh as it is, or a
-                          set of spheres. With a skin its vertices are in world space, and the transform of its
-                          instance is the identity */
+    uint32_t node; /* deforms the mesh, and is the only one that shows this geometry; 0: the mesh as it is, or a
+                      set of spheres. With a skin its vertices are in world space, and the transform of its
+                      instance is the identity */
     uint64_t deformed_revision; /* counts up whenever its vertices, or those as the shutter closes, are others; 0:
                                    they are those of the mesh */
     float lower[3], upper[3];   /* bounds in object space while the shutter is open; of what deforms conservative:
@@ -44,12 +43,16 @@ struct scene_gpu_geometry {
 
 struct scene_gpu {
     struct gpu_device *device;
-    const struct scene *scene; /* of the last update, for tracers on the host; valid until it is edited */
-    uint64_t revision;         /* of the scene that is on the device */
+    const struct scene *scene;         /* of the last update, for tracers on the host; valid until it is edited */
+    const struct scene_motion *motion; /* likewise; NULL: things are as they were committed. The caller's: valid as
+                                          long as it keeps it, which is until the tracers are up to date */
+    uint64_t revision;                 /* of the scene that is on the device */
     struct scene_gpu_geometry *geometries;
     uint32_t geometry_count;
     struct instance *instances; /* mirror of the buffer */
     uint32_t instance_count;
+    float (*motions)[12];  /* mirror of the buffer: that of instance i begin at (instances[i].motion - 1) / 3 */
+    uint32_t motion_count; /* matrices */
     struct disc *discs;
     uint32_t disc_count;
     uint32_t material_count, light_count;
@@ -63,7 +66,7 @@ struct scene_gpu {
     float diagonal;                       /* of these bounds */
     /* buffers as shared/geometry.h and shared/material.h describe them */
     struct gpu_buffer triangles, positions, normals, tangents, texcoords, colours, spheres, sphere_materials;
-    struct gpu_buffer instance_buffer, geometry_buffer, disc_buffer;
+    struct gpu_buffer instance_buffer, motion_buffer, geometry_buffer, disc_buffer;
     struct gpu_buffer materials, texture_slots, textures, texels, lights;
     struct gpu_texture environment;
     float environment_colour[3], environment_rotation;
@@ -78,6 +81,9 @@ void scene_gpu_finish(struct scene_gpu *gpu);
  * made anew by the next update. */
 bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error);
+/* Of an instance in world space, wherever it goes while the shutter is open. */
+void scene_gpu_instance_bounds(const struct scene_gpu *gpu, uint32_t instance, float lower_world[3],
+                               float upper_world[3]);
 /* Binds every buffer and texture at its place of shared/bindings.h. */
 void scene_gpu_bind(struct scene_gpu *gpu);
 uint64_t scene_gpu_device_bytes(const struct scene_gpu *gpu);

@@ -10,7 +10,8 @@
 
 struct totals {
     uint64_t triangles, vertices, spheres;
-    uint32_t flags; /* GEOMETRY_HAS_*, of any mesh */
+    uint64_t close_vertices; /* behind the vertices: those of what deforms, as the shutter closes */
+    uint32_t flags;          /* GEOMETRY_HAS_*, of any mesh */
 };
 
 static int by_id(const void *a, const void *b)
@@ -36,32 +37,91 @@ static uint32_t mesh_flags(const struct scene_mesh *mesh)
     return flags;
 }
 
-/* Meshes by id, then sphere sets by id: the same scene has the same order however it came about. */
-static bool list_geometries(struct scene_gpu *gpu, const struct scene *scene, struct error *error)
+/* By mesh id: whether a node shows the mesh as it is. */
+static bool find_rigid_meshes(const struct scene *scene, struct hashmap *shown)
 {
-    const struct hashmap *meshes = &scene->objects[SCENE_MESH], *sets = &scene->objects[SCENE_SPHERES];
-    size_t total = meshes->count + sets->count, n = 0, cursor = 0;
+    size_t cursor = 0;
     uint64_t id;
     void *value;
+    bool ok = true;
+    while (ok && hashmap_next(&scene->objects[SCENE_NODE], &cursor, &id, &value)) {
+        const struct scene_node *node = value;
+        const struct scene_mesh *mesh = node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;
+        if (mesh && !scene_node_deforms(node, mesh))
+            ok = hashmap_put(shown, node->object, value);
+    }
+    return ok;
+}
+
+/* A mesh that nodes deform has no rigid geometry beside theirs unless another node shows it as it is. */
+static bool is_only_deformed(const struct scene_gpu *gpu, uint32_t mesh, const struct hashmap *shown)
+{
+    const struct scene_gpu_deform *deform = &gpu->state->deform;
+    bool deforms = false;
+    for (uint32_t i = 0; !deforms && i < deform->use_count; i++)
+        deforms = deform->uses[i].mesh_id == mesh;
+    return deforms && !hashmap_get(shown, mesh);
+}
+
+static void add_meshes(struct scene_gpu *gpu, const struct scene *scene, const struct hashmap *shown)
+{
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, &id, &value)) {
+        const struct scene_mesh *mesh = value;
+        if (is_only_deformed(gpu, (uint32_t)id, shown))
+            continue;
+        struct scene_gpu_geometry *geometry = &gpu->geometries[gpu->geometry_count++];
+        *geometry = (struct scene_gpu_geometry){.mesh = mesh, .id = (uint32_t)id, .revision = mesh->base.revision};
+        memcpy(geometry->lower, mesh->lower, sizeof(geometry->lower));
+        memcpy(geometry->upper, mesh->upper, sizeof(geometry->upper));
+    }
+    qsort(gpu->geometries, gpu->geometry_count, sizeof(*gpu->geometries), by_id);
+}
+
+static void add_sphere_sets(struct scene_gpu *gpu, const struct scene *scene)
+{
+    uint32_t first = gpu->geometry_count;
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    while (hashmap_next(&scene->objects[SCENE_SPHERES], &cursor, &id, &value)) {
+        const struct scene_spheres *set = value;
+        struct scene_gpu_geometry *geometry = &gpu->geometries[gpu->geometry_count++];
+        *geometry =
+            (struct scene_gpu_geometry){.spheres = set, .id = (uint32_t)id, .revision = set->base.revision};
+        memcpy(geometry->lower, set->lower, sizeof(geometry->lower));
+        memcpy(geometry->upper, set->upper, sizeof(geometry->upper));
+    }
+    qsort(gpu->geometries + first, gpu->geometry_count - first, sizeof(*gpu->geometries), by_id);
+}
+
+/* Meshes by id, then sphere sets by id, then deformed meshes by node: the same scene has the same order however it
+ * came about. */
+static bool list_geometries(struct scene_gpu *gpu, const struct scene *scene, struct error *error)
+{
+    const struct scene_gpu_deform *deform = &gpu->state->deform;
+    struct hashmap shown = {0};
+    size_t total = scene->objects[SCENE_MESH].count + scene->objects[SCENE_SPHERES].count + deform->use_count;
     free(gpu->geometries);
     gpu->geometry_count = 0;
     gpu->geometries = calloc(total ? total : 1, sizeof(*gpu->geometries));
-    if (!gpu->geometries)
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %zu geometries", total);
-    while (hashmap_next(meshes, &cursor, &id, &value)) {
-        const struct scene_mesh *mesh = value;
-        gpu->geometries[n++] =
-            (struct scene_gpu_geometry){.mesh = mesh, .id = (uint32_t)id, .revision = mesh->base.revision};
+    bool ok = gpu->geometries && (deform->use_count == 0 || find_rigid_meshes(scene, &shown));
+    if (ok) {
+        add_meshes(gpu, scene, &shown);
+        add_sphere_sets(gpu, scene);
+        gpu->state->rigid_count = gpu->geometry_count;
     }
-    qsort(gpu->geometries, n, sizeof(*gpu->geometries), by_id);
-    for (cursor = 0; hashmap_next(sets, &cursor, &id, &value);) {
-        const struct scene_spheres *set = value;
-        gpu->geometries[n++] =
-            (struct scene_gpu_geometry){.spheres = set, .id = (uint32_t)id, .revision = set->base.revision};
-    }
-    qsort(gpu->geometries + meshes->count, n - meshes->count, sizeof(*gpu->geometries), by_id);
-    gpu->geometry_count = (uint32_t)n;
-    return true;
+    hashmap_finish(&shown);
+    for (uint32_t i = 0; ok && i < deform->use_count; i++)
+        gpu->geometries[gpu->geometry_count++] = (struct scene_gpu_geometry){
+            .mesh = scene_mesh(scene, deform->uses[i].mesh_id),
+            .id = deform->uses[i].mesh_id,
+            .revision = deform->uses[i].mesh_revision,
+            .node = deform->uses[i].node,
+        };
+    return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %zu geometries", total);
 }
 
 /* Where each geometry's part of the buffers begins. */
@@ -81,6 +141,7 @@ static struct totals lay_out(struct scene_gpu *gpu)
             };
             totals.triangles += geometry->mesh->triangle_count;
             totals.vertices += geometry->mesh->vertex_count;
+            totals.close_vertices += geometry->node ? geometry->mesh->vertex_count : 0;
             totals.flags |= geometry->device.flags;
         } else {
             geometry->device = (struct geometry){
@@ -99,7 +160,9 @@ static bool check_totals(const struct scene_gpu *gpu, const struct totals *total
     const struct {
         const char *what;
         uint64_t count;
-    } rows[] = {{"triangles", totals->triangles}, {"vertices", totals->vertices}, {"spheres", totals->spheres}};
+    } rows[] = {{"triangles", totals->triangles},
+                {"vertices", totals->vertices + totals->close_vertices},
+                {"spheres", totals->spheres}};
     uint64_t max = gpu->device->facts.texture_buffer_texels_max;
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
         if (rows[i].count > max)
@@ -147,9 +210,11 @@ static void pack_triangles(const struct scene_gpu *gpu, const struct scene_gpu_g
     }
 }
 
-static void pack_positions(const struct scene_gpu *gpu, const struct scene_gpu_geometry *geometry, float *out)
+/* Of what deforms the positions, and normals and tangents where it has some, are the device's to make. */
+static void pack_positions(const struct scene_gpu_geometry *geometry, float *out)
 {
-    (void)gpu;
+    if (geometry->node)
+        return;
     const float *in = (const float *)(const void *)geometry->mesh->arrays[MESH_POSITIONS]->data;
     out += (size_t)geometry->device.first_vertex * 4;
     for (size_t i = 0; i < geometry->mesh->vertex_count; i++) {
@@ -172,6 +237,8 @@ static void pack_normals(const struct scene_gpu_geometry *geometry, float *out)
         memset(out, 0, (size_t)mesh->vertex_count * 4 * sizeof(float));
         return;
     }
+    if (geometry->node)
+        return;
     const float *in = (const float *)(const void *)mesh->arrays[MESH_NORMALS]->data;
     const float *tangents = NULL;
     if (geometry->device.flags & GEOMETRY_HAS_TANGENTS)
@@ -209,6 +276,8 @@ static void pack_tangents(const struct scene_gpu_geometry *geometry, uint32_t *o
         memset(out, 0, (size_t)mesh->vertex_count * sizeof(*out));
         return;
     }
+    if (geometry->node)
+        return;
     const float *in = (const float *)(const void *)mesh->arrays[MESH_TANGENTS]->data;
     for (size_t i = 0; i < mesh->vertex_count; i++)
         out[i] = pack_unit(&in[4 * i]);
@@ -255,14 +324,15 @@ static void pack_colours(const struct scene_gpu_geometry *geometry, uint32_t *ou
 static bool upload_meshes(struct scene_gpu *gpu, const struct totals *totals, struct scene_changes *changes,
                           struct error *error)
 {
+    uint64_t moving = totals->vertices + totals->close_vertices;
     if (totals->triangles) {
         PACK(triangles, totals->triangles * 4, uint32_t, pack_triangles(gpu, &gpu->geometries[i], out));
-        PACK(positions, totals->vertices * 4, float, pack_positions(gpu, &gpu->geometries[i], out));
+        PACK(positions, moving * 4, float, pack_positions(&gpu->geometries[i], out));
     }
     if (totals->flags & GEOMETRY_HAS_NORMALS)
-        PACK(normals, totals->vertices * 4, float, pack_normals(&gpu->geometries[i], out));
+        PACK(normals, moving * 4, float, pack_normals(&gpu->geometries[i], out));
     if (totals->flags & GEOMETRY_HAS_TANGENTS)
-        PACK(tangents, totals->vertices, uint32_t, pack_tangents(&gpu->geometries[i], out));
+        PACK(tangents, moving, uint32_t, pack_tangents(&gpu->geometries[i], out));
     if (totals->flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1))
         PACK(texcoords, totals->vertices * 4, float, pack_texcoords(&gpu->geometries[i], out));
     if (totals->flags & GEOMETRY_HAS_COLOURS)
@@ -321,14 +391,17 @@ static void refresh_pointers(struct scene_gpu *gpu, const struct scene *scene)
 bool scene_gpu_upload_geometry(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
                                struct error *error)
 {
-    uint64_t signature = scene_gpu_signature(scene, SCENE_MESH) * 3 + scene_gpu_signature(scene, SCENE_SPHERES);
+    uint64_t signature = scene_gpu_signature(scene, SCENE_MESH) * 3 + scene_gpu_signature(scene, SCENE_SPHERES) +
+                         scene_gpu_deform_signature(scene) * 5;
     if (gpu->state->any_update && signature == gpu->state->shapes_signature) {
         refresh_pointers(gpu, scene);
         return true;
     }
-    if (!list_geometries(gpu, scene, error))
+    if (!scene_gpu_deform_list(&gpu->state->deform, scene, error) || !list_geometries(gpu, scene, error))
         return false;
     struct totals totals = lay_out(gpu);
+    gpu->state->close_vertex = (uint32_t)totals.vertices;
+    gpu->state->stale_geometries = true;
     struct gpu_buffer *optional[] = {&gpu->triangles, &gpu->positions, &gpu->normals, &gpu->tangents,
                                      &gpu->texcoords, &gpu->colours,   &gpu->spheres, &gpu->sphere_materials};
     for (size_t i = 0; i < sizeof(optional) / sizeof(optional[0]); i++)
@@ -336,19 +409,20 @@ bool scene_gpu_upload_geometry(struct scene_gpu *gpu, const struct scene *scene,
             return false;
     changes->geometry = true;
     if (!check_totals(gpu, &totals, error) || !upload_meshes(gpu, &totals, changes, error) ||
-        !upload_spheres(gpu, &totals, changes, error))
+        !upload_spheres(gpu, &totals, changes, error) || !scene_gpu_deform_upload_rest(gpu, scene, changes, error))
         return false;
     gpu->state->shapes_signature = signature;
     return true;
 }
 
-/* What a material asks of the tracers. */
-static void classify_material(struct scene_gpu *gpu, const struct scene *scene, uint32_t material_id,
-                              uint32_t *geometry_flags)
+/* What a material asks of the tracers, as it is when the shutter opens. */
+static void classify_material(struct scene_gpu *gpu, const struct scene *scene, const struct scene_pose *pose,
+                              uint32_t material_id, uint32_t *geometry_flags)
 {
     const struct scene_material *material = scene_material(scene, material_id);
     if (!material)
         return;
+    material = scene_pose_material(pose, material);
     if (material->alpha_mode == ALPHA_MASK) {
         *geometry_flags |= GEOMETRY_HAS_CUTOUT;
         gpu->has_cutout = true;
@@ -358,21 +432,10 @@ static void classify_material(struct scene_gpu *gpu, const struct scene *scene, 
     gpu->has_transmission |= material->transmission > 0.0f;
 }
 
-static void classify_discs(struct scene_gpu *gpu, const struct scene *scene)
+void scene_gpu_classify_geometry(struct scene_gpu *gpu, const struct scene *scene,
+                                 const struct scene_motion *motion)
 {
-    size_t cursor = 0;
-    uint64_t id;
-    void *value;
-    uint32_t ignored = 0;
-    while (hashmap_next(&scene->objects[SCENE_DISC], &cursor, &id, &value))
-        classify_material(gpu, scene, ((const struct scene_disc *)value)->material, &ignored);
-}
-
-bool scene_gpu_classify_geometry(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
-                                 struct error *error)
-{
-    size_t bytes = gpu->geometry_count * sizeof(struct geometry);
-    bool changed = changes->geometry;
+    const struct scene_pose *pose = motion ? &motion->poses[0] : NULL;
     gpu->has_cutout = false;
     gpu->has_translucent = false;
     gpu->has_transmission = false;
@@ -383,12 +446,23 @@ bool scene_gpu_classify_geometry(struct scene_gpu *gpu, const struct scene *scen
         uint32_t flags = geometry->device.flags & ~GEOMETRY_HAS_CUTOUT;
         for (uint32_t k = 0; k < range_count; k++)
             if (ranges[k].count > 0)
-                classify_material(gpu, scene, ranges[k].material, &flags);
-        changed |= flags != geometry->device.flags;
+                classify_material(gpu, scene, pose, ranges[k].material, &flags);
+        if (flags != geometry->device.flags)
+            gpu->state->stale_geometries = true;
         geometry->device.flags = flags;
     }
-    classify_discs(gpu, scene);
-    if (!changed)
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    uint32_t ignored = 0;
+    while (hashmap_next(&scene->objects[SCENE_DISC], &cursor, &id, &value))
+        classify_material(gpu, scene, pose, ((const struct scene_disc *)value)->material, &ignored);
+}
+
+bool scene_gpu_upload_geometry_table(struct scene_gpu *gpu, struct scene_changes *changes, struct error *error)
+{
+    size_t bytes = gpu->geometry_count * sizeof(struct geometry);
+    if (!gpu->state->stale_geometries)
         return true;
     struct geometry *out = gpu_buffer_map(gpu->device, &gpu->geometry_buffer, bytes, error);
     if (!out)
@@ -397,5 +471,6 @@ bool scene_gpu_classify_geometry(struct scene_gpu *gpu, const struct scene *scen
         out[i] = gpu->geometries[i].device;
     gpu_buffer_unmap(gpu->device, &gpu->geometry_buffer);
     changes->uploaded_bytes += bytes;
+    gpu->state->stale_geometries = false;
     return true;
 }

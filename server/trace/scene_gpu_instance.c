@@ -14,10 +14,10 @@ static int compare_ids(uint32_t a, uint32_t b)
     return a < b ? -1 : a > b;
 }
 
-/* Geometries are sorted by id, meshes before sphere sets. */
-static bool find_geometry(const struct scene_gpu *gpu, bool is_mesh, uint32_t id, uint32_t *index)
+/* Those that do not deform are sorted by id, meshes before sphere sets. */
+static bool find_rigid(const struct scene_gpu *gpu, bool is_mesh, uint32_t id, uint32_t *index)
 {
-    uint32_t low = 0, high = gpu->geometry_count;
+    uint32_t low = 0, high = gpu->state->rigid_count;
     while (low < high) {
         uint32_t middle = low + (high - low) / 2;
         const struct scene_gpu_geometry *geometry = &gpu->geometries[middle];
@@ -34,6 +34,24 @@ static bool find_geometry(const struct scene_gpu *gpu, bool is_mesh, uint32_t id
     return false;
 }
 
+/* Behind them, those that do, by their nodes. */
+static bool find_deforming(const struct scene_gpu *gpu, uint32_t node, uint32_t *index)
+{
+    uint32_t low = gpu->state->rigid_count, high = gpu->geometry_count;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2;
+        if (gpu->geometries[middle].node == node) {
+            *index = middle;
+            return true;
+        }
+        if (gpu->geometries[middle].node < node)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return false;
+}
+
 static double determinant(const float m[12])
 {
     return (double)m[0] * ((double)m[5] * m[10] - (double)m[6] * m[9]) -
@@ -41,48 +59,128 @@ static double determinant(const float m[12])
            (double)m[2] * ((double)m[4] * m[9] - (double)m[5] * m[8]);
 }
 
-static uint32_t pack_instances(const struct scene_gpu *gpu, const struct scene_instance *list, size_t count,
-                               bool is_mesh, struct instance *out)
+/* The instances as they will be, and their matrices over the shutter's time. */
+struct fresh {
+    struct instance *instances;
+    uint32_t count;
+    float (*motions)[12];
+    uint32_t motion_count;
+};
+
+/* What is shown of one kind, in each of the poses; by node ids. */
+struct posed {
+    uint32_t pose_count;
+    struct scene_instance *list[MOTION_POSES_MAX];
+    size_t count[MOTION_POSES_MAX];
+    size_t cursor[MOTION_POSES_MAX];
+};
+
+static void posed_finish(struct posed *posed)
 {
-    uint32_t n = 0;
-    for (size_t i = 0; i < count; i++) {
-        uint32_t geometry;
-        if (list[i].singular || !find_geometry(gpu, is_mesh, list[i].node->object, &geometry))
-            continue;
-        struct instance *instance = &out[n++];
-        *instance = (struct instance){
-            .geometry = geometry,
-            .node = list[i].node->base.id,
-            .flags = determinant(list[i].world_from_object) < 0.0 ? INSTANCE_MIRRORED : 0,
-        };
-        memcpy(instance->world_from_object, list[i].world_from_object, sizeof(instance->world_from_object));
-        memcpy(instance->object_from_world, list[i].object_from_world, sizeof(instance->object_from_world));
-    }
-    return n;
+    for (uint32_t p = 0; p < posed->pose_count; p++)
+        free(posed->list[p]);
 }
 
-static bool same_set(const struct scene_gpu *gpu, const struct instance *fresh, uint32_t count)
+static bool posed_init(struct posed *posed, const struct scene *scene, const struct scene_motion *motion,
+                       enum scene_node_kind kind)
 {
-    if (!gpu->state->any_update || count != gpu->instance_count)
-        return false;
-    for (uint32_t i = 0; i < count; i++)
-        if (fresh[i].node != gpu->instances[i].node || fresh[i].geometry != gpu->instances[i].geometry)
+    *posed = (struct posed){.pose_count = motion ? motion->pose_count : 1};
+    for (uint32_t p = 0; p < posed->pose_count; p++)
+        if (!scene_flatten(scene, motion ? &motion->poses[p] : NULL, kind, &posed->list[p], &posed->count[p]))
             return false;
     return true;
 }
+
+/* Where the i-th of the first pose's instances is in each pose; false: it is flat in one of them. What a later
+ * pose hides stays where it was last seen: it is there while the shutter is open if it is there when it opens. */
+static bool matrices_of(struct posed *posed, size_t i, const float *matrices[MOTION_POSES_MAX])
+{
+    const struct scene_instance *first = &posed->list[0][i];
+    bool regular = !first->singular;
+    matrices[0] = first->world_from_object;
+    for (uint32_t p = 1; p < posed->pose_count; p++) {
+        const struct scene_instance *list = posed->list[p];
+        size_t *at = &posed->cursor[p];
+        while (*at < posed->count[p] && list[*at].node->base.id < first->node->base.id)
+            ++*at;
+        bool shown = *at < posed->count[p] && list[*at].node == first->node;
+        matrices[p] = shown ? list[*at].world_from_object : matrices[p - 1];
+        regular = regular && !(shown && list[*at].singular);
+    }
+    return regular;
+}
+
+static void add_motion(struct fresh *fresh, struct instance *instance, const float *const *matrices,
+                       uint32_t pose_count)
+{
+    bool moves = false;
+    for (uint32_t p = 1; p < pose_count; p++)
+        moves = moves || memcmp(matrices[p], matrices[0], 12 * sizeof(float)) != 0;
+    if (!moves)
+        return;
+    instance->motion = fresh->motion_count * 3 + 1;
+    instance->flags |= pose_count << INSTANCE_POSES_SHIFT;
+    for (uint32_t p = 0; p < pose_count; p++)
+        memcpy(fresh->motions[fresh->motion_count++], matrices[p], 12 * sizeof(float));
+}
+
+/* With a skin the vertices are in world space already. */
+static void place_in_world(struct instance *instance)
+{
+    for (size_t k = 0; k < 3; k++)
+        instance->world_from_object[k][k] = instance->object_from_world[k][k] = 1.0f;
+}
+
+static void pack_instances(const struct scene_gpu *gpu, struct posed *posed, bool is_mesh, struct fresh *fresh)
+{
+    for (size_t i = 0; i < posed->count[0]; i++) {
+        const struct scene_instance *in = &posed->list[0][i];
+        const float *matrices[MOTION_POSES_MAX];
+        uint32_t geometry;
+        bool deforms = is_mesh && find_deforming(gpu, in->node->base.id, &geometry);
+        bool in_world = deforms && scene_gpu_has_skin(gpu, geometry);
+        if (!deforms && !find_rigid(gpu, is_mesh, in->node->object, &geometry))
+            continue;
+        if (!in_world && !matrices_of(posed, i, matrices))
+            continue;
+        struct instance *instance = &fresh->instances[fresh->count++];
+        *instance = (struct instance){.geometry = geometry, .node = in->node->base.id};
+        if (in_world) {
+            place_in_world(instance);
+            continue;
+        }
+        instance->flags = determinant(in->world_from_object) < 0.0 ? INSTANCE_MIRRORED : 0;
+        memcpy(instance->world_from_object, in->world_from_object, sizeof(instance->world_from_object));
+        memcpy(instance->object_from_world, in->object_from_world, sizeof(instance->object_from_world));
+        add_motion(fresh, instance, matrices, posed->pose_count);
+    }
+}
+
+static bool same_set(const struct scene_gpu *gpu, const struct fresh *fresh)
+{
+    if (!gpu->state->any_update || fresh->count != gpu->instance_count)
+        return false;
+    for (uint32_t i = 0; i < fresh->count; i++)
+        if (fresh->instances[i].node != gpu->instances[i].node ||
+            fresh->instances[i].geometry != gpu->instances[i].geometry)
+            return false;
+    return true;
+}
+
+/* Equal ones between two that changed go along if they are so few: a call costs more than their bytes. */
+#define GAP_INSTANCES_MAX 4u
 
 /* Writes the runs that differ from the mirror. */
 static void write_changed(struct scene_gpu *gpu, const struct instance *fresh, uint32_t count,
                           struct scene_changes *changes)
 {
-    for (uint32_t i = 0; i < count;) {
-        uint32_t end = i;
-        while (end < count && memcmp(&fresh[end], &gpu->instances[end], sizeof(*fresh)) != 0)
-            end++;
-        if (end == i) {
-            i++;
+    for (uint32_t i = 0; i < count; i++) {
+        if (memcmp(&fresh[i], &gpu->instances[i], sizeof(*fresh)) == 0)
             continue;
-        }
+        uint32_t end = i + 1;
+        for (uint32_t k = end; k < count && k - end <= GAP_INSTANCES_MAX; k++)
+            if (memcmp(&fresh[k], &gpu->instances[k], sizeof(*fresh)) != 0)
+                end = k + 1;
         size_t bytes = (end - i) * sizeof(*fresh);
         gpu_buffer_write(gpu->device, &gpu->instance_buffer, i * sizeof(*fresh), &fresh[i], bytes);
         changes->instances = true;
@@ -91,44 +189,65 @@ static void write_changed(struct scene_gpu *gpu, const struct instance *fresh, u
     }
 }
 
-static bool flatten(struct scene_gpu *gpu, const struct scene *scene, struct instance **fresh, uint32_t *count,
-                    struct error *error)
+static bool flatten(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
+                    struct fresh *fresh, struct error *error)
 {
-    struct scene_instance *meshes = NULL, *sets = NULL;
-    size_t mesh_count = 0, set_count = 0;
-    *fresh = NULL;
-    if (scene_flatten(scene, NULL, NODE_MESH, &meshes, &mesh_count) &&
-        scene_flatten(scene, NULL, NODE_SPHERES, &sets, &set_count))
-        *fresh = calloc(mesh_count + set_count + 1, sizeof(**fresh));
-    if (*fresh) {
-        *count = pack_instances(gpu, meshes, mesh_count, true, *fresh);
-        *count += pack_instances(gpu, sets, set_count, false, *fresh + *count);
+    struct posed meshes = {0}, sets = {0};
+    *fresh = (struct fresh){0};
+    bool ok = posed_init(&meshes, scene, motion, NODE_MESH) && posed_init(&sets, scene, motion, NODE_SPHERES);
+    if (ok) {
+        size_t count = meshes.count[0] + sets.count[0];
+        fresh->instances = calloc(count + 1, sizeof(*fresh->instances));
+        fresh->motions = malloc((meshes.pose_count > 1 ? count * meshes.pose_count : 1) * sizeof(*fresh->motions));
+        ok = fresh->instances && fresh->motions;
     }
-    free(meshes);
-    free(sets);
-    return *fresh || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the instances of a scene");
+    if (ok) {
+        pack_instances(gpu, &meshes, true, fresh);
+        pack_instances(gpu, &sets, false, fresh);
+    }
+    posed_finish(&meshes);
+    posed_finish(&sets);
+    return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the instances of a scene");
 }
 
-bool scene_gpu_upload_instances(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
+static bool upload(struct scene_gpu *gpu, const struct fresh *fresh, struct scene_changes *changes,
+                   struct error *error)
+{
+    if (same_set(gpu, fresh)) {
+        write_changed(gpu, fresh->instances, fresh->count, changes);
+    } else {
+        size_t bytes = fresh->count * sizeof(*fresh->instances);
+        if (!gpu_buffer_upload(gpu->device, &gpu->instance_buffer, fresh->instances, bytes, error))
+            return false;
+        changes->instances = true;
+        changes->uploaded_bytes += bytes;
+    }
+    size_t bytes = fresh->motion_count * sizeof(*fresh->motions);
+    if (fresh->motion_count == gpu->motion_count && (!bytes || memcmp(fresh->motions, gpu->motions, bytes) == 0))
+        return true;
+    if (!gpu_buffer_upload(gpu->device, &gpu->motion_buffer, fresh->motions, bytes, error))
+        return false;
+    changes->instances = true;
+    changes->uploaded_bytes += bytes;
+    return true;
+}
+
+bool scene_gpu_upload_instances(struct scene_gpu *gpu, const struct scene *scene,
+                                const struct scene_motion *motion, struct scene_changes *changes,
                                 struct error *error)
 {
-    struct instance *fresh;
-    uint32_t count = 0;
-    if (!flatten(gpu, scene, &fresh, &count, error))
+    struct fresh fresh;
+    if (!flatten(gpu, scene, motion, &fresh, error) || !upload(gpu, &fresh, changes, error)) {
+        free(fresh.instances);
+        free(fresh.motions);
         return false;
-    if (same_set(gpu, fresh, count)) {
-        write_changed(gpu, fresh, count, changes);
-    } else {
-        if (!gpu_buffer_upload(gpu->device, &gpu->instance_buffer, fresh, count * sizeof(*fresh), error)) {
-            free(fresh);
-            return false;
-        }
-        changes->instances = true;
-        changes->uploaded_bytes += count * sizeof(*fresh);
     }
     free(gpu->instances);
-    gpu->instances = fresh;
-    gpu->instance_count = count;
+    free(gpu->motions);
+    gpu->instances = fresh.instances;
+    gpu->instance_count = fresh.count;
+    gpu->motions = fresh.motions;
+    gpu->motion_count = fresh.motion_count;
     return true;
 }
 
@@ -189,19 +308,39 @@ static void grow(float lower[3], float upper[3], const float low[3], const float
     }
 }
 
-void scene_gpu_instance_bounds(const struct scene_gpu *gpu, float lower[3], float upper[3])
+void scene_gpu_instance_bounds(const struct scene_gpu *gpu, uint32_t index, float lower_world[3],
+                               float upper_world[3])
+{
+    const struct instance *instance = &gpu->instances[index];
+    const struct scene_gpu_geometry *geometry = &gpu->geometries[instance->geometry];
+    if (instance->motion == 0) {
+        affine_bounds(lower_world, upper_world, (const float *)(const void *)instance->world_from_object,
+                      geometry->lower, geometry->upper);
+        return;
+    }
+    /* Between two poses a point goes straight from where the one has it to where the other does. */
+    uint32_t pose_count = instance->flags >> INSTANCE_POSES_SHIFT & INSTANCE_POSES_MASK;
+    uint32_t first = (instance->motion - 1) / 3;
+    for (uint32_t p = 0; p < pose_count; p++) {
+        float low[3], high[3];
+        affine_bounds(low, high, gpu->motions[first + p], geometry->lower, geometry->upper);
+        if (p == 0) {
+            memcpy(lower_world, low, sizeof(low));
+            memcpy(upper_world, high, sizeof(high));
+        }
+        grow(lower_world, upper_world, low, high);
+    }
+}
+
+void scene_gpu_all_instance_bounds(const struct scene_gpu *gpu, float lower[3], float upper[3])
 {
     for (int k = 0; k < 3; k++) {
         lower[k] = FLT_MAX;
         upper[k] = -FLT_MAX;
     }
     for (uint32_t i = 0; i < gpu->instance_count; i++) {
-        const struct scene_gpu_geometry *geometry = &gpu->geometries[gpu->instances[i].geometry];
-        const float *low = geometry->mesh ? geometry->mesh->lower : geometry->spheres->lower;
-        const float *high = geometry->mesh ? geometry->mesh->upper : geometry->spheres->upper;
-        float low_world[3], high_world[3];
-        affine_bounds(low_world, high_world, (const float *)(const void *)gpu->instances[i].world_from_object, low,
-                      high);
-        grow(lower, upper, low_world, high_world);
+        float low[3], high[3];
+        scene_gpu_instance_bounds(gpu, i, low, high);
+        grow(lower, upper, low, high);
     }
 }

@@ -64,18 +64,19 @@ static bool pack_light(const struct scene_light *in, const float world_from_ligh
     return true;
 }
 
-static bool pack_lights(struct scene_gpu *gpu, const struct scene *scene, struct light **packed,
-                        struct error *error)
+static bool pack_lights(struct scene_gpu *gpu, const struct scene *scene, const struct scene_pose *pose,
+                        struct light **packed, struct error *error)
 {
     struct scene_instance *list = NULL;
     size_t count = 0;
     *packed = NULL;
-    if (scene_flatten(scene, NULL, NODE_LIGHT, &list, &count))
+    if (scene_flatten(scene, pose, NODE_LIGHT, &list, &count))
         *packed = calloc(count + 1, sizeof(**packed));
     gpu->light_count = 0;
     for (size_t i = 0; *packed && i < count; i++) {
         const struct scene_light *light = scene_light(scene, list[i].node->object);
-        if (light && pack_light(light, list[i].world_from_object, *packed + gpu->light_count))
+        if (light &&
+            pack_light(scene_pose_light(pose, light), list[i].world_from_object, *packed + gpu->light_count))
             gpu->light_count++;
     }
     free(list);
@@ -116,7 +117,7 @@ static void grow(struct scene_gpu *gpu, const float point[3], float radius)
 
 static void find_bounds(struct scene_gpu *gpu, const struct light *lights)
 {
-    scene_gpu_instance_bounds(gpu, gpu->lower_world, gpu->upper_world);
+    scene_gpu_all_instance_bounds(gpu, gpu->lower_world, gpu->upper_world);
     for (uint32_t i = 0; i < gpu->light_count; i++) {
         float radius = lights[i].colour[3] + length3(lights[i].half_u_inner) + length3(lights[i].half_v_outer);
         if (lights[i].position_kind[3] != (float)LIGHT_KIND_DIRECTIONAL)
@@ -133,21 +134,26 @@ static void find_bounds(struct scene_gpu *gpu, const struct light *lights)
     gpu->diagonal = length3(size);
 }
 
-bool scene_gpu_upload_lights(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
-                             struct error *error)
+bool scene_gpu_upload_lights(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
+                             struct scene_changes *changes, struct error *error)
 {
+    uint32_t count_before = gpu->light_count;
     struct light *packed;
-    if (!upload_environment(gpu, scene, changes, error) || !pack_lights(gpu, scene, &packed, error))
+    if (!upload_environment(gpu, scene, changes, error) ||
+        !pack_lights(gpu, scene, motion ? &motion->poses[0] : NULL, &packed, error))
         return false;
     find_bounds(gpu, packed);
     size_t bytes = gpu->light_count * sizeof(*packed);
-    bool ok = true;
     /* Also after a change of geometry alone: then the lights are as they were. */
-    if (!gpu->state->any_update || gpu->lights_revision != scene->lights_revision) {
-        ok = gpu_buffer_upload(gpu->device, &gpu->lights, packed, bytes, error);
+    bool same = gpu->state->any_update && gpu->light_count == count_before &&
+                memcmp(packed, gpu->state->lights, bytes) == 0;
+    if (!gpu->state->any_update || gpu->lights_revision != scene->lights_revision)
         changes->lights = true;
-        changes->uploaded_bytes += bytes;
-    }
-    free(packed);
-    return ok;
+    free(gpu->state->lights);
+    gpu->state->lights = packed;
+    if (same)
+        return true;
+    changes->lights = true;
+    changes->uploaded_bytes += bytes;
+    return gpu_buffer_upload(gpu->device, &gpu->lights, packed, bytes, error);
 }

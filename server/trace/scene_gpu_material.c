@@ -129,10 +129,37 @@ static void pack_default(struct material *out)
     };
 }
 
-bool scene_gpu_upload_materials(struct scene_gpu *gpu, const struct scene *scene, struct scene_changes *changes,
+/* The items from the first that differs from the mirror to the last; all of them where the number is another. */
+static bool upload_changed(struct scene_gpu *gpu, struct gpu_buffer *buffer, const void *fresh, const void *mirror,
+                           size_t item_bytes, size_t count, struct scene_changes *changes, struct error *error)
+{
+    const char *now = fresh, *before = mirror;
+    if (!mirror || buffer->size_bytes != count * item_bytes) {
+        changes->shading = true;
+        changes->uploaded_bytes += count * item_bytes;
+        return gpu_buffer_upload(gpu->device, buffer, fresh, count * item_bytes, error);
+    }
+    size_t first = 0, end = count;
+    while (first < count && memcmp(now + first * item_bytes, before + first * item_bytes, item_bytes) == 0)
+        first++;
+    while (end > first && memcmp(now + (end - 1) * item_bytes, before + (end - 1) * item_bytes, item_bytes) == 0)
+        end--;
+    if (first == end)
+        return true;
+    changes->shading = true;
+    changes->uploaded_bytes += (end - first) * item_bytes;
+    gpu_buffer_write(gpu->device, buffer, first * item_bytes, now + first * item_bytes,
+                     (end - first) * item_bytes);
+    return true;
+}
+
+bool scene_gpu_upload_materials(struct scene_gpu *gpu, const struct scene *scene,
+                                const struct scene_motion *motion, struct scene_changes *changes,
                                 struct error *error)
 {
-    uint32_t count = gpu->state->material_indices.count, slot_count = 1;
+    const struct scene_pose *pose = motion ? &motion->poses[0] : NULL;
+    struct scene_gpu_state *state = gpu->state;
+    uint32_t count = state->material_indices.count, slot_count = 1;
     size_t slot_max = 1 + scene->objects[SCENE_MATERIAL].count * MATERIAL_TEXTURE_COUNT, cursor = 0;
     struct material *packed = calloc(count, sizeof(*packed));
     struct texture_slot *slots = calloc(slot_max, sizeof(*slots));
@@ -144,15 +171,16 @@ bool scene_gpu_upload_materials(struct scene_gpu *gpu, const struct scene *scene
     else
         pack_default(&packed[0]);
     while (ok && hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value))
-        pack_material(gpu, value, &packed[scene_gpu_material_index(gpu, (uint32_t)id)], slots, &slot_count);
-    ok = ok && gpu_buffer_upload(gpu->device, &gpu->materials, packed, count * sizeof(*packed), error) &&
-         gpu_buffer_upload(gpu->device, &gpu->texture_slots, slots, slot_count * sizeof(*slots), error);
-    free(packed);
-    free(slots);
-    if (!ok)
-        return false;
+        pack_material(gpu, scene_pose_material(pose, value), &packed[scene_gpu_material_index(gpu, (uint32_t)id)],
+                      slots, &slot_count);
+    ok = ok &&
+         upload_changed(gpu, &gpu->materials, packed, state->materials, sizeof(*packed), count, changes, error) &&
+         upload_changed(gpu, &gpu->texture_slots, slots, state->texture_slots, sizeof(*slots), slot_count, changes,
+                        error);
+    free(state->materials);
+    free(state->texture_slots);
+    state->materials = packed;
+    state->texture_slots = slots;
     gpu->material_count = count;
-    changes->shading = true;
-    changes->uploaded_bytes += count * sizeof(*packed) + slot_count * sizeof(*slots);
-    return true;
+    return ok;
 }

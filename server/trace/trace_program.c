@@ -8,10 +8,23 @@
 
 #define OWN_DEFINES_MAX 12
 
-const struct gpu_program *trace_program_get(const struct scene_gpu *scene, enum wave_kind kind,
+/* All rays at the time 0 see the first pose, which is what a program that knows no motion sees. */
+static bool has_motion(const struct scene_gpu *scene, const struct wave *wave)
+{
+    return scene->has_motion && wave->times;
+}
+
+static void bind_rays(const struct scene_gpu *scene, const struct wave *wave)
+{
+    gpu_buffer_bind_texels(scene->device, wave->rays, UNIT_RAYS, GL_RGBA32F);
+    if (has_motion(scene, wave))
+        gpu_buffer_bind_texels(scene->device, wave->times, UNIT_RAY_TIMES, GL_R32F);
+}
+
+const struct gpu_program *trace_program_get(const struct scene_gpu *scene, const struct wave *wave,
                                             const struct trace_program_source *source, struct error *error)
 {
-    struct gpu_define defines[OWN_DEFINES_MAX + 12] = {0};
+    struct gpu_define defines[OWN_DEFINES_MAX + 13] = {0};
     char traverse[128], together[16];
     size_t n = 0;
     /* In quotes: program.c takes the file to include from it. */
@@ -19,7 +32,7 @@ const struct gpu_program *trace_program_get(const struct scene_gpu *scene, enum 
     snprintf(together, sizeof(together), "%u", source->rays_together ? source->rays_together : 1);
     defines[n++] = (struct gpu_define){"TRAVERSE", traverse};
     defines[n++] = (struct gpu_define){"RAYS_TOGETHER", together};
-    if (kind == WAVE_ANY)
+    if (wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"ANY_HIT", "1"};
     if (scene->has_spheres)
         defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
@@ -27,10 +40,12 @@ const struct gpu_program *trace_program_get(const struct scene_gpu *scene, enum 
         defines[n++] = (struct gpu_define){"HAS_DISCS", "1"};
     if (scene->has_cutout)
         defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
+    if (has_motion(scene, wave))
+        defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
     /* To a closest hit a translucent surface is one like any other: no second program for it. */
-    if (scene->has_translucent && kind == WAVE_ANY)
+    if (scene->has_translucent && wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"HAS_TRANSLUCENT", "1"};
-    if (scene->has_transmission && kind == WAVE_ANY)
+    if (scene->has_transmission && wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"HAS_TRANSMISSION", "1"};
     for (size_t i = 0; i < OWN_DEFINES_MAX && source->defines && source->defines[i].name; i++)
         defines[n++] = source->defines[i];
@@ -42,14 +57,18 @@ bool trace_surfaces(const struct scene_gpu *scene, const struct wave *wave, stru
 {
     if (wave->kind == WAVE_ANY || wave->crossings_only)
         return true;
-    static const struct gpu_define spheres[] = {{"HAS_SPHERES", "1"}, {NULL, NULL}};
-    const struct gpu_program_source source = {.compute = "surface.comp",
-                                              .defines = scene->has_spheres ? spheres : NULL};
+    struct gpu_define defines[3] = {0};
+    size_t n = 0;
+    if (scene->has_spheres)
+        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    if (has_motion(scene, wave))
+        defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
+    const struct gpu_program_source source = {.compute = "surface.comp", .defines = defines};
     const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
     if (!program)
         return false;
     gpu_uniform_uint(program, "ray_count", wave->ray_count);
-    gpu_buffer_bind_texels(scene->device, wave->rays, UNIT_RAYS, GL_RGBA32F);
+    bind_rays(scene, wave);
     gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
     gpu_dispatch(scene->device, program, wave->ray_count);
     return true;
@@ -59,7 +78,7 @@ bool trace_program_run(const struct gpu_program *program, const struct scene_gpu
                        const struct trace_program_source *source, struct error *error)
 {
     uint32_t together = source->rays_together ? source->rays_together : 1;
-    gpu_buffer_bind_texels(scene->device, wave->rays, UNIT_RAYS, GL_RGBA32F);
+    bind_rays(scene, wave);
     if (wave->kind == WAVE_ANY)
         gpu_buffer_bind_storage(wave->visibility, BIND_VISIBILITY);
     else

@@ -19,9 +19,10 @@ struct trace_program_source {
     uint32_t rays_a_dispatch;         /* 0: all; a multiple of rays_together */
 };
 
-/* Compiled for what the scene has (spheres, cutouts, translucent surfaces) and for the kind of wave, or from the
- * device's cache. The tracer may set uniforms of its own on it before trace_program_run. */
-const struct gpu_program *trace_program_get(const struct scene_gpu *scene, enum wave_kind kind,
+/* Compiled for what the scene has (spheres, cutouts, translucent surfaces, motion where the wave has times) and
+ * for the kind of wave, or from the device's cache. The tracer may set uniforms of its own on it before
+ * trace_program_run. */
+const struct gpu_program *trace_program_get(const struct scene_gpu *scene, const struct wave *wave,
                                             const struct trace_program_source *source, struct error *error);
 /* Binds the wave's buffers, sets `ray_count`, `disc_count` and `instance_count`, dispatches, and makes hits of the
  * crossings. The scene's buffers and the tracer's own are bound already. */

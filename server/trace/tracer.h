@@ -24,7 +24,7 @@ struct tracer_options {
     enum { BVH_BOUNDS_AUTO, BVH_BOUNDS_BOX, BVH_BOUNDS_SPHERE } bvh_bounds; /* protocol's numbers */
     /* plain: sphere links in a storage buffer, for the benchmark */
     enum { BVH_LAYOUT_FAST, BVH_LAYOUT_PLAIN } bvh_layout;
-    uint32_t bvh_rays_together;     /* 0: chosen; 1, 2, 4, 8 */
+    uint32_t bvh_rays_together;     /* 0: chosen; 1, 2, 3, 4, 8 */
     uint32_t reference_rays_a_call; /* 0: chosen; 1, 4, 8, 16 */
 };
 

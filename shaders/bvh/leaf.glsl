@@ -10,7 +10,7 @@ layout(binding = UNIT_TRACER_2) uniform usamplerBuffer bvh_primitives;
 #endif
 
 #ifdef ANY_HIT
-#define answer vec3 // transmittance
+#define answer vec3 // what was taken of the light
 #else
 #define answer candidate
 #endif
@@ -44,7 +44,7 @@ void offer(inout trace_ray r, candidate c, inout answer found)
 {
 #ifdef ANY_HIT
     if (offer_any(r, c, found)) {
-        found = vec3(0.0);
+        found = vec3(TAKEN_ALL);
         put_out(r);
     }
 #else
@@ -108,7 +108,8 @@ void settle(uint noted_bits, candidate common_part, noted_hits noted[RAYS_TOGETH
 #endif
 
 // Rays in an instance's space, as triangles are tested against them: relative to the leading ray's origin, so that
-// what hangs on the origin alone is computed once for all.
+// what hangs on the origin alone is computed once for all. The leading ray is that of the walk, done or not: how a
+// triangle's distance rounds must not hang on what was met before.
 struct relative_rays {
     vec3 centre;
     vec3 direction[RAYS_TOGETHER];
@@ -145,7 +146,7 @@ void test_triangle(uint i, entered_instance inside, relative_rays rays, inout tr
     vec3 v2 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 2).xyz) - rays.centre;
     precise vec3 e0 = v2 - v1, e1 = v0 - v2, e2 = v1 - v0;
     precise vec3 c0 = cross(e0, v2 + v1), c1 = cross(e1, v0 + v2), c2 = cross(e2, v1 + v0);
-    vec3 normal = cross(e2, v2 - v0);
+    precise vec3 normal = cross(e2, v2 - v0);
     candidate c = candidate(0.0, inside.first_primitive + first.w, inside.index, vec2(0.0));
     noted_hits noted[RAYS_TOGETHER];
     uint noted_bits = 0u;
@@ -154,12 +155,12 @@ void test_triangle(uint i, entered_instance inside, relative_rays rays, inout tr
 #ifdef ORIGINS_DIFFER
         vec3 m = rays.moment[k];
         precise float w0 = dot(c0, d) - dot(e0, m), w1 = dot(c1, d) - dot(e1, m), w2 = dot(c2, d) - dot(e2, m);
-        float above = dot(normal, v0 - rays.origin[k]);
+        precise float above = dot(normal, v0 - rays.origin[k]);
 #else
         precise float w0 = dot(c0, d), w1 = dot(c1, d), w2 = dot(c2, d);
-        float above = dot(normal, v0);
+        precise float above = dot(normal, v0);
 #endif
-        float sum = w0 + w1 + w2, slope = dot(normal, d);
+        precise float sum = w0 + w1 + w2, slope = dot(normal, d);
         bool inside_edges = (w0 >= 0.0 && w1 >= 0.0 && w2 >= 0.0) || (w0 <= 0.0 && w1 <= 0.0 && w2 <= 0.0);
         c.distance = above / slope;
         // seen on edge, or no area: not hit

@@ -13,6 +13,11 @@
 // once and tested against all. The octant is that of the first live ray; the others' answers are right
 // whatever the order, only less is pruned.
 //
+// Answers do not depend on the top tree: one that was refitted and one that was built anew give the same to the bit.
+// What is found on a primitive depends on the ray and the walk's leading one alone (leaf.glsl); of instances at one
+// distance the first by number is met (favour_instance), within one the first in the order of its tree, which is that
+// of its shape; what is taken of light is summed up exactly (taken_by).
+//
 // Three loops in one another: elements until a leaf, leaves until an instance is entered or left, instances. All
 // invocations of a SIMD group first find their leaf, then all test primitives (the paper's PROCESSGEOMETRY):
 // software GL runs the code of both sides of a branch for the whole group, so leaf code in the inner loop would
@@ -64,6 +69,11 @@ struct distances_left {
     float t_min, t_max;
 };
 
+// How much farther than the closest hit so far an element may begin: a distance is not as exact as a bound where the ray
+// grazes a triangle, and whether one just nearer is found must not depend on the order. 2^-14 holds where the cosine
+// between ray and normal is above some 0.005; below, of two surfaces that close together, either may be met.
+const float PRUNE_SLACK = 1.00006103515625;
+
 distances_left left_of(trace_ray r[RAYS_TOGETHER], answer found[RAYS_TOGETHER])
 {
     distances_left left = distances_left(r[0].t_min, end_of(r[0], found[0]));
@@ -71,6 +81,9 @@ distances_left left_of(trace_ray r[RAYS_TOGETHER], answer found[RAYS_TOGETHER])
         left.t_min = min(left.t_min, r[k].t_min);
         left.t_max = max(left.t_max, end_of(r[k], found[k]));
     }
+#ifndef ANY_HIT
+    left.t_max *= PRUNE_SLACK;
+#endif
     return left;
 }
 
@@ -122,24 +135,31 @@ bool is_alive_any(trace_ray r[RAYS_TOGETHER])
     return alive;
 }
 
+// The first of those that walk: it leads to the end, also when it is done.
+int leading_of(trace_ray r[RAYS_TOGETHER])
+{
+    int leading = 0;
+    for (int k = RAYS_TOGETHER - 1; k > 0; k--)
+        leading = r[k].t_max > r[k].t_min ? k : leading;
+    return r[0].t_max > r[0].t_min ? 0 : leading;
+}
+
 // Enters a tree with all rays that are still alive: what it needs of them in its space.
-void enter_tree(object_ray o[RAYS_TOGETHER], trace_ray r[RAYS_TOGETHER], tree_grid grid, float slack,
+void enter_tree(object_ray o[RAYS_TOGETHER], trace_ray r[RAYS_TOGETHER], int leading, tree_grid grid, float slack,
                 out bundle b, out relative_rays rays)
 {
     bool alive[RAYS_TOGETHER];
-    int leading = 0;
     vec3 centre = o[0].origin;
-    for (int k = RAYS_TOGETHER - 1; k >= 0; k--) {
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
         alive[k] = r[k].t_max > r[k].t_min;
-        leading = alive[k] ? k : leading;
-        centre = alive[k] ? o[k].origin : centre;
+        centre = k == leading ? o[k].origin : centre;
     }
     b = bundle_of(o, alive, leading, grid, slack);
     rays = relative_to(centre, o);
 }
 
 // A transform element: the rays go on in the instance's space, wherever the instance lies.
-void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], out entered_instance inside,
+void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading, out entered_instance inside,
                     out object_ray o[RAYS_TOGETHER], out walk_state walk, out bundle b, out relative_rays rays)
 {
     int texel = int(instance_index) * BVH_TRANSFORM_TEXELS;
@@ -155,7 +175,7 @@ void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], out entered
     inside = entered_instance(instance_index, tree.z, tree.w);
     for (int k = 0; k < RAYS_TOGETHER; k++)
         o[k] = object_ray(affine_point(rows, r[k].origin), affine_vector(rows, r[k].direction));
-    enter_tree(o, r, grid, OBJECT_SLACK, b, rays);
+    enter_tree(o, r, leading, grid, OBJECT_SLACK, b, rays);
     begin_tree(walk, tree.x, tree.y, b.octant);
 }
 
@@ -175,6 +195,19 @@ uint test_leaves(inout walk_state walk, bundle b, entered_instance inside, objec
     }
 }
 
+#ifndef ANY_HIT
+// While the walk is in an instance, what was found in one with a higher number is one step of a float farther away, so that
+// what lies at the same distance here comes before it. (Discs and what is not there have a number that wraps to 0.)
+void favour_instance(uint instance_index, int step_, inout answer found[RAYS_TOGETHER])
+{
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+        int moved = floatBitsToInt(found[k].distance) + step_;
+        found[k].distance =
+            instance_index + 1u < found[k].instance_index + 1u ? intBitsToFloat(moved) : found[k].distance;
+    }
+}
+#endif
+
 #ifdef BVH_ONE_INSTANCE
 
 void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
@@ -184,7 +217,7 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
     walk_state walk;
     bundle b;
     relative_rays rays;
-    enter_instance(bvh_instance, r, inside, o, walk, b, rays);
+    enter_instance(bvh_instance, r, leading_of(r), inside, o, walk, b, rays);
     test_leaves(walk, b, inside, o, rays, r, found);
 }
 
@@ -203,7 +236,8 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
         o[k] = object_ray(r[k].origin, r[k].direction);
     bundle b, world_bundle;
     relative_rays rays;
-    enter_tree(o, r, grid, WORLD_SLACK, world_bundle, rays);
+    int leading = leading_of(r);
+    enter_tree(o, r, leading, grid, WORLD_SLACK, world_bundle, rays);
     walk_state walk, world_walk;
     begin_tree(world_walk, 0u, bvh_top_count, world_bundle.octant);
     entered_instance inside = entered_instance(NOT_INSIDE, 0u, 0u);
@@ -213,7 +247,10 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
         uint leaf = test_leaves(walk, b, inside, o, rays, r, found);
         if (leaf != 0u) {
             world_walk.element = walk.element;
-            enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, inside, o, walk, b, rays);
+#ifndef ANY_HIT
+            favour_instance(leaf & BVH_LEAF_FIRST_MASK, 1, found);
+#endif
+            enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, walk, b, rays);
         } else {
             // The tree is done. Out of an instance the world's bundle comes back as it was.
             bool all_done = inside.index == NOT_INSIDE;
@@ -222,6 +259,9 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 #endif
             if (all_done)
                 return;
+#ifndef ANY_HIT
+            favour_instance(inside.index, -1, found);
+#endif
             inside.index = NOT_INSIDE;
             b = world_bundle;
             walk = world_walk;
@@ -235,13 +275,13 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 #if RAYS_TOGETHER == 1
 
 #ifdef ANY_HIT
-bool trace_any(trace_ray r, inout vec3 transmittance)
+bool trace_any(trace_ray r, inout vec3 taken)
 {
     trace_ray walked[RAYS_TOGETHER] = trace_ray[RAYS_TOGETHER](r);
-    vec3 found[RAYS_TOGETHER] = vec3[RAYS_TOGETHER](transmittance);
+    vec3 found[RAYS_TOGETHER] = vec3[RAYS_TOGETHER](taken);
     trace_together(walked, found);
-    transmittance = found[0];
-    return greatest(transmittance) == 0.0;
+    taken = found[0];
+    return least(taken) >= TAKEN_BLACK;
 }
 #else
 void trace_closest(trace_ray r, inout candidate best)

@@ -20,13 +20,13 @@ struct surface_point {
     vec4 colour;
 };
 
-surface_point point_of(candidate found, vec3 origin_world, vec3 direction_world)
+surface_point point_of(candidate found, vec3 origin_world, vec3 direction_world, float time)
 {
     if (found.instance_index == HIT_NO_PRIMITIVE)
         return surface_point(disc_texcoords(discs[found.primitive],
                                             origin_world + found.distance * direction_world),
                              vec4(1.0));
-    instance i = instance_at(found.instance_index);
+    instance i = instance_at_time(found.instance_index, time);
 #ifdef HAS_SPHERES
     if (geometry_at(i.geometry).kind == GEOMETRY_SPHERES) {
         vec4 sphere = texelFetch(spheres, int(found.primitive));
@@ -50,13 +50,13 @@ vec4 base_colour_at(material m, surface_point point)
 }
 
 // Alpha mode mask: is the surface cut away here?
-bool is_cut_out(candidate found, vec3 origin_world, vec3 direction_world)
+bool is_cut_out(candidate found, vec3 origin_world, vec3 direction_world, float time)
 {
 #ifdef HAS_CUTOUT
     material m = materials[material_index_of(found)];
     if ((m.flags & MATERIAL_ALPHA_MASK) == 0u)
         return false;
-    return base_colour_at(m, point_of(found, origin_world, direction_world)).a < m.alpha_cutoff;
+    return base_colour_at(m, point_of(found, origin_world, direction_world, time)).a < m.alpha_cutoff;
 #else
     return false;
 #endif
@@ -64,7 +64,7 @@ bool is_cut_out(candidate found, vec3 origin_world, vec3 direction_world)
 
 // What of a shadow ray's light passes the surface: 0 where it is opaque, 1 where it is cut away; the base
 // colour tints what is transmitted, and what alpha blending leaves open passes as it is.
-vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world)
+vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, float time)
 {
 #if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
     material m = materials[material_index_of(found)];
@@ -72,7 +72,7 @@ vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world)
     bool is_blend = (m.flags & MATERIAL_ALPHA_BLEND) != 0u;
     if (!is_mask && !is_blend && m.transmission == 0.0)
         return vec3(0.0);
-    surface_point point = point_of(found, origin_world, direction_world);
+    surface_point point = point_of(found, origin_world, direction_world, time);
     vec4 colour = base_colour_at(m, point);
     if (is_mask && colour.a < m.alpha_cutoff)
         return vec3(1.0);

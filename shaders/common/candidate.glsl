@@ -9,7 +9,20 @@ struct trace_ray {
     vec3 direction;
     float t_min;
     float t_max;
+#ifdef HAS_MOTION
+    float time;
+#endif
 };
+
+// Where nothing moves no ray carries its time along.
+float time_of(trace_ray r)
+{
+#ifdef HAS_MOTION
+    return r.time;
+#else
+    return 0.0;
+#endif
+}
 
 // The same ray in an instance's space: the direction is not made unit, so distances stay those of the world.
 struct object_ray {
@@ -19,7 +32,7 @@ struct object_ray {
 
 object_ray object_from_world_ray(trace_ray r, uint instance_index)
 {
-    vec4 rows[3] = instance_at(instance_index).object_from_world;
+    vec4 rows[3] = instance_at_time(instance_index, time_of(r)).object_from_world;
     return object_ray(affine_point(rows, r.origin), affine_vector(rows, r.direction));
 }
 
@@ -32,41 +45,78 @@ candidate candidate_none(float t_max)
 void offer_closest(trace_ray r, candidate found, inout candidate best)
 {
     if (found.distance > r.t_min && found.distance < best.distance &&
-        !is_cut_out(found, r.origin, r.direction))
+        !is_cut_out(found, r.origin, r.direction, time_of(r)))
         best = found;
+}
+
+// What surfaces have taken of a shadow ray's light, of each channel: -log2 of the transmittance in steps of 2^-19,
+// as whole numbers in floats. Their sums are exact, so the answer does not hang on the order of the surfaces either,
+// as a product of floats would.
+const float TAKEN_STEPS = 524288.0;
+const float TAKEN_ALL = 8388607.0;   // no more is kept: twice as much is a whole number of a float still
+const float TAKEN_BLACK = 4715632.0; // what the 8-bit answer rounds to black: transmittance 0.5 / 255
+
+vec3 taken_by(vec3 transmittance)
+{
+#ifdef HAS_TRANSLUCENT
+    vec3 taken = min(round(-TAKEN_STEPS * log2(max(transmittance, vec3(1e-5)))), vec3(TAKEN_ALL));
+    return mix(taken, vec3(0.0), greaterThanEqual(transmittance, vec3(1.0)));
+#else
+    return TAKEN_ALL * (1.0 - transmittance); // 0 or 1
+#endif
+}
+
+vec3 transmittance_left(vec3 taken)
+{
+#ifdef HAS_TRANSLUCENT
+    return least(taken) >= TAKEN_BLACK ? vec3(0.0) : exp2(-taken / TAKEN_STEPS);
+#else
+    return vec3(taken.x == 0.0 ? 1.0 : 0.0);
+#endif
 }
 
 // Any hit: true when nothing of the light is left and the ray is done. A surface counts once for each time that
 // the ray crosses it, so no primitive may be offered twice to one ray.
-bool offer_any(trace_ray r, candidate found, inout vec3 transmittance)
+bool offer_any(trace_ray r, candidate found, inout vec3 taken)
 {
     if (!(found.distance > r.t_min && found.distance < r.t_max))
         return false;
-    transmittance *= transmittance_of(found, r.origin, r.direction);
-    return greatest(transmittance) < 0.5 / 255.0; // what the 8-bit answer rounds to black
+#if defined HAS_CUTOUT || defined HAS_TRANSLUCENT
+    taken = min(taken + taken_by(transmittance_of(found, r.origin, r.direction, time_of(r))), vec3(TAKEN_ALL));
+    return least(taken) >= TAKEN_BLACK;
+#else
+    taken = vec3(TAKEN_ALL);
+    return true;
+#endif
+}
+
+bool cross_triangle(trace_ray r, object_ray o, uint primitive, uint instance_index, out candidate found)
+{
+    uint close_offset = 0u;
+#ifdef HAS_MOTION
+    close_offset = close_offset_of(instance_at(instance_index).geometry);
+#endif
+    float time = time_of(r);
+    uvec4 triangle = texelFetch(triangles, int(primitive));
+    found = candidate(0.0, primitive, instance_index, vec2(0.0));
+    return intersect_triangle(o.direction, position_at_time(triangle.x, close_offset, time) - o.origin,
+                              position_at_time(triangle.y, close_offset, time) - o.origin,
+                              position_at_time(triangle.z, close_offset, time) - o.origin, found.distance,
+                              found.barycentrics);
 }
 
 // The triangle or sphere against the ray in the instance's space `o`.
 void visit_triangle_closest(trace_ray r, object_ray o, uint primitive, uint instance_index, inout candidate best)
 {
-    uvec4 triangle = texelFetch(triangles, int(primitive));
-    candidate found = candidate(0.0, primitive, instance_index, vec2(0.0));
-    if (intersect_triangle(o.direction, texelFetch(positions, int(triangle.x)).xyz - o.origin,
-                           texelFetch(positions, int(triangle.y)).xyz - o.origin,
-                           texelFetch(positions, int(triangle.z)).xyz - o.origin, found.distance,
-                           found.barycentrics))
+    candidate found;
+    if (cross_triangle(r, o, primitive, instance_index, found))
         offer_closest(r, found, best);
 }
 
-bool visit_triangle_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 transmittance)
+bool visit_triangle_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 taken)
 {
-    uvec4 triangle = texelFetch(triangles, int(primitive));
-    candidate found = candidate(0.0, primitive, instance_index, vec2(0.0));
-    return intersect_triangle(o.direction, texelFetch(positions, int(triangle.x)).xyz - o.origin,
-                              texelFetch(positions, int(triangle.y)).xyz - o.origin,
-                              texelFetch(positions, int(triangle.z)).xyz - o.origin, found.distance,
-                              found.barycentrics) &&
-           offer_any(r, found, transmittance);
+    candidate found;
+    return cross_triangle(r, o, primitive, instance_index, found) && offer_any(r, found, taken);
 }
 
 void visit_sphere_closest(trace_ray r, object_ray o, uint primitive, uint instance_index, inout candidate best)
@@ -81,7 +131,7 @@ void visit_sphere_closest(trace_ray r, object_ray o, uint primitive, uint instan
     }
 }
 
-bool visit_sphere_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 transmittance)
+bool visit_sphere_any(trace_ray r, object_ray o, uint primitive, uint instance_index, inout vec3 taken)
 {
     vec4 sphere = texelFetch(spheres, int(primitive));
     vec2 distances;
@@ -89,7 +139,7 @@ bool visit_sphere_any(trace_ray r, object_ray o, uint primitive, uint instance_i
         return false;
     for (int side = 0; side < 2; side++) {
         float distance = side == 0 ? distances.x : distances.y;
-        if (offer_any(r, candidate(distance, primitive, instance_index, vec2(0.0)), transmittance))
+        if (offer_any(r, candidate(distance, primitive, instance_index, vec2(0.0)), taken))
             return true;
     }
     return false;

@@ -18,14 +18,15 @@ vec3 clamped_weights(vec3 direction, vec3 v0, vec3 v1, vec3 v2)
     return w / (w.x + w.y + w.z);
 }
 
-candidate candidate_triangle(uint instance_index, uint primitive, vec3 origin, vec3 direction)
+candidate candidate_triangle(uint instance_index, uint primitive, vec3 origin, vec3 direction, float time)
 {
-    vec4 rows[3] = instance_at(instance_index).object_from_world;
-    vec3 o = affine_point(rows, origin), d = affine_vector(rows, direction);
+    instance i = instance_at_time(instance_index, time);
+    uint close_offset = close_offset_of(i.geometry);
+    vec3 o = affine_point(i.object_from_world, origin), d = affine_vector(i.object_from_world, direction);
     uvec4 triangle = texelFetch(triangles, int(primitive));
-    vec3 v0 = texelFetch(positions, int(triangle.x)).xyz - o;
-    vec3 v1 = texelFetch(positions, int(triangle.y)).xyz - o;
-    vec3 v2 = texelFetch(positions, int(triangle.z)).xyz - o;
+    vec3 v0 = position_at_time(triangle.x, close_offset, time) - o;
+    vec3 v1 = position_at_time(triangle.y, close_offset, time) - o;
+    vec3 v2 = position_at_time(triangle.z, close_offset, time) - o;
     candidate found = candidate(0.0, primitive, instance_index, vec2(0.0));
     if (intersect_triangle(d, v0, v1, v2, found.distance, found.barycentrics))
         return found;

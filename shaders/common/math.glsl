@@ -21,6 +21,11 @@ float greatest(vec3 v)
     return max(v.x, max(v.y, v.z));
 }
 
+float least(vec3 v)
+{
+    return min(v.x, min(v.y, v.z));
+}
+
 // 1 for zero too: an octahedron's seam must not fold to nothing.
 vec2 sign_not_zero(vec2 v)
 {

@@ -3,7 +3,7 @@
 // that all see one surface.
 #include "shared/hit.h"
 #include "common/math.glsl"
-#include "common/geometry.glsl"
+#include "common/motion.glsl"
 #include "common/texture.glsl"
 
 // What is known of a ray before it is decided that it hits.
@@ -57,12 +57,10 @@ vec4 disc_texcoords(disc d, vec3 position_world)
 
 // Where a triangle's texture runs: tangent along u and the handedness of the frame, for meshes that bring no
 // tangents. v grows downwards in an image while a normal map's green points up, hence the sign.
-bool texture_tangent(uvec4 triangle, uint slot_index, vec3 normal_object, out vec4 tangent_object)
+bool texture_tangent(uvec4 triangle, vec3 corners[3], uint slot_index, vec3 normal_object, out vec4 tangent_object)
 {
     bool second = (texture_slots[slot_index].texture & 0x80000000u) != 0u;
-    vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
-    vec3 e1 = texelFetch(positions, int(triangle.y)).xyz - p0;
-    vec3 e2 = texelFetch(positions, int(triangle.z)).xyz - p0;
+    vec3 e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
     vec4 t0 = texelFetch(texcoords, int(triangle.x));
     vec4 t1 = texelFetch(texcoords, int(triangle.y)) - t0;
     vec4 t2 = texelFetch(texcoords, int(triangle.z)) - t0;
@@ -81,12 +79,13 @@ bool texture_tangent(uvec4 triangle, uint slot_index, vec3 normal_object, out ve
     return true;
 }
 
-bool triangle_tangent(uvec4 triangle, uint flags, vec3 weights, vec3 normal_object, out vec4 tangent_object)
+bool triangle_tangent(uvec4 triangle, vec3 corners[3], geometry g, float time, vec3 weights, vec3 normal_object,
+                      out vec4 tangent_object)
 {
-    if ((flags & GEOMETRY_HAS_TANGENTS) != 0u) {
-        vec3 sum = unpack_unit(texelFetch(tangents, int(triangle.x)).x) * weights.x +
-                   unpack_unit(texelFetch(tangents, int(triangle.y)).x) * weights.y +
-                   unpack_unit(texelFetch(tangents, int(triangle.z)).x) * weights.z;
+    if ((g.flags & GEOMETRY_HAS_TANGENTS) != 0u) {
+        vec3 sum = tangent_at_time(triangle.x, g.close_offset, time) * weights.x +
+                   tangent_at_time(triangle.y, g.close_offset, time) * weights.y +
+                   tangent_at_time(triangle.z, g.close_offset, time) * weights.z;
         float handedness = texelFetch(normals, int(triangle.x)).w;
         tangent_object = vec4(sum, handedness);
         return handedness != 0.0 && dot(sum, sum) > 0.0;
@@ -94,9 +93,9 @@ bool triangle_tangent(uvec4 triangle, uint flags, vec3 weights, vec3 normal_obje
     tangent_object = vec4(0.0);
     material m = materials[triangle.w & HIT_MATERIAL_MASK];
     uint slot_index = m.texture_normal != 0u ? m.texture_normal : m.texture_bump;
-    if (slot_index == 0u || (flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
+    if (slot_index == 0u || (g.flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
         return false;
-    return texture_tangent(triangle, slot_index, normal_object, tangent_object);
+    return texture_tangent(triangle, corners, slot_index, normal_object, tangent_object);
 }
 
 // The interpolated normal, mirrored at the surface where it points to the wrong side of it: a normal that is
@@ -132,29 +131,31 @@ hit finish_hit(uint material_index, float distance, vec3 direction_world, vec3 g
     return h;
 }
 
-hit surface_triangle(uint instance_index, uint primitive, vec2 barycentrics, float distance, vec3 direction_world)
+hit surface_triangle(uint instance_index, uint primitive, vec2 barycentrics, float distance, vec3 direction_world,
+                     float time)
 {
-    instance i = instance_at(instance_index);
-    uint flags = geometry_at(i.geometry).flags;
+    instance i = instance_at_time(instance_index, time);
+    geometry g = geometry_at(i.geometry);
+    uint flags = g.flags;
     uvec4 triangle = texelFetch(triangles, int(primitive));
     vec3 weights = triangle_weights(barycentrics);
-    vec3 p0 = texelFetch(positions, int(triangle.x)).xyz;
-    vec3 p1 = texelFetch(positions, int(triangle.y)).xyz;
-    vec3 p2 = texelFetch(positions, int(triangle.z)).xyz;
-    vec3 normal_object = normalize(cross(p1 - p0, p2 - p0));
+    vec3 corners[3] = vec3[3](position_at_time(triangle.x, g.close_offset, time),
+                              position_at_time(triangle.y, g.close_offset, time),
+                              position_at_time(triangle.z, g.close_offset, time));
+    vec3 normal_object = normalize(cross(corners[1] - corners[0], corners[2] - corners[0]));
     vec3 geometric = normalize(affine_covector(i.object_from_world, normal_object));
     vec3 shading = geometric;
     if ((flags & GEOMETRY_HAS_NORMALS) != 0u) {
-        vec3 sum = texelFetch(normals, int(triangle.x)).xyz * weights.x +
-                   texelFetch(normals, int(triangle.y)).xyz * weights.y +
-                   texelFetch(normals, int(triangle.z)).xyz * weights.z;
+        vec3 sum = normal_at_time(triangle.x, g.close_offset, time) * weights.x +
+                   normal_at_time(triangle.y, g.close_offset, time) * weights.y +
+                   normal_at_time(triangle.z, g.close_offset, time) * weights.z;
         vec3 interpolated = affine_covector(i.object_from_world, sum);
         float squared = dot(interpolated, interpolated);
         if (squared > 0.0) // opposite normals cancel each other
             shading = interpolated * inversesqrt(squared);
     }
     vec4 tangent;
-    if (triangle_tangent(triangle, flags, weights, normal_object, tangent)) {
+    if (triangle_tangent(triangle, corners, g, time, weights, normal_object, tangent)) {
         tangent.xyz = affine_vector(i.world_from_object, tangent.xyz);
         if ((i.flags & INSTANCE_MIRRORED) != 0u)
             tangent.w = -tangent.w;
@@ -167,9 +168,10 @@ hit surface_triangle(uint instance_index, uint primitive, vec2 barycentrics, flo
     return h;
 }
 
-hit surface_sphere(uint instance_index, uint primitive, float distance, vec3 origin_world, vec3 direction_world)
+hit surface_sphere(uint instance_index, uint primitive, float distance, vec3 origin_world, vec3 direction_world,
+                   float time)
 {
-    instance i = instance_at(instance_index);
+    instance i = instance_at_time(instance_index, time);
     vec4 sphere = texelFetch(spheres, int(primitive));
     vec3 position_object = affine_point(i.object_from_world, origin_world) +
                            distance * affine_vector(i.object_from_world, direction_world);
@@ -201,7 +203,8 @@ hit surface_miss()
     return hit(-1.0, 0u, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE, 0.0, 0.0, 0.0, 0.0, 0u, 0u, 0u, 0u);
 }
 
-hit surface_of(candidate found, vec3 origin_world, vec3 direction_world)
+// At the time of the ray that found it.
+hit surface_of(candidate found, vec3 origin_world, vec3 direction_world, float time)
 {
     if (found.primitive == HIT_NO_PRIMITIVE)
         return surface_miss();
@@ -210,10 +213,10 @@ hit surface_of(candidate found, vec3 origin_world, vec3 direction_world)
 #ifdef HAS_SPHERES
     if (geometry_at(instance_at(found.instance_index).geometry).kind == GEOMETRY_SPHERES)
         return surface_sphere(found.instance_index, found.primitive, found.distance, origin_world,
-                              direction_world);
+                              direction_world, time);
 #endif
     return surface_triangle(found.instance_index, found.primitive, found.barycentrics, found.distance,
-                            direction_world);
+                            direction_world, time);
 }
 
 // How far texture coordinates of set 0 run per metre of a triangle: for the level of detail of a footprint.

@@ -31,7 +31,8 @@ void main()
 #if PRIMITIVE_KIND == 0
     uint primitive = first_primitive + uint(gl_PrimitiveID);
 #ifdef HAS_CUTOUT
-    if (is_cut_out(candidate_triangle(instance_index, primitive, origin, direction), origin, direction))
+    if (is_cut_out(candidate_triangle(instance_index, primitive, origin, direction, 0.0), origin, direction,
+                   0.0))
         discard;
 #endif
     visible = uvec2(instance_index + 1u, primitive);
@@ -47,7 +48,7 @@ void main()
     candidate found = candidate_disc(primitive, origin, direction);
     vec3 from_centre = origin + found.distance * direction - discs[primitive].centre_radius.xyz;
     float radius = discs[primitive].centre_radius.w;
-    if (dot(from_centre, from_centre) > radius * radius || is_cut_out(found, origin, direction))
+    if (dot(from_centre, from_centre) > radius * radius || is_cut_out(found, origin, direction, 0.0))
         discard;
     visible = uvec2(VISIBLE_DISC, primitive);
 #endif

@@ -31,8 +31,8 @@ void main()
         found = candidate_sphere(instance_index, primitive, origin, direction, rays[k].origin_t_min.w);
 #endif
     else
-        found = candidate_triangle(instance_index, primitive, origin, direction);
+        found = candidate_triangle(instance_index, primitive, origin, direction, 0.0);
     // Two compilations of one test may round apart at a rim: a hit stays a hit.
     found.distance = max(found.distance, rays[k].origin_t_min.w);
-    hits[k] = surface_of(found, origin, direction);
+    hits[k] = surface_of(found, origin, direction, 0.0);
 }

@@ -22,7 +22,7 @@ candidate candidate_sphere(uint instance_index, uint primitive, vec3 origin, vec
         return found;
     for (int i = 0; i < 2; i++) {
         found.distance = distances[i];
-        if (found.distance > t_min && !is_cut_out(found, origin, direction))
+        if (found.distance > t_min && !is_cut_out(found, origin, direction, 0.0))
             return found;
     }
     found.distance = -1.0;

@@ -24,6 +24,10 @@
 
 /* image units */
 #define IMAGE_HITS 0
+#define IMAGE_POSITIONS 0 /* deform.comp */
+#define IMAGE_NORMALS 1
+#define IMAGE_TANGENTS 2
+#define IMAGE_TRACER_0 1 /* the tracer's own */
 
 /* texture units */
 #define UNIT_TRIANGLES 0
@@ -42,6 +46,17 @@
 #define UNIT_TRACER_3 13
 #define UNIT_TRACER_4 14
 #define UNIT_TRACER_5 15
+
+/* deform.comp, which reads nothing of the scene but makes it */
+#define UNIT_REST_POSITIONS 0
+#define UNIT_REST_NORMALS 1
+#define UNIT_REST_TANGENTS 2
+#define UNIT_JOINTS 3
+#define UNIT_JOINT_WEIGHTS 4
+#define UNIT_TARGET_POSITIONS 5
+#define UNIT_TARGET_NORMALS 6
+#define UNIT_TARGET_TANGENTS 7
+#define UNIT_DEFORM_PARAMETERS 8
 
 #define UNIT_PASS_0 16
 #define UNIT_PASS_1 17

@@ -67,4 +67,20 @@ SHARED_SIZE(bvh_transform, 96)
 #define BVH_TRIANGLE_TEXELS 3u
 #define BVH_SPHERE_TEXELS 2u
 
+/* What the refit of a deformed geometry's tree (shaders/bvh/refit_bounds.comp) has to know of an element besides
+ * where its primitives are now. Texels of an RGBA32UI buffer, elements by their height above the leaves below
+ * them. */
+struct bvh_refit_record {
+    uint element; /* by the order of octant 0, in which a node's children follow it */
+    uint size;    /* elements of its subtree, itself included */
+    uint leaf;    /* its link, 0: an inner one */
+    uint pad;
+    uvec4 places_0123, places_4567; /* in the order of each octant */
+};
+SHARED_SIZE(bvh_refit_record, 48)
+#define BVH_REFIT_TEXELS 3
+/* The box of each element while it is refitted: two texels of an RGBA32UI buffer, by the order of octant 0: lower
+ * corner and the size of its subtree; upper corner and (a float) the surfaces of all boxes of its subtree. */
+#define BVH_REFIT_BOX_TEXELS 2
+
 #endif

@@ -4,6 +4,8 @@
 #ifndef FARLIGHT_TESTS_NAIVE_TWIN_H
 #define FARLIGHT_TESTS_NAIVE_TWIN_H
 
+#include "scene/affine.h"
+#include "scene/pose.h"
 #include "scene/scene.h"
 #include "shared/ray.h"
 
@@ -32,16 +34,27 @@ struct twin_crossing {
     bool cut_out;
 };
 
+/* The vertices of an instance as the shutter opens and as it closes; NULL: those of its mesh. */
+struct twin_shape {
+    float *positions[2], *normals[2];
+    bool changes; /* between the two */
+};
+
 struct twin {
     const struct scene *scene;
     struct scene_instance *instances[2]; /* of meshes, of spheres */
     size_t instance_counts[2];
+    struct twin_shape *shapes; /* by mesh instance */
+    /* Where the instances are in each pose; the same are shown in all. */
+    uint32_t pose_count;
+    struct scene_instance *posed[2][MOTION_POSES_MAX];
 };
 
 /* What a walk over everything gathers. */
 struct twin_walk {
     const struct twin *twin;
-    double origin[3], direction[3], t_min, t_max;
+    double origin[3], direction[3], t_min, t_max, time;
+    const struct twin_shape *shape; /* of the instance in hand */
     struct twin_hit closest;
     double second_distance; /* of what is there behind (or just before) the closest */
     double transmittance[3];
@@ -50,18 +63,80 @@ struct twin_walk {
     bool close_call;
 };
 
+static inline const struct scene_pose *twin_pose(const struct scene_motion *motion, uint32_t pose)
+{
+    return motion ? &motion->poses[pose] : NULL;
+}
+
+static inline void twin_init_shapes(struct twin *twin, const struct scene_motion *motion)
+{
+    struct error error = {0};
+    twin->shapes = calloc(twin->instance_counts[0] + 1, sizeof(*twin->shapes));
+    for (size_t i = 0; i < twin->instance_counts[0]; i++) {
+        const struct scene_node *node = twin->instances[0][i].node;
+        const struct scene_mesh *mesh = scene_mesh(twin->scene, node->object);
+        for (uint32_t end = 0; scene_node_deforms(node, mesh) && end < 2; end++) {
+            float *positions = malloc(mesh->vertex_count * 3 * sizeof(float));
+            float *normals = malloc(mesh->vertex_count * 3 * sizeof(float));
+            if (!scene_deform(twin->scene, twin_pose(motion, end * (twin->pose_count - 1)), node, positions,
+                              normals, &error))
+                exit(1);
+            twin->shapes[i].positions[end] = positions;
+            twin->shapes[i].normals[end] = normals;
+        }
+        float *const *ends = twin->shapes[i].positions;
+        twin->shapes[i].changes = ends[0] && memcmp(ends[0], ends[1], mesh->vertex_count * 3 * sizeof(float)) != 0;
+    }
+}
+
+/* `motion` as for scene_gpu_update; not needed afterwards. */
+static inline void twin_init_moving(struct twin *twin, const struct scene *scene,
+                                    const struct scene_motion *motion)
+{
+    *twin = (struct twin){.scene = scene, .pose_count = motion ? motion->pose_count : 1};
+    for (int kind = 0; kind < 2; kind++) {
+        enum scene_node_kind node_kind = kind == 0 ? NODE_MESH : NODE_SPHERES;
+        for (uint32_t p = 0; p < twin->pose_count; p++)
+            if (!scene_flatten(scene, twin_pose(motion, p), node_kind, &twin->posed[kind][p],
+                               &twin->instance_counts[kind]))
+                exit(1);
+        twin->instances[kind] = twin->posed[kind][0];
+    }
+    twin_init_shapes(twin, motion);
+}
+
 static inline void twin_init(struct twin *twin, const struct scene *scene)
 {
-    twin->scene = scene;
-    if (!scene_flatten(scene, NULL, NODE_MESH, &twin->instances[0], &twin->instance_counts[0]) ||
-        !scene_flatten(scene, NULL, NODE_SPHERES, &twin->instances[1], &twin->instance_counts[1]))
-        exit(1);
+    twin_init_moving(twin, scene, NULL);
 }
 
 static inline void twin_finish(struct twin *twin)
 {
-    free(twin->instances[0]);
-    free(twin->instances[1]);
+    for (size_t i = 0; i < twin->instance_counts[0]; i++)
+        for (int end = 0; end < 2; end++) {
+            free(twin->shapes[i].positions[end]);
+            free(twin->shapes[i].normals[end]);
+        }
+    free(twin->shapes);
+    for (int kind = 0; kind < 2; kind++)
+        for (uint32_t p = 0; p < twin->pose_count; p++)
+            free(twin->posed[kind][p]);
+}
+
+/* Where an instance is at the time: entry by entry between the poses before and after it. */
+static inline struct scene_instance twin_instance_at(const struct twin *twin, int kind, size_t i, double time)
+{
+    struct scene_instance instance = twin->instances[kind][i];
+    if (twin->pose_count == 1)
+        return instance;
+    double place = time * (twin->pose_count - 1);
+    uint32_t before = (uint32_t)fmin(floor(place), twin->pose_count - 2);
+    const float *a = twin->posed[kind][before][i].world_from_object;
+    const float *b = twin->posed[kind][before + 1][i].world_from_object;
+    for (int k = 0; k < 12; k++)
+        instance.world_from_object[k] = (float)(a[k] + (place - before) * ((double)b[k] - a[k]));
+    instance.singular = !affine_invert(instance.object_from_world, instance.world_from_object);
+    return instance;
 }
 
 static inline double twin_dot(const double a[3], const double b[3])
@@ -214,8 +289,26 @@ static inline void twin_vertex(const struct scene_mesh *mesh, enum mesh_array ar
         out[k] = (double)data[(size_t)vertex * (size_t)components + (size_t)k];
 }
 
+/* A position or a normal at the walk's time. */
+static inline void twin_moving_vertex(const struct twin_walk *walk, const struct scene_mesh *mesh,
+                                      enum mesh_array array, uint32_t vertex, double out[3])
+{
+    float *const *ends = array == MESH_POSITIONS ? walk->shape->positions : walk->shape->normals;
+    if (!ends[0]) {
+        twin_vertex(mesh, array, vertex, 3, out);
+        return;
+    }
+    for (size_t k = 0; k < 3; k++) {
+        size_t at = (size_t)vertex * 3 + k;
+        out[k] = ends[0][at] + walk->time * ((double)ends[1][at] - ends[0][at]);
+    }
+    if (array == MESH_NORMALS && walk->shape->changes)
+        twin_normalize(out);
+}
+
 /* Attributes of a point in a triangle. */
-static inline void twin_attributes(const struct scene_mesh *mesh, const uint32_t index[3], const double weight[3],
+static inline void twin_attributes(const struct twin_walk *walk, const struct scene_mesh *mesh,
+                                   const uint32_t index[3], const double weight[3],
                                    const float object_from_world[12], struct twin_hit *hit)
 {
     memcpy(hit->normal_shading, hit->normal_geometric, sizeof(hit->normal_shading));
@@ -224,7 +317,7 @@ static inline void twin_attributes(const struct scene_mesh *mesh, const uint32_t
     if (mesh->arrays[MESH_NORMALS]) {
         double normal[3] = {0}, one[3];
         for (int v = 0; v < 3; v++) {
-            twin_vertex(mesh, MESH_NORMALS, index[v], 3, one);
+            twin_moving_vertex(walk, mesh, MESH_NORMALS, index[v], one);
             for (int k = 0; k < 3; k++)
                 normal[k] += weight[v] * one[k];
         }
@@ -253,7 +346,7 @@ static inline void twin_triangle(struct twin_walk *walk, const struct scene_inst
                          indices[3 * (size_t)primitive + 2]};
     double corner[3][3], corner_world[3][3], e1[3], e2[3], from[3], p[3], q[3];
     for (int v = 0; v < 3; v++) {
-        twin_vertex(mesh, MESH_POSITIONS, index[v], 3, corner[v]);
+        twin_moving_vertex(walk, mesh, MESH_POSITIONS, index[v], corner[v]);
         twin_transform(corner_world[v], instance->world_from_object, corner[v], 1);
     }
     /* In world space, and by another method than the shaders': Moeller and Trumbore's. */
@@ -284,7 +377,8 @@ static inline void twin_triangle(struct twin_walk *walk, const struct scene_inst
     }
     twin_cross(crossing.hit.normal_geometric, a, b);
     twin_normal_to_world(crossing.hit.normal_geometric, instance->object_from_world);
-    twin_attributes(mesh, index, (const double[3]){1 - u - v, u, v}, instance->object_from_world, &crossing.hit);
+    twin_attributes(walk, mesh, index, (const double[3]){1 - u - v, u, v}, instance->object_from_world,
+                    &crossing.hit);
     crossing.hit.material = twin_range_material(mesh->ranges, mesh->range_count, primitive);
     twin_cross_surface(walk, &crossing);
 }
@@ -346,9 +440,11 @@ static inline void twin_discs(struct twin_walk *walk)
 }
 
 /* All that lies on the ray. A dead ray (t_max <= t_min) finds nothing. */
-static inline void twin_trace(struct twin_walk *walk, const struct twin *twin, const struct ray *ray)
+static inline void twin_trace_at(struct twin_walk *walk, const struct twin *twin, const struct ray *ray,
+                                 double time)
 {
     *walk = (struct twin_walk){.twin = twin,
+                               .time = time,
                                .t_min = ray->origin_t_min[3],
                                .t_max = ray->direction_t_max[3],
                                .closest = {.distance = -1},
@@ -362,22 +458,27 @@ static inline void twin_trace(struct twin_walk *walk, const struct twin *twin, c
         return;
     for (int kind = 0; kind < 2; kind++) {
         for (size_t i = 0; i < twin->instance_counts[kind]; i++) {
-            const struct scene_instance *instance = &twin->instances[kind][i];
-            const struct scene_mesh *mesh = kind == 0 ? scene_mesh(twin->scene, instance->node->object) : NULL;
-            const struct scene_spheres *set =
-                kind == 1 ? scene_spheres(twin->scene, instance->node->object) : NULL;
-            if (instance->singular)
+            const struct scene_instance instance = twin_instance_at(twin, kind, i, time);
+            const struct scene_mesh *mesh = kind == 0 ? scene_mesh(twin->scene, instance.node->object) : NULL;
+            const struct scene_spheres *set = kind == 1 ? scene_spheres(twin->scene, instance.node->object) : NULL;
+            if (instance.singular)
                 continue;
+            walk->shape = kind == 0 ? &twin->shapes[i] : NULL;
             for (uint32_t p = 0; mesh && p < mesh->triangle_count; p++)
-                twin_triangle(walk, instance, mesh, p);
+                twin_triangle(walk, &instance, mesh, p);
             for (uint32_t p = 0; set && p < set->sphere_count; p++)
-                twin_sphere(walk, instance, set, p);
+                twin_sphere(walk, &instance, set, p);
         }
     }
     twin_discs(walk);
     /* Two surfaces in one place: either may win. */
     if (walk->closest.distance >= 0)
         walk->close_call |= walk->second_distance - walk->closest.distance < 1e-4 * (1 + walk->closest.distance);
+}
+
+static inline void twin_trace(struct twin_walk *walk, const struct twin *twin, const struct ray *ray)
+{
+    twin_trace_at(walk, twin, ray, 0);
 }
 
 #endif

@@ -2,6 +2,7 @@
 /* One suite for every tracer: ray by ray, its answers are those of a plain C tracer in double precision.
  *
  * To add a tracer (or another form of one), add a row to `tracers`. To add a scene, add a row to `scenes`. */
+#include "motion_scenes.h"
 #include "naive_twin.h"
 #include "test_scenes.h"
 
@@ -26,29 +27,42 @@ struct tracer_row {
     const char *name;
     unsigned number; /* the protocol's */
     struct tracer_options options;
+    bool still; /* knows no motion: its rows are of scenes in which nothing moves or deforms */
 };
 static const struct tracer_row tracers[] = {
-    {"naive", 1, {0}},
-    {"bvh", 0, {0}},
-    {"bvh, one ray alone", 0, {.bvh_rays_together = 1}},
-    {"bvh, eight rays together", 0, {.bvh_rays_together = 8}},
-    {"bvh in the plain form", 0, {.bvh_layout = BVH_LAYOUT_PLAIN}},
-    {"bvh, two rays together", 0, {.bvh_rays_together = 2}},
-    {"bvh with spheres, four rays together", 0, {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 4}},
-    {"reference", 2, {0}}, /* as many rays a call as the processor takes at once */
-    {"reference, one ray a call", 2, {.reference_rays_a_call = 1}},
-    {"reference, four rays a call", 2, {.reference_rays_a_call = 4}},
-    {"reference, eight rays a call", 2, {.reference_rays_a_call = 8}},
+    {"naive", 1, {0}, false},
+    {"bvh", 0, {0}, true},
+    {"bvh, one ray alone", 0, {.bvh_rays_together = 1}, true},
+    {"bvh, eight rays together", 0, {.bvh_rays_together = 8}, true},
+    {"bvh in the plain form", 0, {.bvh_layout = BVH_LAYOUT_PLAIN}, true},
+    {"bvh, two rays together", 0, {.bvh_rays_together = 2}, true},
+    {"bvh with spheres, four rays together", 0, {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 4}, true},
+    {"reference", 2, {0}, false}, /* as many rays a call as the processor takes at once */
+    {"reference, one ray a call", 2, {.reference_rays_a_call = 1}, false},
+    {"reference, four rays a call", 2, {.reference_rays_a_call = 4}, false},
+    {"reference, eight rays a call", 2, {.reference_rays_a_call = 8}, false},
 };
 
 struct scene_row {
     const char *name;
     struct scene *(*create)(void);
+    /* Where things are while the shutter is open; 1 pose: it is closed. NULL: as they were committed. */
+    void (*move)(struct scene_motion *motion, uint32_t pose_count);
+    uint32_t pose_count;
+    bool lively; /* something moves or deforms */
 };
 static const struct scene_row scenes[] = {
-    {"a triangle soup in mirrored, squeezed and nested instances", test_scene_soup},
-    {"spheres among triangles", test_scene_spheres},
-    {"cutouts, glass, panes and a disc", test_scene_translucent},
+    {.name = "a triangle soup in mirrored, squeezed and nested instances", .create = test_scene_soup},
+    {.name = "spheres among triangles", .create = test_scene_spheres},
+    {.name = "cutouts, glass, panes and a disc", .create = test_scene_translucent},
+    {"a posed soup", test_scene_soup, test_motion_of_soup, 1, true},
+    {"a soup that moves from one pose to another", test_scene_soup, test_motion_of_soup, 2, true},
+    {"a soup that moves through nine poses", test_scene_soup, test_motion_of_soup, 9, true},
+    {"spheres of which some move", test_scene_spheres, test_motion_of_two, 3, true},
+    {"cutouts and glass that move", test_scene_translucent, test_motion_of_two, 4, true},
+    {.name = "skins and morph targets as they were committed", .create = test_scene_deformed, .lively = true},
+    {"posed skins and morph targets", test_scene_deformed, test_motion_of_deformed, 1, true},
+    {"skins and morph targets that move", test_scene_deformed, test_motion_of_deformed, 3, true},
 };
 
 static struct gpu_device *device;
@@ -56,12 +70,14 @@ static struct gpu_device *device;
 /* A scene on the device with one tracer on it, and its twin. */
 struct fixture {
     struct scene *scene;
+    struct scene_motion motion;
     struct scene_gpu gpu;
     struct tracer *tracer;
     struct twin twin;
-    struct gpu_buffer rays, answers;
+    struct gpu_buffer rays, times, answers;
     struct ray *host_rays;
-    struct material *materials; /* of the device, read back */
+    float host_times[RAY_COUNT]; /* 0 where nothing moves */
+    struct material *materials;  /* of the device, read back */
 };
 
 static void expect_ok(bool ok, const struct error *error)
@@ -90,17 +106,26 @@ static void make_rays(struct fixture *fixture, uint64_t seed)
         if (i % 17 == 0)
             ray->direction_t_max[3] = i % 2 ? 0.0f : -1.0f;
     }
+    for (uint32_t i = 0; fixture->motion.pose_count > 1 && i < RAY_COUNT; i++)
+        fixture->host_times[i] = i % 11 == 0 ? (float)(i % 2) : test_uniform(&seed, 0, 1);
     struct error error = {0};
+    expect_ok(gpu_buffer_upload(device, &fixture->times, fixture->host_times, sizeof(fixture->host_times), &error),
+              &error);
     expect_ok(
         gpu_buffer_upload(device, &fixture->rays, fixture->host_rays, RAY_COUNT * sizeof(struct ray), &error),
         &error);
+}
+
+static const struct scene_motion *motion_of(const struct fixture *fixture)
+{
+    return fixture->motion.pose_count ? &fixture->motion : NULL;
 }
 
 static void update(struct fixture *fixture)
 {
     struct error error = {0};
     struct scene_changes changes;
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, NULL, &changes, NULL, &error), &error);
+    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, motion_of(fixture), &changes, NULL, &error), &error);
     expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &changes, NULL, &error), &error);
     fixture->materials = realloc(fixture->materials, fixture->gpu.materials.size_bytes);
     gpu_buffer_read(device, &fixture->gpu.materials, 0, fixture->materials, fixture->gpu.materials.size_bytes);
@@ -112,18 +137,22 @@ static void fixture_init(struct fixture *fixture, const struct tracer_row *trace
     const struct tracer_impl *impl = tracer_impl_by_number(tracer->number);
     *fixture = (struct fixture){.scene = scene->create(), .host_rays = malloc(RAY_COUNT * sizeof(struct ray))};
     assert_non_null(impl);
+    if (scene->move)
+        scene->move(&fixture->motion, scene->pose_count);
     scene_gpu_init(&fixture->gpu, device);
     fixture->tracer = tracer_create(impl, device, &tracer->options, &error);
     expect_ok(fixture->tracer != NULL, &error);
     update(fixture);
-    twin_init(&fixture->twin, fixture->scene);
+    twin_init_moving(&fixture->twin, fixture->scene, motion_of(fixture));
     make_rays(fixture, 42);
 }
 
 static void fixture_finish(struct fixture *fixture)
 {
     twin_finish(&fixture->twin);
+    scene_motion_finish(&fixture->motion);
     gpu_buffer_finish(device, &fixture->rays);
+    gpu_buffer_finish(device, &fixture->times);
     gpu_buffer_finish(device, &fixture->answers);
     tracer_destroy(fixture->tracer);
     scene_gpu_finish(&fixture->gpu);
@@ -145,7 +174,8 @@ static void *trace(struct fixture *fixture, enum wave_kind kind, uint32_t ray_co
                               .ray_count = ray_count,
                               .rays = &fixture->rays,
                               .hits = &fixture->answers,
-                              .visibility = &fixture->answers};
+                              .visibility = &fixture->answers,
+                              .times = fixture->motion.pose_count > 1 ? &fixture->times : NULL};
     scene_gpu_bind(&fixture->gpu);
     expect_ok(tracer_trace(fixture->tracer, &fixture->gpu, &wave, &error), &error);
     void *answers = malloc(size_bytes);
@@ -221,7 +251,7 @@ static void compare_closest(struct fixture *fixture)
     uint32_t close_calls = 0, hit_count = 0;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         struct twin_walk walk;
-        twin_trace(&walk, &fixture->twin, &fixture->host_rays[i]);
+        twin_trace_at(&walk, &fixture->twin, &fixture->host_rays[i], fixture->host_times[i]);
         close_calls += walk.close_call;
         hit_count += walk.closest.distance >= 0;
         if (!walk.close_call)
@@ -238,7 +268,7 @@ static void compare_any(struct fixture *fixture)
     uint32_t close_calls = 0;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
         struct twin_walk walk;
-        twin_trace(&walk, &fixture->twin, &fixture->host_rays[i]);
+        twin_trace_at(&walk, &fixture->twin, &fixture->host_rays[i], fixture->host_times[i]);
         close_calls += walk.close_call;
         for (int k = 0; k < 3 && !walk.close_call; k++)
             expect_near(i, "transmittance", (visibilities[i] >> (8 * k) & 255) / 255.0, walk.transmittance[k],
@@ -290,7 +320,7 @@ static void answers_follow_the_edits(void **state)
     test_commit(&edits);
     update(&fixture);
     twin_finish(&fixture.twin);
-    twin_init(&fixture.twin, fixture.scene);
+    twin_init_moving(&fixture.twin, fixture.scene, motion_of(&fixture));
     compare_closest(&fixture);
     compare_any(&fixture);
     fixture_finish(&fixture);
@@ -308,7 +338,7 @@ static void answers_follow_a_changed_shape(void **state)
     test_commit(&edits);
     update(&fixture);
     twin_finish(&fixture.twin);
-    twin_init(&fixture.twin, fixture.scene);
+    twin_init_moving(&fixture.twin, fixture.scene, motion_of(&fixture));
     compare_closest(&fixture);
     compare_any(&fixture);
     fixture_finish(&fixture);
@@ -325,7 +355,7 @@ static void a_wave_in_parts_has_the_answers_of_the_whole(void **state)
     const struct wave wave = {.ray_count = 777, .rays = &fixture.rays, .hits = &fixture.answers};
     struct hit *whole = trace(&fixture, WAVE_CLOSEST, wave.ray_count);
     struct hit *hits = malloc(RAY_COUNT * sizeof(struct hit));
-    const struct gpu_program *program = trace_program_get(&fixture.gpu, WAVE_CLOSEST, &parts, &error);
+    const struct gpu_program *program = trace_program_get(&fixture.gpu, &wave, &parts, &error);
     expect_ok(program != NULL, &error);
     gpu_buffer_clear(device, &fixture.answers, UNTOUCHED);
     expect_ok(trace_program_run(program, &fixture.gpu, &wave, &parts, &error), &error);
@@ -366,7 +396,7 @@ static struct scene *empty_scene(void)
 static void a_scene_with_nothing_in_it_is_missed(void **state)
 {
     const struct case_state *row = *state;
-    static const struct scene_row empty = {"nothing", empty_scene};
+    static const struct scene_row empty = {.name = "nothing", .create = empty_scene};
     struct fixture fixture;
     fixture_init(&fixture, row->tracer, &empty);
     struct hit *hits = trace(&fixture, WAVE_CLOSEST, RAY_COUNT);
@@ -427,7 +457,7 @@ int main(void)
         }
         for (size_t s = 0; s < COUNT(scenes); s++) {
             for (size_t c = 0; c < COUNT(checks); c++) {
-                if (checks[c].once && s > 0)
+                if ((checks[c].once && s > 0) || (tracers[t].still && scenes[s].lively))
                     continue;
                 states[n] = (struct case_state){&tracers[t], &scenes[s]};
                 snprintf(names[n], sizeof(names[n]), "%s: %s: %s", tracers[t].name, checks[c].name,

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include <cmocka.h>
+#include <xxhash.h>
 
 /* ---- a renderer that renders nothing ------------------------------------------------------------ */
 
@@ -25,7 +26,8 @@
 struct frame_renderer {
     const struct scene *scene;
     struct frame_request request;
-    uint32_t steps_left;
+    uint64_t motion_digest;
+    uint32_t pose_count, steps_left;
     bool busy;
     struct stage_times times;
 };
@@ -79,13 +81,34 @@ static inline void fake_renderer_destroy(struct frame_renderer *renderer)
     free(renderer);
 }
 
+/* Of everything that a motion says; 0: none. The result's `splits` has it, and `structure_bytes` the poses. */
+static inline uint64_t fake_motion_digest(const struct scene_motion *motion)
+{
+    uint64_t digest = motion != NULL;
+    for (uint32_t i = 0; motion && i < motion->pose_count; i++) {
+        const struct scene_pose *pose = &motion->poses[i];
+        for (uint32_t k = 0; k < pose->node_count; k++) {
+            const struct pose_node *node = &pose->nodes[k];
+            digest = XXH3_64bits_withSeed(node->parent_from_node, sizeof node->parent_from_node,
+                                          digest + node->node * 2 + node->hidden);
+        }
+        digest = XXH3_64bits_withSeed(pose->weights, pose->weight_count * sizeof *pose->weights, digest);
+        for (uint32_t k = 0; k < pose->light_count; k++)
+            digest = XXH3_64bits_withSeed(pose->lights[k].colour, sizeof pose->lights[k].colour, digest);
+        for (uint32_t k = 0; k < pose->material_count; k++)
+            digest = XXH3_64bits_withSeed(pose->materials[k].emission, sizeof pose->materials[k].emission, digest);
+    }
+    return digest;
+}
+
 static inline bool fake_begin(struct frame_renderer *renderer, const struct scene *scene,
                               const struct scene_motion *motion, const struct frame_request *request,
                               struct error *error)
 {
     if (renderer->busy)
         return error_set(error, ERROR_INTERNAL, "fake", "a frame is in progress already");
-    (void)motion;
+    renderer->motion_digest = fake_motion_digest(motion);
+    renderer->pose_count = motion ? motion->pose_count : 0;
     renderer->busy = true;
     renderer->scene = scene;
     renderer->request = *request;
@@ -123,6 +146,8 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         .primary_rays = 10,
         .shadow_rays = 5,
         .secondary_rays = 1,
+        .splits = renderer->motion_digest,
+        .structure_bytes = renderer->pose_count,
         .times = renderer->times,
     };
     result->pixels = malloc(result->size_bytes);

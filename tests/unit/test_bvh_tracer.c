@@ -159,8 +159,8 @@ static void expect_like_brute_force(struct scene *scene, const struct ray *rays,
 {
     static const struct tracer_options forms[] = {
         {.bvh_rays_together = 1},         {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 1},
-        {.bvh_layout = BVH_LAYOUT_PLAIN}, {.bvh_rays_together = 4},
-        {.bvh_rays_together = 8},
+        {.bvh_layout = BVH_LAYOUT_PLAIN}, {.bvh_rays_together = 3},
+        {.bvh_rays_together = 4},         {.bvh_rays_together = 8},
     };
     struct scene_gpu gpu;
     struct error error = {0};
@@ -380,7 +380,7 @@ static void a_number_of_rays_that_cannot_walk_together_is_refused(void **state)
 {
     (void)state;
     struct error error = {0};
-    assert_null(tracer_create(&tracer_bvh_impl, device, &(struct tracer_options){.bvh_rays_together = 3}, &error));
+    assert_null(tracer_create(&tracer_bvh_impl, device, &(struct tracer_options){.bvh_rays_together = 5}, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "options.bvh_rays_together");
 }

@@ -606,11 +606,16 @@ static void an_interrupted_video_can_be_finished_with_what_there_is(void **state
     for (written = 1; written < 100 && fl_video_write(video, &frame, &error);)
         written++;
     assert_int_equal(error.code, FL_ERROR_INTERRUPTED);
+    assert_false(fl_video_finish(video, &error));
+    assert_int_equal(error.code, FL_ERROR_INTERRUPTED);
     fl_video_set_interrupt(video, 0);
     if (!fl_video_finish(video, &error))
         fail_msg("%s", error.text);
     /* The one on the way is kept where all of it was handed over already. */
     assert_in_range(fl_video_info(video)->frames, written, written + 1);
+    assert_false(fl_video_finish(video, &error));
+    assert_false(fl_video_write(video, &frame, &error));
+    assert_int_equal(error.code, FL_ERROR_ARGUMENT);
     char line[64];
     snprintf(line, sizeof line, "nb_read_frames=%u", fl_video_info(video)->frames);
     fl_video_destroy(video);

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+// Where things are at a time: 0 where the shutter opens, 1 where it closes.
+//
+// Defines: HAS_MOTION if something moves meanwhile; without it all of this is as the shutter opens, whatever the time.
+#include "common/geometry.glsl"
+#include "common/math.glsl"
+
+#ifdef HAS_MOTION
+
+layout(binding = UNIT_MOTIONS) uniform samplerBuffer motions; // three texels a pose
+
+// Entry by entry between the two poses, at even distances, that the time lies between.
+void world_from_object_at(uint first_texel, uint pose_count, float time, out vec4 rows[3])
+{
+    float place = clamp(time, 0.0, 1.0) * float(pose_count - 1u);
+    float before = min(floor(place), float(pose_count - 2u));
+    int texel = int(first_texel) + 3 * int(before);
+    for (int row = 0; row < 3; row++)
+        rows[row] = mix(texelFetch(motions, texel + row), texelFetch(motions, texel + 3 + row), place - before);
+}
+
+// The inverse of an affine transform; its determinant's sign. Divided by their greatest entry first, products of very
+// small or large ones stay numbers. Where it is flat the inverse is not a number, and no ray hits anything.
+float invert(vec4 m[3], out vec4 inverse[3])
+{
+    float greatest_entry = greatest(max(abs(m[0].xyz), max(abs(m[1].xyz), abs(m[2].xyz))));
+    float scale = 1.0 / greatest_entry;
+    vec3 r0 = m[0].xyz * scale, r1 = m[1].xyz * scale, r2 = m[2].xyz * scale;
+    vec3 c0 = cross(r1, r2), c1 = cross(r2, r0), c2 = cross(r0, r1); // columns of the inverse
+    float determinant = dot(r0, c0);
+    float factor = scale / determinant;
+    vec3 move = vec3(m[0].w, m[1].w, m[2].w);
+    for (int row = 0; row < 3; row++) {
+        vec3 entries = vec3(c0[row], c1[row], c2[row]) * factor;
+        inverse[row] = vec4(entries, -dot(entries, move));
+    }
+    return determinant;
+}
+
+#endif
+
+instance instance_at_time(uint index, float time)
+{
+    instance i = instance_at(index);
+#ifdef HAS_MOTION
+    if (i.motion != 0u) {
+        world_from_object_at(i.motion - 1u, i.flags >> INSTANCE_POSES_SHIFT & INSTANCE_POSES_MASK, time,
+                             i.world_from_object);
+        float determinant = invert(i.world_from_object, i.object_from_world);
+        i.flags = determinant < 0.0 ? i.flags | INSTANCE_MIRRORED : i.flags & ~INSTANCE_MIRRORED;
+    }
+#endif
+    return i;
+}
+
+uint close_offset_of(uint geometry_index)
+{
+#ifdef HAS_MOTION
+    return geometry_at(geometry_index).close_offset;
+#else
+    return 0u;
+#endif
+}
+
+// A vertex of a geometry whose vertices as the shutter closes lie `close_offset` behind those as it opens.
+vec3 position_at_time(uint vertex, uint close_offset, float time)
+{
+    vec3 position = texelFetch(positions, int(vertex)).xyz;
+#ifdef HAS_MOTION
+    if (close_offset != 0u)
+        position = mix(position, texelFetch(positions, int(vertex + close_offset)).xyz, time);
+#endif
+    return position;
+}
+
+// Unit where it lies between two.
+vec3 normal_at_time(uint vertex, uint close_offset, float time)
+{
+    vec3 normal = texelFetch(normals, int(vertex)).xyz;
+#ifdef HAS_MOTION
+    if (close_offset != 0u) {
+        normal = mix(normal, texelFetch(normals, int(vertex + close_offset)).xyz, time);
+        float squared = dot(normal, normal);
+        normal *= squared > 0.0 ? inversesqrt(squared) : 0.0;
+    }
+#endif
+    return normal;
+}
+
+vec3 tangent_at_time(uint vertex, uint close_offset, float time)
+{
+    vec3 tangent = unpack_unit(texelFetch(tangents, int(vertex)).x);
+#ifdef HAS_MOTION
+    if (close_offset != 0u)
+        tangent = mix(tangent, unpack_unit(texelFetch(tangents, int(vertex + close_offset)).x), time);
+#endif
+    return tangent;
+}
