@@ -49,7 +49,7 @@ def children(pid, name):
 
 
 def moving_model(path):
-    """A glTF file with a pyramid and three clips: it slides, spins, and (`pulse`) grows along a cubic spline."""
+    """A glTF file with a pyramid that slides, spins, and (`pulse`) grows along a cubic spline; the ground sinks."""
     chunks, views, accessors = [], [], []
 
     def add(values, kind, component=5126):
@@ -62,20 +62,21 @@ def moving_model(path):
                           "type": kind, "min": [min(p) for p in parts], "max": [max(p) for p in parts]})
         return len(accessors) - 1
 
-    corners = [-1, 0, -1, 1, 0, -1, 1, 0, 1, -1, 0, 1, 0, 2, 0]
+    corners = [-1, 0, -1, 1, 0, -1, 1, 0, 1, -1, 0, 1, 0.3, 2, 0.2]  # the apex stands askew: no turn is like another
     position = add(corners, "VEC3")
     index = add([0, 1, 2, 0, 2, 3, 0, 4, 1, 1, 4, 2, 2, 4, 3, 3, 4, 0], "SCALAR", 5123)
     half = 0.5 ** 0.5
     clips = {
-        "slide": ("translation", "LINEAR", [0, 1], [-1, 0, 0, 1, 0, 0], "VEC3"),
-        "spin": ("rotation", "LINEAR", [0, 0.5, 1], [0, 0, 0, 1, 0, half, 0, half, 0, 1, 0, 0], "VEC4"),
-        "pulse": ("scale", "CUBICSPLINE", [0, 1], [0, 0, 0, 1, 1, 1, 1, 2, 1, 0, 0, 0, 2, 1, 2, 0, 0, 0], "VEC3"),
+        "slide": (0, "translation", "LINEAR", [0, 1], [-1, 0, 0, 1, 0, 0], "VEC3"),
+        "spin": (0, "rotation", "LINEAR", [0, 0.5, 1], [0, 0, 0, 1, 0, half, 0, half, 0, 1, 0, 0], "VEC4"),
+        "pulse": (0, "scale", "CUBICSPLINE", [0, 1], [0, 0, 0, 1, 1, 1, 1, 2, 1, 0, 0, 0, 2, 1, 2, 0, 0, 0], "VEC3"),
+        "sink": (1, "translation", "LINEAR", [0, 1], [0, -2.2, -1, 0, -3, -1], "VEC3"),
     }
     animations = []
-    for name, (target, interpolation, times, values, kind) in clips.items():
+    for name, (node, target, interpolation, times, values, kind) in clips.items():
         sampler = {"input": add(times, "SCALAR"), "output": add(values, kind), "interpolation": interpolation}
         animations.append({"name": name, "samplers": [sampler],
-                           "channels": [{"sampler": 0, "target": {"node": 0, "path": target}}]})
+                           "channels": [{"sampler": 0, "target": {"node": node, "path": target}}]})
     data = b"".join(chunks)
     document = {
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2]}],
@@ -486,7 +487,7 @@ class Clips(OneDaemon):
         self.assertEqual(fast, {1: loop[1], 2: loop[3]})
 
     def test_two_clips_are_played_at_once(self):
-        both, _ = self.animate("both", self.model, "--clip", "slide", "--clip", "spin", "--fps", "4", *self.VIEW)
+        both, _ = self.animate("both", self.model, "--clip", "slide", "--clip", "sink", "--fps", "4", *self.VIEW)
         alone, _ = self.animate("alone", self.model, "--clip", "slide", "--fps", "4", *self.VIEW)
         self.assertEqual(both[1], alone[1])
         self.assertNotEqual(both[2], alone[2])
@@ -537,10 +538,7 @@ class Clips(OneDaemon):
         self.expect(farlight("animate", "--script", script), 0)
         frames = [digest(self.folder / f"{n}.exr") for n in range(1, 6)]
         self.assertEqual(frames[0], frames[4])
-        # A square pyramid looks the same after a quarter, and its edges are elsewhere after an eighth.
-        spun = self.write({**json.loads(script.read_text()), "fps": 8, "frames": "1-2", "output": "eighth-%d.exr"})
-        self.expect(farlight("animate", "--script", spun), 0)
-        self.assertNotEqual(digest(self.folder / "eighth-2.exr"), frames[0])
+        self.assertEqual(len(set(frames)), 4)
 
     @needs_shared_scenes
     def test_a_skinned_model_in_parts_and_resumed_is_the_whole_to_the_bit(self):
