@@ -15,7 +15,7 @@ const struct glb_material parts_materials[PARTS_MATERIALS] = {
     [COPPER] = {"brushed copper", {0.95f, 0.60f, 0.45f, 1}, 1, 0.35f, 0, 0, {0, 0, 0}},
     [BRASS] = {"brass", {0.85f, 0.68f, 0.38f, 1}, 1, 0.25f, 0, 0, {0, 0, 0}},
     [JADE] = {"jade", {0.10f, 0.42f, 0.22f, 1}, 0, 0.3f, 0, 0, {0, 0, 0}},
-    [GLOW] = {"glow", {0, 0, 0, 1}, 0, 1, 0, 0, {14, 9, 4}},
+    [GLOW] = {"glow", {0, 0, 0, 1}, 0, 1, 0, 0, {5, 3.4f, 1.6f}},
     [DARK] = {"iron", {0.12f, 0.12f, 0.13f, 1}, 0, 0.7f, 0, 0, {0, 0, 0}},
 };
 

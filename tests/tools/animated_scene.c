@@ -258,8 +258,8 @@ static void morph(struct carousel *carousel)
     even_times(times_s, KEYS);
     for (unsigned i = 0; i < KEYS; i++) { /* up, then into lobes, with nothing of either at first and last */
         const float t = (float)i / (KEYS - 1);
-        values[i][0] = smooth(1 - fabsf(t - 0.33f) * 3);
-        values[i][1] = smooth(1 - fabsf(t - 0.67f) * 3);
+        values[i][0] = smooth(1 - fabsf(t - 1.0f / 3) * 3);
+        values[i][1] = smooth(1 - fabsf(t - 2.0f / 3) * 3);
     }
     gltf_animate(&carousel->writer, BLOB,
                  &(struct gltf_curve){"weights", "LINEAR", times_s, &values[0][0], KEYS, 2});

@@ -4,6 +4,7 @@
  *   teapot.glb       a teapot on a mirror, with metal and glass beside it
  *   carousel.glb     a roundabout of teapots with a clip, "ride": everything that moves
  *   sky.hdr          an evening sky with two soft lights, to be used as environment
+ *   dusk.hdr         the same, a sixth as bright: what lamps light has shadows under it
  *   sphereflake-N.nff  Eric Haines' 'balls' of the Standard Procedural Databases, N levels
  *   bumpy-N.glb      a bumpy sphere of about N thousand triangles above a floor, the family of the benchmark */
 #include "animated_scene.h"
@@ -143,7 +144,7 @@ static void sky_radiance(float rgb[3], float height, float azimuth)
 }
 
 /* Radiance's own format, without run lengths: https://radsite.lbl.gov/radiance/refer/filefmts.pdf */
-static bool write_sky(const char *path)
+static bool write_sky(const char *path, float strength)
 {
     enum { WIDTH = 512, HEIGHT = 256 };
     FILE *file = fopen(path, "wb");
@@ -157,6 +158,8 @@ static bool write_sky(const char *path)
             float rgb[3];
             sky_radiance(rgb, cosf(3.14159265f * ((float)y + 0.5f) / HEIGHT),
                          6.2831853f * (((float)x + 0.5f) / WIDTH - 0.5f));
+            for (int i = 0; i < 3; i++)
+                rgb[i] *= strength;
             int exponent;
             const float mantissa = frexpf(fmaxf(rgb[0], fmaxf(rgb[1], rgb[2])), &exponent);
             const float scale = mantissa * 256 / fmaxf(rgb[0], fmaxf(rgb[1], rgb[2]));
@@ -211,7 +214,9 @@ int main(int argc, char **argv)
     snprintf(path, sizeof path, "%s/carousel.glb", argv[1]);
     ok &= animated_scene_write(path);
     snprintf(path, sizeof path, "%s/sky.hdr", argv[1]);
-    ok &= write_sky(path);
+    ok &= write_sky(path, 1);
+    snprintf(path, sizeof path, "%s/dusk.hdr", argv[1]);
+    ok &= write_sky(path, 0.16f);
     for (int levels = 2; levels <= 4; levels++) {
         snprintf(path, sizeof path, "%s/sphereflake-%d.nff", argv[1], levels);
         ok &= write_sphereflake(path, levels);
