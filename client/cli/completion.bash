@@ -30,7 +30,8 @@ _farlight()
             info) words="--json --environment --help" ;;
             compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help
                 --tracers --far --server --size --samples --depth --seed --environment --exposure --camera --eye --look-at
-                --up --fov --bvh-bounds --integrator --encoding --quality --quiet" ;;
+                --up --fov --clip --clip-once --clip-start --clip-speed --time --bvh-bounds --integrator --encoding
+                --quality --quiet" ;;
             stats) words="--server --json --help" ;;
             ping) words="--server --count --help" ;;
             help) words="render animate info compare stats ping bridge" ;;

@@ -77,8 +77,9 @@ struct scene_gpu {
 void scene_gpu_init(struct scene_gpu *gpu, struct gpu_device *device);
 void scene_gpu_finish(struct scene_gpu *gpu);
 /* Brings the copy to the scene's revision and to where things are in it while the shutter is open (NULL: as they
- * were committed); *changes says what moved. On failure the copy is empty and will be
- * made anew by the next update. */
+ * were committed); *changes says what moved. Materials and lights, also where lights are, are those of the first
+ * pose; so is which nodes are hidden. What a transform makes flat in some pose is left out. On failure the copy is
+ * empty and will be made anew by the next update. */
 bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error);
 /* Of an instance in world space, wherever it goes while the shutter is open. */
