@@ -201,7 +201,7 @@ $(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/ser
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -lembree3 -o $@
 
 # The generator of the bundled scenes.
-TOOLS_OBJ := $(B)/tests/tools/make_scenes.o $(B)/tests/tools/glb.o $(B)/tests/tools/shape.o
+TOOLS_OBJ := $(patsubst %,$(B)/tests/tools/%.o,make_scenes animated_scene animated_parts gltf_writer glb shape)
 $(B)/tests/tools/make_scenes: $(TOOLS_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -lm -o $@
 

@@ -34,7 +34,8 @@ _farlight()
             info) words="--json --environment --help" ;;
             compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help
                 --tracers --far --server --size --samples --depth --seed --environment --exposure --camera --eye --look-at
-                --up --fov --aperture --focus --shutter --filter --bvh-bounds --bvh-rays --integrator --encoding --quality --quiet" ;;
+                --up --fov --aperture --focus --shutter --filter --clip --clip-once --clip-start --clip-speed --time
+                --bvh-bounds --bvh-rays --integrator --encoding --quality --quiet" ;;
             stats) words="--server --json --help" ;;
             ping) words="--server --count --help" ;;
             help) words="render animate info compare stats ping bridge" ;;

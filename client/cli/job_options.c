@@ -355,9 +355,8 @@ const struct argp cli_job_argp = {.options = options, .parser = parse};
 
 const struct argp *cli_picture_argp(void)
 {
-    static const int left_out[] = {KEY_OUTPUT,    KEY_FORMAT,     KEY_HALF,      KEY_FLOAT,      KEY_TONE_MAP,
-                                   KEY_TRACER,    KEY_PRIMARY,    KEY_TIMINGS,   KEY_TRACE_FILE, KEY_CLIP,
-                                   KEY_CLIP_ONCE, KEY_CLIP_START, KEY_CLIP_SPEED};
+    static const int left_out[] = {KEY_OUTPUT, KEY_FORMAT,  KEY_HALF,    KEY_FLOAT,     KEY_TONE_MAP,
+                                   KEY_TRACER, KEY_PRIMARY, KEY_TIMINGS, KEY_TRACE_FILE};
     static struct argp_option kept[sizeof options / sizeof options[0]];
     static const struct argp argp = {.options = kept, .parser = parse};
     size_t count = 0;
