@@ -205,6 +205,10 @@ TOOLS_OBJ := $(B)/tests/tools/make_scenes.o $(B)/tests/tools/glb.o $(B)/tests/to
 $(B)/tests/tools/make_scenes: $(TOOLS_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -lm -o $@
 
+# Where a model is at a time of a clip, as the daemon has it.
+$(B)/tests/tools/pose_dump: $(B)/tests/tools/pose_dump.o $(MODEL_OBJ) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libjxl-dev libtinygltf-dev \
@@ -214,7 +218,7 @@ PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
 .PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help
-tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(B)/tests/tools/make_scenes
+tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
@@ -307,7 +311,9 @@ FUZZ_SEED := $(B)/tests/fuzz/seed
 $(FUZZ_SEED): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
-	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ -o $@
+	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
+$(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ))
+$(B)/tests/fuzz/fuzz_scene: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
 .PHONY: fuzz $(addprefix run-fuzz-,$(FUZZERS))
 ifeq ($(config),fuzz)
 fuzz: $(addprefix run-fuzz-,$(FUZZERS))

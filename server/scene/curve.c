@@ -158,16 +158,27 @@ static double dot(const double a[4], const double b[4])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
 }
 
-/* Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985. The angle comes from the lengths of sum and
- * difference, which is exact for small ones too. */
-static void slerp(const double from[4], const double to[4], double share, double q[4])
+/* Between two unit quaternions on a sphere, along the shorter arc; half of what the rotation turns. It comes from
+ * the lengths of sum and difference, which is exact for small angles too. */
+static double arc_between(const double from[4], const double to[4], double sign)
 {
-    double sign = dot(from, to) < 0.0 ? -1.0 : 1.0, sum = 0.0, difference = 0.0;
+    double sum = 0.0, difference = 0.0;
     for (int i = 0; i < 4; i++) {
         sum += (sign * to[i] + from[i]) * (sign * to[i] + from[i]);
         difference += (sign * to[i] - from[i]) * (sign * to[i] - from[i]);
     }
-    double angle = 2.0 * atan2(sqrt(difference), sqrt(sum)), sine = sin(angle);
+    return 2.0 * atan2(sqrt(difference), sqrt(sum));
+}
+
+static double shorter_sign(const double from[4], const double to[4])
+{
+    return dot(from, to) < 0.0 ? -1.0 : 1.0;
+}
+
+/* Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985. */
+static void slerp(const double from[4], const double to[4], double share, double q[4])
+{
+    double sign = shorter_sign(from, to), angle = arc_between(from, to, sign), sine = sin(angle);
     double of_from = 1.0 - share, of_to = share;
     if (sine > 1e-9) { /* below it the arc is straight to the last bit */
         of_from = sin((1.0 - share) * angle) / sine;
@@ -186,10 +197,10 @@ static void near_signs(const struct curve *curve, uint32_t key, double sign[4])
     unit_key(curve, key, from);
     unit_key(curve, key + 1, to);
     unit_key(curve, key + 2 < last ? key + 2 : last, after);
-    sign[0] = dot(before, from) < 0.0 ? -1.0 : 1.0;
+    sign[0] = shorter_sign(before, from);
     sign[1] = 1.0;
-    sign[2] = dot(from, to) < 0.0 ? -1.0 : 1.0;
-    sign[3] = dot(to, after) < 0.0 ? -sign[2] : sign[2];
+    sign[2] = shorter_sign(from, to);
+    sign[3] = sign[2] * shorter_sign(to, after);
 }
 
 void curve_rotation_at(const struct curve *curve, double time_s, double rotation[4])
@@ -211,4 +222,26 @@ void curve_rotation_at(const struct curve *curve, double time_s, double rotation
         between_keys(curve, &span, sign, rotation);
     }
     make_unit(rotation);
+}
+
+#define TURN_KEYS_MAX 16
+
+double curve_turn_bound(const struct curve *curve, double from_s, double to_s)
+{
+    if (curve->interpolation != INTERPOLATION_STEP && curve->interpolation != INTERPOLATION_LINEAR)
+        return INFINITY;
+    double at[4], next[4], arc = 0.0;
+    uint32_t last = curve->key_count - 1;
+    curve_rotation_at(curve, from_s, at);
+    uint32_t key =
+        from_s >= time_at(curve, 0) ? (from_s < time_at(curve, last) ? key_before(curve, from_s) + 1 : last) : 0;
+    for (uint32_t keys = 0; key <= last && time_at(curve, key) < to_s; key++, keys++) {
+        if (keys == TURN_KEYS_MAX)
+            return INFINITY;
+        unit_key(curve, key, next);
+        arc += arc_between(at, next, shorter_sign(at, next));
+        memcpy(at, next, sizeof at);
+    }
+    curve_rotation_at(curve, to_s, next);
+    return 2.0 * (arc + arc_between(at, next, shorter_sign(at, next)));
 }

@@ -25,5 +25,8 @@ void curve_at(const struct curve *curve, double time_s, double *value);
 /* The same for a unit quaternion x y z w (width 4): linear is slerp along the shorter arc, Catmull-Rom takes of
  * each key the sign that is nearer to its neighbour; the result is made unit. */
 void curve_rotation_at(const struct curve *curve, double time_s, double rotation[4]);
+/* How far a rotation turns at most from one time to a later one, radians: the arcs between its keys. INFINITY
+ * where that is not known: of splines, and of more than a few keys. */
+double curve_turn_bound(const struct curve *curve, double from_s, double to_s);
 
 #endif

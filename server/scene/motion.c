@@ -155,36 +155,68 @@ static void thin_out(struct scene_motion *motion, uint32_t step)
     motion->pose_count = kept;
 }
 
-static bool choose_poses(struct scene_motion *motion, const struct scene *scene, struct error *error)
+/* Whether two poses will do, by what is known of the turns without looking at the poses between. */
+static bool turns_little(struct player *player, const struct scene_motion *ends, double open_s, double shutter_s,
+                         interval_turns *turns, double *bounds)
 {
-    if (stands_still(motion)) {
-        thin_out(motion, MOTION_POSES_MAX);
-        return true;
+    uint32_t count = ends->poses[0].node_count;
+    player_turn_bounds(player, open_s, open_s + shutter_s, bounds);
+    memset(turns, 0, count * sizeof *turns);
+    for (uint32_t node = 0; node < count; node++)
+        turns[node][0] = bounds[node];
+    return intervals_together(player->scene, ends, (const interval_turns *)turns) == INTERVALS;
+}
+
+static bool add_poses(struct scene_motion *motion, struct player *player, double open_s, double shutter_s,
+                      uint32_t intervals, struct error *error)
+{
+    for (uint32_t i = 0; i <= intervals; i++) {
+        double time_s = intervals ? open_s + shutter_s * i / intervals : open_s;
+        if (!player_pose(player, time_s, &motion->poses[i], error))
+            return false;
+        motion->pose_count = i + 1;
     }
-    interval_turns *turns = calloc(motion->poses[0].node_count + 1, sizeof *turns);
-    if (!turns)
-        return error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for the poses of %u nodes",
-                         motion->poses[0].node_count);
-    posed_turns(motion, turns);
-    thin_out(motion, (uint32_t)intervals_together(scene, motion, (const interval_turns *)turns));
-    free(turns);
     return true;
+}
+
+/* Of two poses, the ends, to as many as are needed. */
+static bool fill_in(struct scene_motion *motion, struct player *player, double open_s, double shutter_s,
+                    struct error *error)
+{
+    size_t count = (size_t)motion->poses[0].node_count + 1;
+    interval_turns *turns = malloc(count * sizeof *turns);
+    double *bounds = malloc(count * sizeof *bounds);
+    bool fine = turns && bounds;
+    if (!fine)
+        error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for the turns of %zu nodes", count);
+    if (fine && !turns_little(player, motion, open_s, shutter_s, turns, bounds)) {
+        for (uint32_t i = 0; i < 2; i++)
+            scene_pose_finish(&motion->poses[i]);
+        motion->pose_count = 0;
+        fine = add_poses(motion, player, open_s, shutter_s, INTERVALS, error);
+        if (fine) {
+            posed_turns(motion, turns);
+            thin_out(motion, (uint32_t)intervals_together(player->scene, motion, (const interval_turns *)turns));
+        }
+    }
+    if (fine && stands_still(motion))
+        thin_out(motion, MOTION_POSES_MAX);
+    free(turns);
+    free(bounds);
+    return fine;
 }
 
 bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scene, const struct clip_use *uses,
                            uint32_t use_count, double open_s, double shutter_s, struct error *error)
 {
     struct player player;
-    uint32_t wanted = shutter_s > 0.0 ? MOTION_POSES_MAX : 1;
+    bool moves = shutter_s > 0.0;
     *motion = (struct scene_motion){0};
     bool fine = player_init(&player, scene, uses, use_count, error);
-    if (fine && !(motion->poses = calloc(wanted, sizeof *motion->poses)))
-        fine = error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for %u poses", wanted);
-    for (uint32_t i = 0; fine && i < wanted; i++) {
-        double time_s = open_s + shutter_s * i / INTERVALS;
-        fine = player_pose(&player, time_s, &motion->poses[motion->pose_count++], error);
-    }
-    fine = fine && (wanted == 1 || choose_poses(motion, scene, error));
+    if (fine && !(motion->poses = calloc(MOTION_POSES_MAX, sizeof *motion->poses)))
+        fine = error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for %d poses", MOTION_POSES_MAX);
+    fine = fine && add_poses(motion, &player, open_s, shutter_s, moves ? 1 : 0, error) &&
+           (!moves || fill_in(motion, &player, open_s, shutter_s, error));
     player_finish(&player);
     if (!fine)
         scene_motion_finish(motion);

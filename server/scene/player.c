@@ -26,6 +26,26 @@ static int compare_tracks(const void *a, const void *b)
     return (id_x > id_y) - (id_x < id_y);
 }
 
+static bool is_sorted(const struct player *player)
+{
+    for (size_t i = 1; i < player->track_count; i++) {
+        if (compare_tracks(&player->tracks[i - 1], &player->tracks[i]) > 0)
+            return false;
+    }
+    return true;
+}
+
+/* Behind the tracks that change the same object as the one at `first`. */
+static size_t group_end(const struct player *player, size_t first)
+{
+    const struct player_track *track = &player->tracks[first];
+    size_t end = first + 1;
+    while (end < player->track_count && player->tracks[end].target == track->target &&
+           player->tracks[end].channel->object == track->channel->object)
+        end++;
+    return end;
+}
+
 static double last_key_s(const struct scene_channel *channel, const struct scene_clip *clip)
 {
     const float *floats = (const float *)(const void *)clip->floats->data;
@@ -89,7 +109,8 @@ bool player_init(struct player *player, const struct scene *scene, const struct 
     void *value;
     while (hashmap_next(channels, &cursor, NULL, &value))
         take_channel(player, value);
-    qsort(player->tracks, player->track_count, sizeof *player->tracks, compare_tracks);
+    if (!is_sorted(player))
+        qsort(player->tracks, player->track_count, sizeof *player->tracks, compare_tracks);
     return true;
 }
 
@@ -303,13 +324,39 @@ bool player_pose(struct player *player, double time_s, struct scene_pose *pose, 
         return false;
     set_times(player, time_s);
     for (size_t first = 0, end; first < player->track_count; first = end) {
-        const struct player_track *track = &player->tracks[first];
-        for (end = first + 1; end < player->track_count; end++) {
-            const struct player_track *next = &player->tracks[end];
-            if (next->target != track->target || next->channel->object != track->channel->object)
-                break;
-        }
-        makers[track->target](player, track, end - first, pose);
+        end = group_end(player, first);
+        makers[player->tracks[first].target](player, &player->tracks[first], end - first, pose);
     }
     return true;
+}
+
+/* Of the last track that turns the node, which is the one that counts. */
+static double track_turn_bound(struct player *player, const struct player_track *tracks, size_t count,
+                               double from_s, double to_s)
+{
+    for (size_t i = count; i-- > 0;) {
+        if (tracks[i].channel->path != CHANNEL_NODE_ROTATION)
+            continue;
+        struct curve curve = channel_curve(tracks[i].channel, tracks[i].clip);
+        set_times(player, from_s);
+        double clip_from_s = player->times_s[tracks[i].use];
+        set_times(player, to_s);
+        double clip_to_s = player->times_s[tracks[i].use];
+        /* A clip that begins again jumps. */
+        bool jumps = clip_to_s < clip_from_s || (player->uses[tracks[i].use].loop &&
+                                                 (to_s - from_s) * (double)player->uses[tracks[i].use].speed >=
+                                                     player->durations_s[tracks[i].use]);
+        return jumps ? INFINITY : curve_turn_bound(&curve, clip_from_s, clip_to_s);
+    }
+    return 0.0;
+}
+
+void player_turn_bounds(struct player *player, double from_s, double to_s, double *bounds)
+{
+    uint32_t node = 0;
+    for (size_t first = 0, end; first < player->target_tracks[TARGET_NODE]; first = end) {
+        end = group_end(player, first);
+        if (scene_node(player->scene, player->tracks[first].channel->object))
+            bounds[node++] = track_turn_bound(player, &player->tracks[first], end - first, from_s, to_s);
+    }
 }

@@ -31,6 +31,8 @@ bool player_init(struct player *player, const struct scene *scene, const struct 
 void player_finish(struct player *player);
 /* What a pose has of a node; NULL: nothing, or no pose. */
 const struct pose_node *scene_pose_node(const struct scene_pose *pose, uint32_t id);
+/* For each node that poses list, in their order: how far it turns at most, see curve_turn_bound(). */
+void player_turn_bounds(struct player *player, double from_s, double to_s, double *bounds);
 bool player_pose(struct player *player, double time_s, struct scene_pose *pose, struct error *error);
 
 #endif

@@ -105,8 +105,8 @@ float filter_place(int i)
 // Where a sample lies about its pixel's centre, in pixels: server/render/pixel_filter.h.
 float filter_offset(float number)
 {
-    float side = 2.0 * number - 1.0, at = sqrt(1.0 - abs(side)) * 32.0;
-    int i = min(int(at), 31);
+    float side = 2.0 * number - 1.0, at = sqrt(1.0 - abs(side)) * 64.0;
+    int i = min(int(at), 63);
     float place = mix(filter_place(i), filter_place(i + 1), at - float(i));
     return side < 0.0 ? -place : place;
 }

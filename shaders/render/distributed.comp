@@ -8,16 +8,26 @@
 //   child       at most one: straight on (alpha blending), mirrored or refracted, in a direction that a facet of the
 //               rough surface sends it
 //
-// Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and render/shade.glsl.
+// Defines: those of common/material.glsl, common/light.glsl, common/environment.glsl and
+// render/shade.glsl.
 
 #include "common/environment.glsl"
-#include "common/light.glsl"
+#include "common/light_choice.glsl"
 #include "common/lobe.glsl"
 #include "render/shade.glsl"
 
 // A child that would carry less than this to its pixel is followed only as often as its weight is of it, with this
 // weight.
 const float ROULETTE = 1.0 / 8.0;
+
+// How rough the mirrors and windows were that a path has met: what it sees from there is blurred by them. A lamp's
+// highlight on a smooth surface, which is as bright as it is narrow, is therefore widened to that; else one ray in
+// thousands would meet it, as a spark. Kaplanyan, Dachsbacher. Path Space Regularization for Holistic and Robust Light
+// Transport. 2013.
+float path_roughness(path p)
+{
+    return float(p.flags >> PATH_ROUGHNESS_SHIFT) / 65535.0;
+}
 
 void add_lobe(uint j, path p, surface s, float NoV, float distance_, vec3 direction, vec3 weight, float choice, vec2 u)
 {
@@ -26,6 +36,8 @@ void add_lobe(uint j, path p, surface s, float NoV, float distance_, vec3 direct
     float survival = greatest(carried) / ROULETTE;
     if (!(choice < survival)) // not a number: likewise
         return;
+    uint roughness = uint(max(path_roughness(p), s.roughness) * 65535.0 + 0.5);
+    p.flags = p.flags & (1u << PATH_ROUGHNESS_SHIFT) - 1u | roughness << PATH_ROUGHNESS_SHIFT;
     add_child(j, p, s, distance_, chosen.direction, carried / min(survival, 1.0), false);
 }
 
@@ -33,7 +45,9 @@ bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV,
 {
     vec3 origin = off_surface(s, distance_, s.geometric);
     float probability;
-    uint index = light_choose(origin, s.normal, frame.light_count, u.x, probability);
+    s.roughness = max(s.roughness, path_roughness(p));
+    light_receiver receiver = light_receiver_of(s, parts, origin, view, NoV);
+    uint index = light_choose(receiver, frame.light_count, u.x, probability);
     if (probability <= 0.0) {
         no_shadow_ray(j);
         return false;

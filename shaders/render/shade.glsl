@@ -72,7 +72,8 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     c.sample_slot = parent.sample_slot;
     c.cone_width = parent.cone_width + parent.cone_spread * distance_;
     c.cone_spread = parent.cone_spread;
-    c.flags = bounces | (straight ? parent.flags & PATH_STRAIGHT : 0u);
+    uint kept = straight ? ~PATH_BOUNCES_MASK : ~(PATH_BOUNCES_MASK | PATH_STRAIGHT);
+    c.flags = bounces | parent.flags & kept;
     c.time = parent.time;
     children[j * children_a_hit + child_count] = c;
     child_count++;

@@ -17,7 +17,7 @@ struct frame_uniforms {
     vec4 lens; /* x: radius, 0: a pinhole; y: distance along the view of what is in focus; z, w unused */
     vec4 environment_colour; /* radiance, or what the image is multiplied by; w: rotation about +y, radians */
     vec4 irradiance[9];      /* rgb: of the environment, divided by pi: harmonics of a world-space normal */
-    vec4 filter_places[9];   /* of the pixel filter, see server/render/pixel_filter.h */
+    vec4 filter_places[17];  /* of the pixel filter, see server/render/pixel_filter.h */
     uint width, height;      /* pixels */
     uint tiles_across;
     uint sample_index;     /* the first of those in hand */
@@ -28,7 +28,7 @@ struct frame_uniforms {
     uint seed;
     uint pad0, pad1, pad2;
 };
-SHARED_SIZE(frame_uniforms, 448)
+SHARED_SIZE(frame_uniforms, 576)
 
 #define ENVIRONMENT_NONE 0u /* black; leaves the picture transparent */
 #define ENVIRONMENT_CONSTANT 1u

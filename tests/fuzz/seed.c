@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Writes what the fuzzers start from: seed FOLDER makes FOLDER/protocol.dict out of the table, and valid inputs in
- * FOLDER/codec, FOLDER/framing and FOLDER/handshake. */
+ * FOLDER/codec, FOLDER/framing and FOLDER/handshake, noise in FOLDER/scene. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
@@ -144,6 +144,23 @@ static bool write_handshakes(const char *folder)
            write_file(folder, "handshake", "reply", 1, bytes, handshake_reply_encode(bytes, &refusal));
 }
 
+/* Bytes that a generator makes, for fuzzers that read any as something. */
+static bool write_noise(const char *folder)
+{
+    uint32_t state = 1;
+    for (int number = 0; number < 16; number++) {
+        uint8_t bytes[1024];
+        for (size_t i = 0; i < sizeof bytes; i++) {
+            state = state * 1664525u + 1013904223u; /* Numerical Recipes */
+            bytes[i] = (uint8_t)(state >> 24);
+        }
+        if (!write_file(folder, "scene", "noise", number, bytes, sizeof bytes)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 int main(int argument_count, char **arguments)
 {
     if (argument_count != 2) {
@@ -151,6 +168,6 @@ int main(int argument_count, char **arguments)
         return 2;
     }
     bool ok = make_folder(arguments[1]) && write_dictionary(arguments[1]) && write_messages(arguments[1]) &&
-              write_handshakes(arguments[1]);
+              write_handshakes(arguments[1]) && write_noise(arguments[1]);
     return ok ? 0 : 1;
 }

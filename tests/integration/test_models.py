@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Every real model renders, whole way: file, importer, daemon, exporter. Hostile ones render or are refused by name."""
 import concurrent.futures
+import json
 import pathlib
 
 import farlight_test
@@ -16,10 +17,15 @@ def models(*folders):
                   if path.suffix.lower() in ENDINGS and path.is_file())
 
 
+def pixels(path):
+    _, _, rows, channels = read_png(path)
+    return [row[x:x + channels] for row in rows for x in range(0, len(row), channels)]
+
+
 @needs_shared_scenes
 class Models(Case):
-    def render(self, path, daemon, output):
-        return path, output, farlight("render", path, "--server", daemon.address, "--size", "64x48", "--depth", "2",
+    def render(self, path, daemon, output, size="64x48"):
+        return path, output, farlight("render", path, "--server", daemon.address, "--size", size, "--depth", "2",
                                       "--quiet", "-o", output)
 
     def render_all(self, paths):
@@ -65,6 +71,38 @@ class Models(Case):
                     for got, want in zip(means[1], means[0]):
                         for channel in range(3):
                             self.assertAlmostEqual(got[channel], want[channel], delta=0.5, msg=name)
+
+    def test_the_standard_procedural_databases_have_their_primitives_and_show_them(self):
+        """Spheres are exact, polygons triangles, a cone or cylinder has 64 triangles. What covers the picture is held
+        against one of the same view with nothing in it: all of it where the camera sees ground only."""
+        databases = {  # triangles, spheres, least and greatest share of the picture that is covered
+            "spd-balls-2": (2, 91, 1, 1), "spd-balls-3": (2, 820, 1, 1), "spd-balls-4": (2, 7381, 1, 1),
+            "spd-balls-5": (2, 66430, 1, 1), "spd-gears-2": (4578, 0, 0.6, 0.99), "spd-gears": (36610, 0, 0.7, 0.99),
+            "spd-mount": (8192, 4, 0.4, 0.8), "spd-rings": (64 * 4200 + 2, 4200, 0.95, 1),
+            "spd-teapot": (2328, 0, 0.4, 0.8), "spd-tetra": (4096, 0, 0.15, 0.5),
+            "spd-tree": (64 * 4095 + 2, 4095, 0.5, 0.8)}
+        self.assertEqual(set(databases), {path.stem for path in (SHARED_SCENES / "bvh").glob("spd-*.nff")})
+        with Daemon() as daemon:
+            for name, (triangles, spheres, least, greatest) in databases.items():
+                with self.subTest(database=name):
+                    path = SHARED_SCENES / "bvh" / f"{name}.nff"
+                    info = json.loads(self.expect(farlight("info", "--json", path), 0).stdout)
+                    self.assertEqual((info["triangles"], info["spheres"], info["notes"]), (triangles, spheres, []))
+                    empty = self.folder / f"{name}-empty.nff"
+                    statements = path.read_text(encoding="utf-8").splitlines()
+                    last_light = max(i for i, line in enumerate(statements) if line.startswith("l "))
+                    eye, middle = ([float(x) for x in line.split()[1:]] for line in statements
+                                   if line.startswith(("from ", "at ")))
+                    behind = [2 * e - m for e, m in zip(eye, middle)]
+                    empty.write_text("\n".join(statements[:last_light + 1]) + "\ns %g %g %g 0.001\n" % tuple(behind),
+                                     encoding="utf-8")
+                    _, shown, result = self.render(path, daemon, self.folder / f"{name}.png", "48x48")
+                    self.expect(result, 0)
+                    _, background, result = self.render(empty, daemon, self.folder / f"{name}-empty.png", "48x48")
+                    self.expect(result, 0)
+                    self.assertEqual(len(set(pixels(background))), 1)
+                    covered = sum(a != b for a, b in zip(pixels(shown), pixels(background))) / (48 * 48)
+                    self.assertTrue(least <= covered <= greatest, f"{covered} is covered")
 
     def test_hostile_files_are_rendered_or_refused_by_name_and_never_crash_anything(self):
         paths = models("hostile")

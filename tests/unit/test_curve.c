@@ -305,6 +305,25 @@ static void a_spline_of_rotations_is_made_unit(void **state)
     expect("unit", q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1, 1e-12);
 }
 
+static void how_far_a_rotation_turns_is_the_sum_of_its_arcs(void **state)
+{
+    (void)state;
+    const float times[] = {0, 1, 2, 3, 4};
+    const double degrees[] = {0, 40, 90, 80, 180};
+    float values[20];
+    for (int key = 0; key < 5; key++)
+        turn(degrees[key], key % 2 ? -1 : 1, values + 4 * key);
+    struct curve curve = curve_of(INTERPOLATION_LINEAR, times, 5, values, 4);
+    const double cases[][3] = {{0.5, 3.5, 20 + 50 + 10 + 50}, {-3, 9, 200}, {1.25, 1.5, 12.5}, {1, 2, 50},
+                               {-2, -1, 0},                   {5, 6, 0},    {2, 2.5, 5},       {3.9, 4, 10}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+        expect("turn", curve_turn_bound(&curve, cases[i][0], cases[i][1]) * 180 / PI, cases[i][2], 1e-4);
+    curve.interpolation = INTERPOLATION_STEP;
+    expect("steps", curve_turn_bound(&curve, 0.5, 3.5) * 180 / PI, 40 + 50 + 10, 1e-4);
+    curve.interpolation = INTERPOLATION_CATMULL_ROM;
+    assert_true(isinf(curve_turn_bound(&curve, 0, 1)));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -320,6 +339,7 @@ int main(void)
         cmocka_unit_test(catmull_rom_does_not_see_the_sign_of_a_quaternion),
         cmocka_unit_test(what_has_no_direction_is_no_rotation),
         cmocka_unit_test(a_spline_of_rotations_is_made_unit),
+        cmocka_unit_test(how_far_a_rotation_turns_is_the_sum_of_its_arcs),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

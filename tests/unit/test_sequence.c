@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The numbers that samples choose by: how evenly they are spread, and that pixels and choices do not follow each other.
+/* The numbers that samples choose by: how evenly they are spread, and that pixels and choices do not follow each
+ * other.
  */
 #include "render/sequence.h"
 #include "shared/frame.h"
@@ -29,8 +30,8 @@ static void expect_net(uint32_t seed, uint32_t dimension, uint32_t first, int lo
         uint32_t x = (uint32_t)ldexpf(pair[0], columns), y = (uint32_t)ldexpf(pair[1], log2 - columns);
         uint32_t cell = x << (log2 - columns) | y;
         if (seen[cell]++)
-            fail_msg("seed %u, dimension %u, samples %u + 2^%d: two in cell %u,%u of 2^%d columns", seed, dimension,
-                     first, log2, x, y, columns);
+            fail_msg("seed %u, dimension %u, samples %u + 2^%d: two in cell %u,%u of 2^%d columns", seed,
+                     dimension, first, log2, x, y, columns);
     }
 }
 
@@ -42,8 +43,8 @@ static void every_aligned_block_of_pairs_has_one_in_each_elementary_cell(void **
             for (int log2 = 0; log2 <= SAMPLES_LOG2; log2++)
                 for (int columns = 0; columns <= log2; columns++)
                     for (uint32_t block = 0; block < 3; block++)
-                        expect_net(sequence_seed(s, 7), dimensions[d], (block * 5 * SAMPLES) & ~((1u << log2) - 1), log2,
-                                   columns);
+                        expect_net(sequence_seed(s, 7), dimensions[d], (block * 5 * SAMPLES) & ~((1u << log2) - 1),
+                                   log2, columns);
     expect_net(sequence_seed(1, 1), 0, 0xffffff00u, 8, 4); /* to the end of the numbers of samples */
 }
 
@@ -150,8 +151,8 @@ static void choices_samples_and_seeds_are_independent(void **state)
     expect_independent("x and y", (const float(*)[2])pairs, PIXELS);
 }
 
-/* What a dimension shows beside the others of its own pixel: in 16 samples of a pixel two choices must not go hand in
- * hand, which is what the shuffled order is for. */
+/* What a dimension shows beside the others of its own pixel: in 16 samples of a pixel two choices must not go hand
+ * in hand, which is what the shuffled order is for. */
 static void the_order_of_one_choice_says_nothing_of_anothers(void **state)
 {
     (void)state;

@@ -71,6 +71,8 @@ static struct {
     atomic_bool keep_commits;
     struct engine_command *_Atomic kept_commit; /* has no answer until release_commit() */
     uint32_t job_request, next_frame, last_frame;
+    struct engine_job job; /* the last one, but for what it owns */
+    struct clip_use job_clips[16];
     uint64_t credit_seen, commits;
     atomic_uint edits, gone, frames_sent;
 } engine;
@@ -102,7 +104,10 @@ static void render(const struct engine_command *command)
         struct engine_frame *frame = made->frame;
         frame->frame = engine.next_frame;
         frame->request.width = frame->request.height = frame->request.samples = 1;
-        frame->result.samples = 1;
+        frame->request.aperture = engine.job.frame.aperture;
+        frame->request.focus = engine.job.frame.focus;
+        frame->shutter_s = engine.job.shutter / 8;
+        frame->result.samples = 5; /* with those of frames before */
         frame->size_bytes = FRAME_BYTES;
         frame->bytes = malloc(FRAME_BYTES);
         for (size_t i = 0; i < FRAME_BYTES; i++)
@@ -139,6 +144,9 @@ static bool submit(void *context, struct engine_command *command, struct error *
         engine.next_frame = command->job.first_frame;
         engine.last_frame = command->job.last_frame;
         engine.credit_seen = command->job.credit;
+        engine.job = command->job;
+        for (uint32_t i = 0; i < command->job.clip_count; i++)
+            engine.job_clips[i] = command->job.clips[i];
         if (!atomic_load(&engine.keep_jobs))
             render(command);
         break;
@@ -829,6 +837,173 @@ static void a_job_that_cannot_be_is_refused_by_its_field(void **state)
     expect_error(6, PROTOCOL_ERROR_CODE_INVALID);
 }
 
+/* ---- what moves --------------------------------------------------------------------------------------- */
+
+static struct record_blob_ref upload(uint32_t request, const void *data, size_t bytes)
+{
+    struct record_blob_ref reference = reference_to(data, bytes);
+    assert_int_equal(offer(request, reference), 1);
+    send_blob(request + 1, &reference, data);
+    expect(MESSAGE_OK, request + 1);
+    return reference;
+}
+
+static void send_skinned(uint32_t request, struct record_blob_ref *joints_and_matrices,
+                         struct record_blob_ref *floats)
+{
+    struct record_morph_weight weights[] = {{0.25f}, {-4}};
+    struct message message = made(MESSAGE_SET_NODE);
+    message.set_node.node = 7;
+    message.set_node.kind = PROTOCOL_NODE_KIND_MESH;
+    message.set_node.object = 3;
+    message.set_node.skin = 5;
+    message.set_node.weights = weights;
+    message.set_node.weights_count = 2;
+    send_message(request, 0, &message);
+    message = made(MESSAGE_SET_MESH);
+    message.set_mesh.mesh = 3;
+    message.set_mesh.influence_count = 4;
+    message.set_mesh.target_count = 2;
+    message.set_mesh.weights = weights + 1;
+    message.set_mesh.weights_count = 1;
+    send_message(request, 0, &message);
+    message = made(MESSAGE_SET_SKIN);
+    message.set_skin.skin = 5;
+    message.set_skin.joint_count = 1;
+    message.set_skin.arrays = joints_and_matrices;
+    message.set_skin.arrays_count = 2;
+    message.set_skin.name = "bones";
+    send_message(request, 0, &message);
+    message = made(MESSAGE_SET_CLIP);
+    message.set_clip.clip = 6;
+    message.set_clip.arrays = floats;
+    message.set_clip.arrays_count = 1;
+    message.set_clip.name = "run";
+    send_message(request, 0, &message);
+    message = made(MESSAGE_SET_CHANNEL);
+    message.set_channel = (struct message_set_channel){
+        .channel = 8,
+        .clip = 6,
+        .path = PROTOCOL_CHANNEL_PATH_LIGHT_SIZE,
+        .object = 9,
+        .interpolation = PROTOCOL_INTERPOLATION_BEZIER,
+        .width = 2,
+        .key_count = 1,
+        .first_time = 1,
+        .first_value = 2,
+    };
+    send_message(request, 0, &message);
+}
+
+static void skins_clips_and_channels_become_edits(void **state)
+{
+    (void)state;
+    const uint32_t joint = 7;
+    const float matrix[12] = {1, 2, 3}, numbers[3] = {4, 5, 6};
+    open_scene(1, 1);
+    struct record_blob_ref joints_and_matrices[] = {upload(10, &joint, 4), upload(12, matrix, sizeof matrix)};
+    struct record_blob_ref floats = upload(14, numbers, sizeof numbers);
+    atomic_store(&engine.keep_commits, true);
+    begin_edit(2, 1);
+    send_skinned(2, joints_and_matrices, &floats);
+    commit(2);
+    struct engine_command *kept;
+    while (!(kept = atomic_load(&engine.kept_commit)))
+        usleep(1000);
+    assert_int_equal(kept->edit_count, 5);
+    const struct scene_node *node = &kept->edits[0].set.node;
+    assert_true(kept->edits[0].object == SCENE_NODE && node->skin == 5 && node->weight_count == 2);
+    assert_true(node->weights[0] == 0.25f && node->weights[1] == -4.0f);
+    const struct scene_mesh *mesh = &kept->edits[1].set.mesh;
+    assert_true(mesh->influence_count == 4 && mesh->target_count == 2);
+    assert_true(mesh->weight_count == 1 && mesh->weights[0] == -4.0f);
+    const struct scene_skin *skin = &kept->edits[2].set.skin;
+    assert_true(kept->edits[2].object == SCENE_SKIN && skin->base.id == 5 && skin->joint_count == 1);
+    assert_string_equal(skin->base.name, "bones");
+    assert_memory_equal(skin->joints->data, &joint, 4);
+    assert_memory_equal(skin->joint_from_mesh->data, matrix, sizeof matrix);
+    const struct scene_clip *clip = &kept->edits[3].set.clip;
+    assert_true(kept->edits[3].object == SCENE_CLIP && clip->base.id == 6);
+    assert_memory_equal(clip->floats->data, numbers, sizeof numbers);
+    const struct scene_channel *channel = &kept->edits[4].set.channel;
+    assert_true(kept->edits[4].object == SCENE_CHANNEL && channel->base.id == 8 && channel->clip == 6);
+    assert_true(channel->path == CHANNEL_LIGHT_SIZE && channel->object == 9);
+    assert_true(channel->interpolation == INTERPOLATION_BEZIER && channel->width == 2);
+    assert_true(channel->key_count == 1 && channel->first_time == 1 && channel->first_value == 2);
+    release_commit();
+    expect(MESSAGE_OK, 2);
+    /* An array that is not held is named. */
+    begin_edit(3, 1);
+    joints_and_matrices[1].hash[0] ^= 1;
+    struct message message = made(MESSAGE_SET_SKIN);
+    message.set_skin.skin = 5;
+    message.set_skin.arrays = joints_and_matrices;
+    message.set_skin.arrays_count = 2;
+    send_message(3, 0, &message);
+    expect_error(3, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    assert_string_equal(client.message.error.field, "set_skin 5.arrays[1]");
+}
+
+static void weights_count_as_memory_of_a_transaction(void **state)
+{
+    (void)state;
+    static struct record_material_range ranges[4096];
+    static struct record_morph_weight weights[1024];
+    open_scene(1, 1);
+    begin_edit(2, 1);
+    struct message message = made(MESSAGE_SET_MESH); /* 48 of 64 KiB */
+    message.set_mesh.ranges = ranges;
+    message.set_mesh.ranges_count = 4096;
+    send_message(2, 0, &message);
+    for (uint32_t node = 1; node <= 4; node++) { /* 4 KiB each */
+        message = made(MESSAGE_SET_NODE);
+        message.set_node.node = node;
+        message.set_node.weights = weights;
+        message.set_node.weights_count = 1024;
+        send_message(2, 0, &message);
+    }
+    expect_error(2, PROTOCOL_ERROR_CODE_LIMIT);
+}
+
+static void a_job_takes_its_clips_and_its_lens_along(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct record_clip_use clips[] = {{.clip = 4, .start_s = -2, .speed = 0.5f, .loop = 1},
+                                      {.clip = 5, .speed = 3}};
+    struct message message = render_message(0, 1);
+    message.render.clips = clips;
+    message.render.clips_count = 2;
+    message.render.aperture = 0.125f;
+    message.render.focus = 7;
+    message.render.shutter = 0.5f;
+    message.render.pixel_filter = PROTOCOL_PIXEL_FILTER_TENT;
+    message.render.bvh_rays_together = 3;
+    message.render.accumulate = 1;
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    const struct message_frame_begin *begin = &client.message.frame_begin;
+    assert_true(begin->aperture == 0.125f && begin->focus == 7.0f && begin->shutter_s == 0.0625f);
+    assert_int_equal(begin->samples, 5);
+    const struct engine_job *job = &engine.job;
+    assert_int_equal(job->clip_count, 2);
+    assert_true(engine.job_clips[0].clip == 4 && engine.job_clips[0].start_s == -2.0f);
+    assert_true(engine.job_clips[0].speed == 0.5f && engine.job_clips[0].loop);
+    assert_true(engine.job_clips[1].clip == 5 && engine.job_clips[1].speed == 3.0f && !engine.job_clips[1].loop);
+    assert_true(job->shutter == 0.5f && job->frame.filter == FILTER_TENT && job->frame.accumulate);
+    assert_int_equal(job->frame.tracer_options.bvh_rays_together, 3);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+    const uint32_t not_walked[] = {5, 6, 7};
+    for (uint32_t i = 0; i < 3; i++) {
+        message = render_message(0, 1);
+        message.render.bvh_rays_together = not_walked[i];
+        send_message(3 + i, 0, &message);
+        expect_error(3 + i, PROTOCOL_ERROR_CODE_INVALID);
+        assert_string_equal(client.message.error.field, "render.bvh_rays_together");
+    }
+}
+
 static void a_job_whose_frames_have_no_room_waits_for_others_to_end(void **state)
 {
     (void)state;
@@ -1094,6 +1269,9 @@ int main(void)
         BOTH(a_cancelled_job_has_one_answer_and_nothing_follows_it),
         BOTH(a_job_cancelled_while_it_sends_ends_at_its_answer),
         BOTH(a_job_that_cannot_be_is_refused_by_its_field),
+        BOTH(skins_clips_and_channels_become_edits),
+        BOTH(weights_count_as_memory_of_a_transaction),
+        BOTH(a_job_takes_its_clips_and_its_lens_along),
         BOTH(a_job_whose_frames_have_no_room_waits_for_others_to_end),
         BOTH(a_full_engine_makes_clients_wait_and_loses_nothing),
         BOTH(rubbish_is_told_so_and_the_connection_closed),

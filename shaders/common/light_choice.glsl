@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// One light of all, by what each is likely to bring.
+// Defines: those of common/light.glsl and common/scattering.glsl.
+
+#include "common/light.glsl"
+#include "common/scattering.glsl"
+
+// Of a surface, what its lights are weighed by.
+struct light_receiver {
+    vec3 position, normal, view;
+    float scattered, mirrored; // reflectances
+    float alpha;               // of the facets
+};
+
+light_receiver light_receiver_of(surface s, split parts, vec3 position, vec3 view, float NoV)
+{
+    // A mirror that is seen at a slant is dim at its own angle, but not at every facet's: never 0.
+    return light_receiver(position, s.normal, view, greatest(parts.scattered) * INVERSE_PI,
+                          (greatest(parts.mirror) + 1e-3) * 0.25 / max(NoV, 0.1),
+                          square(max(s.roughness, ROUGHNESS_MIN_LIGHT)));
+}
+
+// About how much of a light goes to the eye if nothing is in the way: more than 0 wherever any of it does.
+float light_estimate(uint index, light_receiver r)
+{
+    light l = lights[index];
+    int kind = int(l.position_kind.w);
+    bool directional = kind == LIGHT_KIND_DIRECTIONAL;
+    vec3 to_light = directional ? -l.direction_range.xyz : l.position_kind.xyz - r.position;
+    float squared = max(dot(to_light, to_light), 1e-12), inverse = inversesqrt(squared);
+    vec3 direction = to_light * inverse;
+    float power = l.colour.r + l.colour.g + l.colour.b, cosine = dot(r.normal, direction), reach = 0.0;
+    if (!directional)
+        power *= light_falloff(squared * inverse, l.direction_range.w);
+    if (kind == LIGHT_KIND_SPOT)
+        power *= light_cone(l, direction);
+#ifdef HAS_AREA_LIGHTS
+    // Points of it are so far off its middle, as a share of the distance.
+    if (kind == LIGHT_KIND_RECTANGLE) {
+        float radius = length(l.half_u_inner.xyz) + length(l.half_v_outer.xyz);
+        power *= max(-dot(l.direction_range.xyz, direction), 0.0) * radius * radius;
+        reach = radius * inverse;
+    } else if (kind == LIGHT_KIND_SPHERE) {
+        power *= PI * l.colour.w * l.colour.w;
+        reach = l.colour.w * inverse;
+    }
+#endif
+    // The highlight of GGX, as wide as the lamp makes it (Karis. Real Shading in Unreal Engine 4. 2013).
+    float NoH = max(dot(r.normal, normalize(direction + r.view)), 0.0), alpha = r.alpha + 0.5 * reach;
+    float wide = alpha * alpha, spread = 1.0 + NoH * NoH * (wide - 1.0) + 1e-6;
+    float highlight = r.mirrored * wide / (PI * spread * spread);
+    return cosine + reach > 0.0 ? power * (r.scattered * min(cosine + reach, 1.0) + highlight) : 0.0;
+}
+
+// One of all lights, as probable as its estimate. `number` in [0, 1) chooses it and comes back stretched to [0, 1)
+// again. Probability 0: none shines here.
+uint light_choose(light_receiver r, uint light_count, inout float number, out float probability)
+{
+    uint chosen = 0u;
+    float sum = 0.0, own = 0.0;
+    // Each light takes the lower end of what is left of the interval from those before it.
+    for (uint i = 0u; i < light_count; i++) {
+        float estimate = light_estimate(i, r);
+        sum += estimate;
+        float share = estimate > 0.0 ? estimate / sum : 0.0;
+        bool taken = number < share;
+        number = min(taken ? number / share : (number - share) / (1.0 - share), 0.99999994);
+        chosen = taken ? i : chosen;
+        own = taken ? estimate : own;
+    }
+    probability = own > 0.0 ? own / sum : 0.0;
+    return chosen;
+}
