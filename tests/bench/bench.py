@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: MIT
 """`make bench`: where the time goes, in tables and as JSON. Usage: bench.py BUILD_FOLDER [PART ..] [--out FOLDER]
 
-Parts: start, oneshot, frames, animation, tracers, reach, family, pixels, rays, forms; all of them where none is named. Each
-figure is the median of several runs after a warm-up, with the median absolute deviation beside it; what is compared takes
-turns, run by run. Scenes of FARLIGHT_SCENES (default: ../shared/scenes beside the checkout) are left out, and named, where
-missing.
+Parts: start, oneshot, frames, animation, tracers, forms, family, pixels, rays, parallel, instances, refit, flake, reach; all of
+them where none is named. Each figure is the median of several runs after a warm-up, with the median absolute deviation beside
+it; what is compared takes turns, run by run. Scenes of FARLIGHT_SCENES (default: ../shared/scenes beside the checkout) are
+left out, and named, where missing.
 
 Writes FOLDER/bench.txt and FOLDER/bench.json (FOLDER: out). Parts that an earlier run on the same device and commit left
 there stay. The JSON: {"format": 1, "environment": {date, commit, processor, processors, device, vendor, version, software,
@@ -26,6 +26,7 @@ import sys
 import tempfile
 import time
 
+import bench_animated
 import bench_client
 import bench_rays
 import bench_reach
@@ -42,6 +43,10 @@ PARTS = {
     "family": ("Time against triangles", bench_rays.measure_family, bench_rays.show_family),
     "pixels": ("Time against pixels", bench_rays.measure_pixels, bench_rays.show_pixels),
     "rays": ("Time against rays per pixel", bench_rays.measure_rays, bench_rays.show_rays),
+    "parallel": ("Rays that walk together", bench_animated.measure_parallel, bench_animated.show_parallel),
+    "instances": ("Instances that move", bench_animated.measure_instances, bench_animated.show_instances),
+    "refit": ("A mesh that deforms", bench_animated.measure_refit, bench_animated.show_refit),
+    "flake": ("Time against spheres", bench_animated.measure_flake, bench_animated.show_flake),
     "reach": ("bvh beside Embree", bench_rays.measure_reach, bench_rays.show_reach),
 }
 WANTED_TITLE = "What is wanted"

@@ -18,7 +18,7 @@ import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
 import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 
-PARTS = ("frames", "tracers", "family", "pixels", "rays", "reach")
+PARTS = ("frames", "tracers", "family", "pixels", "rays", "parallel", "instances", "refit", "flake", "reach")
 
 
 class Figures(unittest.TestCase):

@@ -3,7 +3,8 @@
  *   cornell.glb      a box with coloured walls, a mirror block and a glass sphere
  *   teapot.glb       a teapot on a mirror, with metal and glass beside it
  *   sky.hdr          an evening sky with two soft lights, to be used as environment
- *   sphereflake-N.nff  Eric Haines' 'balls' of the Standard Procedural Databases, N levels
+ *   sphereflake-N.nff  Eric Haines' 'balls' of the Standard Procedural Databases, N levels: 2 to 4, others
+ *                    where asked for
  *   bumpy-N.glb      a bumpy sphere of about N thousand triangles above a floor, the family of the benchmark */
 #include "glb.h"
 
@@ -224,7 +225,7 @@ static bool write_bumpy(const char *path, uint32_t thousand_triangles)
 int main(int argc, char **argv)
 {
     if (argc < 2 || argv[1][0] == '-') {
-        fprintf(stderr, "usage: make_scenes FOLDER [BUMPY_KILOTRIANGLES ..]\n");
+        fprintf(stderr, "usage: make_scenes FOLDER [BUMPY_KILOTRIANGLES | flake-LEVELS ..]\n");
         return 2;
     }
     if (mkdir(argv[1], 0777) != 0 && errno != EEXIST) {
@@ -243,6 +244,16 @@ int main(int argc, char **argv)
         ok &= write_sphereflake(path, levels);
     }
     for (int i = 2; i < argc; i++) {
+        if (strncmp(argv[i], "flake-", 6) == 0) {
+            const long levels = strtol(argv[i] + 6, NULL, 10);
+            if (levels < 1 || levels > 6) {
+                fprintf(stderr, "make_scenes: %s: 1 to 6 levels are expected\n", argv[i]);
+                return 2;
+            }
+            snprintf(path, sizeof path, "%s/sphereflake-%ld.nff", argv[1], levels);
+            ok &= write_sphereflake(path, (int)levels);
+            continue;
+        }
         const long thousands = strtol(argv[i], NULL, 10);
         if (thousands < 1 || thousands > 8000) {
             fprintf(stderr, "make_scenes: %s: a number of thousands from 1 to 8000 is expected\n", argv[i]);
