@@ -40,10 +40,10 @@ void bvh_refit_finish(struct bvh_refit *refit, struct gpu_device *device)
 
 /* A part of a buffer as storage; returns how many texels of it lie before that part, which begins where the device
  * lets it. */
-static uint32_t bind_part(const struct gpu_buffer *buffer, uint64_t first_texel, uint64_t texels)
+static uint32_t bind_part(unsigned binding, const struct gpu_buffer *buffer, uint64_t first_texel, uint64_t texels)
 {
     uint32_t before = (uint32_t)(first_texel % (PART_ALIGNMENT / TEXEL_BYTES));
-    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, BIND_TRACER_0, buffer->name,
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, binding, buffer->name,
                       (GLintptr)((first_texel - before) * TEXEL_BYTES),
                       (GLsizeiptr)((before + texels) * TEXEL_BYTES));
     return before;
@@ -70,16 +70,18 @@ bool bvh_refit_bounds(struct bvh_refit *refit, struct gpu_device *device, const 
     if (!above)
         return false;
     gpu_buffer_bind_texels(device, &refit->records, UNIT_TRACER_0, GL_RGBA32UI);
-    gpu_buffer_bind_image(device, place->boxes, IMAGE_TRACER_0, GL_RGBA32UI);
+    uint32_t first_box = bind_part(BIND_TRACER_1, place->boxes, (uint64_t)place->first_box * BVH_REFIT_BOX_TEXELS,
+                                   (uint64_t)refit->record_count * BVH_REFIT_BOX_TEXELS);
     gpu_buffer_bind_texels(device, &refit->corners, UNIT_TRACER_1, GL_RGBA32UI);
-    uint32_t first_texel = bind_part(place->primitives, place->first_texel, 2 * (uint64_t)place->close_texels);
-    gpu_uniform_uint(leaves, "first_box", place->first_box);
+    uint32_t first_texel =
+        bind_part(BIND_TRACER_0, place->primitives, place->first_texel, 2 * (uint64_t)place->close_texels);
+    gpu_uniform_uint(leaves, "first_box", first_box);
     gpu_uniform_uint(leaves, "first_texel", first_texel);
     gpu_uniform_uint(leaves, "close_texels", place->close_texels);
     gpu_uniform_uint(leaves, "first_vertex", place->first_vertex);
     gpu_uniform_uint(leaves, "close_offset", place->close_offset);
     dispatch(device, leaves, 0, refit->leaf_count, false);
-    gpu_uniform_uint(above, "first_box", place->first_box);
+    gpu_uniform_uint(above, "first_box", first_box);
     for (uint32_t i = 0; i < refit->step_count; i++)
         dispatch(device, above, refit->steps[i].first, refit->steps[i].count, refit->steps[i].in_order);
     return true;
@@ -100,7 +102,8 @@ bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const s
     gpu_buffer_bind_texels(device, &refit->records, UNIT_TRACER_0, GL_RGBA32UI);
     gpu_buffer_bind_texels(device, place->boxes, UNIT_TRACER_1, GL_RGBA32UI);
     uint64_t each = bvh_element_bytes(settings) / TEXEL_BYTES;
-    uint32_t first_texel = bind_part(place->elements, place->first_element * each, refit->record_count * each);
+    uint32_t first_texel =
+        bind_part(BIND_TRACER_0, place->elements, place->first_element * each, refit->record_count * each);
     gpu_uniform_uint(program, "record_count", refit->record_count);
     gpu_uniform_uint(program, "first_box", place->first_box);
     gpu_uniform_uint(program, "first_texel", first_texel);

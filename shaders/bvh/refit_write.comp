@@ -39,7 +39,7 @@ void main()
         return;
     int at = int(i) * BVH_REFIT_TEXELS;
     uvec4 record = texelFetch(records, at), places_0123 = texelFetch(records, at + 1), places_4567 = texelFetch(records, at + 2);
-    int box_texel = int(first_box + record.x) * BVH_REFIT_BOX_TEXELS;
+    int box_texel = int((first_box + record.x) * BVH_REFIT_BOX_TEXELS);
     vec3 lower = uintBitsToFloat(texelFetch(boxes, box_texel).xyz);
     vec3 upper = uintBitsToFloat(texelFetch(boxes, box_texel + 1).xyz);
 #ifdef BVH_SPHERES

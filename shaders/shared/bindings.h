@@ -27,7 +27,6 @@
 #define IMAGE_POSITIONS 0 /* deform.comp */
 #define IMAGE_NORMALS 1
 #define IMAGE_TANGENTS 2
-#define IMAGE_TRACER_0 1 /* the tracer's own */
 
 /* texture units */
 #define UNIT_TRIANGLES 0

@@ -81,9 +81,9 @@ struct bvh_refit_record {
 };
 SHARED_SIZE(bvh_refit_record, 48)
 #define BVH_REFIT_TEXELS 3
-/* The box of each element while it is refitted: texels of an RGBA32UI buffer, by the order of octant 0: lower
+/* The box of each element while it is refitted: texels of 4 words, by the order of octant 0: lower
  * corner and the size of its subtree; upper corner; (floats) surfaces of all boxes of its subtree, and of each of
  * its triangles' own box. */
-#define BVH_REFIT_BOX_TEXELS 3
+#define BVH_REFIT_BOX_TEXELS 3u
 
 #endif

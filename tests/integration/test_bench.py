@@ -19,7 +19,8 @@ import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
 import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 
-PARTS = ("frames", "distributed", "tracers", "family", "pixels", "rays", "reach")
+PARTS = ("frames", "distributed", "tracers", "family", "pixels", "rays", "parallel", "instances", "refit", "flake",
+         "reach")
 
 
 class Figures(unittest.TestCase):
