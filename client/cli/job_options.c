@@ -80,7 +80,7 @@ static const struct argp_option options[] = {
      "How long the shutter is open; 0.5 is a film camera's 180 degrees (default 0: nothing moves in a frame)", 0},
     {NULL, 0, NULL, 0, "Clips of the model ('farlight info' lists them):", 3},
     {"clip", KEY_CLIP, "NAME|INDEX", 0,
-     "Play it; may be repeated, the later one counts where both change the same", 0},
+     "Play it; may be repeated, the later one counts where both move the same node", 0},
     {"clip-once", KEY_CLIP_ONCE, NULL, 0, "Stop at the clips' end (default: begin again)", 0},
     {"clip-start", KEY_CLIP_START, "SECONDS", 0, "When they begin (default 0; negative: they run already)", 0},
     {"clip-speed", KEY_CLIP_SPEED, "FACTOR", 0, "How fast they run (default 1)", 0},
