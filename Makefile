@@ -201,7 +201,7 @@ $(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/ser
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -lembree3 -o $@
 
 # The generator of the bundled scenes.
-TOOLS_OBJ := $(B)/tests/tools/make_scenes.o $(B)/tests/tools/glb.o $(B)/tests/tools/shape.o
+TOOLS_OBJ := $(patsubst %,$(B)/tests/tools/%.o,make_scenes animated_scene animated_parts gltf_writer glb shape)
 $(B)/tests/tools/make_scenes: $(TOOLS_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -lm -o $@
 
@@ -213,12 +213,12 @@ $(B)/tests/tools/pose_dump: $(B)/tests/tools/pose_dump.o $(MODEL_OBJ) $(SERVER_O
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libjxl-dev libtinygltf-dev \
     libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libegl1 libgl1-mesa-dri
-TEST_PACKAGES := libcmocka-dev python3 ffmpeg
+TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg
 PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
 .PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help
-tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump
+tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
@@ -261,7 +261,8 @@ lint: lint-packages
 	$(MAKE) CC=clang CXX=clang++ config=debug B=build/clang all tests
 
 install: all
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man8 \
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/farlight \
+	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 5 8) \
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)/etc/farlight
 	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
 	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/share/bash-completion/completions
@@ -274,16 +275,19 @@ install: all
 	    >$(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc
 	install -m 644 client/cli/completion.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
 	install -m 644 conf/man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
+	install -m 644 conf/man/*.5 $(DESTDIR)$(PREFIX)/share/man/man5
+	install -m 644 client/cli/shot.schema.json $(DESTDIR)$(PREFIX)/share/farlight
 	install -m 644 conf/man/*.8 $(DESTDIR)$(PREFIX)/share/man/man8
 	install -m 644 README.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
 	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight
 uninstall:
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/bin/,$(notdir $(PROGRAMS)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man1/,$(notdir $(wildcard conf/man/*.1)))
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man5/,$(notdir $(wildcard conf/man/*.5)))
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man8/,$(notdir $(wildcard conf/man/*.8)))
 	rm -f $(DESTDIR)$(PREFIX)/lib/$(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so \
 	    $(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
-	rm -rf $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)$(PREFIX)/include/farlight
+	rm -rf $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)$(PREFIX)/share/farlight $(DESTDIR)$(PREFIX)/include/farlight
 
 clean:
 	rm -rf build out

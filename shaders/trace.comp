@@ -11,6 +11,7 @@
 //   HAS_CUTOUT           some material is alpha mode mask
 //   HAS_TRANSLUCENT      some material lets shadow rays pass
 //   HAS_TRANSMISSION     and tints them on the way
+//   EVEN_ALPHA           none of these has a texture or vertex colours
 //   RAYS_TOGETHER        how many consecutive rays one invocation walks together: 1, 2, 3, 4, 8
 //
 // A traverse.glsl defines one of these, for ANY_HIT or not, and for RAYS_TOGETHER 1 or more:

@@ -18,6 +18,7 @@ enum key {
     KEY_PICTURE = 'o',
     KEY_TRACERS = 0x400,
     KEY_FAR,
+    KEY_TIME,
     KEY_FAIL_ABOVE,
     KEY_THRESHOLD,
     KEY_HEAT_TOP,
@@ -43,6 +44,7 @@ static const struct argp_option options[] = {
     {"tracers", KEY_TRACERS, "A,B", 0, "The tracer under examination, and the reference", 0},
     {"far", KEY_FAR, "SHARE", 0,
      "Two hits of a ray disagree beyond this share of the scene's diagonal (default 0.0001)", 0},
+    {"time", KEY_TIME, "SECONDS", 0, "The moment of the clips that is compared (default 0)", 0},
     {"output", KEY_PICTURE, "PICTURE", 0, "PNG or JPEG: the reference, the tracer and the errors, side by side",
      0},
     {"heat-top", KEY_HEAT_TOP, "ERROR", 0,
@@ -114,6 +116,10 @@ static error_t parse_own(struct tracer_comparison *comparison, int key, char *va
         if (status == 0 && !(comparison->far_share >= FAR_LEAST))
             return cli_usage(&comparison->job, "--far", "must be at least %g", FAR_LEAST);
         return status;
+    case KEY_TIME:
+        return fl_text_real(value, -1e6, 1e6, &comparison->job.time_s, &comparison->job.error)
+                   ? 0
+                   : name_field(comparison, "--time");
     case KEY_FAIL_ABOVE:
         return parse_limit(comparison, value);
     case KEY_THRESHOLD:
@@ -159,6 +165,10 @@ static bool complete(struct tracer_comparison *comparison)
     struct cli_job *job = &comparison->job;
     if (!comparison->has_tracers)
         return cli_usage(job, "--tracers", "no tracers are named, such as bvh,reference") == 0;
+    if (job->time_s != 0 && job->clip_count == 0) {
+        cli_usage(job, "--time", "no clip is played");
+        return fl_error_remedy(&job->error, "add --clip NAME");
+    }
     job->output = "picture.exr";
     job->float_pixels = true;
     if (!cli_job_complete(job, false))
@@ -192,7 +202,8 @@ static bool load(struct tracer_comparison *comparison, struct fl_error *error)
         return false;
     comparison->exporter = fl_exporter_start(&export, error);
     return comparison->exporter != NULL && cli_loading_end(&comparison->loading, error) &&
-           cli_choose_camera(&comparison->job, comparison->loading.scene, error);
+           cli_choose_camera(&comparison->job, comparison->loading.scene, error) &&
+           cli_settle(&comparison->job, comparison->loading.scene, false, error);
 }
 
 /* The one frame of a job, into a file; the caller's to destroy, NULL if it failed. */

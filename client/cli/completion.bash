@@ -6,7 +6,8 @@ _farlight()
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]}
     local job="--output --format --half --float --server --size --samples --depth --seed --environment --exposure
         --tone-map --camera --eye --look-at --up --fov --tracer --bvh-bounds --integrator --primary --encoding
-        --quality --timings --timings=json --trace-file --quiet --help"
+        --quality --timings --timings=json --trace-file --quiet --help --filter --aperture --focus --shutter --clip
+        --clip-once --clip-start --clip-speed --bvh-rays"
     local words=
 
     if [ "$COMP_CWORD" -eq 1 ]; then
@@ -16,21 +17,25 @@ _farlight()
         --tracer) words="bvh naive reference" ;;
         --tracers) words="bvh,reference bvh,naive naive,reference" ;;
         --bvh-bounds) words="auto box sphere" ;;
-        --integrator) words="whitted" ;;
+        --integrator) words="whitted distributed" ;;
+        --filter) words="blackman-harris gaussian tent box" ;;
+        --bvh-rays) words="0 1 2 3 4 8" ;;
         --primary) words="raster trace" ;;
         --encoding) words="raw zstd jpeg" ;;
         --tone-map) words="neutral aces none" ;;
-        --format) words="png jpeg exr hdr" ;;
+        --format) words="png jpeg exr hdr mp4 mkv y4m" ;;
         --layout) words="heat side" ;;
         --fail-above) words="psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite= agree=" ;;
         *)
             case $subcommand in
-            render) words=$job ;;
-            animate) words="$job --frames --fps --orbit --keys" ;;
+            render) words="$job --time --progressive" ;;
+            animate) words="$job --script --dry-run --frames --fps --orbit --keys --shard --resume --retries
+                --lossless" ;;
             info) words="--json --environment --help" ;;
             compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help
                 --tracers --far --server --size --samples --depth --seed --environment --exposure --camera --eye --look-at
-                --up --fov --bvh-bounds --integrator --encoding --quality --quiet" ;;
+                --up --fov --aperture --focus --shutter --filter --clip --clip-once --clip-start --clip-speed --time
+                --bvh-bounds --bvh-rays --integrator --encoding --quality --quiet" ;;
             stats) words="--server --json --help" ;;
             ping) words="--server --count --help" ;;
             help) words="render animate info compare stats ping bridge" ;;

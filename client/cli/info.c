@@ -76,6 +76,9 @@ static void print_json(const struct info_options *wanted, const struct fl_model_
                    {"materials", info->materials},
                    {"textures", info->textures},
                    {"lights", info->lights},
+                   {"skins", info->skins},
+                   {"joints", info->joints},
+                   {"morph_targets", info->morph_targets},
                    {"notes_left_out", info->notes_left_out},
                    {"read_bytes", info->import.read_bytes},
                    {"blob_bytes", info->import.offered_bytes},
@@ -103,10 +106,10 @@ static void print_table(const struct info_options *wanted, const struct fl_model
     const struct {
         const char *name;
         uint64_t value;
-    } rows[] = {{"nodes", info->nodes},       {"meshes", info->meshes}, {"triangles", info->triangles},
-                {"spheres", info->spheres},   {"discs", info->discs},   {"materials", info->materials},
-                {"textures", info->textures}, {"lights", info->lights}, {"cameras", info->camera_count},
-                {"clips", info->clip_count}};
+    } rows[] = {{"nodes", info->nodes},       {"meshes", info->meshes},         {"triangles", info->triangles},
+                {"spheres", info->spheres},   {"discs", info->discs},           {"materials", info->materials},
+                {"textures", info->textures}, {"lights", info->lights},         {"cameras", info->camera_count},
+                {"skins", info->skins},       {"targets", info->morph_targets}, {"clips", info->clip_count}};
     print_text(wanted->model != NULL ? wanted->model : wanted->environment);
     printf("\n");
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)

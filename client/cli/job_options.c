@@ -80,7 +80,7 @@ static const struct argp_option options[] = {
      "How long the shutter is open; 0.5 is a film camera's 180 degrees (default 0: nothing moves in a frame)", 0},
     {NULL, 0, NULL, 0, "Clips of the model ('farlight info' lists them):", 3},
     {"clip", KEY_CLIP, "NAME|INDEX", 0,
-     "Play it; may be repeated, the later one counts where both change the same", 0},
+     "Play it; may be repeated, the later one counts where both move the same node", 0},
     {"clip-once", KEY_CLIP_ONCE, NULL, 0, "Stop at the clips' end (default: begin again)", 0},
     {"clip-start", KEY_CLIP_START, "SECONDS", 0, "When they begin (default 0; negative: they run already)", 0},
     {"clip-speed", KEY_CLIP_SPEED, "FACTOR", 0, "How fast they run (default 1)", 0},
@@ -355,9 +355,8 @@ const struct argp cli_job_argp = {.options = options, .parser = parse};
 
 const struct argp *cli_picture_argp(void)
 {
-    static const int left_out[] = {KEY_OUTPUT,    KEY_FORMAT,     KEY_HALF,      KEY_FLOAT,      KEY_TONE_MAP,
-                                   KEY_TRACER,    KEY_PRIMARY,    KEY_TIMINGS,   KEY_TRACE_FILE, KEY_CLIP,
-                                   KEY_CLIP_ONCE, KEY_CLIP_START, KEY_CLIP_SPEED};
+    static const int left_out[] = {KEY_OUTPUT, KEY_FORMAT,  KEY_HALF,    KEY_FLOAT,     KEY_TONE_MAP,
+                                   KEY_TRACER, KEY_PRIMARY, KEY_TIMINGS, KEY_TRACE_FILE};
     static struct argp_option kept[sizeof options / sizeof options[0]];
     static const struct argp argp = {.options = kept, .parser = parse};
     size_t count = 0;

@@ -69,6 +69,9 @@ void cli_loading_close(struct cli_loading *loading)
     fl_import_destroy(loading->load.started);
     fl_scene_destroy(loading->scene);
     fl_connection_destroy(loading->connection);
+    loading->load.started = NULL;
+    loading->scene = NULL;
+    loading->connection = NULL;
 }
 
 /* By name or number; without either the model's first camera, unless keys or an orbit say where to look. */

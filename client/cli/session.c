@@ -240,8 +240,13 @@ static void close_connection(struct session *session)
 /* Of a daemon that was there once: one that never was is a mistake in its address. */
 static bool is_lost(const struct session *session, const struct fl_error *error)
 {
-    return session->is_series && session->was_loaded && !session->sink_failed &&
-           (error->code == FL_ERROR_CONNECTION || (error->code == FL_ERROR_REFUSED && error->retryable));
+    if (!session->is_series || !session->was_loaded || session->sink_failed)
+        return false;
+    /* What it says of its own state, it may say otherwise later, or another one at the same address. */
+    const bool is_passing = error->retryable || error->server_code == PROTOCOL_ERROR_CODE_SHUTTING_DOWN ||
+                            error->server_code == PROTOCOL_ERROR_CODE_DEVICE_LOST ||
+                            error->server_code == PROTOCOL_ERROR_CODE_BUSY;
+    return error->code == FL_ERROR_CONNECTION || (error->code == FL_ERROR_REFUSED && is_passing);
 }
 
 /* Twice as long each time. False: interrupted. */

@@ -4,6 +4,7 @@
 #include "lib/text.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -58,9 +59,11 @@ static bool wrong_type(const struct shot_reader *reader, const struct shot_value
     return shot_wrong(reader, at, remedy, "must be %s", wanted[setting->type]);
 }
 
+/* 16.0 is a whole number, too. */
 static bool is_whole(const json_t *value)
 {
-    return json_is_integer(value) && json_integer_value(value) >= 0;
+    const double number = json_number_value(value);
+    return json_is_number(value) && number >= 0 && number <= 9007199254740992.0 && floor(number) == number;
 }
 
 /* As it would be typed; NULL: it has the wrong type. */
@@ -71,14 +74,13 @@ static const char *typed(const struct setting *setting, const json_t *value, cha
     case WORD:
         return json_string_value(value);
     case WHOLE:
-        snprintf(text, text_bytes, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
+        snprintf(text, text_bytes, "%.0f", json_number_value(value));
         return is_whole(value) ? text : NULL;
     case REAL:
         snprintf(text, text_bytes, "%.17g", json_number_value(value));
         return json_is_number(value) ? text : NULL;
     case SIZE:
-        snprintf(text, text_bytes, "%" JSON_INTEGER_FORMAT "x%" JSON_INTEGER_FORMAT, json_integer_value(width),
-                 json_integer_value(height));
+        snprintf(text, text_bytes, "%.0fx%.0f", json_number_value(width), json_number_value(height));
         return json_array_size(value) == 2 && is_whole(width) && is_whole(height) ? text : NULL;
     default:
         return json_is_boolean(value) ? "" : NULL;
@@ -219,24 +221,46 @@ static bool apply_clips(const struct shot_reader *reader, const struct shot_valu
 
 /* ---- outputs ---- */
 
+/* The file's folder before a pattern: a percent sign in it is one. */
+static bool join_pattern(const struct shot_reader *reader, const char *pattern, const char **joined)
+{
+    const char *folder = pattern[0] == '/' ? "" : reader->shot->folder;
+    char *out = shot_allocate(reader, 2 * strlen(folder) + strlen(pattern) + 1, 1);
+    if (out == NULL)
+        return false;
+    *joined = out;
+    for (const char *at = folder; *at != '\0'; at++) {
+        if (*at == '%')
+            *out++ = '%';
+        *out++ = *at;
+    }
+    memcpy(out, pattern, strlen(pattern) + 1);
+    return true;
+}
+
 static bool apply_output(const struct shot_reader *reader, const struct shot_value *at)
 {
     struct cli_job *job = reader->job;
     struct cli_output *output = &job->outputs[job->output_count];
+    const char *written = json_string_value(at->value);
     struct fl_pattern pattern;
     struct fl_error why = {0};
     if (!shot_path(reader, at, &output->path))
         return false;
-    output->image = cli_image_by_path(output->path);
+    output->image = cli_image_by_path(written);
     if (output->image == CLI_IMAGE_UNKNOWN)
         output->image = job->image;
-    const bool to_stdout = strcmp(output->path, "-") == 0;
+    const bool to_stdout = strcmp(written, "-") == 0;
     if (output->image == CLI_IMAGE_UNKNOWN && !to_stdout)
         return shot_wrong(reader, at, "known: .png .jpg .jpeg .exr .hdr .mp4 .mkv .y4m, or say \"format\"",
                           "its ending names no format");
-    if (!to_stdout && !cli_image_is_video(output->image) && !fl_pattern_parse(output->path, &pattern, &why))
-        return shot_wrong(reader, at, why.remedy[0] != '\0' ? why.remedy : "write it like 'frames/%04d.exr'", "%s",
-                          why.text);
+    if (!to_stdout && !cli_image_is_video(output->image)) {
+        if (!fl_pattern_parse(written, &pattern, &why))
+            return shot_wrong(reader, at, why.remedy[0] != '\0' ? why.remedy : "write it like 'frames/%04d.exr'",
+                              "%s", why.text);
+        if (!join_pattern(reader, written, &output->path))
+            return false;
+    }
     job->output_count++;
     return true;
 }
@@ -245,6 +269,8 @@ static bool apply_outputs(const struct shot_reader *reader, const struct shot_va
 {
     if (!shot_is_array(reader, at, CLI_OUTPUTS_MAX))
         return false;
+    if (json_array_size(at->value) == 0)
+        return shot_wrong(reader, at, "\"outputs\": [\"frames/%04d.exr\"]", "names no file");
     for (size_t i = 0; i < json_array_size(at->value); i++) {
         const struct shot_value output = shot_element(at, i);
         if (!apply_output(reader, &output))
@@ -270,7 +296,7 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
     if ((model.value != NULL && !shot_path(reader, &model, &job->model)) ||
         (environment.value != NULL && !shot_path(reader, &environment, &job->environment)) ||
         (camera.value != NULL && !shot_camera(reader, &camera)) ||
-        (clips.value != NULL && !given->clips && !apply_clips(reader, &clips)))
+        (clips.value != NULL && !apply_clips(reader, &clips)))
         return false;
     for (size_t i = 0; i < GROUP_COUNT; i++) {
         const struct shot_value group = shot_member(root, groups[i].name);
@@ -279,10 +305,16 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
     }
     if (output.value != NULL && outputs.value != NULL)
         return shot_wrong(reader, &output, "leave one of them out", "\"outputs\" is there, too");
-    if (given->output)
-        return true;
-    return (output.value == NULL || apply_output(reader, &output)) &&
-           (outputs.value == NULL || apply_outputs(reader, &outputs));
+    if ((output.value != NULL && !apply_output(reader, &output)) ||
+        (outputs.value != NULL && !apply_outputs(reader, &outputs)))
+        return false;
+    /* All of the file has been read, so that every mistake in it is told. */
+    if (given->output) {
+        job->output_count = 0;
+        job->image = CLI_IMAGE_UNKNOWN; /* of the file's outputs */
+    }
+    job->clip_count = given->clips ? 0 : job->clip_count;
+    return true;
 }
 
 bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli_shot_given *given,

@@ -167,12 +167,44 @@ static bool read_place(const struct shot_reader *reader, const struct shot_value
             !read_view(reader, &view[LOOK_AT], LOOK_AT, job->key.look_at_world))
             return false;
     }
-    if (view[UP].value != NULL && !reader->given->up && !read_view(reader, &view[UP], UP, job->key.up_world))
+    if (view[UP].value != NULL && !read_view(reader, &view[UP], UP, job->key.up_world))
         return false;
-    if (view[FOV].value != NULL && !reader->given->fov && !read_view(reader, &view[FOV], FOV, &job->key.fov_y))
+    if (view[FOV].value != NULL && !read_view(reader, &view[FOV], FOV, &job->key.fov_y))
         return false;
     return (orbit.value == NULL || read_orbit(reader, &orbit)) &&
            (dolly.value == NULL || read_dolly(reader, &dolly));
+}
+
+/* What the command line says instead; all of the file has been read, so that every mistake in it is told. */
+static void override(const struct shot_reader *reader, const struct cli_job *before)
+{
+    struct cli_job *job = reader->job;
+    const struct cli_shot_given *given = reader->given;
+    size_t kept = 0;
+    if (given->camera) {
+        job->camera = before->camera;
+        job->key = before->key;
+        job->has_eye = before->has_eye;
+        job->has_look_at = before->has_look_at;
+        job->is_orbit = before->is_orbit;
+        job->series = before->series;
+    }
+    for (size_t i = 0; i < job->channel_count; i++) {
+        const enum protocol_channel_path path = job->channels[i].channel.path;
+        const bool is_place = path == PROTOCOL_CHANNEL_PATH_VIEW_EYE ||
+                              path == PROTOCOL_CHANNEL_PATH_VIEW_LOOK_AT ||
+                              path == PROTOCOL_CHANNEL_PATH_VIEW_UP || path == PROTOCOL_CHANNEL_PATH_VIEW_FOV_Y;
+        const bool is_dropped = (is_place && given->camera) ||
+                                (path == PROTOCOL_CHANNEL_PATH_VIEW_UP && given->up) ||
+                                (path == PROTOCOL_CHANNEL_PATH_VIEW_FOV_Y && given->fov) ||
+                                (path == PROTOCOL_CHANNEL_PATH_VIEW_APERTURE && given->aperture) ||
+                                (path == PROTOCOL_CHANNEL_PATH_VIEW_FOCUS && given->focus);
+        if (!is_dropped)
+            job->channels[kept++] = job->channels[i];
+        else if (path == PROTOCOL_CHANNEL_PATH_VIEW_APERTURE)
+            job->lens_changes = false;
+    }
+    job->channel_count = kept;
 }
 
 bool shot_camera(const struct shot_reader *reader, const struct shot_value *at)
@@ -180,22 +212,25 @@ bool shot_camera(const struct shot_reader *reader, const struct shot_value *at)
     static const char *const known[] = {"name",  "eye",      "look_at", "up",    "fov", "aperture",
                                         "focus", "exposure", "orbit",   "dolly", NULL};
     struct cli_job *job = reader->job;
+    const struct cli_job before = *job;
     struct shot_value view[VIEW_COUNT];
     float exposure = 0;
-    if (json_is_string(at->value) || json_is_integer(at->value))
-        return reader->given->camera || shot_name(reader, at, &job->camera);
+    if (json_is_string(at->value) || json_is_number(at->value)) {
+        const char *name = NULL;
+        const bool read = shot_name(reader, at, &name);
+        job->camera = reader->given->camera ? job->camera : name;
+        return read;
+    }
     if (!shot_is_object(reader, at, known))
         return false;
     for (enum view which = EYE; which < VIEW_COUNT; which++)
         view[which] = shot_member(at, properties[which].name);
-    if (!reader->given->camera && !read_place(reader, at, view))
+    if (!read_place(reader, at, view) ||
+        (view[APERTURE].value != NULL && !read_view(reader, &view[APERTURE], APERTURE, &job->options.aperture)) ||
+        (view[FOCUS].value != NULL && !read_view(reader, &view[FOCUS], FOCUS, &job->options.focus)) ||
+        (view[EXPOSURE].value != NULL && !read_view(reader, &view[EXPOSURE], EXPOSURE, &exposure)))
         return false;
-    if (view[APERTURE].value != NULL && !reader->given->aperture &&
-        !read_view(reader, &view[APERTURE], APERTURE, &job->options.aperture))
-        return false;
-    job->lens_changes = shot_is_keyed(&view[APERTURE]) && !reader->given->aperture;
-    if (view[FOCUS].value != NULL && !reader->given->focus &&
-        !read_view(reader, &view[FOCUS], FOCUS, &job->options.focus))
-        return false;
-    return view[EXPOSURE].value == NULL || read_view(reader, &view[EXPOSURE], EXPOSURE, &exposure);
+    job->lens_changes = shot_is_keyed(&view[APERTURE]);
+    override(reader, &before);
+    return true;
 }

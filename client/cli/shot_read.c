@@ -156,13 +156,14 @@ bool shot_name(const struct shot_reader *reader, const struct shot_value *at, co
         *name = json_string_value(at->value);
         return true;
     }
-    if (!json_is_integer(at->value) || json_integer_value(at->value) < 0)
+    const double number = json_number_value(at->value);
+    if (!json_is_number(at->value) || number < 0 || number > UINT32_MAX || floor(number) != number)
         return shot_wrong(reader, at, "'farlight info' lists what a model has",
                           "must be a name, or a number counted from 0");
     char *text = shot_allocate(reader, 24, 1);
     if (text == NULL)
         return false;
-    snprintf(text, 24, "%" JSON_INTEGER_FORMAT, json_integer_value(at->value));
+    snprintf(text, 24, "%.0f", number);
     *name = text;
     return true;
 }

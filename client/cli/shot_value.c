@@ -204,15 +204,16 @@ static bool read_spline_key(const struct shot_reader *reader, const struct shot_
     if (json_array_size(pair.value) != 2)
         return shot_wrong(reader, &pair, "two values a key, what is before it and what is after it",
                           "must be an array of two values");
+    /* A curve's control values may lie beyond what the curve reaches, and tangents are per second. */
+    struct shot_property property = *keys->property;
+    property.least = -1e12;
+    property.greatest = 1e12;
     for (size_t k = 0; k < 2; k++) {
         const struct shot_value at = shot_element(&pair, k);
-        struct shot_property property = *keys->property;
-        if (!is_bezier) { /* tangents are per second, and may go down */
-            property.least = -1e12;
-            property.greatest = 1e12;
-        }
         if (!read_plain(reader, &at, &property, side))
             return false;
+        if (!is_bezier && property.kind == SHOT_COLOUR && json_array_size(at.value) == 3)
+            side[3] = 0; /* an alpha that is not said does not change */
         memcpy(out + keys->numbers * 2 * k, side, bytes);
     }
     return true;

@@ -23,6 +23,21 @@ std::string name_of(const reader &r, const tinygltf::Node &node)
     return "";
 }
 
+// The extension knows only points. A point light whose "extras" have a "radius" (metres) is a sphere that sends as
+// much, intensity being its radiance times the disc that it shows.
+void give_size(reader &r, const tinygltf::Light &light, const std::string &where, message_set_light &set)
+{
+    const double radius = number(light.extras, "radius", 0);
+
+    if (!(radius > 0))
+        return;
+    set.kind = PROTOCOL_LIGHT_KIND_SPHERE;
+    set.size[0] = limited(r, where, "the light's radius", radius, 1e-6, 1e12);
+    const double disc = 3.14159265358979 * double(set.size[0]) * double(set.size[0]);
+    for (float &one : set.colour)
+        one = limited(r, where, "the light's radiance", double(one) / disc, 0, 1e12);
+}
+
 // Candela become watts per steradian and lux watts per square metre number by number: the renderer works in one
 // unit throughout, and files are made to look right at exposure 0, not to be photometric.
 uint32_t light_id(reader &r, int index, const std::string &where)
@@ -42,6 +57,7 @@ uint32_t light_id(reader &r, int index, const std::string &where)
         set.kind = PROTOCOL_LIGHT_KIND_DIRECTIONAL;
     } else if (light.type == "point") {
         set.kind = PROTOCOL_LIGHT_KIND_POINT;
+        give_size(r, light, here, set);
     } else if (light.type == "spot") {
         set.kind = PROTOCOL_LIGHT_KIND_SPOT;
         set.outer_cone = limited(r, here, "the outer cone", light.spot.outerConeAngle, 0, 1.5707);

@@ -305,6 +305,9 @@ static bool begin_sample(struct frame_renderer *renderer, struct error *error)
     uint32_t left = context->request.samples - renderer->sample;
     context->uniforms.sample_index = renderer->samples_before + renderer->sample;
     context->uniforms.sample_shift = renderer->rasterise ? 0 : slices_sample_shift(&renderer->slices, left);
+    /* One that is added to others has no group of its own. */
+    context->uniforms.group_shift =
+        context->request.accumulate ? 0 : slices_group_shift(context->request.samples, renderer->sample);
     place_sample(renderer);
     context->wave_number = 0;
     slices_restart(&renderer->slices);

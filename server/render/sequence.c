@@ -54,11 +54,23 @@ float sequence_number(uint32_t pixel_seed, uint32_t dimension, uint32_t index)
     return unit_from_bits(reverse(scramble_reversed(place, sequence_hash(own))));
 }
 
+static void pair_at(float pair[2], uint32_t place, uint32_t own)
+{
+    uint32_t first = sequence_hash(own), second = sequence_hash(first);
+    pair[0] = unit_from_bits(reverse(scramble_reversed(place, first)));
+    pair[1] = unit_from_bits(reverse(scramble_reversed(sobol_second_reversed(place), second)));
+}
+
 void sequence_pair(float pair[2], uint32_t pixel_seed, uint32_t dimension, uint32_t index)
 {
     uint32_t own = sequence_hash(pixel_seed + dimension * 0x9e3779b9u);
-    uint32_t first = sequence_hash(own), second = sequence_hash(first);
-    uint32_t place = reverse(scramble_reversed(reverse(index), own));
-    pair[0] = unit_from_bits(reverse(scramble_reversed(place, first)));
-    pair[1] = unit_from_bits(reverse(scramble_reversed(sobol_second_reversed(place), second)));
+    pair_at(pair, reverse(scramble_reversed(reverse(index), own)), own);
+}
+
+void sequence_pair_sorted(float pair[2], uint32_t pixel_seed, uint32_t dimension, uint32_t index,
+                          uint32_t group_shift)
+{
+    uint32_t own = sequence_hash(pixel_seed + dimension * 0x9e3779b9u), mask = (1u << group_shift) - 1u;
+    uint32_t group = reverse(scramble_reversed(reverse(index), own)) & ~mask;
+    pair_at(pair, group | (group_shift > 0 ? reverse(index & mask) >> (32 - group_shift) : 0), own);
 }

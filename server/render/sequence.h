@@ -11,5 +11,9 @@ uint32_t sequence_seed(uint32_t number, uint32_t seed);
 /* In [0, 1). `dimension`: SEQUENCE_* of shared/frame.h. */
 float sequence_number(uint32_t pixel_seed, uint32_t dimension, uint32_t index);
 void sequence_pair(float pair[2], uint32_t pixel_seed, uint32_t dimension, uint32_t index);
+/* The same numbers in another order: those of 2^group_shift samples, which begin at a multiple of that, close
+ * together. */
+void sequence_pair_sorted(float pair[2], uint32_t pixel_seed, uint32_t dimension, uint32_t index,
+                          uint32_t group_shift);
 
 #endif

@@ -9,6 +9,18 @@ uint32_t slices_sample_shift(const struct slices *slices, uint32_t samples)
     return shift;
 }
 
+uint32_t slices_group_shift(uint32_t samples, uint32_t done)
+{
+    uint32_t shift = 0, group = 0;
+    for (uint32_t end = 0; end <= done; end += group) {
+        shift = 0;
+        while (2u << shift <= SLICES_SAMPLES_TOGETHER && 2u << shift <= samples - end)
+            shift++;
+        group = 1u << shift;
+    }
+    return shift;
+}
+
 void slices_restart(struct slices *slices)
 {
     slices->next_slot = 0;

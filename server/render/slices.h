@@ -19,6 +19,8 @@ struct slices {
 /* Of `samples` that are left to do how many are done together, as a power of two: as the rays of a pixel walk
  * together, they lie side by side where they are traced. The picture is the same whatever it is. */
 uint32_t slices_sample_shift(const struct slices *slices, uint32_t samples);
+/* The same if slices were large: of a picture of `samples` what follows the first `done`. */
+uint32_t slices_group_shift(uint32_t samples, uint32_t done);
 /* From the first pixel on. */
 void slices_restart(struct slices *slices);
 /* The next slice for so many samples; false: there is none. */

@@ -13,22 +13,6 @@ static const float *floats_of(const struct blob *blob)
     return blob ? (const float *)(const void *)blob->data : NULL;
 }
 
-bool scene_skin_matrices(const struct scene *scene, const struct scene_pose *pose, const struct scene_skin *skin,
-                         float *world_from_mesh, struct error *error)
-{
-    const uint32_t *joints = (const uint32_t *)(const void *)skin->joints->data;
-    const float *joint_from_mesh = floats_of(skin->joint_from_mesh);
-    for (uint32_t i = 0; i < skin->joint_count; i++) {
-        float *matrix = world_from_mesh + (size_t)i * 12;
-        if (!scene_world_from_node(scene, pose, joints[i], matrix))
-            return error_set(error, ERROR_INTERNAL, "skin", "joint %u of skin %u is node %u, which is not there",
-                             i, skin->base.id, joints[i]);
-        if (joint_from_mesh)
-            affine_multiply(matrix, matrix, joint_from_mesh + (size_t)i * 12);
-    }
-    return true;
-}
-
 static bool normalise(double v[3])
 {
     double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);

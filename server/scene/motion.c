@@ -2,6 +2,7 @@
 /* Where things are while a shutter is open. */
 #include "scene/pose.h"
 
+#include "scene/hierarchy.h"
 #include "scene/player.h"
 
 #include <math.h>
@@ -54,16 +55,51 @@ static void posed_turns(const struct scene_motion *motion, interval_turns *turns
     }
 }
 
-/* Adds up along the way to the root: that is as far as the node can turn in the world. */
-static void chain_turns(const struct scene *scene, const struct scene_pose *pose, const interval_turns *turns,
-                        const struct scene_node *node, interval_turns sum)
+/* Of each node, by its position in the hierarchy: the turns of all from it up to the root, which is as far as it
+ * can turn in the world. */
+struct turn_sums {
+    const struct scene_pose *pose;
+    const interval_turns *turns; /* of posed nodes */
+    struct hierarchy hierarchy;
+    interval_turns *sums;
+    bool *known;
+};
+
+static bool turn_sums_init(struct turn_sums *sums, const struct scene *scene, const struct scene_pose *pose,
+                           const interval_turns *turns)
 {
-    memset(sum, 0, sizeof(interval_turns));
-    for (int depth = 0; node && depth < SCENE_DEPTH_MAX; depth++) {
-        const struct pose_node *posed = scene_pose_node(pose, node->base.id);
-        for (int i = 0; posed && i < INTERVALS; i++)
-            sum[i] += turns[posed - pose->nodes][i];
-        node = node->parent ? scene_node(scene, node->parent) : NULL;
+    *sums = (struct turn_sums){.pose = pose, .turns = turns};
+    if (!hierarchy_of_scene(&sums->hierarchy, scene))
+        return false;
+    sums->sums = malloc((sums->hierarchy.count + 1) * sizeof *sums->sums);
+    sums->known = calloc(sums->hierarchy.count + 1, sizeof *sums->known);
+    return sums->sums && sums->known;
+}
+
+static void turn_sums_finish(struct turn_sums *sums)
+{
+    hierarchy_finish(&sums->hierarchy);
+    free(sums->sums);
+    free(sums->known);
+}
+
+/* Goes up to a node that is known, then down again. */
+static void turn_sums_resolve(struct turn_sums *sums, uint32_t start)
+{
+    uint32_t chain[SCENE_DEPTH_MAX], above = start;
+    size_t length = 0;
+    while (above != HIERARCHY_NONE && !sums->known[above] && length < SCENE_DEPTH_MAX) {
+        chain[length++] = above;
+        above = sums->hierarchy.parents[above];
+    }
+    while (length > 0) {
+        uint32_t node = chain[--length];
+        const struct pose_node *posed = scene_pose_node(sums->pose, sums->hierarchy.nodes[node]->base.id);
+        for (int i = 0; i < INTERVALS; i++)
+            sums->sums[node][i] = (above == HIERARCHY_NONE ? 0.0 : sums->sums[above][i]) +
+                                  (posed ? sums->turns[posed - sums->pose->nodes][i] : 0.0);
+        sums->known[node] = true;
+        above = node;
     }
 }
 
@@ -90,6 +126,7 @@ static bool is_drawn_rigid(const struct scene *scene, const struct scene_node *n
     return node->kind == NODE_SPHERES || (mesh && !(node->skin && mesh->influence_count));
 }
 
+/* How many of the finest intervals may be one: 8, 4, 2 or 1; 0: out of memory. */
 static int intervals_together(const struct scene *scene, const struct scene_motion *motion,
                               const interval_turns *turns)
 {
@@ -102,15 +139,16 @@ static int intervals_together(const struct scene *scene, const struct scene_moti
     int together = INTERVALS;
     if (joinable(all, together) == together)
         return together; /* even if everything hung below one another */
-    size_t cursor = 0;
-    void *value;
-    while (together > 1 && hashmap_next(&scene->objects[SCENE_NODE], &cursor, NULL, &value)) {
-        interval_turns sum;
-        if (!is_drawn_rigid(scene, value))
+    struct turn_sums sums;
+    if (!turn_sums_init(&sums, scene, pose, turns))
+        together = 0;
+    for (uint32_t i = 0; together > 1 && i < sums.hierarchy.count; i++) {
+        if (!is_drawn_rigid(scene, sums.hierarchy.nodes[i]))
             continue;
-        chain_turns(scene, pose, turns, value, sum);
-        together = joinable(sum, together);
+        turn_sums_resolve(&sums, i);
+        together = joinable(sums.sums[i], together);
     }
+    turn_sums_finish(&sums);
     return together;
 }
 
@@ -155,18 +193,6 @@ static void thin_out(struct scene_motion *motion, uint32_t step)
     motion->pose_count = kept;
 }
 
-/* Whether two poses will do, by what is known of the turns without looking at the poses between. */
-static bool turns_little(struct player *player, const struct scene_motion *ends, double open_s, double shutter_s,
-                         interval_turns *turns, double *bounds)
-{
-    uint32_t count = ends->poses[0].node_count;
-    player_turn_bounds(player, open_s, open_s + shutter_s, bounds);
-    memset(turns, 0, count * sizeof *turns);
-    for (uint32_t node = 0; node < count; node++)
-        turns[node][0] = bounds[node];
-    return intervals_together(player->scene, ends, (const interval_turns *)turns) == INTERVALS;
-}
-
 static bool add_poses(struct scene_motion *motion, struct player *player, double open_s, double shutter_s,
                       uint32_t intervals, struct error *error)
 {
@@ -179,31 +205,50 @@ static bool add_poses(struct scene_motion *motion, struct player *player, double
     return true;
 }
 
-/* Of two poses, the ends, to as many as are needed. */
+/* What is known of the turns without looking at the poses between: as if all of it were in the first interval. */
+static void bound_turns(struct player *player, uint32_t node_count, double open_s, double shutter_s,
+                        double *bounds, interval_turns *turns)
+{
+    player_turn_bounds(player, open_s, open_s + shutter_s, bounds);
+    memset(turns, 0, node_count * sizeof *turns);
+    for (uint32_t node = 0; node < node_count; node++)
+        turns[node][0] = bounds[node];
+}
+
+/* Of two poses, the ends, to as many as are needed; false: out of memory. */
 static bool fill_in(struct scene_motion *motion, struct player *player, double open_s, double shutter_s,
-                    struct error *error)
+                    interval_turns *turns, double *bounds, struct error *error)
+{
+    bound_turns(player, motion->poses[0].node_count, open_s, shutter_s, bounds, turns);
+    int together = intervals_together(player->scene, motion, (const interval_turns *)turns);
+    if (together == 0 || together == INTERVALS)
+        return together != 0;
+    for (uint32_t i = 0; i < 2; i++)
+        scene_pose_finish(&motion->poses[i]);
+    motion->pose_count = 0;
+    if (!add_poses(motion, player, open_s, shutter_s, INTERVALS, error))
+        return false;
+    posed_turns(motion, turns);
+    together = intervals_together(player->scene, motion, (const interval_turns *)turns);
+    if (together)
+        thin_out(motion, (uint32_t)together);
+    return together != 0;
+}
+
+static bool choose_poses(struct scene_motion *motion, struct player *player, double open_s, double shutter_s,
+                         struct error *error)
 {
     size_t count = (size_t)motion->poses[0].node_count + 1;
     interval_turns *turns = malloc(count * sizeof *turns);
     double *bounds = malloc(count * sizeof *bounds);
-    bool fine = turns && bounds;
-    if (!fine)
-        error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for the turns of %zu nodes", count);
-    if (fine && !turns_little(player, motion, open_s, shutter_s, turns, bounds)) {
-        for (uint32_t i = 0; i < 2; i++)
-            scene_pose_finish(&motion->poses[i]);
-        motion->pose_count = 0;
-        fine = add_poses(motion, player, open_s, shutter_s, INTERVALS, error);
-        if (fine) {
-            posed_turns(motion, turns);
-            thin_out(motion, (uint32_t)intervals_together(player->scene, motion, (const interval_turns *)turns));
-        }
-    }
-    if (fine && stands_still(motion))
-        thin_out(motion, MOTION_POSES_MAX);
+    bool fine = turns && bounds && fill_in(motion, player, open_s, shutter_s, turns, bounds, error);
     free(turns);
     free(bounds);
-    return fine;
+    if (!fine)
+        return error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for the turns of %zu nodes", count - 1);
+    if (stands_still(motion))
+        thin_out(motion, MOTION_POSES_MAX);
+    return true;
 }
 
 bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scene, const struct clip_use *uses,
@@ -216,7 +261,7 @@ bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scen
     if (fine && !(motion->poses = calloc(MOTION_POSES_MAX, sizeof *motion->poses)))
         fine = error_set(error, ERROR_OUT_OF_MEMORY, "clips", "no memory for %d poses", MOTION_POSES_MAX);
     fine = fine && add_poses(motion, &player, open_s, shutter_s, moves ? 1 : 0, error) &&
-           (!moves || fill_in(motion, &player, open_s, shutter_s, error));
+           (!moves || choose_poses(motion, &player, open_s, shutter_s, error));
     player_finish(&player);
     if (!fine)
         scene_motion_finish(motion);

@@ -135,6 +135,8 @@ bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const st
                       struct scene_changes *changes, struct stage_times *times, struct error *error)
 {
     uint64_t start_ns = clock_now_ns();
+    if (motion && motion->pose_count == 0)
+        motion = NULL;
     unsigned parts = posed_parts(motion);
     *changes = (struct scene_changes){0};
     gpu->scene = scene;

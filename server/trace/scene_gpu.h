@@ -60,6 +60,7 @@ struct scene_gpu {
     bool has_cutout;      /* some material in use is alpha mode mask: tracers must ask for alpha */
     bool has_translucent; /* some material lets shadow rays pass: blend or transmission */
     bool has_transmission;
+    bool has_varied_alpha; /* what one of these lets pass differs from place to place: texture or vertex colours */
     bool has_motion; /* something moves while the shutter is open: tracers must look at the rays' times */
     bool has_environment_image;
     float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */
@@ -77,8 +78,9 @@ struct scene_gpu {
 void scene_gpu_init(struct scene_gpu *gpu, struct gpu_device *device);
 void scene_gpu_finish(struct scene_gpu *gpu);
 /* Brings the copy to the scene's revision and to where things are in it while the shutter is open (NULL: as they
- * were committed); *changes says what moved. On failure the copy is empty and will be
- * made anew by the next update. */
+ * were committed); *changes says what moved. Materials and lights, also where lights are, are those of the first
+ * pose; so is which nodes are hidden. What a transform makes flat in some pose is left out. On failure the copy is
+ * empty and will be made anew by the next update. */
 bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error);
 /* Of an instance in world space, wherever it goes while the shutter is open. */

@@ -63,8 +63,10 @@ static float *values_of(const struct scene *scene, const struct scene_pose *pose
 static void join(struct deform_box *box, const float lower[3], const float upper[3])
 {
     for (int k = 0; k < 3; k++) {
-        box->lower[k] = fminf(box->lower[k], lower[k]);
-        box->upper[k] = fmaxf(box->upper[k], upper[k]);
+        /* What is beyond the numbers may be anywhere; the device puts such a vertex at 0. */
+        bool fine = isfinite(lower[k]) && isfinite(upper[k]);
+        box->lower[k] = fminf(box->lower[k], fine ? lower[k] : -FLT_MAX);
+        box->upper[k] = fmaxf(box->upper[k], fine ? upper[k] : FLT_MAX);
     }
 }
 

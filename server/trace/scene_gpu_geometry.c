@@ -430,6 +430,9 @@ static void classify_material(struct scene_gpu *gpu, const struct scene *scene, 
     if (material->alpha_mode == ALPHA_BLEND || material->transmission > 0.0f)
         gpu->has_translucent = true;
     gpu->has_transmission |= material->transmission > 0.0f;
+    bool varies = material->textures[MATERIAL_BASE_COLOUR].texture ||
+                  material->textures[MATERIAL_TRANSMISSION].texture || (*geometry_flags & GEOMETRY_HAS_COLOURS);
+    gpu->has_varied_alpha |= varies && (material->alpha_mode != ALPHA_OPAQUE || material->transmission > 0.0f);
 }
 
 void scene_gpu_classify_geometry(struct scene_gpu *gpu, const struct scene *scene,
@@ -439,6 +442,7 @@ void scene_gpu_classify_geometry(struct scene_gpu *gpu, const struct scene *scen
     gpu->has_cutout = false;
     gpu->has_translucent = false;
     gpu->has_transmission = false;
+    gpu->has_varied_alpha = false;
     for (uint32_t i = 0; i < gpu->geometry_count; i++) {
         struct scene_gpu_geometry *geometry = &gpu->geometries[i];
         const struct material_range *ranges = geometry->mesh ? geometry->mesh->ranges : geometry->spheres->ranges;

@@ -24,7 +24,7 @@ static void bind_rays(const struct scene_gpu *scene, const struct wave *wave)
 const struct gpu_program *trace_program_get(const struct scene_gpu *scene, const struct wave *wave,
                                             const struct trace_program_source *source, struct error *error)
 {
-    struct gpu_define defines[OWN_DEFINES_MAX + 13] = {0};
+    struct gpu_define defines[OWN_DEFINES_MAX + 14] = {0};
     char traverse[128], together[16];
     size_t n = 0;
     /* In quotes: program.c takes the file to include from it. */
@@ -47,6 +47,8 @@ const struct gpu_program *trace_program_get(const struct scene_gpu *scene, const
         defines[n++] = (struct gpu_define){"HAS_TRANSLUCENT", "1"};
     if (scene->has_transmission && wave->kind == WAVE_ANY)
         defines[n++] = (struct gpu_define){"HAS_TRANSMISSION", "1"};
+    if (!scene->has_varied_alpha)
+        defines[n++] = (struct gpu_define){"EVEN_ALPHA", "1"};
     for (size_t i = 0; i < OWN_DEFINES_MAX && source->defines && source->defines[i].name; i++)
         defines[n++] = source->defines[i];
     struct gpu_program_source whole = {.compute = "trace.comp", .defines = defines};

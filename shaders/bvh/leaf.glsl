@@ -69,21 +69,28 @@ void offer(inout trace_ray r, candidate c, inout answer found)
 #endif
 }
 
-// Where materials have to be asked, what the rays found on a primitive is noted first and settled one by one in a
-// loop: the code that asks (textures and all) would else stand in the program once for each ray and root.
+// Where materials have to be asked, what the rays found on a primitive is noted first, and the walk comes out of its inner
+// loops to settle it. Software GL runs the code that asks (textures and all) each time that it comes by, hit or no hit: in
+// the loop over primitives shadow rays took eight times as long.
 struct noted_hits {
     vec2 distances; // triangles have the first alone
     vec2 barycentrics;
 };
 
-void offer_or_note(uint bit, candidate c, inout trace_ray r, inout answer found, inout noted_hits noted,
-                   inout uint noted_bits)
+struct noted_primitive {
+    uint bits; // two a ray; 0: nothing is noted
+    candidate common_part;
+    noted_hits hits[RAYS_TOGETHER];
+};
+
+void offer_or_note(uint bit, candidate c, inout trace_ray r, inout answer found, inout noted_hits hits,
+                   inout uint bits)
 {
 #ifdef ASK_MATERIALS
     if (c.distance > r.t_min && c.distance <= end_of(r, found)) {
-        noted.distances[bit & 1u] = c.distance;
-        noted.barycentrics = c.barycentrics;
-        noted_bits |= 1u << bit;
+        hits.distances[bit & 1u] = c.distance;
+        hits.barycentrics = c.barycentrics;
+        bits |= 1u << bit;
     }
 #else
     offer(r, c, found);
@@ -91,25 +98,25 @@ void offer_or_note(uint bit, candidate c, inout trace_ray r, inout answer found,
 }
 
 #ifdef ASK_MATERIALS
-void settle(uint noted_bits, candidate common_part, noted_hits noted[RAYS_TOGETHER],
-            inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+void settle(inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
 {
-    while (noted_bits != 0u) {
-        int bit = findLSB(noted_bits), chosen = bit >> 1;
-        noted_bits &= noted_bits - 1u;
+    while (noted.bits != 0u) {
+        int bit = findLSB(noted.bits), chosen = bit >> 1;
+        noted.bits &= noted.bits - 1u;
         trace_ray ray_asking = r[0];
-        noted_hits noted_here = noted[0];
+        noted_hits noted_here = noted.hits[0];
         answer found_here = found[0];
         for (int k = 1; k < RAYS_TOGETHER; k++) {
             if (k == chosen) {
                 ray_asking = r[k];
-                noted_here = noted[k];
+                noted_here = noted.hits[k];
                 found_here = found[k];
             }
         }
-        common_part.distance = (bit & 1) == 0 ? noted_here.distances.x : noted_here.distances.y;
-        common_part.barycentrics = noted_here.barycentrics;
-        offer(ray_asking, common_part, found_here);
+        candidate c = noted.common_part;
+        c.distance = (bit & 1) == 0 ? noted_here.distances.x : noted_here.distances.y;
+        c.barycentrics = noted_here.barycentrics;
+        offer(ray_asking, c, found_here);
         for (int k = 0; k < RAYS_TOGETHER; k++) {
             if (k == chosen) {
                 r[k] = ray_asking;
@@ -154,7 +161,7 @@ relative_rays relative_to(vec3 centre, object_ray o[RAYS_TOGETHER])
 
 // The corners as they are at the ray's own time: nothing of a triangle is the same for several rays.
 void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
-                   inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+                   inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
 {
     int texel = int(inside.first_texel + i * BVH_TRIANGLE_TEXELS), close = texel + int(inside.close_texels);
     uvec4 first = texelFetch(bvh_primitives, texel);
@@ -166,18 +173,16 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
     vec3 way1 = uintBitsToFloat(texelFetch(bvh_primitives, close + 1).xyz) - v1;
     vec3 way2 = uintBitsToFloat(texelFetch(bvh_primitives, close + 2).xyz) - v2;
     candidate c = candidate(0.0, inside.first_primitive + first.w, inside.index, vec2(0.0));
-    noted_hits noted[RAYS_TOGETHER];
-    uint noted_bits = 0u;
     for (int k = 0; k < RAYS_TOGETHER; k++) {
         float time = r[k].time;
         bool is_hit = intersect_triangle(o[k].direction, v0 + time * way0 - o[k].origin,
                                          v1 + time * way1 - o[k].origin, v2 + time * way2 - o[k].origin,
                                          c.distance, c.barycentrics);
         c.distance = is_hit ? c.distance : -1.0;
-        offer_or_note(uint(2 * k), c, r[k], found[k], noted[k], noted_bits);
+        offer_or_note(uint(2 * k), c, r[k], found[k], noted.hits[k], noted.bits);
     }
 #ifdef ASK_MATERIALS
-    settle(noted_bits, c, noted, r, found);
+    noted.common_part = c;
 #endif
 }
 
@@ -187,7 +192,7 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
 // ray from o along d the edge function d . (e x (s - 2 o)) = d . (e x s) - e . (2 o x d): the first cross product is the
 // same for all rays, the second for all edges. Two triangles that share an edge still get exactly opposite values.
 void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
-                   inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+                   inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
 {
     int texel = int(inside.first_texel + i * BVH_TRIANGLE_TEXELS);
     uvec4 first = texelFetch(bvh_primitives, texel);
@@ -198,8 +203,6 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
     precise vec3 c0 = cross(e0, v2 + v1), c1 = cross(e1, v0 + v2), c2 = cross(e2, v1 + v0);
     precise vec3 normal = cross(e2, v2 - v0);
     candidate c = candidate(0.0, inside.first_primitive + first.w, inside.index, vec2(0.0));
-    noted_hits noted[RAYS_TOGETHER];
-    uint noted_bits = 0u;
     for (int k = 0; k < RAYS_TOGETHER; k++) {
         vec3 d = rays.direction[k];
 #ifdef ORIGINS_DIFFER
@@ -218,10 +221,10 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
 #ifdef ASK_MATERIALS
         c.barycentrics = vec2(w1, w2) / sum;
 #endif
-        offer_or_note(uint(2 * k), c, r[k], found[k], noted[k], noted_bits);
+        offer_or_note(uint(2 * k), c, r[k], found[k], noted.hits[k], noted.bits);
     }
 #ifdef ASK_MATERIALS
-    settle(noted_bits, c, noted, r, found);
+    noted.common_part = c;
 #endif
 }
 
@@ -229,41 +232,40 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
 
 #ifdef HAS_SPHERES
 void test_sphere(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], inout trace_ray r[RAYS_TOGETHER],
-                 inout answer found[RAYS_TOGETHER])
+                 inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
 {
     int texel = int(inside.first_texel + i * BVH_SPHERE_TEXELS);
     vec4 sphere = uintBitsToFloat(texelFetch(bvh_primitives, texel));
     candidate c = candidate(0.0, inside.first_primitive + texelFetch(bvh_primitives, texel + 1).x, inside.index,
                             vec2(0.0));
-    noted_hits noted[RAYS_TOGETHER];
-    uint noted_bits = 0u;
     for (int k = 0; k < RAYS_TOGETHER; k++) {
         vec2 distances;
         if (intersect_sphere(o[k].origin, o[k].direction, sphere.xyz, sphere.w, distances)) {
             c.distance = distances.x;
-            offer_or_note(uint(2 * k), c, r[k], found[k], noted[k], noted_bits);
+            offer_or_note(uint(2 * k), c, r[k], found[k], noted.hits[k], noted.bits);
             c.distance = distances.y;
-            offer_or_note(uint(2 * k + 1), c, r[k], found[k], noted[k], noted_bits);
+            offer_or_note(uint(2 * k + 1), c, r[k], found[k], noted.hits[k], noted.bits);
         }
     }
 #ifdef ASK_MATERIALS
-    settle(noted_bits, c, noted, r, found);
+    noted.common_part = c;
 #endif
 }
 #endif
 
-void test_leaf(uint leaf, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
-               inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+// From `primitive` of the leaf on, which comes back as the next one. False: the leaf is not done, as something is noted.
+bool test_leaf(uint leaf, inout uint primitive, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
+               inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
 {
-    uint first = leaf & BVH_LEAF_FIRST_MASK;
-    uint end = first + (leaf >> BVH_LEAF_COUNT_SHIFT & BVH_LEAF_COUNT_MASK) + 1u;
+    uint first = leaf & BVH_LEAF_FIRST_MASK, count = (leaf >> BVH_LEAF_COUNT_SHIFT & BVH_LEAF_COUNT_MASK) + 1u;
 #ifdef HAS_SPHERES
     if (leaf >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_SPHERES) {
-        for (uint i = first; i < end; i++)
-            test_sphere(i, inside, o, r, found);
-        return;
+        for (; primitive < count && noted.bits == 0u; primitive++)
+            test_sphere(first + primitive, inside, o, r, found, noted);
+        return primitive == count && noted.bits == 0u;
     }
 #endif
-    for (uint i = first; i < end; i++)
-        test_triangle(i, inside, o, rays, r, found);
+    for (; primitive < count && noted.bits == 0u; primitive++)
+        test_triangle(first + primitive, inside, o, rays, r, found, noted);
+    return primitive == count && noted.bits == 0u;
 }

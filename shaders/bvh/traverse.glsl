@@ -55,6 +55,8 @@ struct walk_state {
     uint first;   // the walked tree's copy for the octant
     uint end;     // its number of elements
     uint element; // next one, counted from the first
+    uint leaf;    // that is being tested, 0: none
+    uint primitive; // the next one in it
 };
 
 void begin_tree(inout walk_state walk, uint first_element, uint element_count, uint octant)
@@ -66,6 +68,7 @@ void begin_tree(inout walk_state walk, uint first_element, uint element_count, u
 #endif
     walk.end = element_count;
     walk.element = 0u;
+    walk.leaf = walk.primitive = 0u;
 }
 
 // Before which and after which distance no ray has anything to find.
@@ -95,7 +98,7 @@ distances_left left_of(trace_ray r[RAYS_TOGETHER], answer found[RAYS_TOGETHER])
 uint next_leaf(inout walk_state walk, bundle b, distances_left left, trace_ray r[RAYS_TOGETHER],
                answer found[RAYS_TOGETHER])
 {
-    uint leaf = 0u;
+    uint leaf = walk.leaf;
     while (leaf == 0u && walk.element < walk.end) {
 #ifdef BVH_PLAIN
         bvh_element e = bvh_elements[walk.first + walk.element];
@@ -195,21 +198,48 @@ void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading
     begin_tree(walk, tree.x, tree.y, b.octant);
 }
 
-// All leaves on the way of the tree that is walked, up to an instance, whose link is returned; 0: the tree is done.
+// A link that no leaf has: something is noted, and the leaf that is being tested not done.
+#define LEAF_NOTED 1u
+
+// All leaves on the way of the tree that is walked, up to an instance, whose link is returned; 0: the tree is done; or up to
+// something to be settled.
 uint test_leaves(inout walk_state walk, bundle b, entered_instance inside, object_ray o[RAYS_TOGETHER],
-                 relative_rays rays, inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
+                 relative_rays rays, inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER],
+                 inout noted_primitive noted)
 {
     for (;;) {
         uint leaf = next_leaf(walk, b, left_of(r, found), r, found);
         if (leaf == 0u || leaf >> BVH_LEAF_KIND_SHIFT == BVH_LEAF_INSTANCE)
             return leaf;
-        test_leaf(leaf, inside, o, rays, r, found);
+#ifdef ASK_MATERIALS
+        walk.leaf = test_leaf(leaf, walk.primitive, inside, o, rays, r, found, noted) ? 0u : leaf;
+        if (walk.leaf != 0u)
+            return LEAF_NOTED;
+        walk.primitive = 0u;
+#else
+        uint primitive = 0u;
+        test_leaf(leaf, primitive, inside, o, rays, r, found, noted);
 #ifdef ANY_HIT
         if (!is_alive_any(r))
             walk.element = walk.end;
 #endif
+#endif
     }
 }
+
+#ifdef ASK_MATERIALS
+void settle_and_go_on(inout walk_state walk, inout noted_primitive noted, inout trace_ray r[RAYS_TOGETHER],
+                      inout answer found[RAYS_TOGETHER])
+{
+    settle(noted, r, found);
+#ifdef ANY_HIT
+    if (!is_alive_any(r)) {
+        walk.leaf = 0u;
+        walk.element = walk.end;
+    }
+#endif
+}
+#endif
 
 #if !defined ANY_HIT && !defined BVH_DEFORMS
 #define FAVOUR_INSTANCES
@@ -235,10 +265,52 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
     bundle b;
     relative_rays rays;
     enter_instance(bvh_instance, r, leading_of(r), inside, o, walk, b, rays);
-    test_leaves(walk, b, inside, o, rays, r, found);
+    noted_primitive noted;
+    noted.bits = 0u;
+#ifdef ASK_MATERIALS
+    while (test_leaves(walk, b, inside, o, rays, r, found, noted) != 0u)
+        settle_and_go_on(walk, noted, r, found);
+#else
+    test_leaves(walk, b, inside, o, rays, r, found, noted);
+#endif
 }
 
 #else
+
+// All instances on the way. True: something is to be settled before it goes on.
+bool walk_instances(inout walk_state walk, inout walk_state world_walk, inout bundle b, bundle world_bundle, int leading,
+                    inout entered_instance inside, inout object_ray o[RAYS_TOGETHER], inout relative_rays rays,
+                    inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
+{
+    for (;;) {
+        uint leaf = test_leaves(walk, b, inside, o, rays, r, found, noted);
+#ifdef ASK_MATERIALS
+        if (leaf == LEAF_NOTED)
+            return true;
+#endif
+        if (leaf != 0u) {
+            world_walk.element = walk.element;
+#ifdef FAVOUR_INSTANCES
+            favour_instance(leaf & BVH_LEAF_FIRST_MASK, 1, found);
+#endif
+            enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, walk, b, rays);
+        } else {
+            // The tree is done. Out of an instance the world's bundle comes back as it was.
+            bool all_done = inside.index == NOT_INSIDE;
+#ifdef ANY_HIT
+            all_done = all_done || !is_alive_any(r);
+#endif
+            if (all_done)
+                return false;
+#ifdef FAVOUR_INSTANCES
+            favour_instance(inside.index, -1, found);
+#endif
+            inside.index = NOT_INSIDE;
+            b = world_bundle;
+            walk = world_walk;
+        }
+    }
+}
 
 void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER])
 {
@@ -265,30 +337,14 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
 #endif
     b = world_bundle;
     walk = world_walk;
-    for (;;) {
-        uint leaf = test_leaves(walk, b, inside, o, rays, r, found);
-        if (leaf != 0u) {
-            world_walk.element = walk.element;
-#ifdef FAVOUR_INSTANCES
-            favour_instance(leaf & BVH_LEAF_FIRST_MASK, 1, found);
+    noted_primitive noted;
+    noted.bits = 0u;
+#ifdef ASK_MATERIALS
+    while (walk_instances(walk, world_walk, b, world_bundle, leading, inside, o, rays, r, found, noted))
+        settle_and_go_on(walk, noted, r, found);
+#else
+    walk_instances(walk, world_walk, b, world_bundle, leading, inside, o, rays, r, found, noted);
 #endif
-            enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, walk, b, rays);
-        } else {
-            // The tree is done. Out of an instance the world's bundle comes back as it was.
-            bool all_done = inside.index == NOT_INSIDE;
-#ifdef ANY_HIT
-            all_done = all_done || !is_alive_any(r);
-#endif
-            if (all_done)
-                return;
-#ifdef FAVOUR_INSTANCES
-            favour_instance(inside.index, -1, found);
-#endif
-            inside.index = NOT_INSIDE;
-            b = world_bundle;
-            walk = world_walk;
-        }
-    }
 }
 
 #endif

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Surfaces that are not all there: what a tracer asks about a candidate before it counts.
+// EVEN_ALPHA: no such material has a texture or vertex colours, and the place on it does not matter.
 // Compiled to constants where the scene has no such material (HAS_CUTOUT, HAS_TRANSLUCENT not defined).
 #include "common/surface.glsl"
 
@@ -22,6 +23,9 @@ struct surface_point {
 
 surface_point point_of(candidate found, vec3 origin_world, vec3 direction_world, float time)
 {
+#ifdef EVEN_ALPHA
+    return surface_point(vec4(0.0), vec4(1.0));
+#else
     if (found.instance_index == HIT_NO_PRIMITIVE)
         return surface_point(disc_texcoords(discs[found.primitive],
                                             origin_world + found.distance * direction_world),
@@ -39,13 +43,16 @@ surface_point point_of(candidate found, vec3 origin_world, vec3 direction_world,
     uvec4 triangle = texelFetch(triangles, int(found.primitive));
     vec3 weights = triangle_weights(found.barycentrics);
     return surface_point(triangle_texcoords(triangle, flags, weights), triangle_colour(triangle, flags, weights));
+#endif
 }
 
 vec4 base_colour_at(material m, surface_point point)
 {
     vec4 colour = m.base_colour * point.colour;
+#ifndef EVEN_ALPHA
     if (m.texture_base_colour != 0u)
         colour *= sample_slot(m.texture_base_colour, point.uv01, 0.0);
+#endif
     return colour;
 }
 
@@ -79,8 +86,10 @@ vec3 transmittance_of(candidate found, vec3 origin_world, vec3 direction_world, 
     vec3 through = vec3(0.0);
 #ifdef HAS_TRANSMISSION // else only alpha is of interest, and no colour is decoded
     float transmission = m.transmission * (1.0 - m.metallic);
+#ifndef EVEN_ALPHA
     if (transmission > 0.0 && m.texture_transmission != 0u)
         transmission *= sample_slot(m.texture_transmission, point.uv01, 0.0).r;
+#endif
     through = transmission * clamp(colour.rgb, 0.0, 1.0);
 #endif
     return is_blend ? mix(vec3(1.0), through, clamp(colour.a, 0.0, 1.0)) : through;

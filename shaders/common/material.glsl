@@ -143,9 +143,12 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
     const int BASE_COLOUR = 0, NORMAL = 1, METALLIC_ROUGHNESS = 2, OCCLUSION = 3, EMISSION = 4, TRANSMISSION = 5;
     uint uses[6] = uint[6](m.texture_base_colour, m.texture_normal, m.texture_metallic_roughness,
                            m.texture_occlusion, m.texture_emission, m.texture_transmission);
-    for (int i = 0; i < 6; i++) {
-        if (uses[i] == 0u)
-            continue;
+    uint used = 0u;
+    for (int i = 0; i < 6; i++)
+        used |= uses[i] != 0u ? 1u << i : 0u;
+    while (used != 0u) { // not a loop over all: software GL would sample for those that are not there
+        int i = findLSB(used);
+        used &= used - 1u;
         texture_slot slot = texture_slots[uses[i]];
         vec4 texel = sample_use(slot, uv01, footprint_uv);
         if (i == BASE_COLOUR) {

@@ -62,11 +62,28 @@ float sequence_number(uint pixel_seed, uint dimension, uint index)
     return unit_from_bits(bitfieldReverse(scramble_reversed(place, hash_u32(own))));
 }
 
+// The two numbers of a place in the sequence.
+vec2 sequence_pair_at(uint place, uint own)
+{
+    uint first = hash_u32(own), second = hash_u32(first);
+    return vec2(unit_from_bits(bitfieldReverse(scramble_reversed(place, first))),
+                unit_from_bits(bitfieldReverse(scramble_reversed(sobol_second_reversed(place), second))));
+}
+
 // Likewise where it has two.
 vec2 sequence_pair(uint pixel_seed, uint dimension, uint index)
 {
-    uint own = hash_u32(pixel_seed + dimension * 0x9e3779b9u), first = hash_u32(own), second = hash_u32(first);
-    uint place = bitfieldReverse(scramble_reversed(bitfieldReverse(index), own));
-    return vec2(unit_from_bits(bitfieldReverse(scramble_reversed(place, first))),
-                unit_from_bits(bitfieldReverse(scramble_reversed(sobol_second_reversed(place), second))));
+    uint own = hash_u32(pixel_seed + dimension * 0x9e3779b9u);
+    return sequence_pair_at(bitfieldReverse(scramble_reversed(bitfieldReverse(index), own)), own);
+}
+
+// Likewise, with the samples of each group of 2^group_shift in an order in which neighbours have first numbers close
+// together, up to the halves, quarters and so on of the interval being swapped: what they choose is alike, and rays side by
+// side go the same way. Not for more than one choice of a wave, as two in order would go hand in hand.
+vec2 sequence_pair_sorted(uint pixel_seed, uint dimension, uint index, uint group_shift)
+{
+    uint own = hash_u32(pixel_seed + dimension * 0x9e3779b9u), mask = (1u << group_shift) - 1u;
+    uint group = bitfieldReverse(scramble_reversed(bitfieldReverse(index), own)) & ~mask;
+    uint in_group = group_shift > 0u ? bitfieldReverse(index & mask) >> 32u - group_shift : 0u;
+    return sequence_pair_at(group | in_group, own);
 }

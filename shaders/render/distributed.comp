@@ -18,7 +18,7 @@
 
 // A child that would carry less than this to its pixel is followed only as often as its weight is of it, with this
 // weight.
-const float ROULETTE = 1.0 / 8.0;
+const float ROULETTE = 1.0 / 4.0;
 
 // How rough the mirrors and windows were that a path has met: what it sees from there is blurred by them. A lamp's
 // highlight on a smooth surface, which is as bright as it is narrow, is therefore widened to that; else one ray in
@@ -91,7 +91,7 @@ void main()
             no_shadow_ray(j);
         else
             asked = ask_for_light(j, p, s, parts, view, NoV, weight, h.distance,
-                                  sequence_pair(seed, dimension + SEQUENCE_LIGHT, index));
+                                  sequence_pair_sorted(seed, dimension + SEQUENCE_LIGHT, index, frame.group_shift));
     }
     bool seen = !straight && (p.flags & PATH_STRAIGHT) != 0u;
     radiance[k] = vec4(weight * sent, seen ? p.weight_r : 0.0);

@@ -26,7 +26,8 @@ struct frame_uniforms {
     uint light_count;
     uint depth; /* bounces after the first hit */
     uint seed;
-    uint pad0, pad1, pad2;
+    uint group_shift; /* 2 to its power samples of a pixel have their lights in order: sequence_pair_sorted */
+    uint pad0, pad1;
 };
 SHARED_SIZE(frame_uniforms, 576)
 

@@ -94,26 +94,66 @@ static void out_of_focus(struct fixture *fixture)
     fixture->request.focus = 3.5f;
 }
 
-static void begin(struct fixture *fixture, void (*build)(struct fixture *fixture))
+/* A ball that falls by its own size while the shutter is open. */
+static struct pose_node fall[2];
+static struct scene_pose poses[2];
+static const struct scene_motion falling = {.poses = poses, .pose_count = 2};
+
+static void in_motion(struct fixture *fixture)
 {
-    fixture_clear((void **)&fixture);
-    fixture->request.width = fixture->request.height = EDGE;
-    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
-    fixture->request.primary = PRIMARY_TRACE;
-    build(fixture);
+    a_soft_shadow(fixture);
+    struct scene_material *glow = fixture_material(fixture);
+    glow->unlit = true;
+    glow->base_colour[1] = 0.8f;
+    fixture_sphere(fixture, -0.6f, 0.0f, 0.8f, 0.3f, glow->base.id);
+    for (int i = 0; i < 2; i++) {
+        fall[i] =
+            (struct pose_node){.node = fixture->next_id - 1,
+                               .parent_from_node = {1, 0, 0, 0, 0, 1, 0, 0.4f - 0.6f * (float)i, 0, 0, 1, 0}};
+        poses[i] = (struct scene_pose){.nodes = &fall[i], .node_count = 1};
+    }
 }
 
 /* ---- statistics ---- */
+
+/* As fixture_render(), with what moves. */
+static struct frame_result render(struct fixture *fixture, const struct scene_motion *motion)
+{
+    struct error error = {0};
+    struct frame_result result = {0};
+    if (fixture->edit_count > 0)
+        fixture_commit(fixture);
+    if (!frame_begin(fixture->renderer, fixture->scene, motion, &fixture->request, &error))
+        fail_msg("frame_begin: %s: %s", error.field, error.text);
+    enum frame_progress progress;
+    while ((progress = frame_step(fixture->renderer, &result, &error)) == FRAME_MORE)
+        ;
+    if (progress != FRAME_DONE)
+        fail_msg("frame_step: %s: %s", error.field, error.text);
+    return result;
+}
+
+static const struct scene_motion *motion_of_scene; /* NULL: nothing moves */
 
 /* Green of every pixel. */
 static void picture(struct fixture *fixture, uint32_t samples, uint64_t seed, double values[PIXELS])
 {
     fixture->request.samples = samples;
     fixture->request.seed = seed;
-    struct frame_result result = fixture_render(fixture);
+    struct frame_result result = render(fixture, motion_of_scene);
     for (uint32_t i = 0; i < PIXELS; i++)
         values[i] = (double)fixture_pixel(&result, i % EDGE, i / EDGE)[1];
     frame_result_finish(&result);
+}
+
+static void begin(struct fixture *fixture, void (*build)(struct fixture *fixture))
+{
+    fixture_clear((void **)&fixture);
+    fixture->request.width = fixture->request.height = EDGE;
+    fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
+    fixture->request.primary = PRIMARY_TRACE;
+    motion_of_scene = build == in_motion ? &falling : NULL;
+    build(fixture);
 }
 
 struct moments {
@@ -238,6 +278,60 @@ static void depth_of_field_converges_without_bias(void **state)
     expect_convergence(*state, "out of focus", SLOPE_MOST);
 }
 
+static void motion_blur_converges_without_bias(void **state)
+{
+    begin(*state, in_motion);
+    expect_convergence(*state, "in motion", SLOPE_MOST);
+}
+
+/* A ball that glows before nothing, a pixel within its way: the share of the time that it is there. */
+static void what_moves_is_seen_for_as_long_as_it_is_there(void **state)
+{
+    struct fixture *fixture = *state;
+    enum { WIDTH = 16, SAMPLES = 256 };
+    fixture_clear(state);
+    struct scene_material *glow = fixture_material(fixture);
+    glow->unlit = true;
+    const float square[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    fixture_square(fixture, 0.5f, glow->base.id, square); /* 1 high */
+    uint32_t node = fixture->next_id - 1;
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 3.0f, 1.0f);
+    for (int i = 0; i < 2; i++) { /* from 1.5 below to 1.5 above */
+        fall[i] = (struct pose_node){
+            .node = node, .parent_from_node = {1, 0, 0, 0, 0, 1, 0, -1.5f + 3.0f * (float)i, 0, 0, 1, 0}};
+        poses[i] = (struct scene_pose){.nodes = &fall[i], .node_count = 1};
+    }
+    fixture->request.width = fixture->request.height = WIDTH;
+    fixture->request.samples = SAMPLES;
+    fixture->request.filter = FILTER_BOX;
+    fixture->request.camera.fov_y = 0.0f;
+    fixture->request.camera.ortho_height = 0.8f;
+    for (int i = 0; i < 2; i++) {
+        fixture->request.integrator = i ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_WHITTED;
+        struct frame_result result = render(fixture, &falling);
+        for (uint32_t p = 0; p < WIDTH * WIDTH; p++)
+            /* a third of the time, and one in each 256th of it: off by a sample at each end */
+            assert_near(fixture_pixel(&result, p % WIDTH, p / WIDTH)[0], 1.0 / 3.0, 2.01 / SAMPLES + 0.01);
+        frame_result_finish(&result);
+    }
+}
+
+static void motion_of_other_content_begins_an_accumulated_picture_from_new(void **state)
+{
+    struct fixture *fixture = *state;
+    begin(fixture, in_motion);
+    fixture->request.accumulate = true;
+    fixture->request.samples = 2;
+    static const uint32_t expected[] = {2, 4, 2, 4, 2};
+    for (int i = 0; i < 5; i++) {
+        if (i == 2)
+            fall[1].parent_from_node[7] -= 0.1f;
+        struct frame_result result = render(fixture, i == 4 ? NULL : &falling);
+        assert_int_equal(result.samples, expected[i]);
+        frame_result_finish(&result);
+    }
+}
+
 /* ---- lobes ---- */
 
 /* In an evenly lit world a rough metal mirrors what leaves the first facet that is met, and no more. */
@@ -309,6 +403,9 @@ int main(void)
         TEST(glossy_reflections_converge_without_bias),
         TEST(frosted_glass_converges_without_bias),
         TEST(depth_of_field_converges_without_bias),
+        TEST(motion_blur_converges_without_bias),
+        TEST(what_moves_is_seen_for_as_long_as_it_is_there),
+        TEST(motion_of_other_content_begins_an_accumulated_picture_from_new),
         TEST(a_rough_mirror_in_an_even_light_loses_only_what_a_second_facet_would_catch),
         TEST(coverage_is_whole_where_half_open_panes_stand_before_a_wall),
         TEST(a_sample_has_one_shadow_ray_a_hit_and_one_child_at_most),

@@ -34,7 +34,7 @@ static const struct form {
     {"and motion", INTEGRATOR_DISTRIBUTED, 16, 0.12f, true, 0, 0},
     {"rays walk alone", INTEGRATOR_DISTRIBUTED, 16, 0.12f, true, 1, 0},
 };
-enum { FORM_COUNT = sizeof(forms) / sizeof(forms[0]) };
+enum { FORM_COUNT = sizeof(forms) / sizeof(forms[0]), FORM_WHOLE = 4 };
 
 struct bench {
     struct gpu_device *device;
@@ -97,7 +97,7 @@ static void write_picture(struct bench *bench)
     struct frame_result result = {0};
     struct error error = {0};
     FILE *file = fopen(bench->picture, "wb");
-    if (!file || !render(bench, &forms[FORM_COUNT - 1], &result, &error)) {
+    if (!file || !render(bench, &forms[FORM_WHOLE], &result, &error)) {
         fprintf(stderr, "bench_distributed: %s cannot be written\n", bench->picture);
     } else {
         fprintf(file, "P6\n%u %u\n255\n", result.width, result.height);

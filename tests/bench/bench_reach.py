@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What is wanted of the tracers, held against what was measured: derived from the parts `reach`, `family` and `tracers`."""
+"""What is wanted, held against what was measured: derived from the parts `reach`, `family`, `tracers` and `distributed`."""
 from bench_common import significant, table, with_spread
+from bench_frames import distributed_row
 from bench_rays import CURVES, exponents, find_measure, find_wave, times_as_fast
 
 RAY_BYTES = 32
@@ -79,6 +80,9 @@ def derive(parts):
         elif result["triangles"] <= MIDDLE:
             rows += [beside_embree(result, "primary", 0.8), beside_embree(result, "bounce", 0.33)]
     rows += list(together_rows(scenes)) + list(exponent_rows(family))
+    if "distributed" in parts:
+        line, wanted, measured, where = distributed_row(parts["distributed"])
+        rows.append(row(line, wanted, measured, where, at_most=True))
     rows = [r for r in rows if r]
     if not rows:
         return None

@@ -279,12 +279,12 @@ class Model:
                 positions = [move(m, p) for m, p in zip(matrices, positions)]
                 if normals:
                     normals = [turn_normal(m, n) for m, n in zip(matrices, normals)]
-                texcoord = primitive["attributes"].get("TEXCOORD_0")
+                texcoords = [name for name in ("TEXCOORD_0", "TEXCOORD_1") if name in primitive["attributes"]]
                 corners = [i for i, in self.numbers(primitive["indices"])] if "indices" in primitive else \
                     range(len(positions))
                 yield Part(node, primitive.get("material"), [positions[i] for i in corners],
                            [normals[i] for i in corners] if normals else None,
-                           [self.numbers(texcoord)[i] for i in corners] if texcoord is not None else None)
+                           {name: [self.numbers(primitive["attributes"][name])[i] for i in corners] for name in texcoords})
 
     def times(self, animation):
         """First and last key."""
@@ -337,8 +337,8 @@ def write_still(model, animation, time, path):
         attributes = {"POSITION": writer.accessor("VEC3", part.positions)}
         if part.normals:
             attributes["NORMAL"] = writer.accessor("VEC3", part.normals)
-        if part.texcoords:
-            attributes["TEXCOORD_0"] = writer.accessor("VEC2", part.texcoords)
+        for name, texcoords in part.texcoords.items():
+            attributes[name] = writer.accessor("VEC2", texcoords)
         primitive = {"attributes": attributes}
         if part.material is not None:
             primitive["material"] = part.material

@@ -14,12 +14,14 @@ from farlight_test import BIN, ROOT, TIMEOUT_S
 BENCH = ROOT / "tests" / "bench"
 sys.path.insert(0, str(BENCH))
 import bench_common  # noqa: E402  pylint: disable=wrong-import-position
+import bench_frames  # noqa: E402  pylint: disable=wrong-import-position
 import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
 import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of bench_tracers
-PARTS = ("frames", "tracers", "family", "pixels", "rays", "parallel", "instances", "refit", "flake", "reach")
+PARTS = ("frames", "distributed", "tracers", "family", "pixels", "rays", "parallel", "instances",
+         "refit", "flake", "reach")
 
 
 class Figures(unittest.TestCase):
@@ -119,6 +121,19 @@ class Benchmark(unittest.TestCase):
         self.assertGreater(refit["rebuild_ms"]["least"], 0)
         self.assertLess(instances["update_ms"]["least"], instances["frame_ms"]["least"])
         self.assertEqual([row["spheres"] for row in self.document["parts"]["flake"]["frames"]], [91, 820, 7381])
+
+    def test_distributed_frames_stand_beside_a_plain_one(self):
+        data = self.document["parts"]["distributed"]
+        self.assertEqual(data["scene"], {"primitives": 1767, "width": 64, "height": 48})
+        forms = {form["name"]: form for form in data["forms"]}
+        pixels = 64 * 48
+        self.assertEqual(forms[bench_frames.PLAIN]["primary_rays"], pixels)
+        self.assertEqual(forms[bench_frames.WHOLE]["primary_rays"], 16 * pixels)
+        for form in data["forms"]:
+            self.assertEqual(len(form["frame_ns"]), 1)
+            self.assertGreater(form["shadow_rays"], 0)
+            self.assertGreater(form["stages_ns"]["shade"][0], 0)
+        self.assertLess(forms[bench_frames.WHOLE]["shadow_rays"], 16 * forms[bench_frames.PLAIN]["shadow_rays"])
 
     def test_embree_is_there_with_1_8_and_16_rays_a_call_beside_the_walk(self):
         result = self.document["parts"]["reach"]["results"][0]

@@ -1,17 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Rendered clips against rendered models that stand as gltf_pose.py says, and blurred frames of divided ranges."""
+"""Frames of a clip with an open shutter and a lens, of ranges that were divided."""
 import os
 
 import farlight_test
 from farlight_test import SHARED_SCENES, Case, Daemon, farlight, needs_shared_scenes, read_png
-from gltf_pose import Model, write_still
 
-WIDTH, HEIGHT = 160, 120
+WIDTH, HEIGHT = 128, 96
 SIZE = ["--size", f"{WIDTH}x{HEIGHT}"]
-# Vertices differ by rounding (test_poses.py), so that edges may lie on the other side of a pixel's middle here and
-# there: of the pixels at outlines, some thousandths of the picture. Elsewhere a channel is off by rounding only.
-EDGE_PIXELS = WIDTH * HEIGHT // 200
-SAME = 3
+SAME = 3  # of 255: what rounding may do
 
 
 def differing(one, other):
@@ -33,48 +29,6 @@ class Clips(Case):
         os.environ["FARLIGHT_SERVER"] = daemon.address
         cls.addClassCleanup(os.environ.pop, "FARLIGHT_SERVER")
 
-    def picture(self, name, model, *arguments):
-        path = self.folder / f"{name}.png"
-        self.expect(farlight("render", model, "-o", path, *SIZE, *arguments), 0)
-        return path
-
-    def view_of(self, model, animation, time):
-        """A camera that is the same for both."""
-        corners = [p for part in model.parts(animation, time) for p in part.positions]
-        low, high = ([pick(p[i] for p in corners) for i in range(3)] for pick in (min, max))
-        size = max(b - a for a, b in zip(low, high))
-        middle = [(a + b) / 2 for a, b in zip(low, high)]
-        eye = [middle[0] + 0.7 * size, middle[1] + 0.5 * size, middle[2] + 1.3 * size]
-        return ["--eye", ",".join(map(repr, eye)), "--look-at", ",".join(map(repr, middle)), "--fov", "45"]
-
-
-@needs_shared_scenes
-class Stills(Clips):
-    MODELS = ("gltf/Fox.glb", "gltf/khronos/AnimatedMorphCube-glTF/AnimatedMorphCube.gltf")
-
-    def test_a_moment_of_a_clip_shows_the_model_that_stands_so(self):
-        for name in self.MODELS:
-            path = SHARED_SCENES / name
-            model, animation = Model(path), len(Model(path).json["animations"]) - 1
-            begin, end = model.times(animation)
-            times = [begin + 0.31 * (end - begin), begin + 0.62 * (end - begin)]
-            view = self.view_of(model, animation, times[0])
-            moving, still = [], []
-            for i, time in enumerate(times):
-                write_still(model, animation, time, self.folder / "still.gltf")
-                moving.append(self.picture(f"moving-{i}", path, *view, "--clip", animation, "--time", repr(time)))
-                still.append(self.picture(f"still-{i}", self.folder / "still.gltf", *view))
-            for tracer in ("bvh", "reference"):
-                traced = self.picture(tracer, path, *view, "--clip", animation, "--time", repr(times[1]),
-                                      "--tracer", tracer, "--primary", "trace")
-                with self.subTest(model=name, tracer=tracer):
-                    self.assertLess(differing(traced, still[1]), EDGE_PIXELS)
-            for i in range(2):
-                with self.subTest(model=name, time=times[i]):
-                    self.assertLess(differing(moving[i], still[i]), EDGE_PIXELS)
-            with self.subTest(model=name):
-                self.assertGreater(differing(moving[0], moving[1]), 2 * EDGE_PIXELS, "or nothing above could fail")
-
 
 @needs_shared_scenes
 class Blurred(Clips):
@@ -86,20 +40,23 @@ class Blurred(Clips):
         return {int(file.stem): read_png(file) for file in (self.folder / folder).iterdir()}
 
     def test_blurred_frames_are_the_same_to_the_bit_however_the_range_was_divided(self):
-        whole = self.frames("whole", "--frames", "3-8")
-        divided = {**self.frames("odd", "--frames", "3-8:2"), **self.frames("first", "--frames", "3-8", "--shard", "1/3"),
-                   **self.frames("last", "--frames", "3-8", "--shard", "3/3"),
-                   **self.frames("middle", "--frames", "3-8", "--shard", "2/3")}
+        whole = self.frames("whole", "--frames", "3-6")
+        divided = {**self.frames("last", "--frames", "3-6", "--shard", "2/2"),
+                   **self.frames("first", "--frames", "3-6", "--shard", "1/2")}
+        stepped = self.frames("stepped", "--frames", "3-6:3")
         self.assertEqual(sorted(divided), sorted(whole))
         for frame, picture in whole.items():
             self.assertEqual(picture, divided[frame], f"frame {frame}")
+            self.assertEqual(picture, stepped.get(frame, picture), f"frame {frame} of every third")
 
     def test_an_open_shutter_is_seen(self):
         self.frames("open", "--frames", "3")
         self.expect(farlight("animate", SHARED_SCENES / "gltf/Fox.glb", "--clip", "Run", "--fps", "12", *SIZE,
                              "--samples", "4", "--integrator", "distributed", "--aperture", "5", "--frames", "3",
                              "-o", self.folder / "open" / "still-%d.png"), 0)
-        self.assertGreater(differing(self.folder / "open/3.png", self.folder / "open/still-3.png"), EDGE_PIXELS)
+        # A running leg alone covers more of the picture than this.
+        self.assertGreater(differing(self.folder / "open/3.png", self.folder / "open/still-3.png"),
+                           WIDTH * HEIGHT // 200)
 
 
 if __name__ == "__main__":

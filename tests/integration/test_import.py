@@ -673,6 +673,19 @@ class Written(unittest.TestCase):
         self.assertAlmostEqual(result.of(SET_CAMERA)[0]["fov_y"], 0.7, 6)
         self.assertEqual(result.of(SET_LIGHT)[0]["colour"], (5, 2.5, 0))
 
+    def test_gltf_point_lights_with_a_radius_are_spheres_that_send_as_much(self):
+        lights = [{"type": "point", "intensity": 5, "color": [1, 0.5, 0], "extras": {"radius": radius}}
+                  for radius in (0.5, 0, -1, "wide")]
+        result = self.run_gltf({
+            "scenes": [{"nodes": [0, 1, 2, 3]}],
+            "nodes": [{"extensions": {"KHR_lights_punctual": {"light": i}}} for i in range(4)],
+            "extensions": {"KHR_lights_punctual": {"lights": lights}}})
+        sphere, *points = result.of(SET_LIGHT)
+        self.assertEqual((sphere["kind"], sphere["size"][0]), (4, 0.5))
+        for got, intensity in zip(sphere["colour"], (5, 2.5, 0)):
+            self.assertAlmostEqual(got * 3.14159265 * 0.25, intensity, 5)
+        self.assertEqual([(light["kind"], light["colour"]) for light in points], [(0, (5, 2.5, 0))] * 3)
+
     def test_gltf_strips_and_fans_become_triangles(self):
         data = struct.pack("<12f", 0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0)
         for mode, wanted in ((5, [0, 1, 2, 1, 3, 2]), (6, [1, 2, 0, 2, 3, 0])):

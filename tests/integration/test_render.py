@@ -19,9 +19,10 @@ FIGURES = farlight_test.ROOT / "tests/integration/figures.json"
 # edges, and far less than any fault of shading does.
 TOLERANCE = 2.0
 PICTURES = {
-    "cornell": ("cornell.glb", []),
-    "teapot": ("teapot.glb", []),
-    "sphereflake-2": ("sphereflake-2.nff", []),
+    # The integrator without noise, or differences of these pictures would be that.
+    "cornell": ("cornell.glb", ["--integrator", "whitted"]),
+    "teapot": ("teapot.glb", ["--integrator", "whitted"]),
+    "sphereflake-2": ("sphereflake-2.nff", ["--integrator", "whitted"]),
 }
 
 

@@ -1,6 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Starts a daemon on a private socket, renders a bundled scene and a short orbit through it, and stops it.
+# Starts a daemon on a private socket, renders bundled scenes through it, one of them with all that moves, a lens and a
+# shutter, and stops it.
 # Usage: demo.sh BUILD_FOLDER OUT_FOLDER
 set -eu
 bin=$1
@@ -45,5 +46,16 @@ echo "--- $out/demo.exr, linear; the same scene again, so that no bulk data move
 echo "--- $out/orbit/, 24 frames once around a sphereflake"
 "$bin/farlight" animate "$private/scenes/sphereflake-3.nff" --server "$server" --size 480x270 --orbit \
     --frames 1-24 --fps 24 -o "$out/orbit/%04d.png"
+carousel=$private/scenes/carousel.glb
+dusk=$private/scenes/dusk.hdr
+echo "--- $out/carousel.mp4, the clip 'ride' once: soft shadows, gloss, and a shutter that is open for half of every frame"
+"$bin/farlight" animate "$carousel" --environment "$dusk" --server "$server" --clip ride --fps 12 --frames 1-36 \
+    --size 480x270 --samples 6 --shutter 0.5 -o "$out/carousel.mp4"
+echo "--- $out/shot.mp4, every third frame of what conf/examples/shot.json asks for: camera, focus, lamp and a colour change"
+cp conf/examples/shot.json "$private/scenes/shot.json"
+"$bin/farlight" animate --script "$private/scenes/shot.json" --server "$server" --frames 1-36:3 -o "$out/shot.mp4"
+echo "--- $out/lens.png, the clip at 0.7 s through a wide open lens, in focus on the nearest pot"
+"$bin/farlight" render "$carousel" --environment "$dusk" --server "$server" --clip ride --time 0.7 --size 640x360 \
+    --samples 16 --aperture 0.3 --focus 7.4 --timings -o "$out/lens.png"
 echo "--- the daemon, afterwards"
 "$bin/farlight" stats --server "$server"

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void print_material(FILE *json, const struct glb_material *m)
+void glb_print_material(FILE *json, const struct glb_material *m)
 {
     fprintf(json, "{\"name\":\"%s\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[%g,%g,%g,%g],", m->name,
             m->base_colour[0], m->base_colour[1], m->base_colour[2], m->base_colour[3]);
@@ -44,8 +44,7 @@ static void print_accessors(FILE *json, const struct shape *shape, size_t part, 
     *offset += 2 * vertex_bytes + (size_t)shape->index_count * 4;
 }
 
-/* Rotation whose -z looks from eye to look_at with +y up, as a quaternion x y z w. */
-static void look_rotation(float q[4], const struct glb_camera *camera)
+void glb_look_rotation(float q[4], const struct glb_camera *camera)
 {
     const float dx = camera->look_at[0] - camera->eye[0], dy = camera->look_at[1] - camera->eye[1];
     const float dz = camera->look_at[2] - camera->eye[2];
@@ -70,7 +69,7 @@ static void print_nodes(FILE *json, const struct glb_part *parts, size_t part_co
         fprintf(json, "{\"translation\":[%g,%g,%g],\"extensions\":{\"KHR_lights_punctual\":{\"light\":%zu}}},",
                 lights[i].position[0], lights[i].position[1], lights[i].position[2], i);
     float q[4];
-    look_rotation(q, camera);
+    glb_look_rotation(q, camera);
     fprintf(json,
             "{\"name\":\"camera\",\"camera\":0,\"translation\":[%g,%g,%g],\"rotation\":[%.9g,%.9g,%.9g,%.9g]}],",
             camera->eye[0], camera->eye[1], camera->eye[2], q[0], q[1], q[2], q[3]);
@@ -96,7 +95,7 @@ static void print_json(FILE *json, const struct glb_part *parts, size_t part_cou
     fprintf(json, "\"materials\":[");
     for (size_t i = 0; i < part_count; i++) {
         fprintf(json, "%s", i ? "," : "");
-        print_material(json, &parts[i].material);
+        glb_print_material(json, &parts[i].material);
     }
     fprintf(json, "],\"meshes\":[");
     for (size_t i = 0; i < part_count; i++)
@@ -119,54 +118,60 @@ static void write_u32(FILE *file, size_t value)
     fwrite(bytes, 1, 4, file);
 }
 
-bool glb_write(const char *path, const struct glb_part *parts, size_t part_count, const struct glb_light *lights,
-               size_t light_count, const struct glb_camera *camera)
+bool glb_write_chunks(const char *path, const char *json, size_t json_bytes, const void *binary,
+                      size_t binary_bytes)
 {
-    size_t binary_bytes = 0;
-    for (size_t i = 0; i < part_count; i++) {
-        if (parts[i].shape.out_of_memory) {
-            fprintf(stderr, "make_scenes: %s: out of memory\n", path);
-            return false;
-        }
-        binary_bytes += (size_t)parts[i].shape.vertex_count * 24 + (size_t)parts[i].shape.index_count * 4;
-    }
-    char *text = NULL;
-    size_t text_bytes = 0;
-    FILE *json = open_memstream(&text, &text_bytes);
-    if (!json) {
-        fprintf(stderr, "make_scenes: %s: out of memory\n", path);
-        return false;
-    }
-    print_json(json, parts, part_count, lights, light_count, camera);
-    fclose(json);
-    const size_t padding = (4 - text_bytes % 4) % 4;
-
+    const size_t padding = (4 - json_bytes % 4) % 4;
     FILE *file = fopen(path, "wb");
     if (!file) {
         fprintf(stderr, "make_scenes: %s: %s\n", path, strerror(errno));
-        free(text);
         return false;
     }
     fwrite("glTF", 1, 4, file);
     write_u32(file, 2);
-    write_u32(file, 12 + 8 + text_bytes + padding + 8 + binary_bytes);
-    write_u32(file, text_bytes + padding);
+    write_u32(file, 12 + 8 + json_bytes + padding + 8 + binary_bytes);
+    write_u32(file, json_bytes + padding);
     fwrite("JSON", 1, 4, file);
-    fwrite(text, 1, text_bytes, file);
+    fwrite(json, 1, json_bytes, file);
     fwrite("   ", 1, padding, file);
     write_u32(file, binary_bytes);
     fwrite("BIN", 1, 4, file);
-    for (size_t i = 0; i < part_count; i++) {
-        const struct shape *shape = &parts[i].shape;
-        fwrite(shape->positions, 12, shape->vertex_count, file);
-        fwrite(shape->normals, 12, shape->vertex_count, file);
-        fwrite(shape->indices, 4, shape->index_count, file);
-    }
-    free(text);
+    fwrite(binary, 1, binary_bytes, file);
     const bool written = !ferror(file);
     if (fclose(file) != 0 || !written) {
         fprintf(stderr, "make_scenes: %s: %s\n", path, strerror(errno));
         return false;
     }
     return true;
+}
+
+bool glb_write(const char *path, const struct glb_part *parts, size_t part_count, const struct glb_light *lights,
+               size_t light_count, const struct glb_camera *camera)
+{
+    char *text = NULL, *bytes = NULL;
+    size_t text_bytes = 0, binary_bytes = 0;
+    FILE *json = open_memstream(&text, &text_bytes), *binary = open_memstream(&bytes, &binary_bytes);
+    bool written = json && binary;
+    if (json)
+        print_json(json, parts, part_count, lights, light_count, camera);
+    for (size_t i = 0; i < part_count; i++) {
+        const struct shape *shape = &parts[i].shape;
+        written &= !shape->out_of_memory;
+        if (!written)
+            break;
+        fwrite(shape->positions, 12, shape->vertex_count, binary);
+        fwrite(shape->normals, 12, shape->vertex_count, binary);
+        fwrite(shape->indices, 4, shape->index_count, binary);
+    }
+    if (json)
+        written &= fclose(json) == 0;
+    if (binary)
+        written &= fclose(binary) == 0;
+    if (written)
+        written = glb_write_chunks(path, text, text_bytes, bytes, binary_bytes);
+    else
+        fprintf(stderr, "make_scenes: %s: out of memory\n", path);
+    free(text);
+    free(bytes);
+    return written;
 }

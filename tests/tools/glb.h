@@ -7,6 +7,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 
 struct glb_material {
     const char *name;
@@ -36,5 +37,15 @@ struct glb_camera {
 /* Returns false and has said why on stderr. */
 bool glb_write(const char *path, const struct glb_part *parts, size_t part_count, const struct glb_light *lights,
                size_t light_count, const struct glb_camera *camera);
+
+/* The pieces of it, for files with more in them. */
+
+/* One element of "materials". */
+void glb_print_material(FILE *json, const struct glb_material *material);
+/* Rotation whose -z looks from eye to look_at with +y up, as a quaternion x y z w. */
+void glb_look_rotation(float q[4], const struct glb_camera *camera);
+/* A file of JSON and one buffer, a multiple of four bytes long. Returns false and has said why on stderr. */
+bool glb_write_chunks(const char *path, const char *json, size_t json_bytes, const void *binary,
+                      size_t binary_bytes);
 
 #endif

@@ -2,10 +2,13 @@
 /* Writes the bundled scenes into a folder, so that a fresh machine has something to render:
  *   cornell.glb      a box with coloured walls, a mirror block and a glass sphere
  *   teapot.glb       a teapot on a mirror, with metal and glass beside it
+ *   carousel.glb     a roundabout of teapots with a clip, "ride": everything that moves
  *   sky.hdr          an evening sky with two soft lights, to be used as environment
+ *   dusk.hdr         the same, a sixth as bright: what lamps light has shadows under it
  *   sphereflake-N.nff  Eric Haines' 'balls' of the Standard Procedural Databases, N levels: 2 to 4, others
  *                    where asked for
  *   bumpy-N.glb      a bumpy sphere of about N thousand triangles above a floor, the family of the benchmark */
+#include "animated_scene.h"
 #include "glb.h"
 
 #include <errno.h>
@@ -60,43 +63,13 @@ static bool write_cornell(const char *path)
     return finish_parts(glb_write(path, parts, count, lights, 2, &camera), parts, count);
 }
 
-static void add_teapot(struct shape *shape)
-{
-    enum { PROFILE = 40, PATH = 24 };
-    float profile[PROFILE][2];
-    for (int i = 0; i < PROFILE; i++) { /* a squashed ball with a flat foot, its lid, and a knob */
-        const float t = (float)i / (PROFILE - 1);
-        const float body = powf(sinf(3.14159265f * (0.12f + 0.80f * t)), 0.8f);
-        const float knob = t > 0.86f ? 0.13f * sqrtf(fmaxf(0, sinf(3.14159265f * (t - 0.86f) / 0.14f))) : 0;
-        profile[i][0] = t > 0.86f ? knob + 0.02f * (1 - t) : body * (1 - 0.18f * t);
-        profile[i][1] = t > 0.86f ? 0.98f + (t - 0.86f) * 1.6f : t * 1.14f;
-    }
-    shape_lathe(shape, (const float(*)[2])profile, PROFILE, 96);
-    float path[PATH][3], radii[PATH];
-    for (int i = 0; i < PATH; i++) { /* spout */
-        const float t = (float)i / (PATH - 1);
-        path[i][0] = 0.75f + 0.85f * t;
-        path[i][1] = 0.38f + 0.62f * t * t * (3 - 2 * t);
-        path[i][2] = 0;
-        radii[i] = 0.2f - 0.12f * t;
-    }
-    shape_tube(shape, (const float(*)[3])path, radii, PATH, 32);
-    for (int i = 0; i < PATH; i++) { /* handle */
-        const float angle = 1.0f + 3.9f * (float)i / (PATH - 1);
-        path[i][0] = -0.72f + 0.62f * cosf(angle);
-        path[i][1] = 0.58f + 0.36f * sinf(angle);
-        radii[i] = 0.07f;
-    }
-    shape_tube(shape, (const float(*)[3])path, radii, PATH, 32);
-}
-
 static bool write_teapot(const char *path)
 {
     struct glb_part parts[] = {{"table", {0}, mirror},     {"teapot", {0}, glaze}, {"gold ball", {0}, gold},
                                {"glass ball", {0}, glass}, {"red ball", {0}, red}, {"wall", {0}, white}};
     shape_quad(&parts[0].shape, (const float[3]){-14, 0, 4}, (const float[3]){14, 0, 4},
                (const float[3]){14, 0, -4}, (const float[3]){-14, 0, -4});
-    add_teapot(&parts[1].shape);
+    shape_teapot(&parts[1].shape, 96);
     shape_sphere(&parts[2].shape, (const float[3]){1.5f, 0.35f, 1.1f}, 0.35f, 96);
     shape_sphere(&parts[3].shape, (const float[3]){-0.5f, 0.3f, 1.5f}, 0.3f, 96);
     shape_sphere(&parts[4].shape, (const float[3]){-1.9f, 0.45f, 0.3f}, 0.45f, 96);
@@ -172,7 +145,7 @@ static void sky_radiance(float rgb[3], float height, float azimuth)
 }
 
 /* Radiance's own format, without run lengths: https://radsite.lbl.gov/radiance/refer/filefmts.pdf */
-static bool write_sky(const char *path)
+static bool write_sky(const char *path, float strength)
 {
     enum { WIDTH = 512, HEIGHT = 256 };
     FILE *file = fopen(path, "wb");
@@ -186,6 +159,8 @@ static bool write_sky(const char *path)
             float rgb[3];
             sky_radiance(rgb, cosf(3.14159265f * ((float)y + 0.5f) / HEIGHT),
                          6.2831853f * (((float)x + 0.5f) / WIDTH - 0.5f));
+            for (int i = 0; i < 3; i++)
+                rgb[i] *= strength;
             int exponent;
             const float mantissa = frexpf(fmaxf(rgb[0], fmaxf(rgb[1], rgb[2])), &exponent);
             const float scale = mantissa * 256 / fmaxf(rgb[0], fmaxf(rgb[1], rgb[2]));
@@ -237,8 +212,12 @@ int main(int argc, char **argv)
     bool ok = write_cornell(path);
     snprintf(path, sizeof path, "%s/teapot.glb", argv[1]);
     ok &= write_teapot(path);
+    snprintf(path, sizeof path, "%s/carousel.glb", argv[1]);
+    ok &= animated_scene_write(path);
     snprintf(path, sizeof path, "%s/sky.hdr", argv[1]);
-    ok &= write_sky(path);
+    ok &= write_sky(path, 1);
+    snprintf(path, sizeof path, "%s/dusk.hdr", argv[1]);
+    ok &= write_sky(path, 0.16f);
     for (int levels = 2; levels <= 4; levels++) {
         snprintf(path, sizeof path, "%s/sphereflake-%d.nff", argv[1], levels);
         ok &= write_sphereflake(path, levels);

@@ -26,5 +26,7 @@ void shape_lathe(struct shape *shape, const float (*profile)[2], uint32_t profil
 /* A tube along a path of centres with a radius each. */
 void shape_tube(struct shape *shape, const float (*path)[3], const float *radii, uint32_t path_count,
                 uint32_t segments);
+/* On its foot at the origin, its spout towards +x, about 1.2 high and 2.8 long. */
+void shape_teapot(struct shape *shape, uint32_t segments);
 
 #endif

@@ -314,8 +314,14 @@ static void how_far_a_rotation_turns_is_the_sum_of_its_arcs(void **state)
     for (int key = 0; key < 5; key++)
         turn(degrees[key], key % 2 ? -1 : 1, values + 4 * key);
     struct curve curve = curve_of(INTERPOLATION_LINEAR, times, 5, values, 4);
-    const double cases[][3] = {{0.5, 3.5, 20 + 50 + 10 + 50}, {-3, 9, 200}, {1.25, 1.5, 12.5}, {1, 2, 50},
-                               {-2, -1, 0},                   {5, 6, 0},    {2, 2.5, 5},       {3.9, 4, 10}};
+    const double cases[][3] = {{0.5, 3.5, 20 + 50 + 10 + 50},
+                               {-3, 9, 200},
+                               {1.25, 1.5, 12.5},
+                               {1, 2, 50},
+                               {-2, -1, 0},
+                               {5, 6, 0},
+                               {2, 2.5, 5},
+                               {3.9, 4, 10}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
         expect("turn", curve_turn_bound(&curve, cases[i][0], cases[i][1]) * 180 / PI, cases[i][2], 1e-4);
     curve.interpolation = INTERPOLATION_STEP;

@@ -8,6 +8,7 @@
 #include "shared/light.h"
 #include "shared/material.h"
 #include "trace/scene_gpu.h"
+#include "trace/tracer.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -461,6 +462,41 @@ static void what_is_flat_in_some_pose_is_left_out(void **state)
     fixture_finish(&fixture);
 }
 
+/* Half way through a half turn in two poses everything lies in a line. Embree would divide by that. */
+static void the_reference_refuses_what_turns_flat_between_two_poses(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct error error = {0};
+    const struct tracer_impl *impl = tracer_find(2, "tracer", &error);
+    if (!impl) {
+        printf("SKIP: %s\n", error.text);
+        return;
+    }
+    fixture_init(&fixture, test_scene_soup());
+    struct tracer *reference = tracer_create(impl, device, &(struct tracer_options){0}, &error);
+    assert_non_null(reference);
+    for (uint32_t poses = 2; poses <= 9; poses += 7) {
+        struct scene_motion motion;
+        test_motion_init(&motion, poses);
+        for (uint32_t p = 0; p < poses; p++) {
+            float m[12];
+            test_transform(m, 1, 1, 1, 1, 3.14159265f * (float)p / (float)(poses - 1), 1, 2, 3);
+            test_pose_node(&motion.poses[p], 1, m);
+        }
+        assert_true(scene_gpu_update(&fixture.gpu, fixture.scene, &motion, &fixture.changes, NULL, &error));
+        assert_int_equal(tracer_update(reference, &fixture.gpu, &fixture.changes, NULL, &error), poses > 2);
+        if (poses == 2) {
+            assert_int_equal(error.kind, ERROR_UNSUPPORTED);
+            assert_string_equal(error.field, "node 1.parent_from_node");
+        }
+        error = (struct error){0};
+        scene_motion_finish(&motion);
+    }
+    tracer_destroy(reference);
+    fixture_finish(&fixture);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -475,6 +511,7 @@ int main(void)
         cmocka_unit_test(an_instance_is_bounded_wherever_it_goes),
         cmocka_unit_test(materials_and_lights_follow_the_first_pose),
         cmocka_unit_test(what_is_flat_in_some_pose_is_left_out),
+        cmocka_unit_test(the_reference_refuses_what_turns_flat_between_two_poses),
     };
     struct error error = {0};
     device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);

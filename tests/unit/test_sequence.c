@@ -62,6 +62,34 @@ static void every_aligned_block_of_numbers_has_one_in_each_interval(void **state
         }
 }
 
+static void in_order_they_are_the_same_numbers_and_neighbours_are_close_together(void **state)
+{
+    (void)state;
+    for (uint32_t s = 0; s < SEEDS; s++)
+        for (uint32_t shift = 0; shift <= 4; shift++)
+            for (uint32_t first = 0; first < 48; first += 16) {
+                uint32_t count = 1u << shift, taken = 0, seed = sequence_seed(s, 7);
+                float sum = 0.0f, sorted_sum = 0.0f;
+                for (uint32_t i = 0; i < count; i++) {
+                    float pair[2], sorted[2];
+                    sequence_pair(pair, seed, SEQUENCE_LIGHT, first + i);
+                    sequence_pair_sorted(sorted, seed, SEQUENCE_LIGHT, first + i, shift);
+                    /* neighbours to the left half of the group, the half of that, .. share an interval of that size */
+                    uint32_t interval = (uint32_t)ldexpf(sorted[0], (int)shift);
+                    taken |= 1u << interval;
+                    for (uint32_t half = 1; half < count; half *= 2) {
+                        float other[2];
+                        sequence_pair_sorted(other, seed, SEQUENCE_LIGHT, first + (i ^ (half - 1)), shift);
+                        assert_int_equal((uint32_t)ldexpf(other[0], (int)shift) / half, interval / half);
+                    }
+                    sum += pair[0] + 2.0f * pair[1];
+                    sorted_sum += sorted[0] + 2.0f * sorted[1];
+                }
+                assert_int_equal(taken, (1ull << count) - 1);
+                assert_true(fabsf(sum - sorted_sum) < 1e-4f);
+            }
+}
+
 /* Root mean square over pixels of a mean of `samples` less the integral, of a smooth bump that is no product. */
 static double error_of(uint32_t samples)
 {
@@ -169,6 +197,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_aligned_block_of_pairs_has_one_in_each_elementary_cell),
         cmocka_unit_test(every_aligned_block_of_numbers_has_one_in_each_interval),
+        cmocka_unit_test(in_order_they_are_the_same_numbers_and_neighbours_are_close_together),
         cmocka_unit_test(the_error_of_a_pixels_mean_falls_faster_than_that_of_independent_numbers),
         cmocka_unit_test(neighbouring_pixels_are_independent),
         cmocka_unit_test(choices_samples_and_seeds_are_independent),

@@ -1,0 +1,599 @@
+# SPDX-License-Identifier: MIT
+"""Animations: in parts and resumed, through lost daemons, from request files, as videos; progressive pictures.
+
+Frames are compared by their digest, which the daemon computes of the pixels and the client checks: frames with the same
+digest are the same to the bit.
+"""
+import base64
+import contextlib
+import json
+import os
+import pathlib
+import pty
+import signal
+import struct
+import subprocess
+import time
+
+import farlight_test
+from farlight_test import BIN, Case, Daemon, SHARED_SCENES, bundled_scenes, farlight, needs_shared_scenes
+
+SIZE = ["--size", "96x64"]
+
+
+def exr_attributes(path):
+    """name -> bytes of the header of an EXR file."""
+    data, at, found = path.read_bytes(), 8, {}
+    while data[at]:
+        name_end = data.index(b"\0", at)
+        kind_end = data.index(b"\0", name_end + 1)
+        size = struct.unpack_from("<I", data, kind_end + 1)[0]
+        found[data[at:name_end].decode()] = data[kind_end + 5:kind_end + 5 + size]
+        at = kind_end + 5 + size
+    return found
+
+
+def digest(path):
+    return exr_attributes(path)["farlight/digest"]
+
+
+def children(pid, name):
+    """Process numbers of the children of `pid` that run the program `name`."""
+    found = []
+    with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+        for child in pathlib.Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+                if pathlib.Path(f"/proc/{child}/comm").read_text().strip() == name:
+                    found.append(int(child))
+    return found
+
+
+def moving_model(path):
+    """A glTF file with a pyramid that slides, spins, and (`pulse`) grows along a cubic spline; the ground sinks."""
+    chunks, views, accessors = [], [], []
+
+    def add(values, kind, component=5126):
+        data = struct.pack(f"<{len(values)}{'f' if component == 5126 else 'H'}", *values)
+        views.append({"buffer": 0, "byteOffset": sum(map(len, chunks)), "byteLength": len(data)})
+        chunks.append(data + bytes(-len(data) % 4))
+        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[kind]
+        parts = [values[i::width] for i in range(width)]
+        accessors.append({"bufferView": len(views) - 1, "componentType": component, "count": len(values) // width,
+                          "type": kind, "min": [min(p) for p in parts], "max": [max(p) for p in parts]})
+        return len(accessors) - 1
+
+    corners = [-1, 0, -1, 1, 0, -1, 1, 0, 1, -1, 0, 1, 0.3, 2, 0.2]  # the apex stands askew: no turn is like another
+    position = add(corners, "VEC3")
+    index = add([0, 1, 2, 0, 2, 3, 0, 4, 1, 1, 4, 2, 2, 4, 3, 3, 4, 0], "SCALAR", 5123)
+    half = 0.5 ** 0.5
+    clips = {
+        "slide": (0, "translation", "LINEAR", [0, 1], [-1, 0, 0, 1, 0, 0], "VEC3"),
+        "spin": (0, "rotation", "LINEAR", [0, 0.5, 1], [0, 0, 0, 1, 0, half, 0, half, 0, 1, 0, 0], "VEC4"),
+        "pulse": (0, "scale", "CUBICSPLINE", [0, 1], [0, 0, 0, 1, 1, 1, 1, 2, 1, 0, 0, 0, 2, 1, 2, 0, 0, 0], "VEC3"),
+        "sink": (1, "translation", "LINEAR", [0, 1], [0, -2.2, -1, 0, -3, -1], "VEC3"),
+    }
+    animations = []
+    for name, (node, target, interpolation, times, values, kind) in clips.items():
+        sampler = {"input": add(times, "SCALAR"), "output": add(values, kind), "interpolation": interpolation}
+        animations.append({"name": name, "samplers": [sampler],
+                           "channels": [{"sampler": 0, "target": {"node": node, "path": target}}]})
+    data = b"".join(chunks)
+    document = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1, 2]}],
+        "nodes": [{"name": "pyramid", "mesh": 0}, {"name": "ground", "mesh": 0, "translation": [0, -2.2, -1],
+                                                   "scale": [4, 1, 4]},
+                  {"name": "lamp", "extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [2, 5, 4]}],
+        "extensionsUsed": ["KHR_lights_punctual"],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "name": "bulb", "intensity": 400}]}},
+        "meshes": [{"primitives": [{"attributes": {"POSITION": position}, "indices": index, "material": 0}]}],
+        "materials": [{"name": "clay", "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.4, 0.2, 1],
+                                                               "metallicFactor": 0}}],
+        "animations": animations, "accessors": accessors, "bufferViews": views,
+        "buffers": [{"byteLength": len(data), "uri": "data:application/octet-stream;base64," +
+                     base64.b64encode(data).decode()}]}
+    path.write_text(json.dumps(document))
+    return path
+
+
+class Animations(Case):
+    def setUp(self):
+        super().setUp()
+        self.model = bundled_scenes() / "sphereflake-2.nff"
+
+    def animate(self, folder, *arguments, status=0, **options):
+        """Runs it into a folder of its own and returns the digests by frame, and what it said."""
+        path = self.folder / folder
+        path.mkdir(exist_ok=True)
+        result = self.expect(farlight("animate", *arguments, "-o", path / "%04d.exr", *SIZE, **options), status)
+        return self.digests(folder), result
+
+    def digests(self, folder):
+        return {int(file.stem): digest(file) for file in sorted((self.folder / folder).glob("*.exr"))}
+
+    def write(self, document, name="shot.json"):
+        path = self.folder / name
+        path.write_text(json.dumps(document))
+        return path
+
+
+class OneDaemon(Animations):
+    """A daemon for all tests of a class, which commands find by themselves: much faster."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        daemon = cls.enterClassContext(Daemon())
+        os.environ["FARLIGHT_SERVER"] = daemon.address
+        cls.addClassCleanup(os.environ.pop, "FARLIGHT_SERVER")
+
+
+class Parts(OneDaemon):
+    RANGE = ["--frames", "10-31:3"]  # 10 13 16 19 22 25 28 31
+
+    def test_parts_together_are_the_whole_to_the_bit(self):
+        whole, _ = self.animate("whole", self.model, *self.RANGE)
+        self.assertEqual(list(whole), list(range(10, 32, 3)))
+        self.assertEqual(len(set(whole.values())), 8, "frames of an orbit differ")
+        for part, frames in ((1, [10, 19, 28]), (2, [13, 22, 31]), (3, [16, 25])):
+            got, _ = self.animate(f"part{part}", self.model, *self.RANGE, "--shard", f"{part}/3")
+            self.assertEqual(got, {frame: whole[frame] for frame in frames})
+        got, result = self.animate("part9", self.model, *self.RANGE, "--shard", "9/9")
+        self.assertEqual(got, {})
+        self.assertIn("none falls to part 9", result.stderr)
+
+    def test_resuming_makes_what_is_missing_and_leaves_the_rest_alone(self):
+        whole, _ = self.animate("whole", self.model, *self.RANGE)
+        folder = self.folder / "whole"
+        (folder / "0010.exr").unlink()
+        (folder / "0013.exr").unlink()
+        data = (folder / "0019.exr").read_bytes()
+        (folder / "0019.exr").write_bytes(data[:-1])  # as a full disk leaves copies
+        self.expect(farlight("animate", self.model, "--frames", "31", "--size", "48x32", "-o", folder / "%04d.exr"), 0)
+        kept = {frame: (folder / f"{frame:04d}.exr").stat() for frame in (16, 22, 25, 28)}
+        again, result = self.animate("whole", self.model, *self.RANGE, "--resume")
+        self.assertEqual(again, whole)
+        self.assertIn("4 of 8 frames are there already", result.stderr)
+        for frame, before in kept.items():
+            after = (folder / f"{frame:04d}.exr").stat()
+            self.assertEqual((after.st_ino, after.st_mtime_ns), (before.st_ino, before.st_mtime_ns))
+
+    def test_with_all_frames_there_nothing_is_asked_of_anyone(self):
+        whole, _ = self.animate("whole", self.model, *self.RANGE)
+        again, _ = self.animate("whole", self.model, *self.RANGE, "--resume", "--server", "unix:/nonexistent")
+        self.assertEqual(again, whole)
+
+    def test_a_part_can_be_resumed(self):
+        whole, _ = self.animate("whole", self.model, *self.RANGE)
+        self.animate("part", self.model, *self.RANGE, "--shard", "2/3")
+        (self.folder / "part" / "0022.exr").unlink()
+        got, _ = self.animate("part", self.model, *self.RANGE, "--shard", "2/3", "--resume")
+        self.assertEqual(got, {frame: whole[frame] for frame in (13, 22, 31)})
+
+
+class Lost(Animations):
+    """The daemon goes away in the middle."""
+
+    FRAMES = ["--frames", "1-24", "--samples", "2"]
+
+    def start(self, folder, *arguments):
+        path = self.folder / folder
+        path.mkdir()
+        child = subprocess.Popen([BIN / "farlight", "animate", self.model, *self.FRAMES, *SIZE, "-o", path / "%04d.exr",
+                                  *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(child.stdout.close)
+        self.addCleanup(child.stderr.close)
+        return child
+
+    def wait_for_files(self, folder, count, child):
+        deadline = time.monotonic() + farlight_test.TIMEOUT_S
+        while len(list((self.folder / folder).glob("*.exr"))) < count:
+            self.assertIsNone(child.poll(), "it ended before it could be disturbed")
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.005)
+
+    def finish(self, child, status):
+        out, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
+        self.assertEqual(child.returncode, status, out + errors)
+        return errors
+
+    def test_a_killed_private_daemon_is_started_again_and_nothing_is_lost(self):
+        whole, _ = self.animate("whole", self.model, *self.FRAMES)
+        child = self.start("killed")
+        for count in (3, 9):
+            self.wait_for_files("killed", count, child)
+            os.kill(children(child.pid, "farlightd")[0], signal.SIGKILL)
+            while children(child.pid, "farlightd") == []:  # until there is another one
+                self.assertIsNone(child.poll())
+                time.sleep(0.005)
+        errors = self.finish(child, 0)
+        self.assertEqual(self.digests("killed"), whole)
+        self.assertEqual(errors.count("trying again"), 2, errors)
+        self.assertEqual([p.name for p in (self.folder / "killed").iterdir() if p.suffix != ".exr"], [])
+
+    def test_a_killed_daemon_is_sought_again_until_it_is_back(self):
+        whole, _ = self.animate("whole", self.model, *self.FRAMES)
+        daemon = Daemon()
+        with daemon:
+            child = self.start("killed", "--server", daemon.address)
+            self.wait_for_files("killed", 4, child)
+            address = daemon.address
+            daemon.process.kill()
+            daemon.process.wait()
+            made = len(self.digests("killed"))
+            self.assertLess(made, 24)
+            os.unlink(daemon.path)
+            time.sleep(0.7)  # so that the first attempt finds nobody
+            with Daemon(listen=address):
+                errors = self.finish(child, 0)
+        self.assertEqual(self.digests("killed"), whole)
+        self.assertIn("trying again", errors)
+
+    def test_a_daemon_that_shuts_down_is_sought_again(self):
+        whole, _ = self.animate("whole", self.model, *self.FRAMES)
+        with Daemon() as daemon:
+            child = self.start("left", "--server", daemon.address)
+            self.wait_for_files("left", 2, child)
+            daemon.stop()
+            with Daemon(listen=daemon.address):
+                self.finish(child, 0)
+        self.assertEqual(self.digests("left"), whole)
+
+    def test_without_retries_it_fails_with_complete_files_only(self):
+        with Daemon() as daemon:
+            child = self.start("failed", "--server", daemon.address, "--retries", "0")
+            self.wait_for_files("failed", 2, child)
+            daemon.process.kill()
+            errors = self.finish(child, 1)
+        self.assertNotIn("trying again", errors)
+        whole, _ = self.animate("whole", self.model, *self.FRAMES)
+        made = self.digests("failed")
+        self.assertLess(len(made), 24)
+        self.assertEqual(made, {frame: whole[frame] for frame in made})
+
+    def test_attempts_end(self):
+        with Daemon() as daemon:
+            child = self.start("failed", "--server", daemon.address, "--retries", "2")
+            self.wait_for_files("failed", 2, child)
+            daemon.process.kill()
+            errors = self.finish(child, 1)
+        self.assertEqual(errors.count("trying again"), 2, errors)
+
+    def test_a_daemon_that_never_was_is_not_waited_for(self):
+        begin = time.monotonic()
+        _, result = self.animate("none", self.model, "--frames", "1-2", "--server", "unix:/nonexistent/socket",
+                                 status=1)
+        self.assertNotIn("trying again", result.stderr)
+        self.assertLess(time.monotonic() - begin, 30)
+
+    def test_an_interrupt_while_waiting_ends_it(self):
+        with Daemon() as daemon:
+            child = self.start("interrupted", "--server", daemon.address, "--retries", "100")
+            self.wait_for_files("interrupted", 2, child)
+            daemon.process.kill()
+            for line in child.stderr:
+                if "trying again" in line:
+                    break
+            child.send_signal(signal.SIGINT)
+            self.finish(child, 130)
+        for path in (self.folder / "interrupted").iterdir():
+            self.assertEqual(path.suffix, ".exr", "an unfinished file was left")
+            digest(path)
+
+    def test_a_video_goes_on_where_it_was(self):
+        path = self.folder / "movie.mkv"
+        command = [BIN / "farlight", "animate", self.model, *self.FRAMES, *SIZE, "--lossless", "-o"]
+        subprocess.run([*command, self.folder / "whole.mkv"], check=True, stderr=subprocess.DEVNULL,
+                       timeout=farlight_test.TIMEOUT_S)
+        child = subprocess.Popen([*command, path], stderr=subprocess.PIPE, text=True)
+        for line in child.stderr:
+            if line.startswith("1 of 24"):
+                break
+        os.kill(children(child.pid, "farlightd")[0], signal.SIGKILL)
+        _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
+        self.assertEqual(child.returncode, 0, errors)
+        self.assertIn("trying again", errors)
+        hashes = [subprocess.run(["ffmpeg", "-v", "error", "-i", file, "-f", "framemd5", "-"], check=True,
+                                 stdout=subprocess.PIPE).stdout for file in (self.folder / "whole.mkv", path)]
+        self.assertEqual(hashes[0].count(b"\n0,"), 24)
+        self.assertEqual(hashes[0], hashes[1])
+
+
+class Videos(OneDaemon):
+    def test_a_video_and_images_come_of_one_script(self):
+        (self.folder / "f").mkdir()
+        script = self.write({"model": str(self.model), "frames": "1-5", "size": [96, 64], "camera": {"orbit": True},
+                             "outputs": ["f/%d.png", "movie.mp4", "raw.y4m"]})
+        self.expect(farlight("animate", "--script", script), 0)
+        self.assertEqual(self.leftovers(), [*(f"f/{n}.png" for n in range(1, 6)), "movie.mp4", "raw.y4m", "shot.json"])
+        raw = (self.folder / "raw.y4m").read_bytes()
+        self.assertTrue(raw.startswith(b"YUV4MPEG2 W96 H64 F24:1"), raw[:60])
+        self.assertEqual(raw.count(b"FRAME\n"), 5)
+        got = subprocess.run(["ffprobe", "-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames",
+                              "-of", "csv=p=0", self.folder / "movie.mp4"], check=True, stdout=subprocess.PIPE, text=True)
+        self.assertEqual(got.stdout.strip(), "5")
+
+    def test_standard_output_gets_raw_video_and_no_talk(self):
+        result = farlight("animate", self.model, "--frames", "1-3", "--fps", "25", *SIZE, "-o", "-", "--timings",
+                          text=False)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertTrue(result.stdout.startswith(b"YUV4MPEG2 W96 H64 F25:1"), result.stdout[:60])
+        header = result.stdout.index(b"\n") + 1
+        self.assertEqual(len(result.stdout) - header, 3 * (len(b"FRAME\n") + 96 * 64 * 3 // 2))
+
+    def test_a_terminal_gets_no_video(self):
+        ours, theirs = pty.openpty()
+        try:
+            result = subprocess.run([BIN / "farlight", "animate", self.model, "--frames", "1-3", "-o", "-"],
+                                    stdout=theirs, stderr=subprocess.PIPE, text=True, check=False,
+                                    timeout=farlight_test.TIMEOUT_S)
+        finally:
+            os.close(ours)
+            os.close(theirs)
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn("terminal", result.stderr)
+
+    def test_a_reader_that_goes_away_is_told(self):
+        child = subprocess.Popen([BIN / "farlight", "animate", self.model, "--frames", "1-500", *SIZE, "-q", "-o", "-"],
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        child.stdout.read(1000)
+        child.stdout.close()
+        errors = child.stderr.read().decode()
+        child.stderr.close()
+        self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 1, errors)
+        self.assertNotIn("trying again", errors)
+
+    def test_what_makes_no_video_is_refused_before_anything_is_rendered(self):
+        for arguments, said in ((["-o", "m.mp4", "--resume"], "--resume"), (["-o", "m.mp4", "--shard", "1/2"], "--shard"),
+                                (["-o", "-", "--format", "png"], "standard output"), (["-o", "m.webm"], "m.webm"),
+                                (["-o", "m.mp4", "--lossless"], ".mkv"), (["-o", "m.mp4", "--quality", "60"], "51")):
+            with self.subTest(arguments=arguments):
+                result = self.expect(farlight("animate", self.model, "--frames", "1-2", *arguments,
+                                              cwd=self.folder), 2)
+                self.assertIn(said, result.stderr)
+        result = self.expect(farlight("render", self.model, "-o", self.folder / "m.mp4"), 2)
+        self.assertIn("animate", result.stderr)
+        self.assertEqual(self.leftovers(), [])
+
+    def test_an_interrupted_video_leaves_nothing(self):
+        child = subprocess.Popen([BIN / "farlight", "animate", self.model, "--frames", "1-500", *SIZE, "-o",
+                                  self.folder / "movie.mp4"], stderr=subprocess.PIPE, text=True)
+        for line in child.stderr:
+            if line.startswith("1 of 500"):
+                break
+        child.send_signal(signal.SIGINT)
+        _, errors = child.communicate(timeout=farlight_test.TIMEOUT_S)
+        self.assertEqual(child.returncode, 130, errors)
+        self.assertEqual(self.leftovers(), [])
+
+
+class Scripts(OneDaemon):
+    EYE, LOOK_AT = [2, 1.5, 2.5], [0, 0, 0]
+
+    def camera(self, **more):
+        return {"eye": self.EYE, "look_at": self.LOOK_AT, "fov": 40, **more}
+
+    def shot(self, folder, name="shot.json", **more):
+        (self.folder / folder).mkdir(exist_ok=True)
+        script = self.write({"model": str(self.model), "size": [96, 64], "output": f"{folder}/%04d.exr", **more}, name)
+        result = self.expect(farlight("animate", "--script", script), 0)
+        return self.digests(folder), result
+
+    def still(self, *arguments, name="still.exr"):
+        path = self.folder / name
+        self.expect(farlight("render", self.model, "-o", path, *SIZE, *arguments), 0)
+        return digest(path)
+
+    def test_an_orbit_is_that_of_the_command_line(self):
+        got, _ = self.shot("script", camera=self.camera(orbit={"degrees": 90}), frames="5-9")
+        want, _ = self.animate("typed", self.model, "--frames", "5-9", "--orbit=90", "--eye", "2,1.5,2.5", "--look-at",
+                               "0,0,0", "--fov", "40")
+        self.assertEqual(got, want)
+
+    def test_the_command_line_goes_before_the_script(self):
+        self.shot("script", camera=self.camera(orbit=True), frames="1-4")
+        self.expect(farlight("animate", "--script", self.folder / "shot.json", "--shard", "2/2", "-o",
+                             self.folder / "%d.exr"), 0)
+        self.assertEqual({2: digest(self.folder / "2.exr"), 4: digest(self.folder / "4.exr")},
+                         {n: value for n, value in self.digests("script").items() if n in (2, 4)})
+        self.expect(farlight("animate", "--script", self.folder / "shot.json", "--frames", "1-1", "--eye", "2,1.5,2.5",
+                             "--look-at", "0,0,0", "--fov", "40", "-o", self.folder / "still-%d.exr"), 0)
+        self.assertEqual(digest(self.folder / "still-1.exr"), self.still("--eye", "2,1.5,2.5", "--look-at", "0,0,0",
+                                                                         "--fov", "40"))
+
+    def test_keys_begin_and_end_where_they_say(self):
+        """The first and the last frame are pictures of a camera that stands there."""
+        eye = {"times": [0, 0.25], "values": [self.EYE, [3, 1, 1]]}
+        for interpolation in ("linear", "catmull-rom", "bezier", "cubic-spline"):
+            with self.subTest(interpolation=interpolation):
+                got, _ = self.shot(interpolation, camera=self.camera(
+                    eye={**eye, "interpolation": interpolation},
+                    fov={"times": [0, 0.25], "values": [40, 60], "interpolation": interpolation}))
+                self.assertEqual(list(got), list(range(1, 8)), "without a range: up to the last key")
+                self.assertEqual(len(set(got.values())), 7)
+                self.assertEqual(got[1], self.still("--eye", "2,1.5,2.5", "--look-at", "0,0,0", "--fov", "40"))
+                self.assertEqual(got[7], self.still("--eye", "3,1,1", "--look-at", "0,0,0", "--fov", "60"))
+
+    def test_steps_stand_still_between_keys(self):
+        got, _ = self.shot("steps", frames="1-6", camera=self.camera(
+            eye={"times": [0, 0.125], "values": [self.EYE, [3, 1, 1]], "interpolation": "step"}))
+        self.assertEqual([got[n] == got[1] for n in range(1, 7)], [True, True, True, False, False, False])
+        self.assertEqual(got[4], got[6])
+
+    def test_a_dolly_arrives_with_the_last_frame(self):
+        got, _ = self.shot("dolly", frames="1-5", camera=self.camera(dolly={"to": [3, 1, 1]}))
+        self.assertEqual(got[5], self.still("--eye", "3,1,1", "--look-at", "0,0,0", "--fov", "40"))
+        ease, _ = self.shot("ease", frames="1-5", camera=self.camera(dolly={"to": [3, 1, 1], "ease": True}))
+        self.assertEqual((ease[1], ease[5]), (got[1], got[5]))
+        self.assertNotEqual(ease[2], got[2])
+
+    def test_parts_of_a_script_are_the_whole_to_the_bit(self):
+        keyed = {"camera": self.camera(eye={"times": [0, 0.2, 0.5], "values": [self.EYE, [3, 1, 1], [1, 3, 1]],
+                                            "interpolation": "catmull-rom"},
+                                       exposure={"times": [0, 0.5], "values": [0, -2]}),
+                 "samples": 2, "frames": "1-9"}
+        whole, _ = self.shot("whole", **keyed)
+        self.assertEqual(len(set(whole.values())), 9)
+        first, _ = self.shot("first", shard="1/2", **keyed)
+        second, _ = self.shot("second", shard="2/2", **keyed)
+        self.assertEqual({**first, **second}, whole)
+
+    def test_names_that_the_model_does_not_have_are_told_with_their_line(self):
+        model = moving_model(self.folder / "moving.gltf")
+        for member, value, told in (("materials", [{"target": "brass", "roughness": 1}], "clay"),
+                                    ("nodes", [{"target": "pyramids", "scale": [1, 1, 1]}], "pyramid"),
+                                    ("lights", [{"target": 7, "size": 1}], "bulb"), ("clips", ["sliding"], "slide")):
+            with self.subTest(member=member):
+                script = self.write({"model": str(model), "frames": "1", "output": "%d.png", member: value})
+                result = self.expect(farlight("animate", "--script", script), 2)
+                self.assertRegex(result.stderr, rf"shot\.json: line 1: {member}")
+                self.assertIn(told, result.stderr, "what there is, is listed")
+
+
+class Clips(OneDaemon):
+    """Clips of a small model of our own, and of a real one."""
+
+    VIEW = ["--eye", "0,2,7", "--look-at", "0,0.5,0", "--fov", "45"]
+
+    def setUp(self):
+        super().setUp()
+        self.model = moving_model(self.folder / "moving.gltf")
+
+    def still(self, *arguments):
+        path = self.folder / "still.exr"
+        self.expect(farlight("render", self.model, "-o", path, *SIZE, *self.VIEW, *arguments), 0)
+        return digest(path)
+
+    def test_a_clip_runs_once_through_and_every_moment_can_be_rendered_alone(self):
+        for clip in ("slide", "1", "pulse"):
+            with self.subTest(clip=clip):
+                got, _ = self.animate(f"clip-{clip}", self.model, "--clip", clip, "--fps", "8", *self.VIEW)
+                self.assertEqual(list(got), list(range(1, 9)), "the ninth would be the first again")
+                self.assertGreater(len(set(got.values())), 7)
+                for frame in (1, 4, 8):
+                    self.assertEqual(got[frame], self.still("--clip", clip, "--time", (frame - 1) / 8))
+
+    def test_clips_end_once_begin_later_and_run_faster(self):
+        once, _ = self.animate("once", self.model, "--clip", "slide", "--clip-once", "--fps", "4", *self.VIEW)
+        self.assertEqual(list(once), list(range(1, 6)), "the last pose is one of them")
+        long, _ = self.animate("long", self.model, "--clip", "slide", "--clip-once", "--fps", "4", "--frames", "1-7",
+                               *self.VIEW)
+        self.assertEqual((long[5], long[6]), (long[7], long[7]))
+        loop, _ = self.animate("loop", self.model, "--clip", "slide", "--fps", "4", "--frames", "1-7", *self.VIEW)
+        self.assertEqual(loop[5], loop[1])
+        late, _ = self.animate("late", self.model, "--clip", "slide", "--fps", "4", "--frames", "1-4", "--clip-start",
+                               "0.5", *self.VIEW)
+        self.assertEqual((late[1], late[3], late[4]), (loop[1], loop[1], loop[2]))
+        fast, _ = self.animate("fast", self.model, "--clip", "slide", "--fps", "4", "--clip-speed", "2", *self.VIEW)
+        self.assertEqual(fast, {1: loop[1], 2: loop[3]})
+
+    def test_two_clips_are_played_at_once(self):
+        both, _ = self.animate("both", self.model, "--clip", "slide", "--clip", "sink", "--fps", "4", *self.VIEW)
+        alone, _ = self.animate("alone", self.model, "--clip", "slide", "--fps", "4", *self.VIEW)
+        self.assertEqual(both[1], alone[1])
+        self.assertNotEqual(both[2], alone[2])
+
+    def test_a_script_moves_what_a_clip_moves(self):
+        """The same keys from the model and from a script give the same pictures."""
+        clip, _ = self.animate("clip", self.model, "--clip", "slide", "--fps", "4", "--frames", "1-5", "--clip-once",
+                               *self.VIEW)
+        (self.folder / "script").mkdir()
+        script = self.write({
+            "model": str(self.model), "fps": 4, "frames": "1-5", "size": [96, 64], "output": "script/%04d.exr",
+            "camera": {"eye": [0, 2, 7], "look_at": [0, 0.5, 0], "fov": 45},
+            "nodes": [{"target": "pyramid", "translation": {"times": [0, 1], "values": [[-1, 0, 0], [1, 0, 0]]}}]})
+        self.expect(farlight("animate", "--script", script), 0)
+        self.assertEqual(self.digests("script"), clip)
+
+    def test_lights_materials_and_nodes_change(self):
+        view = {"camera": {"eye": [0, 2, 7], "look_at": [0, 0.5, 0], "fov": 45}}
+        plain = self.still()
+        for name, change in {
+                "colour": {"lights": [{"target": "bulb", "colour": {"times": [0, 1], "values": [[30, 30, 30], [1, 5, 9]]}}]},
+                "base colour": {"materials": [{"target": "clay", "base_colour": {"times": [0, 1], "values":
+                                                                               [[0.8, 0.4, 0.2], [0, 0, 1]]}}]},
+                "emission": {"materials": [{"target": 0, "emission": {"times": [0, 1], "values": [[0, 0, 0], [1, 1, 1]]}}]},
+                "roughness": {"materials": [{"target": 0, "roughness": {"times": [0, 1], "values": [1, 0.2]}}]},
+                "rotation": {"nodes": [{"target": "pyramid", "rotation_degrees": {"times": [0, 1], "values":
+                                                                                 [[0, 0, 0], [0, 45, 0]]}}]},
+                "hidden": {"nodes": [{"target": "pyramid", "hidden": {"times": [0, 0.9], "values": [False, True]}}]},
+        }.items():
+            with self.subTest(change=name):
+                folder = self.folder / name.replace(" ", "-")
+                folder.mkdir()
+                script = self.write({"model": str(self.model), "fps": 1, "frames": "1-2", "size": [96, 64],
+                                     "output": f"{folder.name}/%d.exr", **view, **change})
+                self.expect(farlight("animate", "--script", script), 0)
+                first, second = (digest(folder / f"{n}.exr") for n in (1, 2))
+                self.assertNotEqual(first, second)
+                if name not in ("colour",):  # its first key is not the model's own
+                    self.assertEqual(first, plain)
+
+    def test_a_turn_in_degrees_goes_all_the_way_round(self):
+        """Between 0 and 360 degrees the shorter arc would stand still."""
+        script = self.write({"model": str(self.model), "fps": 4, "frames": "1-5", "size": [96, 64], "output": "%d.exr",
+                             "camera": {"eye": [0, 2, 7], "look_at": [0, 0.5, 0]},
+                             "nodes": [{"target": "pyramid", "rotation_degrees": {"times": [0, 1], "values":
+                                                                                 [[0, 0, 0], [0, 360, 0]]}},
+                                       {"target": "ground", "hidden": True}]})
+        self.expect(farlight("animate", "--script", script), 0)
+        frames = [digest(self.folder / f"{n}.exr") for n in range(1, 6)]
+        self.assertEqual(frames[0], frames[4])
+        self.assertEqual(len(set(frames)), 4)
+
+    @needs_shared_scenes
+    def test_a_skinned_model_in_parts_and_resumed_is_the_whole_to_the_bit(self):
+        self.model = SHARED_SCENES / "gltf" / "Fox.glb"
+        common = ["--clip", "Run", "--fps", "12", "--samples", "2"]
+        whole, _ = self.animate("whole", self.model, *common)
+        self.assertEqual(len(whole), 14)
+        self.assertEqual(len(set(whole.values())), 14, "a running fox stands still in no frame")
+        parts = {}
+        for part in (2, 1, 3):
+            parts.update(self.animate("parts", self.model, *common, "--shard", f"{part}/3")[0])
+        self.assertEqual(parts, whole)
+        for frame in (1, 5, 6, 14):
+            (self.folder / "parts" / f"{frame:04d}.exr").unlink()
+        resumed, _ = self.animate("parts", self.model, *common, "--resume")
+        self.assertEqual(resumed, whole)
+
+
+class Progressive(OneDaemon):
+    ARGUMENTS = [*SIZE, "--aperture", "0.2"]
+
+    def samples(self, path):
+        return float(exr_attributes(path)["farlight/samples"].decode(errors="replace").strip("\0") or 0)
+
+    def test_passes_add_up_to_the_samples(self):
+        path = self.folder / "p.exr"
+        for passes in ("--progressive", "--progressive=3"):
+            with self.subTest(passes=passes):
+                result = self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", path, *self.ARGUMENTS,
+                                              "--samples", "8", passes, "--timings=json"), 0)
+                lines = [json.loads(line) for line in result.stdout.splitlines()]
+                held = [line["samples"] for line in lines if line["kind"] == "frame"]
+                self.assertEqual(held, [1, 2, 4, 8] if passes == "--progressive" else [3, 6, 8])
+
+    def test_the_picture_is_replaced_pass_by_pass_and_stays_after_an_interrupt(self):
+        path = self.folder / "p.exr"
+        child = subprocess.Popen([BIN / "farlight", "render", bundled_scenes() / "teapot.glb", "-o", path,
+                                  *self.ARGUMENTS, "--samples", "60000", "--progressive=4"], stderr=subprocess.PIPE)
+        seen, deadline = set(), time.monotonic() + farlight_test.TIMEOUT_S
+        while len(seen) < 3 and time.monotonic() < deadline and child.poll() is None:
+            with contextlib.suppress(FileNotFoundError):
+                seen.add(digest(path))
+            time.sleep(0.02)
+        child.send_signal(signal.SIGINT)
+        errors = child.stderr.read().decode()
+        child.stderr.close()
+        self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 130, errors)
+        self.assertGreaterEqual(len(seen), 3, errors)
+        self.assertEqual(self.leftovers(), ["p.exr"])
+        digest(path)
+
+    def test_standard_output_is_written_once(self):
+        result = self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", "-", "--progressive"), 2)
+        self.assertIn("--progressive", result.stderr)
+
+
+if __name__ == "__main__":
+    farlight_test.unittest.main()
