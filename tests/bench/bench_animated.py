@@ -69,7 +69,7 @@ def show_parallel(data):
     header = [("scene", "rays", "bounds", "number", "1 ray", *(str(n) for n in TOGETHER[1:]), *(["paper, 2"] * 2)),
               ("", "", "", "", "Mray/s", *(["x 1 ray"] * 4), *PAPER_SIZES)]
     return ("Coherent: 24 jittered camera rays a pixel; partly: their reflections; incoherent: diffuse bounces in random order.\n"
-            "Rays that go apart are walked one after the other (bvh/together.glsl): a group never costs more than its walks.\n"
+            "Of a group, rays that go apart are walked one after the other (bvh/together.glsl), which the paper's are not.\n"
             "Paper: twice the frames a second with two rays of a pixel, over those with one: its 512x512 (51; 44, 26, 14) and\n"
             "256x256 (72; 66, 54, 36).\n\n" + table(header, rows) + "\n\n" + "\n".join(verdicts))
 

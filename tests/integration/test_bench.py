@@ -19,8 +19,9 @@ import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
 import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 
-PARTS = ("frames", "distributed", "tracers", "family", "pixels", "rays", "parallel", "instances", "refit", "flake",
-         "reach")
+TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of bench_tracers
+PARTS = ("frames", "distributed", "tracers", "family", "pixels", "rays", "parallel", "instances",
+         "refit", "flake", "reach")
 
 
 class Figures(unittest.TestCase):
@@ -93,7 +94,7 @@ class Benchmark(unittest.TestCase):
         self.assertEqual(set(self.document["parts"]), {*PARTS, "wanted"})
 
     def test_every_result_has_structures_and_waves_that_agree_with_the_reference(self):
-        results = [r for part in PARTS[2:] for r in self.document["parts"][part]["results"]]
+        results = [r for part in TRACED for r in self.document["parts"][part]["results"]]
         self.assertGreaterEqual(len(results), 11)
         for result in results:
             self.assertGreater(result["triangles"] + result["spheres"], 0)
@@ -107,6 +108,19 @@ class Benchmark(unittest.TestCase):
                     self.assertGreater(measure["rays_per_s"], 0)
                     self.assertEqual(len(measure["time"]["runs_ns"]), 1)
                     self.assertFalse(measure.get("agreement", {}).get("failed"), (result["title"], wave["kind"], measure))
+
+    def test_rays_walk_together_in_all_numbers_on_all_kinds_of_rays(self):
+        for result in self.document["parts"]["parallel"]["results"]:
+            self.assertEqual({(row["order"], row["bounds"], row["together"]) for row in result["rows"]},
+                             {(order, bounds, n) for order in ("coherent", "partly", "incoherent")
+                              for bounds in ("boxes", "spheres") for n in (1, 2, 3, 4, 8)})
+
+    def test_what_changes_is_measured_and_a_refitted_tree_answers_as_a_new_one(self):
+        refit, instances = self.document["parts"]["refit"], self.document["parts"]["instances"]
+        self.assertEqual(refit["differing"], 0)
+        self.assertGreater(refit["rebuild_ms"]["least"], 0)
+        self.assertLess(instances["update_ms"]["least"], instances["frame_ms"]["least"])
+        self.assertEqual([row["spheres"] for row in self.document["parts"]["flake"]["frames"]], [91, 820, 7381])
 
     def test_distributed_frames_stand_beside_a_plain_one(self):
         data = self.document["parts"]["distributed"]
