@@ -94,8 +94,8 @@ bool find_interpolation(const std::string &name, protocol_interpolation &found)
 
 // ---- keys
 
-// Ascending times: of equal ones the later is moved by as little as possible, so that a leap stays one; earlier
-// ones go.
+// Ascending times: of equal ones the last is moved by as little as possible, so that a leap stays one, and those
+// between it and the first go, as do earlier times.
 key_times read_times(builder &b, int accessor, const std::string &where)
 {
     key_times result;
@@ -106,8 +106,14 @@ key_times read_times(builder &b, int accessor, const std::string &where)
     for (size_t i = 0; i < times.size(); i++) {
         const bool first = result.times.empty();
         float time = times[i];
-        if (!first && time == times[result.kept.back()])
-            time = std::nextafter(result.times.back(), value_max);
+        if (!first && time == times[result.kept.back()]) {
+            mended = true;
+            if (time != result.times.back()) { // moved already
+                result.kept.back() = uint32_t(i);
+                continue;
+            }
+            time = std::nextafter(time, value_max);
+        }
         const bool kept = std::fabs(time) <= 1e9f && (first || time > result.times.back());
         mended = mended || !kept || time != times[i];
         if (!kept)
@@ -117,7 +123,7 @@ key_times read_times(builder &b, int accessor, const std::string &where)
     }
     if (mended)
         import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, where.c_str(),
-                    "the times of keys do not ascend; equal ones were moved and earlier ones left out");
+                    "the times of keys do not ascend; equal ones were moved apart and earlier ones left out");
     return result;
 }
 

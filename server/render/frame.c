@@ -163,8 +163,8 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     tracer_set_note(&renderer->tracers, updated ? &changes : NULL);
     if (!updated)
         return false;
-    if (renderer->scene.revision != revision_before || changes.geometry || changes.instances || changes.shading ||
-        changes.lights)
+    if (renderer->scene.revision != revision_before || changes.geometry || changes.deformed || changes.instances ||
+        changes.shading || changes.lights)
         renderer->samples_before = 0;
     renderer->result.uploaded_bytes = changes.uploaded_bytes;
     context->tracer = tracer_set_get(&renderer->tracers, &renderer->scene,

@@ -4,7 +4,7 @@
 #include <string.h>
 
 static const struct scene_changes everything = {
-    .geometry = true, .instances = true, .shading = true, .lights = true};
+    .geometry = true, .deformed = true, .instances = true, .shading = true, .lights = true};
 
 void tracer_set_note(struct tracer_set *set, const struct scene_changes *changes)
 {
@@ -12,6 +12,7 @@ void tracer_set_note(struct tracer_set *set, const struct scene_changes *changes
     for (int i = 0; i < TRACERS_KEPT; i++) {
         struct scene_changes *pending = &set->slots[i].pending;
         pending->geometry |= noted->geometry;
+        pending->deformed |= noted->deformed;
         pending->instances |= noted->instances;
         pending->shading |= noted->shading;
         pending->lights |= noted->lights;

@@ -135,8 +135,8 @@ void affine_bounds(float out_lower[3], float out_upper[3], const float m[12], co
         for (int column = 0; column < 3; column++) {
             double a = (double)m[4 * row + column] * (double)lower[column];
             double b = (double)m[4 * row + column] * (double)upper[column];
-            new_lower[row] += fmin(a, b);
-            new_upper[row] += fmax(a, b);
+            new_lower[row] += a < b ? a : b;
+            new_upper[row] += a < b ? b : a;
         }
     }
     for (int row = 0; row < 3; row++) {

@@ -18,6 +18,7 @@
 #define GRID_COST_MAX 1.3f
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX (1u << 18)
+#define MOTION_TEXELS 3u /* a pose */
 
 static unsigned build_threads(void)
 {
@@ -78,11 +79,11 @@ static void bvh_destroy(struct tracer *tracer)
 
 /* The tree's box in world space, with room for what taking the ray to object space rounds: a few units in the
  * last place of everything that is summed up. Infinite where the sum overflows, which is right. */
-static struct bvh_world_box world_box(const struct bvh_entry *entry, vec4 world_from_object[3])
+static struct bvh_world_box box_at_pose(const struct bvh_entry *entry, const float *world_from_object)
 {
     struct bvh_world_box box;
     for (int row = 0; row < 3; row++) {
-        const float *m = world_from_object[row];
+        const float *m = world_from_object + 4 * row;
         float low = m[3], high = m[3], size = fabsf(m[3]);
         for (int i = 0; i < 3; i++) {
             float a = m[i] * entry->lower[i], b = m[i] * entry->upper[i];
@@ -100,25 +101,44 @@ static struct bvh_world_box world_box(const struct bvh_entry *entry, vec4 world_
     return box;
 }
 
+/* Wherever it goes while the shutter is open: between two poses each point goes straight from one to the other. */
+static struct bvh_world_box world_box(const struct bvh_entry *entry, const struct scene_gpu *scene,
+                                      const struct instance *instance)
+{
+    if (instance->motion == 0)
+        return box_at_pose(entry, (const float *)instance->world_from_object);
+    uint32_t first = (instance->motion - 1) / MOTION_TEXELS;
+    uint32_t count = instance->flags >> INSTANCE_POSES_SHIFT & INSTANCE_POSES_MASK;
+    struct bvh_world_box box = box_at_pose(entry, scene->motions[first]);
+    for (uint32_t pose = first + 1; pose < first + count; pose++) {
+        const struct bvh_world_box other = box_at_pose(entry, scene->motions[pose]);
+        bvh_world_box_include(&box, &other);
+    }
+    return box;
+}
+
 /* What instance i is now. The box is empty where its geometry has no primitives. */
 static struct bvh_transform describe(const struct bvh *bvh, const struct scene_gpu *scene, uint32_t i,
-                                     struct bvh_world_box *box, bool *is_fresh)
+                                     struct bvh_world_box *box)
 {
     struct instance *instance = &scene->instances[i];
     const struct bvh_entry *entry = bvh_store_entry(&bvh->store, instance->geometry);
     struct bvh_transform transform = {0};
     memcpy(transform.object_from_world, instance->object_from_world, sizeof transform.object_from_world);
     *box = (struct bvh_world_box){{1, 1, 1}, {-1, -1, -1}};
-    *is_fresh = entry && entry->is_fresh;
     if (!entry || !(entry->lower[0] <= entry->upper[0]))
         return transform;
     transform.first_element = entry->first_element;
     transform.element_count = entry->element_count;
     transform.first_texel = entry->first_texel;
     transform.first_primitive = scene->geometries[instance->geometry].device.first_primitive;
-    memcpy(transform.grid_lower, entry->grid.lower, sizeof entry->grid.lower);
+    transform.grid_lower_x = entry->grid.lower[0];
+    transform.grid_lower_y = entry->grid.lower[1];
+    transform.grid_lower_z = entry->grid.lower[2];
     memcpy(transform.cells_per_unit, entry->grid.cells_per_unit, sizeof entry->grid.cells_per_unit);
-    *box = world_box(entry, instance->world_from_object);
+    if (scene->geometries[instance->geometry].device.close_offset)
+        transform.close_texels = entry->texel_count / 2;
+    *box = world_box(entry, scene, instance);
     return transform;
 }
 
@@ -150,9 +170,9 @@ static bool rebuild_top(struct bvh *bvh, const struct scene_gpu *scene, struct e
     uint32_t count = scene->instance_count;
     struct bvh_world_box *boxes = malloc(((size_t)count + 1) * sizeof *boxes);
     struct bvh_transform *transforms = malloc(((size_t)count + 1) * sizeof *transforms);
-    bool ok = boxes && transforms, is_fresh;
+    bool ok = boxes && transforms;
     for (uint32_t i = 0; ok && i < count; i++)
-        transforms[i] = describe(bvh, scene, i, &boxes[i], &is_fresh);
+        transforms[i] = describe(bvh, scene, i, &boxes[i]);
     bvh_top_finish(&bvh->top);
     ok = ok && bvh_top_build(&bvh->top, boxes, count, &bvh->store.settings);
     free(boxes);
@@ -173,12 +193,9 @@ static bool refit_top(struct bvh *bvh, const struct scene_gpu *scene)
     uint32_t first = scene->instance_count, end = 0; /* of the transforms that changed */
     for (uint32_t i = 0; i < scene->instance_count; i++) {
         struct bvh_world_box box;
-        bool is_fresh;
-        struct bvh_transform transform = describe(bvh, scene, i, &box, &is_fresh);
+        const struct bvh_transform transform = describe(bvh, scene, i, &box);
         struct bvh_transform *old = &bvh->transforms[i];
-        bool same_place =
-            memcmp(old->object_from_world, transform.object_from_world, sizeof old->object_from_world) == 0;
-        if ((!same_place || is_fresh) && !bvh_top_move(&bvh->top, i, &box))
+        if (!bvh_top_move(&bvh->top, i, &box))
             return false;
         if (memcmp(old, &transform, sizeof transform) == 0)
             continue;
@@ -250,12 +267,12 @@ static bool has_coarse_grid(const struct bvh *bvh)
     return false;
 }
 
-static bool update_geometries(struct bvh *bvh, struct scene_gpu *scene, struct stage_times *times,
+static bool update_geometries(struct bvh *bvh, struct scene_gpu *scene, bool all, struct stage_times *times,
                               struct error *error)
 {
     struct tracer_stats *stats = &bvh->base.stats;
     struct bvh_store_report report;
-    bool ok = bvh_store_update(&bvh->store, scene, &report, times, error);
+    bool ok = bvh_store_update(&bvh->store, scene, all, &report, times, error);
     stats->uploaded_bytes += report.uploaded_bytes;
     stats->nodes_rebuilt += report.built_elements;
     stats->nodes_refitted += report.refitted_elements;
@@ -264,7 +281,7 @@ static bool update_geometries(struct bvh *bvh, struct scene_gpu *scene, struct s
     /* All trees again, with boxes in floats or no longer: a scene is walked in one form however it came about. */
     bvh_reset(bvh);
     bvh->store.settings.whole = !bvh->store.settings.whole;
-    return update_geometries(bvh, scene, times, error);
+    return update_geometries(bvh, scene, true, times, error);
 }
 
 static bool bvh_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
@@ -275,12 +292,11 @@ static bool bvh_update(struct tracer *tracer, struct scene_gpu *scene, const str
     stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
     if (!changes->geometry && !changes->deformed && !changes->instances)
         return true;
-    bool ok = ((!changes->geometry && !changes->deformed) || update_geometries(bvh, scene, times, error)) &&
+    bool ok = ((!changes->geometry && !changes->deformed) ||
+               update_geometries(bvh, scene, changes->geometry, times, error)) &&
               update_instances(bvh, scene, times, error);
     if (!ok)
         bvh_reset(bvh);
-    for (uint32_t i = 0; i < bvh->store.entry_count; i++)
-        bvh->store.entries[i].is_fresh = false;
     stats->nodes = node_count(bvh);
     stats->device_bytes = bvh_store_bytes(&bvh->store) + bvh->transform_buffer.capacity_bytes;
     return ok;
@@ -327,7 +343,7 @@ static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const stru
     uint32_t together = bvh_rays_together(bvh, scene, wave, error);
     if (together == 0)
         return false;
-    struct gpu_define defines[7] = {{"TRACER_BVH", "1"}};
+    struct gpu_define defines[9] = {{"TRACER_BVH", "1"}};
     size_t n = 1;
     if (settings->bounds == BVH_BOUNDS_OF_SPHERES)
         defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
@@ -337,8 +353,13 @@ static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const stru
         defines[n++] = (struct gpu_define){"BVH_PACKED", "1"};
     if (is_one_instance(bvh))
         defines[n++] = (struct gpu_define){"BVH_ONE_INSTANCE", "1"};
-    if (wave->shared_origin && together > 1)
+    /* One origin in the world is many in the space of what moves. */
+    if (wave->shared_origin && together > 1 && !scene->has_motion)
         defines[n++] = (struct gpu_define){"SHARED_ORIGIN", "1"};
+    if (bvh->store.deforms)
+        defines[n++] = (struct gpu_define){"BVH_DEFORMS", "1"};
+    if (bvh->store.deforms_in_shutter)
+        defines[n++] = (struct gpu_define){"BVH_DEFORMS_IN_SHUTTER", "1"};
     const struct trace_program_source source = {
         .traverse = "bvh/traverse.glsl",
         .defines = defines,

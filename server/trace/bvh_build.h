@@ -110,7 +110,8 @@ struct bvh_tree {
     float *primitives; /* 4 x primitive_texels floats, see shared/bvh_node.h */
     size_t primitive_texels;
     float lower[3], upper[3]; /* of everything, padded */
-    float cost; /* surfaces of all elements' boxes over that of the root's: tests that a ray through it makes */
+    float wear; /* surfaces of all elements' boxes over those of each primitive's own box; of shapes that deform.
+                   That of a refitted tree grows as its boxes come to overlap, and not where all grows alike */
     struct bvh_refit_plan plan; /* empty: the shape does not deform, or the tree is not one that can be refitted */
     uint64_t build_ns;
 };

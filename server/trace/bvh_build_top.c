@@ -17,7 +17,7 @@ static bool box_is_empty(const struct bvh_world_box *box)
     return !(box->lower[0] <= box->upper[0] && box->lower[1] <= box->upper[1] && box->lower[2] <= box->upper[2]);
 }
 
-static void box_include(struct bvh_world_box *box, const struct bvh_world_box *other)
+void bvh_world_box_include(struct bvh_world_box *box, const struct bvh_world_box *other)
 {
     for (int i = 0; i < 3; i++) {
         box->lower[i] = fminf(box->lower[i], other->lower[i]);
@@ -154,7 +154,7 @@ bool bvh_top_move(struct bvh_top *top, uint32_t instance, const struct bvh_world
     bool is_there = element != BVH_NONE;
     if (is_there == box_is_empty(box))
         return false;
-    if (!is_there)
+    if (!is_there || memcmp(&top->boxes[element], box, sizeof *box) == 0)
         return true;
     top->boxes[element] = *box;
     for (; element != BVH_NONE && !top->moved[element]; element = top->baked.parent[element])
@@ -173,7 +173,7 @@ uint32_t bvh_top_refit(struct bvh_top *top)
         if (end > e + 1)
             top->boxes[e] = top->boxes[e + 1];
         for (uint32_t child = e + 1; child < end; child += top->baked.size[child])
-            box_include(&top->boxes[e], &top->boxes[child]);
+            bvh_world_box_include(&top->boxes[e], &top->boxes[child]);
         set_element(top, e);
         refitted++;
     }

@@ -9,6 +9,8 @@ struct bvh_world_box {
     float lower[3], upper[3]; /* lower > upper: nothing there, not in the tree */
 };
 
+void bvh_world_box_include(struct bvh_world_box *box, const struct bvh_world_box *other);
+
 struct bvh_top {
     uint32_t *elements; /* as the device has them */
     uint32_t element_count;
@@ -28,7 +30,7 @@ struct bvh_top {
 bool bvh_top_build(struct bvh_top *top, const struct bvh_world_box *boxes, uint32_t count,
                    const struct bvh_settings *settings);
 void bvh_top_finish(struct bvh_top *top);
-/* An instance has a new box. One that comes or goes (becomes empty or was) needs a new tree: false. */
+/* Where an instance is now. One that comes or goes (becomes empty or was) needs a new tree: false. */
 bool bvh_top_move(struct bvh_top *top, uint32_t instance, const struct bvh_world_box *box);
 /* Makes the bounds on the paths of what moved; returns how many elements changed and marks them in
  * `moved` until the next bvh_top_settle. */

@@ -234,15 +234,18 @@ static void survey(struct work *work)
     tree->leaf_extent = leaf_count > 0 ? extent_sum / (float)leaf_count : 0;
 }
 
-static float tree_cost(const struct work *work)
+static float tree_wear(const struct work *work)
 {
-    double sum = 0;
+    double boxes = 0, primitives = 0;
     for (uint32_t e = 0; e < work->baked.element_count; e++) {
         const struct bvh_binary_node *node = &work->binary.nodes[work->baked.node[e]];
-        sum += (double)bvh_box_area(node->lower, node->upper);
+        boxes += (double)bvh_box_area(node->lower, node->upper);
     }
-    float root = bvh_box_area(work->binary.nodes[0].lower, work->binary.nodes[0].upper);
-    return root > 0 ? (float)(sum / (double)root) : 0;
+    for (uint32_t i = 0; i < work->shape->primitive_count; i++) {
+        const struct bvh_box box = primitive_box(work->shape, i);
+        primitives += (double)bvh_box_area((const float *)&box.lower, (const float *)&box.upper);
+    }
+    return primitives > 0 ? (float)(boxes / primitives) : 0;
 }
 
 static bool list_corners(struct work *work)
@@ -272,7 +275,7 @@ static bool make_plan(struct work *work)
     }
     ok = ok && bvh_refit_plan_make(&work->tree->plan, baked, leaves);
     free(leaves);
-    work->tree->cost = tree_cost(work);
+    work->tree->wear = tree_wear(work);
     return ok && (work->tree->plan.record_count == 0 || list_corners(work));
 }
 

@@ -20,10 +20,11 @@ struct bvh_refit {
     uint32_t step_count;
 };
 
-/* How many times as many boxes a ray may meet in a refitted tree as it did when that was built, by the sum of all
- * boxes' surfaces over that of the root (struct bvh_tree, cost): beyond, a new one is built. The cost of a ray
- * grows by less than that, and building takes as long as several frames' rays. */
-#define BVH_REFIT_COST_MAX 2.0f
+/* How many times as worn as when it was built a tree may be (struct bvh_tree, wear): beyond, a new one is built. A
+ * ray then meets up to so many times the boxes, which takes longer than a frame's share of building does in scenes
+ * of any size.
+ */
+#define BVH_REFIT_WEAR_MAX 2.0f
 
 /* Takes the steps out of the plan. */
 bool bvh_refit_init(struct bvh_refit *refit, struct gpu_device *device, struct bvh_refit_plan *plan,
@@ -47,7 +48,9 @@ struct bvh_refit_root {
     float lower[3];
     uint32_t size;
     float upper[3];
-    float surfaces;
+    uint32_t pad0;
+    float surfaces, triangle_surfaces;
+    uint32_t pad1[2];
 };
 
 /* Triangles and boxes. */

@@ -198,7 +198,7 @@ static bool find_missing(struct bvh_store *store, const struct scene_gpu *scene,
     bool ok = true;
     for (uint32_t i = 0; ok && i < store->entry_count; i++) {
         struct bvh_entry *entry = &store->entries[i];
-        entry->is_wanted = entry->is_fresh = false;
+        entry->is_wanted = false;
         ok = hashmap_put(&by_key, entry_key(entry->is_mesh, entry->id, entry->node), entry);
     }
     *missing_count = 0;
@@ -232,10 +232,9 @@ static bool upload_tree(struct bvh_store *store, const struct scene_gpu_geometry
     *entry = (struct bvh_entry){.is_mesh = geometry->mesh != NULL,
                                 .id = geometry->id,
                                 .node = geometry->node,
-                                .built_cost = tree->cost,
+                                .built_wear = tree->wear,
                                 .revision = geometry->revision,
                                 .is_wanted = true,
-                                .is_fresh = true,
                                 .first_element = element,
                                 .element_count = tree->element_count,
                                 .first_texel = texel,
@@ -362,10 +361,12 @@ bool bvh_store_rebuild(struct bvh_store *store, const struct scene_gpu *scene, s
     return ok;
 }
 
-bool bvh_store_update(struct bvh_store *store, struct scene_gpu *scene, struct bvh_store_report *report,
+bool bvh_store_update(struct bvh_store *store, struct scene_gpu *scene, bool all, struct bvh_store_report *report,
                       struct stage_times *times, struct error *error)
 {
     *report = (struct bvh_store_report){0};
+    for (uint32_t i = 0; all && i < store->entry_count; i++)
+        store->entries[i].deformed_revision = UINT64_MAX;
     uint32_t missing_count = 0;
     uint32_t *missing = malloc(((size_t)scene->geometry_count + 1) * sizeof *missing);
     bool ok = missing && find_missing(store, scene, missing, &missing_count);

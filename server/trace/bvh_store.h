@@ -24,9 +24,8 @@ struct bvh_entry {
     uint64_t revision;
     uint64_t deformed_revision; /* of the vertices that it was built or refitted for */
     struct bvh_refit refit;
-    float built_cost; /* of the tree when it was built, as struct bvh_tree has it */
+    float built_wear; /* as struct bvh_tree has it */
     bool is_wanted;   /* the scene still has it, in this revision */
-    bool is_fresh;    /* built or refitted by the last update */
     uint32_t first_element, element_count;
     uint32_t first_texel, texel_count;
     float lower[3], upper[3]; /* object space, padded */
@@ -41,8 +40,10 @@ struct bvh_store {
     uint32_t entry_count;
     uint32_t *entry_of; /* geometry of the scene to entry; BVH_NONE: without primitives */
     uint32_t geometry_count;
-    uint32_t top_capacity; /* elements before the first entry */
-    bool top_lost;         /* the top tree has to be written again; cleared by who does */
+    bool deforms;            /* some geometry's vertices may move */
+    bool deforms_in_shutter; /* and do, while the shutter is open */
+    uint32_t top_capacity;   /* elements before the first entry */
+    bool top_lost;           /* the top tree has to be written again; cleared by who does */
     struct gpu_buffer elements, primitives;
     struct gpu_buffer boxes, roots; /* of refits */
 };
@@ -55,10 +56,10 @@ void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const st
 void bvh_store_finish(struct bvh_store *store);
 /* Trees for all geometries of the scene, building those that are new or changed. What is kept is not uploaded
  * again, though the device may move it. Trees of geometries whose vertices have moved are refitted on the device,
- * and built anew from where these are now where refitting has made one worse than BVH_REFIT_COST_MAX; their
+ * and built anew from where these are now where refitting has made one worse than BVH_REFIT_WEAR_MAX; their
  * leaf_extent and grid_cost stay those of the mesh as it is given, so that what is chosen by them does not depend
- * on earlier poses. After a failure the store is empty. */
-bool bvh_store_update(struct bvh_store *store, struct scene_gpu *scene, struct bvh_store_report *report,
+ * on earlier poses. `all`: deformed_revision of what is there says nothing. After a failure the store is empty. */
+bool bvh_store_update(struct bvh_store *store, struct scene_gpu *scene, bool all, struct bvh_store_report *report,
                       struct stage_times *times, struct error *error);
 /* The second half of it: trees of geometries whose vertices are others than those that they were made for. */
 bool bvh_store_deform(struct bvh_store *store, struct scene_gpu *scene, struct bvh_store_report *report,

@@ -100,8 +100,7 @@ static void take_box(struct bvh_entry *entry, const struct bvh_refit_root *root)
 
 static bool has_worn_out(const struct bvh_entry *entry, const struct bvh_refit_root *root)
 {
-    float surface = bvh_box_area(root->lower, root->upper);
-    return root->surfaces > BVH_REFIT_COST_MAX * entry->built_cost * surface;
+    return root->surfaces > BVH_REFIT_WEAR_MAX * entry->built_wear * root->triangle_surfaces;
 }
 
 static bool refit(struct bvh_store *store, struct scene_gpu *scene, struct deforming *deforming,
@@ -122,7 +121,6 @@ static bool refit(struct bvh_store *store, struct scene_gpu *scene, struct defor
         entry->grid = bvh_grid_over(entry->lower, entry->upper, 0);
         ok = bvh_refit_write(&entry->refit, store->device, &place, &store->settings, &entry->grid, error);
         entry->deformed_revision = scene->geometries[moved->geometry].deformed_revision;
-        entry->is_fresh = true;
         report->refitted_elements += entry->element_count;
     }
     free(roots);
@@ -187,6 +185,11 @@ bool bvh_store_deform(struct bvh_store *store, struct scene_gpu *scene, struct b
 {
     struct deforming deforming = {0};
     uint64_t start_ns = clock_now_ns();
+    store->deforms = store->deforms_in_shutter = false;
+    for (uint32_t g = 0; g < scene->geometry_count; g++) {
+        store->deforms = store->deforms || scene->geometries[g].node != 0;
+        store->deforms_in_shutter = store->deforms_in_shutter || scene->geometries[g].device.close_offset != 0;
+    }
     if (!list_moved(&deforming, store, scene))
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
                          scene->geometry_count);

@@ -336,8 +336,3 @@ bool scene_gpu_any_closes(const struct scene_gpu *gpu)
             return true;
     return false;
 }
-
-bool scene_gpu_has_skin(const struct scene_gpu *gpu, uint32_t geometry)
-{
-    return gpu->state->deform.uses[geometry - gpu->state->rigid_count].skin != 0;
-}

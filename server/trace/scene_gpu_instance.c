@@ -85,6 +85,8 @@ static bool posed_init(struct posed *posed, const struct scene *scene, const str
                        enum scene_node_kind kind)
 {
     *posed = (struct posed){.pose_count = motion ? motion->pose_count : 1};
+    if (scene->objects[kind == NODE_MESH ? SCENE_MESH : SCENE_SPHERES].count == 0)
+        return true;
     for (uint32_t p = 0; p < posed->pose_count; p++)
         if (!scene_flatten(scene, motion ? &motion->poses[p] : NULL, kind, &posed->list[p], &posed->count[p]))
             return false;
@@ -124,31 +126,18 @@ static void add_motion(struct fresh *fresh, struct instance *instance, const flo
         memcpy(fresh->motions[fresh->motion_count++], matrices[p], 12 * sizeof(float));
 }
 
-/* With a skin the vertices are in world space already. */
-static void place_in_world(struct instance *instance)
-{
-    for (size_t k = 0; k < 3; k++)
-        instance->world_from_object[k][k] = instance->object_from_world[k][k] = 1.0f;
-}
-
 static void pack_instances(const struct scene_gpu *gpu, struct posed *posed, bool is_mesh, struct fresh *fresh)
 {
     for (size_t i = 0; i < posed->count[0]; i++) {
         const struct scene_instance *in = &posed->list[0][i];
         const float *matrices[MOTION_POSES_MAX];
         uint32_t geometry;
-        bool deforms = is_mesh && find_deforming(gpu, in->node->base.id, &geometry);
-        bool in_world = deforms && scene_gpu_has_skin(gpu, geometry);
-        if (!deforms && !find_rigid(gpu, is_mesh, in->node->object, &geometry))
-            continue;
-        if (!in_world && !matrices_of(posed, i, matrices))
+        bool found = (is_mesh && find_deforming(gpu, in->node->base.id, &geometry)) ||
+                     find_rigid(gpu, is_mesh, in->node->object, &geometry);
+        if (!found || !matrices_of(posed, i, matrices))
             continue;
         struct instance *instance = &fresh->instances[fresh->count++];
         *instance = (struct instance){.geometry = geometry, .node = in->node->base.id};
-        if (in_world) {
-            place_in_world(instance);
-            continue;
-        }
         instance->flags = determinant(in->world_from_object) < 0.0 ? INSTANCE_MIRRORED : 0;
         memcpy(instance->world_from_object, in->world_from_object, sizeof(instance->world_from_object));
         memcpy(instance->object_from_world, in->object_from_world, sizeof(instance->object_from_world));
@@ -303,8 +292,8 @@ bool scene_gpu_upload_discs(struct scene_gpu *gpu, const struct scene *scene, st
 static void grow(float lower[3], float upper[3], const float low[3], const float high[3])
 {
     for (int k = 0; k < 3; k++) {
-        lower[k] = fminf(lower[k], low[k]);
-        upper[k] = fmaxf(upper[k], high[k]);
+        lower[k] = low[k] < lower[k] ? low[k] : lower[k];
+        upper[k] = high[k] > upper[k] ? high[k] : upper[k];
     }
 }
 

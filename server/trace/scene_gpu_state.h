@@ -67,9 +67,8 @@ bool scene_gpu_upload_geometry_table(struct scene_gpu *gpu, struct scene_changes
 /* scene_gpu_deform.c. Brings the vertices of what deforms to the first pose and to the last. */
 bool scene_gpu_deform(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct error *error);
-/* Whether the vertices of some geometry are others as the shutter closes; whether one has a skin. */
+/* Whether the vertices of some geometry are others as the shutter closes. */
 bool scene_gpu_any_closes(const struct scene_gpu *gpu);
-bool scene_gpu_has_skin(const struct scene_gpu *gpu, uint32_t geometry);
 /* scene_gpu_instance.c */
 bool scene_gpu_upload_instances(struct scene_gpu *gpu, const struct scene *scene,
                                 const struct scene_motion *motion, struct scene_changes *changes,

@@ -89,6 +89,7 @@ bool tracer_trace(struct tracer *tracer, struct scene_gpu *scene, const struct w
         fits = fits && buffer_holds(wave->visibility, wave->ray_count, sizeof(uint32_t));
     else
         fits = fits && buffer_holds(wave->hits, wave->ray_count, sizeof(struct hit));
+    fits = fits && (!wave->times || buffer_holds(wave->times, wave->ray_count, sizeof(float)));
     if (!fits)
         return error_set(error, ERROR_INTERNAL, NULL, "%s: a wave of %u rays does not fit its buffers",
                          tracer->impl->name, wave->ray_count);

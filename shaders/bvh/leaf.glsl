@@ -20,6 +20,9 @@ struct entered_instance {
     uint index; // NOT_INSIDE: the top tree is walked
     uint first_texel;
     uint first_primitive;
+#ifdef BVH_DEFORMS_IN_SHUTTER
+    uint close_texels; // as bvh_transform has it
+#endif
 };
 
 // Put out: no bound and no primitive is hit by it any more.
@@ -39,6 +42,17 @@ float end_of(trace_ray r, answer found)
 #endif
 }
 
+#if defined BVH_DEFORMS && !defined ANY_HIT
+// Of surfaces at one distance the one with lower numbers is met first; a disc before all, and nothing at the ray's end
+// (both have numbers that wrap to 0).
+bool is_before(candidate a, candidate b)
+{
+    bool has_lower_numbers = a.instance_index == b.instance_index ? a.primitive + 1u < b.primitive + 1u
+                                                                  : a.instance_index + 1u < b.instance_index + 1u;
+    return a.distance < b.distance || (a.distance == b.distance && has_lower_numbers);
+}
+#endif
+
 // A candidate against its ray; a ray of which nothing is left is put out.
 void offer(inout trace_ray r, candidate c, inout answer found)
 {
@@ -47,6 +61,9 @@ void offer(inout trace_ray r, candidate c, inout answer found)
         found = vec3(TAKEN_ALL);
         put_out(r);
     }
+#elif defined BVH_DEFORMS
+    if (c.distance > r.t_min && is_before(c, found) && !is_cut_out(c, r.origin, r.direction, time_of(r)))
+        found = c;
 #else
     offer_closest(r, c, found);
 #endif
@@ -70,7 +87,7 @@ void offer_or_note(uint bit, candidate c, inout trace_ray r, inout answer found,
                    inout uint bits)
 {
 #ifdef ASK_MATERIALS
-    if (c.distance > r.t_min && c.distance < end_of(r, found)) {
+    if (c.distance > r.t_min && c.distance <= end_of(r, found)) {
         hits.distances[bit & 1u] = c.distance;
         hits.barycentrics = c.barycentrics;
         bits |= 1u << bit;
@@ -140,11 +157,42 @@ relative_rays relative_to(vec3 centre, object_ray o[RAYS_TOGETHER])
     return rays;
 }
 
+#ifdef BVH_DEFORMS_IN_SHUTTER
+
+// The corners as they are at the ray's own time: nothing of a triangle is the same for several rays.
+void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
+                   inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
+{
+    int texel = int(inside.first_texel + i * BVH_TRIANGLE_TEXELS), close = texel + int(inside.close_texels);
+    uvec4 first = texelFetch(bvh_primitives, texel);
+    vec3 v0 = uintBitsToFloat(first.xyz);
+    vec3 v1 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 1).xyz);
+    vec3 v2 = uintBitsToFloat(texelFetch(bvh_primitives, texel + 2).xyz);
+    // Straight from the one to the other: those that stay have a way of zero, which adds nothing.
+    vec3 way0 = uintBitsToFloat(texelFetch(bvh_primitives, close).xyz) - v0;
+    vec3 way1 = uintBitsToFloat(texelFetch(bvh_primitives, close + 1).xyz) - v1;
+    vec3 way2 = uintBitsToFloat(texelFetch(bvh_primitives, close + 2).xyz) - v2;
+    candidate c = candidate(0.0, inside.first_primitive + first.w, inside.index, vec2(0.0));
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+        float time = r[k].time;
+        bool is_hit = intersect_triangle(o[k].direction, v0 + time * way0 - o[k].origin,
+                                         v1 + time * way1 - o[k].origin, v2 + time * way2 - o[k].origin,
+                                         c.distance, c.barycentrics);
+        c.distance = is_hit ? c.distance : -1.0;
+        offer_or_note(uint(2 * k), c, r[k], found[k], noted.hits[k], noted.bits);
+    }
+#ifdef ASK_MATERIALS
+    noted.common_part = c;
+#endif
+}
+
+#else
+
 // As intersect_triangle (common/intersect.glsl), for several rays. An edge from a to b, e = b - a, s = b + a, has for a
 // ray from o along d the edge function d . (e x (s - 2 o)) = d . (e x s) - e . (2 o x d): the first cross product is the
 // same for all rays, the second for all edges. Two triangles that share an edge still get exactly opposite values.
-void test_triangle(uint i, entered_instance inside, relative_rays rays, inout trace_ray r[RAYS_TOGETHER],
-                   inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
+void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], relative_rays rays,
+                   inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TOGETHER], inout noted_primitive noted)
 {
     int texel = int(inside.first_texel + i * BVH_TRIANGLE_TEXELS);
     uvec4 first = texelFetch(bvh_primitives, texel);
@@ -179,6 +227,8 @@ void test_triangle(uint i, entered_instance inside, relative_rays rays, inout tr
     noted.common_part = c;
 #endif
 }
+
+#endif
 
 #ifdef HAS_SPHERES
 void test_sphere(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER], inout trace_ray r[RAYS_TOGETHER],
@@ -216,6 +266,6 @@ bool test_leaf(uint leaf, inout uint primitive, entered_instance inside, object_
     }
 #endif
     for (; primitive < count && noted.bits == 0u; primitive++)
-        test_triangle(first + primitive, inside, rays, r, found, noted);
+        test_triangle(first + primitive, inside, o, rays, r, found, noted);
     return primitive == count && noted.bits == 0u;
 }

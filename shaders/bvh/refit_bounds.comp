@@ -19,8 +19,19 @@ const float FAR = 3.402823466e38;
 
 struct box {
     vec3 lower, upper;
-    float surfaces; // of all boxes below it
+    vec2 surfaces; // of all boxes below it, of each triangle's own
 };
+
+box empty_box()
+{
+    return box(vec3(FAR), vec3(-FAR), vec2(0.0));
+}
+
+float surface_of(box b)
+{
+    vec3 extent = b.upper - b.lower;
+    return extent.x >= 0.0 ? extent.x * extent.y + extent.y * extent.z + extent.z * extent.x : 0.0;
+}
 
 // What is no number is left out.
 void include(inout box b, vec3 lower, vec3 upper)
@@ -31,12 +42,11 @@ void include(inout box b, vec3 lower, vec3 upper)
 
 void store(uvec4 record, box b)
 {
-    vec3 extent = b.upper - b.lower;
-    float surface = extent.x * extent.y + extent.y * extent.z + extent.z * extent.x;
-    b.surfaces += extent.x >= 0.0 ? surface : 0.0;
+    b.surfaces.x += surface_of(b);
     int texel = int(first_box + record.x) * BVH_REFIT_BOX_TEXELS;
     imageStore(boxes, texel, uvec4(floatBitsToUint(b.lower), record.y));
-    imageStore(boxes, texel + 1, uvec4(floatBitsToUint(b.upper), floatBitsToUint(b.surfaces)));
+    imageStore(boxes, texel + 1, uvec4(floatBitsToUint(b.upper), 0u));
+    imageStore(boxes, texel + 2, uvec4(floatBitsToUint(b.surfaces), 0u, 0u));
 }
 
 #ifdef REFIT_LEAVES
@@ -63,15 +73,18 @@ void move(uint texel, ivec3 vertices, uint number, inout box b)
 
 void refit(uvec4 record)
 {
-    box b = box(vec3(FAR), vec3(-FAR), 0.0);
+    box b = empty_box();
     uint first = record.z & BVH_LEAF_FIRST_MASK, count = (record.z >> BVH_LEAF_COUNT_SHIFT & BVH_LEAF_COUNT_MASK) + 1u;
     for (uint i = first; i < first + count; i++) {
         uint texel = first_texel + i * BVH_TRIANGLE_TEXELS;
         uvec4 triangle = texelFetch(corners, int(i));
-        move(texel, ivec3(triangle.xyz + first_vertex), triangle.w, b);
+        box own = empty_box();
+        move(texel, ivec3(triangle.xyz + first_vertex), triangle.w, own);
 #ifdef REFIT_CLOSE
-        move(texel + close_texels, ivec3(triangle.xyz + first_vertex + close_offset), triangle.w, b);
+        move(texel + close_texels, ivec3(triangle.xyz + first_vertex + close_offset), triangle.w, own);
 #endif
+        b.surfaces.y += surface_of(own);
+        include(b, own.lower, own.upper);
     }
     store(record, b);
 }
@@ -80,12 +93,12 @@ void refit(uvec4 record)
 
 void refit(uvec4 record)
 {
-    box b = box(vec3(FAR), vec3(-FAR), 0.0);
+    box b = empty_box();
     for (uint child = record.x + 1u, end = record.x + record.y; child < end;) {
         int texel = int(first_box + child) * BVH_REFIT_BOX_TEXELS;
         uvec4 lower = imageLoad(boxes, texel), upper = imageLoad(boxes, texel + 1);
         include(b, uintBitsToFloat(lower.xyz), uintBitsToFloat(upper.xyz));
-        b.surfaces += uintBitsToFloat(upper.w);
+        b.surfaces += uintBitsToFloat(imageLoad(boxes, texel + 2).xy);
         child += lower.w;
     }
     store(record, b);

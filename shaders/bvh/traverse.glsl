@@ -8,6 +8,10 @@
 //   BVH_PLAIN    the paper's form, for comparison: elements in a storage buffer, one order for all directions
 //   BVH_ONE_INSTANCE  there is one: no top tree is walked
 //   SHARED_ORIGIN     all rays of the wave begin at one point
+//   BVH_DEFORMS       there are meshes that deform, whose trees too may have come about in several ways
+//   BVH_DEFORMS_IN_SHUTTER  and some do while the shutter is open
+//
+// With HAS_MOTION every ray enters an instance as that is at the ray's own time, and leaves hold what they hold at any.
 //
 // RAYS_TOGETHER rays walk as one: an element is entered when any of them may hit its bound, a primitive is fetched
 // once and tested against all. The octant is that of the first live ray; the others' answers are right
@@ -16,7 +20,7 @@
 // Answers do not depend on the top tree: one that was refitted and one that was built anew give the same to the bit.
 // What is found on a primitive depends on the ray and the walk's leading one alone (leaf.glsl); of instances at one
 // distance the first by number is met (favour_instance), within one the first in the order of its tree, which is that
-// of its shape; what is taken of light is summed up exactly (taken_by).
+// of its shape (with BVH_DEFORMS: the first by number, is_before); what is taken of light is summed up exactly (taken_by).
 //
 // Three loops in one another: elements until a leaf, leaves until an instance is entered or left, instances. All
 // invocations of a SIMD group first find their leaf, then all test primitives (the paper's PROCESSGEOMETRY):
@@ -166,18 +170,30 @@ void enter_instance(uint instance_index, trace_ray r[RAYS_TOGETHER], int leading
                     out object_ray o[RAYS_TOGETHER], out walk_state walk, out bundle b, out relative_rays rays)
 {
     int texel = int(instance_index) * BVH_TRANSFORM_TEXELS;
+#ifndef HAS_MOTION
     vec4 rows[3] = vec4[3](uintBitsToFloat(texelFetch(bvh_transforms, texel)),
                            uintBitsToFloat(texelFetch(bvh_transforms, texel + 1)),
                            uintBitsToFloat(texelFetch(bvh_transforms, texel + 2)));
+#endif
     tree_grid grid = NO_GRID;
 #ifdef BVH_PACKED
     grid = tree_grid(uintBitsToFloat(texelFetch(bvh_transforms, texel + 3)).xyz,
                      uintBitsToFloat(texelFetch(bvh_transforms, texel + 4)).xyz);
 #endif
     uvec4 tree = texelFetch(bvh_transforms, texel + 5);
-    inside = entered_instance(instance_index, tree.z, tree.w);
-    for (int k = 0; k < RAYS_TOGETHER; k++)
+    inside.index = instance_index;
+    inside.first_texel = tree.z;
+    inside.first_primitive = tree.w;
+#ifdef BVH_DEFORMS_IN_SHUTTER
+    inside.close_texels = texelFetch(bvh_transforms, texel + 3).w;
+#endif
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+#ifdef HAS_MOTION
+        o[k] = object_from_world_ray(r[k], instance_index);
+#else
         o[k] = object_ray(affine_point(rows, r[k].origin), affine_vector(rows, r[k].direction));
+#endif
+    }
     enter_tree(o, r, leading, grid, OBJECT_SLACK, b, rays);
     begin_tree(walk, tree.x, tree.y, b.octant);
 }
@@ -225,7 +241,8 @@ void settle_and_go_on(inout walk_state walk, inout noted_primitive noted, inout 
 }
 #endif
 
-#ifndef ANY_HIT
+#if !defined ANY_HIT && !defined BVH_DEFORMS
+#define FAVOUR_INSTANCES
 // While the walk is in an instance, what was found in one with a higher number is one step of a float farther away, so that
 // what lies at the same distance here comes before it. (Discs and what is not there have a number that wraps to 0.)
 void favour_instance(uint instance_index, int step_, inout answer found[RAYS_TOGETHER])
@@ -273,7 +290,7 @@ bool walk_instances(inout walk_state walk, inout walk_state world_walk, inout bu
 #endif
         if (leaf != 0u) {
             world_walk.element = walk.element;
-#ifndef ANY_HIT
+#ifdef FAVOUR_INSTANCES
             favour_instance(leaf & BVH_LEAF_FIRST_MASK, 1, found);
 #endif
             enter_instance(leaf & BVH_LEAF_FIRST_MASK, r, leading, inside, o, walk, b, rays);
@@ -285,7 +302,7 @@ bool walk_instances(inout walk_state walk, inout walk_state world_walk, inout bu
 #endif
             if (all_done)
                 return false;
-#ifndef ANY_HIT
+#ifdef FAVOUR_INSTANCES
             favour_instance(inside.index, -1, found);
 #endif
             inside.index = NOT_INSIDE;
@@ -312,7 +329,12 @@ void trace_together(inout trace_ray r[RAYS_TOGETHER], inout answer found[RAYS_TO
     enter_tree(o, r, leading, grid, WORLD_SLACK, world_bundle, rays);
     walk_state walk, world_walk;
     begin_tree(world_walk, 0u, bvh_top_count, world_bundle.octant);
-    entered_instance inside = entered_instance(NOT_INSIDE, 0u, 0u);
+    entered_instance inside;
+    inside.index = NOT_INSIDE;
+    inside.first_texel = inside.first_primitive = 0u;
+#ifdef BVH_DEFORMS_IN_SHUTTER
+    inside.close_texels = 0u;
+#endif
     b = world_bundle;
     walk = world_walk;
     noted_primitive noted;

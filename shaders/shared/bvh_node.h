@@ -50,7 +50,8 @@ SHARED_SIZE(bvh_element, 32)
 /* The other half of a transform element: what entering an instance does. Texels of an RGBA32UI buffer. */
 struct bvh_transform {
     vec4 object_from_world[3];
-    vec4 grid_lower;     /* object space; packed elements count cells from here; w unused */
+    float grid_lower_x, grid_lower_y, grid_lower_z; /* object space; packed elements count cells from here */
+    uint close_texels;   /* from a triangle to itself as the shutter closes; 0: the shape stays meanwhile */
     vec4 cells_per_unit; /* w unused */
     uint first_element;  /* of the geometry's tree, in the element buffer */
     uint element_count;
@@ -63,7 +64,8 @@ SHARED_SIZE(bvh_transform, 96)
 /* Primitives in the order of the leaves, fetched without an index in between. RGBA32UI, though most are floats: a
  * small integer is no float that a driver has to keep. Texels:
  *   triangle  3 texels: corners; w of the first: bits of the primitive's number in its geometry
- *   sphere    2 texels: centre and radius; x of the second: bits of the number */
+ *   sphere    2 texels: centre and radius; x of the second: bits of the number
+ * Triangles of a geometry that deforms come twice: all as the shutter opens, then all as it closes. */
 #define BVH_TRIANGLE_TEXELS 3u
 #define BVH_SPHERE_TEXELS 2u
 
@@ -79,8 +81,9 @@ struct bvh_refit_record {
 };
 SHARED_SIZE(bvh_refit_record, 48)
 #define BVH_REFIT_TEXELS 3
-/* The box of each element while it is refitted: two texels of an RGBA32UI buffer, by the order of octant 0: lower
- * corner and the size of its subtree; upper corner and (a float) the surfaces of all boxes of its subtree. */
-#define BVH_REFIT_BOX_TEXELS 2
+/* The box of each element while it is refitted: texels of an RGBA32UI buffer, by the order of octant 0: lower
+ * corner and the size of its subtree; upper corner; (floats) surfaces of all boxes of its subtree, and of each of
+ * its triangles' own box. */
+#define BVH_REFIT_BOX_TEXELS 3
 
 #endif

@@ -112,6 +112,18 @@ static inline void test_add_targets(struct scene_mesh *mesh, uint64_t seed)
     mesh->weight_count = TEST_TARGETS;
 }
 
+static inline void test_add_tangents(struct scene_mesh *mesh, uint64_t seed)
+{
+    float *v = malloc((size_t)mesh->vertex_count * 4 * sizeof(*v));
+    for (size_t i = 0; i < mesh->vertex_count; i++) {
+        for (size_t k = 0; k < 3; k++)
+            v[4 * i + k] = test_uniform(&seed, -1, 1);
+        v[4 * i + 3] = test_random(&seed) % 2 ? 1.0f : -1.0f;
+    }
+    mesh->arrays[MESH_TANGENTS] = test_blob(v, (size_t)mesh->vertex_count * 4 * sizeof(*v));
+    free(v);
+}
+
 /* The mesh that test_soup_mesh() has just added to the transaction. */
 static inline struct scene_mesh *test_last_mesh(struct test_edits *edits)
 {
@@ -138,9 +150,9 @@ static inline void test_add_skin(struct test_edits *edits)
     skin->joint_from_mesh = test_blob(bind, sizeof(bind));
 }
 
-/* One mesh with joints and targets (10), shown twice, of which once below a node that its skin ignores; one with
- * targets alone (9), squeezed and mirrored; one with joints (8) that a node shows with its skin and another
- * without; a rigid one (7). */
+/* One mesh with tangents, joints and targets (10), shown twice, of which once below a node that its skin ignores;
+ * one with targets alone (9), squeezed and mirrored; one with joints (8) that a node shows with its skin and
+ * another without; a rigid one (7). */
 static inline struct scene *test_scene_deformed(void)
 {
     struct test_edits edits = {.scene = test_scene_create()};
@@ -150,6 +162,7 @@ static inline struct scene *test_scene_deformed(void)
     cutout->alpha_mode = ALPHA_MASK;
     test_add_skin(&edits);
     test_soup_mesh(&edits, 10, 40, 0.4f, 21);
+    test_add_tangents(test_last_mesh(&edits), 51);
     test_add_joints(test_last_mesh(&edits), 4, 31);
     test_add_targets(test_last_mesh(&edits), 41);
     test_soup_mesh(&edits, 9, 40, 0.4f, 22);

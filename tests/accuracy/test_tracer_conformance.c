@@ -31,12 +31,12 @@ struct tracer_row {
 };
 static const struct tracer_row tracers[] = {
     {"naive", 1, {0}, false},
-    {"bvh", 0, {0}, true},
-    {"bvh, one ray alone", 0, {.bvh_rays_together = 1}, true},
-    {"bvh, eight rays together", 0, {.bvh_rays_together = 8}, true},
-    {"bvh in the plain form", 0, {.bvh_layout = BVH_LAYOUT_PLAIN}, true},
-    {"bvh, two rays together", 0, {.bvh_rays_together = 2}, true},
-    {"bvh with spheres, four rays together", 0, {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 4}, true},
+    {"bvh", 0, {0}, false},
+    {"bvh, one ray alone", 0, {.bvh_rays_together = 1}, false},
+    {"bvh, eight rays together", 0, {.bvh_rays_together = 8}, false},
+    {"bvh in the plain form", 0, {.bvh_layout = BVH_LAYOUT_PLAIN}, false},
+    {"bvh, two rays together", 0, {.bvh_rays_together = 2}, false},
+    {"bvh with spheres, four rays together", 0, {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 4}, false},
     {"reference", 2, {0}, false}, /* as many rays a call as the processor takes at once */
     {"reference, one ray a call", 2, {.reference_rays_a_call = 1}, false},
     {"reference, four rays a call", 2, {.reference_rays_a_call = 4}, false},

@@ -172,10 +172,10 @@ static uint64_t update(struct bent *bent, struct tracer *tracer)
     return clock_now_ns() - start_ns;
 }
 
-/* A tree without a cost is worn out at once. */
+/* A tree that was built without wear is worn out at once. */
 static void wear_out(struct tracer *tracer)
 {
-    ((struct bvh *)tracer)->store.entries[0].built_cost = 0;
+    ((struct bvh *)tracer)->store.entries[0].built_wear = 0;
 }
 
 static struct hit *trace(struct bent *bent, struct tracer *tracer, struct gpu_buffer *rays, uint64_t *time_ns)
