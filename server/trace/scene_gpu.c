@@ -55,7 +55,7 @@ void scene_gpu_finish(struct scene_gpu *gpu)
     free(gpu->instances);
     free(gpu->motions);
     free(gpu->discs);
-    scene_gpu_init(gpu, gpu->device);
+    *gpu = (struct scene_gpu){.device = gpu->device, .deformed_revision = gpu->deformed_revision};
 }
 
 /* The finaliser of splitmix64. */

@@ -72,6 +72,8 @@ struct scene_gpu {
     struct gpu_texture environment;
     float environment_colour[3], environment_rotation;
     uint64_t geometry_revision, instances_revision, shading_revision, lights_revision; /* of what is there */
+    uint64_t deformed_revision; /* the last one given out; goes on counting when the copy is made anew, as what a
+                                   tracer has kept is told apart by it */
     struct scene_gpu_state *state; /* private to scene_gpu*.c: which parts need not be uploaded again */
 };
 

@@ -189,7 +189,7 @@ static bool update_use(struct work *work, uint32_t use_index, const struct scene
     use->close = close;
     use->value_count = count;
     if (changed) {
-        use->revision = ++deform->revision;
+        use->revision = ++work->gpu->deformed_revision;
         changes->deformed = true;
         find_box(use, work->scene, &deform->meshes[use->mesh]);
     }

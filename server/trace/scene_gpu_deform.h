@@ -45,7 +45,6 @@ struct scene_gpu_deform {
     uint32_t mesh_count;
     struct deform_use *uses; /* by geometry: that of use i is rigid_count + i */
     uint32_t use_count;
-    uint64_t revision; /* the last one given out */
     /* All of it texels of shaders/deform.comp. */
     struct gpu_buffer positions, normals, tangents, joints, joint_weights;
     struct gpu_buffer target_positions, target_normals, target_tangents;

@@ -328,6 +328,29 @@ static void a_node_that_begins_to_deform_leaves_the_others_their_revisions(void 
     fixture_finish(&fixture);
 }
 
+/* A tracer keeps what it has made of vertices by their revision. */
+static void vertices_have_a_new_revision_after_an_update_that_failed(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct scene_motion motion;
+    struct error error = {0};
+    fixture_init(&fixture, test_scene_deformed());
+    uint64_t before = geometry_of(&fixture, 2)->deformed_revision;
+    uint64_t limit_bytes = device->memory_limit_bytes;
+    device->memory_limit_bytes = 1;
+    test_soup_mesh(&fixture.edits, 1, 5000, 0.4f, 99);
+    test_commit(&fixture.edits);
+    test_motion_init(&motion, 1);
+    assert_false(scene_gpu_update(&fixture.gpu, fixture.scene, &motion, &fixture.changes, NULL, &error));
+    scene_motion_finish(&motion);
+    device->memory_limit_bytes = limit_bytes;
+    update(&fixture, NULL);
+    assert_true(geometry_of(&fixture, 2)->deformed_revision > before);
+    expect_deformed(&fixture, NULL, false);
+    fixture_finish(&fixture);
+}
+
 #define MANY 1000u
 
 static struct scene *many_instances(void)
@@ -507,6 +530,7 @@ int main(void)
         cmocka_unit_test(a_turned_joint_uploads_the_matrices_of_its_skin),
         cmocka_unit_test(targets_without_weight_are_left_out),
         cmocka_unit_test(a_node_that_begins_to_deform_leaves_the_others_their_revisions),
+        cmocka_unit_test(vertices_have_a_new_revision_after_an_update_that_failed),
         cmocka_unit_test(a_thousand_moving_instances_upload_their_transforms_alone),
         cmocka_unit_test(an_instance_is_bounded_wherever_it_goes),
         cmocka_unit_test(materials_and_lights_follow_the_first_pose),
