@@ -18,7 +18,6 @@
 #define GRID_COST_MAX 1.3f
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX (1u << 18)
-#define MOTION_TEXELS 3u /* a pose */
 
 static unsigned build_threads(void)
 {
@@ -105,13 +104,11 @@ static struct bvh_world_box box_at_pose(const struct bvh_entry *entry, const flo
 static struct bvh_world_box world_box(const struct bvh_entry *entry, const struct scene_gpu *scene,
                                       const struct instance *instance)
 {
-    if (instance->motion == 0)
-        return box_at_pose(entry, (const float *)instance->world_from_object);
-    uint32_t first = (instance->motion - 1) / MOTION_TEXELS;
-    uint32_t count = instance->flags >> INSTANCE_POSES_SHIFT & INSTANCE_POSES_MASK;
-    struct bvh_world_box box = box_at_pose(entry, scene->motions[first]);
-    for (uint32_t pose = first + 1; pose < first + count; pose++) {
-        const struct bvh_world_box other = box_at_pose(entry, scene->motions[pose]);
+    uint32_t pose_count;
+    const float(*poses)[12] = scene_gpu_poses(scene, instance, &pose_count);
+    struct bvh_world_box box = box_at_pose(entry, poses[0]);
+    for (uint32_t p = 1; p < pose_count; p++) {
+        const struct bvh_world_box other = box_at_pose(entry, poses[p]);
         bvh_world_box_include(&box, &other);
     }
     return box;

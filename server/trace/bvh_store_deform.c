@@ -133,11 +133,12 @@ static bool refit(struct bvh_store *store, struct scene_gpu *scene, struct defor
 static float *read_vertices(struct bvh_store *store, const struct scene_gpu *scene,
                             const struct geometry *geometry)
 {
-    size_t bytes = geometry->vertex_count * 4 * sizeof(float);
+    size_t bytes = (size_t)geometry->vertex_count * 4 * sizeof(float);
     float *vertices = malloc(2 * bytes + 1);
     if (!vertices)
         return NULL;
-    gpu_buffer_read(store->device, &scene->positions, geometry->first_vertex * 4 * sizeof(float), vertices, bytes);
+    gpu_buffer_read(store->device, &scene->positions, (size_t)geometry->first_vertex * 4 * sizeof(float), vertices,
+                    bytes);
     if (geometry->close_offset)
         gpu_buffer_read(store->device, &scene->positions,
                         ((size_t)geometry->first_vertex + geometry->close_offset) * 4 * sizeof(float),

@@ -108,20 +108,10 @@ static float reach_between(const float *a, const float *b)
     return inverts && reach >= REACH_MIN ? (float)reach : 0.0f;
 }
 
-static const float (*matrices_of(const struct scene_gpu *scene, const struct instance *instance,
-                                 uint32_t *pose_count))[12]
-{
-    *pose_count = 1;
-    if (!instance->motion)
-        return (const float(*)[12])(const void *)instance->world_from_object;
-    *pose_count = instance->flags >> INSTANCE_POSES_SHIFT & INSTANCE_POSES_MASK;
-    return (const float(*)[12]) & scene->motions[(instance->motion - 1) / 3];
-}
-
 static float reach_in_motion(const struct scene_gpu *scene, const struct instance *instance)
 {
     uint32_t pose_count;
-    const float(*matrices)[12] = matrices_of(scene, instance, &pose_count);
+    const float(*matrices)[12] = scene_gpu_poses(scene, instance, &pose_count);
     float reach = reach_of(instance);
     for (uint32_t p = 1; p < pose_count; p++)
         reach = fminf(reach, reach_between(matrices[p - 1], matrices[p]));
@@ -135,7 +125,7 @@ static bool place_instance(struct reference *reference, const struct scene_gpu *
     const struct instance *now = &scene->instances[i];
     const struct reference_entry *entry = reference->entries[now->geometry];
     uint32_t pose_count;
-    const float(*matrices)[12] = matrices_of(scene, now, &pose_count);
+    const float(*matrices)[12] = scene_gpu_poses(scene, now, &pose_count);
     size_t bytes = pose_count * sizeof(*matrices);
     bool same_entry = instance->entry == entry && !entry->is_fresh;
     bool same_place = instance->entry && instance->pose_count == pose_count &&

@@ -78,6 +78,14 @@ uint64_t scene_gpu_signature(const struct scene *scene, enum scene_object_kind k
     return signature;
 }
 
+bool scene_gpu_check_texels(const struct scene_gpu *gpu, uint64_t count, const char *what, struct error *error)
+{
+    uint64_t max = gpu->device->facts.texture_buffer_texels_max;
+    return count <= max ||
+           error_set(error, ERROR_LIMIT, "scene", "%llu %s; this device's texel buffers hold at most %llu",
+                     (unsigned long long)count, what, (unsigned long long)max);
+}
+
 /* What poses say anything about. */
 static unsigned posed_parts(const struct scene_motion *motion)
 {

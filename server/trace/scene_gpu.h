@@ -61,7 +61,7 @@ struct scene_gpu {
     bool has_translucent; /* some material lets shadow rays pass: blend or transmission */
     bool has_transmission;
     bool has_varied_alpha; /* what one of these lets pass differs from place to place: texture or vertex colours */
-    bool has_motion; /* something moves while the shutter is open: tracers must look at the rays' times */
+    bool has_motion;       /* something moves while the shutter is open: tracers must look at the rays' times */
     bool has_environment_image;
     float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */
     float diagonal;                       /* of these bounds */
@@ -85,6 +85,9 @@ void scene_gpu_finish(struct scene_gpu *gpu);
  * empty and will be made anew by the next update. */
 bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error);
+/* Where an instance is in each pose, one if it stands still: world_from_object, borrowed from the copy. */
+const float (*scene_gpu_poses(const struct scene_gpu *gpu, const struct instance *instance,
+                              uint32_t *pose_count))[12];
 /* Of an instance in world space, wherever it goes while the shutter is open. */
 void scene_gpu_instance_bounds(const struct scene_gpu *gpu, uint32_t instance, float lower_world[3],
                                float upper_world[3]);

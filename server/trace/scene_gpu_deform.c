@@ -277,12 +277,8 @@ static bool run_passes(struct work *work, struct scene_changes *changes, struct 
     size_t bytes = work->parameter_count * sizeof(*work->parameters);
     if (work->pass_count == 0)
         return true;
-    if (work->parameter_count > gpu->device->facts.texture_buffer_texels_max)
-        return error_set(error, ERROR_LIMIT, "scene",
-                         "%zu rows of the matrices of joints; this device's texel "
-                         "buffers hold at most %llu",
-                         work->parameter_count, (unsigned long long)gpu->device->facts.texture_buffer_texels_max);
-    if (!gpu_buffer_upload(gpu->device, &gpu->state->deform.parameters, work->parameters, bytes, error))
+    if (!scene_gpu_check_texels(gpu, work->parameter_count, "rows of the matrices of joints", error) ||
+        !gpu_buffer_upload(gpu->device, &gpu->state->deform.parameters, work->parameters, bytes, error))
         return false;
     changes->uploaded_bytes += bytes;
     gpu_push_group(gpu->device, "deform");

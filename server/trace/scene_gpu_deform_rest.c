@@ -239,18 +239,9 @@ static bool list_meshes(struct scene_gpu *gpu, const struct scene *scene, struct
 
 static bool check_totals(const struct scene_gpu *gpu, const struct rest_totals *totals, struct error *error)
 {
-    const struct {
-        const char *what;
-        uint64_t count;
-    } rows[] = {{"vertices that deform", totals->vertices},
-                {"weights of joints", totals->influences},
-                {"vertices of morph targets", totals->target_vertices}};
-    uint64_t max = gpu->device->facts.texture_buffer_texels_max;
-    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
-        if (rows[i].count > max)
-            return error_set(error, ERROR_LIMIT, "scene", "%llu %s; this device's texel buffers hold at most %llu",
-                             (unsigned long long)rows[i].count, rows[i].what, (unsigned long long)max);
-    return true;
+    return scene_gpu_check_texels(gpu, totals->vertices, "vertices that deform", error) &&
+           scene_gpu_check_texels(gpu, totals->influences, "weights of joints", error) &&
+           scene_gpu_check_texels(gpu, totals->target_vertices, "vertices of morph targets", error);
 }
 
 /* Where a mesh's part of a buffer begins, counted in items, and how many items there are a mesh. */

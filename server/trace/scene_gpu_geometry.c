@@ -157,18 +157,9 @@ static struct totals lay_out(struct scene_gpu *gpu)
 
 static bool check_totals(const struct scene_gpu *gpu, const struct totals *totals, struct error *error)
 {
-    const struct {
-        const char *what;
-        uint64_t count;
-    } rows[] = {{"triangles", totals->triangles},
-                {"vertices", totals->vertices + totals->close_vertices},
-                {"spheres", totals->spheres}};
-    uint64_t max = gpu->device->facts.texture_buffer_texels_max;
-    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
-        if (rows[i].count > max)
-            return error_set(error, ERROR_LIMIT, "scene", "%llu %s; this device's texel buffers hold at most %llu",
-                             (unsigned long long)rows[i].count, rows[i].what, (unsigned long long)max);
-    return true;
+    return scene_gpu_check_texels(gpu, totals->triangles, "triangles", error) &&
+           scene_gpu_check_texels(gpu, totals->vertices + totals->close_vertices, "vertices", error) &&
+           scene_gpu_check_texels(gpu, totals->spheres, "spheres", error);
 }
 
 /* Runs of primitives with one material: the ranges, and the default material in the gaps between them. */

@@ -120,7 +120,7 @@ static void add_motion(struct fresh *fresh, struct instance *instance, const flo
         moves = moves || memcmp(matrices[p], matrices[0], 12 * sizeof(float)) != 0;
     if (!moves)
         return;
-    instance->motion = fresh->motion_count * 3 + 1;
+    instance->motion = fresh->motion_count * MOTION_TEXELS + 1;
     instance->flags |= pose_count << INSTANCE_POSES_SHIFT;
     for (uint32_t p = 0; p < pose_count; p++)
         memcpy(fresh->motions[fresh->motion_count++], matrices[p], 12 * sizeof(float));
@@ -199,6 +199,13 @@ static bool flatten(struct scene_gpu *gpu, const struct scene *scene, const stru
     return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the instances of a scene");
 }
 
+static bool check_fresh(const struct scene_gpu *gpu, const struct fresh *fresh, struct error *error)
+{
+    return scene_gpu_check_texels(gpu, (uint64_t)fresh->count * INSTANCE_TEXELS, "texels of instances", error) &&
+           scene_gpu_check_texels(gpu, (uint64_t)fresh->motion_count * MOTION_TEXELS,
+                                  "texels of what moves while the shutter is open", error);
+}
+
 static bool upload(struct scene_gpu *gpu, const struct fresh *fresh, struct scene_changes *changes,
                    struct error *error)
 {
@@ -226,7 +233,8 @@ bool scene_gpu_upload_instances(struct scene_gpu *gpu, const struct scene *scene
                                 struct error *error)
 {
     struct fresh fresh;
-    if (!flatten(gpu, scene, motion, &fresh, error) || !upload(gpu, &fresh, changes, error)) {
+    if (!flatten(gpu, scene, motion, &fresh, error) || !check_fresh(gpu, &fresh, error) ||
+        !upload(gpu, &fresh, changes, error)) {
         free(fresh.instances);
         free(fresh.motions);
         return false;
@@ -297,26 +305,28 @@ static void grow(float lower[3], float upper[3], const float low[3], const float
     }
 }
 
+const float (*scene_gpu_poses(const struct scene_gpu *gpu, const struct instance *instance,
+                              uint32_t *pose_count))[12]
+{
+    *pose_count = 1;
+    if (instance->motion == 0)
+        return (const float(*)[12])(const void *)instance->world_from_object;
+    *pose_count = instance->flags >> INSTANCE_POSES_SHIFT & INSTANCE_POSES_MASK;
+    return (const float(*)[12]) & gpu->motions[(instance->motion - 1) / MOTION_TEXELS];
+}
+
 void scene_gpu_instance_bounds(const struct scene_gpu *gpu, uint32_t index, float lower_world[3],
                                float upper_world[3])
 {
     const struct instance *instance = &gpu->instances[index];
     const struct scene_gpu_geometry *geometry = &gpu->geometries[instance->geometry];
-    if (instance->motion == 0) {
-        affine_bounds(lower_world, upper_world, (const float *)(const void *)instance->world_from_object,
-                      geometry->lower, geometry->upper);
-        return;
-    }
+    uint32_t pose_count;
+    const float(*poses)[12] = scene_gpu_poses(gpu, instance, &pose_count);
+    affine_bounds(lower_world, upper_world, poses[0], geometry->lower, geometry->upper);
     /* Between two poses a point goes straight from where the one has it to where the other does. */
-    uint32_t pose_count = instance->flags >> INSTANCE_POSES_SHIFT & INSTANCE_POSES_MASK;
-    uint32_t first = (instance->motion - 1) / 3;
-    for (uint32_t p = 0; p < pose_count; p++) {
+    for (uint32_t p = 1; p < pose_count; p++) {
         float low[3], high[3];
-        affine_bounds(low, high, gpu->motions[first + p], geometry->lower, geometry->upper);
-        if (p == 0) {
-            memcpy(lower_world, low, sizeof(low));
-            memcpy(upper_world, high, sizeof(high));
-        }
+        affine_bounds(low, high, poses[p], geometry->lower, geometry->upper);
         grow(lower_world, upper_world, low, high);
     }
 }

@@ -45,6 +45,9 @@ uint64_t scene_gpu_mix(uint64_t x);
 /* Changes when an object of the kind is added, removed or set again; 0 for none. */
 uint64_t scene_gpu_signature(const struct scene *scene, enum scene_object_kind kind);
 
+/* What the device's texel buffers do not hold is refused: "5 `what`; this device's ..." */
+bool scene_gpu_check_texels(const struct scene_gpu *gpu, uint64_t count, const char *what, struct error *error);
+
 /* scene_gpu_material.c. Indices first: geometry is packed with them. */
 bool scene_gpu_index_materials(struct scene_gpu *gpu, const struct scene *scene, struct error *error);
 uint32_t scene_gpu_material_index(const struct scene_gpu *gpu, uint32_t material_id); /* 0: the default */

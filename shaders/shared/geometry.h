@@ -16,6 +16,7 @@ struct instance {
 };
 SHARED_SIZE(instance, 112)
 #define INSTANCE_TEXELS 7       /* RGBA32UI */
+#define MOTION_TEXELS 3         /* RGBA32F, a matrix in `motions` */
 #define INSTANCE_MIRRORED 1u    /* negative determinant: winding is reversed */
 #define INSTANCE_POSES_SHIFT 8u /* bits 8..11: number of those matrices, at even distances of time */
 #define INSTANCE_POSES_MASK 15u

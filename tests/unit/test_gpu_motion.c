@@ -466,6 +466,25 @@ static void materials_and_lights_follow_the_first_pose(void **state)
     fixture_finish(&fixture);
 }
 
+static void more_moving_instances_than_the_device_holds_are_refused(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct scene_motion motion;
+    struct error error = {0};
+    fixture_init(&fixture, many_instances());
+    uint64_t texels_max = device->facts.texture_buffer_texels_max;
+    device->facts.texture_buffer_texels_max = MANY * 5 * MOTION_TEXELS - 1;
+    motion_of_many(&motion, 5, 0);
+    assert_false(scene_gpu_update(&fixture.gpu, fixture.scene, &motion, &fixture.changes, NULL, &error));
+    assert_int_equal(error.kind, ERROR_LIMIT);
+    device->facts.texture_buffer_texels_max++;
+    update(&fixture, &motion);
+    assert_int_equal(fixture.gpu.motion_count, MANY * 5);
+    device->facts.texture_buffer_texels_max = texels_max;
+    fixture_finish(&fixture);
+}
+
 /* Without a look at what is flat no ray could be taken to its space. */
 static void what_is_flat_in_some_pose_is_left_out(void **state)
 {
@@ -534,6 +553,7 @@ int main(void)
         cmocka_unit_test(a_thousand_moving_instances_upload_their_transforms_alone),
         cmocka_unit_test(an_instance_is_bounded_wherever_it_goes),
         cmocka_unit_test(materials_and_lights_follow_the_first_pose),
+        cmocka_unit_test(more_moving_instances_than_the_device_holds_are_refused),
         cmocka_unit_test(what_is_flat_in_some_pose_is_left_out),
         cmocka_unit_test(the_reference_refuses_what_turns_flat_between_two_poses),
     };
