@@ -245,7 +245,6 @@ static bool keys_camera(const struct engine_job *job, const struct pose_view *gi
 {
     struct camera_key key;
     animation_key_at(job->keys, job->key_count, time_s, &key);
-    key.time_s = (float)time_s;
     if (given->given & POSE_VIEW_EYE)
         memcpy(key.eye_world, given->eye_world, sizeof key.eye_world);
     if (given->given & POSE_VIEW_LOOK_AT)

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/camera.h"
 
-#include "render/pixel_filter.h"
-
 #include <math.h>
 #include <string.h>
 
@@ -146,9 +144,6 @@ void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_re
     uniforms->jitter_pixel[2] = far_distance(camera, scene, near);
     uniforms->lens[0] = request->aperture / 2.0f;
     uniforms->lens[1] = request->focus > 0.0f ? request->focus : focus_distance(camera, scene);
-    _Static_assert(sizeof(uniforms->filter_places) / sizeof(float) > PIXEL_FILTER_INTERVALS,
-                   "room for all places");
-    pixel_filter_places((float *)uniforms->filter_places, request->filter);
     uniforms->width = request->width;
     uniforms->height = request->height;
     uniforms->tiles_across = (request->width + 7) / 8;

@@ -7,8 +7,8 @@
 #include "shared/frame.h"
 #include "trace/scene_gpu.h"
 
-/* Fills the camera's, the lens's and the pixel filter's part of the uniforms; a near, far or focal distance that
- * the request leaves open comes from the scene. */
+/* Fills the camera's and the lens's part of the uniforms; a near, far or focal distance that the request leaves
+ * open comes from the scene. */
 void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_request *request,
                           const struct scene_gpu *scene);
 

@@ -32,7 +32,9 @@ struct render_context {
     struct scene_features features;
     struct frame_uniforms uniforms;
     struct gpu_buffer uniform_buffer;
-    bool spread;            /* each pixel has its samples in places of its own; else jitter_pixel's */
+    bool spread;     /* each pixel has its samples in places of its own; else jitter_pixel's */
+    bool has_filter; /* the uniforms have the places of `filter` */
+    enum frame_filter filter;
     uint32_t wave_capacity; /* rays that the buffers below hold */
     /* The wave in hand: ray, path and, once traced, hit of each. */
     struct gpu_buffer rays, paths, hits;

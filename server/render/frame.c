@@ -248,6 +248,18 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     return reserve_waves(renderer, error);
 }
 
+/* They take a third of a millisecond, and stay from frame to frame. */
+static void fill_filter(struct render_context *context)
+{
+    _Static_assert(sizeof(context->uniforms.filter_places) / sizeof(float) > PIXEL_FILTER_INTERVALS,
+                   "room for all places");
+    if (!context->spread || (context->has_filter && context->filter == context->request.filter))
+        return;
+    pixel_filter_places((float *)context->uniforms.filter_places, context->request.filter);
+    context->filter = context->request.filter;
+    context->has_filter = true;
+}
+
 bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
                  const struct frame_request *request, struct error *error)
 {
@@ -268,6 +280,7 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
     context->uniforms.jitter_pixel[3] =
         1.0f / sqrtf(request->accumulate ? SAMPLES_GOING_ON : (float)request->samples);
     context->spread = request->samples > 1 || request->accumulate;
+    fill_filter(context);
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
     if (!reserve_frame(renderer, error) || !gpu_check(renderer->device, "beginning a frame", error))
         return false;

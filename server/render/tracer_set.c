@@ -3,19 +3,20 @@
 
 #include <string.h>
 
-static const struct scene_changes everything = {
-    .geometry = true, .deformed = true, .instances = true, .shading = true, .lights = true};
-
 void tracer_set_note(struct tracer_set *set, const struct scene_changes *changes)
 {
-    const struct scene_changes *noted = changes ? changes : &everything;
     for (int i = 0; i < TRACERS_KEPT; i++) {
         struct scene_changes *pending = &set->slots[i].pending;
-        pending->geometry |= noted->geometry;
-        pending->deformed |= noted->deformed;
-        pending->instances |= noted->instances;
-        pending->shading |= noted->shading;
-        pending->lights |= noted->lights;
+        if (!changes) {
+            if (set->slots[i].tracer)
+                tracer_outdate(set->slots[i].tracer);
+            continue;
+        }
+        pending->geometry |= changes->geometry;
+        pending->deformed |= changes->deformed;
+        pending->instances |= changes->instances;
+        pending->shading |= changes->shading;
+        pending->lights |= changes->lights;
     }
 }
 
@@ -49,7 +50,6 @@ static struct tracer_slot *make_slot(struct tracer_set *set, struct gpu_device *
         return NULL;
     oldest->impl = impl;
     oldest->options = *options;
-    oldest->pending = everything;
     return oldest;
 }
 
@@ -62,10 +62,8 @@ struct tracer *tracer_set_get(struct tracer_set *set, struct scene_gpu *scene, c
     if (!slot)
         return NULL;
     slot->last_use = ++set->use_count;
-    if (!tracer_update(slot->tracer, scene, &slot->pending, times, error)) {
-        slot->pending = everything;
+    if (!tracer_update(slot->tracer, scene, &slot->pending, times, error))
         return NULL;
-    }
     slot->pending = (struct scene_changes){0};
     return slot->tracer;
 }

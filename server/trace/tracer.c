@@ -77,6 +77,11 @@ bool tracer_update(struct tracer *tracer, struct scene_gpu *scene, const struct 
     return ok;
 }
 
+void tracer_outdate(struct tracer *tracer)
+{
+    tracer->updated = false;
+}
+
 static bool buffer_holds(const struct gpu_buffer *buffer, uint32_t count, size_t item_bytes)
 {
     return buffer && buffer->size_bytes / item_bytes >= count;

@@ -69,8 +69,11 @@ const struct tracer_impl *tracer_find(unsigned number, const char *field, struct
 struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *device,
                              const struct tracer_options *options, struct error *error);
 void tracer_destroy(struct tracer *tracer); /* accepts NULL */
+/* The first update, and the first one after a failure, takes everything to be changed. */
 bool tracer_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
                    struct stage_times *times, struct error *error);
+/* So does the next one: it is not known what changed. */
+void tracer_outdate(struct tracer *tracer);
 /* Traces rays 0 .. wave->ray_count - 1 (at least 1 and at most what the buffers hold, which is checked). */
 bool tracer_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error);
 
