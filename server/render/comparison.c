@@ -25,10 +25,11 @@ struct comparison {
     struct wave_compare_settings settings;
     bool prepared[2][COMPARED_WAVES_MAX]; /* this frame: kind of wave, number */
     struct gpu_buffer hits, visibility;   /* the second tracer's */
-    struct gpu_buffer moved_rays, moved_hits, moved_visibility;
+    struct gpu_buffer moved_rays, moved_times, moved_hits, moved_visibility;
     struct tally_list slice, frame;
     struct chunk {
         struct ray rays[CHUNK_RAYS], moved[CHUNK_RAYS];
+        float times[CHUNK_RAYS], moved_times[CHUNK_RAYS];
         struct hit first[CHUNK_RAYS], second[CHUNK_RAYS], moved_hits[CHUNK_RAYS];
         uint first_visibility[CHUNK_RAYS], second_visibility[CHUNK_RAYS], moved_visibility[CHUNK_RAYS];
         uint32_t suspects[CHUNK_RAYS];
@@ -128,6 +129,7 @@ void comparison_destroy(struct comparison *comparison)
     gpu_buffer_finish(comparison->device, &comparison->hits);
     gpu_buffer_finish(comparison->device, &comparison->visibility);
     gpu_buffer_finish(comparison->device, &comparison->moved_rays);
+    gpu_buffer_finish(comparison->device, &comparison->moved_times);
     gpu_buffer_finish(comparison->device, &comparison->moved_hits);
     gpu_buffer_finish(comparison->device, &comparison->moved_visibility);
     free(comparison->chunk);
@@ -137,8 +139,8 @@ void comparison_destroy(struct comparison *comparison)
 uint64_t comparison_device_bytes(const struct comparison *comparison)
 {
     return comparison->hits.capacity_bytes + comparison->visibility.capacity_bytes +
-           comparison->moved_rays.capacity_bytes + comparison->moved_hits.capacity_bytes +
-           comparison->moved_visibility.capacity_bytes;
+           comparison->moved_rays.capacity_bytes + comparison->moved_times.capacity_bytes +
+           comparison->moved_hits.capacity_bytes + comparison->moved_visibility.capacity_bytes;
 }
 
 void comparison_begin(struct comparison *comparison, struct scene_gpu *scene, struct tracer *first,
@@ -194,20 +196,36 @@ bool comparison_prepare(struct comparison *comparison, const struct wave *wave, 
     return true;
 }
 
-/* Asks the second tracer about suspects `first` .. `first + count - 1` of the chunk. */
+/* Moves suspects `first` .. `first + count - 1` of the chunk in space; each stays at its own time. */
+static bool upload_moved(struct comparison *comparison, const struct wave_answers *answers, uint32_t first,
+                         uint32_t count, struct error *error)
+{
+    struct chunk *chunk = comparison->chunk;
+    size_t moved_count = (size_t)count * WAVE_MOVES;
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t suspect = chunk->suspects[first + i];
+        wave_moved_rays(&comparison->settings, answers, suspect, &chunk->moved[i * WAVE_MOVES]);
+        for (uint32_t k = 0; k < WAVE_MOVES; k++)
+            chunk->moved_times[i * WAVE_MOVES + k] = chunk->times[suspect];
+    }
+    return gpu_buffer_upload(comparison->device, &comparison->moved_rays, chunk->moved,
+                             moved_count * sizeof(struct ray), error) &&
+           gpu_buffer_upload(comparison->device, &comparison->moved_times, chunk->moved_times,
+                             moved_count * sizeof(float), error);
+}
+
+/* Asks the second tracer about them again. */
 static bool trace_moved(struct comparison *comparison, enum wave_kind kind, const struct wave_answers *answers,
                         uint32_t first, uint32_t count, struct error *error)
 {
     struct chunk *chunk = comparison->chunk;
     struct gpu_device *device = comparison->device;
-    for (uint32_t i = 0; i < count; i++)
-        wave_moved_rays(&comparison->settings, answers, chunk->suspects[first + i], &chunk->moved[i * WAVE_MOVES]);
-    if (!gpu_buffer_upload(device, &comparison->moved_rays, chunk->moved,
-                           (size_t)count * WAVE_MOVES * sizeof(struct ray), error))
+    if (!upload_moved(comparison, answers, first, count, error))
         return false;
     const struct wave wave = {.kind = kind,
                               .ray_count = count * WAVE_MOVES,
                               .rays = &comparison->moved_rays,
+                              .times = &comparison->moved_times,
                               .hits = &comparison->moved_hits,
                               .visibility = &comparison->moved_visibility};
     if (!reserve_answers(comparison, &wave, wave.hits, wave.visibility, error) ||
@@ -244,6 +262,10 @@ static struct wave_answers read_answers(struct comparison *comparison, const str
     struct chunk *chunk = comparison->chunk;
     struct wave_answers answers = {.count = count, .rays = chunk->rays};
     gpu_buffer_read(device, wave->rays, first * sizeof(struct ray), chunk->rays, count * sizeof(struct ray));
+    if (wave->times)
+        gpu_buffer_read(device, wave->times, first * sizeof(float), chunk->times, count * sizeof(float));
+    else
+        memset(chunk->times, 0, sizeof chunk->times);
     if (wave->kind == WAVE_ANY) {
         size_t offset = first * sizeof(uint), bytes = count * sizeof(uint);
         gpu_buffer_read(device, wave->visibility, offset, chunk->first_visibility, bytes);

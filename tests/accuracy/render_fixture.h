@@ -195,14 +195,14 @@ static inline void fixture_commit(struct fixture *fixture)
     fixture->edit_count = 0;
 }
 
-/* Commits what waits and renders the request. */
-static inline struct frame_result fixture_render(struct fixture *fixture)
+/* Commits what waits and renders the request while things move so (NULL: not at all). */
+static inline struct frame_result fixture_render_motion(struct fixture *fixture, const struct scene_motion *motion)
 {
     struct error error = {0};
     struct frame_result result = {0};
     if (fixture->edit_count > 0)
         fixture_commit(fixture);
-    if (!frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error))
+    if (!frame_begin(fixture->renderer, fixture->scene, motion, &fixture->request, &error))
         fail_msg("frame_begin: %s: %s", error.field, error.text);
     enum frame_progress progress;
     do {
@@ -211,6 +211,11 @@ static inline struct frame_result fixture_render(struct fixture *fixture)
     if (progress != FRAME_DONE)
         fail_msg("frame_step: %s: %s", error.field, error.text);
     return result;
+}
+
+static inline struct frame_result fixture_render(struct fixture *fixture)
+{
+    return fixture_render_motion(fixture, NULL);
 }
 
 static inline const float *fixture_pixel(const struct frame_result *result, uint32_t x, uint32_t y)

@@ -116,23 +116,6 @@ static void in_motion(struct fixture *fixture)
 
 /* ---- statistics ---- */
 
-/* As fixture_render(), with what moves. */
-static struct frame_result render(struct fixture *fixture, const struct scene_motion *motion)
-{
-    struct error error = {0};
-    struct frame_result result = {0};
-    if (fixture->edit_count > 0)
-        fixture_commit(fixture);
-    if (!frame_begin(fixture->renderer, fixture->scene, motion, &fixture->request, &error))
-        fail_msg("frame_begin: %s: %s", error.field, error.text);
-    enum frame_progress progress;
-    while ((progress = frame_step(fixture->renderer, &result, &error)) == FRAME_MORE)
-        ;
-    if (progress != FRAME_DONE)
-        fail_msg("frame_step: %s: %s", error.field, error.text);
-    return result;
-}
-
 static const struct scene_motion *motion_of_scene; /* NULL: nothing moves */
 
 /* Green of every pixel. */
@@ -140,7 +123,7 @@ static void picture(struct fixture *fixture, uint32_t samples, uint64_t seed, do
 {
     fixture->request.samples = samples;
     fixture->request.seed = seed;
-    struct frame_result result = render(fixture, motion_of_scene);
+    struct frame_result result = fixture_render_motion(fixture, motion_of_scene);
     for (uint32_t i = 0; i < PIXELS; i++)
         values[i] = (double)fixture_pixel(&result, i % EDGE, i / EDGE)[1];
     frame_result_finish(&result);
@@ -308,7 +291,7 @@ static void what_moves_is_seen_for_as_long_as_it_is_there(void **state)
     fixture->request.camera.ortho_height = 0.8f;
     for (int i = 0; i < 2; i++) {
         fixture->request.integrator = i ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_WHITTED;
-        struct frame_result result = render(fixture, &falling);
+        struct frame_result result = fixture_render_motion(fixture, &falling);
         for (uint32_t p = 0; p < WIDTH * WIDTH; p++)
             /* a third of the time, and one in each 256th of it: off by a sample at each end */
             assert_near(fixture_pixel(&result, p % WIDTH, p / WIDTH)[0], 1.0 / 3.0, 2.01 / SAMPLES + 0.01);
@@ -326,7 +309,7 @@ static void motion_of_other_content_begins_an_accumulated_picture_from_new(void 
     for (int i = 0; i < 5; i++) {
         if (i == 2)
             fall[1].parent_from_node[7] -= 0.1f;
-        struct frame_result result = render(fixture, i == 4 ? NULL : &falling);
+        struct frame_result result = fixture_render_motion(fixture, i == 4 ? NULL : &falling);
         assert_int_equal(result.samples, expected[i]);
         frame_result_finish(&result);
     }

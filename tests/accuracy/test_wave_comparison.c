@@ -267,6 +267,29 @@ static void lost_hits_are_caught_in_their_wave(void **state)
     frame_result_finish(&result);
 }
 
+/* A ray that is asked about again must be so at its own time: where the shutter opens the ball is elsewhere, and a
+ * ray that lost it would seem to have passed its edge. */
+static void lost_hits_are_caught_where_things_move(void **state)
+{
+    struct fixture *fixture = *state;
+    fixture_sphere(fixture, -4.0f, 0.0f, 0.0f, 1.0f, fixture_material(fixture)->base.id);
+    uint32_t node = fixture->next_id - 1;
+    struct pose_node places[2] = {{.node = node, .parent_from_node = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}},
+                                  {.node = node, .parent_from_node = {1, 0, 0, 8, 0, 1, 0, 0, 0, 0, 1, 0}}};
+    struct scene_pose poses[2] = {{.nodes = &places[0], .node_count = 1}, {.nodes = &places[1], .node_count = 1}};
+    const struct scene_motion motion = {.poses = poses, .pose_count = 2};
+    fixture->request.tracer = TRACER_BVH;
+    fixture->request.compare = true;
+    fixture->request.compare_with = TRACER_NAIVE;
+    fixture->request.samples = 4;
+    examine_wrong(fixture, WRONG_MISSES, RAY_PRIMARY);
+    struct frame_result result = fixture_render_motion(fixture, &motion);
+    const struct wave_comparison *figures = assert_only_wrong(&result, 0, RAY_PRIMARY);
+    assert_true(figures->only_second > 100);
+    assert_true(figures->edges < figures->only_second / 20);
+    frame_result_finish(&result);
+}
+
 static void hits_of_nothing_are_caught_in_their_wave(void **state)
 {
     struct fixture *fixture = *state;
@@ -427,6 +450,7 @@ int main(void)
         TEST(comparing_changes_no_byte_of_the_picture),
         TEST(slices_that_overflow_are_counted_once),
         TEST(lost_hits_are_caught_in_their_wave),
+        TEST(lost_hits_are_caught_where_things_move),
         TEST(hits_of_nothing_are_caught_in_their_wave),
         TEST(wrong_distances_are_far_and_their_size_is_told),
         TEST(imprecise_distances_are_hits_with_an_error),
