@@ -42,8 +42,9 @@ struct frame_request {
     float aperture; /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
     float focus;    /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
     enum frame_filter filter;
-    /* The frame goes on where the one before it ended, if that showed the same: scene, motion and request alike
-     * but for `samples`; it adds its samples to those. */
+    /* The frame goes on where the one before it ended, if that showed the same and was to be gone on from: scene,
+     * motion and request alike but for `samples` and what is done with the sum (format, tone map, exposure); it
+     * adds its samples to those. n frames of k samples hold what one of n x k does, to the bit. */
     bool accumulate;
     /* Every wave is traced by a second tracer too, primary rays included (`primary` is taken to be PRIMARY_TRACE),
      * and the result has what came of it. The picture is that of `tracer`. */
@@ -52,7 +53,10 @@ struct frame_request {
     float compare_far_share; /* 0: WAVE_FAR_SHARE, see trace/wave_compare.h */
 };
 
-/* What a picture holds:
+/* Of one sample, that is not to be added to, the place is the pixel's middle; several are spread by the filter.
+ * With a lens, or where something moves, first hits are traced whatever `primary` says.
+ *
+ * What a picture holds:
  *   linear formats  mean radiance of the samples times 2^exposure_stops, premultiplied by alpha
  *   RGBA8           the same divided by alpha, tone-mapped, sRGB
  *   alpha           1 where there is a surface (what blended surfaces leave open goes on to what lies behind) and

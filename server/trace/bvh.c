@@ -358,7 +358,7 @@ static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const stru
         defines[n++] = (struct gpu_define){"SHARED_ORIGIN", "1"};
     if (bvh->store.deforms)
         defines[n++] = (struct gpu_define){"BVH_DEFORMS", "1"};
-    if (bvh->store.deforms_in_shutter && wave->times)
+    if (bvh->store.deforms_in_shutter && wave->times) /* else all rays see the vertices of the first pose */
         defines[n++] = (struct gpu_define){"BVH_DEFORMS_IN_SHUTTER", "1"};
     const struct trace_program_source source = {
         .traverse = "bvh/traverse.glsl",

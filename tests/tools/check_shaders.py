@@ -25,8 +25,11 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "RAYS_TOGE
 CHOICES = {
     "trace.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
     "bvh/coherence.comp": [[{"RAYS_TOGETHER": "8"}]],
+    "bvh/refit_write.comp": [[{"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}]],
     "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
 }
+# Defines that come only with others.
+WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION")}
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"]}
 # Storage blocks of a stage; server/gpu/device.c asks a driver for as many.
 STORAGE_BLOCKS_MAX = {".comp": 16, ".vert": 4, ".frag": 8}
@@ -87,6 +90,7 @@ def variants(program):
         optional = optional_defines(stages, chosen, all_chosen)
         for on in [[], optional] + [[name] for name in optional if len(optional) > 1]:
             if on or on is not optional:
+                on = [*on, *(other for name in on for other in WITH.get(name, ()))]
                 yield stages, {**chosen, **{name: "1" for name in on}}
 
 

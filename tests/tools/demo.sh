@@ -51,9 +51,10 @@ dusk=$private/scenes/dusk.hdr
 echo "--- $out/carousel.mp4, the clip 'ride' once: soft shadows, gloss, and a shutter that is open for half of every frame"
 "$bin/farlight" animate "$carousel" --environment "$dusk" --server "$server" --clip ride --fps 12 --frames 1-36 \
     --size 480x270 --samples 6 --shutter 0.5 -o "$out/carousel.mp4"
-echo "--- $out/shot.mp4, every third frame of what conf/examples/shot.json asks for: camera, focus, lamp and a colour change"
+echo "--- $out/shot.mp4, conf/examples/shot.json, smaller and with fewer frames: camera, focus, a lamp and a colour change"
 cp conf/examples/shot.json "$private/scenes/shot.json"
-"$bin/farlight" animate --script "$private/scenes/shot.json" --server "$server" --frames 1-36:3 -o "$out/shot.mp4"
+"$bin/farlight" animate --script "$private/scenes/shot.json" --server "$server" --fps 8 --frames 1-24 \
+    --size 320x180 --samples 6 -o "$out/shot.mp4"
 echo "--- $out/lens.png, the clip at 0.7 s through a wide open lens, in focus on the nearest pot"
 "$bin/farlight" render "$carousel" --environment "$dusk" --server "$server" --clip ride --time 0.7 --size 640x360 \
     --samples 16 --aperture 0.3 --focus 7.4 --timings -o "$out/lens.png"
