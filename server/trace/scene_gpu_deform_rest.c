@@ -202,39 +202,43 @@ struct rest_totals {
     uint32_t arrays; /* bit by mesh_array: some mesh has it */
 };
 
+static bool add_mesh(struct scene_gpu_deform *deform, const struct scene_mesh *mesh, struct rest_totals *totals)
+{
+    struct deform_mesh *rest = &deform->meshes[deform->mesh_count++];
+    *rest = (struct deform_mesh){
+        .id = mesh->base.id,
+        .first_vertex = (uint32_t)totals->vertices,
+        .first_influence = (uint32_t)totals->influences,
+        .first_target_vertex = (uint32_t)totals->target_vertices,
+    };
+    totals->vertices += mesh->vertex_count;
+    totals->influences += (uint64_t)mesh->vertex_count * mesh->influence_count;
+    totals->target_vertices += (uint64_t)mesh->vertex_count * mesh->target_count;
+    for (int array = 0; array < MESH_ARRAY_COUNT; array++)
+        totals->arrays |= mesh->arrays[array] ? 1u << array : 0;
+    return find_joint_boxes(rest, mesh) && find_target_boxes(rest, mesh);
+}
+
 static bool list_meshes(struct scene_gpu *gpu, const struct scene *scene, struct rest_totals *totals)
 {
     struct scene_gpu_deform *deform = &gpu->state->deform;
+    struct hashmap place_by_id = {0}; /* plus 1 */
     drop_meshes(deform);
     deform->meshes = calloc((size_t)deform->use_count + 1, sizeof(*deform->meshes));
-    if (!deform->meshes)
-        return false;
-    for (uint32_t i = 0; i < deform->use_count; i++) {
+    bool ok = deform->meshes != NULL;
+    for (uint32_t i = 0; ok && i < deform->use_count; i++) {
         struct deform_use *use = &deform->uses[i];
-        uint32_t m = 0;
-        while (m < deform->mesh_count && deform->meshes[m].id != use->mesh_id)
-            m++;
-        use->mesh = m;
+        uintptr_t place = (uintptr_t)hashmap_get(&place_by_id, use->mesh_id);
         use->is_placed = false;
-        if (m < deform->mesh_count)
-            continue;
-        const struct scene_mesh *mesh = scene_mesh(scene, use->mesh_id);
-        struct deform_mesh *rest = &deform->meshes[deform->mesh_count++];
-        *rest = (struct deform_mesh){
-            .id = use->mesh_id,
-            .first_vertex = (uint32_t)totals->vertices,
-            .first_influence = (uint32_t)totals->influences,
-            .first_target_vertex = (uint32_t)totals->target_vertices,
-        };
-        totals->vertices += mesh->vertex_count;
-        totals->influences += (uint64_t)mesh->vertex_count * mesh->influence_count;
-        totals->target_vertices += (uint64_t)mesh->vertex_count * mesh->target_count;
-        for (int array = 0; array < MESH_ARRAY_COUNT; array++)
-            totals->arrays |= mesh->arrays[array] ? 1u << array : 0;
-        if (!find_joint_boxes(rest, mesh) || !find_target_boxes(rest, mesh))
-            return false;
+        if (!place) {
+            place = (uintptr_t)deform->mesh_count + 1;
+            ok = add_mesh(deform, scene_mesh(scene, use->mesh_id), totals) &&
+                 hashmap_put(&place_by_id, use->mesh_id, (void *)place);
+        }
+        use->mesh = (uint32_t)(place - 1);
     }
-    return true;
+    hashmap_finish(&place_by_id);
+    return ok;
 }
 
 static bool check_totals(const struct scene_gpu *gpu, const struct rest_totals *totals, struct error *error)

@@ -37,40 +37,34 @@ static uint32_t mesh_flags(const struct scene_mesh *mesh)
     return flags;
 }
 
-/* By mesh id: whether a node shows the mesh as it is. */
-static bool find_rigid_meshes(const struct scene *scene, struct hashmap *shown)
+/* By mesh id: those that nodes deform, and that no other node shows as they are. They have no rigid geometry
+ * beside those of the nodes. */
+static bool find_only_deformed(const struct scene_gpu *gpu, const struct scene *scene, struct hashmap *meshes)
 {
+    const struct scene_gpu_deform *deform = &gpu->state->deform;
     size_t cursor = 0;
     uint64_t id;
     void *value;
     bool ok = true;
-    while (ok && hashmap_next(&scene->objects[SCENE_NODE], &cursor, &id, &value)) {
+    for (uint32_t i = 0; ok && i < deform->use_count; i++)
+        ok = hashmap_put(meshes, deform->uses[i].mesh_id, &deform->uses[i]);
+    while (ok && meshes->count > 0 && hashmap_next(&scene->objects[SCENE_NODE], &cursor, &id, &value)) {
         const struct scene_node *node = value;
         const struct scene_mesh *mesh = node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;
         if (mesh && !scene_node_deforms(node, mesh))
-            ok = hashmap_put(shown, node->object, value);
+            hashmap_remove(meshes, node->object);
     }
     return ok;
 }
 
-/* A mesh that nodes deform has no rigid geometry beside theirs unless another node shows it as it is. */
-static bool is_only_deformed(const struct scene_gpu *gpu, uint32_t mesh, const struct hashmap *shown)
-{
-    const struct scene_gpu_deform *deform = &gpu->state->deform;
-    bool deforms = false;
-    for (uint32_t i = 0; !deforms && i < deform->use_count; i++)
-        deforms = deform->uses[i].mesh_id == mesh;
-    return deforms && !hashmap_get(shown, mesh);
-}
-
-static void add_meshes(struct scene_gpu *gpu, const struct scene *scene, const struct hashmap *shown)
+static void add_meshes(struct scene_gpu *gpu, const struct scene *scene, const struct hashmap *only_deformed)
 {
     size_t cursor = 0;
     uint64_t id;
     void *value;
     while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, &id, &value)) {
         const struct scene_mesh *mesh = value;
-        if (is_only_deformed(gpu, (uint32_t)id, shown))
+        if (hashmap_get(only_deformed, id))
             continue;
         struct scene_gpu_geometry *geometry = &gpu->geometries[gpu->geometry_count++];
         *geometry = (struct scene_gpu_geometry){.mesh = mesh, .id = (uint32_t)id, .revision = mesh->base.revision};
@@ -102,18 +96,18 @@ static void add_sphere_sets(struct scene_gpu *gpu, const struct scene *scene)
 static bool list_geometries(struct scene_gpu *gpu, const struct scene *scene, struct error *error)
 {
     const struct scene_gpu_deform *deform = &gpu->state->deform;
-    struct hashmap shown = {0};
+    struct hashmap only_deformed = {0};
     size_t total = scene->objects[SCENE_MESH].count + scene->objects[SCENE_SPHERES].count + deform->use_count;
     free(gpu->geometries);
     gpu->geometry_count = 0;
     gpu->geometries = calloc(total ? total : 1, sizeof(*gpu->geometries));
-    bool ok = gpu->geometries && (deform->use_count == 0 || find_rigid_meshes(scene, &shown));
+    bool ok = gpu->geometries && find_only_deformed(gpu, scene, &only_deformed);
     if (ok) {
-        add_meshes(gpu, scene, &shown);
+        add_meshes(gpu, scene, &only_deformed);
         add_sphere_sets(gpu, scene);
         gpu->state->rigid_count = gpu->geometry_count;
     }
-    hashmap_finish(&shown);
+    hashmap_finish(&only_deformed);
     for (uint32_t i = 0; ok && i < deform->use_count; i++)
         gpu->geometries[gpu->geometry_count++] = (struct scene_gpu_geometry){
             .mesh = scene_mesh(scene, deform->uses[i].mesh_id),

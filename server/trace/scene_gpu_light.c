@@ -142,6 +142,10 @@ bool scene_gpu_upload_lights(struct scene_gpu *gpu, const struct scene *scene, c
     if (!upload_environment(gpu, scene, changes, error) ||
         !pack_lights(gpu, scene, motion ? &motion->poses[0] : NULL, &packed, error))
         return false;
+    if (!scene_gpu_check_texels(gpu, (uint64_t)gpu->light_count * LIGHT_TEXELS, "texels of lights", error)) {
+        free(packed);
+        return false;
+    }
     find_bounds(gpu, packed);
     size_t bytes = gpu->light_count * sizeof(*packed);
     /* Also after a change of geometry alone: then the lights are as they were. */

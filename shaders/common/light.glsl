@@ -6,11 +6,11 @@
 #include "shared/light.h"
 #include "common/math.glsl"
 
-layout(binding = UNIT_SHADE_LIGHTS) uniform samplerBuffer lights; // five texels each
+layout(binding = UNIT_SHADE_LIGHTS) uniform samplerBuffer lights;
 
 light light_at(uint index)
 {
-    int texel = int(5u * index);
+    int texel = int(index) * LIGHT_TEXELS;
     return light(texelFetch(lights, texel), texelFetch(lights, texel + 1), texelFetch(lights, texel + 2),
                  texelFetch(lights, texel + 3), texelFetch(lights, texel + 4));
 }

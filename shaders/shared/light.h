@@ -12,6 +12,7 @@ struct light {
     vec4 half_v_outer;    /* rectangle: half edge; w: cosine of the outer cone */
 };
 SHARED_SIZE(light, 80)
+#define LIGHT_TEXELS 5 /* RGBA32F */
 #define LIGHT_KIND_POINT 0
 #define LIGHT_KIND_SPOT 1
 #define LIGHT_KIND_DIRECTIONAL 2
