@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What can only be said once the scene is there. */
 #include "cli/cli.h"
+#include "lib/json_text.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -19,6 +20,13 @@ static bool in_script(const struct cli_job *job, unsigned line, const char *path
                  why.text);
     return fl_error_remedy(error, "%s",
                            why.remedy[0] != '\0' ? why.remedy : "'farlight info' lists what there is");
+}
+
+static bool in_script_at(const struct cli_job *job, const struct fl_json_place *place, struct fl_error *error)
+{
+    char path[96];
+    fl_json_path(place, path, sizeof path);
+    return in_script(job, fl_json_line(job->script_json, place), path, error);
 }
 
 /* ---- clips ---- */
@@ -69,7 +77,7 @@ static bool settle_channels(struct cli_job *job, struct fl_scene *scene, struct 
         const struct cli_channel *given = &job->channels[i];
         channels[i] = given->channel;
         if (!settle_target(given, scene, &channels[i].object, error))
-            good = in_script(job, given->line, given->path, error);
+            good = in_script_at(job, given->place, error);
     }
     *use = (struct record_clip_use){.speed = 1};
     good = good && fl_scene_add_clip(scene, "script", channels, job->channel_count, &use->clip, error);

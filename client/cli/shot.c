@@ -332,6 +332,7 @@ bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli
         known[count++] = settings[i].name;
     known[count] = NULL;
     job->script = shot->path;
+    job->script_json = &shot->json;
     if (!shot_is_object(&reader, &root, known))
         return false;
     for (size_t i = 0; i < SETTING_COUNT; i++) {
