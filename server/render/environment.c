@@ -177,10 +177,9 @@ void environment_fill_uniforms(const struct environment *environment, struct fra
     uniforms->light_count = environment->default_light ? 1 : gpu->light_count;
 }
 
-void environment_bind(const struct environment *environment)
+struct gpu_buffer *environment_lights(struct environment *environment, struct scene_gpu *gpu)
 {
-    if (environment->default_light)
-        gpu_buffer_bind_storage(&environment->default_lights, BIND_LIGHTS);
+    return environment->default_light ? &environment->default_lights : &gpu->lights;
 }
 
 void environment_finish(struct environment *environment, struct gpu_device *device)

@@ -25,8 +25,8 @@ bool environment_update(struct environment *environment, struct gpu_device *devi
                         const struct scene_gpu *gpu, struct error *error);
 void environment_fill_uniforms(const struct environment *environment, struct frame_uniforms *uniforms,
                                const struct scene_gpu *gpu);
-/* Binds the default light where the scene has none; after scene_gpu_bind. */
-void environment_bind(const struct environment *environment);
+/* Of the scene, or the default light where it has none. */
+struct gpu_buffer *environment_lights(struct environment *environment, struct scene_gpu *gpu);
 void environment_finish(struct environment *environment, struct gpu_device *device);
 
 #endif

@@ -86,10 +86,12 @@ static const struct gpu_program *use(struct render_context *context, const char 
 static void bind_shading(struct wave_passes *passes, struct render_context *context)
 {
     context_bind(context);
-    gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
-    gpu_buffer_bind_storage(&context->hits, BIND_HITS);
+    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
+    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
+    gpu_buffer_bind_texels(context->device, &context->paths, UNIT_SHADE_PATHS, GL_RGBA32UI);
+    gpu_buffer_bind_texels(context->device, environment_lights(&context->environment, context->scene),
+                           UNIT_SHADE_LIGHTS, GL_RGBA32F);
     gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
-    gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     gpu_buffer_bind_storage(&passes->children, BIND_CHILDREN);
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
@@ -195,7 +197,7 @@ static bool move_children(struct wave_passes *passes, struct render_context *con
     gpu_uniform_uint(program, "children_a_hit", passes->children_a_hit);
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
     gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
-    gpu_buffer_bind_storage(&passes->children, BIND_CHILDREN);
+    gpu_buffer_bind_texels(context->device, &passes->children, UNIT_MOVE_CHILDREN, GL_RGBA32UI);
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
     gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
     if (context->scene->has_motion)

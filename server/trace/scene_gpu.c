@@ -174,7 +174,6 @@ void scene_gpu_bind(struct scene_gpu *gpu)
     gpu_buffer_bind_storage(&gpu->materials, BIND_MATERIALS);
     gpu_buffer_bind_storage(&gpu->texture_slots, BIND_TEXTURE_SLOTS);
     gpu_buffer_bind_storage(&gpu->textures, BIND_TEXTURES);
-    gpu_buffer_bind_storage(&gpu->lights, BIND_LIGHTS);
     gpu_buffer_bind_storage(&gpu->disc_buffer, BIND_DISCS);
     gpu_buffer_bind_texels(device, &gpu->triangles, UNIT_TRIANGLES, GL_RGBA32UI);
     gpu_buffer_bind_texels(device, &gpu->positions, UNIT_POSITIONS, GL_RGBA32F);

@@ -174,7 +174,7 @@ void test_triangle(uint i, entered_instance inside, object_ray o[RAYS_TOGETHER],
     vec3 way2 = uintBitsToFloat(texelFetch(bvh_primitives, close + 2).xyz) - v2;
     candidate c = candidate(0.0, inside.first_primitive + first.w, inside.index, vec2(0.0));
     for (int k = 0; k < RAYS_TOGETHER; k++) {
-        float time = r[k].time;
+        float time = time_of(r[k]);
         bool is_hit = intersect_triangle(o[k].direction, v0 + time * way0 - o[k].origin,
                                          v1 + time * way1 - o[k].origin, v2 + time * way2 - o[k].origin,
                                          c.distance, c.barycentrics);

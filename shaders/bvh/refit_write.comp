@@ -2,7 +2,7 @@
 // From boxes (refit_bounds.comp) to elements as the walk reads them, in all octants' copies. The C twin is
 // bvh_write_element() in trace/bvh_build_element.c.
 //
-// Defines: BVH_PACKED, BVH_SPHERES as in traverse.glsl.
+// Defines: BVH_PACKED, BVH_SPHERES as in traverse.glsl, one of them or none.
 #include "shared/bvh_node.h"
 #include "common/dispatch.glsl"
 #include "shared/bindings.h"
@@ -65,7 +65,7 @@ void main()
         uint place = octant < 4u ? places_0123[octant] : places_4567[octant & 3u];
         uint link = record.z != 0u ? record.z : place + record.y;
         uint element = octant * record_count + place;
-#ifdef BVH_PACKED
+#if defined BVH_PACKED && !defined BVH_SPHERES
         bvec3 negative = notEqual(uvec3(octant) & uvec3(1u, 2u, 4u), uvec3(0u));
         elements[first_texel + element] = uvec4(mix(forward, backward, negative), link);
 #else

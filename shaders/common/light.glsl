@@ -6,10 +6,14 @@
 #include "shared/light.h"
 #include "common/math.glsl"
 
-layout(std430, binding = BIND_LIGHTS) readonly buffer lights_block
+layout(binding = UNIT_SHADE_LIGHTS) uniform samplerBuffer lights; // five texels each
+
+light light_at(uint index)
 {
-    light lights[];
-};
+    int texel = int(5u * index);
+    return light(texelFetch(lights, texel), texelFetch(lights, texel + 1), texelFetch(lights, texel + 2),
+                 texelFetch(lights, texel + 3), texelFetch(lights, texel + 4));
+}
 
 struct light_sample {
     vec3 direction;  // unit, towards the light
@@ -76,7 +80,7 @@ light_sample light_sample_sphere(light l, vec3 position, vec2 u)
 // `u`: two numbers in [0, 1) that choose the point of a light that has an extent.
 light_sample light_sample_at(uint index, vec3 position, vec2 u)
 {
-    light l = lights[index];
+    light l = light_at(index);
     int kind = int(l.position_kind.w);
     if (kind == LIGHT_KIND_DIRECTIONAL)
         return light_sample(-l.direction_range.xyz, 1e30, l.colour.rgb);

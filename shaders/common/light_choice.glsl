@@ -23,7 +23,7 @@ light_receiver light_receiver_of(surface s, split parts, vec3 position, vec3 vie
 // About how much of a light goes to the eye if nothing is in the way: more than 0 wherever any of it does.
 float light_estimate(uint index, light_receiver r)
 {
-    light l = lights[index];
+    light l = light_at(index);
     int kind = int(l.position_kind.w);
     bool directional = kind == LIGHT_KIND_DIRECTIONAL;
     vec3 to_light = directional ? -l.direction_range.xyz : l.position_kind.xyz - r.position;

@@ -64,10 +64,10 @@ void main()
     if (j >= hit_count)
         return;
     uint k = hit_list[j];
-    path p = paths[k];
+    path p = path_at(k);
     vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
-    ray r = rays[k];
-    hit h = hits[k];
+    ray r = ray_at(k);
+    hit h = hit_at(k);
     vec3 direction = r.direction_t_max.xyz, view = -direction;
     surface s = surface_at(h, r.origin_t_min.xyz, direction, p.cone_width + p.cone_spread * h.distance);
     float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away

@@ -19,10 +19,10 @@ uniform uint wave_number;
 uniform uint last_wave;  // 1: no children
 uniform uint children_a_hit; // room for so many
 
-layout(std430, binding = BIND_RAYS) readonly buffer ray_block { ray rays[]; };
-layout(std430, binding = BIND_HITS) readonly buffer hit_block { hit hits[]; };
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
+layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
+layout(binding = UNIT_SHADE_PATHS) uniform usamplerBuffer paths;
 layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
-layout(std430, binding = BIND_PATHS) readonly buffer path_block { path paths[]; };
 layout(std430, binding = BIND_RADIANCE) writeonly buffer radiance_block { vec4 radiance[]; };
 layout(std430, binding = BIND_CHILDREN) writeonly buffer child_block { child children[]; };
 layout(std430, binding = BIND_CHILD_COUNTS) buffer count_block { uint child_counts[]; };
@@ -36,6 +36,26 @@ layout(std430, binding = BIND_RAY_TIMES) writeonly buffer time_block { float sha
 // what rounding may be off.
 const float OFFSET = 1.0 / 65536.0;
 const float FAR = 1e30;
+
+ray ray_at(uint k)
+{
+    return ray(texelFetch(rays, int(2u * k)), texelFetch(rays, int(2u * k + 1u)));
+}
+
+hit hit_at(uint k)
+{
+    uvec4 a = texelFetch(hits, int(3u * k)), b = texelFetch(hits, int(3u * k + 1u)), c = texelFetch(hits, int(3u * k + 2u));
+    vec4 uv01 = uintBitsToFloat(b);
+    return hit(uintBitsToFloat(a.x), a.y, a.z, a.w, uv01.x, uv01.y, uv01.z, uv01.w, c.x, c.y, c.z, c.w);
+}
+
+path path_at(uint k)
+{
+    uvec4 a = texelFetch(paths, int(2u * k)), b = texelFetch(paths, int(2u * k + 1u));
+    vec3 weight = uintBitsToFloat(a.xyz);
+    return path(weight.r, weight.g, weight.b, a.w, uintBitsToFloat(b.x), uintBitsToFloat(b.y), b.z,
+                uintBitsToFloat(b.w));
+}
 
 // Of which pixel and sample a path is: for common/sequence.glsl.
 uint path_seed(path p)

@@ -81,10 +81,10 @@ void main()
     if (j >= hit_count)
         return;
     uint k = hit_list[j];
-    path p = paths[k];
+    path p = path_at(k);
     vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
-    ray r = rays[k];
-    hit h = hits[k];
+    ray r = ray_at(k);
+    hit h = hit_at(k);
     bool first = first_light == 0u;
     float width = p.cone_width + p.cone_spread * h.distance;
     surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, width);

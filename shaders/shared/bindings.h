@@ -12,7 +12,6 @@
 #define BIND_MATERIALS 6
 #define BIND_TEXTURE_SLOTS 7
 #define BIND_TEXTURES 8
-#define BIND_LIGHTS 9
 #define BIND_DISCS 10
 #define BIND_TRACER_0 11 /* the tracer's own */
 #define BIND_TRACER_1 12
@@ -57,6 +56,10 @@
 #define UNIT_TARGET_TANGENTS 7
 #define UNIT_DEFORM_PARAMETERS 8
 
+#define UNIT_SHADE_HITS UNIT_TRACER_0 /* in passes without a tracer */
+#define UNIT_SHADE_PATHS UNIT_TRACER_1
+#define UNIT_SHADE_LIGHTS UNIT_TRACER_2
+#define UNIT_MOVE_CHILDREN UNIT_TRACER_0
 #define UNIT_PASS_0 16
 #define UNIT_PASS_1 17
 #define UNIT_RAYS 18
