@@ -133,13 +133,15 @@ struct cli_clip {
 };
 #define CLI_CLIPS_MAX 15 /* the protocol's, and one of our own */
 
+struct fl_json;
+struct fl_json_place;
+
 /* A value that the script changes over time, or sets. */
 struct cli_channel {
     struct fl_channel channel; /* its object is found once the scene is there */
     enum protocol_object_kind kind;
-    const char *target; /* name or number; NULL: the view */
-    unsigned line;
-    char path[96]; /* in the script, for people */
+    const char *target;                /* name or number; NULL: the view */
+    const struct fl_json_place *place; /* in the script, for people */
 };
 
 struct cli_job {
@@ -149,6 +151,7 @@ struct cli_job {
     size_t output_count;
     struct cli_series series;
     const char *script; /* path; NULL: none */
+    const struct fl_json *script_json;
     struct cli_clip clips[CLI_CLIPS_MAX];
     size_t clip_count;
     struct cli_channel *channels; /* the script's */

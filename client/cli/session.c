@@ -344,7 +344,7 @@ int cli_dry_run(struct cli_job *job)
                       cli_sinks_prepare(&session.sinks, job, true, &error) &&
                       (!job->series.has_range || choose_frames(&session, &error));
     if (done && session.has_set)
-        printf("%u frames would be rendered\n", session.set.frame_count);
+        printf("%u frame%s would be rendered\n", session.set.frame_count, session.set.frame_count == 1 ? "" : "s");
     else if (done)
         puts("how many frames would be rendered only the model can tell");
     cli_sinks_close(&session.sinks);

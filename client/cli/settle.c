@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What can only be said once the scene is there. */
 #include "cli/cli.h"
+#include "lib/json_text.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -19,6 +20,13 @@ static bool in_script(const struct cli_job *job, unsigned line, const char *path
                  why.text);
     return fl_error_remedy(error, "%s",
                            why.remedy[0] != '\0' ? why.remedy : "'farlight info' lists what there is");
+}
+
+static bool in_script_at(const struct cli_job *job, const struct fl_json_place *place, struct fl_error *error)
+{
+    char path[96];
+    fl_json_path(place, path, sizeof path);
+    return in_script(job, fl_json_line(job->script_json, place), path, error);
 }
 
 /* ---- clips ---- */
@@ -41,6 +49,22 @@ static bool settle_clips(struct cli_job *job, struct fl_scene *scene, double *lo
     return true;
 }
 
+/* What the value changes, and that it can. */
+static bool settle_target(const struct cli_channel *given, struct fl_scene *scene, uint32_t *object,
+                          struct fl_error *error)
+{
+    if (given->target == NULL)
+        return true;
+    if (!fl_scene_find_object(scene, given->kind, given->target, object, error))
+        return false;
+    if (given->channel.path != PROTOCOL_CHANNEL_PATH_LIGHT_SIZE || fl_scene_light_has_size(scene, *object))
+        return true;
+    fl_error_set(error, FL_ERROR_ARGUMENT, "light", "the light '%s' has no size: it is no rectangle and no sphere",
+                 given->target);
+    return fl_error_remedy(
+        error, "give a point light of a glTF file \"extras\": {\"radius\": 0.1}, which makes it a sphere");
+}
+
 /* The script's values, as a clip of our own that is played last. */
 static bool settle_channels(struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
 {
@@ -52,9 +76,8 @@ static bool settle_channels(struct cli_job *job, struct fl_scene *scene, struct 
     for (size_t i = 0; i < job->channel_count && good; i++) {
         const struct cli_channel *given = &job->channels[i];
         channels[i] = given->channel;
-        if (given->target != NULL &&
-            !fl_scene_find_object(scene, given->kind, given->target, &channels[i].object, error))
-            good = in_script(job, given->line, given->path, error);
+        if (!settle_target(given, scene, &channels[i].object, error))
+            good = in_script_at(job, given->place, error);
     }
     *use = (struct record_clip_use){.speed = 1};
     good = good && fl_scene_add_clip(scene, "script", channels, job->channel_count, &use->clip, error);

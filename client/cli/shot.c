@@ -261,6 +261,9 @@ static bool apply_output(const struct shot_reader *reader, const struct shot_val
         if (!join_pattern(reader, written, &output->path))
             return false;
     }
+    for (size_t i = 0; i < job->output_count; i++)
+        if (strcmp(job->outputs[i].path, output->path) == 0)
+            return shot_wrong(reader, at, "leave one of them out", "is there twice");
     job->output_count++;
     return true;
 }
@@ -332,6 +335,7 @@ bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli
         known[count++] = settings[i].name;
     known[count] = NULL;
     job->script = shot->path;
+    job->script_json = &shot->json;
     if (!shot_is_object(&reader, &root, known))
         return false;
     for (size_t i = 0; i < SETTING_COUNT; i++) {

@@ -339,6 +339,19 @@ bool shot_channel(const struct shot_reader *reader, const struct shot_value *at,
     return true;
 }
 
+/* A copy that lives as long as the shot; NULL: out of memory. Lines are only counted where one must be told: that
+ * takes a walk through the file. */
+static const struct fl_json_place *keep_place(const struct shot_reader *reader, const struct fl_json_place *place)
+{
+    struct fl_json_place *kept = shot_allocate(reader, 1, sizeof *kept);
+    if (kept == NULL)
+        return NULL;
+    *kept = *place;
+    if (place->outer != NULL && (kept->outer = keep_place(reader, place->outer)) == NULL)
+        return NULL;
+    return kept;
+}
+
 bool shot_add_channel(const struct shot_reader *reader, const struct shot_value *at,
                       const struct fl_channel *channel, enum protocol_object_kind kind, const char *target)
 {
@@ -350,10 +363,7 @@ bool shot_add_channel(const struct shot_reader *reader, const struct shot_value 
     if (job->channel_count == CHANNELS_MAX)
         return shot_wrong(reader, at, "leave some out", "is one value too many: there can be %u", CHANNELS_MAX);
     struct cli_channel *added = &job->channels[job->channel_count++];
-    *added = (struct cli_channel){.channel = *channel,
-                                  .kind = kind,
-                                  .target = target,
-                                  .line = fl_json_line(&reader->shot->json, &at->place)};
-    fl_json_path(&at->place, added->path, sizeof added->path);
-    return true;
+    *added = (struct cli_channel){
+        .channel = *channel, .kind = kind, .target = target, .place = keep_place(reader, &at->place)};
+    return added->place != NULL;
 }

@@ -30,8 +30,9 @@ struct builder {
     uint32_t played = 0;
     double end_s = 0;
     std::vector<float> floats = {};
-    std::map<int, key_times> inputs = {};                           // by accessor
-    std::map<std::tuple<int, int, uint32_t>, uint32_t> values = {}; // by input, output and width: where they begin
+    std::map<int, key_times> inputs = {}; // by accessor
+    // By input, output and width: where they begin; UINT32_MAX: they are no good, which one look is enough for.
+    std::map<std::tuple<int, int, uint32_t>, uint32_t> values = {};
     std::map<int, unsigned> nodes = {}; // animated ones: bits of enum protocol_channel_path
 };
 
@@ -230,12 +231,13 @@ void play(builder &b, const tinygltf::AnimationSampler &sampler, const target &t
     if (known == b.values.end()) {
         std::vector<float> values;
         const size_t key_count = accessor_count(b.r, sampler.input, TINYGLTF_TYPE_SCALAR, where);
-        if (!read_values(b, sampler.output, to, *keys, key_count, parts, values, where + ".output"))
-            return;
-        if (to.path == PROTOCOL_CHANNEL_PATH_NODE_ROTATION)
+        const bool good = read_values(b, sampler.output, to, *keys, key_count, parts, values, where + ".output");
+        if (good && to.path == PROTOCOL_CHANNEL_PATH_NODE_ROTATION)
             mend_rotations(values, parts);
-        known = b.values.emplace(place_of_values, append(b, values)).first;
+        known = b.values.emplace(place_of_values, good ? append(b, values) : UINT32_MAX).first;
     }
+    if (known->second == UINT32_MAX)
+        return;
     uint32_t &first_time = b.inputs[sampler.input].first;
     if (first_time == UINT32_MAX)
         first_time = append(b, keys->times);

@@ -164,15 +164,15 @@ uint32_t skin_id(reader &r, int index, const shown_mesh &mesh, const std::string
     if (skin.joints.empty() || skin.joints.size() > IMPORT_JOINTS_MAX)
         fail(r, place("skins", size_t(index)), "%zu joints; 1 to %d are allowed", skin.joints.size(),
              IMPORT_JOINTS_MAX);
-    for (int joint : skin.joints)
-        if (joint < 0 || size_t(joint) >= r.model.nodes.size())
-            fail(r, place("skins", size_t(index)), "joint node %d does not exist", joint);
     if (mesh.greatest_joint >= skin.joints.size())
         fail(r, where, "a vertex of the mesh names joint %u of %zu", mesh.greatest_joint, skin.joints.size());
     uint32_t &id = r.skin_ids[index];
-    if (id == 0)
-        id = import_reserve_id(r.scene, PROTOCOL_OBJECT_KIND_SKIN);
-    return id;
+    if (id != 0)
+        return id;
+    for (int joint : skin.joints)
+        if (joint < 0 || size_t(joint) >= r.model.nodes.size())
+            fail(r, place("skins", size_t(index)), "joint node %d does not exist", joint);
+    return id = import_reserve_id(r.scene, PROTOCOL_OBJECT_KIND_SKIN);
 }
 
 void add_skins(reader &r)

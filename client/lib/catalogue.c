@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What a hostile model can make us remember: 8 MiB of each list, 32 MiB of names, 9 MiB of clips. */
+/* What a hostile model can make us remember: 12 MiB of each list, 32 MiB of names, 9 MiB of clips. */
 #define ENTRIES_MAX (1u << 20)
 #define TEXT_BYTES_MAX (32u << 20)
 #define CLIPS_MAX 65536u
@@ -51,10 +51,9 @@ static bool keep_text(struct fl_catalogue *catalogue, const char *name, uint32_t
     return true;
 }
 
-static bool keep(struct fl_catalogue *catalogue, enum fl_catalogue_list list, uint32_t id, const char *name,
-                 struct fl_error *error)
+static bool keep(struct fl_catalogue *catalogue, enum fl_catalogue_list list, struct fl_catalogue_entry entry,
+                 const char *name, struct fl_error *error)
 {
-    struct fl_catalogue_entry entry = {.id = id};
     if (catalogue->lists[list].count >= ENTRIES_MAX) {
         catalogue->lists[list].left_out++;
         return true;
@@ -92,9 +91,20 @@ static bool observe_node(struct fl_catalogue *catalogue, const struct message_se
                          struct fl_error *error)
 {
     count_id(catalogue, PROTOCOL_OBJECT_KIND_NODE, node->node);
-    return keep(catalogue, FL_CATALOGUE_NODES, node->node, node->name, error) &&
+    return keep(catalogue, FL_CATALOGUE_NODES, (struct fl_catalogue_entry){.id = node->node}, node->name, error) &&
            (node->kind != PROTOCOL_NODE_KIND_LIGHT || node->name[0] == '\0' ||
-            keep(catalogue, FL_CATALOGUE_LIGHT_NODES, node->object, node->name, error));
+            keep(catalogue, FL_CATALOGUE_LIGHT_NODES, (struct fl_catalogue_entry){.id = node->object}, node->name,
+                 error));
+}
+
+static bool observe_light(struct fl_catalogue *catalogue, const struct message_set_light *light,
+                          struct fl_error *error)
+{
+    const bool has_size =
+        light->kind == PROTOCOL_LIGHT_KIND_RECTANGLE || light->kind == PROTOCOL_LIGHT_KIND_SPHERE;
+    count_id(catalogue, PROTOCOL_OBJECT_KIND_LIGHT, light->light);
+    return keep(catalogue, FL_CATALOGUE_LIGHTS,
+                (struct fl_catalogue_entry){.id = light->light, .has_size = has_size}, light->name, error);
 }
 
 bool fl_catalogue_observe(struct fl_catalogue *catalogue, const struct message *message, struct fl_error *error)
@@ -104,11 +114,11 @@ bool fl_catalogue_observe(struct fl_catalogue *catalogue, const struct message *
         return observe_node(catalogue, &message->set_node, error);
     case MESSAGE_SET_MATERIAL:
         return count_id(catalogue, PROTOCOL_OBJECT_KIND_MATERIAL, message->set_material.material) &&
-               keep(catalogue, FL_CATALOGUE_MATERIALS, message->set_material.material, message->set_material.name,
+               keep(catalogue, FL_CATALOGUE_MATERIALS,
+                    (struct fl_catalogue_entry){.id = message->set_material.material}, message->set_material.name,
                     error);
     case MESSAGE_SET_LIGHT:
-        return count_id(catalogue, PROTOCOL_OBJECT_KIND_LIGHT, message->set_light.light) &&
-               keep(catalogue, FL_CATALOGUE_LIGHTS, message->set_light.light, message->set_light.name, error);
+        return observe_light(catalogue, &message->set_light, error);
     case MESSAGE_SET_MESH:
         return count_id(catalogue, PROTOCOL_OBJECT_KIND_MESH, message->set_mesh.mesh);
     case MESSAGE_SET_SPHERES:
@@ -225,6 +235,14 @@ bool fl_catalogue_find(const struct fl_catalogue *catalogue, enum protocol_objec
         return true;
     }
     return unknown_object(catalogue, list, protocol_object_kind_text(kind), which, error);
+}
+
+bool fl_catalogue_light_has_size(const struct fl_catalogue *catalogue, uint32_t light)
+{
+    for (size_t i = 0; i < catalogue->lists[FL_CATALOGUE_LIGHTS].count; i++)
+        if (catalogue->lists[FL_CATALOGUE_LIGHTS].entries[i].id == light)
+            return catalogue->lists[FL_CATALOGUE_LIGHTS].entries[i].has_size;
+    return false;
 }
 
 static const struct fl_clip_info *search_clip(const struct fl_catalogue *catalogue, const char *which)

@@ -17,6 +17,7 @@ enum fl_catalogue_list {
 struct fl_catalogue_entry {
     uint32_t id;
     uint32_t name; /* where it begins in `text` */
+    bool has_size; /* of a light by itself: it is a rectangle or a sphere */
 };
 
 struct fl_catalogue {
@@ -41,6 +42,8 @@ bool fl_catalogue_find(const struct fl_catalogue *catalogue, enum protocol_objec
                        uint32_t *id, struct fl_error *error);
 bool fl_catalogue_find_clip(const struct fl_catalogue *catalogue, const char *which, uint32_t *clip,
                             const struct fl_clip_info **info, struct fl_error *error);
+/* As fl_scene_light_has_size(). */
+bool fl_catalogue_light_has_size(const struct fl_catalogue *catalogue, uint32_t light);
 /* As fl_scene_new_id(). */
 uint32_t fl_catalogue_new_id(struct fl_catalogue *catalogue, enum protocol_object_kind kind);
 

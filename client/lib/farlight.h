@@ -178,6 +178,8 @@ FL_API bool fl_scene_find_clip(const struct fl_scene *scene, const char *which, 
  * far as it fits; other kinds are not known by name. */
 FL_API bool fl_scene_find_object(const struct fl_scene *scene, enum protocol_object_kind kind, const char *which,
                                  uint32_t *id, struct fl_error *error);
+/* Whether a light that was found so has a size that can change: a rectangle or a sphere. */
+FL_API bool fl_scene_light_has_size(const struct fl_scene *scene, uint32_t light);
 /* An identifier that nothing in the scene has, for an edit of one's own: another one at each call; 0: none left.
  */
 FL_API uint32_t fl_scene_new_id(struct fl_scene *scene, enum protocol_object_kind kind);

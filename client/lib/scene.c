@@ -342,6 +342,11 @@ bool fl_scene_find_object(const struct fl_scene *scene, enum protocol_object_kin
     return fl_catalogue_find(&scene->catalogue, kind, which, id, error);
 }
 
+bool fl_scene_light_has_size(const struct fl_scene *scene, uint32_t light)
+{
+    return fl_catalogue_light_has_size(&scene->catalogue, light);
+}
+
 uint32_t fl_scene_new_id(struct fl_scene *scene, enum protocol_object_kind kind)
 {
     return fl_catalogue_new_id(&scene->catalogue, kind);

@@ -204,6 +204,7 @@ static bool trace_hits(struct render_context *context, struct error *error)
         .hits = &context->hits,
         .times = context_ray_times(context),
         .shared_origin = context->request.camera.fov_y > 0.0f && !(context->uniforms.lens[0] > 0.0f), /* an eye */
+        .origin_spread = context->request.camera.fov_y > 0.0f ? 2.0f * context->uniforms.lens[0] : 0.0f,
     };
     context_span_end(context);
     bool traced = wave_trace(context, RAY_PRIMARY, &wave, error);

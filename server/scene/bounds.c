@@ -7,6 +7,10 @@
 #include <math.h>
 #include <stdlib.h>
 
+/* Numbers that are looked at for the bounds of deformed meshes: a second or two, which nobody else is served in.
+ * Devices have no room for much more; what is beyond counts as if it stood at rest. */
+#define DEFORM_NUMBERS_MAX (UINT64_C(1) << 30)
+
 static void extend(float lower[3], float upper[3], const float other_lower[3], const float other_upper[3])
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -43,6 +47,17 @@ static bool extend_by_deformed(const struct scene *scene, const struct scene_pos
     return found;
 }
 
+/* Takes what a mesh costs to deform from what is left; false: it is too much. */
+static bool afford(const struct scene_mesh *mesh, uint64_t *left)
+{
+    uint64_t cost = (uint64_t)mesh->vertex_count * (1 + mesh->target_count + mesh->influence_count) +
+                    (uint64_t)mesh->triangle_count * 3;
+    if (cost > *left)
+        return false;
+    *left -= cost;
+    return true;
+}
+
 static bool extend_by_kind(const struct scene *scene, const struct scene_pose *pose, enum scene_node_kind kind,
                            float lower[3], float upper[3])
 {
@@ -51,6 +66,7 @@ static bool extend_by_kind(const struct scene *scene, const struct scene_pose *p
     if (!scene_flatten(scene, pose, kind, &instances, &count))
         return false;
     bool found = false;
+    uint64_t left = DEFORM_NUMBERS_MAX;
     for (size_t i = 0; i < count; i++) {
         if (instances[i].singular)
             continue;
@@ -58,7 +74,7 @@ static bool extend_by_kind(const struct scene *scene, const struct scene_pose *p
         const float *object_lower, *object_upper;
         if (kind == NODE_MESH) {
             const struct scene_mesh *mesh = scene_mesh(scene, id);
-            if (scene_node_deforms(instances[i].node, mesh)) {
+            if (scene_node_deforms(instances[i].node, mesh) && afford(mesh, &left)) {
                 found = extend_by_deformed(scene, pose, &instances[i], lower, upper) || found;
                 continue;
             }

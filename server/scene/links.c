@@ -6,8 +6,46 @@
 
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 /* ---- channels and clips ------------------------------------------------------------------------- */
+
+/* So many times of one transaction are compared one by one. Beyond, it is worked out once for a clip how far its
+ * numbers ascend: any number of channels may share their times, and must not cost that many times as much. */
+#define COMPARED_TIMES_MAX (UINT64_C(1) << 26)
+
+struct ascents {
+    uint64_t compared;
+    struct hashmap clips; /* by identifier: for each number, how many from it on ascend; owned u32s */
+};
+
+static void ascents_finish(struct ascents *ascents)
+{
+    size_t cursor = 0;
+    void *lengths;
+    while (hashmap_next(&ascents->clips, &cursor, NULL, &lengths))
+        free(lengths);
+    hashmap_finish(&ascents->clips);
+}
+
+/* NULL: out of memory. */
+static const uint32_t *ascents_of(struct ascents *ascents, const struct scene_clip *clip)
+{
+    uint32_t *lengths = hashmap_get(&ascents->clips, clip->base.id);
+    size_t count = clip->floats->size_bytes / sizeof(float);
+    const float *floats = (const float *)(const void *)clip->floats->data;
+    if (lengths || !(lengths = malloc(count * sizeof *lengths)))
+        return lengths;
+    for (size_t i = count; i-- > 0;) {
+        bool ascends = i + 1 < count && floats[i + 1] > floats[i];
+        lengths[i] = !ascends ? 1 : lengths[i + 1] < UINT32_MAX ? lengths[i + 1] + 1 : UINT32_MAX;
+    }
+    if (!hashmap_put(&ascents->clips, clip->base.id, lengths)) {
+        free(lengths);
+        return NULL;
+    }
+    return lengths;
+}
 
 /* `count` numbers from `first` on are there. */
 static bool has_numbers(const struct scene_clip *clip, uint64_t first, uint64_t count)
@@ -16,20 +54,26 @@ static bool has_numbers(const struct scene_clip *clip, uint64_t first, uint64_t 
     return first <= floats && count <= floats - first;
 }
 
-/* Key whose time is not after that of the one before; key_count: all ascend. */
-static uint32_t first_unordered(const struct scene_channel *channel, const struct scene_clip *clip)
+/* *key: the first whose time is not after that of the one before; key_count: all ascend. False: out of memory. */
+static bool first_unordered(struct ascents *ascents, const struct scene_channel *channel,
+                            const struct scene_clip *clip, uint32_t *key)
 {
     const float *times = (const float *)(const void *)clip->floats->data + channel->first_time;
-    for (uint32_t i = 1; i < channel->key_count; i++) {
-        if (!(times[i] > times[i - 1]))
-            return i;
+    ascents->compared += channel->key_count;
+    if (ascents->compared > COMPARED_TIMES_MAX) {
+        const uint32_t *lengths = ascents_of(ascents, clip);
+        *key = !lengths || lengths[channel->first_time] > channel->key_count ? channel->key_count
+                                                                             : lengths[channel->first_time];
+        return lengths != NULL;
     }
-    return channel->key_count;
+    for (*key = 1; *key < channel->key_count && times[*key] > times[*key - 1];)
+        ++*key;
+    return true;
 }
 
 /* `whose` is the channel's own edit, or that of its clip. */
-static bool channel_fits(const struct scene_channel *channel, const struct scene_clip *clip,
-                         const struct edit_place *whose)
+static bool channel_fits(struct ascents *ascents, const struct scene_channel *channel,
+                         const struct scene_clip *clip, const struct edit_place *whose)
 {
     bool own = whose->edit->object == SCENE_CHANNEL;
     char text[160];
@@ -45,7 +89,9 @@ static bool channel_fits(const struct scene_channel *channel, const struct scene
                  "its %" PRIu64 " numbers of values from %u on reach beyond the %" PRIu64 " numbers of clip %u",
                  value_floats, channel->first_value, floats, channel->clip);
     } else {
-        uint32_t unordered = first_unordered(channel, clip);
+        uint32_t unordered;
+        if (!first_unordered(ascents, channel, clip, &unordered))
+            return edit_error(whose, ERROR_OUT_OF_MEMORY, path, "no memory to look at clip %u", channel->clip);
         if (unordered == channel->key_count)
             return true;
         snprintf(text, sizeof text, "its key %u is not after the one before it", unordered);
@@ -54,7 +100,7 @@ static bool channel_fits(const struct scene_channel *channel, const struct scene
                : edit_error(whose, ERROR_INVALID, path, "channel %u: %s", channel->base.id, text);
 }
 
-static bool channels_of_set_clips(struct draft *draft)
+static bool channels_of_set_clips(struct draft *draft, struct ascents *ascents)
 {
     size_t cursor = 0;
     const struct scene_channel *channel;
@@ -63,7 +109,7 @@ static bool channels_of_set_clips(struct draft *draft)
         if (!edit || edit->kind != EDIT_SET)
             continue;
         struct edit_place place = draft_place(draft, edit);
-        if (!channel_fits(channel, &edit->set.clip, &place))
+        if (!channel_fits(ascents, channel, &edit->set.clip, &place))
             return error_remedy(draft->error, "set or remove that channel in the same transaction");
     }
     return true;
@@ -112,7 +158,7 @@ static bool nodes_of_set_objects(struct draft *draft)
     return true;
 }
 
-bool links_check(struct draft *draft)
+static bool set_objects_check(struct draft *draft, struct ascents *ascents)
 {
     for (size_t i = 0; i < draft->edit_count; i++) {
         const struct scene_edit *edit = &draft->edits[i];
@@ -124,8 +170,17 @@ bool links_check(struct draft *draft)
             continue;
         const struct scene_channel *channel = &edit->set.channel;
         struct edit_place place = draft_place(draft, edit);
-        if (!channel_fits(channel, draft_find(draft, SCENE_CLIP, channel->clip), &place))
+        if (!channel_fits(ascents, channel, draft_find(draft, SCENE_CLIP, channel->clip), &place))
             return false;
     }
-    return channels_of_set_clips(draft) && nodes_of_set_objects(draft);
+    return true;
+}
+
+bool links_check(struct draft *draft)
+{
+    struct ascents ascents = {0};
+    bool fine = set_objects_check(draft, &ascents) && channels_of_set_clips(draft, &ascents) &&
+                nodes_of_set_objects(draft);
+    ascents_finish(&ascents);
+    return fine;
 }

@@ -307,8 +307,8 @@ bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enu
 /* World transform of one node (hidden or not); false if there is no such node. */
 bool scene_world_from_node(const struct scene *scene, const struct scene_pose *pose, uint32_t node,
                            float world_from_node[12]);
-/* Bounds in world space of everything visible, discs left out unless there is nothing else;
- * false: nothing there. */
+/* Bounds in world space of everything visible, discs left out unless there is nothing else; meshes that deform
+ * count as they are in the pose, unless they are hundreds of millions of vertices. False: nothing there. */
 bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, float lower[3], float upper[3]);
 
 #endif

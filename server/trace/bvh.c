@@ -319,9 +319,10 @@ static bool is_one_instance(const struct bvh *bvh)
     return bvh->top.element_count == 1;
 }
 
-static void set_uniforms(const struct bvh *bvh, const struct gpu_program *program, const struct scene_gpu *scene)
+static void set_uniforms(const struct bvh *bvh, const struct gpu_program *program, const struct scene_gpu *scene,
+                         const struct wave *wave)
 {
-    gpu_uniform_float(program, "bvh_reach_together", BVH_REACH_TOGETHER * scene->diagonal);
+    gpu_uniform_float(program, "bvh_reach_together", bvh_reach_together(scene, wave));
     if (is_one_instance(bvh)) {
         gpu_uniform_uint(program, "bvh_instance", bvh->top.leaves[0] & BVH_LEAF_FIRST_MASK);
         return;
@@ -367,7 +368,7 @@ static bool bvh_trace(struct tracer *tracer, struct scene_gpu *scene, const stru
     if (!program)
         return false;
     bind(bvh);
-    set_uniforms(bvh, program, scene);
+    set_uniforms(bvh, program, scene, wave);
     return trace_program_run(program, scene, wave, &source, error);
 }
 

@@ -19,8 +19,9 @@ struct bvh {
     struct gpu_buffer coherence; /* what bvh/coherence.comp counts */
 };
 
-/* Rays that are walked together begin within this share of the scene's diagonal. */
-#define BVH_REACH_TOGETHER (1.0f / 512)
+/* How far apart rays that are walked together may begin, in world space. Those of a lens, all over it: they meet
+ * again where the lens is in focus. */
+float bvh_reach_together(const struct scene_gpu *scene, const struct wave *wave);
 
 /* How many rays of the wave walk together: what the options say, else what is faster for a wave as coherent as
  * this one, of which a sample is measured. 0: failed. */

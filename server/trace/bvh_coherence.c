@@ -20,9 +20,18 @@
  */
 #define WIDTH_TOGETHER_CLOSEST 2.5f
 #define WIDTH_TOGETHER_ANY 1.5f
+/* A share of the scene's diagonal. */
+#define REACH_TOGETHER (1.0f / 512)
 /* Groups of which the coherence of a wave is found, and the rays below which it is not worth it. */
 #define COHERENCE_GROUPS 512u
 #define COHERENCE_RAYS_MIN 1024u
+
+float bvh_reach_together(const struct scene_gpu *scene, const struct wave *wave)
+{
+    float reach = REACH_TOGETHER * scene->diagonal;
+    /* Rays of several times have several places in what moves: measured, those of a lens are 0.7 of single ones then. */
+    return wave->origin_spread > reach && !scene->has_motion ? wave->origin_spread : reach;
+}
 
 /* Of a sample of the wave: rays alive, and walks that they would take. */
 static bool measure_coherence(struct bvh *bvh, const struct scene_gpu *scene, const struct wave *wave,
@@ -42,7 +51,7 @@ static bool measure_coherence(struct bvh *bvh, const struct scene_gpu *scene, co
     gpu_buffer_bind_texels(device, wave->rays, UNIT_RAYS, GL_RGBA32F);
     gpu_uniform_uint(program, "group_count", groups / step);
     gpu_uniform_uint(program, "group_stride", step * TOGETHER_SOFTWARE);
-    gpu_uniform_float(program, "bvh_reach_together", BVH_REACH_TOGETHER * scene->diagonal);
+    gpu_uniform_float(program, "bvh_reach_together", bvh_reach_together(scene, wave));
     float centre[3];
     for (int k = 0; k < 3; k++)
         centre[k] = 0.5f * scene->lower_world[k] + 0.5f * scene->upper_world[k];

@@ -448,6 +448,17 @@ class Scripts(OneDaemon):
                 self.assertRegex(result.stderr, rf"shot\.json: line 1: {member}")
                 self.assertIn(told, result.stderr, "what there is, is listed")
 
+    def test_a_light_without_a_size_gets_none(self):
+        model = moving_model(self.folder / "moving.gltf")
+        script = self.write({"model": str(model), "frames": "1", "output": "%d.png",
+                             "lights": [{"target": "bulb", "colour": [1, 1, 1], "size": 0.5}]})
+        result = self.expect(farlight("animate", "--script", script), 2)
+        self.assertRegex(result.stderr, r"shot\.json: line 1: lights\[0\]\.size: the light 'bulb' has no size.*radius")
+        document = json.loads(model.read_text())
+        document["extensions"]["KHR_lights_punctual"]["lights"][0]["extras"] = {"radius": 0.1}
+        model.write_text(json.dumps(document))
+        self.expect(farlight("animate", "--script", script, "--size", "16x16"), 0)
+
 
 class Clips(OneDaemon):
     """Clips of a small model of our own, and of a real one."""

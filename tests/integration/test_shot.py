@@ -275,6 +275,7 @@ class Schema(Shots):
                 ("moving", ("nodes", 1, "rotation_degrees", "interpolation"), ("linear", "step", "bezier")),
                 ("moving", ("nodes", 0, "rotation_degrees"), ([0, 0, 0],)),
                 ("moving", ("camera", "eye", "interpolation"), ("cubic-spline", "linear", "catmull-rom", "step")),
+                ("moving", ("outputs",), (["%d.png"], ["%d.png", "%d.png"], ["-"], ["-", "-"], ["a.mp4", "a.mkv"])),
                 ("movie", ("clips", 2, "speed"), (0.001, 1000, 0, 1001)),
                 ("orbit", ("camera", "orbit"), (True, False, 0, 1e6, 1e7, {}, {"degrees": 1}, {"seconds": 0}))):
             for value in values:

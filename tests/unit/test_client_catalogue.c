@@ -30,12 +30,13 @@ static void see_node(uint32_t id, const char *name, enum protocol_node_kind kind
     assert_true(fl_catalogue_observe(&catalogue, &message, &error));
 }
 
-static void see_light(uint32_t id, const char *name)
+static void see_light(uint32_t id, const char *name, enum protocol_light_kind kind)
 {
     struct message message;
     message_init(&message, MESSAGE_SET_LIGHT);
     message.set_light.light = id;
     message.set_light.name = name;
+    message.set_light.kind = kind;
     assert_true(fl_catalogue_observe(&catalogue, &message, &error));
 }
 
@@ -75,13 +76,24 @@ static void an_object_is_found_by_name_before_number(void **state)
 static void a_light_is_also_known_by_the_node_that_shows_it(void **state)
 {
     (void)state;
-    see_light(7, "");
-    see_light(8, "lamp");
+    see_light(7, "", PROTOCOL_LIGHT_KIND_POINT);
+    see_light(8, "lamp", PROTOCOL_LIGHT_KIND_SPHERE);
     see_node(1, "ceiling", PROTOCOL_NODE_KIND_LIGHT, 7);
     see_node(2, "lamp", PROTOCOL_NODE_KIND_LIGHT, 7);
     assert_int_equal(find(PROTOCOL_OBJECT_KIND_LIGHT, "ceiling"), 7);
     assert_int_equal(find(PROTOCOL_OBJECT_KIND_LIGHT, "lamp"), 8);
     assert_int_equal(find(PROTOCOL_OBJECT_KIND_LIGHT, "0"), 7);
+}
+
+static void only_some_lights_have_a_size(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < PROTOCOL_LIGHT_KIND_COUNT; kind++) {
+        bool has_size = kind == PROTOCOL_LIGHT_KIND_RECTANGLE || kind == PROTOCOL_LIGHT_KIND_SPHERE;
+        see_light(10 + (uint32_t)kind, "", (enum protocol_light_kind)kind);
+        assert_int_equal(fl_catalogue_light_has_size(&catalogue, 10 + (uint32_t)kind), has_size);
+    }
+    assert_false(fl_catalogue_light_has_size(&catalogue, 1));
 }
 
 static void what_is_not_there_is_answered_with_what_is(void **state)
@@ -167,6 +179,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(an_object_is_found_by_name_before_number, empty),
         cmocka_unit_test_setup(a_light_is_also_known_by_the_node_that_shows_it, empty),
+        cmocka_unit_test_setup(only_some_lights_have_a_size, empty),
         cmocka_unit_test_setup(what_is_not_there_is_answered_with_what_is, empty),
         cmocka_unit_test_setup(a_clip_tells_its_identifier_and_length, empty),
         cmocka_unit_test_setup(a_new_identifier_is_one_that_the_import_has_not_used, empty),

@@ -221,6 +221,35 @@ static void channels_have_their_numbers_in_their_clips(void **state)
     scene_destroy(scene);
 }
 
+/* As many as are not compared one by one any more. */
+static void many_channels_of_the_same_times_are_told_apart(void **state)
+{
+    (void)state;
+    enum { COUNT = 4 << 20, CHANNELS = 20, LEAP = COUNT - 3 };
+    struct scene *scene = animated_scene();
+    struct draft_list list = {0};
+    float *times = malloc(COUNT * sizeof *times);
+    assert_non_null(times);
+    for (int i = 0; i < COUNT; i++)
+        times[i] = (float)(i < LEAP ? i : i - LEAP);
+    add_clip(&list, 2, times, COUNT);
+    for (uint32_t i = 0; i < CHANNELS; i++)
+        add_channel(&list, 10 + i, 2, CHANNEL_NODE_HIDDEN, 1, 1, LEAP)->first_value = 0;
+    add_channel(&list, 50, 2, CHANNEL_NODE_HIDDEN, 1, 1, 3)->first_time = LEAP;
+    expect_commit(scene, &list);
+    times[LEAP] = LEAP;
+    add_clip(&list, 2, times, COUNT);
+    add_channel(&list, 51, 2, CHANNEL_NODE_HIDDEN, 1, 1, LEAP + 1)->first_value = 0;
+    add_channel(&list, 50, 2, CHANNEL_NODE_HIDDEN, 1, 1, 2)->first_time = LEAP + 1;
+    expect_commit(scene, &list);
+    for (uint32_t i = 0; i < CHANNELS; i++)
+        add_channel(&list, 10 + i, 2, CHANNEL_NODE_HIDDEN, 1, 1, LEAP + 1)->first_value = 0;
+    add_channel(&list, 52, 2, CHANNEL_NODE_HIDDEN, 1, 1, 3)->first_time = LEAP - 1;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[20] (channel 52).first_time");
+    free(times);
+    scene_destroy(scene);
+}
+
 static void joints_of_a_mesh_have_their_places_in_its_skin(void **state)
 {
     (void)state;
@@ -386,6 +415,7 @@ int main(void)
         cmocka_unit_test(skins_clips_and_channels_make_sense_alone),
         cmocka_unit_test(skins_and_channels_refer_to_what_is_there),
         cmocka_unit_test(channels_have_their_numbers_in_their_clips),
+        cmocka_unit_test(many_channels_of_the_same_times_are_told_apart),
         cmocka_unit_test(joints_of_a_mesh_have_their_places_in_its_skin),
         cmocka_unit_test(what_changes_something_removed_goes_along),
         cmocka_unit_test(a_skin_in_use_is_not_removed),
