@@ -37,7 +37,13 @@ def text(value):
 
 
 def set_node(node, parent=0, kind=0, thing=0, matrix=IDENTITY):
+    """The fixed part without its last field, the skin, as an older client sends it."""
     return struct.pack("<5I12f", node, parent, kind, thing, 0, *matrix)
+
+
+def named(value):
+    """What follows the fixed part of a node: no weights, and its name."""
+    return struct.pack("<I", 0) + text(value)
 
 
 class Peer:
@@ -231,20 +237,20 @@ class Sessions(Case):
 
     def test_revisions_count_transactions_and_a_failed_one_changes_nothing(self):
         self.open_scene()
-        kind, payload = self.transact(2, (SET_NODE, set_node(1), text("a")))
+        kind, payload = self.transact(2, (SET_NODE, set_node(1), named("a")))
         self.assertEqual((kind, struct.unpack_from("<Q", payload, 2)[0]), (OK, 1))
-        kind, payload = self.transact(3, (SET_NODE, set_node(2), text("b")), (SET_NODE, set_node(3, parent=99), text("c")))
+        kind, payload = self.transact(3, (SET_NODE, set_node(2), named("b")), (SET_NODE, set_node(3, parent=99), named("c")))
         self.assertEqual(kind, ERROR)
         self.assertIn("parent", error_text(payload))
         # Had node 2 been made, it could be a parent now.
-        kind, payload = self.transact(4, (SET_NODE, set_node(4, parent=2), text("d")))
+        kind, payload = self.transact(4, (SET_NODE, set_node(4, parent=2), named("d")))
         self.assertEqual(kind, ERROR, "the failed transaction left node 2 behind")
-        kind, payload = self.transact(5, (SET_NODE, set_node(5, parent=1), text("e")))
+        kind, payload = self.transact(5, (SET_NODE, set_node(5, parent=1), named("e")))
         self.assertEqual((kind, struct.unpack_from("<Q", payload, 2)[0]), (OK, 2))
 
     def test_a_cycle_of_nodes_is_refused(self):
         self.open_scene()
-        kind, _ = self.transact(2, (SET_NODE, set_node(1, parent=2), text("")), (SET_NODE, set_node(2, parent=1), text("")))
+        kind, _ = self.transact(2, (SET_NODE, set_node(1, parent=2), named("")), (SET_NODE, set_node(2, parent=1), named("")))
         self.assertEqual(kind, ERROR)
 
     def test_not_a_number_is_refused_by_its_field(self):
@@ -254,7 +260,7 @@ class Sessions(Case):
             peer.send(SCENE_OPEN, 1, struct.pack("<I", 1), text("x"))
             peer.answer(1)
             peer.send(EDIT_BEGIN, 2, struct.pack("<I", 1))
-            peer.send(SET_NODE, 2, set_node(1, matrix=(bad,) + IDENTITY[1:]), text(""))
+            peer.send(SET_NODE, 2, set_node(1, matrix=(bad,) + IDENTITY[1:]), named(""))
             errors = [error_text(payload) for kind, _, payload in self.drain(peer) if kind == ERROR]
             self.assertTrue(any("parent_from_node" in line for line in errors), errors)
             peer.close()
