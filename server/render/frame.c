@@ -21,6 +21,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Rays of a slice. Software GL has no latency to hide, and its caches are the CPU's; a GPU wants enough rays to
  * fill itself. Waves have room for twice as many: mirrors and glass rarely fill a slice. */
@@ -174,6 +175,7 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
         return false;
     renderer->result.uploaded_bytes += context->tracer->stats.uploaded_bytes;
     renderer->result.structure_bytes = context->tracer->stats.device_bytes;
+    memcpy(renderer->result.cubes, context->tracer->stats.cubes, sizeof(renderer->result.cubes));
     context->features = scene_features_of(scene);
     uint64_t start_ns = clock_now_ns();
     updated = environment_update(&context->environment, renderer->device, scene, &renderer->scene, error);

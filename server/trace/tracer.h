@@ -26,6 +26,29 @@ struct tracer_options {
     enum { BVH_LAYOUT_FAST, BVH_LAYOUT_PLAIN } bvh_layout;
     uint32_t bvh_rays_together;     /* 0: chosen; 1, 2, 3, 4, 8 */
     uint32_t reference_rays_a_call; /* 0: chosen; 1, 4, 8, 16 */
+    uint32_t ldc_resolution;        /* cells along the longest side of a cube; 0: 1024; 16 to 4096 */
+    uint32_t ldc_block;             /* texels along a side of a min/max block: 2, 4, 8, 16, 32; 0: 8 */
+    enum { LDC_BUILD_AUTO, LDC_BUILD_PEEL, LDC_BUILD_LISTS } ldc_build;         /* protocol's numbers */
+    enum { LDC_LEVELS_AUTO, LDC_LEVELS_BLOCKS, LDC_LEVELS_PYRAMID } ldc_levels; /* protocol's numbers */
+    /* 0: a hit is where the ray crosses a sample's plane; else where it comes as near to the sample: metres */
+    float ldc_tolerance;
+    uint32_t ldc_rays_together;   /* 0: chosen; 1, 4 */
+    uint32_t ldc_layers_together; /* of a texel, tested at once; 0: chosen; 1, 4; for the benchmark */
+    uint32_t ldc_layers_max;      /* 0: 255, more cannot be kept; of more the nearest are kept */
+    uint32_t ldc_mebibytes_max;   /* device memory of one cube's samples; 0: no limit but the device's */
+};
+
+enum { TRACER_CUBE_STATIC, TRACER_CUBE_DYNAMIC, TRACER_CUBES_MAX };
+
+/* A sampled structure: what of the scene is in it, and how finely. */
+struct tracer_cube {
+    uint32_t resolution;    /* cells along the longest side; 0: there is no such cube */
+    float cell_metres;      /* size of a cell, world space */
+    uint32_t layers_needed; /* greatest depth complexity of an image's texels */
+    uint32_t layers_kept; /* fewer than are needed: there was no room for more, and the farther ones are missing */
+    uint64_t samples;
+    uint64_t samples_lost; /* of those that are missing */
+    bool rebuilt;          /* by the last update */
 };
 
 struct tracer_stats {
@@ -34,6 +57,7 @@ struct tracer_stats {
     uint64_t nodes;          /* elements of the structure */
     uint64_t nodes_rebuilt;  /* by the last update */
     uint64_t nodes_refitted;
+    struct tracer_cube cubes[TRACER_CUBES_MAX]; /* `ldc` */
     uint64_t
         walk_ns; /* `reference`: of the last wave, in Embree alone, without the copies from and to the device */
 };

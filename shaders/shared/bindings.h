@@ -66,6 +66,8 @@
 #define UNIT_INSTANCES 19
 #define UNIT_GEOMETRIES 20
 #define UNIT_MOTIONS 21
+#define UNIT_TRACER_6 23
+#define UNIT_TRACER_7 24
 #define UNIT_RAY_TIMES 22 /* R32F, one a ray: 0 the shutter opens .. 1 it closes */
 
 #endif

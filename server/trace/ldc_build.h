@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+/* Builds a cube by rasterising instances along three axes: by depth peeling, as the paper does it (section 1.2),
+ * or in one pass with a list for each texel ("layered buffers", section 1.2.1). Both give the same samples. */
+#ifndef FARLIGHT_TRACE_LDC_BUILD_H
+#define FARLIGHT_TRACE_LDC_BUILD_H
+
+#include "base/error.h"
+#include "trace/ldc_store.h"
+#include "trace/scene_gpu.h"
+#include "trace/tracer.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Private buffers and images of the build, kept between builds; all-zero is empty. */
+struct ldc_builder;
+
+struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *error);
+void ldc_builder_destroy(struct ldc_builder *builder); /* accepts NULL */
+uint64_t ldc_builder_bytes(const struct ldc_builder *builder);
+
+/* Fills cube `which` of the store, whose lower_world, cell_world and resolution are set, with the triangles and
+ * spheres of instances[0 .. count - 1] as they are when the shutter opens (scene_gpu's, bound by the build
+ * itself); texels, quads, geometry and surface are written, nodes are not. Of the other cube nothing changes but,
+ * if this is the static one, everything behind it is lost. Discs are no part of it. More layers than
+ * options->ldc_layers_max or than fit options->ldc_mebibytes_max: the nearest (least depth) of each texel are
+ * kept, and the cube says how many were needed. Queues the work; reads one count back. On failure the cube is
+ * empty. */
+bool ldc_build(struct ldc_builder *builder, struct ldc_store *store, unsigned which, struct scene_gpu *scene,
+               const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
+               struct error *error);
+
+#endif

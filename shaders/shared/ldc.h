@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/* Layered depth cubes on the device: what the build (ldc/pack.comp, ldc/sample.comp) writes and the walk reads.
+ *
+ * A cube is N x N x N cells of one size over a box of the world. It has three layered depth images, one an axis:
+ * image a looks along axis a (0 x, 1 y, 2 z) towards greater values; a texel's u runs along axis (a + 1) % 3 and
+ * its v along axis (a + 2) % 3. Places are in cells from the cube's lower corner: p_cell = (p_world - lower) /
+ * cell; texel (u, v) covers [u, u + 1) x [v, v + 1) and was sampled at its middle. A triangle is in the image of
+ * the axis that its normal leans to most (of equal ones the first) and in no other, so a sample's depth changes by
+ * at most one cell for each cell of u or of v.
+ *
+ * Five buffers, the cubes of a tracer one behind the other in each:
+ *   texels    RGBA32UI, one a texel, image after image, row (v) after row
+ *               x  first sample
+ *               y  bits 0..7 number of samples, 8..31 first quad
+ *               z  least depth (float, cells), w greatest; of an empty texel LDC_NO_DEPTH and -LDC_NO_DEPTH
+ *   quads     RGBA32F: depths of four samples of a texel, ascending; behind the last one LDC_NO_DEPTH
+ *   geometry  RG32UI, one a sample: the paper's first target
+ *               x  depth (float, cells)
+ *               y  geometric normal, octahedral 2 x 16 bit snorm, world space, on the side of the outside
+ * (winding) surface   RGBA32UI, one a sample: the paper's second target. Shares are what textures and vertex
+ * colours give, filtered to the size of a cell; what the material itself says is multiplied when the hit is
+ * shaded, so an edit of it needs no new cube x  bits 0..23 base colour, r g b, sRGB, 8 bits each; 24..31 alpha y
+ * shading normal, normal and bump maps applied, as the geometric one; same side z  bits 0..23 index into the
+ * materials; 24..27 share of metallic, 28..31 of transmission (of 15) w  bits 0..7 share of roughness, 8..15 of
+ * occlusion (strength applied); 16..20, 21..26, 27..31 r g b of the share of emission, square roots nodes     what
+ * of the images' texels can be skipped: ldc_levels.h Samples of a texel ascend in depth. Of several at the same
+ * depth the one that was drawn first is there: lowest instance, then lowest primitive. */
+#ifndef FARLIGHT_SHARED_LDC_H
+#define FARLIGHT_SHARED_LDC_H
+#include "shared/types.h"
+
+#define LDC_NO_DEPTH 1e30f
+#define LDC_TEXEL_COUNT_MASK 255u
+#define LDC_TEXEL_QUAD_SHIFT 8u
+#define LDC_QUADS_MAX 0x01000000u /* of all cubes of a tracer */
+#define LDC_MATERIAL_MASK 0x00ffffffu
+#define LDC_METALLIC_SHIFT 24u
+#define LDC_TRANSMISSION_SHIFT 28u
+
+#endif
