@@ -176,7 +176,7 @@ bool ldc_draw(struct ldc_task *task, enum ldc_pass pass,
         if (set)
             set(task, program);
         glMultiDrawArraysIndirect(run->sort == LDC_SPHERES ? GL_POINTS : GL_TRIANGLES,
-                                  (const char *)0 + run->first * sizeof(struct draw_command), (GLsizei)run->count,
+                                  (const void *)(run->first * sizeof(struct draw_command)), (GLsizei)run->count,
                                   sizeof(struct draw_command));
     }
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
