@@ -26,6 +26,7 @@
 #define IMAGE_POSITIONS 0 /* deform.comp */
 #define IMAGE_NORMALS 1
 #define IMAGE_TANGENTS 2
+#define IMAGE_LDC_NODES 0 /* ldc/levels.comp */
 
 /* texture units */
 #define UNIT_TRIANGLES 0
