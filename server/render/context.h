@@ -41,6 +41,7 @@ struct render_context {
     struct gpu_buffer ray_times; /* float a ray; empty where nothing moves */
     struct slice slice;          /* in hand */
     uint32_t ray_count, wave_number;
+    bool sampled_hits;                      /* but for those of discs, those of the wave are stored samples */
     struct gpu_buffer hit_list, hit_places; /* of those paths that hit something, see compact.h */
     uint32_t hit_count;
     struct gpu_buffer block_offsets, wave_state; /* of the compaction */

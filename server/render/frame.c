@@ -168,9 +168,11 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
         changes.shading || changes.lights)
         renderer->samples_before = 0;
     renderer->result.uploaded_bytes = changes.uploaded_bytes;
-    context->tracer = tracer_set_get(&renderer->tracers, &renderer->scene,
-                                     find_tracer(renderer, request->tracer, "tracer", error),
-                                     &request->tracer_options, &context->times, error);
+    const struct tracer_impl *impl = find_tracer(renderer, request->tracer, "tracer", error);
+    context->tracer = tracer_check_motion(impl, &renderer->scene, error)
+                          ? tracer_set_get(&renderer->tracers, &renderer->scene, impl, &request->tracer_options,
+                                           &context->times, error)
+                          : NULL;
     if (!context->tracer)
         return false;
     renderer->result.uploaded_bytes += context->tracer->stats.uploaded_bytes;
@@ -195,9 +197,11 @@ static bool begin_comparison(struct frame_renderer *renderer, struct error *erro
         return true;
     }
     uint64_t start_ns = clock_now_ns();
-    struct tracer *second = tracer_set_get(&renderer->tracers, &renderer->scene,
-                                           find_tracer(renderer, request->compare_with, "compare_with", error),
-                                           &request->tracer_options, NULL, error);
+    const struct tracer_impl *impl = find_tracer(renderer, request->compare_with, "compare_with", error);
+    if (!tracer_check_motion(impl, &renderer->scene, error))
+        return false;
+    struct tracer *second =
+        tracer_set_get(&renderer->tracers, &renderer->scene, impl, &request->tracer_options, NULL, error);
     if (!renderer->comparison)
         renderer->comparison = comparison_create(renderer->device, error);
     if (!second || !renderer->comparison)
@@ -374,6 +378,7 @@ static bool trace_wave(struct render_context *context, struct error *error)
     };
     if (!wave_trace(context, RAY_SECONDARY, &wave, error))
         return false;
+    context->sampled_hits = context->tracer->impl->sampled;
     context_span_begin(context, STAGE_SHADE);
     bool listed = compact_hits(context, error);
     context_span_end(context);

@@ -216,6 +216,7 @@ bool primary_slice(const struct primary *primary, struct render_context *context
 {
     context->ray_count = context->slice.slot_count << context->uniforms.sample_shift;
     context->wave_number = 0;
+    context->sampled_hits = !primary && context->tracer->impl->sampled;
     context->shadow_rays = context->secondary_rays = 0;
     context_span_begin(context, STAGE_PRIMARY);
     bool found = make_rays(primary, context, error) && (primary || trace_hits(context, error)) &&

@@ -109,9 +109,13 @@ const struct gpu_program *wave_passes_shade_program(struct wave_passes *passes, 
     size_t n = 0;
     for (; own && own->name; own++)
         defines[n++] = *own;
-    if (context->features.textures)
+    /* Only discs have textures that are not applied already. */
+    bool sampled = context->sampled_hits, exact = !sampled || context->scene->disc_count > 0;
+    if (sampled)
+        defines[n++] = (struct gpu_define){"HAS_SAMPLED", "1"};
+    if (context->features.textures && exact)
         defines[n++] = (struct gpu_define){"HAS_TEXTURES", "1"};
-    if (context->features.bump)
+    if (context->features.bump && exact)
         defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
     if (context->features.area_lights)
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};

@@ -44,6 +44,16 @@ const struct tracer_impl *tracer_find(unsigned number, const char *field, struct
     return NULL;
 }
 
+bool tracer_check_motion(const struct tracer_impl *impl, const struct scene_gpu *scene, struct error *error)
+{
+    if (!impl->sampled || !scene->has_motion)
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "shutter",
+              "%s holds samples of the scene as the shutter opens, and something moves before it closes",
+              impl->name);
+    return error_remedy(error, "take a shutter of 0, or another tracer");
+}
+
 struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *device,
                              const struct tracer_options *options, struct error *error)
 {
@@ -101,6 +111,8 @@ bool tracer_trace(struct tracer *tracer, struct scene_gpu *scene, const struct w
     if (!tracer->updated)
         return error_set(error, ERROR_INTERNAL, NULL, "%s: traced before it was brought to the scene",
                          tracer->impl->name);
+    if (wave->times && !tracer_check_motion(tracer->impl, scene, error))
+        return false;
     gpu_push_group(tracer->device, tracer->impl->name);
     bool ok =
         tracer->impl->trace(tracer, scene, wave, error) && gpu_check(tracer->device, tracer->impl->name, error);

@@ -73,6 +73,9 @@ struct tracer {
 struct tracer_impl {
     const char *name;
     unsigned depends_on; /* tracer_dependency bits */
+    /* Hits of meshes and spheres are stored samples (HIT_SAMPLED), taken as the shutter opens: rays of a scene in
+     * which something moves meanwhile must have no times. */
+    bool sampled;
     struct tracer *(*create)(struct gpu_device *device, const struct tracer_options *options, struct error *error);
     void (*destroy)(struct tracer *tracer);
     /* Brings the structure to the scene; `changes` is what changed since the last update of this tracer.
@@ -89,6 +92,9 @@ extern const struct tracer_impl tracer_bvh_impl, tracer_naive_impl, tracer_refer
 const struct tracer_impl *tracer_impl_by_number(unsigned number);
 /* The same for who asked for it: where there is none, ERROR_UNSUPPORTED says why and what can be done. */
 const struct tracer_impl *tracer_find(unsigned number, const char *field, struct error *error);
+
+/* Whether the tracer can show what moves while the shutter is open, if something does; else ERROR_UNSUPPORTED. */
+bool tracer_check_motion(const struct tracer_impl *impl, const struct scene_gpu *scene, struct error *error);
 
 struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *device,
                              const struct tracer_options *options, struct error *error);

@@ -7,9 +7,11 @@
 // Software GL runs both sides of every branch, so what the scene does not have is left out by defines, and all
 // textures of a material are sampled in one place, in a loop.
 //
-// Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPHERES.
+// Defines: HAS_TEXTURES some material has a texture; HAS_BUMP one of them is a bump map; HAS_SPHERES; HAS_SAMPLED the
+// hits of the wave are stored samples, but for those of discs.
 
 #include "shared/hit.h"
+#include "common/sampled.glsl"
 #include "common/surface.glsl"
 
 struct surface {
@@ -170,6 +172,20 @@ void apply_textures(inout surface s, inout vec4 colour, hit h, material m, vec4 
 }
 #endif
 
+#ifdef HAS_SAMPLED
+// What textures and vertex colours gave when the sample was taken, in their place.
+void apply_sample(inout surface s, inout vec4 colour, uvec4 words)
+{
+    surface_sample stored = unpack_sample(words);
+    colour *= stored.base_colour;
+    s.metallic *= stored.metallic;
+    s.roughness *= stored.roughness;
+    s.transmission *= stored.transmission;
+    s.occlusion = stored.occlusion;
+    s.emission *= stored.emission;
+}
+#endif
+
 // `width`: of the ray's cone at the hit.
 surface surface_at(hit h, vec3 origin, vec3 direction, float width)
 {
@@ -188,13 +204,20 @@ surface surface_at(hit h, vec3 origin, vec3 direction, float width)
     s.transmission = m.transmission;
     s.occlusion = 1.0;
     vec4 colour = m.base_colour * unpackUnorm4x8(h.colour);
+    bool is_stored = false;
+#ifdef HAS_SAMPLED
+    is_stored = (h.material & HIT_SAMPLED) != 0u;
+    if (is_stored)
+        apply_sample(s, colour, floatBitsToUint(uv01));
+#endif
 #ifdef HAS_TEXTURES
-    apply_textures(s, colour, h, m, uv01, footprint_of(h, m, s.geometric, direction, width));
+    if (!is_stored)
+        apply_textures(s, colour, h, m, uv01, footprint_of(h, m, s.geometric, direction, width));
 #endif
     s.base = clamp(colour.rgb, vec3(0.0), vec3(1.0));
     s.alpha = (m.flags & MATERIAL_ALPHA_BLEND) != 0u ? clamp(colour.a, 0.0, 1.0) : 1.0;
 #ifdef HAS_BUMP
-    if (m.texture_bump != 0u)
+    if (m.texture_bump != 0u && !is_stored)
         s.normal = bump_normal(h, m.texture_bump, s.normal, uv01);
 #endif
     if (s.inside) {

@@ -2,18 +2,13 @@
 // Materials, and textures from the one texel buffer that holds them all. Layouts: shared/material.h.
 #include "shared/bindings.h"
 #include "shared/material.h"
+#include "common/colour.glsl"
 
 layout(binding = UNIT_TEXELS) uniform samplerBuffer texels; // RGBA8 unorm, as stored
 
 layout(std430, binding = BIND_MATERIALS) readonly buffer material_block { material materials[]; };
 layout(std430, binding = BIND_TEXTURE_SLOTS) readonly buffer texture_slot_block { texture_slot texture_slots[]; };
 layout(std430, binding = BIND_TEXTURES) readonly buffer texture_block { texture_info textures[]; };
-
-// IEC 61966-2-1.
-vec3 linear_from_srgb(vec3 c)
-{
-    return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, lessThanEqual(c, vec3(0.04045)));
-}
 
 // Modes: 0 repeat, 1 clamp, 2 mirror.
 float wrap_coordinate(float u, uint mode)

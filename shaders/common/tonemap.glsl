@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // From linear light to what a screen shows.
+#include "common/colour.glsl"
 
 #define TONE_MAP_NEUTRAL 0u
 #define TONE_MAP_ACES 1u
@@ -36,10 +37,4 @@ vec3 tone_map(vec3 colour, uint kind)
     else if (kind == TONE_MAP_ACES)
         colour = tone_map_aces(colour);
     return clamp(colour, vec3(0.0), vec3(1.0));
-}
-
-// IEC 61966-2-1.
-vec3 srgb_from_linear(vec3 x)
-{
-    return mix(1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, 12.92 * x, lessThanEqual(x, vec3(0.0031308)));
 }

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// From the crossings of a closest-hit wave to hits: the second half of the walk through layered depth cubes, in the
+// place of surface.comp. What a sample holds of its surface goes into the hit as it is; discs, which no cube holds,
+// become what they are everywhere.
+//
+// Defines: HAS_DISCS as the scene has them.
+#include "common/dispatch.glsl"
+#include "common/sampled.glsl"
+#include "common/surface.glsl"
+
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
+layout(binding = UNIT_TRACER_0) uniform usamplerBuffer sample_geometry;
+layout(binding = UNIT_TRACER_1) uniform usamplerBuffer sample_surfaces;
+layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; a crossing is the first
+
+uniform uint ray_count;
+
+hit surface_sampled(uint sample_index, float distance_, vec3 direction)
+{
+    uint normal_geometric = texelFetch(sample_geometry, int(sample_index)).y;
+    uvec4 words = texelFetch(sample_surfaces, int(sample_index));
+    uint flags = HIT_SAMPLED;
+    if (dot(direction, unpack_unit(normal_geometric)) > 0.0)
+        flags |= HIT_BACK_FACE;
+    vec4 bits = uintBitsToFloat(words);
+    return hit(distance_, sample_material(words) | flags, HIT_NO_PRIMITIVE, HIT_NO_PRIMITIVE, bits.x, bits.y, bits.z,
+               bits.w, normal_geometric, words.y, 0u, 0xffffffffu);
+}
+
+void main()
+{
+    uint k = item_index();
+    if (k >= ray_count)
+        return;
+    uvec4 crossing = imageLoad(hits, int(3u * k));
+    float distance_ = uintBitsToFloat(crossing.x);
+    hit h = surface_miss();
+    if (crossing.z != HIT_NO_PRIMITIVE) {
+        vec3 direction = texelFetch(rays, int(2u * k + 1u)).xyz;
+#ifdef HAS_DISCS
+        if (crossing.w == HIT_NO_PRIMITIVE)
+            h = surface_disc(crossing.z, distance_, texelFetch(rays, int(2u * k)).xyz, direction);
+        else
+#endif
+            h = surface_sampled(crossing.z, distance_, direction);
+    }
+    imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material, h.primitive, h.instance));
+    imageStore(hits, int(3u * k + 1u), floatBitsToUint(vec4(h.u0, h.v0, h.u1, h.v1)));
+    imageStore(hits, int(3u * k + 2u), uvec4(h.normal_geometric, h.normal_shading, h.tangent, h.colour));
+}
