@@ -62,6 +62,9 @@ static const struct option options[] = {
      "Host memory that the frames of all jobs may take; a job that may need more has to wait for others to end"},
     {"memory", "device", OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
      "Device memory; 0: 70 % of what the device tells it has"},
+    {"memory", "ldc", OPTION_BYTES, AT(limits.ldc_bytes), "0", 0, 16 * TIB, "bytes",
+     "The part of it that the samples of one layered depth cube may take, in whole MiB; of more the nearest layers "
+     "are kept, and the frame says so. 0: no limit of its own"},
 
     {"limits", "clients", OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
     {"limits", "unauthenticated", OPTION_U32, AT(limits.unauthenticated), "64", 1, 65536, "",
@@ -82,6 +85,8 @@ static const struct option options[] = {
     {"limits", "width", OPTION_U32, AT(limits.width_pixels), "8192", 1, 8192, "pixels", "Width of a frame"},
     {"limits", "height", OPTION_U32, AT(limits.height_pixels), "8192", 1, 8192, "pixels", "Height of a frame"},
     {"limits", "samples", OPTION_U32, AT(limits.samples), "65536", 1, 65536, "", "Samples per pixel"},
+    {"limits", "ldc_layers", OPTION_U32, AT(limits.ldc_layers), "255", 1, 255, "",
+     "Layers of a layered depth cube; of more the nearest are kept, and the frame says so"},
     {"limits", "upload_window", OPTION_BYTES, AT(limits.upload_window_bytes), "16M", MIB, GIB, "bytes",
      "Blob data that a client may send ahead"},
     {"limits", "frame_window", OPTION_BYTES, AT(limits.frame_window_bytes), "64M", MIB, 16 * GIB, "bytes",

@@ -8,6 +8,7 @@
 
 #include <argp.h>
 #include <jansson.h>
+#include <stdio.h>
 
 /* Exit statuses; 128 + signal besides. */
 enum cli_status {
@@ -100,7 +101,7 @@ void cli_progress_clear(struct cli_progress *progress);
 /* The last bar of what is done stays; any other is removed. */
 void cli_progress_end(struct cli_progress *progress, bool done);
 
-/* ---- job_options.c: what render and animate have in common ---- */
+/* ---- job_options.c, job_tracer.c: what render and animate have in common ---- */
 
 enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
 
@@ -223,6 +224,15 @@ void cli_print_waves(const struct fl_frame *frame, enum protocol_tracer referenc
 json_t *cli_waves_json(const struct fl_frame *frame);      /* an object a wave and kind of ray */
 json_t *cli_wave_total_json(const struct fl_frame *frame); /* all of them together */
 double cli_wave_agreement(const struct fl_frame *frame);   /* likewise; see fl_wave_agreement */
+
+/* ---- cubes.c: what the tracer ldc made of a scene ---- */
+
+/* "1024 cells of 1.2 mm; 6 layers, 812345 samples" */
+void cli_cube_print(FILE *out, const struct record_layered_cube *cube);
+json_t *cli_cubes_json(const struct fl_frame *frame);
+/* On standard error, where a limit keeps surfaces from the picture; once for each part of the scene. */
+void cli_cubes_warn(const struct fl_frame *frame, bool warned[PROTOCOL_CUBE_PART_COUNT],
+                    struct cli_progress *progress);
 
 /* ---- timings.c ---- */
 

@@ -223,6 +223,7 @@ static struct fl_frame *render(struct tracer_comparison *comparison, const char 
 static bool render_both(struct tracer_comparison *comparison, struct fl_error *error)
 {
     struct fl_job_options *wanted = &comparison->job.options;
+    bool warned[PROTOCOL_CUBE_PART_COUNT] = {false};
     char what[100];
     snprintf(what, sizeof what, "rays of %s and %s", protocol_tracer_text(comparison->tracer),
              protocol_tracer_text(comparison->reference));
@@ -233,11 +234,14 @@ static bool render_both(struct tracer_comparison *comparison, struct fl_error *e
     comparison->frame = render(comparison, comparison->paths[1], error);
     if (comparison->frame == NULL)
         return false;
+    cli_cubes_warn(comparison->frame, warned, &comparison->progress);
     snprintf(what, sizeof what, "picture of %s", protocol_tracer_text(comparison->reference));
     cli_progress_step(&comparison->progress, 1, STEPS, what);
     wanted->compare = false;
     wanted->tracer = comparison->reference;
     struct fl_frame *reference = render(comparison, comparison->paths[0], error);
+    if (reference != NULL)
+        cli_cubes_warn(reference, warned, &comparison->progress);
     fl_frame_destroy(reference);
     return reference != NULL && fl_exporter_wait(comparison->exporter, error);
 }
@@ -263,6 +267,15 @@ static bool is_within(const struct tracer_comparison *comparison)
            cli_limits_hold(&comparison->limits, &comparison->figures);
 }
 
+static void print_cubes(const struct fl_frame *frame)
+{
+    for (size_t i = 0; i < frame->cube_count; i++) {
+        printf("  %s cube: ", protocol_cube_part_text(frame->cubes[i].part));
+        cli_cube_print(stdout, &frame->cubes[i]);
+        putchar('\n');
+    }
+}
+
 static void print_text(const struct tracer_comparison *comparison)
 {
     const struct fl_frame *frame = comparison->frame;
@@ -273,6 +286,7 @@ static void print_text(const struct tracer_comparison *comparison)
     cli_print_name(comparison->job.model);
     printf(", %ux%u, %u sample%s a pixel, %s\n", frame->width, frame->height, frame->samples,
            frame->samples == 1 ? "" : "s", protocol_integrator_text(frame->integrator));
+    print_cubes(frame);
     cli_print_waves(frame, comparison->reference, comparison->far_share);
     if (agreement < comparison->least_agreement)
         printf("  over the limit: agree %.6g %%, at least %.6g %%\n", agreement * 100,
@@ -296,6 +310,8 @@ static void print_json(const struct tracer_comparison *comparison)
     fl_text_utf8(comparison->job.model, model, sizeof model);
     json_object_set_new(object, "model", json_string(model));
     json_object_set_new(object, "picture", picture != NULL ? json_string(picture) : json_null());
+    if (frame->cube_count > 0)
+        json_object_set_new(object, "cubes", cli_cubes_json(frame));
     json_object_set_new(object, "least_agreement",
                         comparison->least_agreement > 0 ? json_real(comparison->least_agreement) : json_null());
     json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));

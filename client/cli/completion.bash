@@ -7,19 +7,25 @@ _farlight()
     local job="--output --format --half --float --server --size --samples --depth --seed --environment --exposure
         --tone-map --camera --eye --look-at --up --fov --tracer --bvh-bounds --integrator --primary --encoding
         --quality --timings --timings=json --trace-file --quiet --help --filter --aperture --focus --shutter --clip
-        --clip-once --clip-start --clip-speed --bvh-rays"
+        --clip-once --clip-start --clip-speed --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels
+        --ldc-block --ldc-rays"
     local words=
 
     if [ "$COMP_CWORD" -eq 1 ]; then
         words="render animate info compare stats ping bridge help --version"
     else
         case $before in
-        --tracer) words="bvh naive reference" ;;
-        --tracers) words="bvh,reference bvh,naive naive,reference" ;;
+        --tracer) words="bvh naive reference ldc" ;;
+        --tracers) words="bvh,reference ldc,reference bvh,naive naive,reference ldc,bvh" ;;
         --bvh-bounds) words="auto box sphere" ;;
         --integrator) words="whitted distributed" ;;
         --filter) words="blackman-harris gaussian tent box" ;;
         --bvh-rays) words="0 1 2 3 4 8" ;;
+        --ldc-resolution) words="512 1024 2048" ;;
+        --ldc-build) words="auto peel lists" ;;
+        --ldc-levels) words="auto blocks pyramid" ;;
+        --ldc-block) words="2 4 8 16 32" ;;
+        --ldc-rays) words="0 1 4" ;;
         --primary) words="raster trace" ;;
         --encoding) words="raw zstd jpeg" ;;
         --tone-map) words="neutral aces none" ;;
@@ -35,7 +41,8 @@ _farlight()
             compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help
                 --tracers --far --server --size --samples --depth --seed --environment --exposure --camera --eye --look-at
                 --up --fov --aperture --focus --shutter --filter --clip --clip-once --clip-start --clip-speed --time
-                --bvh-bounds --bvh-rays --integrator --encoding --quality --quiet" ;;
+                --bvh-bounds --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels --ldc-block --ldc-rays
+                --integrator --encoding --quality --quiet" ;;
             stats) words="--server --json --help" ;;
             ping) words="--server --count --help" ;;
             help) words="render animate info compare stats ping bridge" ;;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-#include "cli/cli.h"
+#include "cli/job_options.h"
+
 #include "lib/text.h"
 
 #include <ctype.h>
@@ -11,44 +12,6 @@
 #include <string.h>
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
-
-enum key {
-    KEY_SERVER = 's',
-    KEY_OUTPUT = 'o',
-    KEY_QUIET = 'q',
-    KEY_TRACER = 0x100,
-    KEY_BVH_BOUNDS,
-    KEY_INTEGRATOR,
-    KEY_PRIMARY,
-    KEY_TONE_MAP,
-    KEY_ENCODING,
-    KEY_SIZE,
-    KEY_SAMPLES,
-    KEY_DEPTH,
-    KEY_SEED,
-    KEY_EXPOSURE,
-    KEY_QUALITY,
-    KEY_ENVIRONMENT,
-    KEY_CAMERA,
-    KEY_EYE,
-    KEY_LOOK_AT,
-    KEY_UP,
-    KEY_FOV,
-    KEY_FORMAT,
-    KEY_HALF,
-    KEY_FLOAT,
-    KEY_TIMINGS,
-    KEY_TRACE_FILE,
-    KEY_APERTURE,
-    KEY_FOCUS,
-    KEY_SHUTTER,
-    KEY_FILTER,
-    KEY_BVH_RAYS,
-    KEY_CLIP,
-    KEY_CLIP_ONCE,
-    KEY_CLIP_START,
-    KEY_CLIP_SPEED
-};
 
 static const struct argp_option options[] = {
     {"output", KEY_OUTPUT, "IMAGE", 0, "Image file; its ending is its format. '-' is standard output", 0},
@@ -85,10 +48,7 @@ static const struct argp_option options[] = {
     {"clip-start", KEY_CLIP_START, "SECONDS", 0, "When they begin (default 0; negative: they run already)", 0},
     {"clip-speed", KEY_CLIP_SPEED, "FACTOR", 0, "How fast they run (default 1)", 0},
     {NULL, 0, NULL, 0, "Method:", 4},
-    {"tracer", KEY_TRACER, "NAME", 0, "bvh (default), naive, reference", 0},
-    {"bvh-bounds", KEY_BVH_BOUNDS, "NAME", 0, "auto (default), box, sphere", 0},
-    {"bvh-rays", KEY_BVH_RAYS, "N", 0,
-     "Rays that walk the bvh as one: 1, 2, 3, 4, 8 (default 0: chosen for each wave)", 0},
+    {"tracer", KEY_TRACER, "NAME", 0, "bvh (default), naive, reference, ldc", 0},
     {"integrator", KEY_INTEGRATOR, "NAME", 0,
      "whitted, distributed (default: distributed for several samples, a lens or a shutter)", 0},
     {"primary", KEY_PRIMARY, "NAME", 0,
@@ -97,7 +57,21 @@ static const struct argp_option options[] = {
      "How pixels travel: raw, zstd, jpeg (default: raw on this machine, zstd over a network)", 0},
     {"quality", KEY_QUALITY, "N", 0,
      "JPEG quality 1 to 100, zstd level 1 to 19, or rate factor of a video, 1 (best) to 51", 0},
-    {NULL, 0, NULL, 0, "Talk:", 5},
+    {NULL, 0, NULL, 0, "Tracer bvh, a hierarchy of bounding volumes:", 5},
+    {"bvh-bounds", KEY_BVH_BOUNDS, "NAME", 0, "auto (default), box, sphere", 0},
+    {"bvh-rays", KEY_BVH_RAYS, "N", 0,
+     "Rays that walk the bvh as one: 1, 2, 3, 4, 8 (default 0: chosen for each wave)", 0},
+    {NULL, 0, NULL, 0, "Tracer ldc, surfaces sampled along three axes:", 6},
+    {"ldc-resolution", KEY_LDC_RESOLUTION, "N", 0,
+     "Cells along the longest side of the sampled box, 16 to 4096 (default 1024)", 0},
+    {"ldc-tolerance", KEY_LDC_TOLERANCE, "METRES", 0,
+     "Hit a sample where the ray comes this near to it (default 0: where it crosses the sample's plane)", 0},
+    {"ldc-build", KEY_LDC_BUILD, "NAME", 0, "auto (default), peel: layer by layer, lists: all in one pass", 0},
+    {"ldc-levels", KEY_LDC_LEVELS, "NAME", 0,
+     "What leads over emptiness: auto (default), blocks of one size, pyramid of all sizes", 0},
+    {"ldc-block", KEY_LDC_BLOCK, "N", 0, "Texels along a side of a block: 2, 4, 8, 16, 32 (default 8)", 0},
+    {"ldc-rays", KEY_LDC_RAYS, "N", 0, "Rays that walk as one: 1, 4 (default 0: chosen)", 0},
+    {NULL, 0, NULL, 0, "Talk:", 7},
     {"timings", KEY_TIMINGS, "json", OPTION_ARG_OPTIONAL,
      "Print the time of every stage, as a table or as JSON, one object a line", 0},
     {"trace-file", KEY_TRACE_FILE, "FILE", 0,
@@ -123,7 +97,7 @@ static error_t name_field(struct cli_job *job, const char *field)
     return EINVAL;
 }
 
-static error_t unknown_value(struct cli_job *job, const char *field, const char *enum_name, const char *value)
+error_t job_unknown_value(struct cli_job *job, const char *field, const char *enum_name, const char *value)
 {
     char known[200], words[40];
     size_t length = 0;
@@ -135,8 +109,8 @@ static error_t unknown_value(struct cli_job *job, const char *field, const char 
     return EINVAL;
 }
 
-static error_t set_integer(struct cli_job *job, const char *field, const char *value, uint64_t least,
-                           uint64_t greatest, uint64_t *number)
+error_t job_set_integer(struct cli_job *job, const char *field, const char *value, uint64_t least,
+                        uint64_t greatest, uint64_t *number)
 {
     return fl_text_integer(value, least, greatest, number, &job->error) ? 0 : name_field(job, field);
 }
@@ -152,31 +126,28 @@ static error_t set_name(struct cli_job *job, int key, const char *field, const c
 {
     struct fl_job_options *wanted = &job->options;
     switch (key) {
-    case KEY_TRACER:
-        return protocol_tracer_parse(value, &wanted->tracer) ? 0 : unknown_value(job, field, "tracer", value);
-    case KEY_BVH_BOUNDS:
-        return protocol_bvh_bounds_parse(value, &wanted->bvh_bounds)
-                   ? 0
-                   : unknown_value(job, field, "bvh_bounds", value);
     case KEY_INTEGRATOR:
         job->has_integrator = true;
         return protocol_integrator_parse(value, &wanted->integrator)
                    ? 0
-                   : unknown_value(job, field, "integrator", value);
+                   : job_unknown_value(job, field, "integrator", value);
     case KEY_PRIMARY:
         job->has_primary = true;
-        return protocol_primary_parse(value, &wanted->primary) ? 0 : unknown_value(job, field, "primary", value);
+        return protocol_primary_parse(value, &wanted->primary) ? 0
+                                                               : job_unknown_value(job, field, "primary", value);
     case KEY_TONE_MAP:
-        return protocol_tone_map_parse(value, &wanted->tone_map) ? 0
-                                                                 : unknown_value(job, field, "tone_map", value);
+        return protocol_tone_map_parse(value, &wanted->tone_map)
+                   ? 0
+                   : job_unknown_value(job, field, "tone_map", value);
     case KEY_ENCODING:
         job->has_encoding = true;
-        return protocol_encoding_parse(value, &wanted->encoding) ? 0
-                                                                 : unknown_value(job, field, "encoding", value);
+        return protocol_encoding_parse(value, &wanted->encoding)
+                   ? 0
+                   : job_unknown_value(job, field, "encoding", value);
     case KEY_FILTER:
         return protocol_pixel_filter_parse(value, &wanted->pixel_filter)
                    ? 0
-                   : unknown_value(job, field, "pixel_filter", value);
+                   : job_unknown_value(job, field, "pixel_filter", value);
     case KEY_FORMAT:
         job->image = cli_image_by_name(value);
         return job->image != CLI_IMAGE_UNKNOWN
@@ -188,8 +159,8 @@ static error_t set_name(struct cli_job *job, int key, const char *field, const c
     }
 }
 
-static error_t set_real(struct cli_job *job, const char *field, const char *value, double least, double greatest,
-                        double *number)
+error_t job_set_real(struct cli_job *job, const char *field, const char *value, double least, double greatest,
+                     double *number)
 {
     return fl_text_real(value, least, greatest, number, &job->error) ? 0 : name_field(job, field);
 }
@@ -198,34 +169,27 @@ static error_t set_real(struct cli_job *job, const char *field, const char *valu
 static error_t set_motion_number(struct cli_job *job, int key, const char *field, const char *value)
 {
     struct fl_job_options *wanted = &job->options;
-    uint64_t rays = 0;
     double real = 0;
     error_t status = 0;
     switch (key) {
     case KEY_APERTURE:
         job->has_aperture = true;
-        status = set_real(job, field, value, 0, 1e6, &real);
+        status = job_set_real(job, field, value, 0, 1e6, &real);
         wanted->aperture = (float)real;
         return status;
     case KEY_FOCUS:
         job->has_focus = true;
-        status = set_real(job, field, value, 0, 1e12, &real);
+        status = job_set_real(job, field, value, 0, 1e12, &real);
         wanted->focus = (float)real;
         return status;
     case KEY_SHUTTER:
-        status = set_real(job, field, value, 0, 64, &real);
+        status = job_set_real(job, field, value, 0, 64, &real);
         wanted->shutter = (float)real;
         return status;
     case KEY_CLIP_START:
-        return set_real(job, field, value, -1e6, 1e6, &job->clip_start_s);
+        return job_set_real(job, field, value, -1e6, 1e6, &job->clip_start_s);
     case KEY_CLIP_SPEED:
-        return set_real(job, field, value, 0.001, 1000, &job->clip_speed);
-    case KEY_BVH_RAYS:
-        status = set_integer(job, field, value, 0, 8, &rays);
-        if (status == 0 && (rays > 4 && rays < 8))
-            return cli_usage(job, field, "%s rays cannot walk together (known: 0, 1, 2, 3, 4, 8)", value);
-        wanted->bvh_rays_together = (unsigned)rays;
-        return status;
+        return job_set_real(job, field, value, 0.001, 1000, &job->clip_speed);
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -242,18 +206,18 @@ static error_t set_number(struct cli_job *job, int key, const char *field, const
     case KEY_SIZE:
         return fl_text_size(value, &wanted->width, &wanted->height, &job->error) ? 0 : name_field(job, field);
     case KEY_SAMPLES:
-        status = set_integer(job, field, value, 1, 65536, &number);
+        status = job_set_integer(job, field, value, 1, 65536, &number);
         wanted->samples = (uint32_t)number;
         return status;
     case KEY_DEPTH:
-        status = set_integer(job, field, value, 0, 32, &number);
+        status = job_set_integer(job, field, value, 0, 32, &number);
         wanted->depth = number == 0 ? FL_DEPTH_NONE : (int)number;
         return status;
     case KEY_SEED:
-        return set_integer(job, field, value, 0, UINT64_MAX, &wanted->seed);
+        return job_set_integer(job, field, value, 0, UINT64_MAX, &wanted->seed);
     case KEY_QUALITY:
         job->has_quality = true;
-        status = set_integer(job, field, value, 1, 100, &number);
+        status = job_set_integer(job, field, value, 1, 100, &number);
         wanted->quality = (unsigned)number;
         return status;
     case KEY_EXPOSURE:
@@ -319,7 +283,8 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
         job->timings = value != NULL ? CLI_TIMINGS_JSON : CLI_TIMINGS_TABLE;
         return 0;
     default: {
-        const error_t status = set_name(job, key, field, value);
+        error_t status = set_name(job, key, field, value);
+        status = status == ARGP_ERR_UNKNOWN ? job_set_tracer(job, key, field, value) : status;
         return status == ARGP_ERR_UNKNOWN ? set_number(job, key, field, value) : status;
     }
     }
@@ -373,10 +338,12 @@ const struct argp *cli_picture_argp(void)
 /* FARLIGHT_SIZE for --size, and so on. */
 static bool read_environment(struct cli_job *job)
 {
-    static const int keys[] = {KEY_SERVER,   KEY_SIZE,     KEY_SAMPLES, KEY_DEPTH,       KEY_SEED,
-                               KEY_EXPOSURE, KEY_TONE_MAP, KEY_TRACER,  KEY_BVH_BOUNDS,  KEY_INTEGRATOR,
-                               KEY_PRIMARY,  KEY_ENCODING, KEY_QUALITY, KEY_ENVIRONMENT, KEY_APERTURE,
-                               KEY_FOCUS,    KEY_SHUTTER,  KEY_FILTER,  KEY_BVH_RAYS};
+    static const int keys[] = {
+        KEY_SERVER,        KEY_SIZE,      KEY_SAMPLES,    KEY_DEPTH,       KEY_SEED,
+        KEY_EXPOSURE,      KEY_TONE_MAP,  KEY_TRACER,     KEY_BVH_BOUNDS,  KEY_INTEGRATOR,
+        KEY_PRIMARY,       KEY_ENCODING,  KEY_QUALITY,    KEY_ENVIRONMENT, KEY_APERTURE,
+        KEY_FOCUS,         KEY_SHUTTER,   KEY_FILTER,     KEY_BVH_RAYS,    KEY_LDC_RESOLUTION,
+        KEY_LDC_TOLERANCE, KEY_LDC_BUILD, KEY_LDC_LEVELS, KEY_LDC_BLOCK,   KEY_LDC_RAYS};
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
         char field[40] = "FARLIGHT_";
         size_t length = strlen(field);

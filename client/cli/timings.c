@@ -10,6 +10,7 @@
 #define STAGES PROTOCOL_STAGE_COUNT
 #define CLOCKS PROTOCOL_CLOCK_COUNT
 #define WAVES_SHOWN 32u
+#define PARTS PROTOCOL_CUBE_PART_COUNT
 
 struct sum {
     uint64_t ns;
@@ -24,6 +25,9 @@ struct cli_timings {
     uint64_t pixels_bytes, wait_ns, receive_ns, decode_ns;
     struct sum stages[STAGES][CLOCKS];
     struct sum waves[2][WAVES_SHOWN][CLOCKS]; /* trace, shade */
+    struct sum cubes[PARTS][CLOCKS];          /* build, of the tracer ldc */
+    struct record_layered_cube cube[PARTS];   /* of the last frame that has it; resolution 0: none has */
+    uint64_t cube_builds[PARTS];
     char title[160];
 };
 
@@ -58,6 +62,18 @@ static void add_stages(struct cli_timings *timings, const struct fl_frame *frame
         const bool is_trace = time->stage == PROTOCOL_STAGE_TRACE;
         if ((is_trace || time->stage == PROTOCOL_STAGE_SHADE) && time->wave < WAVES_SHOWN)
             add(&timings->waves[is_trace ? 0 : 1][time->wave][time->clock], time->duration_ns);
+        /* A build's wave is the cube's number. */
+        if (time->stage == PROTOCOL_STAGE_BUILD && frame->cube_count > 0 && time->wave < PARTS)
+            add(&timings->cubes[time->wave][time->clock], time->duration_ns);
+    }
+}
+
+static void add_cubes(struct cli_timings *timings, const struct fl_frame *frame)
+{
+    for (size_t i = 0; i < frame->cube_count; i++) {
+        const struct record_layered_cube *cube = &frame->cubes[i];
+        timings->cube[cube->part] = *cube;
+        timings->cube_builds[cube->part] += cube->rebuilt;
     }
 }
 
@@ -80,6 +96,7 @@ static void add_frame(struct cli_timings *timings, const struct fl_frame *frame)
     timings->receive_ns += frame->receive_ns;
     timings->decode_ns += frame->decode_ns;
     add_stages(timings, frame);
+    add_cubes(timings, frame);
 }
 
 /* ---- JSON ---- */
@@ -134,6 +151,8 @@ static void print_frame(struct cli_timings *timings, const struct fl_frame *fram
     set(object, "receive_ns", frame->receive_ns);
     set(object, "decode_ns", frame->decode_ns);
     json_object_set_new(object, "stages", stages_array(frame));
+    if (frame->cube_count > 0)
+        json_object_set_new(object, "cubes", cli_cubes_json(frame));
     print_object(timings, object);
 }
 
@@ -189,6 +208,10 @@ static void print_stages(const struct cli_timings *timings)
     fprintf(timings->out, "  %-16s%12s%12s\n", "daemon", "CPU ms", "GPU ms");
     for (unsigned stage = 0; stage < STAGES; stage++) {
         print_row(timings, "", protocol_stage_text((enum protocol_stage)stage), timings->stages[stage]);
+        if (stage == PROTOCOL_STAGE_BUILD)
+            for (unsigned part = 0; part < PARTS; part++)
+                print_row(timings, "  ", protocol_cube_part_text((enum protocol_cube_part)part),
+                          timings->cubes[part]);
         if (stage != PROTOCOL_STAGE_TRACE && stage != PROTOCOL_STAGE_SHADE)
             continue;
         for (unsigned wave = 0; wave < WAVES_SHOWN; wave++) {
@@ -224,6 +247,19 @@ static void print_rays(const struct cli_timings *timings)
             (double)timings->structure_bytes * 1e-6);
 }
 
+static void print_cubes(const struct cli_timings *timings)
+{
+    for (unsigned part = 0; part < PARTS; part++) {
+        if (timings->cube[part].resolution == 0)
+            continue;
+        fprintf(timings->out, "  %-9s%-7s", part == 0 || timings->cube[0].resolution == 0 ? "cubes" : "",
+                protocol_cube_part_text((enum protocol_cube_part)part));
+        cli_cube_print(timings->out, &timings->cube[part]);
+        fprintf(timings->out, "; sampled for %" PRIu64 " of %" PRIu64 " frame%s\n", timings->cube_builds[part],
+                timings->frames, timings->frames == 1 ? "" : "s");
+    }
+}
+
 static void print_part(const struct cli_timings *timings, const char *name, uint64_t ns, const char *doc)
 {
     fprintf(timings->out, "  %-16s%12.3f  %s\n", name, ms(ns), doc);
@@ -238,6 +274,7 @@ static void print_table(struct cli_timings *timings, const struct cli_client_tim
                 timings->frames == 1 ? "" : "s", timings->frames == 1 ? "" : ", means of one");
         print_stages(timings);
         print_rays(timings);
+        print_cubes(timings);
     }
     snprintf(upload, sizeof upload, "%.3f MB of %.3f MB offered", (double)import->uploaded_bytes * 1e-6,
              (double)import->offered_bytes * 1e-6);

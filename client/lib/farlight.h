@@ -262,6 +262,14 @@ struct fl_job_options {
     bool accumulate;            /* frames add to those before as long as nothing changes: see fl_frame.samples */
     const struct record_clip_use *clips; /* that are played, at most 16 */
     size_t clip_count;
+    /* Of the tracer ldc. */
+    uint32_t ldc_resolution; /* cells along the longest side of a cube, 16 to 4096; 0: 1024 */
+    unsigned ldc_block;      /* texels along a side of a block: 2, 4, 8, 16, 32; 0: 8 */
+    enum protocol_ldc_build ldc_build;
+    enum protocol_ldc_levels ldc_levels;
+    float
+        ldc_tolerance; /* a ray hits where it comes this near to a sample, metres; 0: where it crosses its plane */
+    unsigned ldc_rays_together; /* that walk as one: 1, 4; 0: chosen */
 };
 
 /* One picture and what it cost. */
@@ -285,8 +293,10 @@ struct fl_frame {
     struct record_stage_time *stages;
     size_t wave_comparison_count;                    /* 0: the job does not compare */
     struct record_wave_comparison *wave_comparisons; /* ascending by wave and kind of ray; see messages.def */
-    size_t pixels_bytes;                             /* width * height * 4, 8 or 16 */
-    uint8_t *pixels;                                 /* rows from the top, without gaps, in `format` */
+    size_t cube_count;                               /* 0: the tracer does not sample the scene */
+    struct record_layered_cube cubes[PROTOCOL_CUBE_PART_COUNT]; /* static before dynamic; see messages.def */
+    size_t pixels_bytes;                                        /* width * height * 4, 8 or 16 */
+    uint8_t *pixels;                                            /* rows from the top, without gaps, in `format` */
 };
 
 /* One job at a time per connection. */

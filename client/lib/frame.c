@@ -228,6 +228,9 @@ static bool take_costs(struct fl_frame *frame, const struct message_frame_end *e
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     frame->stage_count = end->stages_count;
     frame->wave_comparison_count = end->comparisons_count;
+    for (; frame->cube_count < end->cubes_count && frame->cube_count < PROTOCOL_CUBE_PART_COUNT;
+         frame->cube_count++)
+        frame->cubes[frame->cube_count] = end->cubes[frame->cube_count];
     return true;
 }
 

@@ -54,6 +54,12 @@ static void fill_render(struct message_render *render, const struct fl_job_optio
     render->pixel_filter = options->pixel_filter;
     render->bvh_rays_together = options->bvh_rays_together;
     render->accumulate = options->accumulate ? 1 : 0;
+    render->ldc_resolution = options->ldc_resolution;
+    render->ldc_block = options->ldc_block;
+    render->ldc_build = options->ldc_build;
+    render->ldc_levels = options->ldc_levels;
+    render->ldc_tolerance = options->ldc_tolerance;
+    render->ldc_rays_together = options->ldc_rays_together;
     render->clips = (struct record_clip_use *)(uintptr_t)options->clips; /* only read */
     render->clips_count = (uint32_t)options->clip_count;
     render->keys = (struct record_camera_key *)(uintptr_t)options->keys; /* only read */

@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define CELL_METRES_MAX 3e38f /* the message's */
+
 /* Lives until the last message that refers to its bytes is gone. */
 struct pending_frame {
     struct out_chunk chunk; /* first: release() gets its address */
@@ -154,6 +156,28 @@ static uint32_t fill_comparisons(struct record_wave_comparison *records, const s
     return count;
 }
 
+/* Those that hold anything. */
+static uint32_t fill_cubes(struct record_layered_cube *records, const struct frame_result *result)
+{
+    uint32_t count = 0;
+    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
+        const struct tracer_cube *from = &result->cubes[i];
+        if (!from->resolution)
+            continue;
+        records[count++] = (struct record_layered_cube){
+            .part = (enum protocol_cube_part)i,
+            .resolution = from->resolution,
+            .cell_metres = from->cell_metres < CELL_METRES_MAX ? from->cell_metres : CELL_METRES_MAX,
+            .layers_needed = from->layers_needed,
+            .layers_kept = from->layers_kept,
+            .samples = from->samples,
+            .samples_lost = from->samples_lost,
+            .rebuilt = from->rebuilt ? 1 : 0,
+        };
+    }
+    return count;
+}
+
 static void send_end(struct pending_frame *pending, uint64_t now_ns)
 {
     struct job *job = pending->job;
@@ -175,6 +199,7 @@ static void send_end(struct pending_frame *pending, uint64_t now_ns)
         };
     }
     struct record_wave_comparison comparisons[COMPARISONS_MAX];
+    struct record_layered_cube cubes[TRACER_CUBES_MAX];
     struct message message;
     message_init(&message, MESSAGE_FRAME_END);
     message.frame_end.frame = frame->frame;
@@ -188,6 +213,8 @@ static void send_end(struct pending_frame *pending, uint64_t now_ns)
     message.frame_end.stages_count = times->count;
     message.frame_end.comparisons = comparisons;
     message.frame_end.comparisons_count = fill_comparisons(comparisons, &frame->result);
+    message.frame_end.cubes = cubes;
+    message.frame_end.cubes_count = fill_cubes(cubes, &frame->result);
     session_send(job->session, job->request, job->channel, &message);
     const struct hub_options *hub = &job->session->hub->options;
     timeline_frame(hub->timeline, &(struct timeline_frame){.client = job->session->number,

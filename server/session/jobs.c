@@ -3,6 +3,7 @@
 
 #include "session/frames.h"
 #include "session/session.h"
+#include "session/tracer_settings.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -127,11 +128,8 @@ static bool check(const struct session *session, const struct message_render *re
     if (render->encoding == PROTOCOL_ENCODING_ZSTD && render->quality > ZSTD_LEVEL_MAX)
         return error_set(error, ERROR_INVALID, "render.quality", "zstd has levels up to %u, not %u",
                          ZSTD_LEVEL_MAX, render->quality);
-    if (render->bvh_rays_together > 4 && render->bvh_rays_together != 8)
-        return error_set(error, ERROR_INVALID, "render.bvh_rays_together",
-                         "1, 2, 3, 4 or 8 rays walk as one, not %u", render->bvh_rays_together);
-    return check_limits(session, render, error) && check_camera(render, error) &&
-           check_room(session, render, error);
+    return tracer_settings_check(render, error) && check_limits(session, render, error) &&
+           check_camera(render, error) && check_room(session, render, error);
 }
 
 /* ---- start ------------------------------------------------------------------------------------------- */
@@ -172,7 +170,8 @@ static bool fill_keys(struct engine_job *job, const struct message_render *rende
 }
 
 /* All but keys and clips, which are there already. */
-static void fill_job(struct engine_job *job, const struct message_render *render, uint64_t credit)
+static void fill_job(struct engine_job *job, const struct session *session, const struct message_render *render,
+                     uint64_t credit)
 {
     *job = (struct engine_job){
         .keys = job->keys,
@@ -193,8 +192,7 @@ static void fill_job(struct engine_job *job, const struct message_render *render
                 .depth = render->depth,
                 .seed = render->seed,
                 .tracer = render->tracer,
-                .tracer_options = {.bvh_bounds = (unsigned)render->bvh_bounds,
-                                   .bvh_rays_together = render->bvh_rays_together},
+                .tracer_options = tracer_settings(&session->hub->options.limits, render),
                 .integrator = (enum frame_integrator)render->integrator,
                 .primary = (enum frame_primary)render->primary,
                 .tone_map = (enum frame_tone_map)render->tone_map,
@@ -257,7 +255,7 @@ void jobs_start(struct session *session, struct request *request, const struct m
     session->job_count++;
     session->hub->frame_bytes += job->frame_bytes;
     request->object = job;
-    fill_job(&command->job, render, job->engine_credit);
+    fill_job(&command->job, session, render, job->engine_credit);
     command->scene = render->scene;
     session_submit(session, request, command);
 }

@@ -18,7 +18,8 @@ EXAMPLES = {
         "model": "teapot.glb", "environment": "sky.hdr", "camera": 0,
         "frames": "1-240:2", "fps": 23.976, "shard": "3/8", "size": [64, 48], "samples": 4, "depth": 0, "seed": 7,
         "exposure": -1.5, "tone_map": "aces", "shutter": 0.5, "filter": "gaussian", "tracer": "bvh",
-        "bvh_bounds": "sphere", "bvh_rays": 2, "integrator": "distributed", "primary": "trace", "encoding": "zstd",
+        "bvh_bounds": "sphere", "bvh_rays": 2, "ldc_resolution": 512, "ldc_block": 4, "ldc_build": "lists",
+        "ldc_levels": "pyramid", "ldc_tolerance": 0.001, "ldc_rays": 4, "integrator": "distributed", "primary": "trace", "encoding": "zstd",
         "quality": 3, "format": "exr", "half": True, "float": False, "output": "%04d.exr"},
     "movie": {
         "model": "teapot.glb", "camera": "a camera", "lossless": True, "frames": "5",
@@ -262,6 +263,11 @@ class Schema(Shots):
                 ("stills", ("exposure",), (-64, 64, 64.5)),
                 ("stills", ("shutter",), (0, 64, 64.1, -0.1)),
                 ("stills", ("bvh_rays",), range(-1, 10)),
+                ("stills", ("tracer",), ("naive", "reference", "ldc", "ldc ")),
+                ("stills", ("ldc_resolution",), (0, 1, 15, 16, 4096, 4097, 512.5)),
+                ("stills", ("ldc_block",), range(34)),
+                ("stills", ("ldc_rays",), range(6)),
+                ("stills", ("ldc_tolerance",), (0, 1e6, 1.1e6, -0.1)),
                 ("stills", ("quality",), (0, 1, 19)),
                 ("stills", ("frames",), ("1", "1-2", "1-2:1", "1:2", "1-", "a", "1-2:", " 1")),
                 ("stills", ("shard",), ("1/1", "1", "/1", "1/1/1")),
@@ -284,7 +290,7 @@ class Schema(Shots):
 
     def test_the_schema_lists_the_names_that_the_program_knows(self):
         properties = json.loads(SCHEMA.read_text())["properties"]
-        for name in ("tone_map", "filter", "tracer", "bvh_bounds", "integrator", "primary", "encoding"):
+        for name in ("tone_map", "filter", "tracer", "bvh_bounds", "ldc_build", "ldc_levels", "integrator", "primary", "encoding"):
             with self.subTest(name=name):
                 result = self.expect(self.try_shot({"model": "teapot.glb", name: "nonsense"}), 2)
                 known = re.search(r"known: ([^)]*)\)", result.stderr).group(1)

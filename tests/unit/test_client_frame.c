@@ -249,6 +249,28 @@ static void comparisons_of_waves_arrive(void **state)
     fl_frame_destroy(frame);
 }
 
+static void cubes_arrive_and_no_more_than_there_is_room_for(void **state)
+{
+    (void)state;
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+    const struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+    struct record_layered_cube cubes[3] = {
+        {.resolution = 1024, .cell_metres = 0.5f, .layers_needed = 9, .layers_kept = 8, .samples_lost = 4},
+        {.part = PROTOCOL_CUBE_PART_DYNAMIC, .rebuilt = 1}};
+    const struct message_frame_end last = {.frame = 3, .cubes = cubes, .cubes_count = 3};
+    assert_true(begin(&assembly, &message));
+    assert_true(give(&assembly, pixels, PIXELS_BYTES, 0));
+    struct fl_frame *frame = fl_assembly_end(&assembly, &last, 2, &error);
+    assert_non_null(frame);
+    assert_int_equal(frame->cube_count, 2);
+    assert_true(frame->cubes[0].resolution == 1024 && frame->cubes[0].cell_metres == 0.5f);
+    assert_true(frame->cubes[0].layers_needed == 9 && frame->cubes[0].layers_kept == 8);
+    assert_int_equal(frame->cubes[0].samples_lost, 4);
+    assert_int_equal(frame->cubes[1].part, PROTOCOL_CUBE_PART_DYNAMIC);
+    assert_int_equal(frame->cubes[1].rebuilt, 1);
+    fl_frame_destroy(frame);
+}
+
 static void agreement_leaves_edges_aside_and_stays_a_share_whatever_a_daemon_says(void **state)
 {
     (void)state;
@@ -289,6 +311,7 @@ int main(void)
         cmocka_unit_test(declared_sizes_beyond_all_reason_are_refused_before_memory_is_taken),
         cmocka_unit_test(pieces_out_of_place_are_refused),
         cmocka_unit_test(comparisons_of_waves_arrive),
+        cmocka_unit_test(cubes_arrive_and_no_more_than_there_is_room_for),
         cmocka_unit_test(agreement_leaves_edges_aside_and_stays_a_share_whatever_a_daemon_says),
     };
     return cmocka_run_group_tests(tests, fill_pixels, NULL);

@@ -38,6 +38,8 @@ static void the_defaults_are_within_their_own_bounds(void **state)
     assert_int_equal(config.limits.requests_in_flight, 64);
     assert_int_equal(config.limits.unauthenticated_per_address, 8);
     assert_int_equal(config.limits.samples, 65536);
+    assert_int_equal(config.limits.ldc_layers, 255);
+    assert_int_equal(config.limits.ldc_bytes, 0);
     assert_int_equal(config.limits.upload_window_bytes, 16 << 20);
     assert_int_not_equal(config.scene_bytes, 0);
     assert_string_equal(config.device, "auto");
@@ -51,7 +53,8 @@ static void a_file_sets_numbers_with_units_texts_and_switches(void **state)
     struct error error = {0};
     assert_true(read_text(&config,
                           "[limits]\nclients = 3\nupload_window=2M\n; note\n[server]\ninsecure = yes\n"
-                          "listen = unix:/a tcp:[::1]:0\nlog_level = debug\n[memory]\nblob_cache = 0%\n",
+                          "listen = unix:/a tcp:[::1]:0\nlog_level = debug\n[memory]\nblob_cache = 0%\nldc = 96M\n"
+                          "[limits]\nldc_layers = 12\n",
                           &error));
     assert_int_equal(config.limits.clients, 3);
     assert_int_equal(config.limits.upload_window_bytes, 2 << 20);
@@ -59,6 +62,8 @@ static void a_file_sets_numbers_with_units_texts_and_switches(void **state)
     assert_string_equal(config.listen, "unix:/a tcp:[::1]:0");
     assert_int_equal(config.log_level, 3);
     assert_int_equal(config.limits.blob_cache_bytes, 0);
+    assert_int_equal(config.limits.ldc_bytes, 96 << 20);
+    assert_int_equal(config.limits.ldc_layers, 12);
 }
 
 static void a_mistake_is_told_with_its_file_line_and_key(void **state)
@@ -70,6 +75,7 @@ static void a_mistake_is_told_with_its_file_line_and_key(void **state)
         {"[limits]\n\nclientz = 3\n", ":3", "limits.clientz"},
         {"[limits]\nclients = 0\n", ":2", "1 .. 65536"},
         {"[limits]\nclients = 12x\n", ":2", "12x"},
+        {"[limits]\nldc_layers = 256\n", ":2", "1 .. 255"},
         {"[limits]\nclients = -1\n", ":2", "-1"},
         {"[limits]\nclients = 99999999999999999999999\n", ":2", "no number"},
         {"[memory]\nscene = 101%\n", ":2", "101%"},

@@ -74,7 +74,8 @@ static void in_order_they_are_the_same_numbers_and_neighbours_are_close_together
                     float pair[2], sorted[2];
                     sequence_pair(pair, seed, SEQUENCE_LIGHT, first + i);
                     sequence_pair_sorted(sorted, seed, SEQUENCE_LIGHT, first + i, shift);
-                    /* neighbours to the left half of the group, the half of that, .. share an interval of that size */
+                    /* neighbours to the left half of the group, the half of that, .. share an interval of that
+                     * size */
                     uint32_t interval = (uint32_t)ldexpf(sorted[0], (int)shift);
                     taken |= 1u << interval;
                     for (uint32_t half = 1; half < count; half *= 2) {

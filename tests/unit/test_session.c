@@ -17,6 +17,7 @@
 
 #include <errno.h>
 #include <poll.h>
+#include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -73,6 +74,7 @@ static struct {
     uint32_t job_request, next_frame, last_frame;
     struct engine_job job; /* the last one, but for what it owns */
     struct clip_use job_clips[16];
+    struct tracer_cube cubes[TRACER_CUBES_MAX]; /* of the frames that it renders */
     uint64_t credit_seen, commits;
     atomic_uint edits, gone, frames_sent;
 } engine;
@@ -104,10 +106,12 @@ static void render(const struct engine_command *command)
         struct engine_frame *frame = made->frame;
         frame->frame = engine.next_frame;
         frame->request.width = frame->request.height = frame->request.samples = 1;
+        frame->request.tracer = engine.job.frame.tracer;
         frame->request.aperture = engine.job.frame.aperture;
         frame->request.focus = engine.job.frame.focus;
         frame->shutter_s = engine.job.shutter / 8;
         frame->result.samples = 5; /* with those of frames before */
+        memcpy(frame->result.cubes, engine.cubes, sizeof engine.cubes);
         frame->size_bytes = FRAME_BYTES;
         frame->bytes = malloc(FRAME_BYTES);
         for (size_t i = 0; i < FRAME_BYTES; i++)
@@ -354,6 +358,8 @@ static void start(const struct connection_limits *connection_limits)
                    .requests_in_flight = 64,
                    .scenes_per_client = 2,
                    .jobs_per_client = 2,
+                   .ldc_layers = 7,
+                   .ldc_bytes = (3 << 20) + 1, /* whole MiB are told on */
                    .blobs_per_client = 8,
                    .transaction_edits = 10,
                    .transaction_bytes = 64 << 10,
@@ -1004,6 +1010,86 @@ static void a_job_takes_its_clips_and_its_lens_along(void **state)
     }
 }
 
+static void settings_of_cubes_go_to_the_engine_with_the_daemons_limits(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.tracer = PROTOCOL_TRACER_LDC;
+    message.render.ldc_resolution = 16;
+    message.render.ldc_block = 32;
+    message.render.ldc_build = PROTOCOL_LDC_BUILD_LISTS;
+    message.render.ldc_levels = PROTOCOL_LDC_LEVELS_BLOCKS;
+    message.render.ldc_tolerance = 0.25f;
+    message.render.ldc_rays_together = 4;
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    assert_int_equal(client.message.frame_begin.tracer, PROTOCOL_TRACER_LDC);
+    const struct tracer_options *options = &engine.job.frame.tracer_options;
+    assert_int_equal(options->ldc_resolution, 16);
+    assert_int_equal(options->ldc_block, 32);
+    assert_int_equal(options->ldc_build, LDC_BUILD_LISTS);
+    assert_int_equal(options->ldc_levels, LDC_LEVELS_BLOCKS);
+    assert_true(options->ldc_tolerance == 0.25f);
+    assert_int_equal(options->ldc_rays_together, 4);
+    assert_int_equal(options->ldc_layers_max, 7);
+    assert_int_equal(options->ldc_mebibytes_max, 3);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+}
+
+static void settings_that_no_cube_has_are_refused_by_their_field(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t resolution, block, rays;
+        const char *field, *remedy;
+    } cases[] = {
+        {1, 0, 0, "render.ldc_resolution", "16 to 4096"}, {15, 0, 0, "render.ldc_resolution", "16 to 4096"},
+        {0, 1, 0, "render.ldc_block", "16 or 32"},        {0, 24, 0, "render.ldc_block", "16 or 32"},
+        {0, 0, 2, "render.ldc_rays_together", ""},        {0, 0, 3, "render.ldc_rays_together", ""},
+    };
+    open_scene(1, 1);
+    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct message message = render_message(0, 1);
+        message.render.ldc_resolution = cases[i].resolution;
+        message.render.ldc_block = cases[i].block;
+        message.render.ldc_rays_together = cases[i].rays;
+        send_message(2 + i, 0, &message);
+        expect_error(2 + i, PROTOCOL_ERROR_CODE_INVALID);
+        assert_string_equal(client.message.error.field, cases[i].field);
+        assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
+    }
+}
+
+static void cubes_of_a_frame_are_told(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    engine.cubes[TRACER_CUBE_DYNAMIC] = (struct tracer_cube){.resolution = 512,
+                                                             .cell_metres = INFINITY, /* the scene is too large */
+                                                             .layers_needed = 300,
+                                                             .layers_kept = 255,
+                                                             .samples = 1 << 20,
+                                                             .samples_lost = 77,
+                                                             .rebuilt = true};
+    struct message message = render_message(0, 1);
+    send_message(2, 0, &message);
+    while (receive()->type != MESSAGE_FRAME_END)
+        continue;
+    assert_int_equal(client.message.frame_end.cubes_count, 1);
+    const struct record_layered_cube *cube = &client.message.frame_end.cubes[0];
+    assert_int_equal(cube->part, PROTOCOL_CUBE_PART_DYNAMIC);
+    assert_int_equal(cube->resolution, 512);
+    assert_true(cube->cell_metres > 1e38f && isfinite(cube->cell_metres));
+    assert_int_equal(cube->layers_needed, 300);
+    assert_int_equal(cube->layers_kept, 255);
+    assert_int_equal(cube->samples, 1 << 20);
+    assert_int_equal(cube->samples_lost, 77);
+    assert_int_equal(cube->rebuilt, 1);
+    expect(MESSAGE_OK, 2);
+}
+
 static void a_job_whose_frames_have_no_room_waits_for_others_to_end(void **state)
 {
     (void)state;
@@ -1272,6 +1358,9 @@ int main(void)
         BOTH(skins_clips_and_channels_become_edits),
         BOTH(weights_count_as_memory_of_a_transaction),
         BOTH(a_job_takes_its_clips_and_its_lens_along),
+        BOTH(settings_of_cubes_go_to_the_engine_with_the_daemons_limits),
+        BOTH(settings_that_no_cube_has_are_refused_by_their_field),
+        BOTH(cubes_of_a_frame_are_told),
         BOTH(a_job_whose_frames_have_no_room_waits_for_others_to_end),
         BOTH(a_full_engine_makes_clients_wait_and_loses_nothing),
         BOTH(rubbish_is_told_so_and_the_connection_closed),

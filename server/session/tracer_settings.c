@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/tracer_settings.h"
+
+#define LDC_RESOLUTION_LEAST 16u
+
+static bool is_block(uint32_t texels)
+{
+    return texels >= 2 && (texels & (texels - 1)) == 0; /* the message says at most 32 */
+}
+
+bool tracer_settings_check(const struct message_render *render, struct error *error)
+{
+    if (render->bvh_rays_together > 4 && render->bvh_rays_together != 8)
+        return error_set(error, ERROR_INVALID, "render.bvh_rays_together",
+                         "1, 2, 3, 4 or 8 rays walk as one, not %u", render->bvh_rays_together);
+    if (render->ldc_resolution && render->ldc_resolution < LDC_RESOLUTION_LEAST) {
+        error_set(error, ERROR_INVALID, "render.ldc_resolution", "%u cells are too few", render->ldc_resolution);
+        return error_remedy(error, "%u to 4096 along the longest side, or 0 for 1024", LDC_RESOLUTION_LEAST);
+    }
+    if (render->ldc_block && !is_block(render->ldc_block)) {
+        error_set(error, ERROR_INVALID, "render.ldc_block", "a block has no side of %u texels", render->ldc_block);
+        return error_remedy(error, "2, 4, 8, 16 or 32, or 0 for 8");
+    }
+    if (render->ldc_rays_together > 1 && render->ldc_rays_together != 4)
+        return error_set(error, ERROR_INVALID, "render.ldc_rays_together", "1 or 4 rays walk as one, not %u",
+                         render->ldc_rays_together);
+    return true;
+}
+
+struct tracer_options tracer_settings(const struct session_limits *limits, const struct message_render *render)
+{
+    const uint64_t mebibytes = limits->ldc_bytes >> 20;
+    return (struct tracer_options){
+        .bvh_bounds = (unsigned)render->bvh_bounds,
+        .bvh_rays_together = render->bvh_rays_together,
+        .ldc_resolution = render->ldc_resolution,
+        .ldc_block = render->ldc_block,
+        .ldc_build = (unsigned)render->ldc_build,
+        .ldc_levels = (unsigned)render->ldc_levels,
+        .ldc_tolerance = render->ldc_tolerance,
+        .ldc_rays_together = render->ldc_rays_together,
+        .ldc_layers_max = limits->ldc_layers,
+        /* A limit below 1 MiB is one still. */
+        .ldc_mebibytes_max = limits->ldc_bytes == 0 ? 0
+                             : mebibytes == 0       ? 1
+                                                    : (uint32_t)mebibytes,
+    };
+}
