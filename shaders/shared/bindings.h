@@ -36,6 +36,7 @@
 #define IMAGE_LDC_VISIBLE 4
 #define IMAGE_LDC_GEOMETRY 0
 #define IMAGE_LDC_SURFACE 1
+#define IMAGE_LDC_NODES 0 /* ldc/levels.comp */
 
 /* texture units */
 #define UNIT_TRIANGLES 0
