@@ -15,6 +15,7 @@ static const struct tracer_impl *const tracers[] = {
 #ifdef FARLIGHT_HAVE_EMBREE
     [NUMBER_REFERENCE] = &tracer_reference_impl,
 #endif
+    [3] = &tracer_ldc_impl,
 };
 #define TRACER_COUNT (sizeof(tracers) / sizeof(tracers[0]))
 
