@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/ldc_levels.h"
+
+#include "gpu/program.h"
+#include "shared/bindings.h"
+
+#include <epoxy/gl.h>
+#include <stdio.h>
+
+#define NODE_BYTES (2 * sizeof(float))
+/* 4 x 4 children: half the levels of 2 x 2. */
+#define PYRAMID_BITS 2
+#define BLOCK_DEFAULT 8
+
+struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tracer_options *options)
+{
+    struct ldc_level_layout layout = {.blocks = options->ldc_levels == LDC_LEVELS_BLOCKS};
+    if (layout.blocks) {
+        uint32_t block = options->ldc_block ? options->ldc_block : BLOCK_DEFAULT;
+        while (2u << layout.bits <= block)
+            layout.bits++;
+        layout.top = 1;
+        layout.row = (resolution + block - 1) >> layout.bits;
+        layout.image_nodes = layout.row * layout.row;
+        return layout;
+    }
+    layout.bits = PYRAMID_BITS;
+    for (layout.top = 1; 1u << layout.bits * layout.top < resolution; layout.top++)
+        ;
+    for (uint32_t k = 0; k < layout.top; k++)
+        layout.image_nodes += 1u << 2 * layout.bits * k;
+    return layout;
+}
+
+/* Room for the nodes of the cube, behind those of the one before it, which stay. */
+static bool reserve(struct ldc_store *store, unsigned which, uint32_t node_count, struct error *error)
+{
+    struct gpu_device *device = store->device;
+    uint32_t first = 0;
+    for (unsigned i = 0; i < which; i++)
+        if (store->cubes[i].resolution && store->cubes[i].first_node + store->cubes[i].node_count > first)
+            first = store->cubes[i].first_node + store->cubes[i].node_count;
+    uint64_t nodes = (uint64_t)first + node_count;
+    if (nodes > device->facts.texture_buffer_texels_max || nodes > INT32_MAX)
+        return error_set(error, ERROR_LIMIT, "options.ldc_resolution", "%llu nodes are more than the device takes",
+                         (unsigned long long)nodes);
+    store->cubes[which].first_node = first;
+    store->cubes[which].node_count = node_count;
+    if (first == 0 || nodes * NODE_BYTES <= store->nodes.capacity_bytes)
+        return gpu_buffer_reserve(device, &store->nodes, nodes * NODE_BYTES, error);
+    struct gpu_buffer bigger = {0};
+    if (!gpu_buffer_reserve(device, &bigger, nodes * NODE_BYTES, error))
+        return false;
+    glCopyNamedBufferSubData(store->nodes.name, bigger.name, 0, 0, (GLsizeiptr)(first * NODE_BYTES));
+    gpu_buffer_finish(device, &store->nodes);
+    store->nodes = bigger;
+    return true;
+}
+
+/* Where the nodes of a level lie, or the texels. */
+struct place {
+    uint32_t first, row, width, image;
+};
+
+static struct place place_of(const struct ldc_cube *cube, const struct ldc_level_layout *layout, uint32_t level)
+{
+    uint32_t n = cube->resolution;
+    if (level == 0)
+        return (struct place){cube->first_texel, n, n, n * n};
+    if (layout->blocks)
+        return (struct place){cube->first_node, layout->row, layout->row, layout->image_nodes};
+    uint32_t above = layout->top - level, first = cube->first_node;
+    for (uint32_t k = 0; k < above; k++)
+        first += 1u << 2 * layout->bits * k;
+    uint32_t row = 1u << layout->bits * above;
+    return (struct place){first, row, row, layout->image_nodes};
+}
+
+static void set_place(const struct gpu_program *program, const char *which, const struct place *place)
+{
+    const struct {
+        const char *name;
+        uint32_t value;
+    } parts[] = {{"first", place->first}, {"row", place->row}, {"width", place->width}, {"image", place->image}};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        char name[32];
+        snprintf(name, sizeof name, "%s_%s", parts[i].name, which);
+        gpu_uniform_uint(program, name, parts[i].value);
+    }
+}
+
+bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
+                      struct error *error)
+{
+    struct ldc_cube *cube = &store->cubes[which];
+    cube->node_count = 0;
+    if (cube->resolution == 0)
+        return true;
+    const struct ldc_level_layout layout = ldc_level_layout_of(cube->resolution, options);
+    if (!reserve(store, which, 3 * layout.image_nodes, error))
+        return false;
+    gpu_push_group(store->device, "ldc levels");
+    char bits[4];
+    snprintf(bits, sizeof bits, "%u", layout.bits);
+    bool ok = true;
+    for (uint32_t level = 1; ok && level <= layout.top; level++) {
+        const struct gpu_define defines[] = {
+            {"LDC_LEVEL_BITS", bits}, {level == 1 ? "LDC_FROM_TEXELS" : NULL, "1"}, {NULL, NULL}};
+        const struct gpu_program_source source = {.compute = "ldc/levels.comp", .defines = defines};
+        const struct gpu_program *program = gpu_program_get(store->device, &source, error);
+        ok = program != NULL;
+        if (!ok)
+            break;
+        const struct place below = place_of(cube, &layout, level - 1), here = place_of(cube, &layout, level);
+        if (level == 1) {
+            gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
+            gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
+        } else {
+            gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_0, GL_RG32F);
+        }
+        gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_LDC_NODES, GL_RG32F);
+        set_place(program, "below", &below);
+        set_place(program, "here", &here);
+        gpu_dispatch(store->device, program, 3 * (uint64_t)here.width * here.width);
+    }
+    gpu_pop_group(store->device);
+    return ok;
+}

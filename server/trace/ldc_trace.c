@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/ldc_trace.h"
+
+#include "gpu/program.h"
+#include "shared/bindings.h"
+#include "trace/ldc_levels.h"
+#include "trace/trace_program.h"
+
+#include <epoxy/gl.h>
+#include <stdio.h>
+
+/* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
+#define DISPATCH_RAYS_MAX (1u << 18)
+
+static void set_cube(const struct gpu_program *program, unsigned slot, const struct ldc_cube *cube,
+                     const struct tracer_options *options)
+{
+    const struct ldc_level_layout layout = ldc_level_layout_of(cube->resolution, options);
+    const struct {
+        const char *name;
+        uint32_t value;
+    } whole[] = {
+        {"ldc_resolution", cube->resolution},
+        {"ldc_first_texel", cube->first_texel},
+        {"ldc_first_node", cube->first_node},
+        {"ldc_top", layout.top},
+        {"ldc_row", layout.row},
+    };
+    char name[32];
+    for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) {
+        snprintf(name, sizeof name, "%s[%u]", whole[i].name, slot);
+        gpu_uniform_int(program, name, (int32_t)whole[i].value);
+    }
+    const float place[4] = {cube->lower_world[0], cube->lower_world[1], cube->lower_world[2], cube->cell_world};
+    snprintf(name, sizeof name, "ldc_place[%u]", slot);
+    gpu_uniform_vec(program, name, 4, place);
+    snprintf(name, sizeof name, "ldc_tolerance[%u]", slot);
+    gpu_uniform_float(program, name, options->ldc_tolerance / cube->cell_world);
+}
+
+static void bind(struct ldc_store *store)
+{
+    gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->quads, UNIT_TRACER_1, GL_RGBA32F);
+    gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_2, GL_RG32UI);
+    gpu_buffer_bind_texels(store->device, &store->surface, UNIT_TRACER_3, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_4, GL_RG32F);
+}
+
+bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wave *wave,
+               const struct tracer_options *options, struct error *error)
+{
+    static const struct ldc_cube nothing = {.cell_world = 1};
+    const struct ldc_cube *cubes[TRACER_CUBES_MAX] = {&nothing};
+    unsigned cube_count = 0;
+    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++)
+        if (store->cubes[i].resolution)
+            cubes[cube_count++] = &store->cubes[i];
+    cube_count = cube_count ? cube_count : 1;
+    char number_of_cubes[4], bits[4];
+    snprintf(number_of_cubes, sizeof number_of_cubes, "%u", cube_count);
+    const struct ldc_level_layout layout = ldc_level_layout_of(cubes[0]->resolution, options);
+    snprintf(bits, sizeof bits, "%u", layout.bits);
+    struct gpu_define defines[8] = {
+        {"TRACER_LDC", "1"},
+        {"LDC_CUBES", number_of_cubes},
+        {"LDC_LEVEL_BITS", bits},
+        {"LDC_LAYERS_TOGETHER", options->ldc_layers_together == 1 ? "1" : "4"},
+    };
+    size_t n = 4;
+    if (layout.blocks)
+        defines[n++] = (struct gpu_define){"LDC_BLOCKS", "1"};
+    if (options->ldc_tolerance > 0)
+        defines[n++] = (struct gpu_define){"LDC_TOLERANCE", "1"};
+    const struct trace_program_source source = {
+        .traverse = "ldc/traverse.glsl",
+        .defines = defines,
+        .rays_together = options->ldc_rays_together ? options->ldc_rays_together : 1,
+        .rays_a_dispatch = store->device->facts.software ? 0 : DISPATCH_RAYS_MAX,
+    };
+    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
+    if (!program)
+        return false;
+    bind(store);
+    for (unsigned i = 0; i < cube_count; i++)
+        set_cube(program, i, cubes[i], options);
+    /* Its crossings are samples, of which ldc_surfaces() makes hits. */
+    struct wave walk = *wave;
+    walk.crossings_only = true;
+    return trace_program_run(program, scene, &walk, &source, error);
+}

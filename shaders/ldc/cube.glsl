@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+// A ray among the cells of a cube, and where it crosses a sample.
+//
+// A wave's cubes are walked one behind the other; `ldc_cubes` of them there are, of which each has a lower corner, a
+// size of cell and places in the buffers of its own.
+//
+// In a cube a ray is p(s) = o + s d, in cells, and the greatest component of d is 1 (or -1), so `s` too counts cells,
+// along the axis that the ray runs along most. In an image the components are u, v, depth.
+//
+// Defines: LDC_CUBES 1 or 2; LDC_TOLERANCE a hit is where the ray comes as near to a sample's depth, else where it
+// crosses the sample's plane.
+#include "shared/bindings.h"
+#include "common/candidate.glsl"
+#include "ldc/plane.glsl"
+
+layout(binding = UNIT_TRACER_0) uniform usamplerBuffer ldc_texels;
+layout(binding = UNIT_TRACER_1) uniform samplerBuffer ldc_quads;
+layout(binding = UNIT_TRACER_2) uniform usamplerBuffer ldc_geometry;
+layout(binding = UNIT_TRACER_3) uniform usamplerBuffer ldc_surface;
+
+uniform vec4 ldc_place[LDC_CUBES]; // lower corner, world; size of a cell
+uniform int ldc_resolution[LDC_CUBES];
+uniform int ldc_first_texel[LDC_CUBES];
+uniform int ldc_first_node[LDC_CUBES];
+#ifdef LDC_TOLERANCE
+uniform float ldc_tolerance[LDC_CUBES]; // cells
+#endif
+
+// A ray's component where it has none: it moves by less than a thousandth of a cell on its way through a cube, and
+// no quotient is infinite.
+const float LDC_LEAST_SLOPE = 1e-8;
+
+struct cube_ray {
+    vec3 o, d;
+    float scale; // s of a distance; 0: the direction is no direction, and the ray goes nowhere
+};
+
+vec3 without_zeros(vec3 d)
+{
+    vec3 least_ = vec3(d.x < 0.0 ? -LDC_LEAST_SLOPE : LDC_LEAST_SLOPE, d.y < 0.0 ? -LDC_LEAST_SLOPE : LDC_LEAST_SLOPE,
+                       d.z < 0.0 ? -LDC_LEAST_SLOPE : LDC_LEAST_SLOPE);
+    return mix(d, least_, lessThan(abs(d), vec3(LDC_LEAST_SLOPE)));
+}
+
+cube_ray cube_ray_of(trace_ray r, int cube)
+{
+    vec4 place = ldc_place[cube];
+    vec3 size = abs(r.direction);
+    float length_ = greatest(size);
+    cube_ray c;
+    c.scale = length_ / place.w;
+    // Written so that what is no number, or too small or large for its inverse to be one, goes nowhere.
+    bool is_direction = length_ > 1e-30 && length_ < 1e30 && size.x + size.y + size.z < 1e30;
+    c.scale = is_direction ? c.scale : 0.0;
+    c.o = (r.origin - place.xyz) / place.w;
+    c.d = without_zeros(is_direction ? r.direction / length_ : vec3(1.0, 0.0, 0.0));
+    return c;
+}
+
+// Where [lower, upper] of the ray is inside a box; all of it behind the other where it is not.
+void clip(inout float s_first, inout float s_end, vec3 o, vec3 inverse, vec3 lower, vec3 upper)
+{
+    vec3 a = (lower - o) * inverse, b = (upper - o) * inverse;
+    vec3 near = min(a, b), far = max(a, b);
+    s_first = max(s_first, greatest(near));
+    s_end = min(s_end, least(far));
+}
+
+// ---- samples ----
+
+// A ray that begins on a surface may begin a little below a neighbour's plane, and would at once hit what it leaves.
+// So near its origin a ray does not cross what the origin lies on: a plane that passes it as near as this. The first
+// is that of rays that begin on a surface that bends by a radius of eight cells and more: 2^2 / (2 * 8).
+const float LDC_OWN_HEIGHT = 0.25;
+const float LDC_OWN_WAY = 2.0;
+
+// Where the ray (o, d in the image) crosses a sample of a texel, if it does so there. `normal` may have any length;
+// `side` is positive where the ray comes from behind.
+bool cross_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal, out float s, out float side)
+{
+    vec3 to_sample = vec3(texel + 0.5, depth) - o;
+    float height = dot(normal, to_sample);
+    side = dot(normal, d);
+#ifdef LDC_TOLERANCE
+    // Where on its way through the texel it comes nearest to the sample's depth.
+    vec2 inverse = 1.0 / d.xy;
+    vec2 a = (to_sample.xy - 0.5) * inverse, b = (to_sample.xy + 0.5) * inverse;
+    vec2 near = min(a, b), far = max(a, b);
+    s = min(max(to_sample.z / d.z, max(near.x, near.y)), min(far.x, far.y));
+    bool crosses = abs(s * d.z - to_sample.z) <= ldc_tolerance[cube];
+#else
+    s = height / side;
+    vec2 from_middle = abs(s * d.xy - to_sample.xy);
+    bool crosses = from_middle.x <= 0.5 + LDC_SLACK && from_middle.y <= 0.5 + LDC_SLACK;
+#endif
+    bool is_own = s < LDC_OWN_WAY && height * height < LDC_OWN_HEIGHT * LDC_OWN_HEIGHT * dot(normal, normal);
+    return crosses && !is_own;
+}

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+// The walk image by image: a DDA through an image's nodes, from large to small where the ray's own depths meet what the
+// node holds and on to the next where they do not. Paper, section 1.4.
+//
+// Image after image, that of the axis that the ray runs along most first, whose texels it crosses fewest of; what is
+// found in one ends the ray in the next.
+//
+// Defines: LDC_LEVEL_BITS nodes have 2^bits x 2^bits children; LDC_BLOCKS there is one level, else up to a single node;
+// LDC_LAYERS_TOGETHER 1 or 4 of a texel's samples are tested at once.
+#include "ldc/found.glsl"
+
+layout(binding = UNIT_TRACER_4) uniform samplerBuffer ldc_ranges; // of nodes: least and greatest depth
+
+uniform int ldc_top[LDC_CUBES]; // the top level; 0 are the texels
+#ifdef LDC_BLOCKS
+uniform int ldc_row[LDC_CUBES]; // nodes
+#endif
+
+struct image_walk {
+    vec3 o, d; // cells of the image
+    vec2 inverse;
+    float s, s_end;
+    float s_least, s_limit; // between which a crossing counts
+    float scale;   // s of a distance
+    ivec2 texel;
+    int level;
+    int cube, axis;
+};
+
+// Image number `pass` of all cubes for a ray: one that is not looked at has s >= s_end.
+void begin_image(trace_ray r, float end, int pass, out image_walk w)
+{
+    w.cube = pass / 3;
+    int rank = pass - 3 * w.cube;
+    cube_ray c = cube_ray_of(r, w.cube);
+    vec3 size = abs(c.d);
+    int most = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
+    int least_ = size.z < size.y ? (size.z < size.x ? 2 : 0) : (size.y < size.x ? 1 : 0);
+    least_ = least_ == most ? (most + 1) % 3 : least_;
+    w.axis = rank == 0 ? most : rank == 2 ? least_ : 3 - most - least_;
+    w.o = in_image(c.o, w.axis);
+    w.d = in_image(c.d, w.axis);
+    vec3 inverse = 1.0 / w.d;
+    w.inverse = inverse.xy;
+    w.scale = c.scale;
+    w.s_least = r.t_min * c.scale;
+    w.s = w.s_least;
+    w.s_limit = min(end * c.scale, 1e30);
+    w.s_end = w.s_limit;
+    int resolution = ldc_resolution[w.cube];
+    float cells = float(resolution);
+    clip(w.s, w.s_end, w.o, inverse, vec3(0.0, 0.0, -LDC_SPAN), vec3(cells, cells, cells + LDC_SPAN));
+    w.s_end = c.scale > 0.0 && resolution > 0 ? w.s_end : -1e30;
+    w.texel = clamp(ivec2(floor(w.o.xy + w.s * w.d.xy)), ivec2(0), ivec2(resolution - 1));
+    w.level = ldc_top[w.cube];
+}
+
+int node_index(image_walk w, ivec2 node)
+{
+    int top = ldc_top[w.cube];
+#ifdef LDC_BLOCKS
+    int row = ldc_row[w.cube];
+    return ldc_first_node[w.cube] + (w.axis * row + node.y) * row + node.x;
+#else
+    // Levels from the top on, each with all nodes that a square of so many levels has.
+    int bits = LDC_LEVEL_BITS * (top - w.level);
+#if LDC_LEVEL_BITS == 1
+    const int levels = 0x55555555, image_shift = 2;
+#elif LDC_LEVEL_BITS == 2
+    const int levels = 0x11111111;
+#else
+    const int levels = 0x41041041;
+#endif
+    int first = levels & ((1 << 2 * bits) - 1);
+    int of_image = levels & ((1 << 2 * LDC_LEVEL_BITS * top) - 1);
+    return ldc_first_node[w.cube] + w.axis * of_image + first + (node.y << bits) + node.x;
+#endif
+}
+
+// Where the ray leaves the node of a level that it is in, and by which side.
+float node_exit(image_walk w, int shift, out bool by_u)
+{
+    ivec2 first = w.texel >> shift << shift, last = first + ((1 << shift) - 1);
+    vec2 exits = vec2(w.d.x >= 0.0 ? last.x + 1 : first.x, w.d.y >= 0.0 ? last.y + 1 : first.y);
+    exits = (exits - w.o.xy) * w.inverse;
+    by_u = exits.x < exits.y;
+    return by_u ? exits.x : exits.y;
+}
+
+// Out of that node, in whole numbers, so that each step goes on.
+void leave_node(inout image_walk w, int shift, float s_out, bool by_u)
+{
+    ivec2 first = w.texel >> shift << shift, last = first + ((1 << shift) - 1);
+    ivec2 next = clamp(ivec2(floor(w.o.xy + s_out * w.d.xy)), first, last);
+    next = by_u ? ivec2(w.d.x >= 0.0 ? last.x + 1 : first.x - 1, next.y)
+                : ivec2(next.x, w.d.y >= 0.0 ? last.y + 1 : first.y - 1);
+    ivec2 parents = (next ^ w.texel) >> (shift + LDC_LEVEL_BITS);
+    w.level = parents != ivec2(0) && w.level < ldc_top[w.cube] ? w.level + 1 : w.level;
+    w.texel = next;
+    uint resolution = uint(ldc_resolution[w.cube]);
+    w.s = w.s < s_out ? s_out : w.s;
+    w.s = uint(next.x) >= resolution || uint(next.y) >= resolution ? 1e30 : w.s;
+}
+
+// On to the next texel that the ray may hit something in. False: there is none in this image.
+bool next_texel(inout image_walk w, out uvec4 words, out float z_least, out float z_greatest)
+{
+    words = uvec4(0u);
+    z_least = z_greatest = 0.0;
+    int resolution = ldc_resolution[w.cube];
+    int first_texel = ldc_first_texel[w.cube] + w.axis * resolution * resolution;
+    while (w.s < w.s_end) {
+        int shift = w.level * LDC_LEVEL_BITS;
+        bool by_u;
+        float s_out = node_exit(w, shift, by_u);
+        float s_last = s_out < w.s_end ? s_out : w.s_end;
+        float z0 = w.o.z + w.s * w.d.z, z1 = w.o.z + s_last * w.d.z;
+        z_least = z0 < z1 ? z0 : z1;
+        z_greatest = z0 < z1 ? z1 : z0;
+        vec2 range;
+        if (w.level == 0) {
+            words = texelFetch(ldc_texels, first_texel + w.texel.y * resolution + w.texel.x);
+            range = uintBitsToFloat(words.zw) + vec2(-LDC_SPAN, LDC_SPAN);
+        } else {
+            range = texelFetch(ldc_ranges, node_index(w, w.texel >> shift)).xy;
+        }
+#ifdef LDC_TOLERANCE
+        range += vec2(-ldc_tolerance[w.cube], ldc_tolerance[w.cube]);
+#endif
+        if (z_greatest >= range.x && z_least <= range.y) {
+            if (w.level == 0)
+                return true;
+            w.level--;
+        } else {
+            leave_node(w, shift, s_out, by_u);
+        }
+    }
+    return false;
+}
+
+void test_sample(inout image_walk w, uint sample_index, float depth, uint normal_bits, inout ldc_found found)
+{
+    vec3 normal = in_image(direction_from_octahedral(normal_bits), w.axis);
+    float s, side;
+    if (cross_sample(w.o, w.d, w.cube, vec2(w.texel), depth, normal, s, side) && s > w.s_least && s < w.s_limit) {
+        offer_sample(found, sample_index, s / w.scale, side, 1.0 / w.scale);
+        w.s_limit = found.end * w.scale;
+    }
+}
+
+// The samples of the texel that the ray is in between two depths, which it then leaves.
+void test_texel(inout image_walk w, uvec4 words, float z_least, float z_greatest, inout ldc_found found)
+{
+    uint count = words.y & LDC_TEXEL_COUNT_MASK;
+    float low = z_least - LDC_SPAN, high = z_greatest + LDC_SPAN;
+#ifdef LDC_TOLERANCE
+    low -= ldc_tolerance[w.cube];
+    high += ldc_tolerance[w.cube];
+#endif
+#if LDC_LAYERS_TOGETHER == 4
+    uint first_quad = words.y >> LDC_TEXEL_QUAD_SHIFT;
+    float middle = 0.5 * (low + high), reach = 0.5 * (high - low);
+    for (uint i = 0u; i < count; i += 4u) {
+        vec4 depths = texelFetch(ldc_quads, int(first_quad + i / 4u));
+        bvec4 meet = lessThanEqual(abs(depths - middle), vec4(reach));
+        uint left = (meet.x ? 1u : 0u) | (meet.y ? 2u : 0u) | (meet.z ? 4u : 0u) | (meet.w ? 8u : 0u);
+        while (left != 0u) {
+            uint k = uint(findLSB(left));
+            left &= left - 1u;
+            float depth = k < 2u ? (k == 0u ? depths.x : depths.y) : (k == 2u ? depths.z : depths.w);
+            uint sample_index = words.x + i + k;
+            test_sample(w, sample_index, depth, texelFetch(ldc_geometry, int(sample_index)).y, found);
+        }
+        if (depths.w > high)
+            break;
+    }
+#else
+    for (uint i = 0u; i < count; i++) {
+        uvec4 g = texelFetch(ldc_geometry, int(words.x + i));
+        float depth = uintBitsToFloat(g.x);
+        if (depth > high)
+            break;
+        if (depth >= low)
+            test_sample(w, words.x + i, depth, g.y, found);
+    }
+#endif
+    bool by_u;
+    float s_out = node_exit(w, 0, by_u);
+    leave_node(w, 0, s_out, by_u);
+    w.s_end = w.s_end < w.s_limit ? w.s_end : w.s_limit;
+}

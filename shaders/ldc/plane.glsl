@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// The plane of a sample, and how far it goes.
+#include "shared/ldc.h"
+
+// How far beyond its texel a sample's plane still counts, in cells: what neighbours' planes may leave open between
+// them where a surface bends.
+const float LDC_SLACK = 0.05;
+// How far a plane may leave its sample's depth within its texel and the slack: a cell for each cell of u and of v.
+const float LDC_SPAN = 1.0 + 2.0 * LDC_SLACK;
+// What depths and places round, in cells: some units in the last place of 4096.
+const float LDC_ROUNDING = 0.002;
+
+// Not unit: for ratios.
+vec3 direction_from_octahedral(uint bits)
+{
+    vec2 p = unpackSnorm2x16(bits);
+    vec3 v = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+    vec2 folded = (1.0 - abs(v.yx)) * vec2(v.x >= 0.0 ? 1.0 : -1.0, v.y >= 0.0 ? 1.0 : -1.0);
+    v.xy = v.z < 0.0 ? folded : v.xy;
+    return v;
+}
+
+// World or cube axes x y z as the image of an axis has them: u v depth.
+vec3 in_image(vec3 p, int axis)
+{
+    return axis == 0 ? p.yzx : axis == 1 ? p.zxy : p;
+}
+
+// How far the plane of a sample of an axis's image leaves the sample's depth.
+float plane_reach(uint normal_bits, int axis)
+{
+    vec3 normal = abs(in_image(direction_from_octahedral(normal_bits), axis));
+    float reach = (0.5 + LDC_SLACK) * (normal.x + normal.y) / normal.z;
+    return (reach < LDC_SPAN ? reach : LDC_SPAN) + LDC_ROUNDING;
+}

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// The walk through layered depth cubes (shared/ldc.h). Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary
+// Effects. 2007.
+//
+// The host (trace/ldc_trace.c) sets, besides the defines of trace.comp, those that the files included here name.
+//
+// RAYS_TOGETHER rays are one invocation's, which has walked the next one as soon as it is done with one, while those
+// beside it in its SIMD group are still at theirs: none waits but at the end.
+#include "ldc/images.glsl"
+
+#ifdef ANY_HIT
+#define answer vec3
+#else
+#define answer candidate
+#endif
+
+const int LDC_PASSES = 3 * LDC_CUBES;
+
+void settle(ldc_found found, inout answer a)
+{
+#ifdef ANY_HIT
+    a = found.taken;
+#else
+    if (found.sample_index != HIT_NO_PRIMITIVE)
+        a = candidate(found.end, found.sample_index, HIT_NO_PRIMITIVE - 1u, vec2(0.0));
+#endif
+}
+
+void walk_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOGETHER])
+{
+    trace_ray r = rays_[0];
+    ldc_found found = ldc_found_of(r, answers[0]);
+    image_walk w;
+    w.s = 0.0;
+    w.s_end = -1.0;
+    int ray = 0, pass = 0;
+    for (;;) {
+        if (!(w.s < w.s_end)) {
+            if (pass == LDC_PASSES || !(found.end > r.t_min)) {
+                for (int k = 0; k < RAYS_TOGETHER; k++)
+                    if (k == ray)
+                        settle(found, answers[k]);
+                ray++;
+                if (ray == RAYS_TOGETHER)
+                    break;
+                pass = 0;
+#if RAYS_TOGETHER > 1
+                answer next = answers[1];
+                r = rays_[1];
+                for (int k = 2; k < RAYS_TOGETHER; k++) {
+                    if (k == ray) {
+                        r = rays_[k];
+                        next = answers[k];
+                    }
+                }
+                found = ldc_found_of(r, next);
+#endif
+            }
+            begin_image(r, found.end, pass, w);
+            pass++;
+        }
+        uvec4 words;
+        float z_least, z_greatest;
+        if (next_texel(w, words, z_least, z_greatest))
+            test_texel(w, words, z_least, z_greatest, found);
+    }
+}
+
+// What trace.comp calls.
+#if RAYS_TOGETHER > 1
+
+#ifdef ANY_HIT
+void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 taken[RAYS_TOGETHER])
+#else
+void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER])
+#endif
+{
+#ifdef ANY_HIT
+    walk_rays(r, taken);
+#else
+    walk_rays(r, best);
+#endif
+}
+
+#elif defined ANY_HIT
+
+bool trace_any(trace_ray r, inout vec3 taken)
+{
+    trace_ray rays_[1] = trace_ray[1](r);
+    vec3 answers[1] = vec3[1](taken);
+    walk_rays(rays_, answers);
+    taken = answers[0];
+    return least(taken) >= TAKEN_BLACK;
+}
+
+#else
+
+void trace_closest(trace_ray r, inout candidate best)
+{
+    trace_ray rays_[1] = trace_ray[1](r);
+    candidate answers[1] = candidate[1](best);
+    walk_rays(rays_, answers);
+    best = answers[0];
+}
+
+#endif
