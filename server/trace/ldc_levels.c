@@ -3,11 +3,14 @@
 
 #include "gpu/program.h"
 #include "shared/bindings.h"
+#include "shared/ldc.h"
 
 #include <epoxy/gl.h>
 #include <stdio.h>
+#include <string.h>
 
-#define NODE_BYTES (2 * sizeof(float))
+#define RANGE_BYTES (2 * sizeof(float))
+#define CELL_NODE_BYTES (4 * sizeof(uint32_t))
 /* 4 x 4 children: half the levels of 2 x 2. */
 #define PYRAMID_BITS 2
 #define BLOCK_DEFAULT 8
@@ -24,6 +27,11 @@ struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tr
         layout.image_nodes = layout.row * layout.row;
         return layout;
     }
+    if (options->ldc_levels == LDC_LEVELS_AUTO && !(options->ldc_tolerance > 0)) {
+        layout.cells = true;
+        layout.grid = (resolution + (1u << LDC_NODE_SHIFT) - 1) >> LDC_NODE_SHIFT;
+        return layout;
+    }
     layout.bits = PYRAMID_BITS;
     for (layout.top = 1; 1u << layout.bits * layout.top < resolution; layout.top++)
         ;
@@ -32,29 +40,23 @@ struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tr
     return layout;
 }
 
-/* Room for the nodes of the cube, behind those of the one before it, which stay. */
-static bool reserve(struct ldc_store *store, unsigned which, uint32_t node_count, struct error *error)
+/* Room for the cube's nodes behind those of the one before it, which stay, as do `kept` of its own. */
+static bool reserve(struct ldc_store *store, unsigned which, uint64_t node_count, uint64_t kept, size_t node_bytes,
+                    struct error *error)
 {
     struct gpu_device *device = store->device;
-    uint32_t first = 0;
+    uint64_t first = 0;
     for (unsigned i = 0; i < which; i++)
         if (store->cubes[i].resolution && store->cubes[i].first_node + store->cubes[i].node_count > first)
             first = store->cubes[i].first_node + store->cubes[i].node_count;
-    uint64_t nodes = (uint64_t)first + node_count;
-    if (nodes > device->facts.texture_buffer_texels_max || nodes > INT32_MAX)
+    uint64_t nodes = first + node_count;
+    /* Atomics take them word by word. */
+    if (nodes * (node_bytes / sizeof(uint32_t)) > device->facts.texture_buffer_texels_max || nodes > INT32_MAX)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution", "%llu nodes are more than the device takes",
                          (unsigned long long)nodes);
-    store->cubes[which].first_node = first;
-    store->cubes[which].node_count = node_count;
-    if (first == 0 || nodes * NODE_BYTES <= store->nodes.capacity_bytes)
-        return gpu_buffer_reserve(device, &store->nodes, nodes * NODE_BYTES, error);
-    struct gpu_buffer bigger = {0};
-    if (!gpu_buffer_reserve(device, &bigger, nodes * NODE_BYTES, error))
-        return false;
-    glCopyNamedBufferSubData(store->nodes.name, bigger.name, 0, 0, (GLsizeiptr)(first * NODE_BYTES));
-    gpu_buffer_finish(device, &store->nodes);
-    store->nodes = bigger;
-    return true;
+    store->cubes[which].first_node = (uint32_t)first;
+    store->cubes[which].node_count = (uint32_t)node_count;
+    return ldc_store_grow(device, &store->nodes, (first + kept) * node_bytes, nodes * node_bytes, error);
 }
 
 /* Where the nodes of a level lie, or the texels. */
@@ -89,21 +91,16 @@ static void set_place(const struct gpu_program *program, const char *which, cons
     }
 }
 
-bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
-                      struct error *error)
+static bool build_ranges(struct ldc_store *store, unsigned which, const struct ldc_level_layout *layout,
+                         struct error *error)
 {
     struct ldc_cube *cube = &store->cubes[which];
-    cube->node_count = 0;
-    if (cube->resolution == 0)
-        return true;
-    const struct ldc_level_layout layout = ldc_level_layout_of(cube->resolution, options);
-    if (!reserve(store, which, 3 * layout.image_nodes, error))
+    if (!reserve(store, which, 3 * (uint64_t)layout->image_nodes, 0, RANGE_BYTES, error))
         return false;
-    gpu_push_group(store->device, "ldc levels");
     char bits[4];
-    snprintf(bits, sizeof bits, "%u", layout.bits);
+    snprintf(bits, sizeof bits, "%u", layout->bits);
     bool ok = true;
-    for (uint32_t level = 1; ok && level <= layout.top; level++) {
+    for (uint32_t level = 1; ok && level <= layout->top; level++) {
         const struct gpu_define defines[] = {
             {"LDC_LEVEL_BITS", bits}, {level == 1 ? "LDC_FROM_TEXELS" : NULL, "1"}, {NULL, NULL}};
         const struct gpu_program_source source = {.compute = "ldc/levels.comp", .defines = defines};
@@ -111,7 +108,7 @@ bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct trac
         ok = program != NULL;
         if (!ok)
             break;
-        const struct place below = place_of(cube, &layout, level - 1), here = place_of(cube, &layout, level);
+        const struct place below = place_of(cube, layout, level - 1), here = place_of(cube, layout, level);
         if (level == 1) {
             gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
             gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
@@ -123,6 +120,81 @@ bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct trac
         set_place(program, "here", &here);
         gpu_dispatch(store->device, program, 3 * (uint64_t)here.width * here.width);
     }
+    return ok;
+}
+
+/* ---- cells ---- */
+
+static bool cells_pass(struct ldc_store *store, const struct ldc_cube *cube, uint32_t grid, const char *stage,
+                       struct error *error)
+{
+    const struct gpu_define defines[] = {{stage, "1"}, {NULL, NULL}};
+    const struct gpu_program_source source = {.compute = "ldc/cells.comp", .defines = defines};
+    const struct gpu_program *program = gpu_program_get(store->device, &source, error);
+    if (!program)
+        return false;
+    bool marks = strcmp(stage, "CELLS_BLOCKS") == 0 || strcmp(stage, "CELLS_MARK") == 0;
+    gpu_uniform_int(program, "first_node", (int32_t)cube->first_node);
+    gpu_uniform_int(program, "grid", (int32_t)grid);
+    gpu_uniform_int(program, "first_texel", (int32_t)cube->first_texel);
+    gpu_uniform_int(program, "resolution", (int32_t)cube->resolution);
+    gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_LDC_NODES, marks ? GL_R32UI : GL_RGBA32UI);
+    if (marks) {
+        gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
+        gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
+    }
+    uint64_t n = cube->resolution;
+    gpu_dispatch(store->device, program, marks ? 3 * n * n : (uint64_t)grid * grid * grid);
+    return true;
+}
+
+static void clear_nodes(struct ldc_store *store, uint64_t first, uint64_t count)
+{
+    const uint32_t zero = 0;
+    if (count > 0)
+        glClearNamedBufferSubData(store->nodes.name, GL_R32UI, (GLintptr)(first * CELL_NODE_BYTES),
+                                  (GLsizeiptr)(count * CELL_NODE_BYTES), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
+}
+
+static bool build_cells(struct ldc_store *store, unsigned which, uint32_t grid, struct error *error)
+{
+    struct gpu_device *device = store->device;
+    struct ldc_cube *cube = &store->cubes[which];
+    const uint64_t nodes = (uint64_t)grid * grid * grid;
+    uint32_t block_count = 0;
+    struct gpu_buffer counter = {0};
+    if (!reserve(store, which, nodes, 0, CELL_NODE_BYTES, error) ||
+        !gpu_buffer_upload(device, &counter, &block_count, sizeof block_count, error))
+        return false;
+    clear_nodes(store, cube->first_node, nodes);
+    gpu_buffer_bind_storage(&counter, BIND_TRACER_0);
+    bool ok = cells_pass(store, cube, grid, "CELLS_BLOCKS", error) &&
+              cells_pass(store, cube, grid, "CELLS_PLACE", error);
+    if (ok)
+        gpu_buffer_read(device, &counter, 0, &block_count, sizeof block_count);
+    gpu_buffer_finish(device, &counter);
+    ok = ok && reserve(store, which, nodes + 2 * (uint64_t)block_count, nodes, CELL_NODE_BYTES, error);
+    if (ok)
+        clear_nodes(store, cube->first_node + nodes, 2 * (uint64_t)block_count);
+    return ok && cells_pass(store, cube, grid, "CELLS_MARK", error) &&
+           cells_pass(store, cube, grid, "CELLS_REACH_X", error) &&
+           cells_pass(store, cube, grid, "CELLS_REACH_Y", error) &&
+           cells_pass(store, cube, grid, "CELLS_REACH_Z", error);
+}
+
+bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
+                      struct error *error)
+{
+    struct ldc_cube *cube = &store->cubes[which];
+    cube->node_count = 0;
+    if (cube->resolution == 0)
+        return true;
+    const struct ldc_level_layout layout = ldc_level_layout_of(cube->resolution, options);
+    gpu_push_group(store->device, "ldc levels");
+    bool ok = layout.cells ? build_cells(store, which, layout.grid, error)
+                           : build_ranges(store, which, &layout, error);
     gpu_pop_group(store->device);
+    if (!ok)
+        cube->node_count = 0;
     return ok;
 }

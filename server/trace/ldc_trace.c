@@ -24,7 +24,7 @@ static void set_cube(const struct gpu_program *program, unsigned slot, const str
         {"ldc_first_texel", cube->first_texel},
         {"ldc_first_node", cube->first_node},
         {"ldc_top", layout.top},
-        {"ldc_row", layout.row},
+        {"ldc_row", layout.row},              {"ldc_grid", layout.grid},
     };
     char name[32];
     for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) {
@@ -38,13 +38,13 @@ static void set_cube(const struct gpu_program *program, unsigned slot, const str
     gpu_uniform_float(program, name, options->ldc_tolerance / cube->cell_world);
 }
 
-static void bind(struct ldc_store *store)
+static void bind(struct ldc_store *store, bool cells)
 {
     gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &store->quads, UNIT_TRACER_1, GL_RGBA32F);
     gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_2, GL_RG32UI);
     gpu_buffer_bind_texels(store->device, &store->surface, UNIT_TRACER_3, GL_RGBA32UI);
-    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_4, GL_RG32F);
+    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_4, cells ? GL_RGBA32UI : GL_RG32F);
 }
 
 bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wave *wave,
@@ -68,6 +68,8 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
         {"LDC_LAYERS_TOGETHER", options->ldc_layers_together == 1 ? "1" : "4"},
     };
     size_t n = 4;
+    if (layout.cells)
+        defines[n++] = (struct gpu_define){"LDC_CELLS", "1"};
     if (layout.blocks)
         defines[n++] = (struct gpu_define){"LDC_BLOCKS", "1"};
     if (options->ldc_tolerance > 0)
@@ -81,7 +83,7 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
     const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)
         return false;
-    bind(store);
+    bind(store, layout.cells);
     for (unsigned i = 0; i < cube_count; i++)
         set_cube(program, i, cubes[i], options);
     /* Its crossings are samples, of which ldc_surfaces() makes hits. */

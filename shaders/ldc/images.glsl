@@ -9,6 +9,8 @@
 // LDC_LAYERS_TOGETHER 1 or 4 of a texel's samples are tested at once.
 #include "ldc/found.glsl"
 
+#ifndef LDC_CELLS
+
 layout(binding = UNIT_TRACER_4) uniform samplerBuffer ldc_ranges; // of nodes: least and greatest depth
 
 uniform int ldc_top[LDC_CUBES]; // the top level; 0 are the texels
@@ -189,3 +191,5 @@ void test_texel(inout image_walk w, uvec4 words, float z_least, float z_greatest
     leave_node(w, 0, s_out, by_u);
     w.s_end = w.s_end < w.s_limit ? w.s_end : w.s_limit;
 }
+
+#endif

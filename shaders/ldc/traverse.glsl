@@ -6,6 +6,9 @@
 //
 // RAYS_TOGETHER rays are one invocation's, which has walked the next one as soon as it is done with one, while those
 // beside it in its SIMD group are still at theirs: none waits but at the end.
+//
+// Define: LDC_CELLS the walk is that of ldc/cells.glsl, else that of ldc/images.glsl.
+#include "ldc/cells.glsl"
 #include "ldc/images.glsl"
 
 #ifdef ANY_HIT
@@ -14,7 +17,15 @@
 #define answer candidate
 #endif
 
+#ifdef LDC_CELLS
+const int LDC_PASSES = LDC_CUBES;
+#define WALK cell_walk
+#define BEGIN begin_cells
+#else
 const int LDC_PASSES = 3 * LDC_CUBES;
+#define WALK image_walk
+#define BEGIN begin_image
+#endif
 
 void settle(ldc_found found, inout answer a)
 {
@@ -30,7 +41,7 @@ void walk_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOGETHE
 {
     trace_ray r = rays_[0];
     ldc_found found = ldc_found_of(r, answers[0]);
-    image_walk w;
+    WALK w;
     w.s = 0.0;
     w.s_end = -1.0;
     int ray = 0, pass = 0;
@@ -56,13 +67,19 @@ void walk_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOGETHE
                 found = ldc_found_of(r, next);
 #endif
             }
-            begin_image(r, found.end, pass, w);
+            BEGIN(r, found.end, pass, w);
             pass++;
         }
+#ifdef LDC_CELLS
+        found_cell at = next_cell(w);
+        if (at.block != 0)
+            test_cell(w, at, found);
+#else
         uvec4 words;
         float z_least, z_greatest;
         if (next_texel(w, words, z_least, z_greatest))
             test_texel(w, words, z_least, z_greatest, found);
+#endif
     }
 }
 
