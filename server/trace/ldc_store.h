@@ -32,5 +32,8 @@ struct ldc_store {
 void ldc_store_init(struct ldc_store *store, struct gpu_device *device);
 void ldc_store_finish(struct ldc_store *store); /* leaves it empty */
 uint64_t ldc_store_bytes(const struct ldc_store *store);
+/* Makes room for size_bytes; the first kept_bytes stay what they are. On failure so does all of the buffer. */
+bool ldc_store_grow(struct gpu_device *device, struct gpu_buffer *buffer, uint64_t kept_bytes, uint64_t size_bytes,
+                    struct error *error);
 
 #endif

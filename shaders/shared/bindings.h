@@ -20,12 +20,22 @@
 #define BIND_PASS_2 13
 #define BIND_PASS_3 14
 #define BIND_PASS_4 15
+#define BIND_LDC_BUILD_COUNTS BIND_TRACER_0 /* struct ldc_build_counts */
 
 /* image units */
 #define IMAGE_HITS 0
 #define IMAGE_POSITIONS 0 /* deform.comp */
 #define IMAGE_NORMALS 1
 #define IMAGE_TANGENTS 2
+#define IMAGE_LDC_COUNTS 0 /* ldc/build.*, and the passes behind it: shared/ldc_build.h */
+#define IMAGE_LDC_FRAGMENTS 1
+#define IMAGE_LDC_PLACES 0
+#define IMAGE_LDC_ORDERED 1
+#define IMAGE_LDC_TEXELS 2
+#define IMAGE_LDC_QUADS 3
+#define IMAGE_LDC_VISIBLE 4
+#define IMAGE_LDC_GEOMETRY 0
+#define IMAGE_LDC_SURFACE 1
 #define IMAGE_LDC_NODES 0 /* ldc/levels.comp */
 
 /* texture units */
@@ -61,6 +71,11 @@
 #define UNIT_SHADE_PATHS UNIT_TRACER_1
 #define UNIT_SHADE_LIGHTS UNIT_TRACER_2
 #define UNIT_MOVE_CHILDREN UNIT_TRACER_0
+#define UNIT_LDC_COUNTS UNIT_TRACER_0
+#define UNIT_LDC_PLACES UNIT_TRACER_1
+#define UNIT_LDC_FRAGMENTS UNIT_TRACER_2
+#define UNIT_LDC_VISIBLE UNIT_TRACER_3
+#define UNIT_LDC_DRAWN UNIT_TRACER_4
 #define UNIT_PASS_0 16
 #define UNIT_PASS_1 17
 #define UNIT_RAYS 18

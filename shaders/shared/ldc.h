@@ -16,20 +16,26 @@
  *   quads     RGBA32F: depths of four samples of a texel, ascending; behind the last one LDC_NO_DEPTH
  *   geometry  RG32UI, one a sample: the paper's first target
  *               x  depth (float, cells)
- *               y  geometric normal, octahedral 2 x 16 bit snorm, world space, on the side of the outside
- * (winding) surface   RGBA32UI, one a sample: the paper's second target. Shares are what textures and vertex
- * colours give, filtered to the size of a cell; what the material itself says is multiplied when the hit is
- * shaded, so an edit of it needs no new cube x  bits 0..23 base colour, r g b, sRGB, 8 bits each; 24..31 alpha y
- * shading normal, normal and bump maps applied, as the geometric one; same side z  bits 0..23 index into the
- * materials; 24..27 share of metallic, 28..31 of transmission (of 15) w  bits 0..7 share of roughness, 8..15 of
- * occlusion (strength applied); 16..20, 21..26, 27..31 r g b of the share of emission, square roots nodes     what
- * of the images' texels can be skipped: ldc_levels.h Samples of a texel ascend in depth. Of several at the same
- * depth the one that was drawn first is there: lowest instance, then lowest primitive. */
+ *               y  geometric normal, octahedral 2 x 16 bit snorm, world space, to the outside (winding)
+ *   surface   RGBA32UI, one a sample: the paper's second target. Shares are what textures and vertex colours give,
+ *             filtered to the size of a cell; what the material itself says is multiplied when the hit is shaded,
+ *             so an edit of it needs no new cube
+ *               x  bits 0..23 base colour, r g b, sRGB, 8 bits each; 24..31 alpha
+ *               y  shading normal, normal and bump maps applied, as the geometric one
+ *               z  bits 0..23 index into the materials; 24..27 share of metallic, 28..31 of transmission (of 15)
+ *               w  bits 0..7 share of roughness, 8..15 of occlusion (strength applied); 16..20, 21..26, 27..31
+ *                  r g b of the share of emission, square roots
+ *   nodes     what of the images' texels can be skipped: ldc_levels.h
+ *
+ * Samples of a texel ascend in depth. Of several at the same depth the one that was drawn first is there: lowest
+ * instance, then lowest primitive. Where samples and quads of a texel lie among the others differs from build to
+ * build. */
 #ifndef FARLIGHT_SHARED_LDC_H
 #define FARLIGHT_SHARED_LDC_H
 #include "shared/types.h"
 
 #define LDC_NO_DEPTH 1e30f
+#define LDC_NO_DEPTH_BITS 0x7149f2cau
 #define LDC_TEXEL_COUNT_MASK 255u
 #define LDC_TEXEL_QUAD_SHIFT 8u
 #define LDC_QUADS_MAX 0x01000000u /* of all cubes of a tracer */

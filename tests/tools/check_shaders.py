@@ -33,12 +33,15 @@ CHOICES = {
     "bvh/refit_write.comp": [[{"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}]],
     "ldc/levels.comp": [[{"LDC_LEVEL_BITS": "2"}]],
     "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
+    "ldc/build.vert": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
+                       [{"BUILD_PASS": number} for number in "0"]],
 }
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION")}
-STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"]}
+STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
+          "ldc/build.vert": ["ldc/build.vert", "ldc/build.geom", "ldc/build.frag"]}
 # Storage blocks of a stage; server/gpu/device.c asks a driver for as many.
-STORAGE_BLOCKS_MAX = {".comp": 16, ".vert": 4, ".frag": 8}
+STORAGE_BLOCKS_MAX = {".comp": 16, ".vert": 4, ".geom": 0, ".frag": 8}
 
 DIRECTIVE = re.compile(r"^[ \t]*#[ \t]*(include|version)\b[ \t]*(.*?)[ \t]*$")
 QUOTED = re.compile(r'^"([^"]*)"')

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/ldc_build.h"
+
+#include "gpu/registry.h"
+#include "trace/ldc_build_state.h"
+
+#include <stdlib.h>
+
+#define LAYERS_MAX 255 /* a texel's count has eight bits */
+
+struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *error)
+{
+    struct ldc_builder *builder = calloc(1, sizeof(*builder));
+    if (!builder)
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a builder of layered depth cubes");
+    else
+        builder->device = device;
+    return builder;
+}
+
+void ldc_builder_destroy(struct ldc_builder *builder)
+{
+    if (!builder)
+        return;
+    struct gpu_buffer *buffers[] = {&builder->counts,  &builder->fragments, &builder->places, &builder->ordered,
+                                    &builder->visible, &builder->drawn,     &builder->build,  &builder->commands};
+    for (size_t i = 0; i < sizeof(buffers) / sizeof(buffers[0]); i++)
+        gpu_buffer_finish(builder->device, buffers[i]);
+    gpu_framebuffer_finish(builder->device, &builder->plain);
+    gpu_object_destroy(builder->device->registry, GPU_VERTEX_ARRAY, builder->vertex_array);
+    free(builder->runs);
+    free(builder);
+}
+
+uint64_t ldc_builder_bytes(const struct ldc_builder *builder)
+{
+    return (uint64_t)builder->counts.capacity_bytes + builder->fragments.capacity_bytes +
+           builder->places.capacity_bytes + builder->ordered.capacity_bytes + builder->visible.capacity_bytes +
+           builder->drawn.capacity_bytes + builder->build.capacity_bytes + builder->commands.capacity_bytes;
+}
+
+void ldc_read_counts(struct ldc_task *task)
+{
+    gpu_buffer_read(task->builder->device, &task->builder->build, 0, &task->counts, sizeof(task->counts));
+}
+
+/* Behind the cubes before it. */
+static void place_cube(struct ldc_store *store, unsigned which)
+{
+    struct ldc_cube *cube = &store->cubes[which];
+    cube->first_texel = cube->first_sample = cube->first_quad = 0;
+    if (which > 0 && store->cubes[which - 1].resolution > 0) {
+        const struct ldc_cube *before = &store->cubes[which - 1];
+        cube->first_texel = before->first_texel + 3 * before->resolution * before->resolution;
+        cube->first_sample = before->first_sample + before->sample_count;
+        cube->first_quad = before->first_quad + before->quad_count;
+    }
+    cube->sample_count = cube->quad_count = 0;
+    cube->layers_needed = cube->layers_kept = 0;
+    cube->samples_lost = 0;
+    for (unsigned behind = which + 1; behind < TRACER_CUBES_MAX; behind++)
+        store->cubes[behind].resolution = 0;
+}
+
+static bool build(struct ldc_task *task, struct error *error)
+{
+    struct ldc_builder *builder = task->builder;
+    struct gpu_device *device = builder->device;
+    size_t texel_bytes = 16;
+    return ldc_store_grow(device, &task->store->texels, task->cube->first_texel * texel_bytes,
+                          ((uint64_t)task->cube->first_texel + task->texel_count) * texel_bytes, error) &&
+           gpu_buffer_reserve(device, &builder->counts, (size_t)task->texel_count * sizeof(uint32_t), error) &&
+           gpu_buffer_reserve(device, &builder->places, (size_t)task->texel_count * sizeof(uint32_t), error) &&
+           gpu_buffer_reserve(device, &builder->build, sizeof(struct ldc_build_counts), error) &&
+           ldc_lists(task, error) && ldc_pack(task, error) &&
+           gpu_check(device, "building a layered depth cube", error);
+}
+
+bool ldc_build(struct ldc_builder *builder, struct ldc_store *store, unsigned which, struct scene_gpu *scene,
+               const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
+               struct error *error)
+{
+    struct ldc_cube *cube = &store->cubes[which];
+    uint32_t resolution = cube->resolution;
+    place_cube(store, which);
+    struct ldc_task task = {
+        .builder = builder,
+        .store = store,
+        .cube = cube,
+        .scene = scene,
+        .options = options,
+        .texel_count = 3 * resolution * resolution,
+        .layers_max = options->ldc_layers_max > 0 && options->ldc_layers_max < LAYERS_MAX ? options->ldc_layers_max
+                                                                                          : LAYERS_MAX,
+    };
+    scene_gpu_bind(scene);
+    gpu_push_group(builder->device, "build a layered depth cube");
+    bool built = ldc_draw_prepare(builder, scene, instances, instance_count, error) && build(&task, error);
+    gpu_pop_group(builder->device);
+    if (!built) {
+        cube->resolution = 0;
+        cube->sample_count = cube->quad_count = 0;
+    }
+    return built;
+}

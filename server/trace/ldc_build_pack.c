@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: MIT */
+#include "shared/bindings.h"
+#include "trace/ldc_build_state.h"
+
+#include <epoxy/gl.h>
+
+#define TEXEL_BYTES 16
+#define QUAD_BYTES 16
+#define GEOMETRY_BYTES 8
+#define SURFACE_BYTES 16
+#define VISIBLE_BYTES 16
+
+/* `samples`, `quads`: at most so many. */
+static bool reserve(struct ldc_task *task, uint32_t samples, uint32_t quads, struct error *error)
+{
+    struct gpu_device *device = task->builder->device;
+    struct ldc_store *store = task->store;
+    const struct ldc_cube *cube = task->cube;
+    return ldc_store_grow(device, &store->quads, (uint64_t)cube->first_quad * QUAD_BYTES,
+                          ((uint64_t)cube->first_quad + quads) * QUAD_BYTES, error) &&
+           ldc_store_grow(device, &store->geometry, (uint64_t)cube->first_sample * GEOMETRY_BYTES,
+                          ((uint64_t)cube->first_sample + samples) * GEOMETRY_BYTES, error) &&
+           ldc_store_grow(device, &store->surface, (uint64_t)cube->first_sample * SURFACE_BYTES,
+                          ((uint64_t)cube->first_sample + samples) * SURFACE_BYTES, error) &&
+           gpu_buffer_reserve(device, &task->builder->visible, (size_t)samples * VISIBLE_BYTES, error);
+}
+
+static bool pack(struct ldc_task *task, struct error *error)
+{
+    struct gpu_device *device = task->builder->device;
+    struct ldc_builder *builder = task->builder;
+    struct ldc_store *store = task->store;
+    const struct gpu_program *program =
+        gpu_program_get(device, &(struct gpu_program_source){.compute = "ldc/pack.comp"}, error);
+    if (!program)
+        return false;
+    gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
+    gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
+    gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
+    gpu_buffer_bind_image(device, &store->texels, IMAGE_LDC_TEXELS, GL_RGBA32UI);
+    gpu_buffer_bind_image(device, &store->quads, IMAGE_LDC_QUADS, GL_RGBA32F);
+    gpu_buffer_bind_image(device, &builder->visible, IMAGE_LDC_VISIBLE, GL_RGBA32UI);
+    gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
+    gpu_uniform_uint(program, "texel_count", task->texel_count);
+    gpu_uniform_uint(program, "first_texel", task->cube->first_texel);
+    gpu_uniform_uint(program, "first_sample", task->cube->first_sample);
+    gpu_uniform_uint(program, "first_quad", task->cube->first_quad);
+    gpu_uniform_uint(program, "layers_max", task->layers_max);
+    gpu_dispatch(device, program, (task->texel_count + LDC_PACK_TEXELS - 1) / LDC_PACK_TEXELS);
+    return true;
+}
+
+static const struct gpu_program *sample_program(const struct ldc_task *task, struct error *error)
+{
+    struct gpu_define defines[4] = {0};
+    size_t n = 0, cursor = 0;
+    bool textures = false, bump = false;
+    uint64_t id;
+    for (void *value; hashmap_next(&task->scene->scene->objects[SCENE_MATERIAL], &cursor, &id, &value);) {
+        const struct scene_material *material = value;
+        for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
+            textures |= material->textures[i].texture != 0;
+        bump |= material->textures[MATERIAL_BUMP].texture != 0;
+    }
+    if (textures)
+        defines[n++] = (struct gpu_define){"HAS_TEXTURES", "1"};
+    if (bump)
+        defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
+    if (task->scene->has_spheres)
+        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    return gpu_program_get(task->builder->device,
+                           &(struct gpu_program_source){.compute = "ldc/sample.comp", .defines = defines}, error);
+}
+
+static bool sample(struct ldc_task *task, struct error *error)
+{
+    struct gpu_device *device = task->builder->device;
+    const struct gpu_program *program = sample_program(task, error);
+    if (!program)
+        return false;
+    gpu_buffer_bind_texels(device, &task->builder->visible, UNIT_LDC_VISIBLE, GL_RGBA32UI);
+    gpu_buffer_bind_texels(device, &task->builder->drawn, UNIT_LDC_DRAWN, GL_RGBA32UI);
+    gpu_buffer_bind_image(device, &task->store->geometry, IMAGE_LDC_GEOMETRY, GL_RG32UI);
+    gpu_buffer_bind_image(device, &task->store->surface, IMAGE_LDC_SURFACE, GL_RGBA32UI);
+    gpu_uniform_uint(program, "sample_count", task->counts.samples);
+    gpu_uniform_uint(program, "first_sample", task->cube->first_sample);
+    gpu_uniform_uint(program, "drawn_count", task->builder->drawn_count);
+    gpu_uniform_uint(program, "texels_along", task->cube->resolution);
+    gpu_uniform_vec(program, "lower_world", 3, task->cube->lower_world);
+    gpu_uniform_float(program, "cell_world", task->cube->cell_world);
+    gpu_dispatch(device, program, task->counts.samples);
+    return true;
+}
+
+bool ldc_pack(struct ldc_task *task, struct error *error)
+{
+    struct ldc_cube *cube = task->cube;
+    uint64_t quads = task->counts.fragments; /* at most */
+    if (!reserve(task, task->counts.fragments, (uint32_t)quads, error) || !pack(task, error))
+        return false;
+    ldc_read_counts(task);
+    if (task->counts.samples > 0 && !sample(task, error))
+        return false;
+    cube->sample_count = task->counts.samples;
+    cube->quad_count = task->counts.quads;
+    cube->layers_needed = task->counts.layers_needed;
+    cube->layers_kept = cube->layers_needed < task->layers_max ? cube->layers_needed : task->layers_max;
+    cube->samples_lost = task->counts.samples_lost;
+    return true;
+}

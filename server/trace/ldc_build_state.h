@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to ldc_build*.c: what they keep between builds, and what one build is about. */
+#ifndef FARLIGHT_TRACE_LDC_BUILD_STATE_H
+#define FARLIGHT_TRACE_LDC_BUILD_STATE_H
+
+#include "gpu/program.h"
+#include "shared/ldc.h"
+#include "shared/ldc_build.h"
+#include "trace/ldc_build.h"
+
+/* What is drawn by one program. */
+enum ldc_sort { LDC_TRIANGLES, LDC_TRIANGLES_CUTOUT, LDC_SPHERES, LDC_SORT_COUNT };
+
+/* Instances of one sort, drawn with one call: commands first .. first + count - 1. */
+struct ldc_run {
+    enum ldc_sort sort;
+    uint32_t first, count;
+};
+
+struct ldc_builder {
+    struct gpu_device *device;
+    unsigned vertex_array;
+    struct gpu_framebuffer plain; /* without attachments, three layers */
+    uint32_t plain_along;         /* its texels along a side; 0: not made yet */
+    /* shared/ldc_build.h */
+    struct gpu_buffer counts, fragments, places, ordered, visible, drawn, build;
+    struct gpu_buffer commands;
+    uint32_t fragments_max; /* for which there is room in `fragments` */
+    /* Of the present build. */
+    struct ldc_run *runs;
+    uint32_t run_count, drawn_count;
+};
+
+/* One call of ldc_build(). */
+struct ldc_task {
+    struct ldc_builder *builder;
+    struct ldc_store *store;
+    struct ldc_cube *cube;
+    struct scene_gpu *scene;
+    const struct tracer_options *options;
+    uint32_t texel_count;
+    uint32_t layers_max;
+    struct ldc_build_counts counts; /* as last read back */
+};
+
+enum ldc_pass { LDC_PASS_LISTS, LDC_PASS_COUNT, LDC_PASS_PEEL };
+
+/* ldc_build_draw.c. Lists what is to be drawn, for one build. */
+bool ldc_draw_prepare(struct ldc_builder *builder, const struct scene_gpu *scene, const uint32_t *instances,
+                      uint32_t instance_count, struct error *error);
+/* Draws it. The framebuffer and the pass's own images are bound already; `set` (may be NULL) sets its uniforms. */
+bool ldc_draw(struct ldc_task *task, enum ldc_pass pass,
+              void (*set)(const struct ldc_task *task, const struct gpu_program *program), struct error *error);
+bool ldc_draw_bind_plain(struct ldc_task *task, struct error *error);
+
+/* ldc_build_lists.c. Leaves the fragments in `ordered`, and what was counted in task->counts. */
+bool ldc_lists(struct ldc_task *task, struct error *error);
+
+/* ldc_build_pack.c. From `ordered` to the cube's buffers. */
+bool ldc_pack(struct ldc_task *task, struct error *error);
+
+/* Reads task->counts back. */
+void ldc_read_counts(struct ldc_task *task);
+
+#endif

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+// Where a primitive lies under the middle of a texel: only its depth and its id are noted, of what it is made is found
+// out once for each sample that stays (sample.comp).
+// Defines:
+//   PRIMITIVE_KIND  as in build.vert
+//   HAS_CUTOUT      triangles or spheres may have holes
+//   HAS_SPHERES     with PRIMITIVE_KIND 1
+//   BUILD_PASS      0: each texel's fragments go into the list; 1: they are counted only; 2: of those behind the layer
+//                   before, the nearest is kept (depth peeling)
+
+#include "shared/ldc_build.h"
+#include "shared/bindings.h"
+#include "common/alpha.glsl"
+
+uniform uint texels_along; // a side of the images
+uniform float cell_world;
+uniform vec3 lower_world;
+
+#if PRIMITIVE_KIND == 0
+layout(location = 0) flat in vec4 plane;
+layout(location = 1) flat in vec3 depths;
+#ifdef HAS_CUTOUT
+layout(location = 3) in vec2 barycentrics;
+#endif
+#endif
+layout(location = 2) flat in uvec3 primitive;
+
+#if BUILD_PASS != 2
+layout(binding = IMAGE_LDC_COUNTS, r32ui) uniform uimageBuffer counts;
+#endif
+#if BUILD_PASS == 0
+uniform uint fragments_max;
+layout(binding = IMAGE_LDC_FRAGMENTS, rgba32ui) writeonly uniform uimageBuffer fragments;
+layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
+#endif
+
+void record(float depth_cells)
+{
+    uint texel = (uint(gl_Layer) * texels_along + uint(gl_FragCoord.y)) * texels_along + uint(gl_FragCoord.x);
+    uint number = imageAtomicAdd(counts, int(texel), 1u);
+    uint node = atomicAdd(build.fragments, 1u);
+    if (node < fragments_max)
+        imageStore(fragments, int(node), uvec4(texel, number, floatBitsToUint(depth_cells), primitive.x));
+}
+
+#if PRIMITIVE_KIND == 0
+void main()
+{
+#ifdef HAS_CUTOUT
+    candidate found = candidate(0.0, primitive.z, primitive.y, barycentrics);
+    if (is_cut_out(found, vec3(0.0), vec3(0.0), 0.0))
+        discard;
+#endif
+    precise float along_u = (gl_FragCoord.x - plane.z) * plane.x;
+    precise float along_v = (gl_FragCoord.y - plane.w) * plane.y;
+    precise float depth_cells = depths.x + along_u + along_v;
+    // Not behind nor before the triangle, where it is thin and its plane uncertain; and on the cube.
+    depth_cells = min(max(depth_cells, depths.y), depths.z);
+    record(min(max(depth_cells, 0.0), float(texels_along)));
+}
+#else
+// Along the axis through the texel's middle; what leans more to another axis is in that one's image.
+void main()
+{
+    int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+    vec3 origin = vec3(0.0), direction = vec3(0.0);
+    origin[u] = gl_FragCoord.x * cell_world;
+    origin[v] = gl_FragCoord.y * cell_world;
+    origin += lower_world;
+    direction[axis] = cell_world; // depths are in cells
+    vec4 rows[3] = instance_at(primitive.y).object_from_world;
+    vec4 sphere = texelFetch(spheres, int(primitive.z));
+    precise vec3 from_centre = affine_point(rows, origin) - sphere.xyz;
+    precise vec3 step_object = affine_vector(rows, direction);
+    precise float squared = dot(step_object, step_object);
+    precise float nearest = -dot(from_centre, step_object) / squared;
+    precise vec3 closest = from_centre + nearest * step_object;
+    precise float half_chord = sqrt((sphere.w * sphere.w - dot(closest, closest)) / squared);
+    if (!(half_chord >= 0.0)) // passes it
+        discard;
+    for (int side = 0; side < 2; side++) {
+        precise float reach = side == 0 ? -half_chord : half_chord;
+        precise float depth_cells = nearest + reach;
+        vec3 lean = abs(affine_covector(rows, closest + reach * step_object));
+        int most = lean.x >= lean.y && lean.x >= lean.z ? 0 : lean.y >= lean.z ? 1 : 2;
+        bool there = most == axis;
+#ifdef HAS_CUTOUT
+        candidate found = candidate(depth_cells, primitive.z, primitive.y, vec2(0.0));
+        there = there && !is_cut_out(found, origin, direction, 0.0);
+#endif
+        if (there)
+            record(min(max(depth_cells, 0.0), float(texels_along)));
+    }
+}
+#endif

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// Fragments, which came in any order, to their texels' places.
+
+#include "shared/ldc_build.h"
+#include "shared/bindings.h"
+#include "common/dispatch.glsl"
+
+uniform uint fragment_count;
+
+layout(binding = UNIT_LDC_FRAGMENTS) uniform usamplerBuffer fragments;
+layout(binding = UNIT_LDC_PLACES) uniform usamplerBuffer places;
+layout(binding = IMAGE_LDC_ORDERED, rg32ui) writeonly uniform uimageBuffer ordered;
+
+void main()
+{
+    uint k = item_index();
+    if (k >= fragment_count)
+        return;
+    uvec4 fragment = texelFetch(fragments, int(k));
+    uint place = texelFetch(places, int(fragment.x)).x + fragment.y;
+    imageStore(ordered, int(place), uvec4(fragment.zw, 0u, 0u));
+}

@@ -1,0 +1,262 @@
+/* SPDX-License-Identifier: MIT */
+/* What a layered depth cube has to hold, worked out in double precision from the scene's own buffers: no
+ * rasteriser, no shader. Texels whose middle lies so near to an edge that rounding decides are left out. */
+#ifndef FARLIGHT_TESTS_LDC_ORACLE_H
+#define FARLIGHT_TESTS_LDC_ORACLE_H
+
+#include "trace/ldc_store.h"
+#include "trace/scene_gpu.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A rasteriser moves corners by half of a 1/256 of a texel (OpenGL asks for four bits, drivers have eight). */
+#define ORACLE_EDGE_TEXELS (1.0 / 128)
+/* Of a normal's greatest entries: which of two axes it leans to more is for rounding to say below this. */
+#define ORACLE_LEAN 1e-4
+
+struct oracle_sample {
+    double depth_cells;
+    double normal[3]; /* unit, world, to the outside */
+    double weights[3];
+    uint32_t instance, primitive; /* scene-wide */
+};
+
+struct oracle_texel {
+    struct oracle_sample *samples; /* ascending */
+    uint32_t count, capacity;
+    bool open; /* rounding decides what is there */
+};
+
+/* The scene's buffers, read back. */
+struct oracle_scene {
+    const struct scene_gpu *gpu;
+    uint32_t (*triangles)[4];
+    float (*positions)[4];
+    float (*normals)[4];
+    uint8_t (*colours)[4];
+    float (*spheres)[4];
+    uint32_t *sphere_materials;
+};
+
+struct oracle {
+    uint32_t resolution;
+    double lower_world[3], cell_world;
+    struct oracle_texel *texels; /* 3 * resolution^2 */
+};
+
+static inline void *oracle_read(struct gpu_device *device, const struct gpu_buffer *buffer)
+{
+    void *data = calloc(1, buffer->size_bytes + 1);
+    gpu_buffer_read(device, buffer, 0, data, buffer->size_bytes);
+    return data;
+}
+
+static inline void oracle_scene_init(struct oracle_scene *scene, const struct scene_gpu *gpu)
+{
+    *scene = (struct oracle_scene){.gpu = gpu};
+    scene->triangles = oracle_read(gpu->device, &gpu->triangles);
+    scene->positions = oracle_read(gpu->device, &gpu->positions);
+    scene->normals = oracle_read(gpu->device, &gpu->normals);
+    scene->colours = oracle_read(gpu->device, &gpu->colours);
+    scene->spheres = oracle_read(gpu->device, &gpu->spheres);
+    scene->sphere_materials = oracle_read(gpu->device, &gpu->sphere_materials);
+}
+
+static inline void oracle_scene_finish(struct oracle_scene *scene)
+{
+    free(scene->triangles);
+    free(scene->positions);
+    free(scene->normals);
+    free(scene->colours);
+    free(scene->spheres);
+    free(scene->sphere_materials);
+}
+
+static inline void oracle_finish(struct oracle *oracle)
+{
+    for (uint32_t i = 0; i < 3 * oracle->resolution * oracle->resolution; i++)
+        free(oracle->texels[i].samples);
+    free(oracle->texels);
+}
+
+static inline void oracle_add(struct oracle_texel *texel, const struct oracle_sample *sample)
+{
+    if (texel->count == texel->capacity) {
+        texel->capacity = texel->capacity ? 2 * texel->capacity : 4;
+        texel->samples = realloc(texel->samples, texel->capacity * sizeof(*texel->samples));
+    }
+    texel->samples[texel->count++] = *sample;
+}
+
+static inline void oracle_cross(double out[3], const double a[3], const double b[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+}
+
+static inline double oracle_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Also -1: rounding decides; *second is the other candidate then. */
+static inline int oracle_axis(const double n[3], int *first, int *second)
+{
+    int most = 0;
+    for (int k = 1; k < 3; k++)
+        if (fabs(n[k]) > fabs(n[most]))
+            most = k;
+    int next = most == 0 ? 1 : 0;
+    for (int k = 0; k < 3; k++)
+        if (k != most && fabs(n[k]) > fabs(n[next]))
+            next = k;
+    *first = most;
+    *second = next;
+    return fabs(n[most]) - fabs(n[next]) <= ORACLE_LEAN * fabs(n[most]) ? -1 : most;
+}
+
+/* Texels of image `axis` under the triangle; `open`: they are for rounding to decide. */
+static inline void oracle_cover(struct oracle *oracle, int axis, double p[3][3], const struct oracle_sample *base,
+                                const double n[3], bool open)
+{
+    int u = (axis + 1) % 3, v = (axis + 2) % 3, size = (int)oracle->resolution;
+    double low_u = fmin(p[0][u], fmin(p[1][u], p[2][u])), high_u = fmax(p[0][u], fmax(p[1][u], p[2][u]));
+    double low_v = fmin(p[0][v], fmin(p[1][v], p[2][v])), high_v = fmax(p[0][v], fmax(p[1][v], p[2][v]));
+    double area = (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
+    for (int y = (int)fmax(0, floor(low_v) - 1); y < size && y <= high_v + 1; y++)
+        for (int x = (int)fmax(0, floor(low_u) - 1); x < size && x <= high_u + 1; x++) {
+            double inside = 1e30, weights[3];
+            for (int k = 0; k < 3; k++) {
+                const double *a = p[(k + 1) % 3], *b = p[(k + 2) % 3];
+                double eu = b[u] - a[u], ev = b[v] - a[v];
+                double edge = eu * (y + 0.5 - a[v]) - ev * (x + 0.5 - a[u]);
+                weights[k] = edge / area;
+                inside = fmin(inside, edge * (area > 0 ? 1 : -1) / fmax(hypot(eu, ev), 1e-30));
+            }
+            if (inside < -ORACLE_EDGE_TEXELS)
+                continue;
+            struct oracle_texel *texel =
+                &oracle->texels[((uint32_t)(axis * size + y)) * oracle->resolution + (uint32_t)x];
+            texel->open |= open || inside < ORACLE_EDGE_TEXELS;
+            struct oracle_sample sample = *base;
+            memcpy(sample.weights, weights, sizeof(weights));
+            sample.depth_cells = p[0][axis] - (n[u] * (x + 0.5 - p[0][u]) + n[v] * (y + 0.5 - p[0][v])) / n[axis];
+            oracle_add(texel, &sample);
+        }
+}
+
+static inline void oracle_point(double out[3], const float rows[3][4], const float p[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = (double)rows[k][0] * p[0] + (double)rows[k][1] * p[1] + (double)rows[k][2] * p[2] + rows[k][3];
+}
+
+static inline void oracle_triangle(struct oracle *oracle, const struct oracle_scene *scene, uint32_t instance,
+                                   uint32_t primitive)
+{
+    const struct instance *at = &scene->gpu->instances[instance];
+    double p[3][3], e1[3], e2[3], n[3];
+    for (int i = 0; i < 3; i++) {
+        oracle_point(p[i], (const float(*)[4])at->world_from_object,
+                     scene->positions[scene->triangles[primitive][i]]);
+        for (int k = 0; k < 3; k++)
+            p[i][k] = (p[i][k] - oracle->lower_world[k]) / oracle->cell_world;
+    }
+    for (int k = 0; k < 3; k++) {
+        e1[k] = p[1][k] - p[0][k];
+        e2[k] = p[2][k] - p[0][k];
+    }
+    oracle_cross(n, e1, e2);
+    double length = sqrt(oracle_dot(n, n)), side = at->flags & INSTANCE_MIRRORED ? -1 : 1;
+    if (length == 0)
+        return;
+    struct oracle_sample base = {.instance = instance, .primitive = primitive};
+    for (int k = 0; k < 3; k++)
+        base.normal[k] = side * n[k] / length;
+    int first, second, axis = oracle_axis(n, &first, &second);
+    oracle_cover(oracle, first, p, &base, n, axis < 0);
+    if (axis < 0)
+        oracle_cover(oracle, second, p, &base, n, true);
+}
+
+/* By rays along the axes in the sphere's own space, every texel. */
+static inline void oracle_sphere(struct oracle *oracle, const struct oracle_scene *scene, uint32_t instance,
+                                 uint32_t primitive)
+{
+    const struct instance *at = &scene->gpu->instances[instance];
+    const float *sphere = scene->spheres[primitive];
+    uint32_t size = oracle->resolution;
+    for (uint32_t i = 0; i < 3 * size * size; i++) {
+        int axis = (int)(i / (size * size)), u = (axis + 1) % 3, v = (axis + 2) % 3;
+        double world[3] = {0}, o[3], d[3];
+        world[u] = (i % size + 0.5) * oracle->cell_world;
+        world[v] = (i / size % size + 0.5) * oracle->cell_world;
+        for (int k = 0; k < 3; k++) {
+            const float *row = at->object_from_world[k];
+            o[k] = row[3] - (double)sphere[k];
+            for (int j = 0; j < 3; j++)
+                o[k] += (world[j] + oracle->lower_world[j]) * row[j];
+            d[k] = row[axis] * oracle->cell_world;
+        }
+        double a = oracle_dot(d, d), b = oracle_dot(o, d), c = oracle_dot(o, o) - (double)sphere[3] * sphere[3];
+        double root = b * b - a * c;
+        /* Within a thousandth of the radius of its rim. */
+        bool rim = fabs(root) < 2e-3 * a * (double)sphere[3] * sphere[3];
+        if (root < 0 && !rim)
+            continue;
+        oracle->texels[i].open |= rim;
+        for (int s = -1; s <= 1 && !rim; s += 2) {
+            struct oracle_sample sample = {.instance = instance, .primitive = primitive};
+            sample.depth_cells = (-b + s * sqrt(root)) / a;
+            double length = 0;
+            for (int k = 0; k < 3; k++) {
+                for (int j = 0; j < 3; j++)
+                    sample.normal[k] += (o[j] + sample.depth_cells * d[j]) * at->object_from_world[j][k];
+                length += sample.normal[k] * sample.normal[k];
+            }
+            for (int k = 0; k < 3; k++)
+                sample.normal[k] /= sqrt(length);
+            int first, second, chosen = oracle_axis(sample.normal, &first, &second);
+            if (chosen < 0)
+                oracle->texels[i].open = true;
+            else if (chosen == axis)
+                oracle_add(&oracle->texels[i], &sample);
+        }
+    }
+}
+
+static inline int oracle_compare(const void *a, const void *b)
+{
+    const struct oracle_sample *left = a, *right = b;
+    if (left->depth_cells != right->depth_cells)
+        return left->depth_cells < right->depth_cells ? -1 : 1;
+    if (left->instance != right->instance)
+        return left->instance < right->instance ? -1 : 1;
+    return (left->primitive > right->primitive) - (left->primitive < right->primitive);
+}
+
+static inline void oracle_init(struct oracle *oracle, const struct oracle_scene *scene,
+                               const struct ldc_cube *cube, const uint32_t *instances, uint32_t count)
+{
+    *oracle = (struct oracle){.resolution = cube->resolution, .cell_world = cube->cell_world};
+    for (int k = 0; k < 3; k++)
+        oracle->lower_world[k] = cube->lower_world[k];
+    size_t texels = (size_t)3 * cube->resolution * cube->resolution;
+    oracle->texels = calloc(texels, sizeof(*oracle->texels));
+    for (uint32_t i = 0; i < count; i++) {
+        const struct geometry *g = &scene->gpu->geometries[scene->gpu->instances[instances[i]].geometry].device;
+        for (uint32_t k = g->first_primitive; k < g->first_primitive + g->primitive_count; k++)
+            if (g->kind == GEOMETRY_SPHERES)
+                oracle_sphere(oracle, scene, instances[i], k);
+            else
+                oracle_triangle(oracle, scene, instances[i], k);
+    }
+    for (size_t i = 0; i < texels; i++)
+        qsort(oracle->texels[i].samples, oracle->texels[i].count, sizeof(struct oracle_sample), oracle_compare);
+}
+
+#endif
