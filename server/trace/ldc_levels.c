@@ -6,6 +6,7 @@
 #include "shared/ldc.h"
 
 #include <epoxy/gl.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -57,6 +58,11 @@ static bool reserve(struct ldc_store *store, unsigned which, uint64_t node_count
     store->cubes[which].first_node = (uint32_t)first;
     store->cubes[which].node_count = (uint32_t)node_count;
     return ldc_store_grow(device, &store->nodes, (first + kept) * node_bytes, nodes * node_bytes, error);
+}
+
+static uint64_t texel_count(const struct ldc_cube *cube)
+{
+    return 3 * (uint64_t)cube->resolution * cube->resolution;
 }
 
 /* Where the nodes of a level lie, or the texels. */
@@ -125,61 +131,127 @@ static bool build_ranges(struct ldc_store *store, unsigned which, const struct l
 
 /* ---- cells ---- */
 
-static bool cells_pass(struct ldc_store *store, const struct ldc_cube *cube, uint32_t grid, const char *stage,
-                       struct error *error)
+#define ENTRY_BYTES (2 * sizeof(uint32_t))
+
+/* counts of ldc/cells.comp */
+struct cell_counts {
+    uint32_t blocks, entries, further, unused;
+    uint32_t lower_nodes[4], upper_nodes[4];
+};
+
+struct cell_pass {
+    const char *stage;
+    uint64_t items;
+    uint32_t blocks;
+};
+
+static bool cells_pass(struct ldc_store *store, const struct ldc_cube *cube, uint32_t grid,
+                       const struct cell_pass *pass, struct error *error)
 {
-    const struct gpu_define defines[] = {{stage, "1"}, {NULL, NULL}};
+    const struct gpu_define defines[] = {{pass->stage, "1"}, {NULL, NULL}};
     const struct gpu_program_source source = {.compute = "ldc/cells.comp", .defines = defines};
     const struct gpu_program *program = gpu_program_get(store->device, &source, error);
     if (!program)
         return false;
-    bool marks = strcmp(stage, "CELLS_BLOCKS") == 0 || strcmp(stage, "CELLS_MARK") == 0;
+    bool of_texels = pass->items == texel_count(cube);
     gpu_uniform_int(program, "first_node", (int32_t)cube->first_node);
     gpu_uniform_int(program, "grid", (int32_t)grid);
     gpu_uniform_int(program, "first_texel", (int32_t)cube->first_texel);
     gpu_uniform_int(program, "resolution", (int32_t)cube->resolution);
-    gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_LDC_NODES, marks ? GL_R32UI : GL_RGBA32UI);
-    if (marks) {
-        gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
-        gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
-    }
-    uint64_t n = cube->resolution;
-    gpu_dispatch(store->device, program, marks ? 3 * n * n : (uint64_t)grid * grid * grid);
+    gpu_uniform_int(program, "blocks", (int32_t)pass->blocks);
+    gpu_uniform_uint(program, "first_entry", cube->first_entry);
+    gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_LDC_NODES, of_texels ? GL_R32UI : GL_RGBA32UI);
+    gpu_dispatch(store->device, program, pass->items);
     return true;
 }
 
-static void clear_nodes(struct ldc_store *store, uint64_t first, uint64_t count)
+static void clear_words(struct gpu_buffer *buffer, uint64_t first_byte, uint64_t bytes, uint32_t format,
+                        const uint32_t *value)
 {
-    const uint32_t zero = 0;
-    if (count > 0)
-        glClearNamedBufferSubData(store->nodes.name, GL_R32UI, (GLintptr)(first * CELL_NODE_BYTES),
-                                  (GLsizeiptr)(count * CELL_NODE_BYTES), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
+    if (bytes > 0)
+        glClearNamedBufferSubData(buffer->name, format, (GLintptr)first_byte, (GLsizeiptr)bytes,
+                                  format == GL_R32UI ? GL_RED_INTEGER : GL_RG_INTEGER, GL_UNSIGNED_INT, value);
+}
+
+static bool reserve_entries(struct ldc_store *store, unsigned which, uint64_t count, struct error *error)
+{
+    struct ldc_cube *cube = &store->cubes[which];
+    const uint32_t empty[2] = {LDC_ENTRY_NONE, 0};
+    uint64_t entries = cube->first_entry + count;
+    if (2 * entries > store->device->facts.texture_buffer_texels_max || entries > INT32_MAX)
+        return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
+                         "%llu samples in cells are more than the device takes", (unsigned long long)entries);
+    if (!ldc_store_grow(store->device, &store->entries, cube->first_entry * ENTRY_BYTES, entries * ENTRY_BYTES,
+                        error))
+        return false;
+    cube->entry_count = (uint32_t)count;
+    clear_words(&store->entries, cube->first_entry * ENTRY_BYTES, count * ENTRY_BYTES, GL_RG32UI, empty);
+    return true;
+}
+
+/* The nodes and their blocks, which are marked. */
+static bool place_blocks(struct ldc_store *store, unsigned which, uint32_t grid, struct gpu_buffer *counter,
+                         struct cell_counts *counts, struct error *error)
+{
+    struct ldc_cube *cube = &store->cubes[which];
+    const uint64_t nodes = (uint64_t)grid * grid * grid, texels = texel_count(cube);
+    const uint32_t zero[2] = {0};
+    if (!reserve(store, which, nodes, 0, CELL_NODE_BYTES, error))
+        return false;
+    clear_words(&store->nodes, cube->first_node * CELL_NODE_BYTES, nodes * CELL_NODE_BYTES, GL_R32UI, zero);
+    if (!cells_pass(store, cube, grid, &(struct cell_pass){"CELLS_BLOCKS", texels, 0}, error) ||
+        !cells_pass(store, cube, grid, &(struct cell_pass){"CELLS_PLACE", nodes, 0}, error))
+        return false;
+    gpu_buffer_read(store->device, counter, 0, counts, sizeof *counts);
+    for (int k = 0; k < 3; k++) {
+        cube->lower_cells[k] = counts->blocks ? counts->lower_nodes[k] << LDC_NODE_SHIFT : 0;
+        cube->upper_cells[k] = counts->blocks ? (counts->upper_nodes[k] + 1) << LDC_NODE_SHIFT : 0;
+    }
+    if (!reserve(store, which, nodes + counts->blocks, nodes, CELL_NODE_BYTES, error))
+        return false;
+    clear_words(&store->nodes, (cube->first_node + nodes) * CELL_NODE_BYTES, counts->blocks * CELL_NODE_BYTES,
+                GL_R32UI, zero);
+    return cells_pass(store, cube, grid, &(struct cell_pass){"CELLS_MARK", texels, 0}, error);
+}
+
+static bool fill_blocks(struct ldc_store *store, unsigned which, uint32_t grid, struct gpu_buffer *counter,
+                        struct cell_counts *counts, struct error *error)
+{
+    struct ldc_cube *cube = &store->cubes[which];
+    if (!cells_pass(store, cube, grid, &(struct cell_pass){"CELLS_COUNT", counts->blocks, counts->blocks}, error))
+        return false;
+    gpu_buffer_read(store->device, counter, 0, counts, sizeof *counts);
+    if (!reserve_entries(store, which, (uint64_t)counts->entries + counts->further, error))
+        return false;
+    /* From now on where the next further entry goes. */
+    const uint32_t further = cube->first_entry + counts->entries;
+    gpu_buffer_write(store->device, counter, offsetof(struct cell_counts, further), &further, sizeof further);
+    gpu_buffer_bind_image(store->device, &store->entries, IMAGE_LDC_ENTRIES, GL_R32UI);
+    return cells_pass(store, cube, grid, &(struct cell_pass){"CELLS_FILL", texel_count(cube), 0}, error);
 }
 
 static bool build_cells(struct ldc_store *store, unsigned which, uint32_t grid, struct error *error)
 {
+    static const char *const reaches[] = {"CELLS_REACH_X", "CELLS_REACH_Y", "CELLS_REACH_Z"};
     struct gpu_device *device = store->device;
     struct ldc_cube *cube = &store->cubes[which];
-    const uint64_t nodes = (uint64_t)grid * grid * grid;
-    uint32_t block_count = 0;
+    struct cell_counts counts = {.lower_nodes = {grid, grid, grid, 0}};
     struct gpu_buffer counter = {0};
-    if (!reserve(store, which, nodes, 0, CELL_NODE_BYTES, error) ||
-        !gpu_buffer_upload(device, &counter, &block_count, sizeof block_count, error))
+    cube->first_entry = cube->entry_count = 0;
+    for (unsigned i = 0; i < which; i++)
+        if (store->cubes[i].resolution)
+            cube->first_entry = store->cubes[i].first_entry + store->cubes[i].entry_count;
+    if (!gpu_buffer_upload(device, &counter, &counts, sizeof counts, error))
         return false;
-    clear_nodes(store, cube->first_node, nodes);
     gpu_buffer_bind_storage(&counter, BIND_TRACER_0);
-    bool ok = cells_pass(store, cube, grid, "CELLS_BLOCKS", error) &&
-              cells_pass(store, cube, grid, "CELLS_PLACE", error);
-    if (ok)
-        gpu_buffer_read(device, &counter, 0, &block_count, sizeof block_count);
+    gpu_buffer_bind_texels(device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
+    gpu_buffer_bind_texels(device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
+    bool ok = place_blocks(store, which, grid, &counter, &counts, error) &&
+              (counts.blocks == 0 || fill_blocks(store, which, grid, &counter, &counts, error));
     gpu_buffer_finish(device, &counter);
-    ok = ok && reserve(store, which, nodes + 2 * (uint64_t)block_count, nodes, CELL_NODE_BYTES, error);
-    if (ok)
-        clear_nodes(store, cube->first_node + nodes, 2 * (uint64_t)block_count);
-    return ok && cells_pass(store, cube, grid, "CELLS_MARK", error) &&
-           cells_pass(store, cube, grid, "CELLS_REACH_X", error) &&
-           cells_pass(store, cube, grid, "CELLS_REACH_Y", error) &&
-           cells_pass(store, cube, grid, "CELLS_REACH_Z", error);
+    for (int k = 0; ok && k < 3; k++)
+        ok = cells_pass(store, cube, grid, &(struct cell_pass){reaches[k], (uint64_t)grid * grid * grid, 0}, error);
+    return ok;
 }
 
 bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,

@@ -8,6 +8,7 @@
 
 #include <epoxy/gl.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX (1u << 18)
@@ -34,6 +35,12 @@ static void set_cube(const struct gpu_program *program, unsigned slot, const str
     const float place[4] = {cube->lower_world[0], cube->lower_world[1], cube->lower_world[2], cube->cell_world};
     snprintf(name, sizeof name, "ldc_place[%u]", slot);
     gpu_uniform_vec(program, name, 4, place);
+    const float lower[3] = {(float)cube->lower_cells[0], (float)cube->lower_cells[1], (float)cube->lower_cells[2]};
+    const float upper[3] = {(float)cube->upper_cells[0], (float)cube->upper_cells[1], (float)cube->upper_cells[2]};
+    snprintf(name, sizeof name, "ldc_lower[%u]", slot);
+    gpu_uniform_vec(program, name, 3, lower);
+    snprintf(name, sizeof name, "ldc_upper[%u]", slot);
+    gpu_uniform_vec(program, name, 3, upper);
     snprintf(name, sizeof name, "ldc_tolerance[%u]", slot);
     gpu_uniform_float(program, name, options->ldc_tolerance / cube->cell_world);
 }
@@ -45,6 +52,7 @@ static void bind(struct ldc_store *store, bool cells)
     gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_2, GL_RG32UI);
     gpu_buffer_bind_texels(store->device, &store->surface, UNIT_TRACER_3, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_4, cells ? GL_RGBA32UI : GL_RG32F);
+    gpu_buffer_bind_texels(store->device, &store->entries, UNIT_TRACER_5, GL_RG32UI);
 }
 
 bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wave *wave,
@@ -68,6 +76,8 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
         {"LDC_LAYERS_TOGETHER", options->ldc_layers_together == 1 ? "1" : "4"},
     };
     size_t n = 4;
+    if (getenv("LDC_COUNT"))
+        defines[n++] = (struct gpu_define){"LDC_COUNT_STEPS", "1"};
     if (layout.cells)
         defines[n++] = (struct gpu_define){"LDC_CELLS", "1"};
     if (layout.blocks)

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Which cells of a cube samples' planes pass: the nodes and blocks of shared/ldc.h, in six passes.
+// Which cells of a cube samples' planes pass, and which samples these are: nodes, blocks and entries of shared/ldc.h.
 //
 // Defines, one of them:
 //   CELLS_BLOCKS   marks the blocks that samples are in; an item is a texel of the images
 //   CELLS_PLACE    gives nodes their blocks; an item is a node
 //   CELLS_MARK     marks cells; an item is a texel
+//   CELLS_COUNT    gives blocks their entries; an item is a block
+//   CELLS_FILL     writes entries; an item is a texel
 //   CELLS_REACH_X, CELLS_REACH_Y, CELLS_REACH_Z   how far it is empty; an item is a node
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
@@ -12,19 +14,27 @@
 
 uniform int first_node, grid; // nodes along a side
 
-#if defined CELLS_BLOCKS || defined CELLS_MARK
+#if !defined CELLS_REACH_X && !defined CELLS_REACH_Y && !defined CELLS_REACH_Z
+layout(std430, binding = BIND_TRACER_0) buffer count_block {
+    uint block_count;
+    uint entry_count; // a cell's first
+    uint further_count; // entries of cells that have one
+    uint unused;
+    uvec4 lower, upper; // nodes that hold something
+} counts;
+#endif
+
+#if defined CELLS_BLOCKS || defined CELLS_MARK || defined CELLS_FILL
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer ldc_texels;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer ldc_geometry;
 layout(binding = IMAGE_LDC_NODES, r32ui) uniform uimageBuffer nodes; // words
 
-uniform int first_texel, resolution;
+#ifdef CELLS_FILL
+layout(binding = IMAGE_LDC_ENTRIES, r32ui) uniform uimageBuffer entries; // words
+#endif
 
-void set_bits(int word, uint bits)
-{
-    if ((imageLoad(nodes, word).x & bits) != bits)
-        imageAtomicOr(nodes, word, bits);
-}
+uniform int first_texel, resolution;
 
 int node_of(ivec3 cell)
 {
@@ -32,24 +42,42 @@ int node_of(ivec3 cell)
     return 4 * (first_node + (n.z * grid + n.y) * grid + n.x);
 }
 
-void mark(ivec3 cell, int axis)
+// How many bits of a node's or block's 64 come before one.
+uint rank_of(int words, bool upper_half, uint bit)
+{
+    uint below = uint(bitCount(imageLoad(nodes, upper_half ? words + 1 : words).x & ((1u << bit) - 1u)));
+    return upper_half ? below + uint(bitCount(imageLoad(nodes, words).x)) : below;
+}
+
+void mark(ivec3 cell, int axis, uint sample_index)
 {
     uvec3 b = uvec3(cell);
     int node = node_of(cell);
     uint block_bit = (b.x >> 2 & 3u) | (b.y & 12u) | (b.z & 4u) << 2;
     bool upper_half = (b.z & 8u) != 0u;
+    int word = upper_half ? node + 1 : node;
 #ifdef CELLS_BLOCKS
-    set_bits(upper_half ? node + 1 : node, 1u << block_bit);
+    uint bit = 1u << block_bit;
+    if ((imageLoad(nodes, word).x & bit) == 0u)
+        imageAtomicOr(nodes, word, bit);
 #else
-    uint word = imageLoad(nodes, upper_half ? node + 1 : node).x;
-    uint rank = uint(bitCount(word & ((1u << block_bit) - 1u)));
-    if (upper_half)
-        rank += uint(bitCount(imageLoad(nodes, node).x));
-    int block = int(4u * (imageLoad(nodes, node + 2).x + 2u * rank));
-    uint bit = 1u << ((b.x & 3u) | (b.y & 3u) << 2 | (b.z & 1u) << 4);
-    int half_ = int(b.z >> 1 & 1u);
-    set_bits(block + half_, bit);
-    set_bits(block + 2 + 2 * axis + half_, bit);
+    uint rank = rank_of(node, upper_half, block_bit);
+    int block = int(4u * (imageLoad(nodes, node + 2).x + rank));
+    uint cell_bit = (b.x & 3u) | (b.y & 3u) << 2 | (b.z & 1u) << 4;
+    bool upper_cells = (b.z & 2u) != 0u;
+#ifdef CELLS_MARK
+    uint bit = 1u << cell_bit;
+    if ((imageAtomicOr(nodes, upper_cells ? block + 1 : block, bit) & bit) != 0u)
+        atomicAdd(counts.further_count, 1u);
+#else
+    uint entry = imageLoad(nodes, block + 2).x + rank_of(block, upper_cells, cell_bit);
+    uint packed_ = sample_index | uint(axis) << LDC_ENTRY_AXIS_SHIFT;
+    if (imageAtomicCompSwap(entries, int(2u * entry), LDC_ENTRY_NONE, packed_) != LDC_ENTRY_NONE) {
+        uint further = atomicAdd(counts.further_count, 1u);
+        imageStore(entries, int(2u * further), uvec4(packed_));
+        imageStore(entries, int(2u * further + 1u), uvec4(imageAtomicExchange(entries, int(2u * entry + 1u), further)));
+    }
+#endif
 #endif
 }
 
@@ -61,15 +89,20 @@ void main()
     int axis = item / of_image, in_image_ = item - axis * of_image;
     int v = in_image_ / resolution, u = in_image_ - v * resolution;
     uvec2 words = texelFetch(ldc_texels, first_texel + item).xy;
+#ifdef CELLS_BLOCKS
     int marked = -1; // up to which depth
+#endif
     for (uint i = words.x; i < words.x + (words.y & LDC_TEXEL_COUNT_MASK); i++) {
         uvec2 g = texelFetch(ldc_geometry, int(i)).xy;
         float depth = uintBitsToFloat(g.x), reach = plane_reach(g.y, axis);
         int first = int(clamp(depth - reach, 0.0, float(resolution - 1)));
         int last = int(clamp(depth + reach, 0.0, float(resolution - 1)));
-        for (int k = max(first, marked + 1); k <= last; k++)
-            mark(axis == 0 ? ivec3(k, u, v) : axis == 1 ? ivec3(v, k, u) : ivec3(u, v, k), axis);
+#ifdef CELLS_BLOCKS
+        first = max(first, marked + 1);
         marked = last;
+#endif
+        for (int k = first; k <= last; k++)
+            mark(axis == 0 ? ivec3(k, u, v) : axis == 1 ? ivec3(v, k, u) : ivec3(u, v, k), axis, i);
     }
 }
 
@@ -77,16 +110,40 @@ void main()
 
 layout(binding = IMAGE_LDC_NODES, rgba32ui) uniform uimageBuffer nodes;
 
-#ifdef CELLS_PLACE
+#ifdef CELLS_COUNT
 
-layout(std430, binding = BIND_TRACER_0) buffer count_block { uint blocks_placed; };
+uniform uint first_entry;
+uniform int blocks;
+
+void main()
+{
+    int item = int(item_index());
+    if (item >= blocks)
+        return;
+    int at = first_node + grid * grid * grid + item;
+    uvec4 block = imageLoad(nodes, at);
+    block.z = first_entry + atomicAdd(counts.entry_count, uint(bitCount(block.x) + bitCount(block.y)));
+    imageStore(nodes, at, block);
+}
+
+#else
+
+#ifdef CELLS_PLACE
 
 void settle(int at, ivec3 place)
 {
     uvec4 node = imageLoad(nodes, at);
     uint count = uint(bitCount(node.x) + bitCount(node.y));
-    if (count > 0u)
-        node.z = uint(first_node + grid * grid * grid) + 2u * atomicAdd(blocks_placed, count);
+    if (count > 0u) {
+        node.z = uint(first_node + grid * grid * grid) + atomicAdd(counts.block_count, count);
+        uvec3 at_node = uvec3(place);
+        for (int k = 0; k < 3; k++) {
+            if (at_node[k] < counts.lower[k])
+                atomicMin(counts.lower[k], at_node[k]);
+            if (at_node[k] > counts.upper[k])
+                atomicMax(counts.upper[k], at_node[k]);
+        }
+    }
     imageStore(nodes, at, node);
 }
 
@@ -149,5 +206,7 @@ void main()
         return;
     settle(first_node + item, ivec3(item % grid, item / grid % grid, item / (grid * grid)));
 }
+
+#endif
 
 #endif

@@ -32,6 +32,11 @@ void settle(ldc_found found, inout answer a)
 #ifdef ANY_HIT
     a = found.taken;
 #else
+#ifdef LDC_COUNT_STEPS
+    a = candidate(float(ldc_counts.x), ldc_counts.z, ldc_counts.y, vec2(0.0));
+    ldc_counts = uvec3(0u);
+    return;
+#endif
     if (found.sample_index != HIT_NO_PRIMITIVE)
         a = candidate(found.end, found.sample_index, HIT_NO_PRIMITIVE - 1u, vec2(0.0));
 #endif
@@ -72,13 +77,18 @@ void walk_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOGETHE
         }
 #ifdef LDC_CELLS
         found_cell at = next_cell(w);
-        if (at.block != 0)
+        if (at.entry != LDC_ENTRY_NONE)
+            LDC_COUNT(y);
+        if (at.entry != LDC_ENTRY_NONE)
             test_cell(w, at, found);
 #else
         uvec4 words;
         float z_least, z_greatest;
         if (next_texel(w, words, z_least, z_greatest))
+        {
+            LDC_COUNT(y);
             test_texel(w, words, z_least, z_greatest, found);
+        }
 #endif
     }
 }
