@@ -74,11 +74,25 @@ void begin_cells(trace_ray r, float end, int pass, out cell_walk w)
     w.shift = 2;
 }
 
+// Of the 64 parts of a node or a block those that lie in a cube of so many along each side, 2 or 4, which begins with
+// part b and reaches the way the ray runs.
+uvec2 parts_ahead(uvec3 b, bvec3 down, uint size)
+{
+    uint many = (1u << size) - 1u, back = size - 1u;
+    uint x = down.x ? many << b.x >> back : many << b.x & 15u;
+    uint y = (size == 4u ? 0xffffu : 0xffu) << 4u * b.y;
+    y = (down.y ? y >> 4u * back : y) & 0xffffu;
+    uint z = down.z ? many << b.z >> back : many << b.z;
+    uint slice = x * 0x1111u & y;
+    return slice * uvec2((z & 1u) | (z & 2u) << 15, (z >> 2 & 1u) | (z & 8u) << 13);
+}
+
 // On to the next cell that a plane passes; its entry is LDC_ENTRY_NONE if there is none. Each round looks at one of 64 parts of
 // what the ray is in, a node or a block, and goes into it or past it.
 found_cell next_cell(inout cell_walk w)
 {
     found_cell found = found_cell(ivec3(0), LDC_ENTRY_NONE);
+    bvec3 down = notEqual(w.flip, ivec3(0));
     while (w.s < w.s_end && found.entry == LDC_ENTRY_NONE) {
         LDC_COUNT(x);
         uvec4 words = texelFetch(ldc_nodes, w.at);
@@ -94,9 +108,11 @@ found_cell next_cell(inout cell_walk w)
         } else {
             found.cell = w.cell;
             found.entry = is_set ? words.z + rank : LDC_ENTRY_NONE;
-            // Two parts along each side where the other seven are empty too.
-            int last = ((word & LDC_NODE_EIGHT << (bit & 10u)) == 0u ? 2 << w.shift : 1 << w.shift) - 1;
-            ivec3 border = (w.cell | last) + 1;
+            // As far as the parts ahead are empty.
+            uvec2 all_parts = words.xy & parts_ahead(b & 3u, down, 4u), near_parts = words.xy & parts_ahead(b & 3u, down, 2u);
+            int parts = (all_parts.x | all_parts.y) == 0u ? 4 : (near_parts.x | near_parts.y) == 0u ? 2 : 1;
+            ivec3 border = ((w.cell >> w.shift) + parts) << w.shift, end = ((w.cell >> (w.shift + 2)) + 1) << (w.shift + 2);
+            border = min(border, end);
             int empty = int(words.z >> w.octant_shift & LDC_NODE_FAR);
             ivec3 away = ((w.cell >> LDC_NODE_SHIFT) + (empty > 0 ? empty : 1)) << LDC_NODE_SHIFT;
             border = (words.x | words.y) == 0u ? away : border;
