@@ -131,7 +131,7 @@ static bool build_ranges(struct ldc_store *store, unsigned which, const struct l
 
 /* ---- cells ---- */
 
-#define ENTRY_BYTES (2 * sizeof(uint32_t))
+#define ENTRY_BYTES (4 * sizeof(uint32_t))
 
 /* counts of ldc/cells.comp */
 struct cell_counts {
@@ -170,22 +170,22 @@ static void clear_words(struct gpu_buffer *buffer, uint64_t first_byte, uint64_t
 {
     if (bytes > 0)
         glClearNamedBufferSubData(buffer->name, format, (GLintptr)first_byte, (GLsizeiptr)bytes,
-                                  format == GL_R32UI ? GL_RED_INTEGER : GL_RG_INTEGER, GL_UNSIGNED_INT, value);
+                                  format == GL_R32UI ? GL_RED_INTEGER : GL_RGBA_INTEGER, GL_UNSIGNED_INT, value);
 }
 
 static bool reserve_entries(struct ldc_store *store, unsigned which, uint64_t count, struct error *error)
 {
     struct ldc_cube *cube = &store->cubes[which];
-    const uint32_t empty[2] = {LDC_ENTRY_NONE, 0};
+    const uint32_t empty[4] = {LDC_ENTRY_NONE};
     uint64_t entries = cube->first_entry + count;
-    if (2 * entries > store->device->facts.texture_buffer_texels_max || entries > INT32_MAX)
+    if (4 * entries > store->device->facts.texture_buffer_texels_max || entries > INT32_MAX)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
                          "%llu samples in cells are more than the device takes", (unsigned long long)entries);
     if (!ldc_store_grow(store->device, &store->entries, cube->first_entry * ENTRY_BYTES, entries * ENTRY_BYTES,
                         error))
         return false;
     cube->entry_count = (uint32_t)count;
-    clear_words(&store->entries, cube->first_entry * ENTRY_BYTES, count * ENTRY_BYTES, GL_RG32UI, empty);
+    clear_words(&store->entries, cube->first_entry * ENTRY_BYTES, count * ENTRY_BYTES, GL_RGBA32UI, empty);
     return true;
 }
 

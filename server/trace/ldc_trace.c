@@ -52,7 +52,7 @@ static void bind(struct ldc_store *store, bool cells)
     gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_2, GL_RG32UI);
     gpu_buffer_bind_texels(store->device, &store->surface, UNIT_TRACER_3, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_4, cells ? GL_RGBA32UI : GL_RG32F);
-    gpu_buffer_bind_texels(store->device, &store->entries, UNIT_TRACER_5, GL_RG32UI);
+    gpu_buffer_bind_texels(store->device, &store->entries, UNIT_TRACER_5, GL_RGBA32UI);
 }
 
 bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wave *wave,
@@ -69,7 +69,7 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
     snprintf(number_of_cubes, sizeof number_of_cubes, "%u", cube_count);
     const struct ldc_level_layout layout = ldc_level_layout_of(cubes[0]->resolution, options);
     snprintf(bits, sizeof bits, "%u", layout.bits);
-    struct gpu_define defines[8] = {
+    struct gpu_define defines[10] = {
         {"TRACER_LDC", "1"},
         {"LDC_CUBES", number_of_cubes},
         {"LDC_LEVEL_BITS", bits},
@@ -78,6 +78,8 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
     size_t n = 4;
     if (getenv("LDC_COUNT"))
         defines[n++] = (struct gpu_define){"LDC_COUNT_STEPS", "1"};
+    if (getenv("LDC_EXP")) /* EXPERIMENT */
+        defines[n++] = (struct gpu_define){getenv("LDC_EXP"), "1"};
     if (layout.cells)
         defines[n++] = (struct gpu_define){"LDC_CELLS", "1"};
     if (layout.blocks)

@@ -49,7 +49,7 @@ uint rank_of(int words, bool upper_half, uint bit)
     return upper_half ? below + uint(bitCount(imageLoad(nodes, words).x)) : below;
 }
 
-void mark(ivec3 cell, int axis, uint sample_index)
+void mark(ivec3 cell, int axis, uint sample_index, uvec2 geometry)
 {
     uvec3 b = uvec3(cell);
     int node = node_of(cell);
@@ -72,11 +72,15 @@ void mark(ivec3 cell, int axis, uint sample_index)
 #else
     uint entry = imageLoad(nodes, block + 2).x + rank_of(block, upper_cells, cell_bit);
     uint packed_ = sample_index | uint(axis) << LDC_ENTRY_AXIS_SHIFT;
-    if (imageAtomicCompSwap(entries, int(2u * entry), LDC_ENTRY_NONE, packed_) != LDC_ENTRY_NONE) {
+    if (imageAtomicCompSwap(entries, int(4u * entry), LDC_ENTRY_NONE, packed_) != LDC_ENTRY_NONE) {
         uint further = atomicAdd(counts.further_count, 1u);
-        imageStore(entries, int(2u * further), uvec4(packed_));
-        imageStore(entries, int(2u * further + 1u), uvec4(imageAtomicExchange(entries, int(2u * entry + 1u), further)));
+        uint next = imageAtomicExchange(entries, int(4u * entry + 1u), further);
+        imageStore(entries, int(4u * further), uvec4(packed_));
+        imageStore(entries, int(4u * further + 1u), uvec4(next));
+        entry = further;
     }
+    imageStore(entries, int(4u * entry + 2u), uvec4(geometry.x));
+    imageStore(entries, int(4u * entry + 3u), uvec4(geometry.y));
 #endif
 #endif
 }
@@ -102,7 +106,7 @@ void main()
         marked = last;
 #endif
         for (int k = first; k <= last; k++)
-            mark(axis == 0 ? ivec3(k, u, v) : axis == 1 ? ivec3(v, k, u) : ivec3(u, v, k), axis, i);
+            mark(axis == 0 ? ivec3(k, u, v) : axis == 1 ? ivec3(v, k, u) : ivec3(u, v, k), axis, i, g);
     }
 }
 

@@ -153,10 +153,9 @@ void test_cell(inout cell_walk w, found_cell at, inout ldc_found found)
 {
     uint entry = at.entry;
     do {
-        uvec2 e = texelFetch(ldc_entries, int(entry)).xy;
-        uint sample_index = e.x & LDC_ENTRY_SAMPLE_MASK;
-        uvec2 g = texelFetch(ldc_geometry, int(sample_index)).xy;
-        test_cell_sample(w, int(e.x >> LDC_ENTRY_AXIS_SHIFT), at.cell, sample_index, uintBitsToFloat(g.x), g.y, found);
+        uvec4 e = texelFetch(ldc_entries, int(entry));
+        test_cell_sample(w, int(e.x >> LDC_ENTRY_AXIS_SHIFT), at.cell, e.x & LDC_ENTRY_SAMPLE_MASK,
+                         uintBitsToFloat(e.z), e.w, found);
         entry = e.y;
     } while (entry != 0u);
     w.s_end = w.s_end < w.s_limit ? w.s_end : w.s_limit;

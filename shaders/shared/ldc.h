@@ -53,7 +53,8 @@
  * then the blocks:
  *   x, y  which of its 64 cells a plane passes
  *   z     entry of the first of these, the others lie behind it; w is unused
- * Entries, RG32UI: x sample, bits 30 and 31 its image; y a further entry of the same cell, 0: there is none. */
+ * Entries, RGBA32UI: x sample, bits 30 and 31 its image; y a further entry of the same cell, 0: there is none; z, w
+ * what the sample has in `geometry`. */
 #define LDC_NODE_SHIFT 4
 #define LDC_NODE_EIGHT 0x00330033u /* 2 x 2 x 2 of 32 bits */
 #define LDC_NODE_FAR 15u
