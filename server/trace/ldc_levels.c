@@ -8,6 +8,8 @@
 #include <epoxy/gl.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include "base/clock.h"
 #include <string.h>
 
 #define RANGE_BYTES (2 * sizeof(float))
@@ -161,7 +163,9 @@ static bool cells_pass(struct ldc_store *store, const struct ldc_cube *cube, uin
     gpu_uniform_int(program, "blocks", (int32_t)pass->blocks);
     gpu_uniform_uint(program, "first_entry", cube->first_entry);
     gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_LDC_NODES, of_texels ? GL_R32UI : GL_RGBA32UI);
+    uint64_t T0 = clock_now_ns(); /*X*/
     gpu_dispatch(store->device, program, pass->items);
+    glFinish(); if (getenv("LDC_TIME")) fprintf(stderr, "    %s %.1f ms\n", pass->stage, (double)(clock_now_ns()-T0)*1e-6); /*X*/
     return true;
 }
 
