@@ -8,8 +8,6 @@
 #include <epoxy/gl.h>
 #include <stddef.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include "base/clock.h"
 #include <string.h>
 
 #define RANGE_BYTES (2 * sizeof(float))
@@ -163,9 +161,7 @@ static bool cells_pass(struct ldc_store *store, const struct ldc_cube *cube, uin
     gpu_uniform_int(program, "blocks", (int32_t)pass->blocks);
     gpu_uniform_uint(program, "first_entry", cube->first_entry);
     gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_LDC_NODES, of_texels ? GL_R32UI : GL_RGBA32UI);
-    uint64_t T0 = clock_now_ns(); /*X*/
     gpu_dispatch(store->device, program, pass->items);
-    glFinish(); if (getenv("LDC_TIME")) fprintf(stderr, "    %s %.1f ms\n", pass->stage, (double)(clock_now_ns()-T0)*1e-6); /*X*/
     return true;
 }
 
@@ -254,7 +250,8 @@ static bool build_cells(struct ldc_store *store, unsigned which, uint32_t grid, 
               (counts.blocks == 0 || fill_blocks(store, which, grid, &counter, &counts, error));
     gpu_buffer_finish(device, &counter);
     for (int k = 0; ok && k < 3; k++)
-        ok = cells_pass(store, cube, grid, &(struct cell_pass){reaches[k], (uint64_t)grid * grid * grid, 0}, error);
+        ok =
+            cells_pass(store, cube, grid, &(struct cell_pass){reaches[k], (uint64_t)grid * grid * grid, 0}, error);
     return ok;
 }
 
@@ -267,8 +264,8 @@ bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct trac
         return true;
     const struct ldc_level_layout layout = ldc_level_layout_of(cube->resolution, options);
     gpu_push_group(store->device, "ldc levels");
-    bool ok = layout.cells ? build_cells(store, which, layout.grid, error)
-                           : build_ranges(store, which, &layout, error);
+    bool ok =
+        layout.cells ? build_cells(store, which, layout.grid, error) : build_ranges(store, which, &layout, error);
     gpu_pop_group(store->device);
     if (!ok)
         cube->node_count = 0;

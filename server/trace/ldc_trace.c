@@ -8,7 +8,6 @@
 
 #include <epoxy/gl.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX (1u << 18)
@@ -25,7 +24,8 @@ static void set_cube(const struct gpu_program *program, unsigned slot, const str
         {"ldc_first_texel", cube->first_texel},
         {"ldc_first_node", cube->first_node},
         {"ldc_top", layout.top},
-        {"ldc_row", layout.row},              {"ldc_grid", layout.grid},
+        {"ldc_row", layout.row},
+        {"ldc_grid", layout.grid},
     };
     char name[32];
     for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) {
@@ -76,10 +76,8 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
         {"LDC_LAYERS_TOGETHER", options->ldc_layers_together == 1 ? "1" : "4"},
     };
     size_t n = 4;
-    if (getenv("LDC_COUNT"))
+    if (options->ldc_count_steps && wave->kind == WAVE_CLOSEST)
         defines[n++] = (struct gpu_define){"LDC_COUNT_STEPS", "1"};
-    if (getenv("LDC_EXP")) /* EXPERIMENT */
-        defines[n++] = (struct gpu_define){getenv("LDC_EXP"), "1"};
     if (layout.cells)
         defines[n++] = (struct gpu_define){"LDC_CELLS", "1"};
     if (layout.blocks)

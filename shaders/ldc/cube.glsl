@@ -83,11 +83,13 @@ void clip(inout float s_first, inout float s_end, vec3 o, vec3 inverse, vec3 low
 
 // ---- samples ----
 
-// A ray that begins on a surface may begin a little below a neighbour's plane, and would at once hit what it leaves.
-// So near its origin a ray does not cross what the origin lies on: a plane that passes it as near as this. The first
-// is that of rays that begin on a surface that bends by a radius of eight cells and more: 2^2 / (2 * 8).
-const float LDC_OWN_HEIGHT = 0.25;
-const float LDC_OWN_WAY = 2.0;
+// A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit what it leaves. So
+// near its origin a ray does not cross planes that pass the origin as near as this. From behind, which is how a ray that
+// goes away outside meets what it leaves, that is generous; from the front, which is how it meets another wall in a
+// corner, and how a ray that was refracted meets what it has entered by, it is what a surface needs that bends by a
+// radius of six cells: 1.5^2 / (2 * 6).
+const float LDC_OWN_WAY = 1.5;
+const float LDC_OWN_BEHIND = 0.5, LDC_OWN_BEFORE = 0.2;
 
 // Where the ray (o, d in the image) crosses a sample of a texel, if it does so there. `normal` may have any length;
 // `side` is positive where the ray comes from behind.
@@ -109,6 +111,7 @@ bool cross_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal
     vec2 from_middle = abs(s * d.xy - to_sample.xy);
     bool crosses = from_middle.x <= 0.5 + LDC_SLACK && from_middle.y <= 0.5 + LDC_SLACK;
 #endif
-    bool is_own = s < LDC_OWN_WAY && height * height < LDC_OWN_HEIGHT * LDC_OWN_HEIGHT * dot(normal, normal);
+    float own = side > 0.0 ? LDC_OWN_BEHIND * LDC_OWN_BEHIND : LDC_OWN_BEFORE * LDC_OWN_BEFORE;
+    bool is_own = s < LDC_OWN_WAY && height * height < own * dot(normal, normal);
     return crosses && !is_own;
 }
