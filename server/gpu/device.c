@@ -87,6 +87,7 @@ static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool 
         .storage_block_bytes_max = get_integer(GL_MAX_SHADER_STORAGE_BLOCK_SIZE),
         .work_groups_max = groups > 0 ? (uint32_t)groups : 65535,
         .texture_size_max = (uint32_t)get_integer(GL_MAX_TEXTURE_SIZE),
+        .texture_layers_max = (uint32_t)get_integer(GL_MAX_ARRAY_TEXTURE_LAYERS),
     };
     if (epoxy_has_gl_extension("GL_NVX_gpu_memory_info"))
         facts->memory_bytes = get_integer(GL_GPU_MEMORY_INFO_TOTAL_AVAILABLE_MEMORY_NVX) * 1024;

@@ -29,6 +29,7 @@ struct gpu_facts {
     uint64_t storage_block_bytes_max;
     uint32_t work_groups_max;  /* on x; more is a GL error */
     uint32_t texture_size_max; /* texels along an edge of a 2D texture */
+    uint32_t texture_layers_max;
     uint64_t memory_bytes;     /* device memory, 0: the driver does not tell */
 };
 

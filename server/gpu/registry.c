@@ -37,6 +37,9 @@ static unsigned create_name(enum gpu_object_kind kind)
     case GPU_TEXTURE_2D:
         glCreateTextures(GL_TEXTURE_2D, 1, &name);
         break;
+    case GPU_TEXTURE_2D_ARRAY:
+        glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &name);
+        break;
     case GPU_TEXTURE_BUFFER:
         glCreateTextures(GL_TEXTURE_BUFFER, 1, &name);
         break;
@@ -65,6 +68,7 @@ static void delete_name(enum gpu_object_kind kind, GLuint name)
         glDeleteBuffers(1, &name);
         break;
     case GPU_TEXTURE_2D:
+    case GPU_TEXTURE_2D_ARRAY:
     case GPU_TEXTURE_BUFFER:
         glDeleteTextures(1, &name);
         break;

@@ -8,6 +8,7 @@
 enum gpu_object_kind {
     GPU_BUFFER,
     GPU_TEXTURE_2D,
+    GPU_TEXTURE_2D_ARRAY,
     GPU_TEXTURE_BUFFER,
     GPU_FRAMEBUFFER,
     GPU_PROGRAM,

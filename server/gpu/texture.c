@@ -41,29 +41,50 @@ static const struct format_row *find_format(GLenum format)
     return NULL;
 }
 
-bool gpu_texture_reserve(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
-                         uint32_t width, uint32_t height, struct error *error)
+static enum gpu_object_kind kind_of(const struct gpu_texture *texture)
+{
+    return texture->layers > 0 ? GPU_TEXTURE_2D_ARRAY : GPU_TEXTURE_2D;
+}
+
+static bool check_size(const struct gpu_device *device, uint32_t width, uint32_t height, uint32_t layers,
+                       struct error *error)
+{
+    const struct gpu_facts *facts = &device->facts;
+    if (width == 0 || height == 0 || width > facts->texture_size_max || height > facts->texture_size_max)
+        return error_set(error, ERROR_LIMIT, NULL, "a texture of %ux%u; this device has at most %ux%u", width,
+                         height, facts->texture_size_max, facts->texture_size_max);
+    if (layers > facts->texture_layers_max)
+        return error_set(error, ERROR_LIMIT, NULL, "a texture of %u layers; this device has at most %u", layers,
+                         facts->texture_layers_max);
+    return true;
+}
+
+/* `layers` 0: no array. */
+static bool reserve(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
+                    uint32_t width, uint32_t height, uint32_t layers, struct error *error)
 {
     if (texture->name && texture->internal_format == internal_format && texture->width == width &&
-        texture->height == height)
+        texture->height == height && texture->layers == layers)
         return true;
     gpu_texture_finish(device, texture);
     const struct format_row *row = find_format(internal_format);
     if (!row)
         return error_set(error, ERROR_INTERNAL, NULL, "texture format 0x%04x is not in the table",
                          internal_format);
-    if (width == 0 || height == 0 || width > device->facts.texture_size_max ||
-        height > device->facts.texture_size_max)
-        return error_set(error, ERROR_LIMIT, NULL, "a texture of %ux%u; this device has at most %ux%u", width,
-                         height, device->facts.texture_size_max, device->facts.texture_size_max);
-    uint64_t size_bytes = (uint64_t)width * height * row->texel_bytes;
-    if (!gpu_memory_take(device, size_bytes, "a texture", error))
+    uint64_t size_bytes = (uint64_t)width * height * (layers > 0 ? layers : 1) * row->texel_bytes;
+    if (!check_size(device, width, height, layers, error) ||
+        !gpu_memory_take(device, size_bytes, "a texture", error))
         return false;
     texture->size_bytes = size_bytes;
-    texture->name = gpu_object_create(device->registry, GPU_TEXTURE_2D);
+    texture->layers = layers;
+    texture->name = gpu_object_create(device->registry, kind_of(texture));
     if (texture->name) {
         (void)glGetError(); /* an older error would be taken for this call's */
-        glTextureStorage2D(texture->name, 1, internal_format, (GLsizei)width, (GLsizei)height);
+        if (layers > 0)
+            glTextureStorage3D(texture->name, 1, internal_format, (GLsizei)width, (GLsizei)height,
+                               (GLsizei)layers);
+        else
+            glTextureStorage2D(texture->name, 1, internal_format, (GLsizei)width, (GLsizei)height);
     }
     if (!texture->name || glGetError() != GL_NO_ERROR) {
         gpu_texture_finish(device, texture);
@@ -81,6 +102,18 @@ bool gpu_texture_reserve(struct gpu_device *device, struct gpu_texture *texture,
     return true;
 }
 
+bool gpu_texture_reserve(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
+                         uint32_t width, uint32_t height, struct error *error)
+{
+    return reserve(device, texture, internal_format, width, height, 0, error);
+}
+
+bool gpu_texture_reserve_array(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
+                               uint32_t width, uint32_t height, uint32_t layers, struct error *error)
+{
+    return reserve(device, texture, internal_format, width, height, layers > 0 ? layers : 1, error);
+}
+
 void gpu_texture_write(struct gpu_texture *texture, unsigned format, unsigned type, const void *texels)
 {
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
@@ -90,7 +123,7 @@ void gpu_texture_write(struct gpu_texture *texture, unsigned format, unsigned ty
 
 void gpu_texture_finish(struct gpu_device *device, struct gpu_texture *texture)
 {
-    gpu_object_destroy(device->registry, GPU_TEXTURE_2D, texture->name);
+    gpu_object_destroy(device->registry, kind_of(texture), texture->name);
     gpu_memory_give(device, texture->size_bytes);
     *texture = (struct gpu_texture){0};
 }

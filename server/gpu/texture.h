@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* 2D textures and framebuffers. */
+/* 2D textures, arrays of them, and framebuffers. */
 #ifndef FARLIGHT_GPU_TEXTURE_H
 #define FARLIGHT_GPU_TEXTURE_H
 
@@ -13,12 +13,16 @@ struct gpu_texture {
     unsigned name;
     unsigned internal_format; /* GL_RGBA16F .. */
     uint32_t width, height;
+    uint32_t layers; /* of an array; 0: it is none */
     uint64_t size_bytes;
 };
 
 /* (Re)makes it where size or format differ. */
 bool gpu_texture_reserve(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
                          uint32_t width, uint32_t height, struct error *error);
+/* Likewise an array of as many layers, 1 and more. */
+bool gpu_texture_reserve_array(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
+                               uint32_t width, uint32_t height, uint32_t layers, struct error *error);
 void gpu_texture_write(struct gpu_texture *texture, unsigned format, unsigned type, const void *texels);
 void gpu_texture_finish(struct gpu_device *device, struct gpu_texture *texture);
 void gpu_texture_bind(const struct gpu_texture *texture, unsigned unit);
@@ -26,6 +30,7 @@ void gpu_texture_bind(const struct gpu_texture *texture, unsigned unit);
 struct gpu_framebuffer {
     unsigned name;
 };
+/* Arrays are attached with all their layers, of which all attachments then have as many. */
 bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
                             const struct gpu_texture *colours, unsigned colour_count,
                             const struct gpu_texture *depth, struct error *error);

@@ -16,6 +16,7 @@ void tracer_set_note(struct tracer_set *set, const struct scene_changes *changes
         pending->deformed |= changes->deformed;
         pending->instances |= changes->instances;
         pending->shading |= changes->shading;
+        pending->surfaces |= changes->surfaces;
         pending->lights |= changes->lights;
     }
 }

@@ -2,8 +2,10 @@
 #include "trace/ldc_build.h"
 
 #include "gpu/registry.h"
+#include "shared/bindings.h"
 #include "trace/ldc_build_state.h"
 
+#include <epoxy/gl.h>
 #include <stdlib.h>
 
 #define LAYERS_MAX 255 /* a texel's count has eight bits */
@@ -18,15 +20,31 @@ struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *
     return builder;
 }
 
+#define BUFFER_COUNT 9
+
+static void list_buffers(struct ldc_builder *builder, struct gpu_buffer *buffers[BUFFER_COUNT])
+{
+    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->counts, &builder->found,   &builder->fragments,
+                                            &builder->places, &builder->ordered, &builder->visible,
+                                            &builder->drawn,  &builder->build,   &builder->commands};
+    for (size_t i = 0; i < BUFFER_COUNT; i++)
+        buffers[i] = all[i];
+}
+
 void ldc_builder_destroy(struct ldc_builder *builder)
 {
     if (!builder)
         return;
-    struct gpu_buffer *buffers[] = {&builder->counts,  &builder->fragments, &builder->places, &builder->ordered,
-                                    &builder->visible, &builder->drawn,     &builder->build,  &builder->commands};
-    for (size_t i = 0; i < sizeof(buffers) / sizeof(buffers[0]); i++)
+    struct gpu_buffer *buffers[BUFFER_COUNT];
+    list_buffers(builder, buffers);
+    for (size_t i = 0; i < BUFFER_COUNT; i++)
         gpu_buffer_finish(builder->device, buffers[i]);
     gpu_framebuffer_finish(builder->device, &builder->plain);
+    for (int i = 0; i < 2; i++) {
+        gpu_framebuffer_finish(builder->device, &builder->layer_framebuffers[i]);
+        gpu_texture_finish(builder->device, &builder->layers[i]);
+    }
+    gpu_texture_finish(builder->device, &builder->depth);
     gpu_object_destroy(builder->device->registry, GPU_VERTEX_ARRAY, builder->vertex_array);
     free(builder->runs);
     free(builder);
@@ -34,9 +52,38 @@ void ldc_builder_destroy(struct ldc_builder *builder)
 
 uint64_t ldc_builder_bytes(const struct ldc_builder *builder)
 {
-    return (uint64_t)builder->counts.capacity_bytes + builder->fragments.capacity_bytes +
-           builder->places.capacity_bytes + builder->ordered.capacity_bytes + builder->visible.capacity_bytes +
-           builder->drawn.capacity_bytes + builder->build.capacity_bytes + builder->commands.capacity_bytes;
+    struct gpu_buffer *buffers[BUFFER_COUNT];
+    uint64_t bytes = builder->layers[0].size_bytes + builder->layers[1].size_bytes + builder->depth.size_bytes;
+    struct ldc_builder copy = *builder;
+    list_buffers(&copy, buffers);
+    for (size_t i = 0; i < BUFFER_COUNT; i++)
+        bytes += buffers[i]->capacity_bytes;
+    return bytes;
+}
+
+const struct gpu_program *ldc_use(struct gpu_device *device, const char *path, struct error *error)
+{
+    const struct gpu_program *program =
+        gpu_program_get(device, &(struct gpu_program_source){.compute = path}, error);
+    if (program)
+        glUseProgram(program->name);
+    return program;
+}
+
+bool ldc_give_places(struct ldc_task *task, bool all, struct error *error)
+{
+    struct ldc_builder *builder = task->builder;
+    struct gpu_device *device = builder->device;
+    const struct gpu_program *program = ldc_use(device, "ldc/places.comp", error);
+    if (!program)
+        return false;
+    gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
+    gpu_buffer_bind_image(device, &builder->places, IMAGE_LDC_PLACES, GL_R32UI);
+    gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
+    gpu_uniform_uint(program, "texel_count", task->texel_count);
+    gpu_uniform_uint(program, "fragments_kept", all ? UINT32_MAX : task->layers_max);
+    gpu_dispatch(device, program, (task->texel_count + LDC_PLACES_TEXELS - 1) / LDC_PLACES_TEXELS);
+    return true;
 }
 
 void ldc_read_counts(struct ldc_task *task)
@@ -72,8 +119,8 @@ static bool build(struct ldc_task *task, struct error *error)
            gpu_buffer_reserve(device, &builder->counts, (size_t)task->texel_count * sizeof(uint32_t), error) &&
            gpu_buffer_reserve(device, &builder->places, (size_t)task->texel_count * sizeof(uint32_t), error) &&
            gpu_buffer_reserve(device, &builder->build, sizeof(struct ldc_build_counts), error) &&
-           ldc_lists(task, error) && ldc_pack(task, error) &&
-           gpu_check(device, "building a layered depth cube", error);
+           (task->options->ldc_build == LDC_BUILD_PEEL ? ldc_peel(task, error) : ldc_lists(task, error)) &&
+           ldc_pack(task, error) && gpu_check(device, "building a layered depth cube", error);
 }
 
 bool ldc_build(struct ldc_builder *builder, struct ldc_store *store, unsigned which, struct scene_gpu *scene,

@@ -8,7 +8,6 @@
 
 #define FRAGMENT_BYTES 16
 #define ORDERED_BYTES 8
-#define PLACES_RUN 32 /* texels of an invocation of ldc/places.comp */
 
 static void set_list(const struct ldc_task *task, const struct gpu_program *program)
 {
@@ -48,22 +47,16 @@ static bool order(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
-    const struct gpu_program *places =
-        gpu_program_get(device, &(struct gpu_program_source){.compute = "ldc/places.comp"}, error);
-    const struct gpu_program *scatter =
-        gpu_program_get(device, &(struct gpu_program_source){.compute = "ldc/order.comp"}, error);
-    if (!places || !scatter ||
+    const struct gpu_program *program = ldc_use(device, "ldc/order.comp", error);
+    if (!program ||
         !gpu_buffer_reserve(device, &builder->ordered, (size_t)task->counts.fragments * ORDERED_BYTES, error))
         return false;
-    gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
     gpu_buffer_bind_texels(device, &builder->fragments, UNIT_LDC_FRAGMENTS, GL_RGBA32UI);
     gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
-    gpu_buffer_bind_image(device, &builder->places, IMAGE_LDC_PLACES, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
-    gpu_uniform_uint(places, "texel_count", task->texel_count);
-    gpu_dispatch(device, places, (task->texel_count + PLACES_RUN - 1) / PLACES_RUN);
-    gpu_uniform_uint(scatter, "fragment_count", task->counts.fragments);
-    gpu_dispatch(device, scatter, task->counts.fragments);
+    gpu_uniform_uint(program, "fragment_count", task->counts.fragments);
+    gpu_dispatch(device, program, task->counts.fragments);
+    task->ordered_count = task->counts.fragments;
     return true;
 }
 
@@ -79,5 +72,5 @@ bool ldc_lists(struct ldc_task *task, struct error *error)
             !draw_lists(task, error))
             return false;
     }
-    return task->counts.fragments == 0 || order(task, error);
+    return ldc_give_places(task, true, error) && (task->counts.fragments == 0 || order(task, error));
 }

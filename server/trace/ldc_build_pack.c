@@ -30,10 +30,13 @@ static bool pack(struct ldc_task *task, struct error *error)
     struct gpu_device *device = task->builder->device;
     struct ldc_builder *builder = task->builder;
     struct ldc_store *store = task->store;
-    const struct gpu_program *program =
-        gpu_program_get(device, &(struct gpu_program_source){.compute = "ldc/pack.comp"}, error);
+    const struct gpu_define defines[] = {{task->peeled ? "PEELED" : NULL, "1"}, {0}};
+    const struct gpu_program *program = gpu_program_get(
+        device, &(struct gpu_program_source){.compute = "ldc/pack.comp", .defines = defines}, error);
     if (!program)
         return false;
+    if (task->peeled)
+        gpu_buffer_bind_texels(device, &builder->found, UNIT_LDC_FOUND, GL_R32UI);
     gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
     gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
@@ -95,8 +98,7 @@ static bool sample(struct ldc_task *task, struct error *error)
 bool ldc_pack(struct ldc_task *task, struct error *error)
 {
     struct ldc_cube *cube = task->cube;
-    uint64_t quads = task->counts.fragments; /* at most */
-    if (!reserve(task, task->counts.fragments, (uint32_t)quads, error) || !pack(task, error))
+    if (!reserve(task, task->ordered_count, task->ordered_count, error) || !pack(task, error))
         return false;
     ldc_read_counts(task);
     if (task->counts.samples > 0 && !sample(task, error))

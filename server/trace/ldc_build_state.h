@@ -4,6 +4,7 @@
 #define FARLIGHT_TRACE_LDC_BUILD_STATE_H
 
 #include "gpu/program.h"
+#include "gpu/texture.h"
 #include "shared/ldc.h"
 #include "shared/ldc_build.h"
 #include "trace/ldc_build.h"
@@ -23,8 +24,11 @@ struct ldc_builder {
     struct gpu_framebuffer plain; /* without attachments, three layers */
     uint32_t plain_along;         /* its texels along a side; 0: not made yet */
     /* shared/ldc_build.h */
-    struct gpu_buffer counts, fragments, places, ordered, visible, drawn, build;
+    struct gpu_buffer counts, found, fragments, places, ordered, visible, drawn, build;
     struct gpu_buffer commands;
+    /* Peeling: what is visible in the layer that is drawn and in the one before it, by turns. */
+    struct gpu_texture layers[2], depth;
+    struct gpu_framebuffer layer_framebuffers[2];
     uint32_t fragments_max; /* for which there is room in `fragments` */
     /* Of the present build. */
     struct ldc_run *runs;
@@ -40,6 +44,8 @@ struct ldc_task {
     const struct tracer_options *options;
     uint32_t texel_count;
     uint32_t layers_max;
+    bool peeled;                    /* `ordered` is sorted, and `found` says how many each texel has */
+    uint32_t ordered_count;         /* fragments in `ordered` */
     struct ldc_build_counts counts; /* as last read back */
 };
 
@@ -55,10 +61,17 @@ bool ldc_draw_bind_plain(struct ldc_task *task, struct error *error);
 
 /* ldc_build_lists.c. Leaves the fragments in `ordered`, and what was counted in task->counts. */
 bool ldc_lists(struct ldc_task *task, struct error *error);
+/* ldc_build_peel.c. Likewise. */
+bool ldc_peel(struct ldc_task *task, struct error *error);
+/* Gives at most task->layers_max or, `all`, all of a texel's fragments places in `ordered`; counts how many that
+ * are, and the most of one texel. */
+bool ldc_give_places(struct ldc_task *task, bool all, struct error *error);
 
 /* ldc_build_pack.c. From `ordered` to the cube's buffers. */
 bool ldc_pack(struct ldc_task *task, struct error *error);
 
+/* ldc_build.c. The compute program, without defines, is made current. */
+const struct gpu_program *ldc_use(struct gpu_device *device, const char *path, struct error *error);
 /* Reads task->counts back. */
 void ldc_read_counts(struct ldc_task *task);
 

@@ -4,6 +4,7 @@
 #include "gpu/program.h"
 #include "shared/bindings.h"
 #include "trace/ldc_levels.h"
+#include "trace/ldc_surface.h"
 #include "trace/trace_program.h"
 
 #include <epoxy/gl.h>
@@ -96,8 +97,8 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
     bind(store, layout.cells);
     for (unsigned i = 0; i < cube_count; i++)
         set_cube(program, i, cubes[i], options);
-    /* Its crossings are samples, of which ldc_surfaces() makes hits. */
+    /* Crossings of samples are no matter of trace_surfaces(). */
     struct wave walk = *wave;
     walk.crossings_only = true;
-    return trace_program_run(program, scene, &walk, &source, error);
+    return trace_program_run(program, scene, &walk, &source, error) && ldc_surfaces(store, scene, wave, error);
 }

@@ -21,6 +21,7 @@ struct scene_changes {
     bool deformed;  /* vertices of deforming geometries are others; of which, their deformed_revision tells */
     bool instances; /* transforms, or which instances there are */
     bool shading;   /* materials, textures; alpha too */
+    bool surfaces;  /* of these: textures, how materials use them, and where they cut out; not their factors */
     bool lights;
     uint64_t uploaded_bytes;
 };

@@ -153,6 +153,39 @@ static bool upload_changed(struct scene_gpu *gpu, struct gpu_buffer *buffer, con
     return true;
 }
 
+static bool same_textures(const struct material *a, const struct material *b)
+{
+    return a->texture_base_colour == b->texture_base_colour && a->texture_normal == b->texture_normal &&
+           a->texture_metallic_roughness == b->texture_metallic_roughness &&
+           a->texture_occlusion == b->texture_occlusion && a->texture_emission == b->texture_emission &&
+           a->texture_transmission == b->texture_transmission && a->texture_bump == b->texture_bump;
+}
+
+/* Whether two materials are alike but for their factors; where alpha decides what is cut out it is more than one.
+ */
+static bool same_surface(const struct material *a, const struct material *b)
+{
+    if (((a->flags ^ b->flags) & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND)) != 0 || !same_textures(a, b))
+        return false;
+    return (a->flags & MATERIAL_ALPHA_MASK) == 0 ||
+           (a->base_colour[3] == b->base_colour[3] && a->alpha_cutoff == b->alpha_cutoff);
+}
+
+/* Against the mirrors. Materials that are new do not count: no surface that was there has one. */
+static bool same_surfaces(const struct scene_gpu *gpu, const struct material *materials, uint32_t count,
+                          const struct texture_slot *slots, uint32_t slot_count)
+{
+    const struct scene_gpu_state *state = gpu->state;
+    size_t slot_bytes = slot_count * sizeof(*slots);
+    if (!state->materials || gpu->texture_slots.size_bytes != slot_bytes ||
+        memcmp(slots, state->texture_slots, slot_bytes) != 0)
+        return false;
+    for (uint32_t i = 0; i < count && i < gpu->material_count; i++)
+        if (!same_surface(&materials[i], &state->materials[i]))
+            return false;
+    return true;
+}
+
 bool scene_gpu_upload_materials(struct scene_gpu *gpu, const struct scene *scene,
                                 const struct scene_motion *motion, struct scene_changes *changes,
                                 struct error *error)
@@ -173,6 +206,7 @@ bool scene_gpu_upload_materials(struct scene_gpu *gpu, const struct scene *scene
     while (ok && hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value))
         pack_material(gpu, scene_pose_material(pose, value), &packed[scene_gpu_material_index(gpu, (uint32_t)id)],
                       slots, &slot_count);
+    changes->surfaces |= ok && !same_surfaces(gpu, packed, count, slots, slot_count);
     ok = ok &&
          upload_changed(gpu, &gpu->materials, packed, state->materials, sizeof(*packed), count, changes, error) &&
          upload_changed(gpu, &gpu->texture_slots, slots, state->texture_slots, sizeof(*slots), slot_count, changes,

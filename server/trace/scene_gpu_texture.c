@@ -257,7 +257,7 @@ bool scene_gpu_upload_textures(struct scene_gpu *gpu, const struct scene *scene,
     if (!ok)
         return false;
     gpu->state->textures_signature = signature;
-    changes->shading = true;
+    changes->shading = changes->surfaces = true;
     changes->uploaded_bytes += texel_count * 4 + count * sizeof(*infos);
     return true;
 }

@@ -15,6 +15,7 @@ static const struct tracer_impl *const tracers[] = {
 #ifdef FARLIGHT_HAVE_EMBREE
     [NUMBER_REFERENCE] = &tracer_reference_impl,
 #endif
+    [3] = &tracer_ldc_impl,
 };
 #define TRACER_COUNT (sizeof(tracers) / sizeof(tracers[0]))
 
@@ -77,7 +78,7 @@ bool tracer_update(struct tracer *tracer, struct scene_gpu *scene, const struct 
                    struct stage_times *times, struct error *error)
 {
     static const struct scene_changes everything = {
-        .geometry = true, .deformed = true, .instances = true, .shading = true, .lights = true};
+        .geometry = true, .deformed = true, .instances = true, .shading = true, .surfaces = true, .lights = true};
     gpu_push_group(tracer->device, tracer->impl->name);
     bool ok = tracer->impl->update(tracer, scene, tracer->updated ? changes : &everything, times, error) &&
               gpu_check(tracer->device, tracer->impl->name, error);

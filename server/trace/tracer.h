@@ -87,7 +87,7 @@ struct tracer_impl {
     bool (*trace)(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error);
 };
 
-extern const struct tracer_impl tracer_bvh_impl, tracer_naive_impl, tracer_reference_impl;
+extern const struct tracer_impl tracer_bvh_impl, tracer_naive_impl, tracer_reference_impl, tracer_ldc_impl;
 
 /* The table of what this build has; index is the protocol's tracer number, NULL where it is left out. */
 const struct tracer_impl *tracer_impl_by_number(unsigned number);

@@ -8,6 +8,7 @@
 //   BUILD_PASS      0: each texel's fragments go into the list; 1: they are counted only; 2: of those behind the layer
 //                   before, the nearest is kept (depth peeling)
 
+#include "shared/ldc.h"
 #include "shared/ldc_build.h"
 #include "shared/bindings.h"
 #include "common/alpha.glsl"
@@ -25,7 +26,11 @@ layout(location = 3) in vec2 barycentrics;
 #endif
 layout(location = 2) flat in uvec3 primitive;
 
-#if BUILD_PASS != 2
+#if BUILD_PASS == 2
+uniform float unit_per_cell; // a power of two, so that nothing is rounded
+layout(binding = UNIT_LDC_LAYER) uniform usampler2DArray layer_before; // depth, id
+layout(location = 0) out uvec2 visible;
+#else
 layout(binding = IMAGE_LDC_COUNTS, r32ui) uniform uimageBuffer counts;
 #endif
 #if BUILD_PASS == 0
@@ -34,13 +39,51 @@ layout(binding = IMAGE_LDC_FRAGMENTS, rgba32ui) writeonly uniform uimageBuffer f
 layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
 #endif
 
+uint texel_number()
+{
+    return (uint(gl_Layer) * texels_along + uint(gl_FragCoord.y)) * texels_along + uint(gl_FragCoord.x);
+}
+
+// Depths of what lies on the sides of the cube may be rounded out of it.
+float depth_in_cube(float depth_cells)
+{
+    return min(max(depth_cells, 0.0), float(texels_along));
+}
+
+#if BUILD_PASS == 0
 void record(float depth_cells)
 {
-    uint texel = (uint(gl_Layer) * texels_along + uint(gl_FragCoord.y)) * texels_along + uint(gl_FragCoord.x);
+    uint texel = texel_number();
     uint number = imageAtomicAdd(counts, int(texel), 1u);
     uint node = atomicAdd(build.fragments, 1u);
     if (node < fragments_max)
         imageStore(fragments, int(node), uvec4(texel, number, floatBitsToUint(depth_cells), primitive.x));
+}
+#elif BUILD_PASS == 1
+void record(float depth_cells)
+{
+    imageAtomicAdd(counts, int(texel_number()), 1u);
+}
+#else
+// Of several records of one fragment the nearest counts; none may be there.
+float nearest_cells = LDC_NO_DEPTH;
+
+void record(float depth_cells)
+{
+    uint before = texelFetch(layer_before, ivec3(gl_FragCoord.xy, gl_Layer), 0).x;
+    if (depth_cells > uintBitsToFloat(before) && depth_cells < nearest_cells)
+        nearest_cells = depth_cells;
+}
+#endif
+
+void finish()
+{
+#if BUILD_PASS == 2
+    if (nearest_cells == LDC_NO_DEPTH)
+        discard;
+    gl_FragDepth = nearest_cells * unit_per_cell;
+    visible = uvec2(floatBitsToUint(nearest_cells), primitive.x);
+#endif
 }
 
 #if PRIMITIVE_KIND == 0
@@ -56,7 +99,8 @@ void main()
     precise float depth_cells = depths.x + along_u + along_v;
     // Not behind nor before the triangle, where it is thin and its plane uncertain; and on the cube.
     depth_cells = min(max(depth_cells, depths.y), depths.z);
-    record(min(max(depth_cells, 0.0), float(texels_along)));
+    record(depth_in_cube(depth_cells));
+    finish();
 }
 #else
 // Along the axis through the texel's middle; what leans more to another axis is in that one's image.
@@ -82,14 +126,14 @@ void main()
         precise float reach = side == 0 ? -half_chord : half_chord;
         precise float depth_cells = nearest + reach;
         vec3 lean = abs(affine_covector(rows, closest + reach * step_object));
-        int most = lean.x >= lean.y && lean.x >= lean.z ? 0 : lean.y >= lean.z ? 1 : 2;
-        bool there = most == axis;
+        bool there = lean[axis] >= LDC_OVERLAP * greatest(lean);
 #ifdef HAS_CUTOUT
         candidate found = candidate(depth_cells, primitive.z, primitive.y, vec2(0.0));
         there = there && !is_cut_out(found, origin, direction, 0.0);
 #endif
         if (there)
-            record(min(max(depth_cells, 0.0), float(texels_along)));
+            record(depth_in_cube(depth_cells));
     }
+    finish();
 }
 #endif

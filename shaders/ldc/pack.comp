@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // From the fragments of texels to their samples: sorted by depth and id, the first of coincident ones, the nearest of
 // more than may be kept. Writes texels and quads, and what sample.comp needs to know of each sample.
+// Define: PEELED  they are sorted already, each once
 
 #include "shared/ldc.h"
 #include "shared/ldc_build.h"
@@ -13,6 +14,9 @@ uniform uint layers_max;                            // at most 255
 
 layout(binding = UNIT_LDC_COUNTS) uniform usamplerBuffer counts;
 layout(binding = UNIT_LDC_PLACES) uniform usamplerBuffer places;
+#ifdef PEELED
+layout(binding = UNIT_LDC_FOUND) uniform usamplerBuffer found;
+#endif
 layout(binding = IMAGE_LDC_ORDERED, rg32ui) uniform uimageBuffer ordered;
 layout(binding = IMAGE_LDC_TEXELS, rgba32ui) writeonly uniform uimageBuffer texels_out;
 layout(binding = IMAGE_LDC_QUADS, rgba32f) writeonly uniform imageBuffer quads_out;
@@ -24,6 +28,7 @@ bool before(uvec2 a, uvec2 b)
     return a.x < b.x || a.x == b.x && a.y < b.y; // depths are not negative: their bits ascend as they do
 }
 
+#ifndef PEELED
 void sort(uint place, uint count)
 {
     for (uint i = 1u; i < count; i++) {
@@ -54,6 +59,7 @@ uint keep(uint place, uint count)
     }
     return kept;
 }
+#endif
 
 void main()
 {
@@ -65,8 +71,13 @@ void main()
     uint samples = 0u, quads = 0u;
     for (uint texel = begin; texel < end; texel++) {
         uint count = texelFetch(counts, int(texel)).x, place = texelFetch(places, int(texel)).x;
+        uint shift = (texel & 3u) * 8u;
+#ifdef PEELED
+        uint own = texelFetch(found, int(texel)).x;
+#else
         sort(place, count);
-        uint own = keep(place, count), shift = (texel & 3u) * 8u;
+        uint own = keep(place, count);
+#endif
         samples += own;
         quads += (own + 3u) >> 2;
         if ((texel & 4u) == 0u)

@@ -7,6 +7,7 @@
 #include "shared/ldc_build.h"
 #include "common/dispatch.glsl"
 #include "common/material.glsl"
+#include "common/sampled.glsl"
 
 uniform uint sample_count, first_sample; // of the cube
 uniform uint drawn_count;
@@ -58,25 +59,18 @@ vec2 barycentrics_at(uvec2 primitive, int u, int v, vec2 middle)
     return sum > 1.0 ? weights / sum : weights;
 }
 
-vec3 srgb_from_linear(vec3 c)
+uvec4 words_of(surface s, vec4 colour, uint material_index)
 {
-    return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, c * 12.92, lessThanEqual(c, vec3(0.0031308)));
-}
-
-uint part(float share, float most)
-{
-    return uint(clamp(share, 0.0, 1.0) * most + 0.5);
-}
-
-uvec4 pack_surface(surface s, vec4 colour, uint material_index)
-{
-    vec3 glow = sqrt(clamp(s.emission, vec3(0.0), vec3(1.0)));
-    return uvec4(packUnorm4x8(vec4(srgb_from_linear(clamp(colour.rgb, vec3(0.0), vec3(1.0))), colour.a)),
-                 pack_unit(s.normal),
-                 material_index & LDC_MATERIAL_MASK | part(s.metallic, 15.0) << LDC_METALLIC_SHIFT |
-                     part(s.transmission, 15.0) << LDC_TRANSMISSION_SHIFT,
-                 part(s.roughness, 255.0) | part(s.occlusion, 255.0) << 8 | part(glow.r, 31.0) << 16 |
-                     part(glow.g, 63.0) << 21 | part(glow.b, 31.0) << 27);
+    surface_sample stored;
+    stored.base_colour = colour;
+    stored.normal = s.normal;
+    stored.material = material_index;
+    stored.metallic = s.metallic;
+    stored.transmission = s.transmission;
+    stored.roughness = s.roughness;
+    stored.occlusion = s.occlusion;
+    stored.emission = s.emission;
+    return pack_sample(stored);
 }
 
 void main()
@@ -119,5 +113,5 @@ void main()
         s.normal = bump_normal(h, m.texture_bump, s.normal, uv01);
 #endif
     imageStore(geometry_out, int(first_sample + k), uvec4(found.y, h.normal_geometric, 0u, 0u));
-    imageStore(surface_out, int(first_sample + k), pack_surface(s, colour, h.material));
+    imageStore(surface_out, int(first_sample + k), words_of(s, colour, h.material));
 }

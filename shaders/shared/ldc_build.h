@@ -18,12 +18,17 @@ SHARED_SIZE(ldc_build_counts, 32)
 
 /* Texels that one invocation packs: their samples lie together, and places are asked for once. */
 #define LDC_PACK_TEXELS 8u
+/* Texels to whose fragments one invocation gives places. */
+#define LDC_PLACES_TEXELS 32u
+
+#define LDC_NO_ID 0xffffffffu
 
 /* A drawn primitive has an id: primitives of all instances are counted through, in the order of the instances. Ids
  * ascend as instances and primitives do.
  *   drawn      RGBA32UI, one an instance: first id; what is added to a primitive's scene-wide number to make its
  *              id; the instance; 0
  *   counts     R32UI, one a texel: its fragments
+ *   found      R32UI, one a texel: layers that were peeled off it
  *   fragments  RGBA32UI: texel, which one of the texel it is, depth (float, cells), id
  *   places     R32UI, one a texel: its first fragment in `ordered`
  *   ordered    RG32UI: depth, id; those of a texel together

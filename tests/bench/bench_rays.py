@@ -14,6 +14,7 @@ from bench_common import (KITCHEN_VIEW, Failure, bundled, command, figure, fit_e
 WAVES = ("primary", "reflection", "shadow", "occlusion", "bounce")
 FAMILY = [1000 * 2 ** k for k in range(11)]
 REACH = (5000, 37000, 147000)
+EXACT = ("--tracers", "bvh,reference")
 MEBI = 1 << 20
 
 
@@ -55,7 +56,7 @@ def measure_tracers(bench):
 def measure_reach(bench):
     sizes = (1000,) if bench.tiny else REACH
     size = "64x64" if bench.tiny else "512x512"
-    return {"results": [trace(bench, f"family {n}", bench.times(5), "--family", n, "--size", size) for n in sizes]}
+    return {"results": [trace(bench, f"family {n}", bench.times(5), "--family", n, "--size", size, *EXACT) for n in sizes]}
 
 
 def join_times(into, more):
@@ -79,10 +80,10 @@ def sweep(bench, calls):
     """Results of calls (title, arguments) that make a curve. There and back, so that a machine that grows slower or faster
     meanwhile bends the curve less; the runs are put together."""
     runs = max(1, bench.times(6) // 2)
-    results = [trace(bench, title, runs, *arguments, "--quick") for title, arguments in calls]
+    results = [trace(bench, title, runs, *arguments, *EXACT, "--quick") for title, arguments in calls]
     if bench.times(6) > 1:
         for result, (title, arguments) in reversed(list(zip(results, calls))):
-            join(result, trace(bench, title, runs, *arguments, "--quick"))
+            join(result, trace(bench, title, runs, *arguments, *EXACT, "--quick"))
     return {"results": results}
 
 

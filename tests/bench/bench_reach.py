@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What is wanted, held against what was measured: derived from the parts `reach`, `family`, `tracers` and `distributed`."""
+"""What is wanted, held against what was measured: derived from the parts `reach`, `family`, `tracers`, `distributed`
+and `ldc`."""
 from bench_common import significant, table, with_spread
 from bench_frames import distributed_row
 from bench_rays import CURVES, exponents, find_measure, find_wave, times_as_fast
@@ -83,7 +84,7 @@ def derive(parts):
     if "distributed" in parts:
         line, wanted, measured, where = distributed_row(parts["distributed"])
         rows.append(row(line, wanted, measured, where, at_most=True))
-    rows = [r for r in rows if r]
+    rows = [r for r in rows if r] + parts.get("ldc", {}).get("wanted", [])
     if not rows:
         return None
     return {"rows": rows, "gpu": list(bandwidth_rows(scenes))}

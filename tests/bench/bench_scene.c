@@ -2,6 +2,7 @@
 #include "tests/bench/bench_scene.h"
 
 #include "tests/accuracy/test_scenes.h"
+#include "tests/bench/bench_sheets.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -122,9 +123,12 @@ bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
     if (options->model) {
         if (!load_model(&scene->loaded, options->model, error))
             return false;
-    } else if (!(scene->loaded.scene = bench_family_scene(options->family_triangles))) {
+    } else if (!(scene->loaded.scene = options->sheets ? bench_sheets_scene(options->sheets)
+                                                       : bench_family_scene(options->family_triangles))) {
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the scene");
     }
+    if (options->mirrors && !bench_make_mirrors(scene->loaded.scene, error))
+        return false;
     if (!scene_gpu_update(&scene->gpu, scene->loaded.scene, NULL, &changes, NULL, error) ||
         !choose_camera(scene, options, error))
         return false;

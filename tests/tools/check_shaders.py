@@ -34,7 +34,7 @@ CHOICES = {
     "ldc/levels.comp": [[{"LDC_LEVEL_BITS": "2"}]],
     "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
     "ldc/build.vert": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
-                       [{"BUILD_PASS": number} for number in "0"]],
+                       [{"BUILD_PASS": number} for number in "012"]],
 }
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION")}

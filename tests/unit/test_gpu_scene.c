@@ -99,7 +99,45 @@ static void an_edited_material_moves_no_geometry_and_no_texels(void **state)
     test_commit(&fixture.edits);
     update(&fixture);
     expect_changes(&fixture, false, false, true, false);
+    assert_false(fixture.changes.surfaces);
     assert_int_equal(fixture.changes.uploaded_bytes, sizeof(struct material));
+    fixture_finish(&fixture);
+}
+
+/* Of a stored surface: its textures are applied, holes are not there; factors are multiplied later. */
+static void only_what_is_more_than_a_factor_changes_surfaces(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_translucent());
+    assert_true(fixture.changes.surfaces);
+    struct scene_material glass = *scene_material(fixture.scene, 3), cutout = *scene_material(fixture.scene, 1);
+    struct scene_material *edited = test_material(&fixture.edits, 3, 0.1f, 0.2f, 0.3f);
+    memcpy(edited->textures, glass.textures, sizeof(glass.textures));
+    edited->transmission = 0.5f;
+    edited->roughness = 0.2f;
+    edited->emission[0] = 3.0f;
+    edited->base_colour[3] = 0.5f;
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_true(fixture.changes.shading && !fixture.changes.surfaces);
+    edited = test_material(&fixture.edits, 3, 0.1f, 0.2f, 0.3f);
+    memcpy(edited->textures, glass.textures, sizeof(glass.textures));
+    edited->textures[MATERIAL_TRANSMISSION].uv_transform[2] = 0.5f;
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_true(fixture.changes.surfaces);
+    edited = test_material(&fixture.edits, 1, 0.1f, 0.2f, 0.3f);
+    memcpy(edited->textures, cutout.textures, sizeof(cutout.textures));
+    edited->alpha_mode = ALPHA_MASK;
+    edited->alpha_cutoff = 0.25f;
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_true(fixture.changes.surfaces);
+    test_texture(&fixture.edits, 2, 5, 5, TEXTURE_RGBA8_LINEAR, WRAP_CLAMP, WRAP_REPEAT, 20);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_true(fixture.changes.surfaces);
     fixture_finish(&fixture);
 }
 
@@ -283,6 +321,7 @@ int main(void)
         cmocka_unit_test(the_first_update_uploads_everything_and_the_next_nothing),
         cmocka_unit_test(a_moved_node_uploads_its_instance_alone),
         cmocka_unit_test(an_edited_material_moves_no_geometry_and_no_texels),
+        cmocka_unit_test(only_what_is_more_than_a_factor_changes_surfaces),
         cmocka_unit_test(a_material_that_ceases_to_be_a_cutout_is_noticed),
         cmocka_unit_test(materials_keep_their_indices),
         cmocka_unit_test(a_texture_is_halved_in_linear_light_down_to_one_texel),

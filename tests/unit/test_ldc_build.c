@@ -262,6 +262,59 @@ static void spheres_are_where_they_are(void **state)
     fixture_finish(&fixture);
 }
 
+/* ---- one pass against peeling ---- */
+
+static void expect_same(const struct contents *a, const struct contents *b)
+{
+    assert_int_equal(a->cube->sample_count, b->cube->sample_count);
+    assert_int_equal(a->cube->quad_count, b->cube->quad_count);
+    assert_int_equal(a->cube->layers_needed, b->cube->layers_needed);
+    assert_int_equal(a->cube->layers_kept, b->cube->layers_kept);
+    assert_int_equal(a->cube->samples_lost, b->cube->samples_lost);
+    for (uint32_t i = 0; i < 3 * a->cube->resolution * a->cube->resolution; i++) {
+        uint32_t count = count_of(a, i);
+        assert_int_equal(count, count_of(b, i));
+        if (count == 0)
+            continue;
+        assert_memory_equal(&a->texels[i][2], &b->texels[i][2], 8);
+        assert_memory_equal(a->geometry[sample_of(a, i)], b->geometry[sample_of(b, i)], 8 * count);
+        assert_memory_equal(a->surface[sample_of(a, i)], b->surface[sample_of(b, i)], 16 * count);
+    }
+}
+
+/* Of all instances. */
+static void expect_both_builds_alike(struct fixture *fixture)
+{
+    struct contents peeled, listed;
+    place(fixture, TRACER_CUBE_STATIC, RESOLUTION);
+    fixture->options.ldc_build = LDC_BUILD_PEEL;
+    build(fixture, TRACER_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
+    contents_read(&peeled, &fixture->store, TRACER_CUBE_STATIC);
+    struct ldc_cube peeled_cube = *peeled.cube;
+    peeled.cube = &peeled_cube;
+    fixture->options.ldc_build = LDC_BUILD_LISTS;
+    build(fixture, TRACER_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
+    contents_read(&listed, &fixture->store, TRACER_CUBE_STATIC);
+    expect_consistent(&peeled);
+    expect_consistent(&listed);
+    expect_same(&peeled, &listed);
+    print_message("%u samples, %u layers\n", listed.cube->sample_count, listed.cube->layers_needed);
+    contents_free(&peeled);
+    contents_free(&listed);
+}
+
+static void both_builds_give_the_same_samples(void **state)
+{
+    (void)state;
+    struct scene *(*const scenes[])(void) = {test_scene_soup, test_scene_spheres, test_scene_translucent};
+    for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++) {
+        struct fixture fixture;
+        fixture_init(&fixture, scenes[i]());
+        expect_both_builds_alike(&fixture);
+        fixture_finish(&fixture);
+    }
+}
+
 static int open_device(void **state)
 {
     (void)state;
@@ -284,6 +337,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_soup_is_where_it_is),
         cmocka_unit_test(spheres_are_where_they_are),
+        cmocka_unit_test(both_builds_give_the_same_samples),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

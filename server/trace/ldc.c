@@ -1,0 +1,213 @@
+/* SPDX-License-Identifier: MIT */
+/* The tracer `ldc`: layered depth cubes. One holds what stands still, another what moves (ldc_parts.h).
+ *
+ * Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary Effects. 2007. */
+#include "gpu/timer.h"
+#include "trace/ldc_build.h"
+#include "trace/ldc_levels.h"
+#include "trace/ldc_parts.h"
+#include "trace/ldc_store.h"
+#include "trace/ldc_trace.h"
+#include "trace/tracer.h"
+
+#include <epoxy/gl.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define RESOLUTION_MIN 16
+#define RESOLUTION_MAX 4096
+#define RESOLUTION_DEFAULT 1024
+#define LAYERS_MAX 255
+
+struct ldc {
+    struct tracer base;
+    struct ldc_store store;
+    struct ldc_builder *builder;
+    struct ldc_parts parts;
+    struct gpu_timer *timer;
+    uint32_t resolution;
+};
+
+/* ---- options ---- */
+
+static bool is_one_of(uint32_t value, const uint32_t *choices, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (value == choices[i])
+            return true;
+    return false;
+}
+
+static bool check_options(const struct tracer_options *options, struct error *error)
+{
+    static const uint32_t blocks[] = {0, 2, 4, 8, 16, 32}, together[] = {0, 1, 4};
+    if (options->ldc_resolution != 0 &&
+        (options->ldc_resolution < RESOLUTION_MIN || options->ldc_resolution > RESOLUTION_MAX))
+        return error_set(error, ERROR_INVALID, "options.ldc_resolution", "%u cells; %d to %d are possible",
+                         options->ldc_resolution, RESOLUTION_MIN, RESOLUTION_MAX);
+    if (!is_one_of(options->ldc_block, blocks, sizeof(blocks) / sizeof(blocks[0])))
+        return error_set(error, ERROR_INVALID, "options.ldc_block",
+                         "a block is 2, 4, 8, 16 or 32 texels wide, not %u", options->ldc_block);
+    if (options->ldc_build > LDC_BUILD_LISTS)
+        return error_set(error, ERROR_INVALID, "options.ldc_build", "there is no way number %u to build a cube",
+                         (unsigned)options->ldc_build);
+    if (options->ldc_levels > LDC_LEVELS_PYRAMID)
+        return error_set(error, ERROR_INVALID, "options.ldc_levels", "there is no kind number %u of levels",
+                         (unsigned)options->ldc_levels);
+    if (!(options->ldc_tolerance >= 0.0f && isfinite(options->ldc_tolerance)))
+        return error_set(error, ERROR_INVALID, "options.ldc_tolerance", "%g metres; 0 and more are possible",
+                         (double)options->ldc_tolerance);
+    if (!is_one_of(options->ldc_rays_together, together, sizeof(together) / sizeof(together[0])))
+        return error_set(error, ERROR_INVALID, "options.ldc_rays_together", "1 or 4 rays walk together, not %u",
+                         options->ldc_rays_together);
+    if (!is_one_of(options->ldc_layers_together, together, sizeof(together) / sizeof(together[0])))
+        return error_set(error, ERROR_INVALID, "options.ldc_layers_together",
+                         "1 or 4 layers are tested together, not %u", options->ldc_layers_together);
+    if (options->ldc_layers_max > LAYERS_MAX)
+        return error_set(error, ERROR_INVALID, "options.ldc_layers_max", "%u layers; at most %d can be kept",
+                         options->ldc_layers_max, LAYERS_MAX);
+    return true;
+}
+
+/* ---- life ---- */
+
+static void ldc_destroy(struct tracer *tracer)
+{
+    struct ldc *ldc = (struct ldc *)tracer;
+    if (!ldc)
+        return;
+    ldc_parts_finish(&ldc->parts);
+    ldc_builder_destroy(ldc->builder);
+    ldc_store_finish(&ldc->store);
+    gpu_timer_destroy(ldc->timer);
+    free(ldc);
+}
+
+static struct tracer *ldc_create(struct gpu_device *device, const struct tracer_options *options,
+                                 struct error *error)
+{
+    if (!check_options(options, error))
+        return NULL;
+    struct ldc *ldc = calloc(1, sizeof(*ldc));
+    if (!ldc) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
+        return NULL;
+    }
+    ldc_store_init(&ldc->store, device);
+    ldc->resolution = options->ldc_resolution ? options->ldc_resolution : RESOLUTION_DEFAULT;
+    ldc->timer = gpu_timer_create(device);
+    if (!ldc->timer)
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer's timer");
+    ldc->builder = ldc->timer ? ldc_builder_create(device, error) : NULL;
+    if (ldc->builder)
+        return &ldc->base;
+    ldc_destroy(&ldc->base);
+    return NULL;
+}
+
+/* After a failure: all is forgotten, and built anew by the next update. */
+static void reset(struct ldc *ldc)
+{
+    struct gpu_device *device = ldc->store.device;
+    ldc_parts_finish(&ldc->parts);
+    ldc_store_finish(&ldc->store);
+    ldc_store_init(&ldc->store, device);
+}
+
+/* ---- updates ---- */
+
+static bool build_cube(struct ldc *ldc, unsigned which, struct scene_gpu *scene, struct error *error)
+{
+    const struct ldc_part *part = &ldc->parts.parts[which];
+    struct ldc_cube *cube = &ldc->store.cubes[which];
+    *cube = (struct ldc_cube){.cell_world = part->cell_world, .resolution = ldc->resolution};
+    memcpy(cube->lower_world, part->lower_world, sizeof(cube->lower_world));
+    if (part->count == 0) {
+        cube->resolution = 0;
+        return true;
+    }
+    gpu_timer_begin(ldc->timer, STAGE_BUILD, which);
+    bool ok = ldc_build(ldc->builder, &ldc->store, which, scene, part->instances, part->count, &ldc->base.options,
+                        error) &&
+              ldc_levels_build(&ldc->store, which, &ldc->base.options, error);
+    glFinish(); /* the time of this cube on the CPU's clock is the time until it is there */
+    gpu_timer_end(ldc->timer);
+    ldc->base.stats.nodes_rebuilt += cube->node_count;
+    ldc->base.stats.cubes[which].rebuilt = true;
+    return ok;
+}
+
+static void fill_stats(struct ldc *ldc)
+{
+    struct tracer_stats *stats = &ldc->base.stats;
+    stats->nodes = 0;
+    for (int i = 0; i < TRACER_CUBES_MAX; i++) {
+        const struct ldc_cube *cube = &ldc->store.cubes[i];
+        bool rebuilt = stats->cubes[i].rebuilt;
+        stats->cubes[i] = (struct tracer_cube){0};
+        if (cube->resolution == 0)
+            continue;
+        stats->nodes += cube->node_count;
+        stats->cubes[i] = (struct tracer_cube){
+            .resolution = cube->resolution,
+            .cell_metres = cube->cell_world,
+            .layers_needed = cube->layers_needed,
+            .layers_kept = cube->layers_kept,
+            .samples = cube->sample_count,
+            .samples_lost = cube->samples_lost,
+            .rebuilt = rebuilt,
+        };
+    }
+    stats->device_bytes = ldc_store_bytes(&ldc->store) + ldc_builder_bytes(ldc->builder);
+}
+
+static bool bring_to(struct ldc *ldc, struct scene_gpu *scene, const struct scene_changes *changes,
+                     struct error *error)
+{
+    bool stale[TRACER_CUBES_MAX];
+    if (!ldc_parts_update(&ldc->parts, scene, ldc->resolution, changes->geometry, stale, error))
+        return false;
+    bool all = changes->surfaces; /* of which materials is known, but not where they are */
+    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
+        all = all || stale[i]; /* what lies behind a cube goes with it */
+        if (all && !build_cube(ldc, i, scene, error))
+            return false;
+    }
+    return true;
+}
+
+static bool ldc_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
+                       struct stage_times *times, struct error *error)
+{
+    struct ldc *ldc = (struct ldc *)tracer;
+    struct tracer_stats *stats = &tracer->stats;
+    stats->uploaded_bytes = stats->nodes_rebuilt = 0;
+    for (int i = 0; i < TRACER_CUBES_MAX; i++)
+        stats->cubes[i].rebuilt = false;
+    if (!changes->geometry && !changes->deformed && !changes->instances && !changes->surfaces)
+        return true;
+    bool ok = bring_to(ldc, scene, changes, error);
+    if (stats->cubes[TRACER_CUBE_STATIC].rebuilt || stats->cubes[TRACER_CUBE_DYNAMIC].rebuilt)
+        gpu_timer_collect(ldc->timer, times); /* else there is nothing to wait for */
+    if (!ok)
+        reset(ldc);
+    fill_stats(ldc);
+    return ok;
+}
+
+static bool ldc_trace_wave(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,
+                           struct error *error)
+{
+    return ldc_trace(&((struct ldc *)tracer)->store, scene, wave, &tracer->options, error);
+}
+
+const struct tracer_impl tracer_ldc_impl = {
+    .name = "ldc",
+    .depends_on = TRACER_NEEDS_SCENE,
+    .sampled = true,
+    .create = ldc_create,
+    .destroy = ldc_destroy,
+    .update = ldc_update,
+    .trace = ldc_trace_wave,
+};

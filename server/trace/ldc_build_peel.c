@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: MIT */
+/* Depth peeling, as the paper has it (section 1.2): fragments are counted first, and the most of one texel is the
+ * number of passes. Each pass draws the scene into all three images, rejects what is not behind the layer before,
+ * and the depth test keeps the nearest of the rest. Everitt. Interactive Order-Independent Transparency. 2001. */
+#include "shared/bindings.h"
+#include "trace/ldc_build_state.h"
+
+#include <epoxy/gl.h>
+#include <math.h>
+#include <string.h>
+
+#define ORDERED_BYTES 8
+
+static bool count_fragments(struct ldc_task *task, struct error *error)
+{
+    struct ldc_builder *builder = task->builder;
+    struct gpu_device *device = builder->device;
+    gpu_buffer_clear(device, &builder->counts, 0);
+    gpu_buffer_clear(device, &builder->build, 0);
+    gpu_buffer_bind_image(device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
+    if (!ldc_draw_bind_plain(task, error) || !ldc_draw(task, LDC_PASS_COUNT, NULL, error) ||
+        !ldc_give_places(task, false, error))
+        return false;
+    ldc_read_counts(task);
+    return true;
+}
+
+static bool reserve(struct ldc_task *task, struct error *error)
+{
+    struct ldc_builder *builder = task->builder;
+    struct gpu_device *device = builder->device;
+    uint32_t along = task->cube->resolution;
+    if (!gpu_buffer_reserve(device, &builder->ordered, (size_t)task->counts.places * ORDERED_BYTES, error) ||
+        !gpu_buffer_reserve(device, &builder->found, (size_t)task->texel_count * sizeof(uint32_t), error))
+        return false;
+    if (builder->depth.name && builder->depth.width == along)
+        return true;
+    if (!gpu_texture_reserve_array(device, &builder->depth, GL_DEPTH_COMPONENT32F, along, along, 3, error))
+        return false;
+    for (int i = 0; i < 2; i++) {
+        gpu_framebuffer_finish(device, &builder->layer_framebuffers[i]);
+        if (!gpu_texture_reserve_array(device, &builder->layers[i], GL_RG32UI, along, along, 3, error) ||
+            !gpu_framebuffer_create(device, &builder->layer_framebuffers[i], &builder->layers[i], 1,
+                                    &builder->depth, error)) {
+            gpu_texture_finish(device, &builder->depth); /* all is made anew by the next build */
+            return false;
+        }
+    }
+    return true;
+}
+
+/* A power of two, by which depths in cells stay exact and below 1. */
+static void set_peel(const struct ldc_task *task, const struct gpu_program *program)
+{
+    int exponent;
+    frexpf((float)task->cube->resolution, &exponent);
+    gpu_uniform_float(program, "unit_per_cell", ldexpf(1.0f, -exponent - 1));
+}
+
+static bool draw_layer(struct ldc_task *task, unsigned into, struct error *error)
+{
+    static const GLuint nothing[4] = {LDC_NO_DEPTH_BITS, LDC_NO_ID, 0, 0};
+    static const GLfloat farthest = 1.0f;
+    struct ldc_builder *builder = task->builder;
+    unsigned framebuffer = builder->layer_framebuffers[into].name;
+    glClearNamedFramebufferuiv(framebuffer, GL_COLOR, 0, nothing);
+    glDepthMask(GL_TRUE);
+    glClearNamedFramebufferfv(framebuffer, GL_DEPTH, 0, &farthest);
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_LESS); /* of equal depths the first stays: instances are drawn in their order */
+    gpu_texture_bind(&builder->layers[!into], UNIT_LDC_LAYER);
+    bool drawn = ldc_draw(task, LDC_PASS_PEEL, set_peel, error);
+    glDisable(GL_DEPTH_TEST);
+    return drawn;
+}
+
+static bool note_layer(struct ldc_task *task, unsigned from, uint32_t layer, struct error *error)
+{
+    struct ldc_builder *builder = task->builder;
+    struct gpu_device *device = builder->device;
+    const struct gpu_program *program = ldc_use(device, "ldc/peeled.comp", error);
+    if (!program)
+        return false;
+    gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
+    gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
+    gpu_texture_bind(&builder->layers[from], UNIT_LDC_LAYER);
+    gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
+    gpu_buffer_bind_image(device, &builder->found, IMAGE_LDC_FOUND, GL_R32UI);
+    gpu_uniform_uint(program, "texel_count", task->texel_count);
+    gpu_uniform_uint(program, "texels_along", task->cube->resolution);
+    gpu_uniform_uint(program, "layer", layer);
+    gpu_dispatch(device, program, task->texel_count);
+    return true;
+}
+
+bool ldc_peel(struct ldc_task *task, struct error *error)
+{
+    /* Before the first layer: every fragment lies behind it. */
+    static const GLfloat before_all = -1.0f;
+    GLuint first[4] = {0, LDC_NO_ID, 0, 0};
+    memcpy(&first[0], &before_all, sizeof(first[0]));
+    struct ldc_builder *builder = task->builder;
+    if (!count_fragments(task, error) || !reserve(task, error))
+        return false;
+    task->peeled = true;
+    task->ordered_count = task->counts.places;
+    uint32_t layers =
+        task->counts.layers_needed < task->layers_max ? task->counts.layers_needed : task->layers_max;
+    gpu_buffer_clear(builder->device, &builder->found, 0);
+    glClearNamedFramebufferuiv(builder->layer_framebuffers[1].name, GL_COLOR, 0, first);
+    for (uint32_t layer = 0; layer < layers; layer++)
+        if (!draw_layer(task, layer & 1, error) || !note_layer(task, layer & 1, layer, error))
+            return false;
+    return true;
+}

@@ -1,0 +1,225 @@
+/* SPDX-License-Identifier: MIT */
+/* Builds: {"name", "cubes", "bytes", "build_ns": [..]}.
+ * Waves: the same, and "waves": [{"kind", "rays", "hits_ns": [..], "walk_ns": [..]}]: rays to hits on the device,
+ * surfaces included, and the walk alone (of any-hit waves there is none). Closest-hit waves beside the reference
+ * also have "agree" (share of the rays that hit with both or miss with both), "only_form", "only_reference", and
+ * of rays that hit with both the difference of distances: "error_median", "error_p99", in metres. Rays begin where
+ * the reference's camera rays hit. */
+#include "tests/bench/bench_ldc.h"
+
+#include "base/clock.h"
+
+#include <epoxy/gl.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- builds ---- */
+
+static bool make(struct bench_ldc *bench, struct bench_form *form, struct error *error)
+{
+    const struct tracer_impl *impl = tracer_find(form->tracer, "--form", error);
+    form->made = impl ? tracer_create(impl, bench->device, &form->options, error) : NULL;
+    return form->made != NULL;
+}
+
+/* All that there is counts as changed. Cubes keep their buffers, as they do for what moves; others, which would
+ * find that nothing changed, begin from nothing. */
+static bool build(struct bench_ldc *bench, struct bench_form *form, uint64_t *time_ns, struct error *error)
+{
+    if (form->tracer != BENCH_TRACER_LDC) {
+        tracer_destroy(form->made);
+        if (!make(bench, form, error))
+            return false;
+    }
+    tracer_outdate(form->made);
+    glFinish();
+    const uint64_t start_ns = clock_now_ns();
+    const bool done = tracer_update(form->made, &bench->scene.gpu, &(struct scene_changes){0}, NULL, error);
+    glFinish();
+    *time_ns = clock_now_ns() - start_ns;
+    if (done && form->tracer == BENCH_TRACER_LDC && !form->made->stats.cubes[TRACER_CUBE_STATIC].rebuilt)
+        return error_set(error, ERROR_INTERNAL, NULL, "%s: it was not built", form->name);
+    return done;
+}
+
+static json_t *describe(const struct bench_form *form, const struct bench_runs *builds)
+{
+    return json_pack("{s:s, s:o, s:I, s:o}", "name", form->name, "cubes",
+                     bench_cubes_json(form->made->stats.cubes), "bytes",
+                     (json_int_t)form->made->stats.device_bytes, "build_ns", bench_times_json(builds));
+}
+
+/* The first build of each compiles, too. */
+static bool build_all(struct bench_ldc *bench, unsigned runs, struct bench_runs *builds, struct error *error)
+{
+    for (unsigned run = 0; run <= runs; run++) {
+        for (unsigned i = 0; i < bench->form_count; i++) {
+            struct bench_form *form = &bench->forms[i];
+            uint64_t time_ns;
+            if ((run == 0 && !make(bench, form, error)) || !build(bench, form, &time_ns, error))
+                return false;
+            if (run > 0)
+                bench_add(&builds[i], time_ns);
+        }
+    }
+    return gpu_check(bench->device, "bench_ldc", error);
+}
+
+json_t *bench_ldc_builds(struct bench_ldc *bench, struct error *error)
+{
+    struct bench_runs builds[BENCH_FORMS_MAX] = {0};
+    if (!build_all(bench, bench->runs, builds, error))
+        return NULL;
+    json_t *list = json_array();
+    for (unsigned i = 0; i < bench->form_count; i++)
+        json_array_append_new(list, describe(&bench->forms[i], &builds[i]));
+    return list;
+}
+
+/* ---- how far answers are from the truth ---- */
+
+static int by_size(const void *a, const void *b)
+{
+    const float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+static void compare(json_t *object, const struct hit *truth, const struct hit *hits, uint32_t count)
+{
+    uint32_t both = 0, only_form = 0, only_reference = 0;
+    float *errors = malloc((count + 1) * sizeof *errors);
+    if (!errors)
+        return;
+    for (uint32_t i = 0; i < count; i++) {
+        const bool is_hit = hits[i].distance >= 0, is_truly = truth[i].distance >= 0;
+        if (is_hit && is_truly)
+            errors[both++] = fabsf(hits[i].distance - truth[i].distance);
+        only_form += is_hit && !is_truly;
+        only_reference += !is_hit && is_truly;
+    }
+    qsort(errors, both, sizeof *errors, by_size);
+    json_object_set_new(object, "agree", json_real(1 - (double)(only_form + only_reference) / (double)count));
+    json_object_set_new(object, "only_form", json_integer(only_form));
+    json_object_set_new(object, "only_reference", json_integer(only_reference));
+    if (both > 0) {
+        json_object_set_new(object, "error_median", json_real((double)errors[both / 2]));
+        json_object_set_new(object, "error_p99", json_real((double)errors[both - 1 - both / 100]));
+    }
+    free(errors);
+}
+
+/* ---- waves ---- */
+
+struct waves {
+    struct bench_ldc *bench;
+    struct bench_contest contest;
+    struct bench_form reference; /* nothing made: this build has none */
+    struct ray *camera_rays;
+    struct hit *camera_hits, *truth, *hits; /* a pixel each */
+    json_t *lists[BENCH_FORMS_MAX];
+};
+
+static bool begin(struct waves *waves, struct bench_ldc *bench, struct error *error)
+{
+    const uint32_t pixels = bench->width * bench->height;
+    *waves = (struct waves){.bench = bench,
+                            .contest = {.device = bench->device, .scene = &bench->scene, .runs = bench->runs},
+                            .reference = {.name = "reference", .tracer = BENCH_TRACER_REFERENCE},
+                            .camera_rays = malloc(pixels * sizeof *waves->camera_rays),
+                            .camera_hits = malloc(pixels * sizeof *waves->camera_hits),
+                            .truth = malloc(pixels * sizeof *waves->truth),
+                            .hits = malloc(pixels * sizeof *waves->hits)};
+    if (!waves->camera_rays || !waves->camera_hits || !waves->truth || !waves->hits)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture's rays");
+    uint64_t time_ns;
+    bench_camera_rays(waves->camera_rays, &bench->scene.camera, bench->width, bench->height);
+    const struct bench_wave primary = {.kind = BENCH_PRIMARY, .rays = waves->camera_rays, .ray_count = pixels};
+    return make(bench, &waves->reference, error) && build(bench, &waves->reference, &time_ns, error) &&
+           bench_contest_hits(&waves->contest, waves->reference.made, &primary, waves->camera_hits, error);
+}
+
+static void add_contenders(struct waves *waves)
+{
+    for (unsigned i = 0; i < waves->bench->form_count; i++)
+        for (enum bench_way way = BENCH_INTERFACE; way <= BENCH_WALK; way++)
+            bench_contest_add(&waves->contest, "", waves->bench->forms[i].name, way)->tracer_used =
+                waves->bench->forms[i].made;
+}
+
+static bool measure(struct waves *waves, const struct bench_wave *wave, struct error *error)
+{
+    const struct bench_wave_fact *fact = &bench_wave_facts[wave->kind];
+    const struct bench_ldc *bench = waves->bench;
+    if (!bench_contest_wave(&waves->contest, wave, error))
+        return false;
+    if (!fact->is_any && !bench_contest_hits(&waves->contest, waves->reference.made, wave, waves->truth, error))
+        return false;
+    for (unsigned i = 0; i < bench->form_count; i++) {
+        const struct bench_contender *pair = &waves->contest.contenders[2 * i];
+        json_t *object = json_pack("{s:s, s:i, s:o}", "kind", fact->name, "rays", (int)wave->ray_count, "hits_ns",
+                                   bench_times_json(&pair[0].runs));
+        if (!fact->is_any) {
+            json_object_set_new(object, "walk_ns", bench_times_json(&pair[1].runs));
+            if (!bench_contest_hits(&waves->contest, bench->forms[i].made, wave, waves->hits, error)) {
+                json_decref(object);
+                return false;
+            }
+            compare(object, waves->truth, waves->hits, wave->ray_count);
+        }
+        json_array_append_new(waves->lists[i], object);
+    }
+    return true;
+}
+
+static bool run_wave(struct waves *waves, enum bench_wave_kind kind, struct error *error)
+{
+    const struct bench_ldc *bench = waves->bench;
+    const uint32_t pixels = bench->width * bench->height;
+    struct ray *rays = malloc(pixels * sizeof *rays);
+    struct bench_wave wave = {.kind = kind, .rays = rays, .ray_count = pixels};
+    if (!rays)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for rays");
+    if (kind == BENCH_PRIMARY)
+        memcpy(rays, waves->camera_rays, pixels * sizeof *rays);
+    else
+        wave.ray_count =
+            bench_secondary_rays(rays, kind, waves->camera_rays, waves->camera_hits, pixels, 1, &bench->scene);
+    const bool done = wave.ray_count == 0 || measure(waves, &wave, error);
+    free(rays);
+    return done;
+}
+
+static void end(struct waves *waves)
+{
+    bench_contest_finish(&waves->contest);
+    tracer_destroy(waves->reference.made);
+    free(waves->camera_rays);
+    free(waves->camera_hits);
+    free(waves->truth);
+    free(waves->hits);
+}
+
+json_t *bench_ldc_waves(struct bench_ldc *bench, struct error *error)
+{
+    struct waves waves;
+    struct bench_runs builds[BENCH_FORMS_MAX] = {0};
+    bool done = begin(&waves, bench, error) && build_all(bench, 1, builds, error);
+    json_t *list = json_array();
+    for (unsigned i = 0; done && i < bench->form_count; i++) {
+        json_t *form = describe(&bench->forms[i], &builds[i]);
+        json_object_set_new(form, "waves", waves.lists[i] = json_array());
+        json_array_append_new(list, form);
+    }
+    if (done)
+        add_contenders(&waves);
+    for (enum bench_wave_kind kind = 0; done && kind < BENCH_WAVE_KINDS; kind++)
+        done = !bench->waves[kind] || run_wave(&waves, kind, error);
+    end(&waves);
+    if (done)
+        return list;
+    json_decref(list);
+    return NULL;
+}

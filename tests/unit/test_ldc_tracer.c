@@ -1,0 +1,628 @@
+/* SPDX-License-Identifier: MIT */
+/* What the tracer `ldc` promises beside its answers: what stands still is built once, what moves alone costs its
+ * frame, and it says how large its cells are and what was lost. That its answers are right to the size of a cell
+ * is shown by tests/accuracy/test_ldc_against_reference.c. */
+#include "../accuracy/motion_scenes.h"
+#include "../accuracy/test_scenes.h"
+
+#include "gpu/device.h"
+#include "render/tracer_set.h"
+#include "shared/hit.h"
+#include "shared/ray.h"
+#include "trace/scene_gpu.h"
+#include "trace/tracer.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+#define RESOLUTION 64u
+#define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
+#define NUMBER_BVH 0
+#define NUMBER_LDC 3
+
+static struct gpu_device *device;
+static const struct tracer_options small = {.ldc_resolution = RESOLUTION};
+
+struct fixture {
+    struct scene *scene;
+    struct scene_gpu gpu;
+    struct test_edits edits;
+    struct tracer *tracer;
+    struct stage_times times; /* of the last update */
+    struct scene_motion motion;
+};
+
+static void expect_ok(bool ok, const struct error *error)
+{
+    if (!ok)
+        fail_msg("%s: %s", error->field, error->text);
+}
+
+static bool try_update(struct fixture *fixture, struct error *error)
+{
+    struct scene_changes changes;
+    if (fixture->edits.count > 0)
+        test_commit(&fixture->edits);
+    const struct scene_motion *motion = fixture->motion.pose_count ? &fixture->motion : NULL;
+    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, error), error);
+    stage_times_begin(&fixture->times);
+    return tracer_update(fixture->tracer, &fixture->gpu, &changes, &fixture->times, error);
+}
+
+static void update(struct fixture *fixture)
+{
+    struct error error = {0};
+    expect_ok(try_update(fixture, &error), &error);
+    assert_int_equal(fixture->tracer->stats.uploaded_bytes, 0); /* cubes are made where they are used */
+}
+
+static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)
+{
+    struct error error = {0};
+    *fixture = (struct fixture){.scene = scene, .edits = {.scene = scene}};
+    scene_gpu_init(&fixture->gpu, device);
+    fixture->tracer = tracer_create(tracer_impl_by_number(NUMBER_LDC), device, options, &error);
+    expect_ok(fixture->tracer != NULL, &error);
+    update(fixture);
+}
+
+static void fixture_finish(struct fixture *fixture)
+{
+    tracer_destroy(fixture->tracer);
+    scene_gpu_finish(&fixture->gpu);
+    scene_motion_finish(&fixture->motion);
+    scene_destroy(fixture->scene);
+}
+
+static const struct tracer_cube *cube(const struct fixture *fixture, unsigned which)
+{
+    return &fixture->tracer->stats.cubes[which];
+}
+
+/* Which cubes the last update built, by what it says and by where its time went. */
+static void expect_built(const struct fixture *fixture, bool static_cube, bool dynamic_cube)
+{
+    const bool expected[TRACER_CUBES_MAX] = {static_cube, dynamic_cube};
+    bool timed[TRACER_CUBES_MAX] = {false};
+    for (uint32_t i = 0; i < fixture->times.count; i++) {
+        const struct stage_span *span = &fixture->times.spans[i];
+        assert_int_equal(span->stage, STAGE_BUILD);
+        assert_in_range(span->wave, 0, TRACER_CUBES_MAX - 1);
+        timed[span->wave] |= span->duration_ns > 0;
+    }
+    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
+        assert_int_equal(cube(fixture, i)->rebuilt, expected[i]);
+        assert_int_equal(timed[i], expected[i]);
+    }
+    uint64_t nodes = fixture->tracer->stats.nodes, rebuilt = fixture->tracer->stats.nodes_rebuilt;
+    assert_int_equal(rebuilt == 0, !static_cube && !dynamic_cube);
+    if (static_cube && (dynamic_cube || cube(fixture, TRACER_CUBE_DYNAMIC)->resolution == 0))
+        assert_int_equal(rebuilt, nodes);
+}
+
+/* ---- scenes and rays ---- */
+
+/* Half a unit from its middle to each side. */
+static void add_box_mesh(struct test_edits *edits, uint32_t id)
+{
+    float positions[24][3];
+    uint32_t indices[36];
+    for (uint32_t side = 0; side < 6; side++) {
+        uint32_t axis = side / 2, u = (axis + 1) % 3, v = (axis + 2) % 3, first = 4 * side;
+        float out = side % 2 ? 0.5f : -0.5f;
+        for (uint32_t corner = 0; corner < 4; corner++) {
+            float *p = positions[first + corner];
+            p[axis] = out;
+            p[u] = (corner == 1 || corner == 2) == (side % 2 != 0) ? 0.5f : -0.5f;
+            p[v] = corner >= 2 ? 0.5f : -0.5f;
+        }
+        memcpy(&indices[6 * side], (uint32_t[6]){first, first + 1, first + 2, first, first + 2, first + 3},
+               6 * sizeof(*indices));
+    }
+    test_mesh(edits, id, (const float(*)[3])positions, 24, indices, 12);
+}
+
+static void add_box(struct test_edits *edits, uint32_t node, float size, float x, float y, float z)
+{
+    float m[12];
+    test_transform(m, size, size, size, 0, 0, x, y, z);
+    test_node(edits, node, 0, NODE_MESH, 10, m);
+}
+
+/* Boxes of one unit: node i + 1 at x = 2 i. */
+static struct scene *scene_of_boxes(uint32_t count)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    add_box_mesh(&edits, 10);
+    for (uint32_t i = 0; i < count; i++)
+        add_box(&edits, i + 1, 1, 2 * (float)i, 0, 0);
+    test_commit(&edits);
+    return edits.scene;
+}
+
+static struct hit trace_one(struct fixture *fixture, struct ray ray)
+{
+    struct error error = {0};
+    struct gpu_buffer rays = {0}, hits = {0};
+    struct hit hit;
+    expect_ok(gpu_buffer_upload(device, &rays, &ray, sizeof(ray), &error), &error);
+    expect_ok(gpu_buffer_reserve(device, &hits, sizeof(hit), &error), &error);
+    scene_gpu_bind(&fixture->gpu);
+    const struct wave wave = {.ray_count = 1, .rays = &rays, .hits = &hits};
+    expect_ok(tracer_trace(fixture->tracer, &fixture->gpu, &wave, &error), &error);
+    gpu_buffer_read(device, &hits, 0, &hit, sizeof(hit));
+    gpu_buffer_finish(device, &rays);
+    gpu_buffer_finish(device, &hits);
+    return hit;
+}
+
+/* Down along z from z = 10, a little askew so that no ray lies on an edge between cells. */
+static float distance_below(struct fixture *fixture, float x, float y)
+{
+    return trace_one(fixture, (struct ray){{x + 0.013f, y + 0.017f, 10, 0}, {0, 0, -1, 1e9f}}).distance;
+}
+
+/* Boxes' tops are flat: the plane of a sample is the face, so distances are right to the rounding of cells. */
+static void expect_distance(float distance, double expected)
+{
+    if (!(fabs((double)distance - expected) < 1e-4 * expected))
+        fail_msg("distance %.9g, expected %.9g", (double)distance, expected);
+}
+
+/* ---- tests ---- */
+
+static void options_out_of_range_are_refused_by_name(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *field;
+        struct tracer_options options;
+    } rows[] = {
+        {"options.ldc_resolution", {.ldc_resolution = 15}},
+        {"options.ldc_resolution", {.ldc_resolution = 4097}},
+        {"options.ldc_block", {.ldc_block = 1}},
+        {"options.ldc_block", {.ldc_block = 12}},
+        {"options.ldc_block", {.ldc_block = 64}},
+        {"options.ldc_build", {.ldc_build = LDC_BUILD_LISTS + 1}},
+        {"options.ldc_levels", {.ldc_levels = LDC_LEVELS_PYRAMID + 1}},
+        {"options.ldc_tolerance", {.ldc_tolerance = -1.0f}},
+        {"options.ldc_tolerance", {.ldc_tolerance = NAN}},
+        {"options.ldc_tolerance", {.ldc_tolerance = INFINITY}},
+        {"options.ldc_rays_together", {.ldc_rays_together = 2}},
+        {"options.ldc_layers_together", {.ldc_layers_together = 3}},
+        {"options.ldc_layers_max", {.ldc_layers_max = 256}},
+    };
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        struct error error = {0};
+        assert_null(tracer_create(tracer_impl_by_number(NUMBER_LDC), device, &rows[i].options, &error));
+        assert_int_equal(error.kind, ERROR_INVALID);
+        assert_string_equal(error.field, rows[i].field);
+    }
+}
+
+static void the_size_of_a_cell_is_that_of_the_longest_side(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_boxes(3), &small); /* 5 x 1 x 1 */
+    expect_built(&fixture, true, false);
+    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->resolution, RESOLUTION);
+    assert_int_equal(cube(&fixture, TRACER_CUBE_DYNAMIC)->resolution, 0);
+    assert_float_equal(cube(&fixture, TRACER_CUBE_STATIC)->cell_metres, 5.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
+    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->layers_needed,
+                     6); /* along x: each box has a side to the left and one to the right */
+    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->layers_kept, 6);
+    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->samples_lost, 0);
+    assert_in_range(fixture.tracer->stats.device_bytes, 3 * RESOLUTION * RESOLUTION * 16, UINT64_MAX);
+    add_box(&fixture.edits, 4, 1, 19.5f, 0, 0); /* the scene is four times as long */
+    update(&fixture);
+    assert_float_equal(cube(&fixture, TRACER_CUBE_STATIC)->cell_metres, 20.5f / (RESOLUTION - MARGIN_CELLS),
+                       1e-5f);
+    expect_distance(distance_below(&fixture, 19.5f, 0), 9.5);
+    fixture_finish(&fixture);
+}
+
+static void without_a_change_nothing_is_built(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_boxes(3), &small);
+    update(&fixture);
+    expect_built(&fixture, false, false);
+    struct scene_light *light = &test_add(&fixture.edits, SCENE_LIGHT)->set.light;
+    light->base.id = 50;
+    light->colour[0] = 1.0f;
+    test_node(&fixture.edits, 50, 0, NODE_LIGHT, 50, NULL);
+    test_material(&fixture.edits, 77, 0.5f, 0.5f, 0.5f);
+    update(&fixture);
+    expect_built(&fixture, false, false);
+    test_material(&fixture.edits, 77, 0.9f, 0.1f, 0.5f)->roughness = 0.1f;
+    add_box(&fixture.edits, 2, 1, 2, 0, 0); /* to where it is */
+    update(&fixture);
+    expect_built(&fixture, false, false);
+    expect_distance(distance_below(&fixture, 2, 0), 9.5);
+    fixture_finish(&fixture);
+}
+
+static void what_begins_to_move_leaves_the_static_cube_once(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_boxes(3), &small);
+    add_box(&fixture.edits, 3, 1, 4, 0, 1);
+    update(&fixture);
+    expect_built(&fixture, true, true);
+    float static_cell = cube(&fixture, TRACER_CUBE_STATIC)->cell_metres;
+    assert_float_equal(static_cell, 3.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
+    for (int step = 0; step < 3; step++) {
+        add_box(&fixture.edits, 3, 1, 4, (float)step, 2);
+        update(&fixture);
+        expect_built(&fixture, false, true);
+        assert_float_equal(cube(&fixture, TRACER_CUBE_STATIC)->cell_metres, static_cell, 0);
+        assert_float_equal(cube(&fixture, TRACER_CUBE_DYNAMIC)->cell_metres, 1.0f / (RESOLUTION - MARGIN_CELLS),
+                           1e-6f);
+        expect_distance(distance_below(&fixture, 4, (float)step), 7.5);
+        expect_distance(distance_below(&fixture, 0, 0), 9.5);
+        if (step > 0)
+            assert_true(distance_below(&fixture, 4, (float)step - 1) < 0); /* where it was */
+    }
+    update(&fixture);
+    expect_built(&fixture, false, false);
+    fixture_finish(&fixture);
+}
+
+static void what_has_moved_back_stays_dynamic(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_boxes(2), &small);
+    add_box(&fixture.edits, 1, 1, 0, 0, 1);
+    update(&fixture);
+    add_box(&fixture.edits, 1, 1, 0, 0, 0);
+    update(&fixture);
+    expect_built(&fixture, false, true);
+    expect_distance(distance_below(&fixture, 0, 0), 9.5);
+    add_box(&fixture.edits, 2, 1, 2, 0, 3); /* the last one: nothing is left in the static cube */
+    update(&fixture);
+    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->resolution, 0);
+    expect_built(&fixture, false, true);
+    expect_distance(distance_below(&fixture, 0, 0), 9.5);
+    expect_distance(distance_below(&fixture, 2, 0), 6.5);
+    fixture_finish(&fixture);
+}
+
+static void what_was_hidden_and_comes_back_is_dynamic(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_boxes(3), &small);
+    for (int turn = 0; turn < 2; turn++) {
+        test_node(&fixture.edits, 1, 0, NODE_MESH, 10, NULL)->hidden = true;
+        update(&fixture);
+        expect_built(&fixture, turn == 0, false);
+        assert_true(distance_below(&fixture, 0, 0) < 0);
+        assert_int_equal(cube(&fixture, TRACER_CUBE_DYNAMIC)->resolution, 0);
+        add_box(&fixture.edits, 1, 1, 0, 0, 0);
+        update(&fixture);
+        expect_built(&fixture, false, true);
+        expect_distance(distance_below(&fixture, 0, 0), 9.5);
+    }
+    fixture_finish(&fixture);
+}
+
+static void new_objects_are_static_and_settle_what_stood_still(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, scene_of_boxes(3), &small);
+    add_box(&fixture.edits, 1, 1, 0, 0, 1);
+    update(&fixture);
+    add_box(&fixture.edits, 2, 1, 2, 0, 1);
+    update(&fixture);
+    expect_built(&fixture, true, true);
+    add_box_mesh(&fixture.edits, 11);
+    test_node(&fixture.edits, 9, 0, NODE_MESH, 11, (const float[12]){1, 0, 0, 8, 0, 1, 0, 0, 0, 0, 1, 0});
+    update(&fixture); /* the first box has settled, the second was on the move until now */
+    expect_built(&fixture, true, true);
+    assert_float_equal(cube(&fixture, TRACER_CUBE_DYNAMIC)->cell_metres, 1.0f / (RESOLUTION - MARGIN_CELLS),
+                       1e-6f);
+    static const float distances[] = {8.5f, 8.5f, 9.5f};
+    for (int i = 0; i < 3; i++)
+        expect_distance(distance_below(&fixture, 2 * (float)i, 0), (double)distances[i]);
+    expect_distance(distance_below(&fixture, 8, 0), 9.5);
+    struct scene_edit *edit = test_add(&fixture.edits, SCENE_NODE);
+    edit->kind = EDIT_REMOVE;
+    edit->id = 9;
+    update(&fixture);
+    expect_built(&fixture, true, true);
+    assert_true(distance_below(&fixture, 8, 0) < 0);
+    fixture_finish(&fixture);
+}
+
+/* A mesh that is sent anew again and again moves, as it were. */
+static void a_mesh_that_is_set_again_is_dynamic(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct scene *scene = scene_of_boxes(2);
+    fixture_init(&fixture, scene, &small);
+    add_box_mesh(&fixture.edits, 11);
+    test_node(&fixture.edits, 9, 0, NODE_MESH, 11, (const float[12]){1, 0, 0, 0, 0, 1, 0, 3, 0, 0, 1, 0});
+    update(&fixture);
+    expect_built(&fixture, true, false);
+    for (int turn = 0; turn < 3; turn++) {
+        add_box_mesh(&fixture.edits, 11);
+        update(&fixture);
+        expect_built(&fixture, turn == 0, true);
+        expect_distance(distance_below(&fixture, 0, 3), 9.5);
+    }
+    fixture_finish(&fixture);
+}
+
+static void a_skinned_mesh_is_dynamic_from_the_first(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_deformed(), &small);
+    expect_built(&fixture, true, true); /* rigid nodes 6 and 7; skins and targets 2, 4, 5 */
+    float static_cell = cube(&fixture, TRACER_CUBE_STATIC)->cell_metres;
+    for (uint32_t turn = 0; turn < 2; turn++) {
+        scene_motion_finish(&fixture.motion);
+        test_motion_init(&fixture.motion, 1);
+        float m[12];
+        test_transform(m, 1, 1, 1, 2, 0.9f + 0.2f * (float)turn, 0.2f, 0.3f, 0);
+        test_pose_node(&fixture.motion.poses[0], 11, m);
+        update(&fixture);
+        expect_built(&fixture, false, true);
+        assert_float_equal(cube(&fixture, TRACER_CUBE_STATIC)->cell_metres, static_cell, 0);
+    }
+    fixture_finish(&fixture);
+}
+
+static void an_edit_of_a_texture_builds_all_and_a_factor_nothing(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_translucent(), &small);
+    struct scene_material glass = *scene_material(fixture.scene, 3);
+    struct scene_material *edited = test_material(&fixture.edits, 3, 0.1f, 0.2f, 0.3f);
+    memcpy(edited->textures, glass.textures, sizeof(glass.textures));
+    edited->transmission = 0.2f;
+    update(&fixture);
+    expect_built(&fixture, false, false);
+    test_texture(&fixture.edits, 2, 5, 5, TEXTURE_RGBA8_LINEAR, WRAP_CLAMP, WRAP_REPEAT, 20);
+    update(&fixture);
+    expect_built(&fixture, true, false);
+    fixture_finish(&fixture);
+}
+
+static void an_empty_scene_is_missed(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_create(), &small);
+    expect_built(&fixture, false, false);
+    assert_int_equal(fixture.tracer->stats.nodes, 0);
+    assert_true(distance_below(&fixture, 0, 0) < 0);
+    struct scene_disc *disc = &test_add(&fixture.edits, SCENE_DISC)->set.disc;
+    disc->base.id = 1;
+    disc->centre_world[2] = -2;
+    disc->normal_world[2] = 1;
+    disc->radius = 3;
+    update(&fixture);
+    expect_distance(distance_below(&fixture, 0, 0), 12);
+    add_box_mesh(&fixture.edits, 10);
+    add_box(&fixture.edits, 1, 1, 0, 0, 0);
+    update(&fixture);
+    expect_built(&fixture, true, false);
+    expect_distance(distance_below(&fixture, 0, 0), 9.5);
+    expect_distance(distance_below(&fixture, 1, 0), 12);
+    fixture_finish(&fixture);
+}
+
+/* As flat as can be, one point wide, far away and of any size: boxes stay boxes. */
+static void flat_and_tiny_and_huge_scenes_have_cells(void **state)
+{
+    (void)state;
+    static const struct {
+        float size[3], place[3], longest;
+    } rows[] = {
+        {{4, 4, 1e-7f}, {0, 0, 0}, 4},
+        {{1e-3f, 1e-3f, 1e-3f}, {0, 0, 0}, 1e-3f},
+        {{1e6f, 1e6f, 1}, {0, 0, 0}, 1e6f},
+        {{1e-3f, 20, 1e-3f}, {1e3f, 0, 0}, 20},
+        {{1e15f, 1e15f, 1e15f}, {0, 0, 0}, 1e15f},
+    };
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        struct test_edits edits = {.scene = test_scene_create()};
+        float m[12];
+        const float *size = rows[i].size, *place = rows[i].place;
+        add_box_mesh(&edits, 10);
+        test_transform(m, size[0], size[1], size[2], 0, 0, place[0], place[1], place[2]);
+        test_node(&edits, 1, 0, NODE_MESH, 10, m);
+        test_commit(&edits);
+        struct fixture fixture;
+        fixture_init(&fixture, edits.scene, &small);
+        float cell = cube(&fixture, TRACER_CUBE_STATIC)->cell_metres;
+        assert_float_equal(cell / rows[i].longest, 1.0f / (RESOLUTION - MARGIN_CELLS), 1e-5f);
+        /* In its middle, from a size above it: cells that hold a sample there are no wider than the box. */
+        float above = rows[i].longest, middle = 0.01f;
+        struct ray ray = {{place[0] + middle * size[0], place[1] + middle * size[1], place[2] + above, 0},
+                          {0, 0, -1, 10 * above}};
+        float expected = above - 0.5f * size[2];
+        if (size[0] > cell && size[1] > cell)
+            assert_float_equal(trace_one(&fixture, ray).distance / expected, 1.0f, 1e-4f);
+        fixture_finish(&fixture);
+    }
+}
+
+/* Squares without thickness, six of them one above the other. */
+static struct scene *scene_of_squares(void)
+{
+    static const float positions[4][3] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    struct test_edits edits = {.scene = test_scene_create()};
+    test_mesh(&edits, 10, positions, 4, indices, 2);
+    for (uint32_t i = 0; i < 6; i++) {
+        float m[12];
+        test_transform(m, 1, 1, 1, 0, 0, 0, 0, 0.25f * (float)i);
+        test_node(&edits, i + 1, 0, NODE_MESH, 10, m);
+    }
+    test_commit(&edits);
+    return edits.scene;
+}
+
+static void more_layers_than_may_be_kept_are_reported_and_the_nearest_stay(void **state)
+{
+    (void)state;
+    struct tracer_options options = {.ldc_resolution = RESOLUTION, .ldc_layers_max = 2};
+    for (options.ldc_build = LDC_BUILD_AUTO; options.ldc_build <= LDC_BUILD_LISTS; options.ldc_build++) {
+        struct fixture fixture;
+        fixture_init(&fixture, scene_of_squares(), &options);
+        const struct tracer_cube *kept = cube(&fixture, TRACER_CUBE_STATIC);
+        assert_int_equal(kept->layers_needed, 6);
+        assert_int_equal(kept->layers_kept, 2);
+        assert_int_equal(kept->samples_lost, 2 * kept->samples);
+        expect_distance(distance_below(&fixture, 0, 0), 9.75); /* z = 0.25, the second from below: least depths */
+        struct ray up = {{0.013f, 0.017f, -10, 0}, {0, 0, 1, 1e9f}};
+        expect_distance(trace_one(&fixture, up).distance, 10);
+        fixture_finish(&fixture);
+    }
+}
+
+static void after_a_failure_the_next_update_starts_anew(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct error error = {0};
+    fixture_init(&fixture, scene_of_boxes(3), &small);
+    add_box(&fixture.edits, 3, 1, 1e30f, 0, 0);
+    assert_false(try_update(&fixture, &error));
+    assert_int_equal(error.kind, ERROR_LIMIT);
+    assert_string_equal(error.field, "scene");
+    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->resolution, 0);
+    add_box(&fixture.edits, 3, 1, 4, 0, 0);
+    update(&fixture);
+    expect_built(&fixture, true, false);
+    expect_distance(distance_below(&fixture, 4, 0), 9.5);
+    /* And when there is no memory for what is to be built. */
+    uint64_t limit = device->memory_limit_bytes;
+    device->memory_limit_bytes = device->memory_used_bytes + 4096;
+    add_box(&fixture.edits, 1, 1, 0, 0, 1);
+    error = (struct error){0};
+    bool updated = try_update(&fixture, &error);
+    device->memory_limit_bytes = limit;
+    if (!updated) {
+        assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
+        update(&fixture);
+    }
+    expect_distance(distance_below(&fixture, 0, 0), 8.5);
+    expect_distance(distance_below(&fixture, 4, 0), 9.5);
+    fixture_finish(&fixture);
+}
+
+static void rays_that_have_times_are_refused_where_something_moves(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct error error = {0};
+    struct gpu_buffer rays = {0}, times = {0}, hits = {0};
+    const struct ray ray = {{0.013f, 0.017f, 10, 0}, {0, 0, -1, 1e9f}};
+    const float time = 0.5f;
+    fixture_init(&fixture, scene_of_boxes(2), &small);
+    expect_ok(gpu_buffer_upload(device, &rays, &ray, sizeof(ray), &error), &error);
+    expect_ok(gpu_buffer_upload(device, &times, &time, sizeof(time), &error), &error);
+    expect_ok(gpu_buffer_reserve(device, &hits, sizeof(struct hit), &error), &error);
+    const struct wave wave = {.ray_count = 1, .rays = &rays, .hits = &hits, .times = &times};
+    scene_gpu_bind(&fixture.gpu);
+    expect_ok(tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error), &error); /* nothing moves */
+    float m[12];
+    test_motion_init(&fixture.motion, 2);
+    for (int p = 0; p < 2; p++) {
+        test_transform(m, 1, 1, 1, 0, 0, 0, 0, (float)p);
+        test_pose_node(&fixture.motion.poses[p], 1, m);
+    }
+    update(&fixture);
+    scene_gpu_bind(&fixture.gpu);
+    assert_false(tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error));
+    assert_int_equal(error.kind, ERROR_UNSUPPORTED);
+    assert_string_equal(error.field, "shutter");
+    expect_distance(distance_below(&fixture, 0, 0), 9.5); /* without times: as the shutter opens */
+    gpu_buffer_finish(device, &rays);
+    gpu_buffer_finish(device, &times);
+    gpu_buffer_finish(device, &hits);
+    fixture_finish(&fixture);
+}
+
+/* As a renderer that is switched between tracers asks for them. */
+static void a_tracer_that_was_away_builds_what_has_changed_meanwhile(void **state)
+{
+    (void)state;
+    static const struct tracer_options options = {.ldc_resolution = RESOLUTION};
+    struct tracer_set set = {0};
+    struct fixture fixture = {.scene = scene_of_boxes(3)};
+    struct error error = {0};
+    struct scene_changes changes;
+    fixture.edits.scene = fixture.scene;
+    scene_gpu_init(&fixture.gpu, device);
+    static const struct {
+        unsigned tracer;
+        bool moves, static_cube, dynamic_cube;
+    } frames[] = {
+        {NUMBER_LDC, false, true, false}, {NUMBER_BVH, false, false, false}, {NUMBER_LDC, false, false, false},
+        {NUMBER_BVH, true, false, false}, {NUMBER_LDC, false, true, true},   {NUMBER_BVH, true, false, false},
+        {NUMBER_LDC, false, false, true}, {NUMBER_LDC, false, false, false},
+    };
+    for (size_t i = 0; i < sizeof(frames) / sizeof(frames[0]); i++) {
+        if (frames[i].moves) {
+            add_box(&fixture.edits, 1, 1, 0, 0, 0.5f * (float)i);
+            test_commit(&fixture.edits);
+        }
+        expect_ok(scene_gpu_update(&fixture.gpu, fixture.scene, NULL, &changes, NULL, &error), &error);
+        tracer_set_note(&set, &changes);
+        stage_times_begin(&fixture.times);
+        fixture.tracer = tracer_set_get(&set, &fixture.gpu, tracer_impl_by_number(frames[i].tracer), &options,
+                                        &fixture.times, &error);
+        expect_ok(fixture.tracer != NULL, &error);
+        if (frames[i].tracer == NUMBER_LDC)
+            expect_built(&fixture, frames[i].static_cube, frames[i].dynamic_cube);
+    }
+    expect_distance(distance_below(&fixture, 0, 0), 10 - 0.5 - 0.5 * 5);
+    fixture.tracer = NULL; /* the set's */
+    tracer_set_finish(&set);
+    fixture_finish(&fixture);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(options_out_of_range_are_refused_by_name),
+        cmocka_unit_test(the_size_of_a_cell_is_that_of_the_longest_side),
+        cmocka_unit_test(without_a_change_nothing_is_built),
+        cmocka_unit_test(what_begins_to_move_leaves_the_static_cube_once),
+        cmocka_unit_test(what_has_moved_back_stays_dynamic),
+        cmocka_unit_test(what_was_hidden_and_comes_back_is_dynamic),
+        cmocka_unit_test(new_objects_are_static_and_settle_what_stood_still),
+        cmocka_unit_test(a_mesh_that_is_set_again_is_dynamic),
+        cmocka_unit_test(a_skinned_mesh_is_dynamic_from_the_first),
+        cmocka_unit_test(an_edit_of_a_texture_builds_all_and_a_factor_nothing),
+        cmocka_unit_test(an_empty_scene_is_missed),
+        cmocka_unit_test(flat_and_tiny_and_huge_scenes_have_cells),
+        cmocka_unit_test(more_layers_than_may_be_kept_are_reported_and_the_nearest_stay),
+        cmocka_unit_test(after_a_failure_the_next_update_starts_anew),
+        cmocka_unit_test(rays_that_have_times_are_refused_where_something_moves),
+        cmocka_unit_test(a_tracer_that_was_away_builds_what_has_changed_meanwhile),
+    };
+    struct error error = {0};
+    device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);
+    if (!device) {
+        printf("SKIP: no OpenGL device: %s\n", error.text);
+        return 0;
+    }
+    int failures = cmocka_run_group_tests_name("layered depth cubes", tests, NULL, NULL);
+    gpu_device_destroy(device);
+    return failures;
+}
