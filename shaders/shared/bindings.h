@@ -38,7 +38,8 @@
 #define IMAGE_LDC_VISIBLE 4
 #define IMAGE_LDC_GEOMETRY 0
 #define IMAGE_LDC_SURFACE 1
-#define IMAGE_LDC_NODES 0 /* ldc/levels.comp */
+#define IMAGE_LDC_NODES 0 /* ldc/levels.comp, ldc/cells.comp */
+#define IMAGE_LDC_ENTRIES 1
 
 /* texture units */
 #define UNIT_TRIANGLES 0
