@@ -54,6 +54,15 @@ static void add(struct sum *sum, uint64_t ns)
     sum->measured = true;
 }
 
+/* Whether a span of building is a cube's: its wave is the cube's number then. */
+static bool is_rebuilt(const struct fl_frame *frame, uint32_t part)
+{
+    for (size_t i = 0; i < frame->cube_count; i++)
+        if ((uint32_t)frame->cubes[i].part == part && frame->cubes[i].rebuilt)
+            return true;
+    return false;
+}
+
 static void add_stages(struct cli_timings *timings, const struct fl_frame *frame)
 {
     for (size_t i = 0; i < frame->stage_count; i++) {
@@ -62,8 +71,7 @@ static void add_stages(struct cli_timings *timings, const struct fl_frame *frame
         const bool is_trace = time->stage == PROTOCOL_STAGE_TRACE;
         if ((is_trace || time->stage == PROTOCOL_STAGE_SHADE) && time->wave < WAVES_SHOWN)
             add(&timings->waves[is_trace ? 0 : 1][time->wave][time->clock], time->duration_ns);
-        /* A build's wave is the cube's number. */
-        if (time->stage == PROTOCOL_STAGE_BUILD && frame->cube_count > 0 && time->wave < PARTS)
+        if (time->stage == PROTOCOL_STAGE_BUILD && is_rebuilt(frame, time->wave))
             add(&timings->cubes[time->wave][time->clock], time->duration_ns);
     }
 }

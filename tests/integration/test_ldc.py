@@ -1,9 +1,24 @@
 # SPDX-License-Identifier: MIT
 """The tracer `ldc` as a person meets it: options, what a frame says of its cubes, comparison, animation."""
+import json
 import os
 
 import farlight_test
-from farlight_test import Case, bundled_scenes, farlight
+from farlight_test import Case, bundled_scenes, farlight, grid_means
+
+SIZE = ["--size", "160x120"]
+LDC = ["--tracer", "ldc"]
+
+
+def frames_of(result):
+    """The frames of --timings=json."""
+    return [record for record in map(json.loads, result.stdout.splitlines()) if record["kind"] == "frame"]
+
+
+def build_ms(frame, cube):
+    """What building took; cube: 0 static, 1 dynamic. Looking whether a table of the lights is still right is in 0, too."""
+    return sum(stage["duration_ns"] for stage in frame["stages"]
+               if (stage["stage"], stage["wave"], stage["clock"]) == ("build", cube, "cpu")) / 1e6
 
 
 class Options(Case):
@@ -27,6 +42,115 @@ class Options(Case):
                           env={**os.environ, "FARLIGHT_LDC_RESOLUTION": "7"})
         self.expect(result, 2)
         self.assertIn("FARLIGHT_LDC_RESOLUTION", result.stderr)
+
+
+class Pictures(Case):
+    def test_samples_are_shaded_as_the_surfaces_that_they_are_of(self):
+        """First hits by the tracer itself. Of 255, in the mean over cells of 20 x 15 pixels: half a step where there is no edge,
+        and what silhouettes, a cell of the cube rough, may move where a mirror or glass repeats them. A wrong colour,
+        texture or shadow is far more, and everywhere."""
+        for scene in ("cornell.glb", "teapot.glb"):
+            with self.subTest(scene=scene):
+                paths = {tracer: self.folder / f"{tracer}.png" for tracer in ("bvh", "ldc")}
+                for tracer, path in paths.items():
+                    self.expect(farlight("render", bundled_scenes() / scene, "-o", path, *SIZE, "--samples", "4",
+                                         "--primary", "trace", "--integrator", "whitted", "--tracer", tracer), 0)
+                errors = sorted(abs(a - b) for got, want in zip(*map(grid_means, paths.values())) for a, b in zip(got, want))
+                self.assertLess(errors[len(errors) // 2], 0.5)
+                self.assertLess(errors[-1], 5)
+
+    def test_both_builds_and_all_levels_give_the_same_picture(self):
+        pictures = set()
+        for options in (["--ldc-build", "peel"], ["--ldc-build", "lists"], ["--ldc-levels", "blocks", "--ldc-block", "4"],
+                        ["--ldc-levels", "pyramid"], ["--ldc-rays", "4"]):
+            path = self.folder / "x.png"
+            self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", path, *SIZE, *LDC, "--primary", "trace",
+                                 "--ldc-resolution", "256", *options), 0)
+            pictures.add(path.read_bytes()[-4096:])
+        self.assertEqual(len(pictures), 1)
+
+
+class Cubes(Case):
+    def render(self, *arguments, **options):
+        return self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", self.folder / "x.png", *SIZE, *arguments,
+                                    **options), 0)
+
+    def test_a_frame_says_how_finely_it_is_sampled(self):
+        cells = {}
+        for resolution in (128, 512):
+            frame, = frames_of(self.render(*LDC, "--ldc-resolution", resolution, "--timings=json"))
+            cube, = frame["cubes"]
+            self.assertEqual((cube["part"], cube["resolution"], cube["rebuilt"]), ("static", resolution, True))
+            self.assertEqual((cube["layers_kept"], cube["samples_lost"]), (cube["layers_needed"], 0))
+            self.assertGreater(cube["samples"], 0)
+            cells[resolution] = cube["cell_metres"]
+        # The box is the same; a cell or two of it may be a margin.
+        self.assertAlmostEqual(cells[128] / cells[512], 4, delta=0.1)
+        frame, = frames_of(self.render("--timings=json"))
+        self.assertNotIn("cubes", frame)
+
+    def test_the_table_says_it_to_people(self):
+        text = self.render(*LDC, "--ldc-resolution", "128", "--timings").stdout
+        self.assertRegex(text, r"cubes +static +128 cells of [0-9.]+ m?m; \d+ layers?, \d+ samples; sampled for 1 of 1 frame")
+
+    def test_layers_that_a_limit_takes_away_are_told_with_the_remedy(self):
+        result = self.render(*LDC, "--ldc-resolution", "128", "--timings=json",
+                             env={**os.environ, "FARLIGHT_LIMITS_LDC_LAYERS": "1"})
+        cube, = frames_of(result)[0]["cubes"]
+        self.assertEqual(cube["layers_kept"], 1)
+        self.assertGreater(cube["layers_needed"], 1)
+        self.assertGreater(cube["samples_lost"], 0)
+        for words in ("warning: frame 0: the static cube has 1 of ", f"{cube['samples_lost']} samples", "limits.ldc_layers"):
+            self.assertIn(words, result.stderr)
+
+    def test_memory_is_a_limit_too(self):
+        result = self.render(*LDC, "--ldc-resolution", "1024", "--timings=json",
+                             env={**os.environ, "FARLIGHT_MEMORY_LDC": "8M"})
+        cube, = frames_of(result)[0]["cubes"]
+        self.assertLess(cube["layers_kept"], cube["layers_needed"])
+        self.assertIn("memory.ldc", result.stderr)
+
+    def test_exr_metadata_holds_the_size_of_a_cell(self):
+        path = self.folder / "x.exr"
+        self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", path, *SIZE, *LDC), 0)
+        self.assertIn(b"farlight/cube/static/cell_metres", path.read_bytes()[:65536])
+
+
+class Animations(Case):
+    def test_what_stands_still_is_sampled_once(self):
+        result = self.expect(farlight("animate", bundled_scenes() / "carousel.glb", "--clip", "ride", "--frames", "1-4",
+                                      "--fps", "8", "-o", self.folder / "%d.png", *SIZE, *LDC, "--ldc-resolution", "256",
+                                      "--timings=json"), 0)
+        frames = frames_of(result)
+        self.assertEqual([{c["part"] for c in frame["cubes"]} for frame in frames], [{"static", "dynamic"}] * 4)
+        rebuilt = [{c["part"] for c in frame["cubes"] if c["rebuilt"]} for frame in frames]
+        self.assertEqual(rebuilt[-1], {"dynamic"})
+        self.assertGreater(build_ms(frames[0], 0), 1)
+        self.assertGreater(build_ms(frames[-1], 1), 1)
+        self.assertLess(build_ms(frames[-1], 0), 0.1, "the static cube cost time")
+        # What moves is known from the first frame in which it does.
+        self.assertIn("static", rebuilt[0])
+        self.assertTrue(all("static" not in parts for parts in rebuilt[2:]), rebuilt)
+
+
+class Comparison(Case):
+    def test_secondary_rays_agree_with_the_reference(self):
+        """99 % of the rays hit with both or miss with both, as is wanted of closed meshes."""
+        result = farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "ldc,reference", *SIZE, "--json")
+        if "libembree-dev" in result.stderr:
+            self.skipTest("this farlightd was built without Embree")
+        report = json.loads(self.expect(result, 0).stdout)
+        cube, = report["cubes"]
+        self.assertEqual((cube["part"], cube["resolution"]), ("static", 1024))
+        self.assertIn("secondary", {wave["kind"] for wave in report["waves"]})
+        for kind in ("primary", "secondary"):
+            waves = [wave for wave in report["waves"] if wave["kind"] == kind]
+            agreed, rays = (sum(wave[key] for wave in waves for key in keys) for keys in
+                            (("both_hit", "both_missed"), ("rays",)))
+            self.assertGreater(rays, 1000)
+            self.assertGreaterEqual(agreed / rays, 0.99, kind)
+        text = self.expect(farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "ldc,bvh", *SIZE), 0).stdout
+        self.assertIn("static cube: 1024 cells of ", text)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,8 @@
 #include <cmocka.h>
 
 #define FRAMES 4
+#define TRACER_BVH 0
+#define TRACER_LDC 3 /* the protocol's numbers */
 
 static struct engine *engine;
 
@@ -95,7 +97,7 @@ static void make_scene(uint64_t client, float radius)
     expect_done();
 }
 
-static void submit_job(uint64_t client, uint32_t request)
+static void submit_job(uint64_t client, uint32_t request, unsigned tracer)
 {
     submit((struct engine_command){
         .kind = ENGINE_JOB_START,
@@ -107,7 +109,14 @@ static void submit_job(uint64_t client, uint32_t request)
                 .last_frame = FRAMES - 1,
                 .frame_step = 1,
                 .frames_per_second = 1,
-                .frame = {.width = 300, .height = 300, .samples = 2, .depth = 2, .seed = 5},
+                .frame = {.width = 300,
+                          .height = 300,
+                          .samples = 2,
+                          .depth = 2,
+                          .seed = 5,
+                          .tracer = tracer,
+                          .tracer_options.ldc_resolution = 64,
+                          .primary = tracer == TRACER_LDC ? PRIMARY_TRACE : PRIMARY_RASTER},
                 .encoding = ENCODING_ZSTD,
                 .quality = 3,
                 .path = CAMERA_ORBIT,
@@ -147,12 +156,12 @@ static void clients_that_take_turns_get_the_frames_they_would_get_alone(void **s
     uint64_t alone[2][FRAMES], together[2][FRAMES];
     make_scene(1, 0.5f);
     make_scene(2, 0.8f);
-    submit_job(1, 3);
+    submit_job(1, 3, TRACER_BVH);
     collect(alone, 1);
-    submit_job(2, 3);
+    submit_job(2, 3, TRACER_BVH);
     collect(alone, 1);
-    submit_job(1, 4);
-    submit_job(2, 4);
+    submit_job(1, 4, TRACER_BVH);
+    submit_job(2, 4, TRACER_BVH);
     collect(together, 2);
     assert_memory_equal(alone, together, sizeof alone);
     /* They are pictures of something: each frame and each scene has its own. */
@@ -177,10 +186,64 @@ static void clients_that_take_turns_get_the_frames_they_would_get_alone(void **s
     engine_event_destroy(event);
 }
 
+/* Digests of the frames of one client's jobs, a row each, which have the requests from `first` on. Counts the
+ * frames for which a cube was sampled. */
+static void collect_jobs(uint64_t (*digests)[FRAMES], uint32_t first, unsigned jobs, unsigned *cubes,
+                         unsigned *built)
+{
+    unsigned next[2] = {0}, running = jobs;
+    *cubes = *built = 0;
+    while (running) {
+        struct engine_event *event = next_event();
+        const uint32_t job = event->request - first;
+        assert_in_range(job, 0, jobs - 1);
+        if (event->kind == ENGINE_FRAME) {
+            const struct tracer_cube *cube = &event->frame->result.cubes[TRACER_CUBE_STATIC];
+            *cubes += cube->resolution > 0;
+            *built += cube->rebuilt;
+            digests[job][next[job]++] = event->frame->digest;
+        } else {
+            assert_int_equal(event->kind, ENGINE_DONE);
+            running--;
+        }
+        engine_event_destroy(event);
+    }
+}
+
+static void jobs_switch_tracers_on_one_scene_while_both_run(void **state)
+{
+    (void)state;
+    if (!engine)
+        skip();
+    uint64_t alone[2][FRAMES], together[2][FRAMES];
+    unsigned cubes, built;
+    make_scene(3, 0.6f);
+    submit_job(3, 3, TRACER_BVH);
+    collect_jobs(alone, 3, 1, &cubes, &built);
+    assert_int_equal(cubes, 0);
+    submit_job(3, 4, TRACER_LDC);
+    collect_jobs(alone + 1, 4, 1, &cubes, &built);
+    assert_int_equal(cubes, FRAMES);
+    assert_int_equal(built, 1); /* nothing moves but the camera */
+    submit_job(3, 5, TRACER_BVH);
+    submit_job(3, 6, TRACER_LDC);
+    collect_jobs(together, 5, 2, &cubes, &built);
+    assert_memory_equal(alone, together, sizeof alone);
+    assert_int_equal(cubes, FRAMES);
+    assert_int_equal(built, 0); /* it was kept beside the other tracer's tree */
+    for (int i = 0; i < FRAMES; i++)
+        assert_true(alone[0][i] != alone[1][i]); /* 64 cells are seen */
+    submit((struct engine_command){.kind = ENGINE_CLIENT_GONE, .client = 3});
+    struct engine_event *event = next_event();
+    assert_int_equal(event->kind, ENGINE_CLIENT_FORGOTTEN);
+    engine_event_destroy(event);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(clients_that_take_turns_get_the_frames_they_would_get_alone),
+        cmocka_unit_test(jobs_switch_tracers_on_one_scene_while_both_run),
     };
     return cmocka_run_group_tests(tests, start, stop);
 }
