@@ -103,13 +103,6 @@ class Cubes(Case):
         for words in ("warning: frame 0: the static cube has 1 of ", f"{cube['samples_lost']} samples", "limits.ldc_layers"):
             self.assertIn(words, result.stderr)
 
-    def test_memory_is_a_limit_too(self):
-        result = self.render(*LDC, "--ldc-resolution", "1024", "--timings=json",
-                             env={**os.environ, "FARLIGHT_MEMORY_LDC": "8M"})
-        cube, = frames_of(result)[0]["cubes"]
-        self.assertLess(cube["layers_kept"], cube["layers_needed"])
-        self.assertIn("memory.ldc", result.stderr)
-
     def test_exr_metadata_holds_the_size_of_a_cell(self):
         path = self.folder / "x.exr"
         self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", path, *SIZE, *LDC), 0)
