@@ -125,6 +125,13 @@ class Animations(Case):
         self.assertIn("static", rebuilt[0])
         self.assertTrue(all("static" not in parts for parts in rebuilt[2:]), rebuilt)
 
+    def test_what_moves_while_the_shutter_is_open_is_refused(self):
+        result = self.expect(farlight("animate", bundled_scenes() / "carousel.glb", "--clip", "ride", "--frames", "1-2",
+                                      "--shutter", "0.5", "-o", self.folder / "%d.png", *SIZE, *LDC), 1)
+        for words in ("shutter", "ldc", "another tracer"):
+            self.assertIn(words, result.stderr)
+        self.assertEqual(self.leftovers(), [])
+
 
 class Comparison(Case):
     def test_secondary_rays_agree_with_the_reference(self):
