@@ -126,8 +126,7 @@ void main()
         precise float reach = side == 0 ? -half_chord : half_chord;
         precise float depth_cells = nearest + reach;
         vec3 lean = abs(affine_covector(rows, closest + reach * step_object));
-        int most = lean.x >= lean.y && lean.x >= lean.z ? 0 : lean.y >= lean.z ? 1 : 2;
-        bool there = most == axis;
+        bool there = lean[axis] >= LDC_OVERLAP * greatest(lean);
 #ifdef HAS_CUTOUT
         candidate found = candidate(depth_cells, primitive.z, primitive.y, vec2(0.0));
         there = there && !is_cut_out(found, origin, direction, 0.0);

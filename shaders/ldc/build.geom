@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Sends a triangle to the one image whose axis its normal leans to most (paper, figure 5), with its plane in cells; a
-// sphere to all three, as the square round it. PRIMITIVE_KIND as in build.vert; HAS_CUTOUT: triangles may have holes.
+// Sends a triangle to the image whose axis its normal leans to most (paper, figure 5), or to those where images overlap
+// (LDC_OVERLAP), with its plane in cells; a sphere to all three, as the square round it. PRIMITIVE_KIND as in build.vert; HAS_CUTOUT: triangles may have holes.
+
+#include "shared/ldc.h"
 
 uniform float resolution; // cells along a side of the cube
 
 #if PRIMITIVE_KIND == 0
 layout(triangles) in;
-layout(triangle_strip, max_vertices = 3) out;
+layout(triangle_strip, max_vertices = 9) out;
 #else
 layout(points) in;
 layout(triangle_strip, max_vertices = 12) out;
@@ -44,21 +46,26 @@ void main()
 {
     vec3 normal = cross(place_cells[1] - place_cells[0], place_cells[2] - place_cells[0]);
     vec3 lean = abs(normal);
-    int axis = lean.x >= lean.y && lean.x >= lean.z ? 0 : lean.y >= lean.z ? 1 : 2;
-    if (!(lean[axis] > 0.0)) // no area
+    float most = max(lean.x, max(lean.y, lean.z));
+    if (!(most > 0.0)) // no area
         return;
-    int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
-    vec3 along = vec3(place_cells[0][axis], place_cells[1][axis], place_cells[2][axis]);
-    vec4 plane_ = vec4(-normal[u] / normal[axis], -normal[v] / normal[axis], place_cells[0][u], place_cells[0][v]);
-    vec3 depths_ = vec3(along.x, min(along.x, min(along.y, along.z)), max(along.x, max(along.y, along.z)));
-    for (int i = 0; i < 3; i++) {
-        plane = plane_;
-        depths = depths_;
-        primitive = primitive_in[0];
+    for (int axis = 0; axis < 3; axis++) {
+        if (lean[axis] < LDC_OVERLAP * most)
+            continue;
+        int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+        vec3 along = vec3(place_cells[0][axis], place_cells[1][axis], place_cells[2][axis]);
+        vec4 plane_ = vec4(-normal[u] / normal[axis], -normal[v] / normal[axis], place_cells[0][u], place_cells[0][v]);
+        vec3 depths_ = vec3(along.x, min(along.x, min(along.y, along.z)), max(along.x, max(along.y, along.z)));
+        for (int i = 0; i < 3; i++) {
+            plane = plane_;
+            depths = depths_;
+            primitive = primitive_in[0];
 #ifdef HAS_CUTOUT
-        barycentrics = vec2(i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0);
+            barycentrics = vec2(i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0);
 #endif
-        emit(vec2(place_cells[i][u], place_cells[i][v]), along[i], axis);
+            emit(vec2(place_cells[i][u], place_cells[i][v]), along[i], axis);
+        }
+        EndPrimitive();
     }
 }
 #else

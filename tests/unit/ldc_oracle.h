@@ -4,6 +4,7 @@
 #ifndef FARLIGHT_TESTS_LDC_ORACLE_H
 #define FARLIGHT_TESTS_LDC_ORACLE_H
 
+#include "shared/ldc.h"
 #include "trace/ldc_store.h"
 #include "trace/scene_gpu.h"
 
@@ -15,7 +16,7 @@
 
 /* A rasteriser moves corners by half of a 1/256 of a texel (OpenGL asks for four bits, drivers have eight). */
 #define ORACLE_EDGE_TEXELS (1.0 / 128)
-/* Of a normal's greatest entries: which of two axes it leans to more is for rounding to say below this. */
+/* Of a normal's greatest entry: whether it leans enough to an axis is for rounding to say below this. */
 #define ORACLE_LEAN 1e-4
 
 struct oracle_sample {
@@ -103,20 +104,16 @@ static inline double oracle_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Also -1: rounding decides; *second is the other candidate then. */
-static inline int oracle_axis(const double n[3], int *first, int *second)
+enum oracle_lean { ORACLE_LEANS_AWAY, ORACLE_LEANS_TO, ORACLE_LEANS_SO_SO /* rounding decides */ };
+
+/* Whether a surface with this normal is in the image of an axis. */
+static inline enum oracle_lean oracle_lean(const double n[3], int axis)
 {
-    int most = 0;
-    for (int k = 1; k < 3; k++)
-        if (fabs(n[k]) > fabs(n[most]))
-            most = k;
-    int next = most == 0 ? 1 : 0;
-    for (int k = 0; k < 3; k++)
-        if (k != most && fabs(n[k]) > fabs(n[next]))
-            next = k;
-    *first = most;
-    *second = next;
-    return fabs(n[most]) - fabs(n[next]) <= ORACLE_LEAN * fabs(n[most]) ? -1 : most;
+    double most = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+    double beyond = fabs(n[axis]) / most - (double)LDC_OVERLAP;
+    if (fabs(beyond) <= ORACLE_LEAN)
+        return ORACLE_LEANS_SO_SO;
+    return beyond > 0 ? ORACLE_LEANS_TO : ORACLE_LEANS_AWAY;
 }
 
 /* Texels of image `axis` under the triangle; `open`: they are for rounding to decide. */
@@ -177,10 +174,11 @@ static inline void oracle_triangle(struct oracle *oracle, const struct oracle_sc
     struct oracle_sample base = {.instance = instance, .primitive = primitive};
     for (int k = 0; k < 3; k++)
         base.normal[k] = side * n[k] / length;
-    int first, second, axis = oracle_axis(n, &first, &second);
-    oracle_cover(oracle, first, p, &base, n, axis < 0);
-    if (axis < 0)
-        oracle_cover(oracle, second, p, &base, n, true);
+    for (int axis = 0; axis < 3; axis++) {
+        enum oracle_lean lean = oracle_lean(n, axis);
+        if (lean != ORACLE_LEANS_AWAY)
+            oracle_cover(oracle, axis, p, &base, n, lean == ORACLE_LEANS_SO_SO);
+    }
 }
 
 /* By rays along the axes in the sphere's own space, every texel. */
@@ -220,10 +218,10 @@ static inline void oracle_sphere(struct oracle *oracle, const struct oracle_scen
             }
             for (int k = 0; k < 3; k++)
                 sample.normal[k] /= sqrt(length);
-            int first, second, chosen = oracle_axis(sample.normal, &first, &second);
-            if (chosen < 0)
+            enum oracle_lean lean = oracle_lean(sample.normal, axis);
+            if (lean == ORACLE_LEANS_SO_SO)
                 oracle->texels[i].open = true;
-            else if (chosen == axis)
+            else if (lean == ORACLE_LEANS_TO)
                 oracle_add(&oracle->texels[i], &sample);
         }
     }

@@ -62,32 +62,18 @@ static inline void ldc_add_sample(struct ldc_samples *s, int axis, uint32_t u, u
                                   {0xffffffffu, ldc_pack_unit(normal), material, 0}};
 }
 
-/* The first of equal ones. */
-static inline int ldc_axis_of(const float normal[3])
+/* Whether a surface with this normal is in the image of an axis. */
+static inline bool ldc_is_in_image(const float normal[3], int axis)
 {
-    int axis = 0;
-    for (int k = 1; k < 3; k++)
-        if (fabsf(normal[k]) > fabsf(normal[axis]))
-            axis = k;
-    return axis;
+    float most = fmaxf(fabsf(normal[0]), fmaxf(fabsf(normal[1]), fabsf(normal[2])));
+    return fabsf(normal[axis]) >= LDC_OVERLAP * most;
 }
 
-/* World space; an edge that two share is one's only. */
-static inline void ldc_add_triangle(struct ldc_samples *s, const float corners[3][3], uint32_t material)
+/* An edge that two share is one's only. */
+static inline void ldc_add_to_image(struct ldc_samples *s, int axis, double p[3][3], const double normal[3],
+                                    const float unit[3], uint32_t material)
 {
-    double p[3][3], normal[3];
-    for (int c = 0; c < 3; c++)
-        for (int k = 0; k < 3; k++)
-            p[c][k] = ((double)corners[c][k] - s->lower[k]) / s->cell;
-    for (int k = 0; k < 3; k++) {
-        int i = (k + 1) % 3, j = (k + 2) % 3;
-        normal[k] = (p[1][i] - p[0][i]) * (p[2][j] - p[0][j]) - (p[1][j] - p[0][j]) * (p[2][i] - p[0][i]);
-    }
-    double length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
-    if (!(length > 0))
-        return;
-    const float unit[3] = {(float)(normal[0] / length), (float)(normal[1] / length), (float)(normal[2] / length)};
-    const int axis = ldc_axis_of(unit), iu = (axis + 1) % 3, iv = (axis + 2) % 3;
+    const int iu = (axis + 1) % 3, iv = (axis + 2) % 3;
     double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
     for (int c = 0; c < 3; c++) {
         low[0] = fmin(low[0], p[c][iu]), high[0] = fmax(high[0], p[c][iu]);
@@ -112,6 +98,26 @@ static inline void ldc_add_triangle(struct ldc_samples *s, const float corners[3
             ldc_add_sample(s, axis, (uint32_t)u, (uint32_t)v, (float)depth, unit, material);
         }
     }
+}
+
+/* World space. */
+static inline void ldc_add_triangle(struct ldc_samples *s, const float corners[3][3], uint32_t material)
+{
+    double p[3][3], normal[3];
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < 3; k++)
+            p[c][k] = ((double)corners[c][k] - s->lower[k]) / s->cell;
+    for (int k = 0; k < 3; k++) {
+        int i = (k + 1) % 3, j = (k + 2) % 3;
+        normal[k] = (p[1][i] - p[0][i]) * (p[2][j] - p[0][j]) - (p[1][j] - p[0][j]) * (p[2][i] - p[0][i]);
+    }
+    double length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    if (!(length > 0))
+        return;
+    const float unit[3] = {(float)(normal[0] / length), (float)(normal[1] / length), (float)(normal[2] / length)};
+    for (int axis = 0; axis < 3; axis++)
+        if (ldc_is_in_image(unit, axis))
+            ldc_add_to_image(s, axis, p, normal, unit, material);
 }
 
 static inline int ldc_by_texel(const void *a, const void *b)
