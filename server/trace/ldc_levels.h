@@ -19,6 +19,8 @@ struct ldc_level_layout {
     uint32_t row;         /* blocks: nodes in a row; of a pyramid each level has 2^(bits (top - l)) */
     uint32_t image_nodes; /* of one of the three */
     bool blocks;          /* one level, not a pyramid up to a single node */
+    bool cells;           /* none of this, but nodes over cells of all three images: LDC_NODE_* of shared/ldc.h */
+    uint32_t grid;        /* cells: nodes along a side */
 };
 struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tracer_options *options);
 

@@ -15,13 +15,14 @@ void ldc_store_finish(struct ldc_store *store)
     gpu_buffer_finish(store->device, &store->geometry);
     gpu_buffer_finish(store->device, &store->surface);
     gpu_buffer_finish(store->device, &store->nodes);
+    gpu_buffer_finish(store->device, &store->entries);
     *store = (struct ldc_store){.device = store->device};
 }
 
 uint64_t ldc_store_bytes(const struct ldc_store *store)
 {
     return (uint64_t)store->texels.capacity_bytes + store->quads.capacity_bytes + store->geometry.capacity_bytes +
-           store->surface.capacity_bytes + store->nodes.capacity_bytes;
+           store->surface.capacity_bytes + store->nodes.capacity_bytes + store->entries.capacity_bytes;
 }
 
 bool ldc_store_grow(struct gpu_device *device, struct gpu_buffer *buffer, uint64_t kept_bytes, uint64_t size_bytes,

@@ -18,14 +18,16 @@ struct ldc_cube {
     float cell_world;    /* metres */
     uint32_t resolution; /* texels along a side of each of the three images; 0: there is no cube */
     uint32_t first_texel, first_sample, sample_count, first_quad, quad_count;
-    uint32_t first_node, node_count; /* ldc_levels.c */
+    /* ldc_levels.c: nodes, entries of cells, and where the cells that have some are */
+    uint32_t first_node, node_count, first_entry, entry_count;
+    uint32_t lower_cells[3], upper_cells[3];
     uint32_t layers_needed, layers_kept;
     uint64_t samples_lost;
 };
 
 struct ldc_store {
     struct gpu_device *device;
-    struct gpu_buffer texels, quads, geometry, surface, nodes;
+    struct gpu_buffer texels, quads, geometry, surface, nodes, entries;
     struct ldc_cube cubes[TRACER_CUBES_MAX]; /* the static one first: what moves lies behind it */
 };
 

@@ -26,6 +26,7 @@ static void set_cube(const struct gpu_program *program, unsigned slot, const str
         {"ldc_first_node", cube->first_node},
         {"ldc_top", layout.top},
         {"ldc_row", layout.row},
+        {"ldc_grid", layout.grid},
     };
     char name[32];
     for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) {
@@ -35,17 +36,24 @@ static void set_cube(const struct gpu_program *program, unsigned slot, const str
     const float place[4] = {cube->lower_world[0], cube->lower_world[1], cube->lower_world[2], cube->cell_world};
     snprintf(name, sizeof name, "ldc_place[%u]", slot);
     gpu_uniform_vec(program, name, 4, place);
+    const float lower[3] = {(float)cube->lower_cells[0], (float)cube->lower_cells[1], (float)cube->lower_cells[2]};
+    const float upper[3] = {(float)cube->upper_cells[0], (float)cube->upper_cells[1], (float)cube->upper_cells[2]};
+    snprintf(name, sizeof name, "ldc_lower[%u]", slot);
+    gpu_uniform_vec(program, name, 3, lower);
+    snprintf(name, sizeof name, "ldc_upper[%u]", slot);
+    gpu_uniform_vec(program, name, 3, upper);
     snprintf(name, sizeof name, "ldc_tolerance[%u]", slot);
     gpu_uniform_float(program, name, options->ldc_tolerance / cube->cell_world);
 }
 
-static void bind(struct ldc_store *store)
+static void bind(struct ldc_store *store, bool cells)
 {
     gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &store->quads, UNIT_TRACER_1, GL_RGBA32F);
     gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_2, GL_RG32UI);
     gpu_buffer_bind_texels(store->device, &store->surface, UNIT_TRACER_3, GL_RGBA32UI);
-    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_4, GL_RG32F);
+    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_4, cells ? GL_RGBA32UI : GL_RG32F);
+    gpu_buffer_bind_texels(store->device, &store->entries, UNIT_TRACER_5, GL_RGBA32UI);
 }
 
 bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wave *wave,
@@ -62,13 +70,17 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
     snprintf(number_of_cubes, sizeof number_of_cubes, "%u", cube_count);
     const struct ldc_level_layout layout = ldc_level_layout_of(cubes[0]->resolution, options);
     snprintf(bits, sizeof bits, "%u", layout.bits);
-    struct gpu_define defines[8] = {
+    struct gpu_define defines[10] = {
         {"TRACER_LDC", "1"},
         {"LDC_CUBES", number_of_cubes},
         {"LDC_LEVEL_BITS", bits},
         {"LDC_LAYERS_TOGETHER", options->ldc_layers_together == 1 ? "1" : "4"},
     };
     size_t n = 4;
+    if (options->ldc_count_steps && wave->kind == WAVE_CLOSEST)
+        defines[n++] = (struct gpu_define){"LDC_COUNT_STEPS", "1"};
+    if (layout.cells)
+        defines[n++] = (struct gpu_define){"LDC_CELLS", "1"};
     if (layout.blocks)
         defines[n++] = (struct gpu_define){"LDC_BLOCKS", "1"};
     if (options->ldc_tolerance > 0)
@@ -82,7 +94,7 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
     const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
     if (!program)
         return false;
-    bind(store);
+    bind(store, layout.cells);
     for (unsigned i = 0; i < cube_count; i++)
         set_cube(program, i, cubes[i], options);
     /* Crossings of samples are no matter of trace_surfaces(). */

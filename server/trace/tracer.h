@@ -34,8 +34,9 @@ struct tracer_options {
     float ldc_tolerance;
     uint32_t ldc_rays_together;   /* 0: chosen; 1, 4 */
     uint32_t ldc_layers_together; /* of a texel, tested at once; 0: chosen; 1, 4; for the benchmark */
-    uint32_t ldc_layers_max;      /* 0: 255, more cannot be kept; of more the nearest are kept */
-    uint32_t ldc_mebibytes_max;   /* device memory of one cube's samples; 0: no limit but the device's */
+    bool ldc_count_steps;       /* for the benchmark: crossings say what the walk did, see shaders/ldc/cube.glsl */
+    uint32_t ldc_layers_max;    /* 0: 255, more cannot be kept; of more the nearest are kept */
+    uint32_t ldc_mebibytes_max; /* device memory of one cube's samples; 0: no limit but the device's */
 };
 
 enum { TRACER_CUBE_STATIC, TRACER_CUBE_DYNAMIC, TRACER_CUBES_MAX };

@@ -8,10 +8,18 @@
 // along the axis that the ray runs along most. In an image the components are u, v, depth.
 //
 // Defines: LDC_CUBES 1 or 2; LDC_TOLERANCE a hit is where the ray comes as near to a sample's depth, else where it
-// crosses the sample's plane.
+// crosses the sample's plane; LDC_COUNT_STEPS crossings are not samples but, for the benchmark, what the walk did: nodes
+// or cells looked at in place of the distance (a uint), samples tested, texels or cells whose samples were.
 #include "shared/bindings.h"
 #include "common/candidate.glsl"
 #include "ldc/plane.glsl"
+
+#ifdef LDC_COUNT_STEPS
+uvec3 ldc_counts = uvec3(0u);
+#define LDC_COUNT(what) ldc_counts.what++
+#else
+#define LDC_COUNT(what)
+#endif
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer ldc_texels;
 layout(binding = UNIT_TRACER_1) uniform samplerBuffer ldc_quads;
@@ -24,6 +32,13 @@ uniform int ldc_first_texel[LDC_CUBES];
 uniform int ldc_first_node[LDC_CUBES];
 #ifdef LDC_TOLERANCE
 uniform float ldc_tolerance[LDC_CUBES]; // cells
+#endif
+
+// A uniform of one number for all of a SIMD group is read once, one of each's own lane by lane.
+#if LDC_CUBES == 1
+#define CUBE(number) 0
+#else
+#define CUBE(number) number
 #endif
 
 // A ray's component where it has none: it moves by less than a thousandth of a cell on its way through a cube, and
@@ -44,7 +59,7 @@ vec3 without_zeros(vec3 d)
 
 cube_ray cube_ray_of(trace_ray r, int cube)
 {
-    vec4 place = ldc_place[cube];
+    vec4 place = ldc_place[CUBE(cube)];
     vec3 size = abs(r.direction);
     float length_ = greatest(size);
     cube_ray c;
@@ -68,16 +83,19 @@ void clip(inout float s_first, inout float s_end, vec3 o, vec3 inverse, vec3 low
 
 // ---- samples ----
 
-// A ray that begins on a surface may begin a little below a neighbour's plane, and would at once hit what it leaves.
-// So near its origin a ray does not cross what the origin lies on: a plane that passes it as near as this. The first
-// is that of rays that begin on a surface that bends by a radius of eight cells and more: 2^2 / (2 * 8).
-const float LDC_OWN_HEIGHT = 0.25;
-const float LDC_OWN_WAY = 2.0;
+// A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit what it leaves. So
+// near its origin a ray does not cross planes that pass the origin as near as this. From behind, which is how a ray that
+// goes away outside meets what it leaves, that is generous; from the front, which is how it meets another wall in a
+// corner, and how a ray that was refracted meets what it has entered by, it is what a surface needs that bends by a
+// radius of six cells: 1.5^2 / (2 * 6).
+const float LDC_OWN_WAY = 1.5;
+const float LDC_OWN_BEHIND = 0.5, LDC_OWN_BEFORE = 0.2;
 
 // Where the ray (o, d in the image) crosses a sample of a texel, if it does so there. `normal` may have any length;
 // `side` is positive where the ray comes from behind.
 bool cross_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal, out float s, out float side)
 {
+    LDC_COUNT(z);
     vec3 to_sample = vec3(texel + 0.5, depth) - o;
     float height = dot(normal, to_sample);
     side = dot(normal, d);
@@ -87,12 +105,13 @@ bool cross_sample(vec3 o, vec3 d, int cube, vec2 texel, float depth, vec3 normal
     vec2 a = (to_sample.xy - 0.5) * inverse, b = (to_sample.xy + 0.5) * inverse;
     vec2 near = min(a, b), far = max(a, b);
     s = min(max(to_sample.z / d.z, max(near.x, near.y)), min(far.x, far.y));
-    bool crosses = abs(s * d.z - to_sample.z) <= ldc_tolerance[cube];
+    bool crosses = abs(s * d.z - to_sample.z) <= ldc_tolerance[CUBE(cube)];
 #else
     s = height / side;
     vec2 from_middle = abs(s * d.xy - to_sample.xy);
     bool crosses = from_middle.x <= 0.5 + LDC_SLACK && from_middle.y <= 0.5 + LDC_SLACK;
 #endif
-    bool is_own = s < LDC_OWN_WAY && height * height < LDC_OWN_HEIGHT * LDC_OWN_HEIGHT * dot(normal, normal);
+    float own = side > 0.0 ? LDC_OWN_BEHIND * LDC_OWN_BEHIND : LDC_OWN_BEFORE * LDC_OWN_BEFORE;
+    bool is_own = s < LDC_OWN_WAY && height * height < own * dot(normal, normal);
     return crosses && !is_own;
 }

@@ -9,6 +9,8 @@
 // LDC_LAYERS_TOGETHER 1 or 4 of a texel's samples are tested at once.
 #include "ldc/found.glsl"
 
+#ifndef LDC_CELLS
+
 layout(binding = UNIT_TRACER_4) uniform samplerBuffer ldc_ranges; // of nodes: least and greatest depth
 
 uniform int ldc_top[LDC_CUBES]; // the top level; 0 are the texels
@@ -47,20 +49,20 @@ void begin_image(trace_ray r, float end, int pass, out image_walk w)
     w.s = w.s_least;
     w.s_limit = min(end * c.scale, 1e30);
     w.s_end = w.s_limit;
-    int resolution = ldc_resolution[w.cube];
+    int resolution = ldc_resolution[CUBE(w.cube)];
     float cells = float(resolution);
     clip(w.s, w.s_end, w.o, inverse, vec3(0.0, 0.0, -LDC_SPAN), vec3(cells, cells, cells + LDC_SPAN));
     w.s_end = c.scale > 0.0 && resolution > 0 ? w.s_end : -1e30;
     w.texel = clamp(ivec2(floor(w.o.xy + w.s * w.d.xy)), ivec2(0), ivec2(resolution - 1));
-    w.level = ldc_top[w.cube];
+    w.level = ldc_top[CUBE(w.cube)];
 }
 
 int node_index(image_walk w, ivec2 node)
 {
-    int top = ldc_top[w.cube];
+    int top = ldc_top[CUBE(w.cube)];
 #ifdef LDC_BLOCKS
-    int row = ldc_row[w.cube];
-    return ldc_first_node[w.cube] + (w.axis * row + node.y) * row + node.x;
+    int row = ldc_row[CUBE(w.cube)];
+    return ldc_first_node[CUBE(w.cube)] + (w.axis * row + node.y) * row + node.x;
 #else
     // Levels from the top on, each with all nodes that a square of so many levels has.
     int bits = LDC_LEVEL_BITS * (top - w.level);
@@ -73,7 +75,7 @@ int node_index(image_walk w, ivec2 node)
 #endif
     int first = levels & ((1 << 2 * bits) - 1);
     int of_image = levels & ((1 << 2 * LDC_LEVEL_BITS * top) - 1);
-    return ldc_first_node[w.cube] + w.axis * of_image + first + (node.y << bits) + node.x;
+    return ldc_first_node[CUBE(w.cube)] + w.axis * of_image + first + (node.y << bits) + node.x;
 #endif
 }
 
@@ -95,9 +97,9 @@ void leave_node(inout image_walk w, int shift, float s_out, bool by_u)
     next = by_u ? ivec2(w.d.x >= 0.0 ? last.x + 1 : first.x - 1, next.y)
                 : ivec2(next.x, w.d.y >= 0.0 ? last.y + 1 : first.y - 1);
     ivec2 parents = (next ^ w.texel) >> (shift + LDC_LEVEL_BITS);
-    w.level = parents != ivec2(0) && w.level < ldc_top[w.cube] ? w.level + 1 : w.level;
+    w.level = parents != ivec2(0) && w.level < ldc_top[CUBE(w.cube)] ? w.level + 1 : w.level;
     w.texel = next;
-    uint resolution = uint(ldc_resolution[w.cube]);
+    uint resolution = uint(ldc_resolution[CUBE(w.cube)]);
     w.s = w.s < s_out ? s_out : w.s;
     w.s = uint(next.x) >= resolution || uint(next.y) >= resolution ? 1e30 : w.s;
 }
@@ -107,9 +109,10 @@ bool next_texel(inout image_walk w, out uvec4 words, out float z_least, out floa
 {
     words = uvec4(0u);
     z_least = z_greatest = 0.0;
-    int resolution = ldc_resolution[w.cube];
-    int first_texel = ldc_first_texel[w.cube] + w.axis * resolution * resolution;
+    int resolution = ldc_resolution[CUBE(w.cube)];
+    int first_texel = ldc_first_texel[CUBE(w.cube)] + w.axis * resolution * resolution;
     while (w.s < w.s_end) {
+        LDC_COUNT(x);
         int shift = w.level * LDC_LEVEL_BITS;
         bool by_u;
         float s_out = node_exit(w, shift, by_u);
@@ -125,7 +128,7 @@ bool next_texel(inout image_walk w, out uvec4 words, out float z_least, out floa
             range = texelFetch(ldc_ranges, node_index(w, w.texel >> shift)).xy;
         }
 #ifdef LDC_TOLERANCE
-        range += vec2(-ldc_tolerance[w.cube], ldc_tolerance[w.cube]);
+        range += vec2(-ldc_tolerance[CUBE(w.cube)], ldc_tolerance[CUBE(w.cube)]);
 #endif
         if (z_greatest >= range.x && z_least <= range.y) {
             if (w.level == 0)
@@ -154,8 +157,8 @@ void test_texel(inout image_walk w, uvec4 words, float z_least, float z_greatest
     uint count = words.y & LDC_TEXEL_COUNT_MASK;
     float low = z_least - LDC_SPAN, high = z_greatest + LDC_SPAN;
 #ifdef LDC_TOLERANCE
-    low -= ldc_tolerance[w.cube];
-    high += ldc_tolerance[w.cube];
+    low -= ldc_tolerance[CUBE(w.cube)];
+    high += ldc_tolerance[CUBE(w.cube)];
 #endif
 #if LDC_LAYERS_TOGETHER == 4
     uint first_quad = words.y >> LDC_TEXEL_QUAD_SHIFT;
@@ -189,3 +192,5 @@ void test_texel(inout image_walk w, uvec4 words, float z_least, float z_greatest
     leave_node(w, 0, s_out, by_u);
     w.s_end = w.s_end < w.s_limit ? w.s_end : w.s_limit;
 }
+
+#endif

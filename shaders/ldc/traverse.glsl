@@ -4,8 +4,10 @@
 //
 // The host (trace/ldc_trace.c) sets, besides the defines of trace.comp, those that the files included here name.
 //
-// RAYS_TOGETHER rays are one invocation's, which has walked the next one as soon as it is done with one, while those
-// beside it in its SIMD group are still at theirs: none waits but at the end.
+// RAYS_TOGETHER rays are one invocation's, one behind the other: fewer invocations, each with more to do.
+//
+// Define: LDC_CELLS the walk is that of ldc/cells.glsl, else that of ldc/images.glsl.
+#include "ldc/cells.glsl"
 #include "ldc/images.glsl"
 
 #ifdef ANY_HIT
@@ -14,13 +16,26 @@
 #define answer candidate
 #endif
 
+#ifdef LDC_CELLS
+const int LDC_PASSES = LDC_CUBES;
+#define WALK cell_walk
+#define BEGIN begin_cells
+#else
 const int LDC_PASSES = 3 * LDC_CUBES;
+#define WALK image_walk
+#define BEGIN begin_image
+#endif
 
 void settle(ldc_found found, inout answer a)
 {
 #ifdef ANY_HIT
     a = found.taken;
 #else
+#ifdef LDC_COUNT_STEPS
+    a = candidate(float(ldc_counts.x), ldc_counts.z, ldc_counts.y, vec2(0.0));
+    ldc_counts = uvec3(0u);
+    return;
+#endif
     if (found.sample_index != HIT_NO_PRIMITIVE)
         a = candidate(found.end, found.sample_index, HIT_NO_PRIMITIVE - 1u, vec2(0.0));
 #endif
@@ -28,41 +43,30 @@ void settle(ldc_found found, inout answer a)
 
 void walk_rays(trace_ray rays_[RAYS_TOGETHER], inout answer answers[RAYS_TOGETHER])
 {
-    trace_ray r = rays_[0];
-    ldc_found found = ldc_found_of(r, answers[0]);
-    image_walk w;
-    w.s = 0.0;
-    w.s_end = -1.0;
-    int ray = 0, pass = 0;
-    for (;;) {
-        if (!(w.s < w.s_end)) {
-            if (pass == LDC_PASSES || !(found.end > r.t_min)) {
-                for (int k = 0; k < RAYS_TOGETHER; k++)
-                    if (k == ray)
-                        settle(found, answers[k]);
-                ray++;
-                if (ray == RAYS_TOGETHER)
-                    break;
-                pass = 0;
-#if RAYS_TOGETHER > 1
-                answer next = answers[1];
-                r = rays_[1];
-                for (int k = 2; k < RAYS_TOGETHER; k++) {
-                    if (k == ray) {
-                        r = rays_[k];
-                        next = answers[k];
-                    }
+    for (int ray = 0; ray < RAYS_TOGETHER; ray++) {
+        trace_ray r = rays_[ray];
+        ldc_found found = ldc_found_of(r, answers[ray]);
+        for (int pass = 0; pass < LDC_PASSES; pass++) {
+            WALK w;
+            BEGIN(r, found.end, pass, w);
+            while (w.s < w.s_end) {
+#ifdef LDC_CELLS
+                found_cell at = next_cell(w);
+                if (at.entry != LDC_ENTRY_NONE) {
+                    LDC_COUNT(y);
+                    test_cell(w, at, found);
                 }
-                found = ldc_found_of(r, next);
+#else
+                uvec4 words;
+                float z_least, z_greatest;
+                if (next_texel(w, words, z_least, z_greatest)) {
+                    LDC_COUNT(y);
+                    test_texel(w, words, z_least, z_greatest, found);
+                }
 #endif
             }
-            begin_image(r, found.end, pass, w);
-            pass++;
         }
-        uvec4 words;
-        float z_least, z_greatest;
-        if (next_texel(w, words, z_least, z_greatest))
-            test_texel(w, words, z_least, z_greatest, found);
+        settle(found, answers[ray]);
     }
 }
 

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+// The walk through a cube's cells, all three images at once: from the first cell on the ray's way that a sample's plane
+// passes to the next, so that what is found first is, up to a cell, the nearest. How cells are found is in shared/ldc.h
+// (LDC_NODE_*): a node of 16 x 16 x 16 cells knows how far it is empty around it, which of its 64 blocks of 4 x 4 x 4
+// hold something, and a block knows that of each cell.
+#include "ldc/found.glsl"
+
+#ifdef LDC_CELLS
+
+layout(binding = UNIT_TRACER_4) uniform usamplerBuffer ldc_nodes; // and blocks
+
+layout(binding = UNIT_TRACER_5) uniform usamplerBuffer ldc_entries;
+
+uniform int ldc_grid[LDC_CUBES]; // nodes along a side
+uniform vec3 ldc_lower[LDC_CUBES], ldc_upper[LDC_CUBES]; // of the cells that hold something
+
+// Axes along which the ray runs down are turned round, so that to the walk it runs up all of them.
+struct cell_walk {
+    vec3 o, d, inverse;
+    ivec3 flip;  // -1: turned
+    ivec3 cell;
+    float s, s_end;
+    float s_least, s_limit; // between which a crossing counts
+    float scale;            // s of a distance
+    int cube, grid, first_node, octant_shift;
+    int at, shift; // texel of what it is in; log2 of the size of its parts: 2 a node, 0 a block
+};
+
+// A cell to be tested.
+struct found_cell {
+    ivec3 cell; // as the walk has it
+    uint entry; // LDC_ENTRY_NONE: there is none
+};
+
+// Not turned.
+ivec3 cube_cell(cell_walk w, ivec3 cell)
+{
+    return (cell ^ w.flip) + (w.flip & (w.grid << LDC_NODE_SHIFT));
+}
+
+// Where what the ray is in lies, a node or a block of it.
+int node_at(cell_walk w, ivec3 cell)
+{
+    ivec3 n = cube_cell(w, cell) >> LDC_NODE_SHIFT;
+    return w.first_node + (n.z * w.grid + n.y) * w.grid + n.x;
+}
+
+void begin_cells(trace_ray r, float end, int pass, out cell_walk w)
+{
+    w.cube = pass;
+    cube_ray c = cube_ray_of(r, w.cube);
+    w.grid = ldc_grid[CUBE(w.cube)];
+    w.first_node = ldc_first_node[CUBE(w.cube)];
+    bvec3 down = lessThan(c.d, vec3(0.0));
+    w.flip = -ivec3(down);
+    w.octant_shift = 4 * (int(down.x) + 2 * int(down.y) + 4 * int(down.z));
+    w.o = mix(c.o, float(w.grid << LDC_NODE_SHIFT) - c.o, down);
+    w.d = abs(c.d);
+    w.inverse = 1.0 / w.d;
+    w.scale = c.scale;
+    w.s_least = r.t_min * c.scale;
+    w.s = w.s_least;
+    w.s_limit = min(end * c.scale, 1e30);
+    w.s_end = w.s_limit;
+    float cells = float(w.grid << LDC_NODE_SHIFT);
+    vec3 lower = ldc_lower[CUBE(w.cube)], upper = ldc_upper[CUBE(w.cube)];
+    vec3 first = lower;
+    lower = mix(lower, cells - upper, down);
+    upper = mix(upper, cells - first, down);
+    clip(w.s, w.s_end, w.o, w.inverse, lower, upper);
+    w.s_end = c.scale > 0.0 ? w.s_end : -1e30;
+    w.cell = clamp(ivec3(w.o + w.s * w.d), ivec3(lower), ivec3(upper) - 1);
+    w.at = node_at(w, w.cell);
+    w.shift = 2;
+}
+
+// Of the 64 parts of a node or a block those that lie in a cube of so many along each side, 2 or 4, which begins with
+// part b and reaches the way the ray runs.
+uvec2 parts_ahead(uvec3 b, bvec3 down, uint size)
+{
+    uint many = (1u << size) - 1u, back = size - 1u;
+    uint x = down.x ? many << b.x >> back : many << b.x & 15u;
+    uint y = (size == 4u ? 0xffffu : 0xffu) << 4u * b.y;
+    y = (down.y ? y >> 4u * back : y) & 0xffffu;
+    uint z = down.z ? many << b.z >> back : many << b.z;
+    uint slice = x * 0x1111u & y;
+    return slice * uvec2((z & 1u) | (z & 2u) << 15, (z >> 2 & 1u) | (z & 8u) << 13);
+}
+
+// On to the next cell that a plane passes; its entry is LDC_ENTRY_NONE if there is none. Each round looks at one of 64 parts of
+// what the ray is in, a node or a block, and goes into it or past it.
+found_cell next_cell(inout cell_walk w)
+{
+    found_cell found = found_cell(ivec3(0), LDC_ENTRY_NONE);
+    bvec3 down = notEqual(w.flip, ivec3(0));
+#define ROUNDS 4
+    for (int round_ = 0; round_ < ROUNDS && w.s < w.s_end && found.entry == LDC_ENTRY_NONE; round_++) {
+        LDC_COUNT(x);
+        uvec4 words = texelFetch(ldc_nodes, w.at);
+        uvec3 b = uvec3(cube_cell(w, w.cell)) >> w.shift;
+        uint bit = (b.x & 3u) | (b.y & 3u) << 2 | (b.z & 1u) << 4; // of 32
+        bool upper_half = (b.z & 2u) != 0u;
+        uint word = upper_half ? words.y : words.x;
+        bool is_set = (word >> bit & 1u) != 0u;
+        uint rank = uint(bitCount(word & ((1u << bit) - 1u))) + (upper_half ? uint(bitCount(words.x)) : 0u);
+        if (is_set && w.shift != 0) {
+            w.at = int(words.z + rank);
+            w.shift = 0;
+        } else {
+            found.cell = w.cell;
+            found.entry = is_set ? words.z + rank : LDC_ENTRY_NONE;
+            // As far as the parts ahead are empty.
+            uvec2 all_parts = words.xy & parts_ahead(b & 3u, down, 4u), near_parts = words.xy & parts_ahead(b & 3u, down, 2u);
+            int parts = (all_parts.x | all_parts.y) == 0u ? 4 : (near_parts.x | near_parts.y) == 0u ? 2 : 1;
+            ivec3 border = ((w.cell >> w.shift) + parts) << w.shift, end = ((w.cell >> (w.shift + 2)) + 1) << (w.shift + 2);
+            border = min(border, end);
+            int empty = int(words.z >> w.octant_shift & LDC_NODE_FAR);
+            ivec3 away = ((w.cell >> LDC_NODE_SHIFT) + (empty > 0 ? empty : 1)) << LDC_NODE_SHIFT;
+            border = (words.x | words.y) == 0u ? away : border;
+            vec3 exits = (vec3(border) - w.o) * w.inverse;
+            float s_out = exits.x < exits.y ? exits.x : exits.y;
+            s_out = exits.z < s_out ? exits.z : s_out;
+            ivec3 next = clamp(ivec3(w.o + s_out * w.d), w.cell, border - 1);
+            // In whole numbers, so that each step goes on.
+            next = mix(next, border, equal(exits, vec3(s_out)));
+            ivec3 others = (next ^ w.cell) >> (w.shift + 2);
+            bool leaves = (others.x | others.y | others.z) != 0;
+            w.cell = next;
+            w.s = w.s < s_out ? s_out : w.s;
+            w.shift = leaves ? 2 : w.shift;
+            w.at = leaves ? node_at(w, next) : w.at;
+        }
+    }
+    return found;
+}
+
+void test_cell_sample(inout cell_walk w, int axis, ivec3 cell, uint sample_index, float depth, uint normal_bits,
+                      inout ldc_found found)
+{
+    vec3 flipped = vec3(w.flip);
+    vec3 normal = direction_from_octahedral(normal_bits) * (1.0 + 2.0 * flipped);
+    float flip_depth = in_image(flipped, axis).z;
+    float turned = flip_depth < 0.0 ? float(w.grid << LDC_NODE_SHIFT) - depth : depth;
+    float s, side;
+    if (cross_sample(in_image(w.o, axis), in_image(w.d, axis), w.cube, in_image(vec3(cell), axis).xy, turned,
+                     in_image(normal, axis), s, side) &&
+        s > w.s_least && s < w.s_limit) {
+        offer_sample(found, sample_index, s / w.scale, side, 1.0 / w.scale);
+        w.s_limit = found.end * w.scale;
+    }
+}
+
+void test_cell(inout cell_walk w, found_cell at, inout ldc_found found)
+{
+    uint entry = at.entry;
+    do {
+        uvec4 e = texelFetch(ldc_entries, int(entry));
+        test_cell_sample(w, int(e.x >> LDC_ENTRY_AXIS_SHIFT), at.cell, e.x & LDC_ENTRY_SAMPLE_MASK,
+                         uintBitsToFloat(e.z), e.w, found);
+        entry = e.y;
+    } while (entry != 0u);
+    w.s_end = w.s_end < w.s_limit ? w.s_end : w.s_limit;
+}
+
+#endif
