@@ -5,6 +5,7 @@
 #define FARLIGHT_TESTS_LDC_ORACLE_H
 
 #include "shared/ldc.h"
+#include "shared/material.h"
 #include "trace/ldc_store.h"
 #include "trace/scene_gpu.h"
 
@@ -41,6 +42,7 @@ struct oracle_scene {
     uint8_t (*colours)[4];
     float (*spheres)[4];
     uint32_t *sphere_materials;
+    struct material *materials;
 };
 
 struct oracle {
@@ -49,10 +51,10 @@ struct oracle {
     struct oracle_texel *texels; /* 3 * resolution^2 */
 };
 
-static inline void *oracle_read(struct gpu_device *device, const struct gpu_buffer *buffer)
+static inline void *oracle_read(struct gpu_device *of, const struct gpu_buffer *buffer)
 {
     void *data = calloc(1, buffer->size_bytes + 1);
-    gpu_buffer_read(device, buffer, 0, data, buffer->size_bytes);
+    gpu_buffer_read(of, buffer, 0, data, buffer->size_bytes);
     return data;
 }
 
@@ -65,6 +67,7 @@ static inline void oracle_scene_init(struct oracle_scene *scene, const struct sc
     scene->colours = oracle_read(gpu->device, &gpu->colours);
     scene->spheres = oracle_read(gpu->device, &gpu->spheres);
     scene->sphere_materials = oracle_read(gpu->device, &gpu->sphere_materials);
+    scene->materials = oracle_read(gpu->device, &gpu->materials);
 }
 
 static inline void oracle_scene_finish(struct oracle_scene *scene)
@@ -75,6 +78,7 @@ static inline void oracle_scene_finish(struct oracle_scene *scene)
     free(scene->colours);
     free(scene->spheres);
     free(scene->sphere_materials);
+    free(scene->materials);
 }
 
 static inline void oracle_finish(struct oracle *oracle)
@@ -116,9 +120,34 @@ static inline enum oracle_lean oracle_lean(const double n[3], int axis)
     return beyond > 0 ? ORACLE_LEANS_TO : ORACLE_LEANS_AWAY;
 }
 
+/* Of vertices, linear. */
+static inline void oracle_colour(double out[4], const struct oracle_scene *scene,
+                                 const struct oracle_sample *sample)
+{
+    for (int c = 0; c < 4; c++) {
+        out[c] = 0;
+        for (int i = 0; i < 3; i++)
+            out[c] += sample->weights[i] * scene->colours[scene->triangles[sample->primitive][i]][c] / 255.0;
+    }
+}
+
+/* -1: cut out, 0: for rounding to say, 1: there. No textures. */
+static inline int oracle_cutout(const struct oracle_scene *scene, const struct oracle_sample *sample)
+{
+    const struct material *m = &scene->materials[scene->triangles[sample->primitive][3]];
+    const struct geometry *g = &scene->gpu->geometries[scene->gpu->instances[sample->instance].geometry].device;
+    double colour[4] = {1, 1, 1, 1};
+    if ((m->flags & MATERIAL_ALPHA_MASK) == 0)
+        return 1;
+    if (g->flags & GEOMETRY_HAS_COLOURS)
+        oracle_colour(colour, scene, sample);
+    double above = colour[3] * m->base_colour[3] - m->alpha_cutoff;
+    return fabs(above) < 0.01 ? 0 : above > 0 ? 1 : -1;
+}
+
 /* Texels of image `axis` under the triangle; `open`: they are for rounding to decide. */
-static inline void oracle_cover(struct oracle *oracle, int axis, double p[3][3], const struct oracle_sample *base,
-                                const double n[3], bool open)
+static inline void oracle_cover(struct oracle *oracle, const struct oracle_scene *scene, int axis, double p[3][3],
+                                const struct oracle_sample *base, const double n[3], bool open)
 {
     int u = (axis + 1) % 3, v = (axis + 2) % 3, size = (int)oracle->resolution;
     double low_u = fmin(p[0][u], fmin(p[1][u], p[2][u])), high_u = fmax(p[0][u], fmax(p[1][u], p[2][u]));
@@ -142,7 +171,10 @@ static inline void oracle_cover(struct oracle *oracle, int axis, double p[3][3],
             struct oracle_sample sample = *base;
             memcpy(sample.weights, weights, sizeof(weights));
             sample.depth_cells = p[0][axis] - (n[u] * (x + 0.5 - p[0][u]) + n[v] * (y + 0.5 - p[0][v])) / n[axis];
-            oracle_add(texel, &sample);
+            int there = oracle_cutout(scene, &sample);
+            texel->open |= there == 0;
+            if (there > 0)
+                oracle_add(texel, &sample);
         }
 }
 
@@ -177,7 +209,7 @@ static inline void oracle_triangle(struct oracle *oracle, const struct oracle_sc
     for (int axis = 0; axis < 3; axis++) {
         enum oracle_lean lean = oracle_lean(n, axis);
         if (lean != ORACLE_LEANS_AWAY)
-            oracle_cover(oracle, axis, p, &base, n, lean == ORACLE_LEANS_SO_SO);
+            oracle_cover(oracle, scene, axis, p, &base, n, lean == ORACLE_LEANS_SO_SO);
     }
 }
 
