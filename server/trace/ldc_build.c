@@ -20,13 +20,13 @@ struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *
     return builder;
 }
 
-#define BUFFER_COUNT 9
+#define BUFFER_COUNT 10
 
 static void list_buffers(struct ldc_builder *builder, struct gpu_buffer *buffers[BUFFER_COUNT])
 {
-    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->counts, &builder->found,   &builder->fragments,
-                                            &builder->places, &builder->ordered, &builder->visible,
-                                            &builder->drawn,  &builder->build,   &builder->commands};
+    struct gpu_buffer *all[BUFFER_COUNT] = {
+        &builder->counts, &builder->occupied, &builder->ordered, &builder->places, &builder->fragments,
+        &builder->found,  &builder->visible,  &builder->drawn,   &builder->build,  &builder->commands};
     for (size_t i = 0; i < BUFFER_COUNT; i++)
         buffers[i] = all[i];
 }
@@ -70,7 +70,7 @@ const struct gpu_program *ldc_use(struct gpu_device *device, const char *path, s
     return program;
 }
 
-bool ldc_give_places(struct ldc_task *task, bool all, struct error *error)
+bool ldc_give_places(struct ldc_task *task, uint32_t kept, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
@@ -79,10 +79,14 @@ bool ldc_give_places(struct ldc_task *task, bool all, struct error *error)
         return false;
     gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->places, IMAGE_LDC_PLACES, GL_R32UI);
+    gpu_buffer_bind_image(device, &builder->occupied, IMAGE_LDC_OCCUPIED, GL_R32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
     gpu_uniform_uint(program, "texel_count", task->texel_count);
-    gpu_uniform_uint(program, "fragments_kept", all ? UINT32_MAX : task->layers_max);
+    gpu_uniform_uint(program, "texels_along", task->cube->resolution);
+    gpu_uniform_uint(program, "slots", task->slots);
+    gpu_uniform_uint(program, "fragments_kept", kept);
     gpu_dispatch(device, program, (task->texel_count + LDC_PLACES_TEXELS - 1) / LDC_PLACES_TEXELS);
+    ldc_read_counts(task);
     return true;
 }
 
@@ -118,6 +122,7 @@ static bool build(struct ldc_task *task, struct error *error)
                           ((uint64_t)task->cube->first_texel + task->texel_count) * texel_bytes, error) &&
            gpu_buffer_reserve(device, &builder->counts, (size_t)task->texel_count * sizeof(uint32_t), error) &&
            gpu_buffer_reserve(device, &builder->places, (size_t)task->texel_count * sizeof(uint32_t), error) &&
+           gpu_buffer_reserve(device, &builder->occupied, (size_t)task->texel_count * sizeof(uint32_t), error) &&
            gpu_buffer_reserve(device, &builder->build, sizeof(struct ldc_build_counts), error) &&
            (task->options->ldc_build == LDC_BUILD_PEEL ? ldc_peel(task, error) : ldc_lists(task, error)) &&
            ldc_pack(task, error) && gpu_check(device, "building a layered depth cube", error);

@@ -12,7 +12,7 @@ struct draw_command { /* as GL has it */
 };
 
 struct drawn { /* shared/ldc_build.h */
-    uint32_t first_id, id_offset, instance, pad0;
+    uint32_t first_id, id_offset, instance, flags;
 };
 
 static enum ldc_sort sort_of(const struct geometry *geometry)
@@ -20,6 +20,14 @@ static enum ldc_sort sort_of(const struct geometry *geometry)
     if (geometry->kind == GEOMETRY_SPHERES)
         return LDC_SPHERES;
     return geometry->flags & GEOMETRY_HAS_CUTOUT ? LDC_TRIANGLES_CUTOUT : LDC_TRIANGLES;
+}
+
+static uint32_t flags_of(const struct instance *instance, const struct geometry *geometry)
+{
+    return (geometry->flags & GEOMETRY_HAS_NORMALS ? LDC_DRAWN_NORMALS : 0) |
+           (geometry->flags & GEOMETRY_HAS_COLOURS ? LDC_DRAWN_COLOURS : 0) |
+           (geometry->kind == GEOMETRY_SPHERES ? LDC_DRAWN_SPHERES : 0) |
+           (instance->flags & INSTANCE_MIRRORED ? LDC_DRAWN_MIRRORED : 0);
 }
 
 static int compare_uint(const void *a, const void *b)
@@ -34,13 +42,15 @@ static bool list_drawn(struct ldc_builder *builder, const struct scene_gpu *scen
 {
     uint64_t id = 0;
     for (uint32_t i = 0; i < count; i++) {
-        const struct geometry *geometry = &scene->geometries[scene->instances[instances[i]].geometry].device;
+        const struct instance *instance = &scene->instances[instances[i]];
+        const struct geometry *geometry = &scene->geometries[instance->geometry].device;
         enum ldc_sort sort = sort_of(geometry);
         uint32_t vertices = sort == LDC_SPHERES ? 1 : 3;
         if (id + geometry->primitive_count > UINT32_MAX ||
             ((uint64_t)geometry->first_primitive + geometry->primitive_count) * vertices > INT32_MAX)
             return error_set(error, ERROR_LIMIT, NULL, "more primitives than a layered depth cube can number");
-        drawn[i] = (struct drawn){(uint32_t)id, (uint32_t)id - geometry->first_primitive, instances[i], 0};
+        drawn[i] = (struct drawn){(uint32_t)id, (uint32_t)id - geometry->first_primitive, instances[i],
+                                  flags_of(instance, geometry)};
         commands[i] = (struct draw_command){geometry->primitive_count * vertices, 1,
                                             geometry->first_primitive * vertices, i};
         id += geometry->primitive_count;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One pass over the scene: every fragment goes into a list, in any order, and its texel counts it; then all go to
- * their texels' places. */
+/* One pass over the scene: every fragment that falls on a texel is noted. The first few of a texel have slots of
+ * their own, the others go into a list, in any order, and then to their texels' places. */
 #include "shared/bindings.h"
 #include "trace/ldc_build_state.h"
 
@@ -8,26 +8,30 @@
 
 #define FRAGMENT_BYTES 16
 #define ORDERED_BYTES 8
+/* A fragment that has a slot costs half of what one in the list does, but all texels have as many. */
+#define SLOTS_FIRST 4u
+#define SLOTS_BYTES_MAX ((uint64_t)512 << 20)
+/* Of fragments, those without a slot that are put up with. */
+#define UNSLOTTED_SHARE 16
 
-static void set_list(const struct ldc_task *task, const struct gpu_program *program)
+/* As many as the last build suggests and memory allows. */
+static uint32_t choose_slots(const struct ldc_task *task)
 {
-    gpu_uniform_uint(program, "fragments_max", task->builder->fragments_max);
+    const struct ldc_builder *builder = task->builder;
+    uint64_t texels = task->texel_count, limit = SLOTS_BYTES_MAX / ORDERED_BYTES / texels;
+    uint64_t fitting = builder->device->facts.texture_buffer_texels_max / 2 / texels;
+    uint64_t slots = builder->slots_texels == task->texel_count ? builder->slots : SLOTS_FIRST;
+    slots = slots < limit ? slots : limit;
+    return (uint32_t)(slots < fitting ? slots : fitting);
 }
 
-/* Of fragments there was room for all, or task->counts says how many there are. */
-static bool draw_lists(struct ldc_task *task, struct error *error)
+static void suggest_slots(struct ldc_task *task)
 {
     struct ldc_builder *builder = task->builder;
-    struct gpu_device *device = builder->device;
-    gpu_buffer_clear(device, &builder->counts, 0);
-    gpu_buffer_clear(device, &builder->build, 0);
-    gpu_buffer_bind_image(device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
-    gpu_buffer_bind_image(device, &builder->fragments, IMAGE_LDC_FRAGMENTS, GL_RGBA32UI);
-    gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
-    if (!ldc_draw_bind_plain(task, error) || !ldc_draw(task, LDC_PASS_LISTS, set_list, error))
-        return false;
-    ldc_read_counts(task);
-    return true;
+    builder->slots_texels = task->texel_count;
+    builder->slots = task->slots > 0 ? task->slots : 1;
+    if (task->counts.unslotted > task->counts.fragments / UNSLOTTED_SHARE)
+        builder->slots *= 2;
 }
 
 static bool reserve_fragments(struct ldc_task *task, uint32_t count, struct error *error)
@@ -43,34 +47,66 @@ static bool reserve_fragments(struct ldc_task *task, uint32_t count, struct erro
     return true;
 }
 
+static void set_lists(const struct ldc_task *task, const struct gpu_program *program)
+{
+    gpu_uniform_uint(program, "texel_count", task->texel_count);
+    gpu_uniform_uint(program, "slots", task->slots);
+    gpu_uniform_uint(program, "fragments_max", task->builder->fragments_max);
+}
+
+/* Of fragments without slots there was room for all, or task->counts says how many there are. */
+static bool draw_lists(struct ldc_task *task, struct error *error)
+{
+    struct ldc_builder *builder = task->builder;
+    struct gpu_device *device = builder->device;
+    gpu_buffer_clear(device, &builder->counts, 0);
+    gpu_buffer_clear(device, &builder->build, 0);
+    gpu_buffer_bind_image(device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
+    gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
+    gpu_buffer_bind_image(device, &builder->fragments, IMAGE_LDC_FRAGMENTS, GL_RGBA32UI);
+    gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
+    return ldc_draw_bind_plain(task, error) && ldc_draw(task, LDC_PASS_LISTS, set_lists, error) &&
+           ldc_give_places(task, UINT32_MAX, error);
+}
+
+/* Those without slots, to behind those with. */
 static bool order(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
+    uint64_t slot_bytes = (uint64_t)task->slots * task->texel_count * ORDERED_BYTES;
     const struct gpu_program *program = ldc_use(device, "ldc/order.comp", error);
-    if (!program ||
-        !gpu_buffer_reserve(device, &builder->ordered, (size_t)task->counts.fragments * ORDERED_BYTES, error))
+    if (!program || !ldc_store_grow(device, &builder->ordered, slot_bytes,
+                                    slot_bytes + (uint64_t)task->counts.places * ORDERED_BYTES, error))
         return false;
     gpu_buffer_bind_texels(device, &builder->fragments, UNIT_LDC_FRAGMENTS, GL_RGBA32UI);
     gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
-    gpu_uniform_uint(program, "fragment_count", task->counts.fragments);
-    gpu_dispatch(device, program, task->counts.fragments);
-    task->ordered_count = task->counts.fragments;
+    gpu_uniform_uint(program, "fragment_count", task->counts.unslotted);
+    gpu_uniform_uint(program, "texel_count", task->texel_count);
+    gpu_uniform_uint(program, "slots", task->slots);
+    gpu_dispatch(device, program, task->counts.unslotted);
     return true;
 }
 
 bool ldc_lists(struct ldc_task *task, struct error *error)
 {
-    if (task->builder->fragments_max == 0 && !reserve_fragments(task, task->texel_count / 2, error))
+    struct ldc_builder *builder = task->builder;
+    task->slots = choose_slots(task);
+    size_t ordered_bytes = (size_t)task->slots * task->texel_count * ORDERED_BYTES;
+    if (builder->ordered.size_bytes < ordered_bytes &&
+        !gpu_buffer_reserve(builder->device, &builder->ordered, ordered_bytes, error))
+        return false;
+    if (builder->fragments_max == 0 && !reserve_fragments(task, task->texel_count / 4, error))
         return false;
     if (!draw_lists(task, error))
         return false;
-    if (task->counts.fragments > task->builder->fragments_max) {
+    if (task->counts.unslotted > builder->fragments_max) {
         /* Once more with room for all: the next build starts with it. */
-        if (!reserve_fragments(task, task->counts.fragments + task->counts.fragments / 8, error) ||
+        if (!reserve_fragments(task, task->counts.unslotted + task->counts.unslotted / 8, error) ||
             !draw_lists(task, error))
             return false;
     }
-    return ldc_give_places(task, true, error) && (task->counts.fragments == 0 || order(task, error));
+    suggest_slots(task);
+    return task->counts.unslotted == 0 || order(task, error);
 }

@@ -3,6 +3,7 @@
 #include "trace/ldc_build_state.h"
 
 #include <epoxy/gl.h>
+#include <string.h>
 
 #define TEXEL_BYTES 16
 #define QUAD_BYTES 16
@@ -25,6 +26,17 @@ static bool reserve(struct ldc_task *task, uint32_t samples, uint32_t quads, str
            gpu_buffer_reserve(device, &task->builder->visible, (size_t)samples * VISIBLE_BYTES, error);
 }
 
+/* As if nothing were there. */
+static void clear_texels(struct ldc_task *task)
+{
+    static const float no_range[2] = {LDC_NO_DEPTH, -LDC_NO_DEPTH};
+    uint32_t empty[4] = {0};
+    memcpy(&empty[2], no_range, sizeof(no_range));
+    glClearNamedBufferSubData(
+        task->store->texels.name, GL_RGBA32UI, (GLintptr)task->cube->first_texel * TEXEL_BYTES,
+        (GLsizeiptr)task->texel_count * TEXEL_BYTES, GL_RGBA_INTEGER, GL_UNSIGNED_INT, empty);
+}
+
 static bool pack(struct ldc_task *task, struct error *error)
 {
     struct gpu_device *device = task->builder->device;
@@ -39,23 +51,27 @@ static bool pack(struct ldc_task *task, struct error *error)
         gpu_buffer_bind_texels(device, &builder->found, UNIT_LDC_FOUND, GL_R32UI);
     gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
     gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
+    gpu_buffer_bind_texels(device, &builder->occupied, UNIT_LDC_OCCUPIED, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
     gpu_buffer_bind_image(device, &store->texels, IMAGE_LDC_TEXELS, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &store->quads, IMAGE_LDC_QUADS, GL_RGBA32F);
     gpu_buffer_bind_image(device, &builder->visible, IMAGE_LDC_VISIBLE, GL_RGBA32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
+    gpu_uniform_uint(program, "occupied_count", task->counts.occupied);
     gpu_uniform_uint(program, "texel_count", task->texel_count);
+    gpu_uniform_uint(program, "texels_along", task->cube->resolution);
+    gpu_uniform_uint(program, "slots", task->slots);
     gpu_uniform_uint(program, "first_texel", task->cube->first_texel);
     gpu_uniform_uint(program, "first_sample", task->cube->first_sample);
     gpu_uniform_uint(program, "first_quad", task->cube->first_quad);
     gpu_uniform_uint(program, "layers_max", task->layers_max);
-    gpu_dispatch(device, program, (task->texel_count + LDC_PACK_TEXELS - 1) / LDC_PACK_TEXELS);
+    gpu_dispatch(device, program, (task->counts.occupied + LDC_PACK_TEXELS - 1) / LDC_PACK_TEXELS);
     return true;
 }
 
 static const struct gpu_program *sample_program(const struct ldc_task *task, struct error *error)
 {
-    struct gpu_define defines[4] = {0};
+    struct gpu_define defines[5] = {0};
     size_t n = 0, cursor = 0;
     bool textures = false, bump = false;
     uint64_t id;
@@ -69,6 +85,8 @@ static const struct gpu_program *sample_program(const struct ldc_task *task, str
         defines[n++] = (struct gpu_define){"HAS_TEXTURES", "1"};
     if (bump)
         defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
+    if (task->scene->colours.size_bytes > 0)
+        defines[n++] = (struct gpu_define){"HAS_COLOURS", "1"};
     if (task->scene->has_spheres)
         defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
     return gpu_program_get(task->builder->device,
@@ -98,7 +116,8 @@ static bool sample(struct ldc_task *task, struct error *error)
 bool ldc_pack(struct ldc_task *task, struct error *error)
 {
     struct ldc_cube *cube = task->cube;
-    if (!reserve(task, task->ordered_count, task->ordered_count, error) || !pack(task, error))
+    clear_texels(task);
+    if (!reserve(task, task->counts.samples_max, task->counts.quads_max, error) || !pack(task, error))
         return false;
     ldc_read_counts(task);
     if (task->counts.samples > 0 && !sample(task, error))

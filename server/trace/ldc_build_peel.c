@@ -18,11 +18,8 @@ static bool count_fragments(struct ldc_task *task, struct error *error)
     gpu_buffer_clear(device, &builder->counts, 0);
     gpu_buffer_clear(device, &builder->build, 0);
     gpu_buffer_bind_image(device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
-    if (!ldc_draw_bind_plain(task, error) || !ldc_draw(task, LDC_PASS_COUNT, NULL, error) ||
-        !ldc_give_places(task, false, error))
-        return false;
-    ldc_read_counts(task);
-    return true;
+    return ldc_draw_bind_plain(task, error) && ldc_draw(task, LDC_PASS_COUNT, NULL, error) &&
+           ldc_give_places(task, task->layers_max, error);
 }
 
 static bool reserve(struct ldc_task *task, struct error *error)
@@ -82,15 +79,15 @@ static bool note_layer(struct ldc_task *task, unsigned from, uint32_t layer, str
     const struct gpu_program *program = ldc_use(device, "ldc/peeled.comp", error);
     if (!program)
         return false;
-    gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
+    gpu_buffer_bind_texels(device, &builder->occupied, UNIT_LDC_OCCUPIED, GL_R32UI);
     gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
     gpu_texture_bind(&builder->layers[from], UNIT_LDC_LAYER);
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
     gpu_buffer_bind_image(device, &builder->found, IMAGE_LDC_FOUND, GL_R32UI);
-    gpu_uniform_uint(program, "texel_count", task->texel_count);
+    gpu_uniform_uint(program, "occupied_count", task->counts.occupied);
     gpu_uniform_uint(program, "texels_along", task->cube->resolution);
     gpu_uniform_uint(program, "layer", layer);
-    gpu_dispatch(device, program, task->texel_count);
+    gpu_dispatch(device, program, task->counts.occupied);
     return true;
 }
 
@@ -104,7 +101,6 @@ bool ldc_peel(struct ldc_task *task, struct error *error)
     if (!count_fragments(task, error) || !reserve(task, error))
         return false;
     task->peeled = true;
-    task->ordered_count = task->counts.places;
     uint32_t layers =
         task->counts.layers_needed < task->layers_max ? task->counts.layers_needed : task->layers_max;
     gpu_buffer_clear(builder->device, &builder->found, 0);

@@ -24,11 +24,13 @@ struct ldc_builder {
     struct gpu_framebuffer plain; /* without attachments, three layers */
     uint32_t plain_along;         /* its texels along a side; 0: not made yet */
     /* shared/ldc_build.h */
-    struct gpu_buffer counts, found, fragments, places, ordered, visible, drawn, build;
+    struct gpu_buffer counts, occupied, ordered, places, fragments, found, visible, drawn, build;
     struct gpu_buffer commands;
     /* Peeling: what is visible in the layer that is drawn and in the one before it, by turns. */
     struct gpu_texture layers[2], depth;
     struct gpu_framebuffer layer_framebuffers[2];
+    uint32_t slots;         /* of a texel: what the last build in one pass suggests */
+    uint32_t slots_texels;  /* of how many texels that was */
     uint32_t fragments_max; /* for which there is room in `fragments` */
     /* Of the present build. */
     struct ldc_run *runs;
@@ -45,7 +47,7 @@ struct ldc_task {
     uint32_t texel_count;
     uint32_t layers_max;
     bool peeled;                    /* `ordered` is sorted, and `found` says how many each texel has */
-    uint32_t ordered_count;         /* fragments in `ordered` */
+    uint32_t slots;                 /* in `ordered` */
     struct ldc_build_counts counts; /* as last read back */
 };
 
@@ -63,9 +65,9 @@ bool ldc_draw_bind_plain(struct ldc_task *task, struct error *error);
 bool ldc_lists(struct ldc_task *task, struct error *error);
 /* ldc_build_peel.c. Likewise. */
 bool ldc_peel(struct ldc_task *task, struct error *error);
-/* Gives at most task->layers_max or, `all`, all of a texel's fragments places in `ordered`; counts how many that
- * are, and the most of one texel. */
-bool ldc_give_places(struct ldc_task *task, bool all, struct error *error);
+/* From `counts`: what is occupied, where fragments without slots lie, sums; reads task->counts back. Of a texel no
+ * more than `kept` fragments are in `ordered`. */
+bool ldc_give_places(struct ldc_task *task, uint32_t kept, struct error *error);
 
 /* ldc_build_pack.c. From `ordered` to the cube's buffers. */
 bool ldc_pack(struct ldc_task *task, struct error *error);

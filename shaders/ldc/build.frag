@@ -5,7 +5,7 @@
 //   PRIMITIVE_KIND  as in build.vert
 //   HAS_CUTOUT      triangles or spheres may have holes
 //   HAS_SPHERES     with PRIMITIVE_KIND 1
-//   BUILD_PASS      0: each texel's fragments go into the list; 1: they are counted only; 2: of those behind the layer
+//   BUILD_PASS      0: each texel's fragments are noted; 1: they are counted only; 2: of those behind the layer
 //                   before, the nearest is kept (depth peeling)
 
 #include "shared/ldc.h"
@@ -34,7 +34,10 @@ layout(location = 0) out uvec2 visible;
 layout(binding = IMAGE_LDC_COUNTS, r32ui) uniform uimageBuffer counts;
 #endif
 #if BUILD_PASS == 0
-uniform uint fragments_max;
+uniform uint texel_count;
+uniform uint slots;         // fragments of a texel that have a slot
+uniform uint fragments_max; // that there is room for without
+layout(binding = IMAGE_LDC_ORDERED, rg32ui) writeonly uniform uimageBuffer ordered;
 layout(binding = IMAGE_LDC_FRAGMENTS, rgba32ui) writeonly uniform uimageBuffer fragments;
 layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
 #endif
@@ -55,9 +58,13 @@ void record(float depth_cells)
 {
     uint texel = texel_number();
     uint number = imageAtomicAdd(counts, int(texel), 1u);
-    uint node = atomicAdd(build.fragments, 1u);
-    if (node < fragments_max)
-        imageStore(fragments, int(node), uvec4(texel, number, floatBitsToUint(depth_cells), primitive.x));
+    if (number < slots) {
+        imageStore(ordered, int(number * texel_count + texel), uvec4(floatBitsToUint(depth_cells), primitive.x, 0u, 0u));
+    } else {
+        uint node = atomicAdd(build.unslotted, 1u);
+        if (node < fragments_max)
+            imageStore(fragments, int(node), uvec4(texel, number, floatBitsToUint(depth_cells), primitive.x));
+    }
 }
 #elif BUILD_PASS == 1
 void record(float depth_cells)

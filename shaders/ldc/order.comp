@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Fragments, which came in any order, to their texels' places.
+// Fragments that there was no slot for, which came in any order, to their texels' places.
 
 #include "shared/ldc_build.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 
 uniform uint fragment_count;
+uniform uint texel_count;
+uniform uint slots;
 
 layout(binding = UNIT_LDC_FRAGMENTS) uniform usamplerBuffer fragments;
 layout(binding = UNIT_LDC_PLACES) uniform usamplerBuffer places;
@@ -17,6 +19,6 @@ void main()
     if (k >= fragment_count)
         return;
     uvec4 fragment = texelFetch(fragments, int(k));
-    uint place = texelFetch(places, int(fragment.x)).x + fragment.y;
+    uint place = slots * texel_count + texelFetch(places, int(fragment.x)).x + (fragment.y - slots);
     imageStore(ordered, int(place), uvec4(fragment.zw, 0u, 0u));
 }

@@ -8,12 +8,16 @@
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 
+uniform uint occupied_count;
 uniform uint texel_count;
+uniform uint texels_along; // a side of the images
+uniform uint slots;
 uniform uint first_texel, first_sample, first_quad; // of the cube
 uniform uint layers_max;                            // at most 255
 
 layout(binding = UNIT_LDC_COUNTS) uniform usamplerBuffer counts;
 layout(binding = UNIT_LDC_PLACES) uniform usamplerBuffer places;
+layout(binding = UNIT_LDC_OCCUPIED) uniform usamplerBuffer occupied;
 #ifdef PEELED
 layout(binding = UNIT_LDC_FOUND) uniform usamplerBuffer found;
 #endif
@@ -23,98 +27,152 @@ layout(binding = IMAGE_LDC_QUADS, rgba32f) writeonly uniform imageBuffer quads_o
 layout(binding = IMAGE_LDC_VISIBLE, rgba32ui) writeonly uniform uimageBuffer visible;
 layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
 
+// A texel's fragments: those with slots, then those without.
+struct run {
+    uint bits, texel, place, count;
+};
+
+run run_of(uint number)
+{
+    uint bits = texelFetch(occupied, int(number)).x;
+    uint texel = ((bits >> 24) * texels_along + (bits >> 12 & 4095u)) * texels_along + (bits & 4095u);
+    uint count = texelFetch(counts, int(texel)).x;
+    return run(bits, texel, slots * texel_count + texelFetch(places, int(texel)).x - slots, count);
+}
+
+int index_of(run r, uint i)
+{
+    return int(i < slots ? i * texel_count + r.texel : r.place + i);
+}
+
+uvec2 load(run r, uint i)
+{
+    return imageLoad(ordered, index_of(r, i)).xy;
+}
+
+#ifndef PEELED
+void store(run r, uint i, uvec2 fragment)
+{
+    imageStore(ordered, index_of(r, i), uvec4(fragment, 0u, 0u));
+}
+
 bool before(uvec2 a, uvec2 b)
 {
     return a.x < b.x || a.x == b.x && a.y < b.y; // depths are not negative: their bits ascend as they do
 }
 
-#ifndef PEELED
-void sort(uint place, uint count)
+void in_order(inout uvec2 a, inout uvec2 b)
 {
-    for (uint i = 1u; i < count; i++) {
-        uvec2 moved = imageLoad(ordered, int(place + i)).xy;
-        uint k = i;
-        for (; k > 0u; k--) {
-            uvec2 above = imageLoad(ordered, int(place + k - 1u)).xy;
-            if (!before(moved, above))
-                break;
-            imageStore(ordered, int(place + k), uvec4(above, 0u, 0u));
-        }
-        imageStore(ordered, int(place + k), uvec4(moved, 0u, 0u));
-    }
+    bool turned = before(b, a);
+    uvec2 least = turned ? b : a;
+    b = turned ? a : b;
+    a = least;
 }
 
-// Those that stay, moved together; their number.
-uint keep(uint place, uint count)
+// The first four in registers, the rest by insertion: most texels have few, and where there are many they often come
+// in some order. Whether some coincide.
+bool sort(run r)
 {
-    uint kept = 0u, last = LDC_NO_DEPTH_BITS;
-    for (uint i = 0u; i < count && kept < layers_max; i++) {
-        uvec2 own = imageLoad(ordered, int(place + i)).xy;
-        if (own.x == last)
-            continue;
-        last = own.x;
-        if (kept != i)
-            imageStore(ordered, int(place + kept), uvec4(own, 0u, 0u));
-        kept++;
+    const uvec2 NONE = uvec2(0xffffffffu);
+    bool coincide = false;
+    if (r.count > 1u) {
+        uvec2 a = load(r, 0u), b = load(r, 1u);
+        uvec2 c = r.count > 2u ? load(r, 2u) : NONE, d = r.count > 3u ? load(r, 3u) : NONE;
+        in_order(a, b);
+        in_order(c, d);
+        in_order(a, c);
+        in_order(b, d);
+        in_order(b, c);
+        store(r, 0u, a);
+        store(r, 1u, b);
+        if (r.count > 2u)
+            store(r, 2u, c);
+        if (r.count > 3u)
+            store(r, 3u, d);
+        coincide = a.x == b.x || r.count > 2u && b.x == c.x || r.count > 3u && c.x == d.x;
+    }
+    for (uint i = 4u; i < r.count; i++) {
+        uvec2 moved = load(r, i);
+        uint k = i;
+        for (; k > 0u; k--) {
+            uvec2 above = load(r, k - 1u);
+            coincide = coincide || above.x == moved.x;
+            if (!before(moved, above))
+                break;
+            store(r, k, above);
+        }
+        if (k != i)
+            store(r, k, moved);
+    }
+    return coincide;
+}
+
+// Of sorted ones, of which some coincide.
+uint count_kept(run r, bool coincide)
+{
+    uint kept = coincide ? 0u : r.count < layers_max ? r.count : layers_max, last = LDC_NO_DEPTH_BITS;
+    for (uint i = 0u; coincide && i < r.count && kept < layers_max; i++) {
+        uint depth = load(r, i).x;
+        kept += depth != last ? 1u : 0u;
+        last = depth;
     }
     return kept;
 }
 #endif
 
+// Writes a texel with `kept` samples.
+void emit(run r, uint kept, uint sample_, uint quad)
+{
+    uint at = sample_ - first_sample, last = LDC_NO_DEPTH_BITS, taken = 0u, quad_at = quad;
+    vec2 range = vec2(LDC_NO_DEPTH, -LDC_NO_DEPTH);
+    vec4 depths = vec4(LDC_NO_DEPTH);
+    for (uint i = 0u; taken < kept; i++) {
+        uvec2 fragment = load(r, i);
+        if (fragment.x == last)
+            continue;
+        last = fragment.x;
+        float depth = uintBitsToFloat(fragment.x);
+        range = vec2(taken == 0u ? depth : range.x, depth);
+        uint part = taken & 3u;
+        depths = vec4(part == 0u ? depth : depths.x, part == 1u ? depth : part == 0u ? LDC_NO_DEPTH : depths.y,
+                      part == 2u ? depth : part == 0u ? LDC_NO_DEPTH : depths.z, part == 3u ? depth : LDC_NO_DEPTH);
+        imageStore(visible, int(at + taken), uvec4(r.bits, fragment, 0u));
+        taken++;
+        if (part == 3u || taken == kept)
+            imageStore(quads_out, int(quad_at++), depths);
+    }
+    imageStore(texels_out, int(first_texel + r.texel),
+               uvec4(sample_, quad << LDC_TEXEL_QUAD_SHIFT | kept, floatBitsToUint(range)));
+}
+
 void main()
 {
     uint begin = item_index() * LDC_PACK_TEXELS;
-    if (begin >= texel_count)
+    if (begin >= occupied_count)
         return;
-    uint end = begin + LDC_PACK_TEXELS < texel_count ? begin + LDC_PACK_TEXELS : texel_count;
-    uvec2 kept = uvec2(0u); // eight numbers of a byte
+    uint end = begin + LDC_PACK_TEXELS < occupied_count ? begin + LDC_PACK_TEXELS : occupied_count;
+    uvec2 bytes = uvec2(0u); // what each of the eight keeps
     uint samples = 0u, quads = 0u;
-    for (uint texel = begin; texel < end; texel++) {
-        uint count = texelFetch(counts, int(texel)).x, place = texelFetch(places, int(texel)).x;
-        uint shift = (texel & 3u) * 8u;
+    for (uint k = begin; k < end; k++) {
+        run r = run_of(k);
 #ifdef PEELED
-        uint own = texelFetch(found, int(texel)).x;
+        uint kept = texelFetch(found, int(r.texel)).x;
 #else
-        sort(place, count);
-        uint own = keep(place, count);
+        uint kept = count_kept(r, sort(r));
 #endif
-        samples += own;
-        quads += (own + 3u) >> 2;
-        if ((texel & 4u) == 0u)
-            kept.x |= own << shift;
-        else
-            kept.y |= own << shift;
-        if (own == layers_max && count > own)
-            atomicAdd(build.samples_lost, count - own);
+        samples += kept;
+        quads += (kept + 3u) >> 2;
+        uint shift = (k & 3u) * 8u;
+        bytes = (k & 4u) == 0u ? uvec2(bytes.x | kept << shift, bytes.y) : uvec2(bytes.x, bytes.y | kept << shift);
+        if (kept == layers_max && r.count > kept)
+            atomicAdd(build.samples_lost, r.count - kept);
     }
-    uint sample_ = first_sample, quad = first_quad;
-    if (samples > 0u) {
-        sample_ += atomicAdd(build.samples, samples);
-        quad += atomicAdd(build.quads, quads);
-    }
-    for (uint texel = begin; texel < end; texel++) {
-        uint own = ((texel & 4u) == 0u ? kept.x : kept.y) >> (texel & 3u) * 8u & 255u;
-        uint place = texelFetch(places, int(texel)).x;
-        vec2 range = vec2(LDC_NO_DEPTH, -LDC_NO_DEPTH);
-        uvec4 texel_out = uvec4(sample_, quad << LDC_TEXEL_QUAD_SHIFT | own, 0u, 0u);
-        for (uint i = 0u; i < own; i += 4u) {
-            vec4 depths = vec4(LDC_NO_DEPTH);
-            for (uint k = 0u; k < 4u; k++) {
-                if (i + k >= own)
-                    break;
-                uvec2 fragment = imageLoad(ordered, int(place + i + k)).xy;
-                float depth = uintBitsToFloat(fragment.x);
-                depths[k] = depth;
-                range = vec2(i + k == 0u ? depth : range.x, depth);
-                imageStore(visible, int(sample_ - first_sample), uvec4(texel, fragment, 0u));
-                sample_++;
-            }
-            imageStore(quads_out, int(quad), depths);
-            quad++;
-        }
-        texel_out.zw = floatBitsToUint(range);
-        if (own == 0u)
-            texel_out.xy = uvec2(0u);
-        imageStore(texels_out, int(first_texel + texel), texel_out);
+    uint sample_ = first_sample + atomicAdd(build.samples, samples);
+    uint quad = first_quad + atomicAdd(build.quads, quads);
+    for (uint k = begin; k < end; k++) {
+        uint kept = ((k & 4u) == 0u ? bytes.x : bytes.y) >> (k & 3u) * 8u & 255u;
+        emit(run_of(k), kept, sample_, quad);
+        sample_ += kept;
+        quad += (kept + 3u) >> 2;
     }
 }

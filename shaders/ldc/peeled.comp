@@ -5,11 +5,11 @@
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 
-uniform uint texel_count;
-uniform uint texels_along;
-uniform uint layer; // 0, 1, ..
+uniform uint occupied_count;
+uniform uint texels_along; // a side of the images
+uniform uint layer;        // 0, 1, ..
 
-layout(binding = UNIT_LDC_COUNTS) uniform usamplerBuffer counts;
+layout(binding = UNIT_LDC_OCCUPIED) uniform usamplerBuffer occupied;
 layout(binding = UNIT_LDC_PLACES) uniform usamplerBuffer places;
 layout(binding = UNIT_LDC_LAYER) uniform usampler2DArray peeled; // depth, id
 layout(binding = IMAGE_LDC_ORDERED, rg32ui) writeonly uniform uimageBuffer ordered;
@@ -17,13 +17,14 @@ layout(binding = IMAGE_LDC_FOUND, r32ui) writeonly uniform uimageBuffer found;
 
 void main()
 {
-    uint texel = item_index();
-    if (texel >= texel_count || texelFetch(counts, int(texel)).x <= layer)
+    uint k = item_index();
+    if (k >= occupied_count)
         return;
-    uint row = texel / texels_along, axis = row / texels_along;
-    uvec2 fragment = texelFetch(peeled, ivec3(texel - row * texels_along, row - axis * texels_along, axis), 0).xy;
+    uint bits = texelFetch(occupied, int(k)).x, u = bits & 4095u, v = bits >> 12 & 4095u, axis = bits >> 24;
+    uvec2 fragment = texelFetch(peeled, ivec3(u, v, axis), 0).xy;
     if (fragment.y == LDC_NO_ID)
         return;
-    imageStore(ordered, int(texelFetch(places, int(texel)).x + layer), uvec4(fragment, 0u, 0u));
-    imageStore(found, int(texel), uvec4(layer + 1u));
+    int texel = int((axis * texels_along + v) * texels_along + u);
+    imageStore(ordered, int(texelFetch(places, texel).x + layer), uvec4(fragment, 0u, 0u));
+    imageStore(found, texel, uvec4(layer + 1u));
 }

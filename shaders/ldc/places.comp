@@ -1,37 +1,61 @@
 // SPDX-License-Identifier: MIT
-// Where each texel's fragments are to lie: places in `ordered`, those of neighbouring texels side by side.
+// Which texels have fragments, how many those are in all, and where those lie that there are no slots for.
 
 #include "shared/ldc_build.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 
 uniform uint texel_count;
+uniform uint texels_along; // a side of the images
+uniform uint slots;          // fragments of a texel that have a slot
 uniform uint fragments_kept; // of one texel
 
 layout(binding = UNIT_LDC_COUNTS) uniform usamplerBuffer counts;
 layout(binding = IMAGE_LDC_PLACES, r32ui) writeonly uniform uimageBuffer places;
+layout(binding = IMAGE_LDC_OCCUPIED, r32ui) writeonly uniform uimageBuffer occupied;
 layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
-
 
 void main()
 {
     uint first = item_index() * LDC_PLACES_TEXELS;
     if (first >= texel_count)
         return;
-    uint end = first + LDC_PLACES_TEXELS < texel_count ? first + LDC_PLACES_TEXELS : texel_count, sum = 0u, most = 0u;
+    uint end = first + LDC_PLACES_TEXELS < texel_count ? first + LDC_PLACES_TEXELS : texel_count;
+    uint sum = 0u, most = 0u, filled = 0u, kept = 0u, quads = 0u, deep = 0u;
     for (uint texel = first; texel < end; texel++) {
         uint count = texelFetch(counts, int(texel)).x;
-        sum += count < fragments_kept ? count : fragments_kept;
+        uint own = count < fragments_kept ? count : fragments_kept;
+        sum += count;
         most = count > most ? count : most;
+        filled += count > 0u ? 1u : 0u;
+        kept += own;
+        quads += (own + 3u) >> 2;
+        deep += own > slots ? own - slots : 0u;
     }
     if (sum == 0u)
         return;
-    uint place = atomicAdd(build.places, sum);
+    atomicAdd(build.fragments, sum);
+    atomicAdd(build.samples_max, kept);
+    atomicAdd(build.quads_max, quads);
     if (most > build.layers_needed) // rarely; the atomic is dear
         atomicMax(build.layers_needed, most);
+    uint at = atomicAdd(build.occupied, filled), place = deep > 0u ? atomicAdd(build.places, deep) : 0u;
+    uint row = first / texels_along, u = first - row * texels_along, axis = row / texels_along;
+    uint bits = axis << 24 | row - axis * texels_along << 12;
     for (uint texel = first; texel < end; texel++) {
-        imageStore(places, int(texel), uvec4(place));
         uint count = texelFetch(counts, int(texel)).x;
-        place += count < fragments_kept ? count : fragments_kept;
+        if (count > 0u)
+            imageStore(occupied, int(at++), uvec4(bits | u));
+        u++;
+        if (u == texels_along) {
+            u = 0u;
+            row = bits >> 12 & 4095u;
+            bits = row + 1u < texels_along ? bits + 4096u : (bits >> 24) + 1u << 24;
+        }
+        uint own = count < fragments_kept ? count : fragments_kept;
+        if (own > slots) {
+            imageStore(places, int(texel), uvec4(place));
+            place += own - slots;
+        }
     }
 }

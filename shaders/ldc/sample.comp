@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Of what the surface is made at each sample: geometry and surface of shared/ldc.h. Textures are applied over the size
 // of a cell, as common/material.glsl applies them; what the material itself says is not.
-// Defines: those of common/material.glsl.
+// Defines: those of common/material.glsl; HAS_COLOURS: some mesh has vertex colours.
 
 #include "shared/ldc.h"
 #include "shared/ldc_build.h"
@@ -20,8 +20,8 @@ layout(binding = UNIT_LDC_DRAWN) uniform usamplerBuffer drawn;
 layout(binding = IMAGE_LDC_GEOMETRY, rg32ui) writeonly uniform uimageBuffer geometry_out;
 layout(binding = IMAGE_LDC_SURFACE, rgba32ui) writeonly uniform uimageBuffer surface_out;
 
-// Which instance an id belongs to, and the primitive's scene-wide number.
-uvec2 primitive_of(uint id)
+// The entry of `drawn` that an id belongs to.
+uvec4 drawn_of(uint id)
 {
     uint first = 0u, count = drawn_count;
     while (count > 1u) {
@@ -30,13 +30,7 @@ uvec2 primitive_of(uint id)
         first = beyond ? first + half_ : first;
         count = beyond ? count - half_ : half_;
     }
-    uvec4 found = texelFetch(drawn, int(first));
-    return uvec2(found.z, id - found.y);
-}
-
-vec3 place_in_cells(instance i, uint vertex)
-{
-    return (affine_point(i.world_from_object, texelFetch(positions, int(vertex)).xyz) - lower_world) / cell_world;
+    return texelFetch(drawn, int(first));
 }
 
 float cross_2d(vec2 a, vec2 b)
@@ -44,25 +38,95 @@ float cross_2d(vec2 a, vec2 b)
     return a.x * b.y - a.y * b.x;
 }
 
-// Of the point under the texel's middle; drawn edges are a little elsewhere than exact ones.
-vec2 barycentrics_at(uvec2 primitive, int u, int v, vec2 middle)
+// Of a primitive under the middle of a texel.
+struct point {
+    uint instance_index, primitive;
+    uint flags; // LDC_DRAWN_*
+    int axis, u, v;
+    vec2 middle;       // u, v in cells
+    float depth_cells;
+};
+
+// A triangle's corners, in cells, and where in it the point is.
+struct placed_triangle {
+    uvec4 vertices; // and the material
+    vec4 world_from_object[3];
+    vec3 e1, e2;
+    vec2 barycentrics;
+};
+
+// Edges as they are drawn lie a little elsewhere than exact ones: the point is taken into the triangle.
+placed_triangle place_triangle(point p)
 {
-    instance i = instance_at(primitive.x);
-    uvec4 triangle = texelFetch(triangles, int(primitive.y));
-    vec3 p0 = place_in_cells(i, triangle.x);
-    vec3 e1 = place_in_cells(i, triangle.y) - p0, e2 = place_in_cells(i, triangle.z) - p0;
-    vec2 a = vec2(e1[u], e1[v]), b = vec2(e2[u], e2[v]), c = middle - vec2(p0[u], p0[v]);
+    placed_triangle t;
+    int first_row = int(p.instance_index) * INSTANCE_TEXELS;
+    for (int row = 0; row < 3; row++)
+        t.world_from_object[row] = uintBitsToFloat(texelFetch(instances, first_row + row));
+    t.vertices = texelFetch(triangles, int(p.primitive));
+    vec3 p0 = texelFetch(positions, int(t.vertices.x)).xyz;
+    t.e1 = affine_vector(t.world_from_object, texelFetch(positions, int(t.vertices.y)).xyz - p0) / cell_world;
+    t.e2 = affine_vector(t.world_from_object, texelFetch(positions, int(t.vertices.z)).xyz - p0) / cell_world;
+    p0 = (affine_point(t.world_from_object, p0) - lower_world) / cell_world;
+    vec2 a = vec2(t.e1[p.u], t.e1[p.v]), b = vec2(t.e2[p.u], t.e2[p.v]), c = p.middle - vec2(p0[p.u], p0[p.v]);
     float area = cross_2d(a, b);
     vec2 weights = area != 0.0 ? vec2(cross_2d(c, b), cross_2d(a, c)) / area : vec2(0.0);
     weights = clamp(weights, vec2(0.0), vec2(1.0));
     float sum = weights.x + weights.y;
-    return sum > 1.0 ? weights / sum : weights;
+    t.barycentrics = sum > 1.0 ? weights / sum : weights;
+    return t;
+}
+
+#if !defined HAS_TEXTURES && !defined HAS_BUMP
+// What surface_triangle() of common/surface.glsl finds, with half of its fetches: no texture coordinates, no tangent.
+hit plain_triangle(point p)
+{
+    placed_triangle t = place_triangle(p);
+    float side = (p.flags & LDC_DRAWN_MIRRORED) != 0u ? -1.0 : 1.0;
+    vec3 geometric = normalize(cross(t.e1, t.e2)) * side, shading = geometric;
+    vec3 weights = triangle_weights(t.barycentrics);
+    if ((p.flags & LDC_DRAWN_NORMALS) != 0u) {
+        vec3 sum = texelFetch(normals, int(t.vertices.x)).xyz * weights.x +
+                   texelFetch(normals, int(t.vertices.y)).xyz * weights.y +
+                   texelFetch(normals, int(t.vertices.z)).xyz * weights.z;
+        vec4 rows[3] = t.world_from_object;
+        float most = greatest(max(abs(rows[0].xyz), max(abs(rows[1].xyz), abs(rows[2].xyz))));
+        vec3 r0 = rows[0].xyz / most, r1 = rows[1].xyz / most, r2 = rows[2].xyz / most;
+        // Cofactors: the inverse, transposed, but for the determinant, of which only the sign is of account.
+        vec3 interpolated = side * vec3(dot(cross(r1, r2), sum), dot(cross(r2, r0), sum), dot(cross(r0, r1), sum));
+        float squared = dot(interpolated, interpolated);
+        if (squared > 0.0)
+            shading = interpolated * inversesqrt(squared);
+    }
+    vec4 colour = vec4(1.0);
+#ifdef HAS_COLOURS
+    if ((p.flags & LDC_DRAWN_COLOURS) != 0u)
+        colour = triangle_colour(t.vertices, GEOMETRY_HAS_COLOURS, weights);
+#endif
+    return finish_hit(t.vertices.w, 0.0, vec3(0.0), geometric, shading, vec4(0.0), vec4(0.0), colour);
+}
+#endif
+
+hit hit_at(point p, vec3 origin, vec3 direction)
+{
+#ifdef HAS_SPHERES
+    if ((p.flags & LDC_DRAWN_SPHERES) != 0u)
+        return surface_sphere(p.instance_index, p.primitive, p.depth_cells * cell_world, origin, direction, 0.0);
+#endif
+#if defined HAS_TEXTURES || defined HAS_BUMP
+    return surface_triangle(p.instance_index, p.primitive, place_triangle(p).barycentrics, 0.0, direction, 0.0);
+#else
+    return plain_triangle(p);
+#endif
 }
 
 uvec4 words_of(surface s, vec4 colour, uint material_index)
 {
     surface_sample stored;
+#if defined HAS_TEXTURES || defined HAS_COLOURS
     stored.base_colour = colour;
+#else
+    stored.base_colour = vec4(1.0); // known to the compiler
+#endif
     stored.normal = s.normal;
     stored.material = material_index;
     stored.metallic = s.metallic;
@@ -79,23 +143,23 @@ void main()
     if (k >= sample_count)
         return;
     uvec4 found = texelFetch(visible, int(k));
-    uint texel = found.x, row = texel / texels_along;
-    int axis = int(row / texels_along), u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
-    vec2 middle = vec2(texel - row * texels_along, row - uint(axis) * texels_along) + 0.5;
-    float depth_cells = uintBitsToFloat(found.y);
-    uvec2 primitive = primitive_of(found.z);
+    uvec4 of = drawn_of(found.z);
+    point p;
+    p.instance_index = of.z;
+    p.primitive = found.z - of.y;
+    p.flags = of.w;
+    p.axis = int(found.x >> 24);
+    p.u = p.axis == 2 ? 0 : p.axis + 1;
+    p.v = p.axis == 0 ? 2 : p.axis - 1;
+    p.middle = vec2(found.x & 4095u, found.x >> 12 & 4095u) + 0.5;
+    p.depth_cells = uintBitsToFloat(found.y);
 
     vec3 origin = vec3(0.0), direction = vec3(0.0);
-    origin[u] = middle.x * cell_world;
-    origin[v] = middle.y * cell_world;
+    origin[p.u] = p.middle.x * cell_world;
+    origin[p.v] = p.middle.y * cell_world;
     origin += lower_world;
-    direction[axis] = 1.0;
-    candidate at = candidate(depth_cells * cell_world, primitive.y, primitive.x, vec2(0.0));
-#ifdef HAS_SPHERES
-    if (geometry_at(instance_at(primitive.x).geometry).kind != GEOMETRY_SPHERES)
-#endif
-        at.barycentrics = barycentrics_at(primitive, u, v, middle);
-    hit h = surface_of(at, origin, direction, 0.0);
+    direction[p.axis] = 1.0;
+    hit h = hit_at(p, origin, direction);
 
     surface s;
     s.geometric = unpack_unit(h.normal_geometric);

@@ -28,9 +28,10 @@
 #define IMAGE_NORMALS 1
 #define IMAGE_TANGENTS 2
 #define IMAGE_LDC_COUNTS 0 /* ldc/build.*, and the passes behind it: shared/ldc_build.h */
-#define IMAGE_LDC_FRAGMENTS 1
-#define IMAGE_LDC_PLACES 0
 #define IMAGE_LDC_ORDERED 1
+#define IMAGE_LDC_FRAGMENTS 2
+#define IMAGE_LDC_PLACES 2
+#define IMAGE_LDC_OCCUPIED 3
 #define IMAGE_LDC_FOUND 2
 #define IMAGE_LDC_TEXELS 2
 #define IMAGE_LDC_QUADS 3
@@ -80,6 +81,7 @@
 #define UNIT_LDC_VISIBLE UNIT_TRACER_3
 #define UNIT_LDC_DRAWN UNIT_TRACER_4
 #define UNIT_LDC_LAYER UNIT_TRACER_5
+#define UNIT_LDC_OCCUPIED UNIT_TRACER_6
 #define UNIT_PASS_0 16
 #define UNIT_PASS_1 17
 #define UNIT_RAYS 18

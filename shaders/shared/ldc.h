@@ -11,7 +11,7 @@
  * The paper has each triangle in one image. Where a surface goes over from one image to another there are texels
  * then whose middle the last triangle of the one does not reach, nor does the first of the other: cracks of up to
  * half a cell, through which a few rays of ten thousand see what is behind. Overlapping images leave none while
- * the surface turns by less than nine degrees from one triangle to the next, and cost a sixth more samples on a
+ * the surface turns by less than nine degrees from one triangle to the next, and cost a seventh more samples on a
  * sphere.
  *
  * Five buffers, the cubes of a tracer one behind the other in each:

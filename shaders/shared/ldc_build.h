@@ -6,32 +6,39 @@
 
 /* Counted while a cube is built. */
 struct ldc_build_counts {
-    uint fragments;     /* that fell on texels, also where there was no room to note them */
+    uint unslotted;     /* fragments that there was no slot for, also where there was no room to note them */
+    uint fragments;     /* all that fell on texels */
     uint layers_needed; /* most of them on one texel */
-    uint samples;       /* kept: coincident ones are one */
-    uint quads;
+    uint occupied;      /* texels with any */
+    uint places;        /* for fragments without a slot, of those that are kept */
+    uint samples_max, quads_max; /* if no two fragments coincide */
+    uint samples, quads;         /* kept: coincident ones are one */
     uint samples_lost; /* fragments behind the farthest sample that could be kept, of texels that have more */
-    uint places;       /* of fragments in `ordered` */
     uint pad0, pad1;
 };
-SHARED_SIZE(ldc_build_counts, 32)
+SHARED_SIZE(ldc_build_counts, 48)
 
-/* Texels that one invocation packs: their samples lie together, and places are asked for once. */
+/* Occupied texels that one invocation packs: their samples lie together, and places are asked for once. */
 #define LDC_PACK_TEXELS 8u
-/* Texels to whose fragments one invocation gives places. */
+/* Texels that one invocation looks at to see what is occupied. */
 #define LDC_PLACES_TEXELS 32u
 
 #define LDC_NO_ID 0xffffffffu
+#define LDC_DRAWN_NORMALS 1u /* what its vertices have */
+#define LDC_DRAWN_COLOURS 2u
+#define LDC_DRAWN_SPHERES 4u
+#define LDC_DRAWN_MIRRORED 8u
 
 /* A drawn primitive has an id: primitives of all instances are counted through, in the order of the instances. Ids
  * ascend as instances and primitives do.
  *   drawn      RGBA32UI, one an instance: first id; what is added to a primitive's scene-wide number to make its
- *              id; the instance; 0
+ *              id; the instance; LDC_DRAWN_*
  *   counts     R32UI, one a texel: its fragments
- *   found      R32UI, one a texel: layers that were peeled off it
- *   fragments  RGBA32UI: texel, which one of the texel it is, depth (float, cells), id
- *   places     R32UI, one a texel: its first fragment in `ordered`
- *   ordered    RG32UI: depth, id; those of a texel together
- *   visible    RGBA32UI, one a sample: texel, depth, id, 0 */
+ *   occupied   R32UI: texels that have fragments, as bits: 0..11 u, 12..23 v, 24..25 axis
+ *   ordered    RG32UI: depth (float, cells), id. The first `slots` fragments of each texel have a slot: texels
+ * side by side, slot after slot. Then the others' places, those of a texel together places     R32UI, one a texel
+ * with more fragments than slots: the first of the others fragments  RGBA32UI, those others as they came: texel,
+ * which one of the texel it is, depth, id found      R32UI, one a texel: layers that were peeled off it visible
+ * RGBA32UI, one a sample: texel, depth, id, 0 */
 
 #endif

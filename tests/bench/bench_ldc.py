@@ -56,13 +56,17 @@ def resolutions(bench):
     return tuple(n // 16 for n in RESOLUTIONS) if bench.tiny else RESOLUTIONS
 
 
+def wave_size(bench):
+    return "64x64" if bench.tiny else "512x512"
+
+
 def forms_of(bench, names=RESOLUTIONS):
     return [argument for n, real in zip(RESOLUTIONS, resolutions(bench)) if n in names for argument in ldc(real)]
 
 
 def paper_rows(bench):
     """(paper's row, what stands for it, arguments that name it)"""
-    for paper in PAPER:
+    for paper in PAPER[:1] + PAPER[-1:] if bench.tiny else PAPER:
         _, _, _, _, name, generated, _ = paper
         path = bench.shared / name
         if path.is_file() and not bench.tiny:
@@ -70,7 +74,7 @@ def paper_rows(bench):
         elif isinstance(generated, str):
             yield paper, f"{generated} (bundled)", ["--model", bench.scenes / generated]
         else:
-            yield paper, f"generated, {generated[1]} triangles", ["--family", 1000] if bench.tiny else generated
+            yield paper, "generated", ["--family", 1000] if bench.tiny else generated
 
 
 def measure_table1(bench):
@@ -97,11 +101,11 @@ def models(bench, names, left_out):
 
 
 def measure_scenes(bench, left_out):
-    size = "64x64" if bench.tiny else "1024x1024"
-    scenes = dict([*models(bench, CLOSED, left_out), *models(bench, LARGE, left_out)])
-    scenes["family 147K"] = ["--family", 1000 if bench.tiny else 147000]
-    return [call(bench, "waves", title, 5, *model, "--size", size, "--waves", "reflection,bounce,shadow", *forms_of(bench),
-                 "--form", "bvh") for title, model in scenes.items()]
+    closed, large = dict(models(bench, CLOSED, left_out)), dict(models(bench, LARGE, left_out))
+    large["family 147K"] = ["--family", 1000 if bench.tiny else 147000]
+    return [call(bench, "waves", title, 5, *model, "--size", wave_size(bench), "--waves", "reflection,bounce,shadow",
+                 *forms_of(bench, RESOLUTIONS if title in closed else (512, 1024)), "--form", "bvh")
+            for title, model in {**large, **closed}.items()]
 
 
 def measure_pictures(bench, left_out):
@@ -113,10 +117,9 @@ def measure_pictures(bench, left_out):
 def measure_family(bench):
     """There and back, as a machine may grow slower meanwhile."""
     sizes = (500, 1000) if bench.tiny else FAMILY
-    size = "64x64" if bench.tiny else "1024x1024"
     results = {}
     for n in [*sizes, *(() if bench.runs == 1 else reversed(sizes))]:
-        got = call(bench, "waves", f"family {n}", 3, "--family", n, "--size", size, "--waves", "reflection",
+        got = call(bench, "waves", f"family {n}", 3, "--family", n, "--size", wave_size(bench), "--waves", "reflection",
                    *forms_of(bench, (USUAL,)), "--form", "bvh")
         if n not in results:
             results[n] = got
@@ -148,16 +151,15 @@ def variants(resolution, cell):
 
 def measure_variants(bench, scenes):
     """On two of the scenes, which have said how large a cell is."""
-    size = "64x64" if bench.tiny else "1024x1024"
     results = []
-    for scene in scenes[:1] + scenes[-1:]:
+    for scene in scenes[:1] if bench.tiny else scenes[:1] + scenes[-1:]:
         resolution = resolutions(bench)[RESOLUTIONS.index(USUAL)]
         cell = form_of(scene, resolution)["cubes"][0]["cell_metres"]
         model = ["--family", 1000 if bench.tiny else 147000] if scene["scene"] == "family" else ["--model", scene["scene"]]
         for what, options in variants(resolution, cell).items():
             forms = [argument for each in options for argument in ldc(resolution, **each)]
-            results.append({"what": what, **call(bench, "waves", scene["title"], 5, *model, "--size", size, "--waves",
-                                                 "reflection,bounce", *forms)})
+            results.append({"what": what, **call(bench, "waves", scene["title"], 5, *model, "--size", wave_size(bench),
+                                                 "--waves", "reflection,bounce", *forms)})
     return results
 
 

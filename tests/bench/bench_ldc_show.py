@@ -9,7 +9,8 @@ from bench_reach import show as show_wanted
 def show_table1(rows):
     """Ours beside the paper's; A builds, B is all the rest of the picture, of which tracing is a part."""
     lines = []
-    for (name, triangles, paper, paper_layers, *_), got in zip(PAPER, rows):
+    for got in rows:
+        name, triangles, paper, paper_layers, *_ = next(row for row in PAPER if row[0] == got["name"])
         forms = [at(got["frames"], n) for n in (512, 1024)]
         builds = [at(got["builds"], n)["build_ns"] if got["builds"] else form["build_ns"]
                   for n, form in zip((512, 1024), forms)]

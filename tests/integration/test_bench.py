@@ -15,13 +15,14 @@ BENCH = ROOT / "tests" / "bench"
 sys.path.insert(0, str(BENCH))
 import bench_common  # noqa: E402  pylint: disable=wrong-import-position
 import bench_frames  # noqa: E402  pylint: disable=wrong-import-position
+import bench_ldc  # noqa: E402  pylint: disable=wrong-import-position
 import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
 import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of bench_tracers
 PARTS = ("frames", "distributed", "tracers", "family", "pixels", "rays", "parallel", "instances",
-         "refit", "flake", "reach")
+         "refit", "flake", "ldc", "reach")
 
 
 class Figures(unittest.TestCase):
@@ -121,6 +122,24 @@ class Benchmark(unittest.TestCase):
         self.assertGreater(refit["rebuild_ms"]["least"], 0)
         self.assertLess(instances["update_ms"]["least"], instances["frame_ms"]["least"])
         self.assertEqual([row["spheres"] for row in self.document["parts"]["flake"]["frames"]], [91, 820, 7381])
+
+    def test_cubes_have_the_papers_table_and_are_held_against_bvh_and_the_reference(self):
+        data = self.document["parts"]["ldc"]
+        self.assertEqual([row["name"] for row in data["table1"]], ["bunny", "skinned figure"])
+        still, figure = data["table1"]
+        self.assertEqual([f["name"] for f in still["builds"]["forms"]], ["ldc:resolution=32", "ldc:resolution=64"])
+        self.assertEqual([c["part"] for c in figure["frames"]["forms"][0]["cubes"] if c["rebuilt"]], ["dynamic"])
+        for scene in data["scenes"]:
+            self.assertEqual([f["cubes"][0]["resolution"] for f in scene["forms"] if f["cubes"]][:2], [32, 64])
+            bvh = bench_ldc.form_of(scene, "bvh")
+            self.assertEqual([w["agree"] for w in bvh["waves"] if "agree" in w], [1, 1])
+        sheets = {r["depth"]: r for r in data["depths"] if "depth" in r}
+        for depth, result in sheets.items():
+            self.assertTrue(bench_ldc.same_samples(result))
+            self.assertEqual([f["cubes"][0]["layers_needed"] for f in result["forms"]], [depth, depth])
+        text = (self.out / "bench.txt").read_text()
+        for row in data["wanted"]:
+            self.assertIn(row["line"], text)
 
     def test_distributed_frames_stand_beside_a_plain_one(self):
         data = self.document["parts"]["distributed"]

@@ -103,13 +103,6 @@ class Cubes(Case):
         for words in ("warning: frame 0: the static cube has 1 of ", f"{cube['samples_lost']} samples", "limits.ldc_layers"):
             self.assertIn(words, result.stderr)
 
-    def test_memory_is_a_limit_too(self):
-        result = self.render(*LDC, "--ldc-resolution", "1024", "--timings=json",
-                             env={**os.environ, "FARLIGHT_MEMORY_LDC": "8M"})
-        cube, = frames_of(result)[0]["cubes"]
-        self.assertLess(cube["layers_kept"], cube["layers_needed"])
-        self.assertIn("memory.ldc", result.stderr)
-
     def test_exr_metadata_holds_the_size_of_a_cell(self):
         path = self.folder / "x.exr"
         self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", path, *SIZE, *LDC), 0)
@@ -131,6 +124,13 @@ class Animations(Case):
         # What moves is known from the first frame in which it does.
         self.assertIn("static", rebuilt[0])
         self.assertTrue(all("static" not in parts for parts in rebuilt[2:]), rebuilt)
+
+    def test_what_moves_while_the_shutter_is_open_is_refused(self):
+        result = self.expect(farlight("animate", bundled_scenes() / "carousel.glb", "--clip", "ride", "--frames", "1-2",
+                                      "--shutter", "0.5", "-o", self.folder / "%d.png", *SIZE, *LDC), 1)
+        for words in ("shutter", "ldc", "another tracer"):
+            self.assertIn(words, result.stderr)
+        self.assertEqual(self.leftovers(), [])
 
 
 class Comparison(Case):
