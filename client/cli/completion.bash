@@ -23,7 +23,7 @@ _farlight()
         --bvh-rays) words="0 1 2 3 4 8" ;;
         --ldc-resolution) words="512 1024 2048" ;;
         --ldc-build) words="auto peel lists" ;;
-        --ldc-levels) words="auto blocks pyramid" ;;
+        --ldc-levels) words="auto blocks pyramid cells" ;;
         --ldc-block) words="2 4 8 16 32" ;;
         --ldc-rays) words="0 1 4" ;;
         --primary) words="raster trace" ;;

@@ -68,7 +68,9 @@ static const struct argp_option options[] = {
      "Hit a sample where the ray comes this near to it (default 0: where it crosses the sample's plane)", 0},
     {"ldc-build", KEY_LDC_BUILD, "NAME", 0, "auto (default), peel: layer by layer, lists: all in one pass", 0},
     {"ldc-levels", KEY_LDC_LEVELS, "NAME", 0,
-     "What leads over emptiness: auto (default), blocks of one size, pyramid of all sizes", 0},
+     "What leads over emptiness: auto (default), blocks of one size, pyramid of all sizes, cells: one tree of all "
+     "three sides",
+     0},
     {"ldc-block", KEY_LDC_BLOCK, "N", 0, "Texels along a side of a block: 2, 4, 8, 16, 32 (default 8)", 0},
     {"ldc-rays", KEY_LDC_RAYS, "N", 0, "Rays that walk as one: 1, 4 (default 0: chosen)", 0},
     {NULL, 0, NULL, 0, "Talk:", 7},

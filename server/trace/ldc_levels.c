@@ -28,7 +28,8 @@ struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tr
         layout.image_nodes = layout.row * layout.row;
         return layout;
     }
-    if (options->ldc_levels == LDC_LEVELS_AUTO && !(options->ldc_tolerance > 0)) {
+    if (options->ldc_levels == LDC_LEVELS_CELLS ||
+        (options->ldc_levels == LDC_LEVELS_AUTO && !(options->ldc_tolerance > 0))) {
         layout.cells = true;
         layout.grid = (resolution + (1u << LDC_NODE_SHIFT) - 1) >> LDC_NODE_SHIFT;
         return layout;

@@ -1060,6 +1060,12 @@ static void settings_that_no_cube_has_are_refused_by_their_field(void **state)
         assert_string_equal(client.message.error.field, cases[i].field);
         assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
     }
+    struct message message = render_message(0, 1);
+    message.render.ldc_levels = PROTOCOL_LDC_LEVELS_CELLS;
+    message.render.ldc_tolerance = 0.5f;
+    send_message(20, 0, &message);
+    expect_error(20, PROTOCOL_ERROR_CODE_INVALID);
+    assert_string_equal(client.message.error.field, "render.ldc_levels");
 }
 
 static void cubes_of_a_frame_are_told(void **state)
