@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Sends a triangle to the image whose axis its normal leans to most (paper, figure 5), or to those where images overlap
-// (LDC_OVERLAP), with its plane in cells; a sphere to all three, as the square round it.
+// Sends a triangle to the image whose axis its normal leans to most (paper, figure 5), or to those where images overlap,
+// with its plane in cells; a sphere to all three, as the square round it.
 // Defines: PRIMITIVE_KIND 0 triangles, 1 spheres; HAS_CUTOUT: triangles may have holes.
 
 #include "shared/bindings.h"
 #include "shared/geometry.h"
-#include "shared/ldc.h"
 #include "common/math.glsl"
+#include "ldc/image.glsl"
 
 uniform float resolution; // cells along a side of the cube
 uniform vec3 lower_world; // of the cube
@@ -100,12 +100,11 @@ void main()
     vec3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
     vec3 lean = abs(normal), lower = min(corners[0], min(corners[1], corners[2])),
          upper = max(corners[0], max(corners[1], corners[2]));
-    float most = greatest(lean);
-    if (!(most > 0.0)) // no area
+    if (!(greatest(lean) > 0.0)) // no area
         return;
     for (int axis = 0; axis < 3; axis++) {
         int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
-        if (lean[axis] < LDC_OVERLAP * most)
+        if (!is_in_image(lean, axis))
             continue;
         if (!may_cover(vec2(corners[0][u], corners[0][v]), vec2(corners[1][u], corners[1][v]),
                        vec2(corners[2][u], corners[2][v])))

@@ -358,6 +358,73 @@ static void what_moves_is_seen_with_what_stands_still(void **state)
     expect_like_the_reference(fixture, "two cubes", PSNR_MIN);
 }
 
+/* ---- frames ---- */
+
+static void switching_to_another_tracer_and_back_builds_nothing(void **state)
+{
+    struct fixture *fixture = *state;
+    static const struct {
+        unsigned tracer;
+        bool builds;
+    } frames[] = {{LDC, true}, {BVH, false}, {LDC, false}, {BVH, false}, {LDC, false}};
+    add_mirrors(fixture);
+    request_picture(fixture);
+    fixture->request.tracer_options.ldc_resolution = 128;
+    for (size_t i = 0; i < sizeof(frames) / sizeof(frames[0]); i++) {
+        struct frame_result result = render(fixture, frames[i].tracer, "switched");
+        assert_int_equal(result.cubes[TRACER_CUBE_STATIC].rebuilt, frames[i].builds);
+        assert_int_equal(result.cubes[TRACER_CUBE_STATIC].resolution, frames[i].tracer == LDC ? 128 : 0);
+        frame_result_finish(&result);
+    }
+}
+
+/* A picture that goes on does so only with what it was begun with. */
+static void a_picture_of_other_cubes_begins_anew(void **state)
+{
+    struct fixture *fixture = *state;
+    add_mirrors(fixture);
+    fixture->request.tracer = LDC;
+    fixture->request.accumulate = true;
+    fixture->request.tracer_options.ldc_resolution = 64;
+    for (uint32_t i = 1; i <= 2; i++) {
+        struct frame_result result = fixture_render(fixture);
+        assert_int_equal(result.samples, i);
+        frame_result_finish(&result);
+    }
+    fixture->request.tracer_options.ldc_resolution = 128;
+    struct frame_result result = fixture_render(fixture);
+    assert_int_equal(result.samples, 1);
+    frame_result_finish(&result);
+}
+
+static void what_moves_while_the_shutter_is_open_is_refused_at_once(void **state)
+{
+    struct fixture *fixture = *state;
+    float m[12];
+    uint32_t mesh = add_shape_mesh(fixture, SHAPE_SPHERE, 16, add_matte(fixture, 0.5f, 0.5f, 0.5f));
+    uint32_t node = fixture_node(fixture, NODE_MESH, mesh, NULL);
+    fixture_commit(fixture);
+    struct pose_node places[2] = {{.node = node}, {.node = node}};
+    struct scene_pose poses[2] = {{.nodes = &places[0], .node_count = 1}, {.nodes = &places[1], .node_count = 1}};
+    for (int i = 0; i < 2; i++) {
+        turned(m, 1, 0, (float)i, 0, 0);
+        memcpy(places[i].parent_from_node, m, sizeof(m));
+    }
+    const struct scene_motion open = {.poses = poses, .pose_count = 2}, closed = {.poses = poses, .pose_count = 1};
+    fixture->request.tracer_options.ldc_resolution = 64;
+    for (int compare = 0; compare < 2; compare++) {
+        struct error error = {0};
+        fixture->request.tracer = compare ? BVH : LDC;
+        fixture->request.compare = compare;
+        fixture->request.compare_with = LDC;
+        assert_false(frame_begin(fixture->renderer, fixture->scene, &open, &fixture->request, &error));
+        assert_int_equal(error.kind, ERROR_UNSUPPORTED);
+        assert_string_equal(error.field, "shutter");
+        struct frame_result result = fixture_render_motion(fixture, &closed);
+        frame_result_finish(&result);
+    }
+}
+
 /* ---- rays ---- */
 
 /* The reference's own waves, its secondary rays answered by `ldc` too. */
@@ -452,6 +519,9 @@ int main(void)
         cmocka_unit_test_setup(spheres_are_like_the_references, fixture_clear),
         cmocka_unit_test_setup(distributed_rays_see_what_the_references_see, fixture_clear),
         cmocka_unit_test_setup(what_moves_is_seen_with_what_stands_still, fixture_clear),
+        cmocka_unit_test_setup(switching_to_another_tracer_and_back_builds_nothing, fixture_clear),
+        cmocka_unit_test_setup(a_picture_of_other_cubes_begins_anew, fixture_clear),
+        cmocka_unit_test_setup(what_moves_while_the_shutter_is_open_is_refused_at_once, fixture_clear),
     };
     exact_tracer = tracer_impl_by_number(REFERENCE) ? REFERENCE : BVH;
     return cmocka_run_group_tests_name("ldc against the reference", tests, fixture_setup, fixture_teardown);

@@ -86,16 +86,17 @@ static const struct tracer_cube *cube(const struct fixture *fixture, unsigned wh
 static void expect_built(const struct fixture *fixture, bool static_cube, bool dynamic_cube)
 {
     const bool expected[TRACER_CUBES_MAX] = {static_cube, dynamic_cube};
-    bool timed[TRACER_CUBES_MAX] = {false};
+    bool timed[TRACER_CUBES_MAX][2] = {{false}}; /* by the CPU's clock and by the GPU's */
     for (uint32_t i = 0; i < fixture->times.count; i++) {
         const struct stage_span *span = &fixture->times.spans[i];
         assert_int_equal(span->stage, STAGE_BUILD);
         assert_in_range(span->wave, 0, TRACER_CUBES_MAX - 1);
-        timed[span->wave] |= span->duration_ns > 0;
+        timed[span->wave][span->clock] |= span->duration_ns > 0;
     }
     for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
         assert_int_equal(cube(fixture, i)->rebuilt, expected[i]);
-        assert_int_equal(timed[i], expected[i]);
+        assert_int_equal(timed[i][STAGE_CPU], expected[i]);
+        assert_int_equal(timed[i][STAGE_GPU], expected[i]);
     }
     uint64_t nodes = fixture->tracer->stats.nodes, rebuilt = fixture->tracer->stats.nodes_rebuilt;
     assert_int_equal(rebuilt == 0, !static_cube && !dynamic_cube);
@@ -187,7 +188,9 @@ static void options_out_of_range_are_refused_by_name(void **state)
         {"options.ldc_block", {.ldc_block = 12}},
         {"options.ldc_block", {.ldc_block = 64}},
         {"options.ldc_build", {.ldc_build = LDC_BUILD_LISTS + 1}},
-        {"options.ldc_levels", {.ldc_levels = LDC_LEVELS_PYRAMID + 1}},
+        {"options.ldc_levels", {.ldc_levels = LDC_LEVELS_CELLS + 1}},
+        {"options.ldc_images", {.ldc_images = LDC_IMAGES_ONE + 1}},
+        {"options.ldc_levels", {.ldc_levels = LDC_LEVELS_CELLS, .ldc_tolerance = 0.5f}},
         {"options.ldc_tolerance", {.ldc_tolerance = -1.0f}},
         {"options.ldc_tolerance", {.ldc_tolerance = NAN}},
         {"options.ldc_tolerance", {.ldc_tolerance = INFINITY}},
