@@ -21,14 +21,14 @@ struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *
     return builder;
 }
 
-#define BUFFER_COUNT 11
+#define BUFFER_COUNT 12
 
 static void list_buffers(struct ldc_builder *builder, struct gpu_buffer *buffers[BUFFER_COUNT])
 {
     struct gpu_buffer *all[BUFFER_COUNT] = {&builder->counts,   &builder->occupied,  &builder->ordered,
                                             &builder->places,   &builder->fragments, &builder->found,
                                             &builder->visible,  &builder->drawn,     &builder->build,
-                                            &builder->commands, &builder->histogram};
+                                            &builder->commands, &builder->histogram, &builder->peeled};
     for (size_t i = 0; i < BUFFER_COUNT; i++)
         buffers[i] = all[i];
 }
@@ -46,6 +46,7 @@ void ldc_builder_destroy(struct ldc_builder *builder)
         gpu_framebuffer_finish(builder->device, &builder->layer_framebuffers[i]);
         gpu_texture_finish(builder->device, &builder->layers[i]);
     }
+    gpu_texture_finish(builder->device, &builder->layer_surface);
     gpu_texture_finish(builder->device, &builder->depth);
     gpu_object_destroy(builder->device->registry, GPU_VERTEX_ARRAY, builder->vertex_array);
     free(builder->runs);
@@ -55,7 +56,8 @@ void ldc_builder_destroy(struct ldc_builder *builder)
 uint64_t ldc_builder_bytes(const struct ldc_builder *builder)
 {
     struct gpu_buffer *buffers[BUFFER_COUNT];
-    uint64_t bytes = builder->layers[0].size_bytes + builder->layers[1].size_bytes + builder->depth.size_bytes;
+    uint64_t bytes = builder->layers[0].size_bytes + builder->layers[1].size_bytes +
+                     builder->layer_surface.size_bytes + builder->depth.size_bytes;
     struct ldc_builder copy = *builder;
     list_buffers(&copy, buffers);
     for (size_t i = 0; i < BUFFER_COUNT; i++)

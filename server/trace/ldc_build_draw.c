@@ -115,7 +115,7 @@ static bool make_vertex_array(struct ldc_builder *builder, struct error *error)
         if (!builder->vertex_array)
             return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more vertex array names");
         glEnableVertexArrayAttrib(builder->vertex_array, 0);
-        glVertexArrayAttribIFormat(builder->vertex_array, 0, 3, GL_UNSIGNED_INT, 0);
+        glVertexArrayAttribIFormat(builder->vertex_array, 0, 4, GL_UNSIGNED_INT, 0);
         glVertexArrayAttribBinding(builder->vertex_array, 0, 0);
         glVertexArrayBindingDivisor(builder->vertex_array, 0, 1);
     }
@@ -129,12 +129,15 @@ static const struct gpu_program *get_program(const struct ldc_task *task, enum l
     static const char *const passes[] = {[LDC_PASS_LISTS] = "0", [LDC_PASS_COUNT] = "1", [LDC_PASS_PEEL] = "2"};
     bool spheres = sort == LDC_SPHERES;
     bool cutout = spheres ? task->scene->has_cutout : sort == LDC_TRIANGLES_CUTOUT;
-    struct gpu_define defines[5] = {{"PRIMITIVE_KIND", spheres ? "1" : "0"}, {"BUILD_PASS", passes[pass]}};
+    struct gpu_define defines[4 + LDC_SAMPLE_DEFINES_MAX] = {{"PRIMITIVE_KIND", spheres ? "1" : "0"},
+                                                             {"BUILD_PASS", passes[pass]}};
     size_t n = 2;
-    if (spheres)
-        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
     if (cutout)
         defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
+    if (pass == LDC_PASS_PEEL)
+        ldc_sample_defines(task, &defines[n]);
+    else if (spheres)
+        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
     const struct gpu_program_source source = {.vertex = "ldc/build.vert",
                                               .geometry = "ldc/build.geom",
                                               .fragment = "ldc/build.frag",

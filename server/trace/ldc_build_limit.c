@@ -26,8 +26,8 @@ static bool fits_device(const struct ldc_task *task, uint64_t samples, uint64_t 
     uint64_t bytes = sample_bytes(all_samples, all_quads) + samples * LDC_VISIBLE_BYTES;
     if (all_samples > texels_max || all_quads > texels_max || all_quads > LDC_QUADS_MAX)
         return false;
-    if (task->slots == 0) /* peeled: they will be in `ordered` */
-        bytes += samples * LDC_ORDERED_BYTES;
+    if (task->slots == 0) /* peeled: they will be in `ordered` and `peeled` */
+        bytes += samples * (LDC_ORDERED_BYTES + LDC_SURFACE_BYTES);
     return device->memory_limit_bytes == 0 || bytes <= present ||
            device->memory_used_bytes + GROWTH(bytes) <= device->memory_limit_bytes;
 }

@@ -17,7 +17,8 @@ static bool reserve(struct ldc_task *task, uint32_t samples, uint32_t quads, str
                           ((uint64_t)cube->first_sample + samples) * LDC_GEOMETRY_BYTES, error) &&
            ldc_store_grow(device, &store->surface, (uint64_t)cube->first_sample * LDC_SURFACE_BYTES,
                           ((uint64_t)cube->first_sample + samples) * LDC_SURFACE_BYTES, error) &&
-           gpu_buffer_reserve(device, &task->builder->visible, (size_t)samples * LDC_VISIBLE_BYTES, error);
+           (task->peeled ||
+            gpu_buffer_reserve(device, &task->builder->visible, (size_t)samples * LDC_VISIBLE_BYTES, error));
 }
 
 /* As if nothing were there. */
@@ -41,12 +42,17 @@ static bool pack(struct ldc_task *task, struct error *error)
         device, &(struct gpu_program_source){.compute = "ldc/pack.comp", .defines = defines}, error);
     if (!program)
         return false;
-    if (task->peeled)
+    if (task->peeled) {
         gpu_buffer_bind_texels(device, &builder->found, UNIT_LDC_FOUND, GL_R32UI);
+        gpu_buffer_bind_texels(device, &builder->peeled, UNIT_LDC_PEELED_SURFACE, GL_RGBA32UI);
+        gpu_buffer_bind_image(device, &store->geometry, IMAGE_LDC_GEOMETRY, GL_RG32UI);
+        gpu_buffer_bind_image(device, &store->surface, IMAGE_LDC_SURFACE, GL_RGBA32UI);
+    } else {
+        gpu_buffer_bind_image(device, &builder->visible, IMAGE_LDC_VISIBLE, GL_RGBA32UI);
+    }
     ldc_bind_runs(task, program);
     gpu_buffer_bind_image(device, &store->texels, IMAGE_LDC_TEXELS, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &store->quads, IMAGE_LDC_QUADS, GL_RGBA32F);
-    gpu_buffer_bind_image(device, &builder->visible, IMAGE_LDC_VISIBLE, GL_RGBA32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
     gpu_uniform_uint(program, "first_texel", task->cube->first_texel);
     gpu_uniform_uint(program, "first_sample", task->cube->first_sample);
@@ -56,9 +62,8 @@ static bool pack(struct ldc_task *task, struct error *error)
     return true;
 }
 
-static const struct gpu_program *sample_program(const struct ldc_task *task, struct error *error)
+void ldc_sample_defines(const struct ldc_task *task, struct gpu_define defines[LDC_SAMPLE_DEFINES_MAX])
 {
-    struct gpu_define defines[5] = {0};
     size_t n = 0, cursor = 0;
     bool textures = false, bump = false;
     uint64_t id;
@@ -76,14 +81,16 @@ static const struct gpu_program *sample_program(const struct ldc_task *task, str
         defines[n++] = (struct gpu_define){"HAS_COLOURS", "1"};
     if (task->scene->has_spheres)
         defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
-    return gpu_program_get(task->builder->device,
-                           &(struct gpu_program_source){.compute = "ldc/sample.comp", .defines = defines}, error);
+    defines[n] = (struct gpu_define){0};
 }
 
 static bool sample(struct ldc_task *task, struct error *error)
 {
     struct gpu_device *device = task->builder->device;
-    const struct gpu_program *program = sample_program(task, error);
+    struct gpu_define defines[LDC_SAMPLE_DEFINES_MAX];
+    ldc_sample_defines(task, defines);
+    const struct gpu_program *program = gpu_program_get(
+        device, &(struct gpu_program_source){.compute = "ldc/sample.comp", .defines = defines}, error);
     if (!program)
         return false;
     gpu_buffer_bind_texels(device, &task->builder->visible, UNIT_LDC_VISIBLE, GL_RGBA32UI);
@@ -107,7 +114,7 @@ bool ldc_pack(struct ldc_task *task, struct error *error)
     if (!reserve(task, task->counts.samples_max, task->counts.quads_max, error) || !pack(task, error))
         return false;
     ldc_read_counts(task);
-    if (task->counts.samples > 0 && !sample(task, error))
+    if (!task->peeled && task->counts.samples > 0 && !sample(task, error))
         return false;
     cube->sample_count = task->counts.samples;
     cube->quad_count = task->counts.quads;

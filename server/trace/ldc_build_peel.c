@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Depth peeling, as the paper has it (section 1.2): fragments are counted first, and the most of one texel is the
- * number of passes. Each pass draws the scene into all three images, rejects what is not behind the layer before,
- * and the depth test keeps the nearest of the rest. Everitt. Interactive Order-Independent Transparency. 2001. */
+ * number of passes. Each pass draws the scene into all three images with both targets, rejects what is not behind
+ * the layer before, and the depth test keeps the nearest of the rest. Everitt. Interactive Order-Independent
+ * Transparency. 2001. */
 #include "shared/bindings.h"
 #include "trace/ldc_build_state.h"
 
@@ -27,22 +28,24 @@ static bool reserve(struct ldc_task *task, struct error *error)
     struct gpu_device *device = builder->device;
     uint32_t along = task->cube->resolution;
     if (!gpu_buffer_reserve(device, &builder->ordered, (size_t)task->counts.places * LDC_ORDERED_BYTES, error) ||
+        !gpu_buffer_reserve(device, &builder->peeled, (size_t)task->counts.places * LDC_SURFACE_BYTES, error) ||
         !gpu_buffer_reserve(device, &builder->found, (size_t)task->texel_count * sizeof(uint32_t), error))
         return false;
     if (builder->depth.name && builder->depth.width == along)
         return true;
-    if (!gpu_texture_reserve_array(device, &builder->depth, GL_DEPTH_COMPONENT32F, along, along, 3, error))
-        return false;
-    for (int i = 0; i < 2; i++) {
+    bool made =
+        gpu_texture_reserve_array(device, &builder->depth, GL_DEPTH_COMPONENT32F, along, along, 3, error) &&
+        gpu_texture_reserve_array(device, &builder->layer_surface, GL_RGBA32UI, along, along, 3, error);
+    for (int i = 0; i < 2 && made; i++) {
         gpu_framebuffer_finish(device, &builder->layer_framebuffers[i]);
-        if (!gpu_texture_reserve_array(device, &builder->layers[i], GL_RG32UI, along, along, 3, error) ||
-            !gpu_framebuffer_create(device, &builder->layer_framebuffers[i], &builder->layers[i], 1,
-                                    &builder->depth, error)) {
-            gpu_texture_finish(device, &builder->depth); /* all is made anew by the next build */
-            return false;
-        }
+        made = gpu_texture_reserve_array(device, &builder->layers[i], GL_RG32UI, along, along, 3, error);
+        const struct gpu_texture targets[] = {builder->layers[i], builder->layer_surface};
+        made = made &&
+               gpu_framebuffer_create(device, &builder->layer_framebuffers[i], targets, 2, &builder->depth, error);
     }
-    return true;
+    if (!made)
+        gpu_texture_finish(device, &builder->depth); /* the next build makes all anew */
+    return made;
 }
 
 /* A power of two, by which depths in cells stay exact and below 1. */
@@ -55,7 +58,7 @@ static void set_peel(const struct ldc_task *task, const struct gpu_program *prog
 
 static bool draw_layer(struct ldc_task *task, unsigned into, struct error *error)
 {
-    static const GLuint nothing[4] = {LDC_NO_DEPTH_BITS, LDC_NO_ID, 0, 0};
+    static const GLuint nothing[4] = {LDC_NO_DEPTH_BITS, 0, 0, 0};
     static const GLfloat farthest = 1.0f;
     struct ldc_builder *builder = task->builder;
     unsigned framebuffer = builder->layer_framebuffers[into].name;
@@ -81,6 +84,8 @@ static bool note_layer(struct ldc_task *task, unsigned from, uint32_t layer, str
     gpu_buffer_bind_texels(device, &builder->occupied, UNIT_LDC_OCCUPIED, GL_R32UI);
     gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
     gpu_texture_bind(&builder->layers[from], UNIT_LDC_LAYER);
+    gpu_texture_bind(&builder->layer_surface, UNIT_LDC_LAYER_SURFACE);
+    gpu_buffer_bind_image(device, &builder->peeled, IMAGE_LDC_PEELED_SURFACE, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
     gpu_buffer_bind_image(device, &builder->found, IMAGE_LDC_FOUND, GL_R32UI);
     gpu_uniform_uint(program, "occupied_count", task->counts.occupied);
@@ -94,7 +99,7 @@ bool ldc_peel(struct ldc_task *task, struct error *error)
 {
     /* Before the first layer: every fragment lies behind it. */
     static const GLfloat before_all = -1.0f;
-    GLuint first[4] = {0, LDC_NO_ID, 0, 0};
+    GLuint first[4] = {0};
     memcpy(&first[0], &before_all, sizeof(first[0]));
     struct ldc_builder *builder = task->builder;
     if (!count_fragments(task, error) || !reserve(task, error))

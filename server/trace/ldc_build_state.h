@@ -25,9 +25,10 @@ struct ldc_builder {
     uint32_t plain_along;         /* its texels along a side; 0: not made yet */
     /* shared/ldc_build.h */
     struct gpu_buffer counts, occupied, ordered, places, fragments, found, visible, drawn, build, histogram;
+    struct gpu_buffer peeled;
     struct gpu_buffer commands;
-    /* Peeling: what is visible in the layer that is drawn and in the one before it, by turns. */
-    struct gpu_texture layers[2], depth;
+    /* Peeling: geometry of the layer that is drawn and of the one before it, by turns. */
+    struct gpu_texture layers[2], layer_surface, depth;
     struct gpu_framebuffer layer_framebuffers[2];
     uint32_t slots;         /* of a texel: what the last build in one pass suggests */
     uint32_t slots_texels;  /* of how many texels that was */
@@ -76,6 +77,10 @@ bool ldc_limit(struct ldc_task *task, struct error *error);
 
 /* ldc_build_pack.c. From `ordered` to the cube's buffers. */
 bool ldc_pack(struct ldc_task *task, struct error *error);
+
+/* What a program that has ldc/sample.glsl needs to know of the scene; ends with {0}. */
+#define LDC_SAMPLE_DEFINES_MAX 5
+void ldc_sample_defines(const struct ldc_task *task, struct gpu_define defines[LDC_SAMPLE_DEFINES_MAX]);
 
 #define LDC_TEXEL_BYTES 16
 #define LDC_QUAD_BYTES 16

@@ -1,22 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Where a primitive lies under the middle of a texel: only its depth and its id are noted, of what it is made is found
-// out once for each sample that stays (sample.comp).
+// Where a primitive lies under the middle of a texel. For the lists only its depth and its id are noted: of what it is
+// made is found out once for each sample that stays (sample.comp). Peeling writes the paper's two targets in each pass.
 // Defines:
 //   PRIMITIVE_KIND  as in build.geom
 //   HAS_CUTOUT      triangles or spheres may have holes
 //   HAS_SPHERES     with PRIMITIVE_KIND 1
 //   BUILD_PASS      0: each texel's fragments are noted; 1: they are counted only; 2: of those behind the layer
 //                   before, the nearest is kept (depth peeling)
+//   with BUILD_PASS 2 those of ldc/sample.glsl
 
-#include "shared/ldc.h"
-#include "shared/ldc_build.h"
 #include "shared/bindings.h"
-#include "ldc/image.glsl"
 #include "common/alpha.glsl"
+#include "ldc/image.glsl"
+#include "ldc/sample.glsl"
 
 uniform uint texels_along; // a side of the images
-uniform float cell_world;
-uniform vec3 lower_world;
 
 #if PRIMITIVE_KIND == 0
 layout(location = 0) flat in vec4 plane;
@@ -25,12 +23,13 @@ layout(location = 1) flat in vec3 depths;
 layout(location = 3) in vec2 barycentrics;
 #endif
 #endif
-layout(location = 2) flat in uvec3 primitive;
+layout(location = 2) flat in uvec4 primitive; // id, instance, scene-wide number, LDC_DRAWN_*
 
 #if BUILD_PASS == 2
 uniform float unit_per_cell; // a power of two, so that nothing is rounded
-layout(binding = UNIT_LDC_LAYER) uniform usampler2DArray layer_before; // depth, id
-layout(location = 0) out uvec2 visible;
+layout(binding = UNIT_LDC_LAYER) uniform usampler2DArray layer_before; // geometry words
+layout(location = 0) out uvec2 geometry_words;
+layout(location = 1) out uvec4 surface_words;
 #else
 layout(binding = IMAGE_LDC_COUNTS, r32ui) uniform uimageBuffer counts;
 #endif
@@ -90,7 +89,8 @@ void finish()
     if (nearest_cells == LDC_NO_DEPTH)
         discard;
     gl_FragDepth = nearest_cells * unit_per_cell;
-    visible = uvec2(floatBitsToUint(nearest_cells), primitive.x);
+    describe(make_point(primitive.y, primitive.z, primitive.w, gl_Layer, gl_FragCoord.xy, nearest_cells),
+             geometry_words, surface_words);
 #endif
 }
 

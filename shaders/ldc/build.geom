@@ -28,7 +28,7 @@ layout(triangle_strip, max_vertices = 9) out;
 layout(triangle_strip, max_vertices = 12) out;
 #endif
 
-layout(location = 0) flat in uvec3 primitive_in[];
+layout(location = 0) flat in uvec4 primitive_in[];
 
 #if PRIMITIVE_KIND == 0
 layout(location = 0) flat out vec4 plane;  // slopes of the depth along u and v; u, v of a point of it
@@ -37,7 +37,7 @@ layout(location = 1) flat out vec3 depths; // of that point; least, greatest
 layout(location = 3) out vec2 barycentrics;
 #endif
 #endif
-layout(location = 2) flat out uvec3 primitive;
+layout(location = 2) flat out uvec4 primitive;
 
 void fetch_world_from_object(out vec4 rows[3])
 {

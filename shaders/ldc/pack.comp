@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // From the fragments of texels to their samples: sorted by depth and id, the first of coincident ones, the nearest of
 // more than may be kept. Writes texels and quads, and what sample.comp needs to know of each sample.
-// Define: PEELED  they are sorted already, each once
+// Define: PEELED  they are sorted already, each once, and samples already
 
 #include "shared/ldc.h"
 #include "common/dispatch.glsl"
@@ -12,10 +12,14 @@ uniform uint layers_max;                            // at most 255
 
 #ifdef PEELED
 layout(binding = UNIT_LDC_FOUND) uniform usamplerBuffer found;
+layout(binding = UNIT_LDC_PEELED_SURFACE) uniform usamplerBuffer peeled;
+layout(binding = IMAGE_LDC_GEOMETRY, rg32ui) writeonly uniform uimageBuffer geometry_out;
+layout(binding = IMAGE_LDC_SURFACE, rgba32ui) writeonly uniform uimageBuffer surface_out;
+#else
+layout(binding = IMAGE_LDC_VISIBLE, rgba32ui) writeonly uniform uimageBuffer visible;
 #endif
 layout(binding = IMAGE_LDC_TEXELS, rgba32ui) writeonly uniform uimageBuffer texels_out;
 layout(binding = IMAGE_LDC_QUADS, rgba32f) writeonly uniform imageBuffer quads_out;
-layout(binding = IMAGE_LDC_VISIBLE, rgba32ui) writeonly uniform uimageBuffer visible;
 layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
 
 #ifndef PEELED
@@ -83,7 +87,7 @@ uint count_kept(run r, bool coincide)
 // Writes a texel with `kept` samples.
 void emit(run r, uint kept, uint sample_, uint quad)
 {
-    uint at = sample_ - first_sample, last = LDC_NO_DEPTH_BITS, taken = 0u, quad_at = quad;
+    uint last = LDC_NO_DEPTH_BITS, taken = 0u, quad_at = quad;
     vec2 range = vec2(LDC_NO_DEPTH, -LDC_NO_DEPTH);
     vec4 depths = vec4(LDC_NO_DEPTH);
     for (uint i = 0u; taken < kept; i++) {
@@ -96,7 +100,12 @@ void emit(run r, uint kept, uint sample_, uint quad)
         uint part = taken & 3u;
         depths = vec4(part == 0u ? depth : depths.x, part == 1u ? depth : part == 0u ? LDC_NO_DEPTH : depths.y,
                       part == 2u ? depth : part == 0u ? LDC_NO_DEPTH : depths.z, part == 3u ? depth : LDC_NO_DEPTH);
-        imageStore(visible, int(at + taken), uvec4(r.bits, fragment, 0u));
+#ifdef PEELED
+        imageStore(geometry_out, int(sample_ + taken), uvec4(fragment, 0u, 0u));
+        imageStore(surface_out, int(sample_ + taken), texelFetch(peeled, index_of(r, i)));
+#else
+        imageStore(visible, int(sample_ - first_sample + taken), uvec4(r.bits, fragment, 0u));
+#endif
         taken++;
         if (part == 3u || taken == kept)
             imageStore(quads_out, int(quad_at++), depths);

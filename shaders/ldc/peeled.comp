@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Notes a layer that was peeled off the scene with its texels, behind those before it.
 
-#include "shared/ldc_build.h"
+#include "shared/ldc.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 
@@ -11,8 +11,10 @@ uniform uint layer;        // 0, 1, ..
 
 layout(binding = UNIT_LDC_OCCUPIED) uniform usamplerBuffer occupied;
 layout(binding = UNIT_LDC_PLACES) uniform usamplerBuffer places;
-layout(binding = UNIT_LDC_LAYER) uniform usampler2DArray peeled; // depth, id
+layout(binding = UNIT_LDC_LAYER) uniform usampler2DArray layer_geometry;
+layout(binding = UNIT_LDC_LAYER_SURFACE) uniform usampler2DArray layer_surface;
 layout(binding = IMAGE_LDC_ORDERED, rg32ui) writeonly uniform uimageBuffer ordered;
+layout(binding = IMAGE_LDC_PEELED_SURFACE, rgba32ui) writeonly uniform uimageBuffer peeled;
 layout(binding = IMAGE_LDC_FOUND, r32ui) writeonly uniform uimageBuffer found;
 
 void main()
@@ -21,10 +23,11 @@ void main()
     if (k >= occupied_count)
         return;
     uint bits = texelFetch(occupied, int(k)).x, u = bits & 4095u, v = bits >> 12 & 4095u, axis = bits >> 24;
-    uvec2 fragment = texelFetch(peeled, ivec3(u, v, axis), 0).xy;
-    if (fragment.y == LDC_NO_ID)
+    uvec2 geometry_words = texelFetch(layer_geometry, ivec3(u, v, axis), 0).xy;
+    if (geometry_words.x == LDC_NO_DEPTH_BITS)
         return;
-    int texel = int((axis * texels_along + v) * texels_along + u);
-    imageStore(ordered, int(texelFetch(places, texel).x + layer), uvec4(fragment, 0u, 0u));
+    int texel = int((axis * texels_along + v) * texels_along + u), place = int(texelFetch(places, texel).x + layer);
+    imageStore(ordered, place, uvec4(geometry_words, 0u, 0u));
+    imageStore(peeled, place, texelFetch(layer_surface, ivec3(u, v, axis), 0));
     imageStore(found, texel, uvec4(layer + 1u));
 }

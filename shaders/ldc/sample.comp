@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Of what the surface is made at each sample: geometry and surface of shared/ldc.h. Textures are applied over the size
-// of a cell, as common/material.glsl applies them; what the material itself says is not.
-// Defines: those of common/material.glsl; HAS_COLOURS: some mesh has vertex colours.
+// Of what the surface is made at each sample that the lists of fragments gave.
+// Defines: those of ldc/sample.glsl.
 
-#include "shared/ldc.h"
-#include "shared/ldc_build.h"
 #include "common/dispatch.glsl"
-#include "common/material.glsl"
-#include "common/sampled.glsl"
+#include "ldc/sample.glsl"
 
 uniform uint sample_count, first_sample; // of the cube
 uniform uint drawn_count;
-uniform uint texels_along; // a side of the images
-uniform vec3 lower_world;
-uniform float cell_world;
 
 layout(binding = UNIT_LDC_VISIBLE) uniform usamplerBuffer visible;
 layout(binding = UNIT_LDC_DRAWN) uniform usamplerBuffer drawn;
@@ -33,110 +26,6 @@ uvec4 drawn_of(uint id)
     return texelFetch(drawn, int(first));
 }
 
-float cross_2d(vec2 a, vec2 b)
-{
-    return a.x * b.y - a.y * b.x;
-}
-
-// Of a primitive under the middle of a texel.
-struct point {
-    uint instance_index, primitive;
-    uint flags; // LDC_DRAWN_*
-    int axis, u, v;
-    vec2 middle;       // u, v in cells
-    float depth_cells;
-};
-
-// A triangle's corners, in cells, and where in it the point is.
-struct placed_triangle {
-    uvec4 vertices; // and the material
-    vec4 world_from_object[3];
-    vec3 e1, e2;
-    vec2 barycentrics;
-};
-
-// Edges as they are drawn lie a little elsewhere than exact ones: the point is taken into the triangle.
-placed_triangle place_triangle(point p)
-{
-    placed_triangle t;
-    int first_row = int(p.instance_index) * INSTANCE_TEXELS;
-    for (int row = 0; row < 3; row++)
-        t.world_from_object[row] = uintBitsToFloat(texelFetch(instances, first_row + row));
-    t.vertices = texelFetch(triangles, int(p.primitive));
-    vec3 p0 = texelFetch(positions, int(t.vertices.x)).xyz;
-    t.e1 = affine_vector(t.world_from_object, texelFetch(positions, int(t.vertices.y)).xyz - p0) / cell_world;
-    t.e2 = affine_vector(t.world_from_object, texelFetch(positions, int(t.vertices.z)).xyz - p0) / cell_world;
-    p0 = (affine_point(t.world_from_object, p0) - lower_world) / cell_world;
-    vec2 a = vec2(t.e1[p.u], t.e1[p.v]), b = vec2(t.e2[p.u], t.e2[p.v]), c = p.middle - vec2(p0[p.u], p0[p.v]);
-    float area = cross_2d(a, b);
-    vec2 weights = area != 0.0 ? vec2(cross_2d(c, b), cross_2d(a, c)) / area : vec2(0.0);
-    weights = clamp(weights, vec2(0.0), vec2(1.0));
-    float sum = weights.x + weights.y;
-    t.barycentrics = sum > 1.0 ? weights / sum : weights;
-    return t;
-}
-
-#if !defined HAS_TEXTURES && !defined HAS_BUMP
-// What surface_triangle() of common/surface.glsl finds, with half of its fetches: no texture coordinates, no tangent.
-hit plain_triangle(point p)
-{
-    placed_triangle t = place_triangle(p);
-    float side = (p.flags & LDC_DRAWN_MIRRORED) != 0u ? -1.0 : 1.0;
-    vec3 geometric = normalize(cross(t.e1, t.e2)) * side, shading = geometric;
-    vec3 weights = triangle_weights(t.barycentrics);
-    if ((p.flags & LDC_DRAWN_NORMALS) != 0u) {
-        vec3 sum = texelFetch(normals, int(t.vertices.x)).xyz * weights.x +
-                   texelFetch(normals, int(t.vertices.y)).xyz * weights.y +
-                   texelFetch(normals, int(t.vertices.z)).xyz * weights.z;
-        vec4 rows[3] = t.world_from_object;
-        float most = greatest(max(abs(rows[0].xyz), max(abs(rows[1].xyz), abs(rows[2].xyz))));
-        vec3 r0 = rows[0].xyz / most, r1 = rows[1].xyz / most, r2 = rows[2].xyz / most;
-        // Cofactors: the inverse, transposed, but for the determinant, of which only the sign is of account.
-        vec3 interpolated = side * vec3(dot(cross(r1, r2), sum), dot(cross(r2, r0), sum), dot(cross(r0, r1), sum));
-        float squared = dot(interpolated, interpolated);
-        if (squared > 0.0)
-            shading = interpolated * inversesqrt(squared);
-    }
-    vec4 colour = vec4(1.0);
-#ifdef HAS_COLOURS
-    if ((p.flags & LDC_DRAWN_COLOURS) != 0u)
-        colour = triangle_colour(t.vertices, GEOMETRY_HAS_COLOURS, weights);
-#endif
-    return finish_hit(t.vertices.w, 0.0, vec3(0.0), geometric, shading, vec4(0.0), vec4(0.0), colour);
-}
-#endif
-
-hit hit_at(point p, vec3 origin, vec3 direction)
-{
-#ifdef HAS_SPHERES
-    if ((p.flags & LDC_DRAWN_SPHERES) != 0u)
-        return surface_sphere(p.instance_index, p.primitive, p.depth_cells * cell_world, origin, direction, 0.0);
-#endif
-#if defined HAS_TEXTURES || defined HAS_BUMP
-    return surface_triangle(p.instance_index, p.primitive, place_triangle(p).barycentrics, 0.0, direction, 0.0);
-#else
-    return plain_triangle(p);
-#endif
-}
-
-uvec4 words_of(surface s, vec4 colour, uint material_index)
-{
-    surface_sample stored;
-#if defined HAS_TEXTURES || defined HAS_COLOURS
-    stored.base_colour = colour;
-#else
-    stored.base_colour = vec4(1.0); // known to the compiler
-#endif
-    stored.normal = s.normal;
-    stored.material = material_index;
-    stored.metallic = s.metallic;
-    stored.transmission = s.transmission;
-    stored.roughness = s.roughness;
-    stored.occlusion = s.occlusion;
-    stored.emission = s.emission;
-    return pack_sample(stored);
-}
-
 void main()
 {
     uint k = item_index();
@@ -144,38 +33,11 @@ void main()
         return;
     uvec4 found = texelFetch(visible, int(k));
     uvec4 of = drawn_of(found.z);
-    point p;
-    p.instance_index = of.z;
-    p.primitive = found.z - of.y;
-    p.flags = of.w;
-    p.axis = int(found.x >> 24);
-    p.u = p.axis == 2 ? 0 : p.axis + 1;
-    p.v = p.axis == 0 ? 2 : p.axis - 1;
-    p.middle = vec2(found.x & 4095u, found.x >> 12 & 4095u) + 0.5;
-    p.depth_cells = uintBitsToFloat(found.y);
-
-    vec3 origin = vec3(0.0), direction = vec3(0.0);
-    origin[p.u] = p.middle.x * cell_world;
-    origin[p.v] = p.middle.y * cell_world;
-    origin += lower_world;
-    direction[p.axis] = 1.0;
-    hit h = hit_at(p, origin, direction);
-
-    surface s;
-    s.geometric = unpack_unit(h.normal_geometric);
-    s.normal = unpack_unit(h.normal_shading);
-    s.emission = vec3(1.0);
-    s.metallic = s.roughness = s.transmission = s.occlusion = 1.0;
-    vec4 colour = unpackUnorm4x8(h.colour);
-    material m = materials[h.material & HIT_MATERIAL_MASK];
-    vec4 uv01 = vec4(h.u0, h.v0, h.u1, h.v1);
-#ifdef HAS_TEXTURES
-    apply_textures(s, colour, h, m, uv01, footprint_of(h, m, s.geometric, direction, cell_world));
-#endif
-#ifdef HAS_BUMP
-    if (m.texture_bump != 0u)
-        s.normal = bump_normal(h, m.texture_bump, s.normal, uv01);
-#endif
-    imageStore(geometry_out, int(first_sample + k), uvec4(found.y, h.normal_geometric, 0u, 0u));
-    imageStore(surface_out, int(first_sample + k), words_of(s, colour, h.material));
+    vec2 middle = vec2(found.x & 4095u, found.x >> 12 & 4095u) + 0.5;
+    uvec2 geometry_words;
+    uvec4 surface_words;
+    describe(make_point(of.z, found.z - of.y, of.w, int(found.x >> 24), middle, uintBitsToFloat(found.y)),
+             geometry_words, surface_words);
+    imageStore(geometry_out, int(first_sample + k), uvec4(geometry_words, 0u, 0u));
+    imageStore(surface_out, int(first_sample + k), surface_words);
 }

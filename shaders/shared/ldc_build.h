@@ -25,7 +25,6 @@ SHARED_SIZE(ldc_build_counts, 48)
 /* Texels that one invocation looks at to see what is occupied. */
 #define LDC_PLACES_TEXELS 32u
 
-#define LDC_NO_ID 0xffffffffu
 #define LDC_DRAWN_NORMALS 1u /* what its vertices have */
 #define LDC_DRAWN_COLOURS 2u
 #define LDC_DRAWN_SPHERES 4u
