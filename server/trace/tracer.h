@@ -28,8 +28,9 @@ struct tracer_options {
     uint32_t reference_rays_a_call; /* 0: chosen; 1, 4, 8, 16 */
     uint32_t ldc_resolution;        /* cells along the longest side of a cube; 0: 1024; 16 to 4096 */
     uint32_t ldc_block;             /* texels along a side of a min/max block: 2, 4, 8, 16, 32; 0: 8 */
-    enum { LDC_BUILD_AUTO, LDC_BUILD_PEEL, LDC_BUILD_LISTS } ldc_build;         /* protocol's numbers */
-    enum { LDC_LEVELS_AUTO, LDC_LEVELS_BLOCKS, LDC_LEVELS_PYRAMID } ldc_levels; /* protocol's numbers */
+    enum { LDC_BUILD_AUTO, LDC_BUILD_PEEL, LDC_BUILD_LISTS } ldc_build; /* protocol's numbers */
+    /* protocol's numbers; auto: cells of all images together, or with a tolerance a pyramid */
+    enum { LDC_LEVELS_AUTO, LDC_LEVELS_BLOCKS, LDC_LEVELS_PYRAMID } ldc_levels;
     /* 0: a hit is where the ray crosses a sample's plane; else where it comes as near to the sample: metres */
     float ldc_tolerance;
     uint32_t ldc_rays_together;   /* 0: chosen; 1, 4 */
