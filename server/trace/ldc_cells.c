@@ -86,6 +86,9 @@ static bool list_samples(struct cell_build *build, struct error *error)
     const struct ldc_cube *cube = &store->cubes[build->which];
     const uint64_t n = cube->resolution;
     const uint64_t words = (uint64_t)cube->sample_count * SAMPLE_CELLS_MAX;
+    if (words > store->device->facts.texture_buffer_texels_max || words > INT32_MAX)
+        return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
+                         "the cells of %u samples are more than the device takes", cube->sample_count);
     if (!gpu_buffer_reserve(store->device, &build->list, words * sizeof(uint32_t), error))
         return false;
     gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/ldc_levels.h"
 
+#include "base/log.h"
 #include "gpu/program.h"
 #include "shared/bindings.h"
 #include "shared/ldc.h"
@@ -14,7 +15,8 @@
 #define PYRAMID_BITS 2
 #define BLOCK_DEFAULT 8
 
-struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tracer_options *options)
+struct ldc_level_layout ldc_level_layout_of(const struct ldc_store *store, uint32_t resolution,
+                                            const struct tracer_options *options)
 {
     struct ldc_level_layout layout = {.blocks = options->ldc_levels == LDC_LEVELS_BLOCKS};
     if (layout.blocks) {
@@ -26,7 +28,7 @@ struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tr
         layout.image_nodes = layout.row * layout.row;
         return layout;
     }
-    if (options->ldc_levels == LDC_LEVELS_AUTO && !(options->ldc_tolerance > 0)) {
+    if (options->ldc_levels == LDC_LEVELS_AUTO && !(options->ldc_tolerance > 0) && !store->no_cells) {
         layout.cells = true;
         layout.grid = (resolution + (1u << LDC_NODE_SHIFT) - 1) >> LDC_NODE_SHIFT;
         return layout;
@@ -48,7 +50,7 @@ bool ldc_levels_reserve(struct ldc_store *store, unsigned which, uint64_t node_c
         if (store->cubes[i].resolution && store->cubes[i].first_node + store->cubes[i].node_count > first)
             first = store->cubes[i].first_node + store->cubes[i].node_count;
     uint64_t nodes = first + node_count;
-    /* Atomics take them word by word. */
+    /* Word by word, which is how some write them. */
     if (nodes * (node_bytes / sizeof(uint32_t)) > device->facts.texture_buffer_texels_max || nodes > INT32_MAX)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution", "%llu nodes are more than the device takes",
                          (unsigned long long)nodes);
@@ -121,19 +123,39 @@ static bool build_ranges(struct ldc_store *store, unsigned which, const struct l
     return ok;
 }
 
+static bool build_levels(struct ldc_store *store, unsigned which, const struct tracer_options *options,
+                         struct error *error)
+{
+    struct ldc_cube *cube = &store->cubes[which];
+    cube->node_count = cube->entry_count = 0;
+    if (cube->resolution == 0)
+        return true;
+    const struct ldc_level_layout layout = ldc_level_layout_of(store, cube->resolution, options);
+    bool ok = layout.cells ? ldc_cells_build(store, which, layout.grid, error)
+                           : build_ranges(store, which, &layout, error);
+    if (!ok)
+        cube->node_count = cube->entry_count = 0;
+    return ok;
+}
+
 bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
                       struct error *error)
 {
-    struct ldc_cube *cube = &store->cubes[which];
-    cube->node_count = 0;
-    if (cube->resolution == 0)
-        return true;
-    const struct ldc_level_layout layout = ldc_level_layout_of(cube->resolution, options);
+    struct error of_cells = {0};
+    if (which == TRACER_CUBE_STATIC)
+        store->no_cells = false;
     gpu_push_group(store->device, "ldc levels");
-    bool ok = layout.cells ? ldc_cells_build(store, which, layout.grid, error)
-                           : build_ranges(store, which, &layout, error);
+    bool ok = build_levels(store, which, options, &of_cells);
+    bool again = !ok && (of_cells.kind == ERROR_LIMIT || of_cells.kind == ERROR_OUT_OF_MEMORY) && !store->no_cells;
+    if (again) {
+        log_write(LOG_WARNING, "ldc", "%s: rays take the slower way by a pyramid", of_cells.text);
+        gpu_buffer_finish(store->device, &store->entries);
+        store->no_cells = ok = true;
+        for (unsigned i = 0; ok && i <= which; i++)
+            ok = build_levels(store, i, options, error);
+    } else if (!ok && error && error->kind == ERROR_NONE) {
+        *error = of_cells;
+    }
     gpu_pop_group(store->device);
-    if (!ok)
-        cube->node_count = 0;
     return ok;
 }

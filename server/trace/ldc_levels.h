@@ -31,14 +31,16 @@ struct ldc_level_layout {
     bool cells;           /* none of this, but nodes over cells of all three images: LDC_NODE_* of shared/ldc.h */
     uint32_t grid;        /* cells: nodes along a side */
 };
-struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tracer_options *options);
+struct ldc_level_layout ldc_level_layout_of(const struct ldc_store *store, uint32_t resolution,
+                                            const struct tracer_options *options);
 
 /* For those that make nodes: room for the cube's behind those of the one before it, which stay, as do `kept` of
  * its own. */
 bool ldc_levels_reserve(struct ldc_store *store, unsigned which, uint64_t node_count, uint64_t kept,
                         size_t node_bytes, struct error *error);
 
-/* Writes the nodes of cube `which`, whose samples are there. */
+/* Writes the nodes of cube `which`, whose samples are there. Where cells are more than the device takes (of some
+ * twenty million samples on software GL) all cubes get a pyramid. */
 bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
                       struct error *error);
 
