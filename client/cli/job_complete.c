@@ -202,6 +202,10 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (job->model == NULL)
         return cli_usage(job, "MODEL", "no model file is named") == 0;
+    if (job->options.ldc_levels == PROTOCOL_LDC_LEVELS_CELLS && job->options.ldc_tolerance > 0) {
+        cli_usage(job, "--ldc-levels", "cells know nothing of --ldc-tolerance");
+        return fl_error_remedy(&job->error, "leave out one of them");
+    }
     /* Else most of the "truth" would be the rasteriser's. */
     if (!job->has_primary && job->options.tracer == PROTOCOL_TRACER_REFERENCE)
         job->options.primary = PROTOCOL_PRIMARY_TRACE;

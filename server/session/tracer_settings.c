@@ -21,6 +21,10 @@ bool tracer_settings_check(const struct message_render *render, struct error *er
         error_set(error, ERROR_INVALID, "render.ldc_block", "a block has no side of %u texels", render->ldc_block);
         return error_remedy(error, "2, 4, 8, 16 or 32, or 0 for 8");
     }
+    if (render->ldc_levels == PROTOCOL_LDC_LEVELS_CELLS && render->ldc_tolerance > 0) {
+        error_set(error, ERROR_INVALID, "render.ldc_levels", "cells know nothing of a tolerance");
+        return error_remedy(error, "a tolerance of 0, or another kind of levels");
+    }
     if (render->ldc_rays_together > 1 && render->ldc_rays_together != 4)
         return error_set(error, ERROR_INVALID, "render.ldc_rays_together", "1 or 4 rays walk as one, not %u",
                          render->ldc_rays_together);
@@ -37,6 +41,7 @@ struct tracer_options tracer_settings(const struct session_limits *limits, const
         .ldc_block = render->ldc_block,
         .ldc_build = (unsigned)render->ldc_build,
         .ldc_levels = (unsigned)render->ldc_levels,
+        .ldc_images = (unsigned)render->ldc_images,
         .ldc_tolerance = render->ldc_tolerance,
         .ldc_rays_together = render->ldc_rays_together,
         .ldc_layers_max = limits->ldc_layers,

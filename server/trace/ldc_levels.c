@@ -28,7 +28,8 @@ struct ldc_level_layout ldc_level_layout_of(const struct ldc_store *store, uint3
         layout.image_nodes = layout.row * layout.row;
         return layout;
     }
-    if (options->ldc_levels == LDC_LEVELS_AUTO && !(options->ldc_tolerance > 0) && !store->no_cells) {
+    const bool may_have_cells = options->ldc_levels == LDC_LEVELS_AUTO && !(options->ldc_tolerance > 0);
+    if (options->ldc_levels == LDC_LEVELS_CELLS || (may_have_cells && !store->no_cells)) {
         layout.cells = true;
         layout.grid = (resolution + (1u << LDC_NODE_SHIFT) - 1) >> LDC_NODE_SHIFT;
         return layout;
@@ -146,7 +147,8 @@ bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct trac
         store->no_cells = false;
     gpu_push_group(store->device, "ldc levels");
     bool ok = build_levels(store, which, options, &of_cells);
-    bool again = !ok && (of_cells.kind == ERROR_LIMIT || of_cells.kind == ERROR_OUT_OF_MEMORY) && !store->no_cells;
+    bool again = !ok && options->ldc_levels == LDC_LEVELS_AUTO && !store->no_cells &&
+                 (of_cells.kind == ERROR_LIMIT || of_cells.kind == ERROR_OUT_OF_MEMORY);
     if (again) {
         log_write(LOG_WARNING, "ldc", "%s: rays take the slower way by a pyramid", of_cells.text);
         gpu_buffer_finish(store->device, &store->entries);

@@ -40,7 +40,7 @@ bool ldc_levels_reserve(struct ldc_store *store, unsigned which, uint64_t node_c
                         size_t node_bytes, struct error *error);
 
 /* Writes the nodes of cube `which`, whose samples are there. Where cells are more than the device takes (of some
- * twenty million samples on software GL) all cubes get a pyramid. */
+ * twenty million samples on software GL) and were not asked for by name, all cubes get a pyramid. */
 bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
                       struct error *error);
 

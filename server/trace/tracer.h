@@ -19,7 +19,8 @@ enum tracer_dependency { /* bits: what a structure is built from */
                          TRACER_NEEDS_RAYS = 4,
 };
 
-/* Options of all tracers; zero is the default of each. */
+/* Options of all tracers; zero is the default of each. Compared byte by byte (render/tracer_set.c), so there is no
+ * member that leaves a gap. */
 struct tracer_options {
     enum { BVH_BOUNDS_AUTO, BVH_BOUNDS_BOX, BVH_BOUNDS_SPHERE } bvh_bounds; /* protocol's numbers */
     /* plain: sphere links in a storage buffer, for the benchmark */
@@ -29,13 +30,17 @@ struct tracer_options {
     uint32_t ldc_resolution;        /* cells along the longest side of a cube; 0: 1024; 16 to 4096 */
     uint32_t ldc_block;             /* texels along a side of a min/max block: 2, 4, 8, 16, 32; 0: 8 */
     enum { LDC_BUILD_AUTO, LDC_BUILD_PEEL, LDC_BUILD_LISTS } ldc_build; /* protocol's numbers */
-    /* protocol's numbers; auto: cells of all images together, or with a tolerance a pyramid */
-    enum { LDC_LEVELS_AUTO, LDC_LEVELS_BLOCKS, LDC_LEVELS_PYRAMID } ldc_levels;
+    /* protocol's numbers; auto: cells, or with a tolerance, which these know nothing of, or where they do not fit,
+     * a pyramid */
+    enum { LDC_LEVELS_AUTO, LDC_LEVELS_BLOCKS, LDC_LEVELS_PYRAMID, LDC_LEVELS_CELLS } ldc_levels;
+    /* Which images a triangle is in: those that its normal leans to almost as much as to one, or that one alone.
+     */
+    enum { LDC_IMAGES_OVERLAP, LDC_IMAGES_ONE } ldc_images; /* protocol's numbers */
     /* 0: a hit is where the ray crosses a sample's plane; else where it comes as near to the sample: metres */
     float ldc_tolerance;
     uint32_t ldc_rays_together;   /* 0: chosen; 1, 4 */
     uint32_t ldc_layers_together; /* of a texel, tested at once; 0: chosen; 1, 4; for the benchmark */
-    bool ldc_count_steps;       /* for the benchmark: crossings say what the walk did, see shaders/ldc/cube.glsl */
+    uint32_t ldc_count_steps;   /* 1: crossings say what the walk did (shaders/ldc/cube.glsl); for the benchmark */
     uint32_t ldc_layers_max;    /* 0: 255, more cannot be kept; of more the nearest are kept */
     uint32_t ldc_mebibytes_max; /* device memory of one cube's samples; 0: no limit but the device's */
 };

@@ -278,14 +278,26 @@ bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *
     return ok;
 }
 
-bool bench_contest_hits(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
-                        struct hit *hits, struct error *error)
+static bool trace_once(struct bench_contest *contest, struct tracer *tracer, bool crossings_only,
+                       const struct bench_wave *wave, struct hit *hits, struct error *error)
 {
     scene_gpu_bind(&contest->scene->gpu);
-    if (!upload(contest, wave, error) || !run_tracer(contest, tracer, false, wave, error))
+    if (!upload(contest, wave, error) || !run_tracer(contest, tracer, crossings_only, wave, error))
         return false;
     gpu_buffer_read(contest->device, &contest->answer_buffer, 0, hits, wave->ray_count * sizeof *hits);
     return true;
+}
+
+bool bench_contest_hits(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
+                        struct hit *hits, struct error *error)
+{
+    return trace_once(contest, tracer, false, wave, hits, error);
+}
+
+bool bench_contest_crossings(struct bench_contest *contest, struct tracer *tracer, const struct bench_wave *wave,
+                             struct hit *hits, struct error *error)
+{
+    return trace_once(contest, tracer, true, wave, hits, error);
 }
 
 void bench_contest_finish(struct bench_contest *contest)

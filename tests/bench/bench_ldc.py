@@ -143,7 +143,7 @@ def measure_depths(bench, left_out):
 
 def variants(resolution, cell):
     """{what is varied: [forms' options]}; `cell` in metres. The first of each is compared with."""
-    return {"levels": [{"levels": "pyramid"}, *({"levels": "blocks", "block": n} for n in (4, 8, 16, 32))],
+    return {"levels": [{"levels": "cells"}, {"levels": "pyramid"}, *({"levels": "blocks", "block": n} for n in (4, 8, 16, 32))],
             "layers of a texel at once": [{"layers": 1}, {"layers": 4}],
             "rays together": [{"rays": 1}, {"rays": 4}],
             "hit": [{"tolerance": 0}, {"tolerance": f"{cell:.6g}"}, {"tolerance": f"{cell / 2:.6g}"}]}

@@ -3,8 +3,9 @@
  * Waves: the same, and "waves": [{"kind", "rays", "hits_ns": [..], "walk_ns": [..]}]: rays to hits on the device,
  * surfaces included, and the walk alone (of any-hit waves there is none). Closest-hit waves beside the reference
  * also have "agree" (share of the rays that hit with both or miss with both), "only_form", "only_reference", and
- * of rays that hit with both the difference of distances: "error_median", "error_p99", in metres. Rays begin where
- * the reference's camera rays hit. */
+ * of rays that hit with both the difference of distances: "error_median", "error_p99", in metres; of ldc also what
+ * a ray looked at in the mean: "nodes", "texels" (or cells) and "samples". Rays begin where the reference's camera
+ * rays hit. */
 #include "tests/bench/bench_ldc.h"
 
 #include "base/clock.h"
@@ -111,6 +112,26 @@ static void compare(json_t *object, const struct hit *truth, const struct hit *h
     free(errors);
 }
 
+/* What the walk looks at, in the mean of the wave's rays. Crossings are no answers then (shaders/ldc/cube.glsl).
+ */
+static bool count_steps(struct bench_contest *contest, struct bench_form *form, const struct bench_wave *wave,
+                        struct hit *counts, json_t *object, struct error *error)
+{
+    static const char *const names[3] = {"nodes", "texels", "samples"};
+    double sums[3] = {0};
+    form->made->options.ldc_count_steps = 1;
+    const bool done = bench_contest_crossings(contest, form->made, wave, counts, error);
+    form->made->options.ldc_count_steps = 0;
+    for (uint32_t i = 0; done && i < wave->ray_count; i++) {
+        sums[0] += (double)counts[i].distance;
+        sums[1] += (double)counts[i].instance;
+        sums[2] += (double)counts[i].primitive;
+    }
+    for (int i = 0; done && i < 3; i++)
+        json_object_set_new(object, names[i], json_real(sums[i] / (double)wave->ray_count));
+    return done;
+}
+
 /* ---- waves ---- */
 
 struct waves {
@@ -149,10 +170,21 @@ static void add_contenders(struct waves *waves)
                 waves->bench->forms[i].made;
 }
 
+/* How good the answers are, and what finding them took. */
+static bool examine(struct waves *waves, struct bench_form *form, const struct bench_wave *wave, json_t *object,
+                    struct error *error)
+{
+    if (!bench_contest_hits(&waves->contest, form->made, wave, waves->hits, error))
+        return false;
+    compare(object, waves->truth, waves->hits, wave->ray_count);
+    return form->tracer != BENCH_TRACER_LDC ||
+           count_steps(&waves->contest, form, wave, waves->hits, object, error);
+}
+
 static bool measure(struct waves *waves, const struct bench_wave *wave, struct error *error)
 {
     const struct bench_wave_fact *fact = &bench_wave_facts[wave->kind];
-    const struct bench_ldc *bench = waves->bench;
+    struct bench_ldc *bench = waves->bench;
     if (!bench_contest_wave(&waves->contest, wave, error))
         return false;
     if (!fact->is_any && !bench_contest_hits(&waves->contest, waves->reference.made, wave, waves->truth, error))
@@ -163,11 +195,10 @@ static bool measure(struct waves *waves, const struct bench_wave *wave, struct e
                                    bench_times_json(&pair[0].runs));
         if (!fact->is_any) {
             json_object_set_new(object, "walk_ns", bench_times_json(&pair[1].runs));
-            if (!bench_contest_hits(&waves->contest, bench->forms[i].made, wave, waves->hits, error)) {
+            if (!examine(waves, &bench->forms[i], wave, object, error)) {
                 json_decref(object);
                 return false;
             }
-            compare(object, waves->truth, waves->hits, wave->ray_count);
         }
         json_array_append_new(waves->lists[i], object);
     }

@@ -5,6 +5,8 @@ from bench_ldc import (ACCURACY_WAVES, PAPER, USUAL, after_build_ms, at, error_c
                        same_samples, wave_of)
 from bench_reach import show as show_wanted
 
+LOOKED_AT = ("nodes", "texels", "samples")  # cells in place of texels, where nodes are of cells
+
 
 def show_table1(rows):
     """Ours beside the paper's; A builds, B is all the rest of the picture, of which tracing is a part."""
@@ -42,10 +44,13 @@ def show_scenes(results):
                 rays = wave_of(form, kind)["rays"]
                 waves += [with_spread(figure([rays * 1e3 / ns for ns in wave_of(form, kind)["hits_ns"]])),
                           significant(ratio(bvh, form, kind)["median"])]
+            looked = wave_of(form, "reflection")
             lines.append((result["title"], result["triangles"], cube["resolution"], f"{cube['layers_needed']}",
-                          f"{cube['samples'] / 1e6:.2f}", f"{form['bytes'] / (1 << 20):.0f}", *waves))
+                          f"{cube['samples'] / 1e6:.2f}", f"{form['bytes'] / (1 << 20):.0f}", *waves,
+                          *(significant(looked[what]) for what in LOOKED_AT)))
     header = [("scene", "triangles", "cells", "layers", "samples", "memory", "reflection", "/ bvh", "bounce", "/ bvh",
-               "shadow", "/ bvh"), ("", "", "", "", "M", "MiB", *(["Mray/s", "x"] * 3))]
+               "shadow", "/ bvh", *(["reflection"] * 3)),
+              ("", "", "", "", "M", "MiB", *(["Mray/s", "x"] * 3), *(f"{what}/ray" for what in LOOKED_AT))]
     return table(header, lines)
 
 
@@ -101,10 +106,10 @@ def show_variants(results):
                 wave = wave_of(form, kind)
                 cells += [with_spread(figure([wave["rays"] * 1e3 / ns for ns in wave["hits_ns"]])),
                           significant(ratio(result["forms"][0], form, kind)["median"]), f"{100 * wave['agree']:.3f}",
-                          significant(error_cells(form, wave))]
+                          significant(error_cells(form, wave)), " ".join(significant(wave[what]) for what in LOOKED_AT)]
             lines.append((result["title"], result["what"], name, *cells))
-    header = [("scene", "what", "form", *(["reflection"] * 4), *(["bounce"] * 4)),
-              ("", "", "", *(["Mray/s", "x first", "agree %", "error, cells"] * 2))]
+    header = [("scene", "what", "form", *(["reflection"] * 5), *(["bounce"] * 5)),
+              ("", "", "", *(["Mray/s", "x first", "agree %", "error, cells", "looked at / ray"] * 2))]
     return table(header, lines)
 
 

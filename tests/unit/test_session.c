@@ -1020,6 +1020,7 @@ static void settings_of_cubes_go_to_the_engine_with_the_daemons_limits(void **st
     message.render.ldc_block = 32;
     message.render.ldc_build = PROTOCOL_LDC_BUILD_LISTS;
     message.render.ldc_levels = PROTOCOL_LDC_LEVELS_BLOCKS;
+    message.render.ldc_images = PROTOCOL_LDC_IMAGES_ONE;
     message.render.ldc_tolerance = 0.25f;
     message.render.ldc_rays_together = 4;
     send_message(2, 0, &message);
@@ -1030,6 +1031,7 @@ static void settings_of_cubes_go_to_the_engine_with_the_daemons_limits(void **st
     assert_int_equal(options->ldc_block, 32);
     assert_int_equal(options->ldc_build, LDC_BUILD_LISTS);
     assert_int_equal(options->ldc_levels, LDC_LEVELS_BLOCKS);
+    assert_int_equal(options->ldc_images, LDC_IMAGES_ONE);
     assert_true(options->ldc_tolerance == 0.25f);
     assert_int_equal(options->ldc_rays_together, 4);
     assert_int_equal(options->ldc_layers_max, 7);
@@ -1060,6 +1062,12 @@ static void settings_that_no_cube_has_are_refused_by_their_field(void **state)
         assert_string_equal(client.message.error.field, cases[i].field);
         assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
     }
+    struct message message = render_message(0, 1);
+    message.render.ldc_levels = PROTOCOL_LDC_LEVELS_CELLS;
+    message.render.ldc_tolerance = 0.5f;
+    send_message(20, 0, &message);
+    expect_error(20, PROTOCOL_ERROR_CODE_INVALID);
+    assert_string_equal(client.message.error.field, "render.ldc_levels");
 }
 
 static void cubes_of_a_frame_are_told(void **state)
