@@ -48,6 +48,7 @@ struct oracle_scene {
 struct oracle {
     uint32_t resolution;
     double lower_world[3], cell_world;
+    bool one_image;              /* as the paper has it: images do not overlap */
     struct oracle_texel *texels; /* 3 * resolution^2 */
 };
 
@@ -110,11 +111,11 @@ static inline double oracle_dot(const double a[3], const double b[3])
 
 enum oracle_lean { ORACLE_LEANS_AWAY, ORACLE_LEANS_TO, ORACLE_LEANS_SO_SO /* rounding decides */ };
 
-/* Whether a surface with this normal is in the image of an axis. */
-static inline enum oracle_lean oracle_lean(const double n[3], int axis)
+/* Whether a surface with this normal is in the image of an axis; `one`: and of no other. */
+static inline enum oracle_lean oracle_lean(const double n[3], int axis, bool one)
 {
-    double most = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
-    double beyond = fabs(n[axis]) / most - (double)LDC_OVERLAP;
+    double others = fmax(fabs(n[(axis + 1) % 3]), fabs(n[(axis + 2) % 3])), most = fmax(fabs(n[axis]), others);
+    double beyond = one ? (fabs(n[axis]) - others) / most : fabs(n[axis]) / most - (double)LDC_OVERLAP;
     if (fabs(beyond) <= ORACLE_LEAN)
         return ORACLE_LEANS_SO_SO;
     return beyond > 0 ? ORACLE_LEANS_TO : ORACLE_LEANS_AWAY;
@@ -207,7 +208,7 @@ static inline void oracle_triangle(struct oracle *oracle, const struct oracle_sc
     for (int k = 0; k < 3; k++)
         base.normal[k] = side * n[k] / length;
     for (int axis = 0; axis < 3; axis++) {
-        enum oracle_lean lean = oracle_lean(n, axis);
+        enum oracle_lean lean = oracle_lean(n, axis, oracle->one_image);
         if (lean != ORACLE_LEANS_AWAY)
             oracle_cover(oracle, scene, axis, p, &base, n, lean == ORACLE_LEANS_SO_SO);
     }
@@ -250,7 +251,7 @@ static inline void oracle_sphere(struct oracle *oracle, const struct oracle_scen
             }
             for (int k = 0; k < 3; k++)
                 sample.normal[k] /= sqrt(length);
-            enum oracle_lean lean = oracle_lean(sample.normal, axis);
+            enum oracle_lean lean = oracle_lean(sample.normal, axis, oracle->one_image);
             if (lean == ORACLE_LEANS_SO_SO)
                 oracle->texels[i].open = true;
             else if (lean == ORACLE_LEANS_TO)
@@ -270,9 +271,11 @@ static inline int oracle_compare(const void *a, const void *b)
 }
 
 static inline void oracle_init(struct oracle *oracle, const struct oracle_scene *scene,
-                               const struct ldc_cube *cube, const uint32_t *instances, uint32_t count)
+                               const struct ldc_cube *cube, bool one_image, const uint32_t *instances,
+                               uint32_t count)
 {
-    *oracle = (struct oracle){.resolution = cube->resolution, .cell_world = cube->cell_world};
+    *oracle =
+        (struct oracle){.resolution = cube->resolution, .cell_world = cube->cell_world, .one_image = one_image};
     for (int k = 0; k < 3; k++)
         oracle->lower_world[k] = cube->lower_world[k];
     size_t texels = (size_t)3 * cube->resolution * cube->resolution;

@@ -60,7 +60,7 @@ static uint32_t expect_like_oracle(struct fixture *fixture, unsigned which, cons
     contents_read(&contents, &fixture->store, which);
     expect_consistent(&contents);
     oracle_scene_init(&scene, &fixture->gpu);
-    oracle_init(&oracle, &scene, &contents.cube, instances, count);
+    oracle_init(&oracle, &scene, &contents.cube, fixture->options.ldc_images == LDC_IMAGES_ONE, instances, count);
     for (uint32_t i = 0; i < 3 * oracle.resolution * oracle.resolution; i++) {
         const struct oracle_texel *expected = &oracle.texels[i];
         if (expected->open || !are_apart(expected))
@@ -76,12 +76,13 @@ static uint32_t expect_like_oracle(struct fixture *fixture, unsigned which, cons
     return compared;
 }
 
-/* A cube of all instances. */
-static void expect_scene_like_oracle(struct scene *scene,
-                                     void (*move)(struct scene_motion *motion, uint32_t poses))
+/* A cube of all instances; returns its samples. */
+static uint32_t expect_scene_like_oracle(struct scene *scene, const struct tracer_options *options,
+                                         void (*move)(struct scene_motion *motion, uint32_t poses))
 {
     struct fixture fixture;
     fixture_init(&fixture, scene);
+    fixture.options = *options;
     if (move) {
         struct scene_motion motion = {0};
         move(&motion, 1);
@@ -95,27 +96,43 @@ static void expect_scene_like_oracle(struct scene *scene,
     print_message("%u samples, %u layers, %u texels compared\n", fixture.store.cubes[0].sample_count,
                   fixture.store.cubes[0].layers_needed, compared);
     assert_in_range(compared, COMPARED_MIN, 3 * RESOLUTION * RESOLUTION);
+    uint32_t samples = fixture.store.cubes[0].sample_count;
     fixture_finish(&fixture);
+    return samples;
 }
+
+static const struct tracer_options defaults;
 
 /* Instances as they are, mirrored, scaled unevenly, nested. */
 static void a_soup_is_where_it_is(void **state)
 {
     (void)state;
-    expect_scene_like_oracle(test_scene_soup(), NULL);
+    expect_scene_like_oracle(test_scene_soup(), &defaults, NULL);
 }
 
 static void spheres_are_where_they_are(void **state)
 {
     (void)state;
-    expect_scene_like_oracle(test_scene_spheres(), NULL);
+    expect_scene_like_oracle(test_scene_spheres(), &defaults, NULL);
 }
 
 /* Skins and morph targets, as the shutter opens; some of it cut out by the alpha of vertices. */
 static void what_deforms_is_where_it_went(void **state)
 {
     (void)state;
-    expect_scene_like_oracle(test_scene_deformed(), test_motion_of_deformed);
+    expect_scene_like_oracle(test_scene_deformed(), &defaults, test_motion_of_deformed);
+}
+
+/* The paper's cube: a surface is in the image that its normal leans to most, and in no other. */
+static void a_surface_is_in_one_image_if_that_is_asked_for(void **state)
+{
+    (void)state;
+    static const struct tracer_options one = {.ldc_images = LDC_IMAGES_ONE};
+    struct scene *(*const scenes[])(void) = {test_scene_soup, test_scene_spheres};
+    for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++) {
+        uint32_t samples = expect_scene_like_oracle(scenes[i](), &one, NULL);
+        assert_true(samples < expect_scene_like_oracle(scenes[i](), &defaults, NULL));
+    }
 }
 
 /* ---- one pass against peeling ---- */
@@ -158,6 +175,7 @@ int main(void)
         cmocka_unit_test(a_soup_is_where_it_is),
         cmocka_unit_test(spheres_are_where_they_are),
         cmocka_unit_test(what_deforms_is_where_it_went),
+        cmocka_unit_test(a_surface_is_in_one_image_if_that_is_asked_for),
         cmocka_unit_test(both_builds_give_the_same_samples),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
