@@ -7,7 +7,7 @@ _farlight()
     local job="--output --format --half --float --server --size --samples --depth --seed --environment --exposure
         --tone-map --camera --eye --look-at --up --fov --tracer --bvh-bounds --integrator --primary --encoding
         --quality --timings --timings=json --trace-file --quiet --help --filter --aperture --focus --shutter --clip
-        --clip-once --clip-start --clip-speed --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels
+        --clip-once --clip-start --clip-speed --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels --ldc-images
         --ldc-block --ldc-rays"
     local words=
 
@@ -24,6 +24,7 @@ _farlight()
         --ldc-resolution) words="512 1024 2048" ;;
         --ldc-build) words="auto peel lists" ;;
         --ldc-levels) words="auto blocks pyramid cells" ;;
+        --ldc-images) words="overlap one" ;;
         --ldc-block) words="2 4 8 16 32" ;;
         --ldc-rays) words="0 1 4" ;;
         --primary) words="raster trace" ;;
@@ -41,7 +42,7 @@ _farlight()
             compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help
                 --tracers --far --server --size --samples --depth --seed --environment --exposure --camera --eye --look-at
                 --up --fov --aperture --focus --shutter --filter --clip --clip-once --clip-start --clip-speed --time
-                --bvh-bounds --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels --ldc-block --ldc-rays
+                --bvh-bounds --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels --ldc-images --ldc-block --ldc-rays
                 --integrator --encoding --quality --quiet" ;;
             stats) words="--server --json --help" ;;
             ping) words="--server --count --help" ;;

@@ -71,6 +71,8 @@ static const struct argp_option options[] = {
      "What leads over emptiness: auto (default), blocks of one size, pyramid of all sizes, cells: one tree of all "
      "three sides",
      0},
+    {"ldc-images", KEY_LDC_IMAGES, "NAME", 0,
+     "overlap (default): no cracks between the three images, one: a surface is in one of them alone", 0},
     {"ldc-block", KEY_LDC_BLOCK, "N", 0, "Texels along a side of a block: 2, 4, 8, 16, 32 (default 8)", 0},
     {"ldc-rays", KEY_LDC_RAYS, "N", 0, "Rays that walk as one: 1, 4 (default 0: chosen)", 0},
     {NULL, 0, NULL, 0, "Talk:", 7},
@@ -341,11 +343,11 @@ const struct argp *cli_picture_argp(void)
 static bool read_environment(struct cli_job *job)
 {
     static const int keys[] = {
-        KEY_SERVER,        KEY_SIZE,      KEY_SAMPLES,    KEY_DEPTH,       KEY_SEED,
-        KEY_EXPOSURE,      KEY_TONE_MAP,  KEY_TRACER,     KEY_BVH_BOUNDS,  KEY_INTEGRATOR,
-        KEY_PRIMARY,       KEY_ENCODING,  KEY_QUALITY,    KEY_ENVIRONMENT, KEY_APERTURE,
-        KEY_FOCUS,         KEY_SHUTTER,   KEY_FILTER,     KEY_BVH_RAYS,    KEY_LDC_RESOLUTION,
-        KEY_LDC_TOLERANCE, KEY_LDC_BUILD, KEY_LDC_LEVELS, KEY_LDC_BLOCK,   KEY_LDC_RAYS};
+        KEY_SERVER,    KEY_SIZE,           KEY_SAMPLES,       KEY_DEPTH,      KEY_SEED,       KEY_EXPOSURE,
+        KEY_TONE_MAP,  KEY_TRACER,         KEY_BVH_BOUNDS,    KEY_INTEGRATOR, KEY_PRIMARY,    KEY_ENCODING,
+        KEY_QUALITY,   KEY_ENVIRONMENT,    KEY_APERTURE,      KEY_FOCUS,      KEY_SHUTTER,    KEY_FILTER,
+        KEY_BVH_RAYS,  KEY_LDC_RESOLUTION, KEY_LDC_TOLERANCE, KEY_LDC_BUILD,  KEY_LDC_LEVELS, KEY_LDC_IMAGES,
+        KEY_LDC_BLOCK, KEY_LDC_RAYS};
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
         char field[40] = "FARLIGHT_";
         size_t length = strlen(field);

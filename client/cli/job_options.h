@@ -45,6 +45,7 @@ enum job_key {
     KEY_LDC_BLOCK,
     KEY_LDC_BUILD,
     KEY_LDC_LEVELS,
+    KEY_LDC_IMAGES,
     KEY_LDC_TOLERANCE,
     KEY_LDC_RAYS
 };

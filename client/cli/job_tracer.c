@@ -23,6 +23,10 @@ static error_t set_name(struct cli_job *job, int key, const char *field, const c
         return protocol_ldc_levels_parse(value, &wanted->ldc_levels)
                    ? 0
                    : job_unknown_value(job, field, "ldc_levels", value);
+    case KEY_LDC_IMAGES:
+        return protocol_ldc_images_parse(value, &wanted->ldc_images)
+                   ? 0
+                   : job_unknown_value(job, field, "ldc_images", value);
     default:
         return ARGP_ERR_UNKNOWN;
     }

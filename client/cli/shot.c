@@ -39,6 +39,7 @@ static const struct setting {
     {"ldc_block", "ldc-block", WHOLE, "8"},
     {"ldc_build", "ldc-build", WORD, "\"lists\""},
     {"ldc_levels", "ldc-levels", WORD, "\"pyramid\""},
+    {"ldc_images", "ldc-images", WORD, "\"one\""},
     {"ldc_tolerance", "ldc-tolerance", REAL, "0.001"},
     {"ldc_rays", "ldc-rays", WHOLE, "4"},
     {"integrator", "integrator", WORD, "\"distributed\""},

@@ -267,6 +267,7 @@ struct fl_job_options {
     unsigned ldc_block;      /* texels along a side of a block: 2, 4, 8, 16, 32; 0: 8 */
     enum protocol_ldc_build ldc_build;
     enum protocol_ldc_levels ldc_levels;
+    enum protocol_ldc_images ldc_images;
     /* A ray hits where it comes this near to a sample, metres; 0: where it crosses its plane. Not with cells. */
     float ldc_tolerance;
     unsigned ldc_rays_together; /* that walk as one: 1, 4; 0: chosen */

@@ -58,6 +58,7 @@ static void fill_render(struct message_render *render, const struct fl_job_optio
     render->ldc_block = options->ldc_block;
     render->ldc_build = options->ldc_build;
     render->ldc_levels = options->ldc_levels;
+    render->ldc_images = options->ldc_images;
     render->ldc_tolerance = options->ldc_tolerance;
     render->ldc_rays_together = options->ldc_rays_together;
     render->clips = (struct record_clip_use *)(uintptr_t)options->clips; /* only read */

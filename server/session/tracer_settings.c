@@ -41,6 +41,7 @@ struct tracer_options tracer_settings(const struct session_limits *limits, const
         .ldc_block = render->ldc_block,
         .ldc_build = (unsigned)render->ldc_build,
         .ldc_levels = (unsigned)render->ldc_levels,
+        .ldc_images = (unsigned)render->ldc_images,
         .ldc_tolerance = render->ldc_tolerance,
         .ldc_rays_together = render->ldc_rays_together,
         .ldc_layers_max = limits->ldc_layers,

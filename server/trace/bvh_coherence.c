@@ -29,7 +29,8 @@
 float bvh_reach_together(const struct scene_gpu *scene, const struct wave *wave)
 {
     float reach = REACH_TOGETHER * scene->diagonal;
-    /* Rays of several times have several places in what moves: measured, those of a lens are 0.7 of single ones then. */
+    /* Rays of several times have several places in what moves: measured, those of a lens are 0.7 of single ones
+     * then. */
     return wave->origin_spread > reach && !scene->has_motion ? wave->origin_spread : reach;
 }
 

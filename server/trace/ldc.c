@@ -57,6 +57,9 @@ static bool check_options(const struct tracer_options *options, struct error *er
                          (unsigned)options->ldc_levels);
     if (options->ldc_levels == LDC_LEVELS_CELLS && options->ldc_tolerance > 0)
         return error_set(error, ERROR_INVALID, "options.ldc_levels", "cells know planes only, no tolerance");
+    if (options->ldc_images > LDC_IMAGES_ONE)
+        return error_set(error, ERROR_INVALID, "options.ldc_images", "there is no choice number %u of images",
+                         (unsigned)options->ldc_images);
     if (!(options->ldc_tolerance >= 0.0f && isfinite(options->ldc_tolerance)))
         return error_set(error, ERROR_INVALID, "options.ldc_tolerance", "%g metres; 0 and more are possible",
                          (double)options->ldc_tolerance);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/ldc_build.h"
 
+#include "base/log.h"
 #include "gpu/registry.h"
 #include "shared/bindings.h"
 #include "trace/ldc_build_state.h"
@@ -20,13 +21,14 @@ struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *
     return builder;
 }
 
-#define BUFFER_COUNT 10
+#define BUFFER_COUNT 11
 
 static void list_buffers(struct ldc_builder *builder, struct gpu_buffer *buffers[BUFFER_COUNT])
 {
-    struct gpu_buffer *all[BUFFER_COUNT] = {
-        &builder->counts, &builder->occupied, &builder->ordered, &builder->places, &builder->fragments,
-        &builder->found,  &builder->visible,  &builder->drawn,   &builder->build,  &builder->commands};
+    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->counts,   &builder->occupied,  &builder->ordered,
+                                            &builder->places,   &builder->fragments, &builder->found,
+                                            &builder->visible,  &builder->drawn,     &builder->build,
+                                            &builder->commands, &builder->histogram};
     for (size_t i = 0; i < BUFFER_COUNT; i++)
         buffers[i] = all[i];
 }
@@ -77,6 +79,7 @@ bool ldc_give_places(struct ldc_task *task, uint32_t kept, struct error *error)
     const struct gpu_program *program = ldc_use(device, "ldc/places.comp", error);
     if (!program)
         return false;
+    gpu_buffer_clear(device, &builder->build, 0);
     gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->places, IMAGE_LDC_PLACES, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->occupied, IMAGE_LDC_OCCUPIED, GL_R32UI);
@@ -88,6 +91,20 @@ bool ldc_give_places(struct ldc_task *task, uint32_t kept, struct error *error)
     gpu_dispatch(device, program, (task->texel_count + LDC_PLACES_TEXELS - 1) / LDC_PLACES_TEXELS);
     ldc_read_counts(task);
     return true;
+}
+
+void ldc_bind_runs(struct ldc_task *task, const struct gpu_program *program)
+{
+    struct ldc_builder *builder = task->builder;
+    struct gpu_device *device = builder->device;
+    gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
+    gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
+    gpu_buffer_bind_texels(device, &builder->occupied, UNIT_LDC_OCCUPIED, GL_R32UI);
+    gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
+    gpu_uniform_uint(program, "occupied_count", task->counts.occupied);
+    gpu_uniform_uint(program, "texel_count", task->texel_count);
+    gpu_uniform_uint(program, "texels_along", task->cube->resolution);
+    gpu_uniform_uint(program, "slots", task->slots);
 }
 
 void ldc_read_counts(struct ldc_task *task)
@@ -113,19 +130,37 @@ static void place_cube(struct ldc_store *store, unsigned which)
         store->cubes[behind].resolution = 0;
 }
 
+/* In one pass, which is the faster way wherever it was measured (tests/bench/bench_ldc_build.c: 2 to 10 times);
+ * by peeling where that is asked for, or the lists of one pass have no room. */
+static bool find_fragments(struct ldc_task *task, struct error *error)
+{
+    struct error own = {0};
+    if (task->options->ldc_build != LDC_BUILD_PEEL) {
+        if (ldc_lists(task, &own))
+            return true;
+        if (own.kind != ERROR_NONE) {
+            if (error)
+                *error = own;
+            return false;
+        }
+        log_write(LOG_DEBUG, "trace", "layered depth cube: no room for lists of fragments, it is peeled");
+    }
+    return ldc_peel(task, error);
+}
+
 static bool build(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
-    size_t texel_bytes = 16;
-    return ldc_store_grow(device, &task->store->texels, task->cube->first_texel * texel_bytes,
-                          ((uint64_t)task->cube->first_texel + task->texel_count) * texel_bytes, error) &&
-           gpu_buffer_reserve(device, &builder->counts, (size_t)task->texel_count * sizeof(uint32_t), error) &&
-           gpu_buffer_reserve(device, &builder->places, (size_t)task->texel_count * sizeof(uint32_t), error) &&
-           gpu_buffer_reserve(device, &builder->occupied, (size_t)task->texel_count * sizeof(uint32_t), error) &&
+    size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
+    return ldc_store_grow(device, &task->store->texels, (uint64_t)task->cube->first_texel * LDC_TEXEL_BYTES,
+                          ((uint64_t)task->cube->first_texel + task->texel_count) * LDC_TEXEL_BYTES, error) &&
+           gpu_buffer_reserve(device, &builder->counts, texel_numbers, error) &&
+           gpu_buffer_reserve(device, &builder->places, texel_numbers, error) &&
+           gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->build, sizeof(struct ldc_build_counts), error) &&
-           (task->options->ldc_build == LDC_BUILD_PEEL ? ldc_peel(task, error) : ldc_lists(task, error)) &&
-           ldc_pack(task, error) && gpu_check(device, "building a layered depth cube", error);
+           find_fragments(task, error) && ldc_pack(task, error) &&
+           gpu_check(device, "building a layered depth cube", error);
 }
 
 bool ldc_build(struct ldc_builder *builder, struct ldc_store *store, unsigned which, struct scene_gpu *scene,

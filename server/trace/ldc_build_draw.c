@@ -150,6 +150,7 @@ static void set_uniforms(const struct ldc_task *task, const struct gpu_program *
     gpu_uniform_float(program, "cell_world", task->cube->cell_world);
     gpu_uniform_float(program, "resolution", (float)task->cube->resolution);
     gpu_uniform_uint(program, "texels_along", task->cube->resolution);
+    gpu_uniform_float(program, "overlap", task->options->ldc_images == LDC_IMAGES_ONE ? 1.0f : LDC_OVERLAP);
 }
 
 static void set_state(uint32_t along)

@@ -7,18 +7,20 @@
 #include <epoxy/gl.h>
 
 #define FRAGMENT_BYTES 16
-#define ORDERED_BYTES 8
 /* A fragment that has a slot costs half of what one in the list does, but all texels have as many. */
 #define SLOTS_FIRST 4u
 #define SLOTS_BYTES_MAX ((uint64_t)512 << 20)
 /* Of fragments, those without a slot that are put up with. */
 #define UNSLOTTED_SHARE 16
+/* Fragments of one texel. Software GL ends the loops of an invocation after 65,535 rounds: a heap of 2048 takes
+ * about 50,000, and pack.comp goes over eight texels three times. */
+#define LISTED_LAYERS_MAX 2048u
 
 /* As many as the last build suggests and memory allows. */
 static uint32_t choose_slots(const struct ldc_task *task)
 {
     const struct ldc_builder *builder = task->builder;
-    uint64_t texels = task->texel_count, limit = SLOTS_BYTES_MAX / ORDERED_BYTES / texels;
+    uint64_t texels = task->texel_count, limit = SLOTS_BYTES_MAX / LDC_ORDERED_BYTES / texels;
     uint64_t fitting = builder->device->facts.texture_buffer_texels_max / 2 / texels;
     uint64_t slots = builder->slots_texels == task->texel_count ? builder->slots : SLOTS_FIRST;
     slots = slots < limit ? slots : limit;
@@ -30,7 +32,7 @@ static void suggest_slots(struct ldc_task *task)
     struct ldc_builder *builder = task->builder;
     builder->slots_texels = task->texel_count;
     builder->slots = task->slots > 0 ? task->slots : 1;
-    if (task->counts.unslotted > task->counts.fragments / UNSLOTTED_SHARE)
+    if (task->counts.places > task->counts.fragments / UNSLOTTED_SHARE)
         builder->slots *= 2;
 }
 
@@ -74,39 +76,63 @@ static bool order(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
-    uint64_t slot_bytes = (uint64_t)task->slots * task->texel_count * ORDERED_BYTES;
+    uint64_t slot_bytes = (uint64_t)task->slots * task->texel_count * LDC_ORDERED_BYTES;
     const struct gpu_program *program = ldc_use(device, "ldc/order.comp", error);
     if (!program || !ldc_store_grow(device, &builder->ordered, slot_bytes,
-                                    slot_bytes + (uint64_t)task->counts.places * ORDERED_BYTES, error))
+                                    slot_bytes + (uint64_t)task->counts.places * LDC_ORDERED_BYTES, error))
         return false;
     gpu_buffer_bind_texels(device, &builder->fragments, UNIT_LDC_FRAGMENTS, GL_RGBA32UI);
     gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
-    gpu_uniform_uint(program, "fragment_count", task->counts.unslotted);
+    gpu_uniform_uint(program, "fragment_count", task->counts.places);
     gpu_uniform_uint(program, "texel_count", task->texel_count);
     gpu_uniform_uint(program, "slots", task->slots);
-    gpu_dispatch(device, program, task->counts.unslotted);
+    gpu_dispatch(device, program, task->counts.places);
     return true;
+}
+
+/* Texels with many fragments are sorted apart. */
+static bool sort_deep(struct ldc_task *task, struct error *error)
+{
+    if (task->counts.layers_needed <= LDC_PACK_SORTS)
+        return true;
+    const struct gpu_program *program = ldc_use(task->builder->device, "ldc/sort.comp", error);
+    if (!program)
+        return false;
+    ldc_bind_runs(task, program);
+    gpu_dispatch(task->builder->device, program, task->counts.occupied);
+    return true;
+}
+
+/* Whether there is room, and the sort's loops come to an end; makes it. */
+static bool can_list(struct ldc_task *task)
+{
+    struct ldc_builder *builder = task->builder;
+    uint64_t texels_max = builder->device->facts.texture_buffer_texels_max, wanted = task->counts.places;
+    if (task->counts.layers_needed > LISTED_LAYERS_MAX ||
+        (uint64_t)task->slots * task->texel_count + wanted > texels_max)
+        return false;
+    if (wanted <= builder->fragments_max)
+        return true;
+    wanted += wanted / 8;
+    return reserve_fragments(task, (uint32_t)(wanted < texels_max ? wanted : texels_max), NULL);
 }
 
 bool ldc_lists(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     task->slots = choose_slots(task);
-    size_t ordered_bytes = (size_t)task->slots * task->texel_count * ORDERED_BYTES;
+    size_t ordered_bytes = (size_t)task->slots * task->texel_count * LDC_ORDERED_BYTES;
     if (builder->ordered.size_bytes < ordered_bytes &&
-        !gpu_buffer_reserve(builder->device, &builder->ordered, ordered_bytes, error))
+        !gpu_buffer_reserve(builder->device, &builder->ordered, ordered_bytes, NULL))
         return false;
-    if (builder->fragments_max == 0 && !reserve_fragments(task, task->texel_count / 4, error))
+    if (builder->fragments_max == 0 && !reserve_fragments(task, task->texel_count / 4, NULL))
         return false;
     if (!draw_lists(task, error))
         return false;
-    if (task->counts.unslotted > builder->fragments_max) {
-        /* Once more with room for all: the next build starts with it. */
-        if (!reserve_fragments(task, task->counts.unslotted + task->counts.unslotted / 8, error) ||
-            !draw_lists(task, error))
-            return false;
-    }
+    bool complete = task->counts.places <= builder->fragments_max;
+    if (!can_list(task) || (!complete && !draw_lists(task, error))) /* once more, with room for all */
+        return false;
     suggest_slots(task);
-    return task->counts.unslotted == 0 || order(task, error);
+    return ldc_limit(task, error) && (task->counts.places == 0 || order(task, error)) && sort_deep(task, error);
 }

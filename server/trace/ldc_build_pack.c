@@ -5,25 +5,19 @@
 #include <epoxy/gl.h>
 #include <string.h>
 
-#define TEXEL_BYTES 16
-#define QUAD_BYTES 16
-#define GEOMETRY_BYTES 8
-#define SURFACE_BYTES 16
-#define VISIBLE_BYTES 16
-
 /* `samples`, `quads`: at most so many. */
 static bool reserve(struct ldc_task *task, uint32_t samples, uint32_t quads, struct error *error)
 {
     struct gpu_device *device = task->builder->device;
     struct ldc_store *store = task->store;
     const struct ldc_cube *cube = task->cube;
-    return ldc_store_grow(device, &store->quads, (uint64_t)cube->first_quad * QUAD_BYTES,
-                          ((uint64_t)cube->first_quad + quads) * QUAD_BYTES, error) &&
-           ldc_store_grow(device, &store->geometry, (uint64_t)cube->first_sample * GEOMETRY_BYTES,
-                          ((uint64_t)cube->first_sample + samples) * GEOMETRY_BYTES, error) &&
-           ldc_store_grow(device, &store->surface, (uint64_t)cube->first_sample * SURFACE_BYTES,
-                          ((uint64_t)cube->first_sample + samples) * SURFACE_BYTES, error) &&
-           gpu_buffer_reserve(device, &task->builder->visible, (size_t)samples * VISIBLE_BYTES, error);
+    return ldc_store_grow(device, &store->quads, (uint64_t)cube->first_quad * LDC_QUAD_BYTES,
+                          ((uint64_t)cube->first_quad + quads) * LDC_QUAD_BYTES, error) &&
+           ldc_store_grow(device, &store->geometry, (uint64_t)cube->first_sample * LDC_GEOMETRY_BYTES,
+                          ((uint64_t)cube->first_sample + samples) * LDC_GEOMETRY_BYTES, error) &&
+           ldc_store_grow(device, &store->surface, (uint64_t)cube->first_sample * LDC_SURFACE_BYTES,
+                          ((uint64_t)cube->first_sample + samples) * LDC_SURFACE_BYTES, error) &&
+           gpu_buffer_reserve(device, &task->builder->visible, (size_t)samples * LDC_VISIBLE_BYTES, error);
 }
 
 /* As if nothing were there. */
@@ -33,8 +27,8 @@ static void clear_texels(struct ldc_task *task)
     uint32_t empty[4] = {0};
     memcpy(&empty[2], no_range, sizeof(no_range));
     glClearNamedBufferSubData(
-        task->store->texels.name, GL_RGBA32UI, (GLintptr)task->cube->first_texel * TEXEL_BYTES,
-        (GLsizeiptr)task->texel_count * TEXEL_BYTES, GL_RGBA_INTEGER, GL_UNSIGNED_INT, empty);
+        task->store->texels.name, GL_RGBA32UI, (GLintptr)task->cube->first_texel * LDC_TEXEL_BYTES,
+        (GLsizeiptr)task->texel_count * LDC_TEXEL_BYTES, GL_RGBA_INTEGER, GL_UNSIGNED_INT, empty);
 }
 
 static bool pack(struct ldc_task *task, struct error *error)
@@ -49,18 +43,11 @@ static bool pack(struct ldc_task *task, struct error *error)
         return false;
     if (task->peeled)
         gpu_buffer_bind_texels(device, &builder->found, UNIT_LDC_FOUND, GL_R32UI);
-    gpu_buffer_bind_texels(device, &builder->counts, UNIT_LDC_COUNTS, GL_R32UI);
-    gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
-    gpu_buffer_bind_texels(device, &builder->occupied, UNIT_LDC_OCCUPIED, GL_R32UI);
-    gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
+    ldc_bind_runs(task, program);
     gpu_buffer_bind_image(device, &store->texels, IMAGE_LDC_TEXELS, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &store->quads, IMAGE_LDC_QUADS, GL_RGBA32F);
     gpu_buffer_bind_image(device, &builder->visible, IMAGE_LDC_VISIBLE, GL_RGBA32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
-    gpu_uniform_uint(program, "occupied_count", task->counts.occupied);
-    gpu_uniform_uint(program, "texel_count", task->texel_count);
-    gpu_uniform_uint(program, "texels_along", task->cube->resolution);
-    gpu_uniform_uint(program, "slots", task->slots);
     gpu_uniform_uint(program, "first_texel", task->cube->first_texel);
     gpu_uniform_uint(program, "first_sample", task->cube->first_sample);
     gpu_uniform_uint(program, "first_quad", task->cube->first_quad);

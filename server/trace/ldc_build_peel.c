@@ -9,16 +9,15 @@
 #include <math.h>
 #include <string.h>
 
-#define ORDERED_BYTES 8
-
 static bool count_fragments(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
+    task->slots = 0;
     gpu_buffer_clear(device, &builder->counts, 0);
-    gpu_buffer_clear(device, &builder->build, 0);
     gpu_buffer_bind_image(device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
     return ldc_draw_bind_plain(task, error) && ldc_draw(task, LDC_PASS_COUNT, NULL, error) &&
+           ldc_give_places(task, task->layers_max, error) && ldc_limit(task, error) &&
            ldc_give_places(task, task->layers_max, error);
 }
 
@@ -27,7 +26,7 @@ static bool reserve(struct ldc_task *task, struct error *error)
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     uint32_t along = task->cube->resolution;
-    if (!gpu_buffer_reserve(device, &builder->ordered, (size_t)task->counts.places * ORDERED_BYTES, error) ||
+    if (!gpu_buffer_reserve(device, &builder->ordered, (size_t)task->counts.places * LDC_ORDERED_BYTES, error) ||
         !gpu_buffer_reserve(device, &builder->found, (size_t)task->texel_count * sizeof(uint32_t), error))
         return false;
     if (builder->depth.name && builder->depth.width == along)

@@ -24,7 +24,7 @@ struct ldc_builder {
     struct gpu_framebuffer plain; /* without attachments, three layers */
     uint32_t plain_along;         /* its texels along a side; 0: not made yet */
     /* shared/ldc_build.h */
-    struct gpu_buffer counts, occupied, ordered, places, fragments, found, visible, drawn, build;
+    struct gpu_buffer counts, occupied, ordered, places, fragments, found, visible, drawn, build, histogram;
     struct gpu_buffer commands;
     /* Peeling: what is visible in the layer that is drawn and in the one before it, by turns. */
     struct gpu_texture layers[2], depth;
@@ -61,7 +61,8 @@ bool ldc_draw(struct ldc_task *task, enum ldc_pass pass,
               void (*set)(const struct ldc_task *task, const struct gpu_program *program), struct error *error);
 bool ldc_draw_bind_plain(struct ldc_task *task, struct error *error);
 
-/* ldc_build_lists.c. Leaves the fragments in `ordered`, and what was counted in task->counts. */
+/* ldc_build_lists.c. Leaves the fragments in `ordered`, and what was counted in task->counts. False and no error
+ * where there are more than lists can hold: to be peeled. */
 bool ldc_lists(struct ldc_task *task, struct error *error);
 /* ldc_build_peel.c. Likewise. */
 bool ldc_peel(struct ldc_task *task, struct error *error);
@@ -69,11 +70,24 @@ bool ldc_peel(struct ldc_task *task, struct error *error);
  * more than `kept` fragments are in `ordered`. */
 bool ldc_give_places(struct ldc_task *task, uint32_t kept, struct error *error);
 
+/* ldc_build_limit.c. Lowers task->layers_max to what fits the options, the layout and the device, if task->counts
+ * do not; counts.samples_max and .quads_max follow. Fails where not even one layer fits. */
+bool ldc_limit(struct ldc_task *task, struct error *error);
+
 /* ldc_build_pack.c. From `ordered` to the cube's buffers. */
 bool ldc_pack(struct ldc_task *task, struct error *error);
 
+#define LDC_TEXEL_BYTES 16
+#define LDC_QUAD_BYTES 16
+#define LDC_GEOMETRY_BYTES 8
+#define LDC_SURFACE_BYTES 16
+#define LDC_ORDERED_BYTES 8
+#define LDC_VISIBLE_BYTES 16
+
 /* ldc_build.c. The compute program, without defines, is made current. */
 const struct gpu_program *ldc_use(struct gpu_device *device, const char *path, struct error *error);
+/* Binds what ldc/run.glsl reads, and sets its uniforms. */
+void ldc_bind_runs(struct ldc_task *task, const struct gpu_program *program);
 /* Reads task->counts back. */
 void ldc_read_counts(struct ldc_task *task);
 

@@ -61,11 +61,6 @@ static bool reserve(struct ldc_store *store, unsigned which, uint64_t node_count
     return ldc_store_grow(device, &store->nodes, (first + kept) * node_bytes, nodes * node_bytes, error);
 }
 
-static uint64_t texel_count(const struct ldc_cube *cube)
-{
-    return 3 * (uint64_t)cube->resolution * cube->resolution;
-}
-
 /* Where the nodes of a level lie, or the texels. */
 struct place {
     uint32_t first, row, width, image;
@@ -140,45 +135,54 @@ struct cell_counts {
     uint32_t lower_nodes[4], upper_nodes[4];
 };
 
-struct cell_pass {
-    const char *stage;
-    uint64_t items;
-    uint32_t blocks;
+struct cell_build {
+    struct ldc_store *store;
+    unsigned which;
+    uint32_t grid; /* nodes along a side */
+    struct gpu_buffer list, counter;
+    struct cell_counts counts;
 };
 
-static bool cells_pass(struct ldc_store *store, const struct ldc_cube *cube, uint32_t grid,
-                       const struct cell_pass *pass, struct error *error)
+static bool cells_pass(struct cell_build *build, const char *stage, uint64_t items, struct error *error)
 {
-    const struct gpu_define defines[] = {{pass->stage, "1"}, {NULL, NULL}};
+    struct ldc_store *store = build->store;
+    const struct ldc_cube *cube = &store->cubes[build->which];
+    const struct gpu_define defines[] = {{stage, "1"}, {NULL, NULL}};
     const struct gpu_program_source source = {.compute = "ldc/cells.comp", .defines = defines};
     const struct gpu_program *program = gpu_program_get(store->device, &source, error);
     if (!program)
         return false;
-    bool of_texels = pass->items == texel_count(cube);
     gpu_uniform_int(program, "first_node", (int32_t)cube->first_node);
-    gpu_uniform_int(program, "grid", (int32_t)grid);
+    gpu_uniform_int(program, "grid", (int32_t)build->grid);
     gpu_uniform_int(program, "first_texel", (int32_t)cube->first_texel);
     gpu_uniform_int(program, "resolution", (int32_t)cube->resolution);
-    gpu_uniform_int(program, "blocks", (int32_t)pass->blocks);
+    gpu_uniform_int(program, "blocks", (int32_t)build->counts.blocks);
     gpu_uniform_uint(program, "first_entry", cube->first_entry);
-    gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_LDC_NODES, of_texels ? GL_R32UI : GL_RGBA32UI);
-    gpu_dispatch(store->device, program, pass->items);
+    gpu_uniform_uint(program, "first_sample", cube->first_sample);
+    gpu_uniform_uint(program, "sample_count", cube->sample_count);
+    gpu_dispatch(store->device, program, items);
     return true;
 }
 
-static void clear_words(struct gpu_buffer *buffer, uint64_t first_byte, uint64_t bytes, uint32_t format,
-                        const uint32_t *value)
+static void bind_nodes(struct cell_build *build, uint32_t format)
 {
-    if (bytes > 0)
-        glClearNamedBufferSubData(buffer->name, format, (GLintptr)first_byte, (GLsizeiptr)bytes,
-                                  format == GL_R32UI ? GL_RED_INTEGER : GL_RGBA_INTEGER, GL_UNSIGNED_INT, value);
+    gpu_buffer_bind_image(build->store->device, &build->store->nodes, IMAGE_LDC_NODES, format);
 }
 
-static bool reserve_entries(struct ldc_store *store, unsigned which, uint64_t count, struct error *error)
+static void clear_nodes(struct gpu_buffer *nodes, uint64_t first, uint64_t count)
 {
-    struct ldc_cube *cube = &store->cubes[which];
-    const uint32_t empty[4] = {LDC_ENTRY_NONE};
-    uint64_t entries = cube->first_entry + count;
+    const uint32_t zero[4] = {0};
+    if (count > 0)
+        glClearNamedBufferSubData(nodes->name, GL_RGBA32UI, (GLintptr)(first * CELL_NODE_BYTES),
+                                  (GLsizeiptr)(count * CELL_NODE_BYTES), GL_RGBA_INTEGER, GL_UNSIGNED_INT, zero);
+}
+
+static bool reserve_entries(struct cell_build *build, struct error *error)
+{
+    struct ldc_store *store = build->store;
+    struct ldc_cube *cube = &store->cubes[build->which];
+    const uint64_t count = (uint64_t)build->counts.entries + build->counts.further,
+                   entries = cube->first_entry + count;
     if (4 * entries > store->device->facts.texture_buffer_texels_max || entries > INT32_MAX)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
                          "%llu samples in cells are more than the device takes", (unsigned long long)entries);
@@ -186,73 +190,105 @@ static bool reserve_entries(struct ldc_store *store, unsigned which, uint64_t co
                         error))
         return false;
     cube->entry_count = (uint32_t)count;
-    clear_words(&store->entries, cube->first_entry * ENTRY_BYTES, count * ENTRY_BYTES, GL_RGBA32UI, empty);
+    return true;
+}
+
+/* Which texel a sample is in: then passes have samples, and not texels most of which are empty, for items. */
+static bool list_samples(struct cell_build *build, struct error *error)
+{
+    struct ldc_store *store = build->store;
+    const struct ldc_cube *cube = &store->cubes[build->which];
+    const uint64_t n = cube->resolution;
+    if (!gpu_buffer_reserve(store->device, &build->list, cube->sample_count * sizeof(uint32_t), error))
+        return false;
+    gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
+    gpu_buffer_bind_image(store->device, &build->list, IMAGE_LDC_NODES, GL_R32UI);
+    if (!cells_pass(build, "CELLS_LIST", 3 * n * n, error))
+        return false;
+    gpu_buffer_bind_texels(store->device, &build->list, UNIT_TRACER_0, GL_R32UI);
+    gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
     return true;
 }
 
 /* The nodes and their blocks, which are marked. */
-static bool place_blocks(struct ldc_store *store, unsigned which, uint32_t grid, struct gpu_buffer *counter,
-                         struct cell_counts *counts, struct error *error)
+static bool place_blocks(struct cell_build *build, struct error *error)
 {
-    struct ldc_cube *cube = &store->cubes[which];
-    const uint64_t nodes = (uint64_t)grid * grid * grid, texels = texel_count(cube);
-    const uint32_t zero[2] = {0};
-    if (!reserve(store, which, nodes, 0, CELL_NODE_BYTES, error))
+    struct ldc_store *store = build->store;
+    struct ldc_cube *cube = &store->cubes[build->which];
+    struct cell_counts *counts = &build->counts;
+    const uint64_t nodes = (uint64_t)build->grid * build->grid * build->grid;
+    if (!reserve(store, build->which, nodes, 0, CELL_NODE_BYTES, error))
         return false;
-    clear_words(&store->nodes, cube->first_node * CELL_NODE_BYTES, nodes * CELL_NODE_BYTES, GL_R32UI, zero);
-    if (!cells_pass(store, cube, grid, &(struct cell_pass){"CELLS_BLOCKS", texels, 0}, error) ||
-        !cells_pass(store, cube, grid, &(struct cell_pass){"CELLS_PLACE", nodes, 0}, error))
+    clear_nodes(&store->nodes, cube->first_node, nodes);
+    bind_nodes(build, GL_R32UI);
+    if (cube->sample_count > 0 && !cells_pass(build, "CELLS_BLOCKS", cube->sample_count, error))
         return false;
-    gpu_buffer_read(store->device, counter, 0, counts, sizeof *counts);
+    bind_nodes(build, GL_RGBA32UI);
+    if (!cells_pass(build, "CELLS_PLACE", nodes, error))
+        return false;
+    gpu_buffer_read(store->device, &build->counter, 0, counts, sizeof *counts);
     for (int k = 0; k < 3; k++) {
         cube->lower_cells[k] = counts->blocks ? counts->lower_nodes[k] << LDC_NODE_SHIFT : 0;
         cube->upper_cells[k] = counts->blocks ? (counts->upper_nodes[k] + 1) << LDC_NODE_SHIFT : 0;
     }
-    if (!reserve(store, which, nodes + counts->blocks, nodes, CELL_NODE_BYTES, error))
+    if (!reserve(store, build->which, nodes + counts->blocks, nodes, CELL_NODE_BYTES, error))
         return false;
-    clear_words(&store->nodes, (cube->first_node + nodes) * CELL_NODE_BYTES, counts->blocks * CELL_NODE_BYTES,
-                GL_R32UI, zero);
-    return cells_pass(store, cube, grid, &(struct cell_pass){"CELLS_MARK", texels, 0}, error);
+    clear_nodes(&store->nodes, cube->first_node + nodes, counts->blocks);
+    return true;
 }
 
-static bool fill_blocks(struct ldc_store *store, unsigned which, uint32_t grid, struct gpu_buffer *counter,
-                        struct cell_counts *counts, struct error *error)
+static bool fill_blocks(struct cell_build *build, struct error *error)
 {
-    struct ldc_cube *cube = &store->cubes[which];
-    if (!cells_pass(store, cube, grid, &(struct cell_pass){"CELLS_COUNT", counts->blocks, counts->blocks}, error))
+    struct ldc_store *store = build->store;
+    struct ldc_cube *cube = &store->cubes[build->which];
+    struct cell_counts *counts = &build->counts;
+    bind_nodes(build, GL_R32UI);
+    gpu_buffer_bind_image(store->device, &build->list, IMAGE_LDC_ENTRIES, GL_R32UI);
+    if (!cells_pass(build, "CELLS_MARK", cube->sample_count, error))
         return false;
-    gpu_buffer_read(store->device, counter, 0, counts, sizeof *counts);
-    if (!reserve_entries(store, which, (uint64_t)counts->entries + counts->further, error))
+    bind_nodes(build, GL_RGBA32UI);
+    if (!cells_pass(build, "CELLS_COUNT", counts->blocks, error))
+        return false;
+    gpu_buffer_read(store->device, &build->counter, 0, counts, sizeof *counts);
+    if (!reserve_entries(build, error))
         return false;
     /* From now on where the next further entry goes. */
     const uint32_t further = cube->first_entry + counts->entries;
-    gpu_buffer_write(store->device, counter, offsetof(struct cell_counts, further), &further, sizeof further);
+    gpu_buffer_write(store->device, &build->counter, offsetof(struct cell_counts, further), &further,
+                     sizeof further);
+    bind_nodes(build, GL_R32UI);
+    gpu_buffer_bind_image(store->device, &store->entries, IMAGE_LDC_ENTRIES, GL_RGBA32UI);
+    if (!cells_pass(build, "CELLS_FILL", cube->sample_count, error))
+        return false;
     gpu_buffer_bind_image(store->device, &store->entries, IMAGE_LDC_ENTRIES, GL_R32UI);
-    return cells_pass(store, cube, grid, &(struct cell_pass){"CELLS_FILL", texel_count(cube), 0}, error);
+    return counts->further == 0 || cells_pass(build, "CELLS_FURTHER", cube->sample_count, error);
+}
+
+/* How far it is empty around empty nodes. */
+static bool measure_emptiness(struct cell_build *build, struct error *error)
+{
+    const uint64_t nodes = (uint64_t)build->grid * build->grid * build->grid;
+    bind_nodes(build, GL_RGBA32UI);
+    return cells_pass(build, "CELLS_REACH_X", nodes, error) && cells_pass(build, "CELLS_REACH_Y", nodes, error) &&
+           cells_pass(build, "CELLS_REACH_Z", nodes, error);
 }
 
 static bool build_cells(struct ldc_store *store, unsigned which, uint32_t grid, struct error *error)
 {
-    static const char *const reaches[] = {"CELLS_REACH_X", "CELLS_REACH_Y", "CELLS_REACH_Z"};
-    struct gpu_device *device = store->device;
     struct ldc_cube *cube = &store->cubes[which];
-    struct cell_counts counts = {.lower_nodes = {grid, grid, grid, 0}};
-    struct gpu_buffer counter = {0};
+    struct cell_build build = {
+        .store = store, .which = which, .grid = grid, .counts.lower_nodes = {grid, grid, grid, 0}};
     cube->first_entry = cube->entry_count = 0;
     for (unsigned i = 0; i < which; i++)
         if (store->cubes[i].resolution)
             cube->first_entry = store->cubes[i].first_entry + store->cubes[i].entry_count;
-    if (!gpu_buffer_upload(device, &counter, &counts, sizeof counts, error))
-        return false;
-    gpu_buffer_bind_storage(&counter, BIND_TRACER_0);
-    gpu_buffer_bind_texels(device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
-    gpu_buffer_bind_texels(device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
-    bool ok = place_blocks(store, which, grid, &counter, &counts, error) &&
-              (counts.blocks == 0 || fill_blocks(store, which, grid, &counter, &counts, error));
-    gpu_buffer_finish(device, &counter);
-    for (int k = 0; ok && k < 3; k++)
-        ok =
-            cells_pass(store, cube, grid, &(struct cell_pass){reaches[k], (uint64_t)grid * grid * grid, 0}, error);
+    bool ok = gpu_buffer_upload(store->device, &build.counter, &build.counts, sizeof build.counts, error);
+    if (ok)
+        gpu_buffer_bind_storage(&build.counter, BIND_TRACER_0);
+    ok = ok && (cube->sample_count == 0 || list_samples(&build, error)) && place_blocks(&build, error) &&
+         (build.counts.blocks == 0 || fill_blocks(&build, error)) && measure_emptiness(&build, error);
+    gpu_buffer_finish(store->device, &build.counter);
+    gpu_buffer_finish(store->device, &build.list);
     return ok;
 }
 

@@ -32,6 +32,9 @@ struct tracer_options {
     enum { LDC_BUILD_AUTO, LDC_BUILD_PEEL, LDC_BUILD_LISTS } ldc_build; /* protocol's numbers */
     /* protocol's numbers; auto: cells, or with a tolerance, which these know nothing of, a pyramid */
     enum { LDC_LEVELS_AUTO, LDC_LEVELS_BLOCKS, LDC_LEVELS_PYRAMID, LDC_LEVELS_CELLS } ldc_levels;
+    /* Which images a triangle is in: those that its normal leans to almost as much as to one, or that one alone.
+     */
+    enum { LDC_IMAGES_OVERLAP, LDC_IMAGES_ONE } ldc_images; /* protocol's numbers */
     /* 0: a hit is where the ray crosses a sample's plane; else where it comes as near to the sample: metres */
     float ldc_tolerance;
     uint32_t ldc_rays_together;   /* 0: chosen; 1, 4 */

@@ -11,6 +11,7 @@
 #include "shared/ldc.h"
 #include "shared/ldc_build.h"
 #include "shared/bindings.h"
+#include "ldc/image.glsl"
 #include "common/alpha.glsl"
 
 uniform uint texels_along; // a side of the images
@@ -133,7 +134,7 @@ void main()
         precise float reach = side == 0 ? -half_chord : half_chord;
         precise float depth_cells = nearest + reach;
         vec3 lean = abs(affine_covector(rows, closest + reach * step_object));
-        bool there = lean[axis] >= LDC_OVERLAP * greatest(lean);
+        bool there = is_in_image(lean, axis);
 #ifdef HAS_CUTOUT
         candidate found = candidate(depth_cells, primitive.z, primitive.y, vec2(0.0));
         there = there && !is_cut_out(found, origin, direction, 0.0);

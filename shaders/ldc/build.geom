@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Sends a triangle to the image whose axis its normal leans to most (paper, figure 5), or to those where images overlap
-// (LDC_OVERLAP), with its plane in cells; a sphere to all three, as the square round it. PRIMITIVE_KIND as in build.vert; HAS_CUTOUT: triangles may have holes.
+// Sends a triangle to the image whose axis its normal leans to most (paper, figure 5), or to those where images overlap,
+// with its plane in cells; a sphere to all three, as the square round it. PRIMITIVE_KIND as in build.vert; HAS_CUTOUT:
+// triangles may have holes.
 
-#include "shared/ldc.h"
+#include "ldc/image.glsl"
 
 uniform float resolution; // cells along a side of the cube
 
@@ -46,11 +47,10 @@ void main()
 {
     vec3 normal = cross(place_cells[1] - place_cells[0], place_cells[2] - place_cells[0]);
     vec3 lean = abs(normal);
-    float most = max(lean.x, max(lean.y, lean.z));
-    if (!(most > 0.0)) // no area
+    if (!(max(lean.x, max(lean.y, lean.z)) > 0.0)) // no area
         return;
     for (int axis = 0; axis < 3; axis++) {
-        if (lean[axis] < LDC_OVERLAP * most)
+        if (!is_in_image(lean, axis))
             continue;
         int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
         vec3 along = vec3(place_cells[0][axis], place_cells[1][axis], place_cells[2][axis]);

@@ -2,11 +2,13 @@
 // Which cells of a cube samples' planes pass, and which samples these are: nodes, blocks and entries of shared/ldc.h.
 //
 // Defines, one of them:
-//   CELLS_BLOCKS   marks the blocks that samples are in; an item is a texel of the images
+//   CELLS_LIST     notes of each sample in which texel it is; an item is a texel of the images
+//   CELLS_BLOCKS   marks the blocks that samples are in; an item is a sample
 //   CELLS_PLACE    gives nodes their blocks; an item is a node
-//   CELLS_MARK     marks cells; an item is a texel
+//   CELLS_MARK     marks cells; an item is a sample
 //   CELLS_COUNT    gives blocks their entries; an item is a block
-//   CELLS_FILL     writes entries; an item is a texel
+//   CELLS_FILL     writes the first entry of each cell; an item is a sample
+//   CELLS_FURTHER  writes those of cells that have one; an item is a sample
 //   CELLS_REACH_X, CELLS_REACH_Y, CELLS_REACH_Z   how far it is empty; an item is a node
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
@@ -24,17 +26,48 @@ layout(std430, binding = BIND_TRACER_0) buffer count_block {
 } counts;
 #endif
 
-#if defined CELLS_BLOCKS || defined CELLS_MARK || defined CELLS_FILL
+// What is noted of a sample: 12 bits of its texel's u, of v, its axis; then of up to four cells, from the one with the
+// least depth on, in which it is the first to come and has the cell's own entry.
+const uint LIST_V_SHIFT = 12u, LIST_AXIS_SHIFT = 24u, LIST_FIRST_SHIFT = 26u, LIST_MASK = 0xfffu;
+
+#ifdef CELLS_LIST
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer ldc_texels;
+layout(binding = IMAGE_LDC_NODES, r32ui) writeonly uniform uimageBuffer list;
+
+uniform int first_texel, resolution;
+uniform uint first_sample;
+
+void main()
+{
+    int item = int(item_index()), of_image = resolution * resolution;
+    if (item >= 3 * of_image)
+        return;
+    int axis = item / of_image, in_image_ = item - axis * of_image;
+    int v = in_image_ / resolution, u = in_image_ - v * resolution;
+    uvec2 words = texelFetch(ldc_texels, first_texel + item).xy;
+    uint place = uint(u) | uint(v) << LIST_V_SHIFT | uint(axis) << LIST_AXIS_SHIFT;
+    uint first = words.x - first_sample;
+    for (uint i = first; i < first + (words.y & LDC_TEXEL_COUNT_MASK); i++)
+        imageStore(list, int(i), uvec4(place));
+}
+
+#elif defined CELLS_BLOCKS || defined CELLS_MARK || defined CELLS_FILL || defined CELLS_FURTHER
+
+layout(binding = UNIT_TRACER_0) uniform usamplerBuffer list;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer ldc_geometry;
 layout(binding = IMAGE_LDC_NODES, r32ui) uniform uimageBuffer nodes; // words
 
-#ifdef CELLS_FILL
+#ifdef CELLS_MARK
+layout(binding = IMAGE_LDC_ENTRIES, r32ui) writeonly uniform uimageBuffer firsts; // the list
+#elif defined CELLS_FILL
+layout(binding = IMAGE_LDC_ENTRIES, rgba32ui) writeonly uniform uimageBuffer entries;
+#elif defined CELLS_FURTHER
 layout(binding = IMAGE_LDC_ENTRIES, r32ui) uniform uimageBuffer entries; // words
 #endif
 
-uniform int first_texel, resolution;
+uniform int resolution;
+uniform uint first_sample, sample_count;
 
 int node_of(ivec3 cell)
 {
@@ -49,65 +82,87 @@ uint rank_of(int words, bool upper_half, uint bit)
     return upper_half ? below + uint(bitCount(imageLoad(nodes, words).x)) : below;
 }
 
-void mark(ivec3 cell, int axis, uint sample_index, uvec2 geometry)
+#ifdef CELLS_BLOCKS
+
+void mark_block(ivec3 cell)
+{
+    uvec3 b = uvec3(cell);
+    uint bit = 1u << ((b.x >> 2 & 3u) | (b.y & 12u) | (b.z & 4u) << 2);
+    int word = node_of(cell) + int(b.z >> 3 & 1u);
+    if ((imageLoad(nodes, word).x & bit) == 0u)
+        imageAtomicOr(nodes, word, bit);
+}
+
+#else
+
+uint bit_of(uvec3 part)
+{
+    return (part.x & 3u) | (part.y & 3u) << 2 | (part.z & 1u) << 4;
+}
+
+// Its first word.
+int block_of(ivec3 cell)
 {
     uvec3 b = uvec3(cell);
     int node = node_of(cell);
-    uint block_bit = (b.x >> 2 & 3u) | (b.y & 12u) | (b.z & 4u) << 2;
-    bool upper_half = (b.z & 8u) != 0u;
-    int word = upper_half ? node + 1 : node;
-#ifdef CELLS_BLOCKS
-    uint bit = 1u << block_bit;
-    if ((imageLoad(nodes, word).x & bit) == 0u)
-        imageAtomicOr(nodes, word, bit);
-#else
-    uint rank = rank_of(node, upper_half, block_bit);
-    int block = int(4u * (imageLoad(nodes, node + 2).x + rank));
-    uint cell_bit = (b.x & 3u) | (b.y & 3u) << 2 | (b.z & 1u) << 4;
-    bool upper_cells = (b.z & 2u) != 0u;
-#ifdef CELLS_MARK
-    uint bit = 1u << cell_bit;
-    if ((imageAtomicOr(nodes, upper_cells ? block + 1 : block, bit) & bit) != 0u)
-        atomicAdd(counts.further_count, 1u);
-#else
-    uint entry = imageLoad(nodes, block + 2).x + rank_of(block, upper_cells, cell_bit);
-    uint packed_ = sample_index | uint(axis) << LDC_ENTRY_AXIS_SHIFT;
-    if (imageAtomicCompSwap(entries, int(4u * entry), LDC_ENTRY_NONE, packed_) != LDC_ENTRY_NONE) {
-        uint further = atomicAdd(counts.further_count, 1u);
-        uint next = imageAtomicExchange(entries, int(4u * entry + 1u), further);
-        imageStore(entries, int(4u * further), uvec4(packed_));
-        imageStore(entries, int(4u * further + 1u), uvec4(next));
-        entry = further;
-    }
-    imageStore(entries, int(4u * entry + 2u), uvec4(geometry.x));
-    imageStore(entries, int(4u * entry + 3u), uvec4(geometry.y));
-#endif
-#endif
+    return int(4u * (imageLoad(nodes, node + 2).x + rank_of(node, (b.z & 8u) != 0u, bit_of(b >> 2))));
 }
+
+uint entry_of(ivec3 cell)
+{
+    uvec3 b = uvec3(cell);
+    int block = block_of(cell);
+    return imageLoad(nodes, block + 2).x + rank_of(block, (b.z & 2u) != 0u, bit_of(b));
+}
+
+#endif
 
 void main()
 {
-    int item = int(item_index()), of_image = resolution * resolution;
-    if (item >= 3 * of_image)
+    uint item = item_index();
+    if (item >= sample_count)
         return;
-    int axis = item / of_image, in_image_ = item - axis * of_image;
-    int v = in_image_ / resolution, u = in_image_ - v * resolution;
-    uvec2 words = texelFetch(ldc_texels, first_texel + item).xy;
+    uint place = texelFetch(list, int(item)).x;
+    uint sample_index = first_sample + item;
+    uvec2 g = texelFetch(ldc_geometry, int(sample_index)).xy;
+    int u = int(place & LIST_MASK), v = int(place >> LIST_V_SHIFT & LIST_MASK), axis = int(place >> LIST_AXIS_SHIFT & 3u);
+    float depth = uintBitsToFloat(g.x), reach = plane_reach(g.y, axis);
+    int first = int(clamp(depth - reach, 0.0, float(resolution - 1)));
+    int last = int(clamp(depth + reach, 0.0, float(resolution - 1)));
 #ifdef CELLS_BLOCKS
-    int marked = -1; // up to which depth
+    const int step_ = 4; // a span is shorter than a block
+    last |= step_ - 1;
+#else
+    const int step_ = 1;
 #endif
-    for (uint i = words.x; i < words.x + (words.y & LDC_TEXEL_COUNT_MASK); i++) {
-        uvec2 g = texelFetch(ldc_geometry, int(i)).xy;
-        float depth = uintBitsToFloat(g.x), reach = plane_reach(g.y, axis);
-        int first = int(clamp(depth - reach, 0.0, float(resolution - 1)));
-        int last = int(clamp(depth + reach, 0.0, float(resolution - 1)));
+    uint packed_ = sample_index | uint(axis) << LDC_ENTRY_AXIS_SHIFT;
+    for (int k = first; k <= last; k += step_) {
+        ivec3 cell = axis == 0 ? ivec3(k, u, v) : axis == 1 ? ivec3(v, k, u) : ivec3(u, v, k);
+        uint noted = 1u << (LIST_FIRST_SHIFT + uint(k - first));
 #ifdef CELLS_BLOCKS
-        first = max(first, marked + 1);
-        marked = last;
+        mark_block(cell);
+#elif defined CELLS_MARK
+        uint bit = 1u << bit_of(uvec3(cell));
+        if ((imageAtomicOr(nodes, block_of(cell) + (cell.z >> 1 & 1), bit) & bit) == 0u)
+            place |= noted;
+        else
+            atomicAdd(counts.further_count, 1u);
+#elif defined CELLS_FILL
+        if ((place & noted) != 0u)
+            imageStore(entries, int(entry_of(cell)), uvec4(packed_, 0u, g));
+#else
+        if ((place & noted) == 0u) {
+            int at = int(4u * atomicAdd(counts.further_count, 1u));
+            imageStore(entries, at, uvec4(packed_));
+            imageStore(entries, at + 1, uvec4(imageAtomicExchange(entries, int(4u * entry_of(cell) + 1u), uint(at) / 4u)));
+            imageStore(entries, at + 2, uvec4(g.x));
+            imageStore(entries, at + 3, uvec4(g.y));
+        }
 #endif
-        for (int k = first; k <= last; k++)
-            mark(axis == 0 ? ivec3(k, u, v) : axis == 1 ? ivec3(v, k, u) : ivec3(u, v, k), axis, i, g);
     }
+#ifdef CELLS_MARK
+    imageStore(firsts, int(item), uvec4(place));
+#endif
 }
 
 #else
@@ -154,49 +209,40 @@ void settle(int at, ivec3 place)
 #else
 
 // How many nodes from this one on, one way along an axis, are empty, squares, cubes of them: as many as each of so many
-// rows, squares beside it has. A node's own words are written by no other invocation.
-uint reach(int at, int left, int step_, int shift)
+// rows, squares beside it has. Of up to four octants at once, whose 4 bits are from `shift` on. A node's own words are
+// written by no other invocation.
+uint reach(int at, int left, int step_, uint shift)
 {
-    uint count = LDC_NODE_FAR;
-    for (uint k = 0u; k < count; k++) {
+    uvec4 counts = uvec4(LDC_NODE_FAR);
+    for (uint k = 0u; any(greaterThan(counts, uvec4(k))); k++) {
         // Beyond the grid all is empty.
-        uint beside = LDC_NODE_FAR;
+        uvec4 beside = uvec4(LDC_NODE_FAR);
         if (int(k) < left) {
             uvec4 node = imageLoad(nodes, at + int(k) * step_);
 #ifdef CELLS_REACH_X
-            beside = (node.x | node.y) == 0u ? LDC_NODE_FAR : 0u;
+            beside = uvec4((node.x | node.y) == 0u ? LDC_NODE_FAR : 0u);
 #else
-            beside = node.w >> shift & LDC_NODE_FAR;
+            beside = uvec4(node.w) >> (shift + uvec4(0u, 4u, 8u, 12u)) & LDC_NODE_FAR;
 #endif
         }
-        count = min(count, max(beside, k));
+        counts = min(counts, max(beside, uvec4(k)));
     }
-    return count;
+    return counts.x | counts.y << 4 | counts.z << 8 | counts.w << 12;
 }
 
 void settle(int at, ivec3 place)
 {
     uvec4 node = imageLoad(nodes, at);
     bool is_empty = (node.x | node.y) == 0u;
-    uint bits = 0u;
 #ifdef CELLS_REACH_X
-    if (is_empty)
-        bits = reach(at, grid - place.x, 1, 0) | reach(at, place.x + 1, -1, 0) << 4;
-    node.w = bits;
+    node.w = is_empty ? (reach(at, grid - place.x, 1, 0u) & 0xfu) | (reach(at, place.x + 1, -1, 0u) & 0xfu) << 4 : 0u;
 #elif defined CELLS_REACH_Y
     if (is_empty)
-        for (int octant = 0; octant < 4; octant++)
-            bits |= reach(at, octant < 2 ? grid - place.y : place.y + 1, octant < 2 ? grid : -grid, 4 * (octant & 1))
-                    << 4 * octant;
-    node.w |= bits << 8;
+        node.w |= (reach(at, grid - place.y, grid, 0u) & 0xffu) << 8 |
+                  (reach(at, place.y + 1, -grid, 0u) & 0xffu) << 16;
 #else
-    if (is_empty) {
-        for (int octant = 0; octant < 8; octant++)
-            bits |= reach(at, octant < 4 ? grid - place.z : place.z + 1, octant < 4 ? grid * grid : -grid * grid,
-                          8 + 4 * (octant & 3))
-                    << 4 * octant;
-        node.z = bits;
-    }
+    if (is_empty)
+        node.z = reach(at, grid - place.z, grid * grid, 8u) | reach(at, place.z + 1, -grid * grid, 8u) << 16;
 #endif
     imageStore(nodes, at, node);
 }

@@ -3,6 +3,7 @@
 //
 // Defines: those of trace.comp.
 #include "shared/hit.h"
+#include "common/sampled.glsl"
 #include "ldc/cube.glsl"
 
 // What a ray has found, and up to where it is still looking.
@@ -28,14 +29,14 @@ struct ldc_found {
 // samples.
 vec3 transmittance_of_sample(uvec4 words)
 {
-    material m = materials[words.z & LDC_MATERIAL_MASK];
+    material m = materials[sample_material(words)];
     vec3 through = vec3(0.0);
 #ifdef HAS_TRANSMISSION
-    float transmission = m.transmission * (1.0 - m.metallic) * float(words.z >> LDC_TRANSMISSION_SHIFT) / 15.0;
+    float transmission = m.transmission * (1.0 - m.metallic) * sample_transmission(words);
     if (transmission > 0.0)
-        through = transmission * clamp(m.base_colour.rgb * linear_from_srgb(unpackUnorm4x8(words.x).rgb), 0.0, 1.0);
+        through = transmission * clamp(m.base_colour.rgb * sample_base_colour(words).rgb, 0.0, 1.0);
 #endif
-    float alpha = m.base_colour.a * float(words.x >> 24) / 255.0;
+    float alpha = m.base_colour.a * sample_alpha(words);
     return (m.flags & MATERIAL_ALPHA_BLEND) != 0u ? mix(vec3(1.0), through, clamp(alpha, 0.0, 1.0)) : through;
 }
 #endif
@@ -45,7 +46,7 @@ void offer_sample(inout ldc_found found, uint sample_index, float distance_, flo
 {
 #ifdef HAS_TRANSLUCENT
     uvec4 words = texelFetch(ldc_surface, int(sample_index));
-    uint material_index = words.z & LDC_MATERIAL_MASK;
+    uint material_index = sample_material(words);
     // Samples of one surface overlap by the slack, and where images meet by up to a cell.
     float signed_ = side > 0.0 ? distance_ : -distance_;
     bvec4 same = lessThan(abs(found.crossed - signed_), vec4(near));

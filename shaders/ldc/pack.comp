@@ -4,63 +4,21 @@
 // Define: PEELED  they are sorted already, each once
 
 #include "shared/ldc.h"
-#include "shared/ldc_build.h"
-#include "shared/bindings.h"
 #include "common/dispatch.glsl"
+#include "ldc/run.glsl"
 
-uniform uint occupied_count;
-uniform uint texel_count;
-uniform uint texels_along; // a side of the images
-uniform uint slots;
 uniform uint first_texel, first_sample, first_quad; // of the cube
 uniform uint layers_max;                            // at most 255
 
-layout(binding = UNIT_LDC_COUNTS) uniform usamplerBuffer counts;
-layout(binding = UNIT_LDC_PLACES) uniform usamplerBuffer places;
-layout(binding = UNIT_LDC_OCCUPIED) uniform usamplerBuffer occupied;
 #ifdef PEELED
 layout(binding = UNIT_LDC_FOUND) uniform usamplerBuffer found;
 #endif
-layout(binding = IMAGE_LDC_ORDERED, rg32ui) uniform uimageBuffer ordered;
 layout(binding = IMAGE_LDC_TEXELS, rgba32ui) writeonly uniform uimageBuffer texels_out;
 layout(binding = IMAGE_LDC_QUADS, rgba32f) writeonly uniform imageBuffer quads_out;
 layout(binding = IMAGE_LDC_VISIBLE, rgba32ui) writeonly uniform uimageBuffer visible;
 layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
 
-// A texel's fragments: those with slots, then those without.
-struct run {
-    uint bits, texel, place, count;
-};
-
-run run_of(uint number)
-{
-    uint bits = texelFetch(occupied, int(number)).x;
-    uint texel = ((bits >> 24) * texels_along + (bits >> 12 & 4095u)) * texels_along + (bits & 4095u);
-    uint count = texelFetch(counts, int(texel)).x;
-    return run(bits, texel, slots * texel_count + texelFetch(places, int(texel)).x - slots, count);
-}
-
-int index_of(run r, uint i)
-{
-    return int(i < slots ? i * texel_count + r.texel : r.place + i);
-}
-
-uvec2 load(run r, uint i)
-{
-    return imageLoad(ordered, index_of(r, i)).xy;
-}
-
 #ifndef PEELED
-void store(run r, uint i, uvec2 fragment)
-{
-    imageStore(ordered, index_of(r, i), uvec4(fragment, 0u, 0u));
-}
-
-bool before(uvec2 a, uvec2 b)
-{
-    return a.x < b.x || a.x == b.x && a.y < b.y; // depths are not negative: their bits ascend as they do
-}
-
 void in_order(inout uvec2 a, inout uvec2 b)
 {
     bool turned = before(b, a);
@@ -70,12 +28,12 @@ void in_order(inout uvec2 a, inout uvec2 b)
 }
 
 // The first four in registers, the rest by insertion: most texels have few, and where there are many they often come
-// in some order. Whether some coincide.
+// in some order. Whether some may coincide.
 bool sort(run r)
 {
     const uvec2 NONE = uvec2(0xffffffffu);
     bool coincide = false;
-    if (r.count > 1u) {
+    if (r.count > 1u && r.count <= LDC_PACK_SORTS) {
         uvec2 a = load(r, 0u), b = load(r, 1u);
         uvec2 c = r.count > 2u ? load(r, 2u) : NONE, d = r.count > 3u ? load(r, 3u) : NONE;
         in_order(a, b);
@@ -91,6 +49,8 @@ bool sort(run r)
             store(r, 3u, d);
         coincide = a.x == b.x || r.count > 2u && b.x == c.x || r.count > 3u && c.x == d.x;
     }
+    if (r.count > LDC_PACK_SORTS) // sort.comp has done it
+        return true;
     for (uint i = 4u; i < r.count; i++) {
         uvec2 moved = load(r, i);
         uint k = i;
@@ -107,7 +67,7 @@ bool sort(run r)
     return coincide;
 }
 
-// Of sorted ones, of which some coincide.
+// Of sorted ones, of which some may coincide.
 uint count_kept(run r, bool coincide)
 {
     uint kept = coincide ? 0u : r.count < layers_max ? r.count : layers_max, last = LDC_NO_DEPTH_BITS;

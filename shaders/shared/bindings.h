@@ -21,6 +21,7 @@
 #define BIND_PASS_3 14
 #define BIND_PASS_4 15
 #define BIND_LDC_BUILD_COUNTS BIND_TRACER_0 /* struct ldc_build_counts */
+#define BIND_LDC_HISTOGRAM BIND_TRACER_1
 
 /* image units */
 #define IMAGE_HITS 0

@@ -20,6 +20,8 @@ SHARED_SIZE(ldc_build_counts, 48)
 
 /* Occupied texels that one invocation packs: their samples lie together, and places are asked for once. */
 #define LDC_PACK_TEXELS 8u
+/* And it sorts those that have no more fragments than this itself. */
+#define LDC_PACK_SORTS 32u
 /* Texels that one invocation looks at to see what is occupied. */
 #define LDC_PLACES_TEXELS 32u
 

@@ -18,7 +18,8 @@ static const char usage[] =
     "  builds: what making a structure takes; waves: rays of them, and how far answers are from the reference;\n"
     "  frames: whole pictures, and how far they are from the reference's\n"
     "  --form TRACER[:KEY=VALUE,..]   bvh, reference or ldc; of ldc: resolution, block, build (auto peel lists),\n"
-    "                        levels (auto blocks pyramid cells), tolerance (metres), rays, layers (together)\n"
+    "                        levels (auto blocks pyramid cells), images (overlap one), tolerance (metres), rays, "
+    "layers (together)\n"
     "  --size WxH            multiples of 8; default 512x512\n"
     "  --eye X,Y,Z --look-at X,Y,Z [--up X,Y,Z] [--fov DEGREES]   else the model's first camera, or one that sees "
     "all\n"
@@ -42,6 +43,7 @@ static bool set_key(struct tracer_options *options, const char *key, const char 
 {
     static const char *const builds[] = {"auto", "peel", "lists"}, *const levels[] = {"auto", "blocks", "pyramid",
                                                                                       "cells"};
+    static const char *const images[] = {"overlap", "one"};
     const struct {
         const char *key;
         uint32_t *number;
@@ -63,6 +65,10 @@ static bool set_key(struct tracer_options *options, const char *key, const char 
     }
     if (strcmp(key, "levels") == 0 && is_word(value, levels, 4, &word)) {
         options->ldc_levels = word;
+        return true;
+    }
+    if (strcmp(key, "images") == 0 && is_word(value, images, 2, &word)) {
+        options->ldc_images = word;
         return true;
     }
     if (strcmp(key, "tolerance") == 0) {

@@ -27,7 +27,7 @@ class Options(Case):
                 ("--ldc-resolution", "15", "16 to 4096"), ("--ldc-resolution", "4097", "4096"),
                 ("--ldc-resolution", "fine", "fine"), ("--ldc-block", "12", "2, 4, 8, 16, 32"),
                 ("--ldc-block", "64", "32"), ("--ldc-rays", "2", "0, 1, 4"), ("--ldc-rays", "8", "4"),
-                ("--ldc-build", "magic", "auto, peel, lists"), ("--ldc-levels", "tree", "auto, blocks, pyramid, cells"),
+                ("--ldc-build", "magic", "auto, peel, lists"), ("--ldc-levels", "tree", "auto, blocks, pyramid, cells"), ("--ldc-images", "two", "overlap, one"),
                 ("--ldc-tolerance", "-1", "-1"), ("--ldc-tolerance", "nan", "nan")):
             for command in (["render"], ["animate", "--frames", "1-2"], ["compare", "--tracers", "ldc,bvh"]):
                 with self.subTest(option=option, value=value, command=command[0]):
@@ -78,7 +78,7 @@ class Pictures(Case):
         """In the mean over a cell of 300 pixels 0.85 of 255 is one pixel that went from black to white. Two of them: rays that
         pass within rounding of where a sample ends, of which there are many at 256 cells."""
         wanted = grid_means(self.picture())
-        for options in (["--ldc-levels", "blocks", "--ldc-block", "4"], ["--ldc-levels", "pyramid"], ["--ldc-levels", "cells"],
+        for options in (["--ldc-levels", "blocks", "--ldc-block", "4"], ["--ldc-levels", "pyramid"], ["--ldc-levels", "cells"], ["--ldc-images", "one"],
                         ["--ldc-rays", "4"]):
             with self.subTest(options=options):
                 for got, want in zip(grid_means(self.picture(*options)), wanted):

@@ -5,6 +5,7 @@
 #define FARLIGHT_TESTS_LDC_ORACLE_H
 
 #include "shared/ldc.h"
+#include "shared/material.h"
 #include "trace/ldc_store.h"
 #include "trace/scene_gpu.h"
 
@@ -41,18 +42,20 @@ struct oracle_scene {
     uint8_t (*colours)[4];
     float (*spheres)[4];
     uint32_t *sphere_materials;
+    struct material *materials;
 };
 
 struct oracle {
     uint32_t resolution;
     double lower_world[3], cell_world;
+    bool one_image;              /* as the paper has it: images do not overlap */
     struct oracle_texel *texels; /* 3 * resolution^2 */
 };
 
-static inline void *oracle_read(struct gpu_device *device, const struct gpu_buffer *buffer)
+static inline void *oracle_read(struct gpu_device *of, const struct gpu_buffer *buffer)
 {
     void *data = calloc(1, buffer->size_bytes + 1);
-    gpu_buffer_read(device, buffer, 0, data, buffer->size_bytes);
+    gpu_buffer_read(of, buffer, 0, data, buffer->size_bytes);
     return data;
 }
 
@@ -65,6 +68,7 @@ static inline void oracle_scene_init(struct oracle_scene *scene, const struct sc
     scene->colours = oracle_read(gpu->device, &gpu->colours);
     scene->spheres = oracle_read(gpu->device, &gpu->spheres);
     scene->sphere_materials = oracle_read(gpu->device, &gpu->sphere_materials);
+    scene->materials = oracle_read(gpu->device, &gpu->materials);
 }
 
 static inline void oracle_scene_finish(struct oracle_scene *scene)
@@ -75,6 +79,7 @@ static inline void oracle_scene_finish(struct oracle_scene *scene)
     free(scene->colours);
     free(scene->spheres);
     free(scene->sphere_materials);
+    free(scene->materials);
 }
 
 static inline void oracle_finish(struct oracle *oracle)
@@ -106,19 +111,44 @@ static inline double oracle_dot(const double a[3], const double b[3])
 
 enum oracle_lean { ORACLE_LEANS_AWAY, ORACLE_LEANS_TO, ORACLE_LEANS_SO_SO /* rounding decides */ };
 
-/* Whether a surface with this normal is in the image of an axis. */
-static inline enum oracle_lean oracle_lean(const double n[3], int axis)
+/* Whether a surface with this normal is in the image of an axis; `one`: and of no other. */
+static inline enum oracle_lean oracle_lean(const double n[3], int axis, bool one)
 {
-    double most = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
-    double beyond = fabs(n[axis]) / most - (double)LDC_OVERLAP;
+    double others = fmax(fabs(n[(axis + 1) % 3]), fabs(n[(axis + 2) % 3])), most = fmax(fabs(n[axis]), others);
+    double beyond = one ? (fabs(n[axis]) - others) / most : fabs(n[axis]) / most - (double)LDC_OVERLAP;
     if (fabs(beyond) <= ORACLE_LEAN)
         return ORACLE_LEANS_SO_SO;
     return beyond > 0 ? ORACLE_LEANS_TO : ORACLE_LEANS_AWAY;
 }
 
+/* Of vertices, linear. */
+static inline void oracle_colour(double out[4], const struct oracle_scene *scene,
+                                 const struct oracle_sample *sample)
+{
+    for (int c = 0; c < 4; c++) {
+        out[c] = 0;
+        for (int i = 0; i < 3; i++)
+            out[c] += sample->weights[i] * scene->colours[scene->triangles[sample->primitive][i]][c] / 255.0;
+    }
+}
+
+/* -1: cut out, 0: for rounding to say, 1: there. No textures. */
+static inline int oracle_cutout(const struct oracle_scene *scene, const struct oracle_sample *sample)
+{
+    const struct material *m = &scene->materials[scene->triangles[sample->primitive][3]];
+    const struct geometry *g = &scene->gpu->geometries[scene->gpu->instances[sample->instance].geometry].device;
+    double colour[4] = {1, 1, 1, 1};
+    if ((m->flags & MATERIAL_ALPHA_MASK) == 0)
+        return 1;
+    if (g->flags & GEOMETRY_HAS_COLOURS)
+        oracle_colour(colour, scene, sample);
+    double above = colour[3] * m->base_colour[3] - m->alpha_cutoff;
+    return fabs(above) < 0.01 ? 0 : above > 0 ? 1 : -1;
+}
+
 /* Texels of image `axis` under the triangle; `open`: they are for rounding to decide. */
-static inline void oracle_cover(struct oracle *oracle, int axis, double p[3][3], const struct oracle_sample *base,
-                                const double n[3], bool open)
+static inline void oracle_cover(struct oracle *oracle, const struct oracle_scene *scene, int axis, double p[3][3],
+                                const struct oracle_sample *base, const double n[3], bool open)
 {
     int u = (axis + 1) % 3, v = (axis + 2) % 3, size = (int)oracle->resolution;
     double low_u = fmin(p[0][u], fmin(p[1][u], p[2][u])), high_u = fmax(p[0][u], fmax(p[1][u], p[2][u]));
@@ -142,7 +172,10 @@ static inline void oracle_cover(struct oracle *oracle, int axis, double p[3][3],
             struct oracle_sample sample = *base;
             memcpy(sample.weights, weights, sizeof(weights));
             sample.depth_cells = p[0][axis] - (n[u] * (x + 0.5 - p[0][u]) + n[v] * (y + 0.5 - p[0][v])) / n[axis];
-            oracle_add(texel, &sample);
+            int there = oracle_cutout(scene, &sample);
+            texel->open |= there == 0;
+            if (there > 0)
+                oracle_add(texel, &sample);
         }
 }
 
@@ -175,9 +208,9 @@ static inline void oracle_triangle(struct oracle *oracle, const struct oracle_sc
     for (int k = 0; k < 3; k++)
         base.normal[k] = side * n[k] / length;
     for (int axis = 0; axis < 3; axis++) {
-        enum oracle_lean lean = oracle_lean(n, axis);
+        enum oracle_lean lean = oracle_lean(n, axis, oracle->one_image);
         if (lean != ORACLE_LEANS_AWAY)
-            oracle_cover(oracle, axis, p, &base, n, lean == ORACLE_LEANS_SO_SO);
+            oracle_cover(oracle, scene, axis, p, &base, n, lean == ORACLE_LEANS_SO_SO);
     }
 }
 
@@ -218,7 +251,7 @@ static inline void oracle_sphere(struct oracle *oracle, const struct oracle_scen
             }
             for (int k = 0; k < 3; k++)
                 sample.normal[k] /= sqrt(length);
-            enum oracle_lean lean = oracle_lean(sample.normal, axis);
+            enum oracle_lean lean = oracle_lean(sample.normal, axis, oracle->one_image);
             if (lean == ORACLE_LEANS_SO_SO)
                 oracle->texels[i].open = true;
             else if (lean == ORACLE_LEANS_TO)
@@ -238,9 +271,11 @@ static inline int oracle_compare(const void *a, const void *b)
 }
 
 static inline void oracle_init(struct oracle *oracle, const struct oracle_scene *scene,
-                               const struct ldc_cube *cube, const uint32_t *instances, uint32_t count)
+                               const struct ldc_cube *cube, bool one_image, const uint32_t *instances,
+                               uint32_t count)
 {
-    *oracle = (struct oracle){.resolution = cube->resolution, .cell_world = cube->cell_world};
+    *oracle =
+        (struct oracle){.resolution = cube->resolution, .cell_world = cube->cell_world, .one_image = one_image};
     for (int k = 0; k < 3; k++)
         oracle->lower_world[k] = cube->lower_world[k];
     size_t texels = (size_t)3 * cube->resolution * cube->resolution;

@@ -59,7 +59,7 @@ static inline void ldc_add_sample(struct ldc_samples *s, int axis, uint32_t u, u
     *sample = (struct ldc_sample){((uint32_t)axis * s->resolution + v) * s->resolution + u,
                                   depth,
                                   ldc_pack_unit(normal),
-                                  {0xffffffffu, ldc_pack_unit(normal), material, 0}};
+                                  {0xffffffffu, ldc_pack_unit(normal), material | 0xff000000u, 0}};
 }
 
 /* Whether a surface with this normal is in the image of an axis. */
@@ -95,7 +95,8 @@ static inline void ldc_add_to_image(struct ldc_samples *s, int axis, double p[3]
             double depth = p[0][axis] - (normal[iu] * ((double)u + 0.5 - p[0][iu]) +
                                          normal[iv] * ((double)v + 0.5 - p[0][iv])) /
                                             normal[axis];
-            ldc_add_sample(s, axis, (uint32_t)u, (uint32_t)v, (float)depth, unit, material);
+            if (depth >= 0 && depth <= (double)s->resolution)
+                ldc_add_sample(s, axis, (uint32_t)u, (uint32_t)v, (float)depth, unit, material);
         }
     }
 }

@@ -189,6 +189,7 @@ static void options_out_of_range_are_refused_by_name(void **state)
         {"options.ldc_block", {.ldc_block = 64}},
         {"options.ldc_build", {.ldc_build = LDC_BUILD_LISTS + 1}},
         {"options.ldc_levels", {.ldc_levels = LDC_LEVELS_CELLS + 1}},
+        {"options.ldc_images", {.ldc_images = LDC_IMAGES_ONE + 1}},
         {"options.ldc_levels", {.ldc_levels = LDC_LEVELS_CELLS, .ldc_tolerance = 0.5f}},
         {"options.ldc_tolerance", {.ldc_tolerance = -1.0f}},
         {"options.ldc_tolerance", {.ldc_tolerance = NAN}},

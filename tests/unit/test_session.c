@@ -1020,6 +1020,7 @@ static void settings_of_cubes_go_to_the_engine_with_the_daemons_limits(void **st
     message.render.ldc_block = 32;
     message.render.ldc_build = PROTOCOL_LDC_BUILD_LISTS;
     message.render.ldc_levels = PROTOCOL_LDC_LEVELS_BLOCKS;
+    message.render.ldc_images = PROTOCOL_LDC_IMAGES_ONE;
     message.render.ldc_tolerance = 0.25f;
     message.render.ldc_rays_together = 4;
     send_message(2, 0, &message);
@@ -1030,6 +1031,7 @@ static void settings_of_cubes_go_to_the_engine_with_the_daemons_limits(void **st
     assert_int_equal(options->ldc_block, 32);
     assert_int_equal(options->ldc_build, LDC_BUILD_LISTS);
     assert_int_equal(options->ldc_levels, LDC_LEVELS_BLOCKS);
+    assert_int_equal(options->ldc_images, LDC_IMAGES_ONE);
     assert_true(options->ldc_tolerance == 0.25f);
     assert_int_equal(options->ldc_rays_together, 4);
     assert_int_equal(options->ldc_layers_max, 7);

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// How many texels have how many fragments; 255 stands for more too.
+
+#include "shared/ldc_build.h"
+#include "shared/bindings.h"
+#include "common/dispatch.glsl"
+
+uniform uint occupied_count;
+uniform uint texels_along; // a side of the images
+
+layout(binding = UNIT_LDC_COUNTS) uniform usamplerBuffer counts;
+layout(binding = UNIT_LDC_OCCUPIED) uniform usamplerBuffer occupied;
+layout(std430, binding = BIND_LDC_HISTOGRAM) buffer histogram_block { uint texels_with[256]; };
+
+void main()
+{
+    uint k = item_index();
+    if (k >= occupied_count)
+        return;
+    uint bits = texelFetch(occupied, int(k)).x;
+    uint texel = ((bits >> 24) * texels_along + (bits >> 12 & 4095u)) * texels_along + (bits & 4095u);
+    uint count = texelFetch(counts, int(texel)).x;
+    atomicAdd(texels_with[count < 255u ? count : 255u], 1u);
+}

@@ -1,0 +1,321 @@
+/* SPDX-License-Identifier: MIT */
+/* Layered depth cubes with more layers than may be kept, with many, with none; cubes beside each other; what a
+ * build costs that has been done before. */
+#include "../accuracy/test_scenes.h"
+#include "ldc_fixture.h"
+
+#include "gpu/registry.h"
+
+#define RESOLUTION 32u
+
+enum stack_order { FRONT_TO_BACK, BACK_TO_FRONT, SHUFFLED };
+
+/* Squares across z, slightly tilted; each twice, the second time with another winding, if they are `doubled`. */
+static struct scene *stack_scene(uint32_t count, enum stack_order order, bool doubled)
+{
+    struct test_edits edits = {.scene = test_scene_create()};
+    float(*positions)[3] = malloc(count * 4 * sizeof(*positions));
+    uint32_t *indices = malloc(count * 12 * sizeof(*indices)), triangles = 0;
+    uint64_t seed = 3;
+    for (uint32_t i = 0; i < count; i++) {
+        /* Multiplying by a number that shares no divisor with it visits every square once. */
+        uint32_t place = order == FRONT_TO_BACK ? i : order == BACK_TO_FRONT ? count - 1 - i : i * 7919u % count;
+        for (uint32_t v = 0; v < 4; v++) {
+            positions[4 * i + v][0] = v & 1 ? 1.0f : -1.0f;
+            positions[4 * i + v][1] = v & 2 ? 1.0f : -1.0f;
+            positions[4 * i + v][2] =
+                2 * ((float)place + 0.5f + test_uniform(&seed, -0.3f, 0.3f)) / (float)count - 1;
+        }
+        const uint32_t faces[4][3] = {{0, 1, 2}, {2, 1, 3}, {0, 2, 1}, {2, 3, 1}};
+        for (uint32_t face = 0; face < (doubled ? 4 : 2); face++, triangles++)
+            for (int k = 0; k < 3; k++)
+                indices[3 * triangles + (uint32_t)k] = 4 * i + faces[face][k];
+    }
+    test_mesh(&edits, 1, (const float(*)[3])positions, count * 4, indices, triangles);
+    test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
+    test_commit(&edits);
+    free(positions);
+    free(indices);
+    return edits.scene;
+}
+
+static void build_and_read(struct fixture *fixture, struct contents *contents, uint32_t resolution)
+{
+    place(fixture, TRACER_CUBE_STATIC, resolution);
+    build(fixture, TRACER_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
+    contents_read(contents, &fixture->store, TRACER_CUBE_STATIC);
+    expect_consistent(contents);
+}
+
+static void expect_both_builds_alike(struct fixture *fixture, uint32_t resolution)
+{
+    struct contents peeled, listed;
+    fixture->options.ldc_build = LDC_BUILD_PEEL;
+    build_and_read(fixture, &peeled, resolution);
+    fixture->options.ldc_build = LDC_BUILD_LISTS;
+    build_and_read(fixture, &listed, resolution);
+    expect_same(&peeled, &listed);
+    contents_free(&peeled);
+    contents_free(&listed);
+}
+
+/* In whatever order they come: few for which there are slots, more, many that are sorted apart. */
+static void many_layers_are_sorted(void **state)
+{
+    (void)state;
+    static const uint32_t counts[] = {3, 9, 30, 120, 251};
+    for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++)
+        for (int order = FRONT_TO_BACK; order <= SHUFFLED; order++) {
+            struct fixture fixture;
+            fixture_init(&fixture, stack_scene(counts[i], (enum stack_order)order, false));
+            expect_both_builds_alike(&fixture, RESOLUTION);
+            const struct ldc_cube *cube = &fixture.store.cubes[TRACER_CUBE_STATIC];
+            assert_int_equal(cube->layers_needed, counts[i]);
+            assert_int_equal(cube->layers_kept, counts[i]);
+            assert_int_equal(cube->samples_lost, 0);
+            assert_in_range(cube->sample_count, counts[i] * (RESOLUTION - 1) * (RESOLUTION - 1),
+                            counts[i] * RESOLUTION * RESOLUTION);
+            fixture_finish(&fixture);
+        }
+}
+
+/* The farther of two triangles at one place is not another layer of it. */
+static void coincident_triangles_are_one_sample(void **state)
+{
+    (void)state;
+    struct fixture single, doubled;
+    struct contents one, two;
+    fixture_init(&single, stack_scene(20, SHUFFLED, false));
+    fixture_init(&doubled, stack_scene(20, SHUFFLED, true));
+    expect_both_builds_alike(&doubled, RESOLUTION);
+    build_and_read(&single, &one, RESOLUTION);
+    build_and_read(&doubled, &two, RESOLUTION);
+    assert_int_equal(two.cube.layers_needed, 2 * one.cube.layers_needed);
+    assert_int_equal(two.cube.samples_lost, 0);
+    /* The first ones of the doubled are those that stand alone in the other, with their normals. */
+    two.cube.layers_needed = one.cube.layers_needed;
+    two.cube.layers_kept = one.cube.layers_kept;
+    expect_same(&one, &two);
+    contents_free(&one);
+    contents_free(&two);
+    fixture_finish(&single);
+    fixture_finish(&doubled);
+}
+
+/* Of each texel the first of those that `all` has. */
+static void expect_nearest(const struct contents *some, const struct contents *all, uint32_t layers)
+{
+    uint64_t lost = 0;
+    for (uint32_t i = 0; i < 3 * all->cube.resolution * all->cube.resolution; i++) {
+        uint32_t count = count_of(all, i), kept = count < layers ? count : layers;
+        assert_int_equal(count_of(some, i), kept);
+        lost += count - kept;
+        if (kept > 0)
+            assert_memory_equal(some->geometry[sample_of(some, i)], all->geometry[sample_of(all, i)], 8 * kept);
+    }
+    assert_int_equal(some->cube.samples_lost, lost);
+}
+
+static void the_nearest_layers_are_kept(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents all, some;
+    fixture_init(&fixture, test_scene_soup());
+    build_and_read(&fixture, &all, 3 * RESOLUTION);
+    for (uint32_t layers = 1; layers <= all.cube.layers_needed; layers++) {
+        fixture.options.ldc_layers_max = layers;
+        expect_both_builds_alike(&fixture, 3 * RESOLUTION);
+        build_and_read(&fixture, &some, 3 * RESOLUTION);
+        assert_int_equal(some.cube.layers_needed, all.cube.layers_needed);
+        assert_int_equal(some.cube.layers_kept, layers);
+        expect_nearest(&some, &all, layers);
+        contents_free(&some);
+    }
+    contents_free(&all);
+    fixture_finish(&fixture);
+}
+
+static void memory_limits_the_layers(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents all, some;
+    struct error error = {0};
+    fixture_init(&fixture, stack_scene(60, SHUFFLED, false));
+    build_and_read(&fixture, &all, 2 * RESOLUTION);
+    fixture.options.ldc_mebibytes_max = 2;
+    expect_both_builds_alike(&fixture, 2 * RESOLUTION);
+    build_and_read(&fixture, &some, 2 * RESOLUTION);
+    assert_int_equal(some.cube.layers_needed, 60);
+    assert_in_range(some.cube.layers_kept, 1, 59);
+    /* Of what is kept no more than is allowed; another layer would have been too much. */
+    uint64_t bytes = some.cube.sample_count * 24ull + some.cube.quad_count * 16ull, allowed = 2 << 20;
+    assert_in_range(bytes, 1, allowed);
+    assert_true(bytes + (24 + 16) * 4ull * RESOLUTION * RESOLUTION > allowed);
+    expect_nearest(&some, &all, some.cube.layers_kept);
+    contents_free(&all);
+    contents_free(&some);
+    /* Not even one layer. */
+    place(&fixture, TRACER_CUBE_STATIC, 512);
+    assert_false(ldc_build(fixture.builder, &fixture.store, TRACER_CUBE_STATIC, &fixture.gpu, fixture.instances,
+                           fixture.gpu.instance_count, &fixture.options, &error));
+    assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
+    assert_int_equal(fixture.store.cubes[TRACER_CUBE_STATIC].resolution, 0);
+    assert_int_equal(fixture.store.cubes[TRACER_CUBE_STATIC].sample_count, 0);
+    fixture_finish(&fixture);
+}
+
+/* A limit of the device's memory, instead of the option's. */
+static void the_device_limits_the_layers(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents all, some;
+    uint64_t limit = device->memory_limit_bytes;
+    fixture_init(&fixture, stack_scene(250, SHUFFLED, false));
+    build_and_read(&fixture, &all, 4 * RESOLUTION);
+    fixture_finish(&fixture);
+    fixture_init(&fixture, stack_scene(250, SHUFFLED, false));
+    device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)100 << 20);
+    build_and_read(&fixture, &some, 4 * RESOLUTION);
+    assert_in_range(some.cube.layers_kept, 20, 249);
+    expect_nearest(&some, &all, some.cube.layers_kept);
+    device->memory_limit_bytes = limit;
+    contents_free(&all);
+    contents_free(&some);
+    fixture_finish(&fixture);
+}
+
+/* The first half of the instances stand still, the others move. */
+static void cubes_leave_each_other_alone(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents before, after, moving, alone;
+    fixture_init(&fixture, test_scene_soup());
+    uint32_t half = fixture.gpu.instance_count / 2, rest = fixture.gpu.instance_count - half;
+    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
+    build(&fixture, TRACER_CUBE_STATIC, fixture.instances, half);
+    contents_read(&before, &fixture.store, TRACER_CUBE_STATIC);
+    for (uint32_t times = 1; times <= 4; times++) { /* it grows, and the buffers with it */
+        place(&fixture, TRACER_CUBE_DYNAMIC, times * RESOLUTION);
+        build(&fixture, TRACER_CUBE_DYNAMIC, fixture.instances + half, rest);
+    }
+    contents_read(&after, &fixture.store, TRACER_CUBE_STATIC);
+    expect_consistent(&after);
+    expect_same(&before, &after);
+    contents_read(&moving, &fixture.store, TRACER_CUBE_DYNAMIC);
+    expect_consistent(&moving);
+    assert_true(moving.cube.sample_count > before.cube.sample_count);
+    /* As it would be without the other. */
+    fixture.store.cubes[TRACER_CUBE_STATIC].resolution = 0;
+    place(&fixture, TRACER_CUBE_DYNAMIC, 4 * RESOLUTION);
+    build(&fixture, TRACER_CUBE_DYNAMIC, fixture.instances + half, rest);
+    contents_read(&alone, &fixture.store, TRACER_CUBE_DYNAMIC);
+    assert_int_equal(alone.cube.first_sample, 0);
+    expect_same(&alone, &moving);
+    /* What lies behind the static one goes with it. */
+    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
+    build(&fixture, TRACER_CUBE_STATIC, fixture.instances, half);
+    assert_int_equal(fixture.store.cubes[TRACER_CUBE_DYNAMIC].resolution, 0);
+    contents_free(&before);
+    contents_free(&after);
+    contents_free(&moving);
+    contents_free(&alone);
+    fixture_finish(&fixture);
+}
+
+static void a_cube_may_be_empty(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents contents;
+    fixture_init(&fixture, test_scene_soup());
+    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
+    build(&fixture, TRACER_CUBE_STATIC, fixture.instances, 0);
+    contents_read(&contents, &fixture.store, TRACER_CUBE_STATIC);
+    expect_consistent(&contents);
+    assert_int_equal(contents.cube.sample_count, 0);
+    assert_int_equal(contents.cube.layers_needed, 0);
+    assert_int_equal(contents.cube.resolution, RESOLUTION);
+    contents_free(&contents);
+    /* Nor does anything come in that lies beside it. */
+    for (int form = 0; form < 2; form++) {
+        place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
+        fixture.store.cubes[TRACER_CUBE_STATIC].lower_world[2] += 100;
+        fixture.options.ldc_build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
+        build(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
+        assert_int_equal(fixture.store.cubes[TRACER_CUBE_STATIC].sample_count, 0);
+    }
+    fixture_finish(&fixture);
+}
+
+/* Squares on the very sides of a cube: rounding does not take them out of it. */
+static void what_lies_on_a_side_is_there(void **state)
+{
+    (void)state;
+    static const float positions[8][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
+                                          {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
+    static const uint32_t indices[12] = {0, 1, 2, 2, 1, 3, 4, 5, 6, 6, 5, 7};
+    struct test_edits edits = {.scene = test_scene_create()};
+    struct fixture fixture;
+    test_mesh(&edits, 1, positions, 8, indices, 4);
+    test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
+    test_commit(&edits);
+    fixture_init(&fixture, edits.scene);
+    for (int form = 0; form < 2; form++) {
+        struct ldc_cube *cube = &fixture.store.cubes[TRACER_CUBE_STATIC];
+        *cube = (struct ldc_cube){.lower_world = {-1, -1, -1}, .cell_world = 2.0f / 30, .resolution = 30};
+        fixture.options.ldc_build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
+        build(&fixture, TRACER_CUBE_STATIC, fixture.instances, 1);
+        assert_int_equal(cube->sample_count, 2 * 30 * 30);
+        assert_int_equal(cube->layers_needed, 2);
+    }
+    fixture_finish(&fixture);
+}
+
+/* What moves is built with every frame. */
+static void a_build_again_allocates_nothing(void **state)
+{
+    (void)state;
+    for (int form = 0; form < 2; form++) {
+        struct fixture fixture;
+        fixture_init(&fixture, test_scene_spheres());
+        fixture.options.ldc_build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
+        for (int i = 0; i < 6; i++) {
+            place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
+            build(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
+        }
+        uint64_t used = device->memory_used_bytes;
+        uint64_t own = ldc_builder_bytes(fixture.builder) + ldc_store_bytes(&fixture.store);
+        size_t buffers = gpu_registry_count(device->registry, GPU_BUFFER);
+        for (int i = 0; i < 5; i++) {
+            place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
+            build(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
+            assert_int_equal(device->memory_used_bytes, used);
+            assert_int_equal(gpu_registry_count(device->registry, GPU_BUFFER), buffers);
+        }
+        /* All that it takes is told. */
+        uint64_t bytes = used - scene_gpu_device_bytes(&fixture.gpu);
+        assert_int_equal(bytes, own);
+        fixture_finish(&fixture);
+        assert_int_equal(device->memory_used_bytes, 0);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(many_layers_are_sorted),
+        cmocka_unit_test(coincident_triangles_are_one_sample),
+        cmocka_unit_test(the_nearest_layers_are_kept),
+        cmocka_unit_test(memory_limits_the_layers),
+        cmocka_unit_test(the_device_limits_the_layers),
+        cmocka_unit_test(cubes_leave_each_other_alone),
+        cmocka_unit_test(a_cube_may_be_empty),
+        cmocka_unit_test(what_lies_on_a_side_is_there),
+        cmocka_unit_test(a_build_again_allocates_nothing),
+    };
+    return cmocka_run_group_tests(tests, open_device, close_device);
+}
