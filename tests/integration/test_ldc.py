@@ -51,7 +51,7 @@ class Options(Case):
 
 class Pictures(Case):
     def test_samples_are_shaded_as_the_surfaces_that_they_are_of(self):
-        """First hits by the tracer itself. Of 255, in the mean over cells of 20 x 15 pixels: half a step where there is no edge,
+        """First hits by the tracer itself. Of 255, in the mean over cells of 20 x 15 pixels: half a step where no edge is,
         and what silhouettes, a cell of the cube rough, may move where a mirror or glass repeats them. A wrong colour,
         texture or shadow is far more, and everywhere."""
         for scene in ("cornell.glb", "teapot.glb"):
