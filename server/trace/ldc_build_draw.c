@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Instances as draws: one call for all of a sort. An instance's number comes to the vertices as an attribute that
- * advances with the instance, so that no uniform has to be set between two of them. */
+ * advances with the instance, so that no uniform has to be set between two of them; a primitive is one vertex. */
 #include "gpu/registry.h"
 #include "trace/ldc_build_state.h"
 
@@ -45,14 +45,12 @@ static bool list_drawn(struct ldc_builder *builder, const struct scene_gpu *scen
         const struct instance *instance = &scene->instances[instances[i]];
         const struct geometry *geometry = &scene->geometries[instance->geometry].device;
         enum ldc_sort sort = sort_of(geometry);
-        uint32_t vertices = sort == LDC_SPHERES ? 1 : 3;
         if (id + geometry->primitive_count > UINT32_MAX ||
-            ((uint64_t)geometry->first_primitive + geometry->primitive_count) * vertices > INT32_MAX)
+            (uint64_t)geometry->first_primitive + geometry->primitive_count > INT32_MAX)
             return error_set(error, ERROR_LIMIT, NULL, "more primitives than a layered depth cube can number");
         drawn[i] = (struct drawn){(uint32_t)id, (uint32_t)id - geometry->first_primitive, instances[i],
                                   flags_of(instance, geometry)};
-        commands[i] = (struct draw_command){geometry->primitive_count * vertices, 1,
-                                            geometry->first_primitive * vertices, i};
+        commands[i] = (struct draw_command){geometry->primitive_count, 1, geometry->first_primitive, i};
         id += geometry->primitive_count;
         if (builder->run_count == 0 || builder->runs[builder->run_count - 1].sort != sort)
             builder->runs[builder->run_count++] = (struct ldc_run){sort, i, 0};
@@ -186,9 +184,8 @@ bool ldc_draw(struct ldc_task *task, enum ldc_pass pass,
         set_uniforms(task, program);
         if (set)
             set(task, program);
-        glMultiDrawArraysIndirect(run->sort == LDC_SPHERES ? GL_POINTS : GL_TRIANGLES,
-                                  (const void *)(run->first * sizeof(struct draw_command)), (GLsizei)run->count,
-                                  sizeof(struct draw_command));
+        glMultiDrawArraysIndirect(GL_POINTS, (const void *)(run->first * sizeof(struct draw_command)),
+                                  (GLsizei)run->count, sizeof(struct draw_command));
     }
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
     glBindVertexArray((GLuint)vertex_array);

@@ -2,7 +2,7 @@
 // Where a primitive lies under the middle of a texel: only its depth and its id are noted, of what it is made is found
 // out once for each sample that stays (sample.comp).
 // Defines:
-//   PRIMITIVE_KIND  as in build.vert
+//   PRIMITIVE_KIND  as in build.geom
 //   HAS_CUTOUT      triangles or spheres may have holes
 //   HAS_SPHERES     with PRIMITIVE_KIND 1
 //   BUILD_PASS      0: each texel's fragments are noted; 1: they are counted only; 2: of those behind the layer

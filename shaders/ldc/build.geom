@@ -1,22 +1,34 @@
 // SPDX-License-Identifier: MIT
 // Sends a triangle to the image whose axis its normal leans to most (paper, figure 5), or to those where images overlap,
-// with its plane in cells; a sphere to all three, as the square round it. PRIMITIVE_KIND as in build.vert; HAS_CUTOUT:
-// triangles may have holes.
+// with its plane in cells; a sphere to all three, as the square round it.
+// Defines: PRIMITIVE_KIND 0 triangles, 1 spheres; HAS_CUTOUT: triangles may have holes.
 
+#include "shared/bindings.h"
+#include "shared/geometry.h"
+#include "common/math.glsl"
 #include "ldc/image.glsl"
 
 uniform float resolution; // cells along a side of the cube
+uniform vec3 lower_world; // of the cube
+uniform float cell_world;
 
+// Of common/geometry.glsl, whose storage blocks a geometry shader need not have.
+layout(binding = UNIT_INSTANCES) uniform usamplerBuffer instances;
 #if PRIMITIVE_KIND == 0
-layout(triangles) in;
+layout(binding = UNIT_TRIANGLES) uniform usamplerBuffer triangles;
+layout(binding = UNIT_POSITIONS) uniform samplerBuffer positions;
+#else
+layout(binding = UNIT_SPHERES) uniform samplerBuffer spheres;
+#endif
+
+layout(points) in;
+#if PRIMITIVE_KIND == 0
 layout(triangle_strip, max_vertices = 9) out;
 #else
-layout(points) in;
 layout(triangle_strip, max_vertices = 12) out;
 #endif
 
-layout(location = 0) in vec3 place_cells[];
-layout(location = 1) flat in uvec3 primitive_in[];
+layout(location = 0) flat in uvec3 primitive_in[];
 
 #if PRIMITIVE_KIND == 0
 layout(location = 0) flat out vec4 plane;  // slopes of the depth along u and v; u, v of a point of it
@@ -24,10 +36,20 @@ layout(location = 1) flat out vec3 depths; // of that point; least, greatest
 #ifdef HAS_CUTOUT
 layout(location = 3) out vec2 barycentrics;
 #endif
-#else
-layout(location = 2) in vec3 reach_cells[];
 #endif
 layout(location = 2) flat out uvec3 primitive;
+
+void fetch_world_from_object(out vec4 rows[3])
+{
+    int first_row = int(primitive_in[0].y) * INSTANCE_TEXELS;
+    for (int row = 0; row < 3; row++)
+        rows[row] = uintBitsToFloat(texelFetch(instances, first_row + row));
+}
+
+vec3 place_in_cells(vec4 world_from_object[3], vec3 object)
+{
+    return (affine_point(world_from_object, object) - lower_world) / cell_world;
+}
 
 // What lies on the sides of the cube stays in it, to rounding.
 float clip_depth(float depth_cells)
@@ -43,19 +65,52 @@ void emit(vec2 uv_cells, float depth_cells, int axis)
 }
 
 #if PRIMITIVE_KIND == 0
+// Of a texel: more than a rasteriser rounds corners by.
+const float SNAP_CELLS = 1.0 / 32.0;
+
+float cross_2d(vec2 a, vec2 b)
+{
+    return a.x * b.y - a.y * b.x;
+}
+
+// Whether a triangle may have the middle of a texel under it. Most small ones have none, and a rasteriser takes ten
+// times as long to find that out.
+bool may_cover(vec2 a, vec2 b, vec2 c)
+{
+    vec2 lower = ceil(min(a, min(b, c)) - (0.5 + SNAP_CELLS)), upper = floor(max(a, max(b, c)) - (0.5 - SNAP_CELLS));
+    if (lower.x > upper.x || lower.y > upper.y)
+        return false;
+    if (lower != upper)
+        return true;
+    vec2 middle = lower + 0.5, ab = b - a, bc = c - b, ca = a - c;
+    float side = cross_2d(ab, bc) < 0.0 ? -1.0 : 1.0;
+    return side * cross_2d(ab, middle - a) >= -SNAP_CELLS * (abs(ab.x) + abs(ab.y)) &&
+           side * cross_2d(bc, middle - b) >= -SNAP_CELLS * (abs(bc.x) + abs(bc.y)) &&
+           side * cross_2d(ca, middle - c) >= -SNAP_CELLS * (abs(ca.x) + abs(ca.y));
+}
+
 void main()
 {
-    vec3 normal = cross(place_cells[1] - place_cells[0], place_cells[2] - place_cells[0]);
-    vec3 lean = abs(normal);
-    if (!(max(lean.x, max(lean.y, lean.z)) > 0.0)) // no area
+    vec4 rows[3];
+    fetch_world_from_object(rows);
+    uvec4 triangle = texelFetch(triangles, int(primitive_in[0].z));
+    vec3 corners[3];
+    for (int i = 0; i < 3; i++)
+        corners[i] = place_in_cells(rows, texelFetch(positions, int(triangle[i])).xyz);
+    vec3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    vec3 lean = abs(normal), lower = min(corners[0], min(corners[1], corners[2])),
+         upper = max(corners[0], max(corners[1], corners[2]));
+    if (!(greatest(lean) > 0.0)) // no area
         return;
     for (int axis = 0; axis < 3; axis++) {
+        int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
         if (!is_in_image(lean, axis))
             continue;
-        int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
-        vec3 along = vec3(place_cells[0][axis], place_cells[1][axis], place_cells[2][axis]);
-        vec4 plane_ = vec4(-normal[u] / normal[axis], -normal[v] / normal[axis], place_cells[0][u], place_cells[0][v]);
-        vec3 depths_ = vec3(along.x, min(along.x, min(along.y, along.z)), max(along.x, max(along.y, along.z)));
+        if (!may_cover(vec2(corners[0][u], corners[0][v]), vec2(corners[1][u], corners[1][v]),
+                       vec2(corners[2][u], corners[2][v])))
+            continue;
+        vec4 plane_ = vec4(-normal[u] / normal[axis], -normal[v] / normal[axis], corners[0][u], corners[0][v]);
+        vec3 depths_ = vec3(corners[0][axis], lower[axis], upper[axis]);
         for (int i = 0; i < 3; i++) {
             plane = plane_;
             depths = depths_;
@@ -63,7 +118,7 @@ void main()
 #ifdef HAS_CUTOUT
             barycentrics = vec2(i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0);
 #endif
-            emit(vec2(place_cells[i][u], place_cells[i][v]), along[i], axis);
+            emit(vec2(corners[i][u], corners[i][v]), corners[i][axis], axis);
         }
         EndPrimitive();
     }
@@ -75,10 +130,14 @@ const float SQUARE_MARGIN = 1.0001;
 
 void main()
 {
+    vec4 rows[3];
+    fetch_world_from_object(rows);
+    vec4 sphere = texelFetch(spheres, int(primitive_in[0].z));
+    vec3 centre = place_in_cells(rows, sphere.xyz);
+    vec3 reaches = sphere.w / cell_world * vec3(length(rows[0].xyz), length(rows[1].xyz), length(rows[2].xyz));
     for (int axis = 0; axis < 3; axis++) {
         int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
-        vec2 middle = vec2(place_cells[0][u], place_cells[0][v]);
-        vec2 reach = vec2(reach_cells[0][u], reach_cells[0][v]) * SQUARE_MARGIN;
+        vec2 middle = vec2(centre[u], centre[v]), reach = vec2(reaches[u], reaches[v]) * SQUARE_MARGIN;
         for (int corner = 0; corner < 4; corner++) {
             primitive = primitive_in[0];
             emit(middle + reach * vec2(float(corner & 1) * 2.0 - 1.0, float(corner >> 1) * 2.0 - 1.0),

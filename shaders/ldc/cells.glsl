@@ -93,8 +93,7 @@ found_cell next_cell(inout cell_walk w)
 {
     found_cell found = found_cell(ivec3(0), LDC_ENTRY_NONE);
     bvec3 down = notEqual(w.flip, ivec3(0));
-#define ROUNDS 4
-    for (int round_ = 0; round_ < ROUNDS && w.s < w.s_end && found.entry == LDC_ENTRY_NONE; round_++) {
+    for (int round_ = 0; round_ < LDC_ROUNDS && w.s < w.s_end && found.entry == LDC_ENTRY_NONE; round_++) {
         LDC_COUNT(x);
         uvec4 words = texelFetch(ldc_nodes, w.at);
         uvec3 b = uvec3(cube_cell(w, w.cell)) >> w.shift;

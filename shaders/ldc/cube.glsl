@@ -34,6 +34,10 @@ uniform int ldc_first_node[LDC_CUBES];
 uniform float ldc_tolerance[LDC_CUBES]; // cells
 #endif
 
+// How far a ray goes on at once before it is looked whether there is something to test. In a SIMD group all wait for the one
+// that has most to go; with no limit rays are up to a seventh slower, with one or two rounds too.
+const int LDC_ROUNDS = 4;
+
 // A uniform of one number for all of a SIMD group is read once, one of each's own lane by lane.
 #if LDC_CUBES == 1
 #define CUBE(number) 0

@@ -108,6 +108,7 @@ static void compare(struct bench *bench, const char *name, struct scene *scene)
     double lists = bench_figure(&runs[0]).median_ns, peel = bench_figure(&runs[1]).median_ns;
     printf("%-24s %5u layers %10u samples: lists %9.2f ms, peeling %9.2f ms, %6.2f times\n", name,
            store.cubes[TRACER_CUBE_STATIC].layers_needed, samples[0], lists / 1e6, peel / 1e6, peel / lists);
+    fflush(stdout);
     bench->failed |= samples[0] != samples[1];
     ldc_builder_destroy(builder);
     ldc_store_finish(&store);

@@ -376,6 +376,35 @@ static void two_cubes_are_walked_as_one(void **state)
     free(rays);
 }
 
+/* A few samples that stand still, and behind them more that move than this device has room for in cells. */
+static void where_cells_do_not_fit_a_pyramid_is_walked(void **state)
+{
+    (void)state;
+    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct error error = {0};
+    struct fixture fixture;
+    fixture_init(&fixture, NULL);
+    start_samples(&fixture.samples[TRACER_CUBE_STATIC], 40, 4, -2, -2, -2);
+    add_soup(&fixture.samples[TRACER_CUBE_STATIC], 3, 0.8f, 25);
+    start_samples(&fixture.samples[TRACER_CUBE_DYNAMIC], 70, 4, -2, -2, -2);
+    add_sphere(&fixture.samples[TRACER_CUBE_DYNAMIC], (const float[3]){0.2f, 0.1f, -0.3f}, 1.4f, 20, 0);
+    random_rays(rays, RAY_COUNT, &fixture.samples[TRACER_CUBE_DYNAMIC], 26);
+    build(&fixture, &forms[0].options);
+    assert_false(fixture.store.no_cells);
+    const uint64_t texels_max = device->facts.texture_buffer_texels_max;
+    device->facts.texture_buffer_texels_max = 4ull * fixture.store.cubes[TRACER_CUBE_DYNAMIC].entry_count;
+    assert_true(ldc_levels_build(&fixture.store, TRACER_CUBE_STATIC, &forms[0].options, &error));
+    assert_false(fixture.store.no_cells);
+    assert_true(ldc_levels_build(&fixture.store, TRACER_CUBE_DYNAMIC, &forms[0].options, &error));
+    assert_true(fixture.store.no_cells);
+    expect_like_brute_force(&fixture, rays, RAY_COUNT, RAY_COUNT / 8);
+    device->facts.texture_buffer_texels_max = texels_max;
+    expect_like_brute_force(&fixture, rays, RAY_COUNT, RAY_COUNT / 8);
+    assert_false(fixture.store.no_cells);
+    fixture_finish(&fixture);
+    free(rays);
+}
+
 /* Along axes through the middles of texels, along their borders, through corners, and nearly so. */
 static void rays_along_axes_and_borders_cross_samples_as_by_brute_force(void **state)
 {
@@ -812,6 +841,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rays_cross_samples_as_by_brute_force),
         cmocka_unit_test(two_cubes_are_walked_as_one),
+        cmocka_unit_test(where_cells_do_not_fit_a_pyramid_is_walked),
         cmocka_unit_test(rays_along_axes_and_borders_cross_samples_as_by_brute_force),
         cmocka_unit_test(what_lies_in_the_sides_of_the_cube_is_hit),
         cmocka_unit_test(directions_that_are_none_and_dead_rays_hit_nothing),
