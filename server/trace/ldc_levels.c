@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/ldc_levels.h"
 
+#include "base/log.h"
 #include "gpu/program.h"
 #include "shared/bindings.h"
 #include "shared/ldc.h"
+#include "trace/ldc_cells.h"
 
 #include <epoxy/gl.h>
-#include <stddef.h>
 #include <stdio.h>
-#include <string.h>
 
 #define RANGE_BYTES (2 * sizeof(float))
-#define CELL_NODE_BYTES (4 * sizeof(uint32_t))
 /* 4 x 4 children: half the levels of 2 x 2. */
 #define PYRAMID_BITS 2
 #define BLOCK_DEFAULT 8
 
-struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tracer_options *options)
+struct ldc_level_layout ldc_level_layout_of(const struct ldc_store *store, uint32_t resolution,
+                                            const struct tracer_options *options)
 {
     struct ldc_level_layout layout = {.blocks = options->ldc_levels == LDC_LEVELS_BLOCKS};
     if (layout.blocks) {
@@ -28,8 +28,8 @@ struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tr
         layout.image_nodes = layout.row * layout.row;
         return layout;
     }
-    if (options->ldc_levels == LDC_LEVELS_CELLS ||
-        (options->ldc_levels == LDC_LEVELS_AUTO && !(options->ldc_tolerance > 0))) {
+    const bool may_have_cells = options->ldc_levels == LDC_LEVELS_AUTO && !(options->ldc_tolerance > 0);
+    if (options->ldc_levels == LDC_LEVELS_CELLS || (may_have_cells && !store->no_cells)) {
         layout.cells = true;
         layout.grid = (resolution + (1u << LDC_NODE_SHIFT) - 1) >> LDC_NODE_SHIFT;
         return layout;
@@ -42,9 +42,8 @@ struct ldc_level_layout ldc_level_layout_of(uint32_t resolution, const struct tr
     return layout;
 }
 
-/* Room for the cube's nodes behind those of the one before it, which stay, as do `kept` of its own. */
-static bool reserve(struct ldc_store *store, unsigned which, uint64_t node_count, uint64_t kept, size_t node_bytes,
-                    struct error *error)
+bool ldc_levels_reserve(struct ldc_store *store, unsigned which, uint64_t node_count, uint64_t kept,
+                        size_t node_bytes, struct error *error)
 {
     struct gpu_device *device = store->device;
     uint64_t first = 0;
@@ -52,7 +51,7 @@ static bool reserve(struct ldc_store *store, unsigned which, uint64_t node_count
         if (store->cubes[i].resolution && store->cubes[i].first_node + store->cubes[i].node_count > first)
             first = store->cubes[i].first_node + store->cubes[i].node_count;
     uint64_t nodes = first + node_count;
-    /* Atomics take them word by word. */
+    /* Word by word, which is how some write them. */
     if (nodes * (node_bytes / sizeof(uint32_t)) > device->facts.texture_buffer_texels_max || nodes > INT32_MAX)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution", "%llu nodes are more than the device takes",
                          (unsigned long long)nodes);
@@ -97,7 +96,7 @@ static bool build_ranges(struct ldc_store *store, unsigned which, const struct l
                          struct error *error)
 {
     struct ldc_cube *cube = &store->cubes[which];
-    if (!reserve(store, which, 3 * (uint64_t)layout->image_nodes, 0, RANGE_BYTES, error))
+    if (!ldc_levels_reserve(store, which, 3 * (uint64_t)layout->image_nodes, 0, RANGE_BYTES, error))
         return false;
     char bits[4];
     snprintf(bits, sizeof bits, "%u", layout->bits);
@@ -125,186 +124,40 @@ static bool build_ranges(struct ldc_store *store, unsigned which, const struct l
     return ok;
 }
 
-/* ---- cells ---- */
-
-#define ENTRY_BYTES (4 * sizeof(uint32_t))
-
-/* counts of ldc/cells.comp */
-struct cell_counts {
-    uint32_t blocks, entries, further, unused;
-    uint32_t lower_nodes[4], upper_nodes[4];
-};
-
-struct cell_build {
-    struct ldc_store *store;
-    unsigned which;
-    uint32_t grid; /* nodes along a side */
-    struct gpu_buffer list, counter;
-    struct cell_counts counts;
-};
-
-static bool cells_pass(struct cell_build *build, const char *stage, uint64_t items, struct error *error)
-{
-    struct ldc_store *store = build->store;
-    const struct ldc_cube *cube = &store->cubes[build->which];
-    const struct gpu_define defines[] = {{stage, "1"}, {NULL, NULL}};
-    const struct gpu_program_source source = {.compute = "ldc/cells.comp", .defines = defines};
-    const struct gpu_program *program = gpu_program_get(store->device, &source, error);
-    if (!program)
-        return false;
-    gpu_uniform_int(program, "first_node", (int32_t)cube->first_node);
-    gpu_uniform_int(program, "grid", (int32_t)build->grid);
-    gpu_uniform_int(program, "first_texel", (int32_t)cube->first_texel);
-    gpu_uniform_int(program, "resolution", (int32_t)cube->resolution);
-    gpu_uniform_int(program, "blocks", (int32_t)build->counts.blocks);
-    gpu_uniform_uint(program, "first_entry", cube->first_entry);
-    gpu_uniform_uint(program, "first_sample", cube->first_sample);
-    gpu_uniform_uint(program, "sample_count", cube->sample_count);
-    gpu_dispatch(store->device, program, items);
-    return true;
-}
-
-static void bind_nodes(struct cell_build *build, uint32_t format)
-{
-    gpu_buffer_bind_image(build->store->device, &build->store->nodes, IMAGE_LDC_NODES, format);
-}
-
-static void clear_nodes(struct gpu_buffer *nodes, uint64_t first, uint64_t count)
-{
-    const uint32_t zero[4] = {0};
-    if (count > 0)
-        glClearNamedBufferSubData(nodes->name, GL_RGBA32UI, (GLintptr)(first * CELL_NODE_BYTES),
-                                  (GLsizeiptr)(count * CELL_NODE_BYTES), GL_RGBA_INTEGER, GL_UNSIGNED_INT, zero);
-}
-
-static bool reserve_entries(struct cell_build *build, struct error *error)
-{
-    struct ldc_store *store = build->store;
-    struct ldc_cube *cube = &store->cubes[build->which];
-    const uint64_t count = (uint64_t)build->counts.entries + build->counts.further,
-                   entries = cube->first_entry + count;
-    if (4 * entries > store->device->facts.texture_buffer_texels_max || entries > INT32_MAX)
-        return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
-                         "%llu samples in cells are more than the device takes", (unsigned long long)entries);
-    if (!ldc_store_grow(store->device, &store->entries, cube->first_entry * ENTRY_BYTES, entries * ENTRY_BYTES,
-                        error))
-        return false;
-    cube->entry_count = (uint32_t)count;
-    return true;
-}
-
-/* Which texel a sample is in: then passes have samples, and not texels most of which are empty, for items. */
-static bool list_samples(struct cell_build *build, struct error *error)
-{
-    struct ldc_store *store = build->store;
-    const struct ldc_cube *cube = &store->cubes[build->which];
-    const uint64_t n = cube->resolution;
-    if (!gpu_buffer_reserve(store->device, &build->list, cube->sample_count * sizeof(uint32_t), error))
-        return false;
-    gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
-    gpu_buffer_bind_image(store->device, &build->list, IMAGE_LDC_NODES, GL_R32UI);
-    if (!cells_pass(build, "CELLS_LIST", 3 * n * n, error))
-        return false;
-    gpu_buffer_bind_texels(store->device, &build->list, UNIT_TRACER_0, GL_R32UI);
-    gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
-    return true;
-}
-
-/* The nodes and their blocks, which are marked. */
-static bool place_blocks(struct cell_build *build, struct error *error)
-{
-    struct ldc_store *store = build->store;
-    struct ldc_cube *cube = &store->cubes[build->which];
-    struct cell_counts *counts = &build->counts;
-    const uint64_t nodes = (uint64_t)build->grid * build->grid * build->grid;
-    if (!reserve(store, build->which, nodes, 0, CELL_NODE_BYTES, error))
-        return false;
-    clear_nodes(&store->nodes, cube->first_node, nodes);
-    bind_nodes(build, GL_R32UI);
-    if (cube->sample_count > 0 && !cells_pass(build, "CELLS_BLOCKS", cube->sample_count, error))
-        return false;
-    bind_nodes(build, GL_RGBA32UI);
-    if (!cells_pass(build, "CELLS_PLACE", nodes, error))
-        return false;
-    gpu_buffer_read(store->device, &build->counter, 0, counts, sizeof *counts);
-    for (int k = 0; k < 3; k++) {
-        cube->lower_cells[k] = counts->blocks ? counts->lower_nodes[k] << LDC_NODE_SHIFT : 0;
-        cube->upper_cells[k] = counts->blocks ? (counts->upper_nodes[k] + 1) << LDC_NODE_SHIFT : 0;
-    }
-    if (!reserve(store, build->which, nodes + counts->blocks, nodes, CELL_NODE_BYTES, error))
-        return false;
-    clear_nodes(&store->nodes, cube->first_node + nodes, counts->blocks);
-    return true;
-}
-
-static bool fill_blocks(struct cell_build *build, struct error *error)
-{
-    struct ldc_store *store = build->store;
-    struct ldc_cube *cube = &store->cubes[build->which];
-    struct cell_counts *counts = &build->counts;
-    bind_nodes(build, GL_R32UI);
-    gpu_buffer_bind_image(store->device, &build->list, IMAGE_LDC_ENTRIES, GL_R32UI);
-    if (!cells_pass(build, "CELLS_MARK", cube->sample_count, error))
-        return false;
-    bind_nodes(build, GL_RGBA32UI);
-    if (!cells_pass(build, "CELLS_COUNT", counts->blocks, error))
-        return false;
-    gpu_buffer_read(store->device, &build->counter, 0, counts, sizeof *counts);
-    if (!reserve_entries(build, error))
-        return false;
-    /* From now on where the next further entry goes. */
-    const uint32_t further = cube->first_entry + counts->entries;
-    gpu_buffer_write(store->device, &build->counter, offsetof(struct cell_counts, further), &further,
-                     sizeof further);
-    bind_nodes(build, GL_R32UI);
-    gpu_buffer_bind_image(store->device, &store->entries, IMAGE_LDC_ENTRIES, GL_RGBA32UI);
-    if (!cells_pass(build, "CELLS_FILL", cube->sample_count, error))
-        return false;
-    gpu_buffer_bind_image(store->device, &store->entries, IMAGE_LDC_ENTRIES, GL_R32UI);
-    return counts->further == 0 || cells_pass(build, "CELLS_FURTHER", cube->sample_count, error);
-}
-
-/* How far it is empty around empty nodes. */
-static bool measure_emptiness(struct cell_build *build, struct error *error)
-{
-    const uint64_t nodes = (uint64_t)build->grid * build->grid * build->grid;
-    bind_nodes(build, GL_RGBA32UI);
-    return cells_pass(build, "CELLS_REACH_X", nodes, error) && cells_pass(build, "CELLS_REACH_Y", nodes, error) &&
-           cells_pass(build, "CELLS_REACH_Z", nodes, error);
-}
-
-static bool build_cells(struct ldc_store *store, unsigned which, uint32_t grid, struct error *error)
+static bool build_levels(struct ldc_store *store, unsigned which, const struct tracer_options *options,
+                         struct error *error)
 {
     struct ldc_cube *cube = &store->cubes[which];
-    struct cell_build build = {
-        .store = store, .which = which, .grid = grid, .counts.lower_nodes = {grid, grid, grid, 0}};
-    cube->first_entry = cube->entry_count = 0;
-    for (unsigned i = 0; i < which; i++)
-        if (store->cubes[i].resolution)
-            cube->first_entry = store->cubes[i].first_entry + store->cubes[i].entry_count;
-    bool ok = gpu_buffer_upload(store->device, &build.counter, &build.counts, sizeof build.counts, error);
-    if (ok)
-        gpu_buffer_bind_storage(&build.counter, BIND_TRACER_0);
-    ok = ok && (cube->sample_count == 0 || list_samples(&build, error)) && place_blocks(&build, error) &&
-         (build.counts.blocks == 0 || fill_blocks(&build, error)) && measure_emptiness(&build, error);
-    gpu_buffer_finish(store->device, &build.counter);
-    gpu_buffer_finish(store->device, &build.list);
+    cube->node_count = cube->entry_count = 0;
+    if (cube->resolution == 0)
+        return true;
+    const struct ldc_level_layout layout = ldc_level_layout_of(store, cube->resolution, options);
+    bool ok = layout.cells ? ldc_cells_build(store, which, layout.grid, error)
+                           : build_ranges(store, which, &layout, error);
+    if (!ok)
+        cube->node_count = cube->entry_count = 0;
     return ok;
 }
 
 bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
                       struct error *error)
 {
-    struct ldc_cube *cube = &store->cubes[which];
-    cube->node_count = 0;
-    if (cube->resolution == 0)
-        return true;
-    const struct ldc_level_layout layout = ldc_level_layout_of(cube->resolution, options);
+    struct error of_cells = {0};
+    if (which == TRACER_CUBE_STATIC)
+        store->no_cells = false;
     gpu_push_group(store->device, "ldc levels");
-    bool ok =
-        layout.cells ? build_cells(store, which, layout.grid, error) : build_ranges(store, which, &layout, error);
+    bool ok = build_levels(store, which, options, &of_cells);
+    bool again = !ok && options->ldc_levels == LDC_LEVELS_AUTO && !store->no_cells &&
+                 (of_cells.kind == ERROR_LIMIT || of_cells.kind == ERROR_OUT_OF_MEMORY);
+    if (again) {
+        log_write(LOG_WARNING, "ldc", "%s: rays take the slower way by a pyramid", of_cells.text);
+        gpu_buffer_finish(store->device, &store->entries);
+        store->no_cells = ok = true;
+        for (unsigned i = 0; ok && i <= which; i++)
+            ok = build_levels(store, i, options, error);
+    } else if (!ok && error && error->kind == ERROR_NONE) {
+        *error = of_cells;
+    }
     gpu_pop_group(store->device);
-    if (!ok)
-        cube->node_count = 0;
     return ok;
 }

@@ -28,6 +28,7 @@ struct ldc_cube {
 struct ldc_store {
     struct gpu_device *device;
     struct gpu_buffer texels, quads, geometry, surface, nodes, entries;
+    bool no_cells;                           /* ldc_levels.c: they were too many, and there are ranges */
     struct ldc_cube cubes[TRACER_CUBES_MAX]; /* the static one first: what moves lies behind it */
 };
 

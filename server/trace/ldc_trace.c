@@ -14,9 +14,8 @@
 #define DISPATCH_RAYS_MAX (1u << 18)
 
 static void set_cube(const struct gpu_program *program, unsigned slot, const struct ldc_cube *cube,
-                     const struct tracer_options *options)
+                     const struct ldc_level_layout *layout, const struct tracer_options *options)
 {
-    const struct ldc_level_layout layout = ldc_level_layout_of(cube->resolution, options);
     const struct {
         const char *name;
         uint32_t value;
@@ -24,9 +23,9 @@ static void set_cube(const struct gpu_program *program, unsigned slot, const str
         {"ldc_resolution", cube->resolution},
         {"ldc_first_texel", cube->first_texel},
         {"ldc_first_node", cube->first_node},
-        {"ldc_top", layout.top},
-        {"ldc_row", layout.row},
-        {"ldc_grid", layout.grid},
+        {"ldc_top", layout->top},
+        {"ldc_row", layout->row},
+        {"ldc_grid", layout->grid},
     };
     char name[32];
     for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) {
@@ -68,7 +67,7 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
     cube_count = cube_count ? cube_count : 1;
     char number_of_cubes[4], bits[4];
     snprintf(number_of_cubes, sizeof number_of_cubes, "%u", cube_count);
-    const struct ldc_level_layout layout = ldc_level_layout_of(cubes[0]->resolution, options);
+    const struct ldc_level_layout layout = ldc_level_layout_of(store, cubes[0]->resolution, options);
     snprintf(bits, sizeof bits, "%u", layout.bits);
     struct gpu_define defines[10] = {
         {"TRACER_LDC", "1"},
@@ -95,8 +94,10 @@ bool ldc_trace(struct ldc_store *store, struct scene_gpu *scene, const struct wa
     if (!program)
         return false;
     bind(store, layout.cells);
-    for (unsigned i = 0; i < cube_count; i++)
-        set_cube(program, i, cubes[i], options);
+    for (unsigned i = 0; i < cube_count; i++) {
+        const struct ldc_level_layout own = ldc_level_layout_of(store, cubes[i]->resolution, options);
+        set_cube(program, i, cubes[i], &own, options);
+    }
     /* Crossings of samples are no matter of trace_surfaces(). */
     struct wave walk = *wave;
     walk.crossings_only = true;

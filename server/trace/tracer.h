@@ -30,7 +30,8 @@ struct tracer_options {
     uint32_t ldc_resolution;        /* cells along the longest side of a cube; 0: 1024; 16 to 4096 */
     uint32_t ldc_block;             /* texels along a side of a min/max block: 2, 4, 8, 16, 32; 0: 8 */
     enum { LDC_BUILD_AUTO, LDC_BUILD_PEEL, LDC_BUILD_LISTS } ldc_build; /* protocol's numbers */
-    /* protocol's numbers; auto: cells, or with a tolerance, which these know nothing of, a pyramid */
+    /* protocol's numbers; auto: cells, or with a tolerance, which these know nothing of, or where they do not fit,
+     * a pyramid */
     enum { LDC_LEVELS_AUTO, LDC_LEVELS_BLOCKS, LDC_LEVELS_PYRAMID, LDC_LEVELS_CELLS } ldc_levels;
     /* Which images a triangle is in: those that its normal leans to almost as much as to one, or that one alone.
      */

@@ -8,7 +8,8 @@
 //   CELLS_MARK     marks cells; an item is a sample
 //   CELLS_COUNT    gives blocks their entries; an item is a block
 //   CELLS_FILL     writes the first entry of each cell; an item is a sample
-//   CELLS_FURTHER  writes those of cells that have one; an item is a sample
+//   CELLS_FURTHER  writes those of cells that have one; an item is such an entry
+//   CELLS_SORT     puts the entries of such cells in order; an item is the same
 //   CELLS_REACH_X, CELLS_REACH_Y, CELLS_REACH_Z   how far it is empty; an item is a node
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
@@ -18,16 +19,19 @@ uniform int first_node, grid; // nodes along a side
 
 #if !defined CELLS_REACH_X && !defined CELLS_REACH_Y && !defined CELLS_REACH_Z
 layout(std430, binding = BIND_TRACER_0) buffer count_block {
-    uint block_count;
-    uint entry_count; // a cell's first
-    uint further_count; // entries of cells that have one
-    uint unused;
     uvec4 lower, upper; // nodes that hold something
+    uvec4 unused[2];    // what is read by all is not beside what is written by all
+    uint block_count;
+    uint entry_count;   // a cell's first
+    uint further_count; // entries of cells that have one
+    uint padding;
 } counts;
 #endif
 
 // What is noted of a sample: 12 bits of its texel's u, of v, its axis; then of up to four cells, from the one with the
 // least depth on, in which it is the first to come and has the cell's own entry.
+// Behind all samples' words those of further entries: the sample, and which of its cells.
+const uint LIST_CELL_SHIFT = 30u, LIST_SAMPLE_MASK = 0x3fffffffu;
 const uint LIST_V_SHIFT = 12u, LIST_AXIS_SHIFT = 24u, LIST_FIRST_SHIFT = 26u, LIST_MASK = 0xfffu;
 
 #ifdef CELLS_LIST
@@ -52,22 +56,22 @@ void main()
         imageStore(list, int(i), uvec4(place));
 }
 
-#elif defined CELLS_BLOCKS || defined CELLS_MARK || defined CELLS_FILL || defined CELLS_FURTHER
+#elif defined CELLS_BLOCKS || defined CELLS_MARK || defined CELLS_FILL || defined CELLS_FURTHER || defined CELLS_SORT
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer list;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer ldc_geometry;
 layout(binding = IMAGE_LDC_NODES, r32ui) uniform uimageBuffer nodes; // words
 
 #ifdef CELLS_MARK
-layout(binding = IMAGE_LDC_ENTRIES, r32ui) writeonly uniform uimageBuffer firsts; // the list
+layout(binding = IMAGE_LDC_ENTRIES, r32ui) writeonly uniform uimageBuffer listed; // the list
 #elif defined CELLS_FILL
 layout(binding = IMAGE_LDC_ENTRIES, rgba32ui) writeonly uniform uimageBuffer entries;
-#elif defined CELLS_FURTHER
+#elif defined CELLS_FURTHER || defined CELLS_SORT
 layout(binding = IMAGE_LDC_ENTRIES, r32ui) uniform uimageBuffer entries; // words
 #endif
 
 uniform int resolution;
-uniform uint first_sample, sample_count;
+uniform uint first_sample, sample_count, first_further, item_count;
 
 int node_of(ivec3 cell)
 {
@@ -117,52 +121,142 @@ uint entry_of(ivec3 cell)
 
 #endif
 
+struct listed_sample {
+    uint index, place; // what is noted of it
+    int axis, u, v, first, last; // texel, depths of its cells
+    uvec2 geometry;
+};
+
+listed_sample sample_at(uint item)
+{
+    listed_sample s;
+    s.index = first_sample + item;
+    s.place = texelFetch(list, int(item)).x;
+    s.geometry = texelFetch(ldc_geometry, int(s.index)).xy;
+    s.axis = int(s.place >> LIST_AXIS_SHIFT & 3u);
+    s.u = int(s.place & LIST_MASK);
+    s.v = int(s.place >> LIST_V_SHIFT & LIST_MASK);
+    float depth = uintBitsToFloat(s.geometry.x), reach = plane_reach(s.geometry.y, s.axis);
+    s.first = int(clamp(depth - reach, 0.0, float(resolution - 1)));
+    s.last = int(clamp(depth + reach, 0.0, float(resolution - 1)));
+    return s;
+}
+
+ivec3 cell_of(listed_sample s, int k)
+{
+    return s.axis == 0 ? ivec3(k, s.u, s.v) : s.axis == 1 ? ivec3(s.v, k, s.u) : ivec3(s.u, s.v, k);
+}
+
+uint packed_entry(listed_sample s)
+{
+    return s.index | uint(s.axis) << LDC_ENTRY_AXIS_SHIFT;
+}
+
+#if defined CELLS_BLOCKS
+
+void handle(uint item)
+{
+    listed_sample s = sample_at(item);
+    for (int k = s.first; k <= (s.last | 3); k += 4)
+        mark_block(cell_of(s, k));
+}
+
+#elif defined CELLS_MARK
+
+void handle(uint item)
+{
+    listed_sample s = sample_at(item);
+    for (int k = s.first; k <= s.last; k++) {
+        ivec3 cell = cell_of(s, k);
+        uint bit = 1u << bit_of(uvec3(cell)), number = uint(k - s.first);
+        if ((imageAtomicOr(nodes, block_of(cell) + (cell.z >> 1 & 1), bit) & bit) == 0u)
+            s.place |= 1u << (LIST_FIRST_SHIFT + number);
+        else
+            imageStore(listed, int(sample_count + atomicAdd(counts.further_count, 1u)),
+                       uvec4(item | number << LIST_CELL_SHIFT));
+    }
+    imageStore(listed, int(item), uvec4(s.place));
+}
+
+#elif defined CELLS_FILL
+
+void handle(uint item)
+{
+    listed_sample s = sample_at(item);
+    for (int k = s.first; k <= s.last; k++)
+        if ((s.place >> (LIST_FIRST_SHIFT + uint(k - s.first)) & 1u) != 0u)
+            imageStore(entries, int(entry_of(cell_of(s, k))), uvec4(packed_entry(s), 0u, s.geometry));
+}
+
+#else
+
+// Of the cell that a further entry is of.
+uint first_entry_of(uint item, out listed_sample s)
+{
+    uint noted = texelFetch(list, int(sample_count + item)).x;
+    s = sample_at(noted & LIST_SAMPLE_MASK);
+    return entry_of(cell_of(s, s.first + int(noted >> LIST_CELL_SHIFT)));
+}
+
+#ifdef CELLS_SORT
+
+uint next_of(uint entry)
+{
+    return imageLoad(entries, int(4u * entry + 1u)).x;
+}
+
+void swap_words(uint a, uint b, uint word)
+{
+    uint of_a = imageLoad(entries, int(4u * a + word)).x;
+    imageStore(entries, int(4u * a + word), imageLoad(entries, int(4u * b + word)));
+    imageStore(entries, int(4u * b + word), uvec4(of_a));
+}
+
+// In what order they came is chance, and of two samples that a ray crosses at the same distance the first counts: by
+// axis and sample, so that the same scene gives the same picture. The last one of a cell does it for all.
+void handle(uint item)
+{
+    if (next_of(first_further + item) != 0u)
+        return;
+    listed_sample s;
+    uint here = first_entry_of(item, s);
+    for (uint next = next_of(here); next != 0u; here = next, next = next_of(here)) {
+        uint least_ = here, least_key = imageLoad(entries, int(4u * here)).x;
+        for (uint k = next; k != 0u; k = next_of(k)) {
+            uint key = imageLoad(entries, int(4u * k)).x;
+            least_ = key < least_key ? k : least_;
+            least_key = key < least_key ? key : least_key;
+        }
+        if (least_ != here) {
+            swap_words(here, least_, 0u);
+            swap_words(here, least_, 2u);
+            swap_words(here, least_, 3u);
+        }
+    }
+}
+
+#else
+
+// Put in front of the further entries that the cell has.
+void handle(uint item)
+{
+    listed_sample s;
+    uint entry = first_entry_of(item, s), here = first_further + item;
+    imageStore(entries, int(4u * here), uvec4(packed_entry(s)));
+    imageStore(entries, int(4u * here + 1u), uvec4(imageAtomicExchange(entries, int(4u * entry + 1u), here)));
+    imageStore(entries, int(4u * here + 2u), uvec4(s.geometry.x));
+    imageStore(entries, int(4u * here + 3u), uvec4(s.geometry.y));
+}
+
+#endif
+
+#endif
+
 void main()
 {
     uint item = item_index();
-    if (item >= sample_count)
-        return;
-    uint place = texelFetch(list, int(item)).x;
-    uint sample_index = first_sample + item;
-    uvec2 g = texelFetch(ldc_geometry, int(sample_index)).xy;
-    int u = int(place & LIST_MASK), v = int(place >> LIST_V_SHIFT & LIST_MASK), axis = int(place >> LIST_AXIS_SHIFT & 3u);
-    float depth = uintBitsToFloat(g.x), reach = plane_reach(g.y, axis);
-    int first = int(clamp(depth - reach, 0.0, float(resolution - 1)));
-    int last = int(clamp(depth + reach, 0.0, float(resolution - 1)));
-#ifdef CELLS_BLOCKS
-    const int step_ = 4; // a span is shorter than a block
-    last |= step_ - 1;
-#else
-    const int step_ = 1;
-#endif
-    uint packed_ = sample_index | uint(axis) << LDC_ENTRY_AXIS_SHIFT;
-    for (int k = first; k <= last; k += step_) {
-        ivec3 cell = axis == 0 ? ivec3(k, u, v) : axis == 1 ? ivec3(v, k, u) : ivec3(u, v, k);
-        uint noted = 1u << (LIST_FIRST_SHIFT + uint(k - first));
-#ifdef CELLS_BLOCKS
-        mark_block(cell);
-#elif defined CELLS_MARK
-        uint bit = 1u << bit_of(uvec3(cell));
-        if ((imageAtomicOr(nodes, block_of(cell) + (cell.z >> 1 & 1), bit) & bit) == 0u)
-            place |= noted;
-        else
-            atomicAdd(counts.further_count, 1u);
-#elif defined CELLS_FILL
-        if ((place & noted) != 0u)
-            imageStore(entries, int(entry_of(cell)), uvec4(packed_, 0u, g));
-#else
-        if ((place & noted) == 0u) {
-            int at = int(4u * atomicAdd(counts.further_count, 1u));
-            imageStore(entries, at, uvec4(packed_));
-            imageStore(entries, at + 1, uvec4(imageAtomicExchange(entries, int(4u * entry_of(cell) + 1u), uint(at) / 4u)));
-            imageStore(entries, at + 2, uvec4(g.x));
-            imageStore(entries, at + 3, uvec4(g.y));
-        }
-#endif
-    }
-#ifdef CELLS_MARK
-    imageStore(firsts, int(item), uvec4(place));
-#endif
+    if (item < item_count)
+        handle(item);
 }
 
 #else

@@ -8,8 +8,9 @@
 // along the axis that the ray runs along most. In an image the components are u, v, depth.
 //
 // Defines: LDC_CUBES 1 or 2; LDC_TOLERANCE a hit is where the ray comes as near to a sample's depth, else where it
-// crosses the sample's plane; LDC_COUNT_STEPS crossings are not samples but, for the benchmark, what the walk did: nodes
-// or cells looked at in place of the distance (a uint), samples tested, texels or cells whose samples were.
+// crosses the sample's plane; LDC_COUNT_STEPS crossings are not samples but, for the benchmark, what the walk did: nodes,
+// blocks and texels looked at in place of the distance, samples tested in that of the primitive, texels or cells whose
+// samples were in that of the instance.
 #include "shared/bindings.h"
 #include "common/candidate.glsl"
 #include "ldc/plane.glsl"

@@ -23,15 +23,17 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "RAYS_TOGE
     for together in ("1", "8")
     for bounds in ({"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}, {"BVH_SPHERES": "1", "BVH_PLAIN": "1"})] + [
     {"TRAVERSE": '"ldc/traverse.glsl"', "TRACER_LDC": "1", "LDC_CUBES": cubes, "LDC_LAYERS_TOGETHER": layers,
-     "RAYS_TOGETHER": together, "LDC_LEVEL_BITS": bits, **blocks}
-    for cubes, layers, together, bits, blocks in (
-        ("1", "4", "1", "2", {}), ("2", "4", "4", "2", {}), ("1", "1", "1", "3", {"LDC_BLOCKS": "1"}),
-        ("2", "4", "4", "3", {"LDC_BLOCKS": "1"}))]
+     "RAYS_TOGETHER": together, "LDC_LEVEL_BITS": bits, **levels}
+    for cubes, layers, together, bits, levels in (
+        ("1", "4", "1", "0", {"LDC_CELLS": "1"}), ("2", "4", "4", "0", {"LDC_CELLS": "1"}),
+        ("2", "1", "4", "2", {}), ("1", "4", "1", "3", {"LDC_BLOCKS": "1"}))]
 CHOICES = {
     "trace.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
     "bvh/coherence.comp": [[{"RAYS_TOGETHER": "8"}]],
     "bvh/refit_write.comp": [[{"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}]],
     "ldc/levels.comp": [[{"LDC_LEVEL_BITS": "2"}]],
+    "ldc/cells.comp": [[{"CELLS_" + stage: "1"} for stage in
+                        "LIST BLOCKS PLACE MARK COUNT FILL FURTHER SORT REACH_X REACH_Y REACH_Z".split()]],
     "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
     "ldc/build.vert": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
                        [{"BUILD_PASS": number} for number in "012"]],
