@@ -142,7 +142,7 @@ static bool fill_blocks(struct cell_build *build, struct error *error)
     gpu_buffer_read(store->device, &build->counter, 0, counts, sizeof *counts);
     if (!reserve_entries(build, error))
         return false;
-    bind_nodes(build, GL_R32UI);
+    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_2, GL_RGBA32UI);
     gpu_buffer_bind_image(store->device, &store->entries, IMAGE_LDC_ENTRIES, GL_RGBA32UI);
     if (!cells_pass(build, "CELLS_FILL", cube->sample_count, error))
         return false;

@@ -123,6 +123,8 @@ void step_on(inout cell_walk w, inout found_cell found, bvec3 down)
             bool leaves = (others.x | others.y | others.z) != 0;
             w.cell = next;
             w.s = w.s < s_out ? s_out : w.s;
+            // Cells only go up, so whatever is rounded the walk ends.
+            w.s = any(greaterThanEqual(next, ivec3(w.grid << LDC_NODE_SHIFT))) ? 1e30 : w.s;
             w.shift = leaves ? 2 : w.shift;
             w.at = leaves ? node_at(w, next) : w.at;
         }

@@ -66,7 +66,8 @@ cube_ray cube_ray_of(trace_ray r, int cube)
     cube_ray c;
     c.scale = length_ / place.w;
     // Written so that what is no number, or too small or large for its inverse to be one, goes nowhere.
-    bool is_direction = length_ > 1e-30 && length_ < 1e30 && size.x + size.y + size.z < 1e30;
+    vec3 away = abs(r.origin);
+    bool is_direction = length_ > 1e-30 && size.x + size.y + size.z < 1e30 && away.x + away.y + away.z < 1e30;
     c.scale = is_direction ? c.scale : 0.0;
     c.o = (r.origin - place.xyz) / place.w;
     c.d = without_zeros(is_direction ? r.direction / length_ : vec3(1.0, 0.0, 0.0));

@@ -333,6 +333,9 @@ static void directions_that_are_none_and_dead_rays_hit_nothing(void **state)
         origin[k] = INFINITY;
         rays[count++] = ray_from(origin, direction, 0, FAR);
     }
+    /* From where a float's step is larger than the cube. */
+    rays[count++] = ray_from((const float[3]){-1e20f, -1e20f, -1e20f}, (const float[3]){1, 0.9f, 1.1f}, 0, FAR);
+    rays[count++] = ray_from((const float[3]){3e9f, 0.1f, 0.2f}, (const float[3]){-1, 0.2f, 0.1f}, 0, FAR);
     rays[count++] = ray_from(middle, right, 1, 1);
     rays[count++] = ray_from(middle, right, 0, -1);
     rays[count++] = ray_from(middle, right, 0, NAN);
