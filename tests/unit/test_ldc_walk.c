@@ -161,10 +161,7 @@ static void add_box(struct ldc_samples *s, const float lower[3], const float upp
             p[k][u] = (k == 1 || k == 2) == (side % 2 == 1) ? upper[u] : lower[u];
             p[k][v] = k >= 2 ? upper[v] : lower[v];
         }
-        if (side % 2)
-            add_quad(s, p[0], p[1], p[2], p[3], material);
-        else
-            add_quad(s, p[0], p[1], p[2], p[3], material);
+        add_quad(s, p[0], p[1], p[2], p[3], material);
     }
 }
 
@@ -403,6 +400,69 @@ static void where_cells_do_not_fit_a_pyramid_is_walked(void **state)
     assert_false(fixture.store.no_cells);
     fixture_finish(&fixture);
     free(rays);
+}
+
+/* Planes that lean as much to one axis as to another, so close to each other that all pass the same cells: nothing
+ * is lost of them, and nothing is there twice. */
+static void what_shares_cells_is_in_each_of_them_once(void **state)
+{
+    (void)state;
+    const int layers = 12;
+    const float n = 24;
+    struct error error = {0};
+    struct fixture fixture;
+    fixture_init(&fixture, NULL);
+    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    start_samples(s, 24, n, 0, 0, 0);
+    for (int i = 0; i < layers; i++) {
+        /* Where u and v are a texel's middle the depth is nearly a whole number: four cells are passed. */
+        const float c = n + 0.006f * (float)i;
+        const float corners[3][3] = {{c - 4, 2, 2}, {2, c - 4, 2}, {2, 2, c - 4}};
+        ldc_add_triangle(s, corners, 0);
+    }
+    build(&fixture, &(struct tracer_options){.ldc_levels = LDC_LEVELS_CELLS});
+    const struct ldc_cube *cube = &fixture.store.cubes[TRACER_CUBE_STATIC];
+    uint32_t(*entries)[4] = malloc(cube->entry_count * sizeof *entries);
+    uint32_t *times = calloc(s->count, sizeof *times);
+    gpu_buffer_read(device, &fixture.store.entries, 0, entries, cube->entry_count * sizeof *entries);
+    expect_ok(gpu_check(device, "entries", &error), &error);
+    for (uint32_t i = 0; i < cube->entry_count; i++) {
+        const uint32_t sample = entries[i][0] & LDC_ENTRY_SAMPLE_MASK;
+        assert_true(sample < s->count);
+        times[sample]++;
+    }
+    for (size_t i = 0; i < s->count; i++)
+        if (times[i] != 4)
+            fail_msg("sample %zu is in %u cells", i, times[i]);
+    free(entries);
+    free(times);
+    fixture_finish(&fixture);
+}
+
+/* Blocks over more samples than software GL lets a loop go round, and what is last of them is the only thing that
+ * is far. */
+static void blocks_of_many_layers_hold_all_of_them(void **state)
+{
+    (void)state;
+    static const float up[3] = {0, 0, 1};
+    enum { n = 64, layers = 100, rays_along = 8 };
+    struct ray rays[rays_along * rays_along];
+    struct fixture fixture;
+    fixture_init(&fixture, NULL);
+    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    start_samples(s, n, n, 0, 0, 0);
+    for (uint32_t v = 0; v < n; v++)
+        for (uint32_t u = 0; u < n; u++)
+            for (int i = 0; i < layers; i++)
+                ldc_add_sample(s, 2, u, v, (v % 32 < 28 ? 5.0f : 40.0f) + 0.1f * (float)i, up, 0);
+    for (int i = 0; i < rays_along * rays_along; i++) {
+        const float step = (float)n / rays_along;
+        const float o[3] = {step * ((float)(i % rays_along) + 0.4f), step * ((float)(i / rays_along) + 0.9f), 30};
+        const float d[3] = {0.01f, 0.02f, 1};
+        rays[i] = ray_from(o, d, 0, FAR);
+    }
+    expect_like_brute_force(&fixture, rays, rays_along * rays_along, rays_along * 2);
+    fixture_finish(&fixture);
 }
 
 /* Along axes through the middles of texels, along their borders, through corners, and nearly so. */
@@ -842,6 +902,8 @@ int main(void)
         cmocka_unit_test(rays_cross_samples_as_by_brute_force),
         cmocka_unit_test(two_cubes_are_walked_as_one),
         cmocka_unit_test(where_cells_do_not_fit_a_pyramid_is_walked),
+        cmocka_unit_test(what_shares_cells_is_in_each_of_them_once),
+        cmocka_unit_test(blocks_of_many_layers_hold_all_of_them),
         cmocka_unit_test(rays_along_axes_and_borders_cross_samples_as_by_brute_force),
         cmocka_unit_test(what_lies_in_the_sides_of_the_cube_is_hit),
         cmocka_unit_test(directions_that_are_none_and_dead_rays_hit_nothing),
