@@ -260,7 +260,7 @@ static void print_cubes(const struct cli_timings *timings)
     for (unsigned part = 0; part < PARTS; part++) {
         if (timings->cube[part].resolution == 0)
             continue;
-        fprintf(timings->out, "  %-9s%-7s", part == 0 || timings->cube[0].resolution == 0 ? "cubes" : "",
+        fprintf(timings->out, "  %-9s%-8s", part == 0 || timings->cube[0].resolution == 0 ? "cubes" : "",
                 protocol_cube_part_text((enum protocol_cube_part)part));
         cli_cube_print(timings->out, &timings->cube[part]);
         fprintf(timings->out, "; sampled for %" PRIu64 " of %" PRIu64 " frame%s\n", timings->cube_builds[part],

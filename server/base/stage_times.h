@@ -30,8 +30,9 @@ enum stage_clock { STAGE_CPU, STAGE_GPU };
 struct stage_span {
     enum stage_id stage;
     enum stage_clock clock;
-    uint32_t wave;     /* of trace and shade: number of the wave in its frame; of `ldc`'s builds: which cube,
-                          0 the static one, 1 the dynamic one */
+    /* Of trace and shade: number of the wave in its frame. Of a build by `ldc`: which cube, 0 the static one, 1
+     * the dynamic one; on the GPU's clock these are all that there are of a build. */
+    uint32_t wave;
     uint64_t start_ns; /* since `origin_ns` */
     uint64_t duration_ns;
 };

@@ -15,6 +15,8 @@ struct drawn { /* shared/ldc_build.h */
     uint32_t first_id, id_offset, instance, flags;
 };
 
+_Static_assert(sizeof(struct drawn) + sizeof(struct draw_command) == LDC_BUILD_INSTANCE_BYTES, "an instance");
+
 static enum ldc_sort sort_of(const struct geometry *geometry)
 {
     if (geometry->kind == GEOMETRY_SPHERES)

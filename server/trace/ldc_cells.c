@@ -148,7 +148,8 @@ static bool fill_blocks(struct cell_build *build, struct error *error)
     if (!cells_pass(build, "CELLS_FILL", cube->sample_count, error))
         return false;
     gpu_buffer_bind_image(store->device, &store->entries, IMAGE_LDC_ENTRIES, GL_R32UI);
-    return counts->further == 0 || cells_pass(build, "CELLS_FURTHER", counts->further, error);
+    return counts->further == 0 || (cells_pass(build, "CELLS_FURTHER", counts->further, error) &&
+                                    cells_pass(build, "CELLS_SORT", counts->further, error));
 }
 
 /* How far it is empty around empty nodes. */

@@ -9,6 +9,7 @@
 //   CELLS_COUNT    gives blocks their entries; an item is a block
 //   CELLS_FILL     writes the first entry of each cell; an item is a sample
 //   CELLS_FURTHER  writes those of cells that have one; an item is such an entry
+//   CELLS_SORT     puts the entries of such cells in order; an item is the same
 //   CELLS_REACH_X, CELLS_REACH_Y, CELLS_REACH_Z   how far it is empty; an item is a node
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
@@ -55,7 +56,7 @@ void main()
         imageStore(list, int(i), uvec4(place));
 }
 
-#elif defined CELLS_BLOCKS || defined CELLS_MARK || defined CELLS_FILL || defined CELLS_FURTHER
+#elif defined CELLS_BLOCKS || defined CELLS_MARK || defined CELLS_FILL || defined CELLS_FURTHER || defined CELLS_SORT
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer list;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer ldc_geometry;
@@ -65,7 +66,7 @@ layout(binding = IMAGE_LDC_NODES, r32ui) uniform uimageBuffer nodes; // words
 layout(binding = IMAGE_LDC_ENTRIES, r32ui) writeonly uniform uimageBuffer listed; // the list
 #elif defined CELLS_FILL
 layout(binding = IMAGE_LDC_ENTRIES, rgba32ui) writeonly uniform uimageBuffer entries;
-#elif defined CELLS_FURTHER
+#elif defined CELLS_FURTHER || defined CELLS_SORT
 layout(binding = IMAGE_LDC_ENTRIES, r32ui) uniform uimageBuffer entries; // words
 #endif
 
@@ -189,17 +190,65 @@ void handle(uint item)
 
 #else
 
+// Of the cell that a further entry is of.
+uint first_entry_of(uint item, out listed_sample s)
+{
+    uint noted = texelFetch(list, int(sample_count + item)).x;
+    s = sample_at(noted & LIST_SAMPLE_MASK);
+    return entry_of(cell_of(s, s.first + int(noted >> LIST_CELL_SHIFT)));
+}
+
+#ifdef CELLS_SORT
+
+uint next_of(uint entry)
+{
+    return imageLoad(entries, int(4u * entry + 1u)).x;
+}
+
+void swap_words(uint a, uint b, uint word)
+{
+    uint of_a = imageLoad(entries, int(4u * a + word)).x;
+    imageStore(entries, int(4u * a + word), imageLoad(entries, int(4u * b + word)));
+    imageStore(entries, int(4u * b + word), uvec4(of_a));
+}
+
+// In what order they came is chance, and of two samples that a ray crosses at the same distance the first counts: by
+// axis and sample, so that the same scene gives the same picture. The last one of a cell does it for all.
+void handle(uint item)
+{
+    if (next_of(first_further + item) != 0u)
+        return;
+    listed_sample s;
+    uint here = first_entry_of(item, s);
+    for (uint next = next_of(here); next != 0u; here = next, next = next_of(here)) {
+        uint least_ = here, least_key = imageLoad(entries, int(4u * here)).x;
+        for (uint k = next; k != 0u; k = next_of(k)) {
+            uint key = imageLoad(entries, int(4u * k)).x;
+            least_ = key < least_key ? k : least_;
+            least_key = key < least_key ? key : least_key;
+        }
+        if (least_ != here) {
+            swap_words(here, least_, 0u);
+            swap_words(here, least_, 2u);
+            swap_words(here, least_, 3u);
+        }
+    }
+}
+
+#else
+
 // Put in front of the further entries that the cell has.
 void handle(uint item)
 {
-    uint noted = texelFetch(list, int(sample_count + item)).x;
-    listed_sample s = sample_at(noted & LIST_SAMPLE_MASK);
-    uint entry = entry_of(cell_of(s, s.first + int(noted >> LIST_CELL_SHIFT))), here = first_further + item;
+    listed_sample s;
+    uint entry = first_entry_of(item, s), here = first_further + item;
     imageStore(entries, int(4u * here), uvec4(packed_entry(s)));
     imageStore(entries, int(4u * here + 1u), uvec4(imageAtomicExchange(entries, int(4u * entry + 1u), here)));
     imageStore(entries, int(4u * here + 2u), uvec4(s.geometry.x));
     imageStore(entries, int(4u * here + 3u), uvec4(s.geometry.y));
 }
+
+#endif
 
 #endif
 

@@ -8,8 +8,9 @@
 // along the axis that the ray runs along most. In an image the components are u, v, depth.
 //
 // Defines: LDC_CUBES 1 or 2; LDC_TOLERANCE a hit is where the ray comes as near to a sample's depth, else where it
-// crosses the sample's plane; LDC_COUNT_STEPS crossings are not samples but, for the benchmark, what the walk did: nodes
-// or cells looked at in place of the distance (a uint), samples tested, texels or cells whose samples were.
+// crosses the sample's plane; LDC_COUNT_STEPS crossings are not samples but, for the benchmark, what the walk did: nodes,
+// blocks and texels looked at in place of the distance, samples tested in that of the primitive, texels or cells whose
+// samples were in that of the instance.
 #include "shared/bindings.h"
 #include "common/candidate.glsl"
 #include "ldc/plane.glsl"
@@ -33,10 +34,6 @@ uniform int ldc_first_node[LDC_CUBES];
 #ifdef LDC_TOLERANCE
 uniform float ldc_tolerance[LDC_CUBES]; // cells
 #endif
-
-// How far a ray goes on at once before it is looked whether there is something to test. In a SIMD group all wait for the one
-// that has most to go; with no limit rays are up to a seventh slower, with one or two rounds too.
-const int LDC_ROUNDS = 4;
 
 // A uniform of one number for all of a SIMD group is read once, one of each's own lane by lane.
 #if LDC_CUBES == 1

@@ -104,6 +104,9 @@ void leave_node(inout image_walk w, int shift, float s_out, bool by_u)
     w.s = uint(next.x) >= resolution || uint(next.y) >= resolution ? 1e30 : w.s;
 }
 
+// How often, before it is looked whether there is something to test: in a SIMD group all wait for the one that has most to do.
+const int IMAGE_ROUNDS = 4;
+
 // On towards the next texel that the ray may hit something in, for some rounds. True: it is there.
 bool next_texel(inout image_walk w, out uvec4 words, out float z_least, out float z_greatest)
 {
@@ -111,7 +114,7 @@ bool next_texel(inout image_walk w, out uvec4 words, out float z_least, out floa
     z_least = z_greatest = 0.0;
     int resolution = ldc_resolution[CUBE(w.cube)];
     int first_texel = ldc_first_texel[CUBE(w.cube)] + w.axis * resolution * resolution;
-    for (int round_ = 0; round_ < LDC_ROUNDS && w.s < w.s_end; round_++) {
+    for (int round_ = 0; round_ < IMAGE_ROUNDS && w.s < w.s_end; round_++) {
         LDC_COUNT(x);
         int shift = w.level * LDC_LEVEL_BITS;
         bool by_u;

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The tables of the part `ldc` of the benchmark."""
 from bench_common import figure, paired_ratio, significant, table, with_spread
-from bench_ldc import (ACCURACY_WAVES, PAPER, USUAL, after_build_ms, at, error_cells, form_of, milliseconds, ratio,
+from bench_ldc import (ACCURACY_WAVES, PAPER, PICTURES, USUAL, after_build_ms, at, error_cells, form_of, milliseconds, ratio,
                        same_samples, wave_of)
 from bench_reach import show as show_wanted
 
@@ -55,7 +55,7 @@ def show_scenes(results):
 
 
 def show_accuracy(scenes, pictures):
-    closed = {result["title"]: result for result in pictures}
+    closed = {(result["title"], result["how"]): result for result in pictures}
     lines = []
     for result in scenes:
         for i, form in enumerate(form for form in result["forms"] if form["cubes"]):
@@ -64,10 +64,11 @@ def show_accuracy(scenes, pictures):
                 wave = wave_of(form, kind)
                 cells += [f"{100 * wave['agree']:.3f}", *(significant(error_cells(form, wave, which)) for which in
                                                           ("error_median", "error_p99"))]
-            psnr = closed[result["title"]]["forms"][i]["psnr_db"] if result["title"] in closed else None
-            lines.append((result["title"], form["cubes"][0]["resolution"], *cells, significant(psnr)))
-    header = [("scene", "cells", *(["reflection"] * 3), *(["bounce"] * 3), "picture"),
-              ("", "", *(["agree %", "error, cells", "of 99 %"] * 2), "PSNR, dB")]
+            same = [closed.get((result["title"], how)) for how in PICTURES]
+            lines.append((result["title"], form["cubes"][0]["resolution"], *cells,
+                          *(significant(picture["forms"][i]["psnr_db"] if picture else None) for picture in same)))
+    header = [("scene", "cells", *(["reflection"] * 3), *(["bounce"] * 3), *PICTURES),
+              ("", "", *(["agree %", "error, cells", "of 99 %"] * 2), *(["PSNR, dB"] * len(PICTURES)))]
     return table(header, lines)
 
 
@@ -121,7 +122,7 @@ def show(data):
         "Rays to hits, surfaces included, from where the camera's rays hit; beside bvh on the same waves",
         show_scenes(data["scenes"]),
         "How far answers are from the reference's: share of the rays that hit with both or miss with both, and errors of\n"
-        "distance in cells where both hit. Pictures: everything a mirror, depth 4.",
+        "distance in cells where both hit. Pictures by the Whitted integrator: as the model is, and all of it a mirror.",
         show_accuracy(data["scenes"], data["pictures"]),
         f"Time against triangles at {USUAL}", show_family(data["family"]),
         "Peeling, as the paper builds, and one pass with lists", show_depths(data["depths"]),

@@ -27,7 +27,8 @@ class Options(Case):
                 ("--ldc-resolution", "15", "16 to 4096"), ("--ldc-resolution", "4097", "4096"),
                 ("--ldc-resolution", "fine", "fine"), ("--ldc-block", "12", "2, 4, 8, 16, 32"),
                 ("--ldc-block", "64", "32"), ("--ldc-rays", "2", "0, 1, 4"), ("--ldc-rays", "8", "4"),
-                ("--ldc-build", "magic", "auto, peel, lists"), ("--ldc-levels", "tree", "auto, blocks, pyramid, cells"), ("--ldc-images", "two", "overlap, one"),
+                ("--ldc-build", "magic", "auto, peel, lists"), ("--ldc-levels", "tree", "auto, blocks, pyramid, cells"),
+                ("--ldc-images", "two", "overlap, one"),
                 ("--ldc-tolerance", "-1", "-1"), ("--ldc-tolerance", "nan", "nan")):
             for command in (["render"], ["animate", "--frames", "1-2"], ["compare", "--tracers", "ldc,bvh"]):
                 with self.subTest(option=option, value=value, command=command[0]):
@@ -70,20 +71,30 @@ class Pictures(Case):
                              "--ldc-resolution", "256", *options), 0)
         return path
 
-    def test_both_builds_give_the_same_picture(self):
-        pictures = [read_png(self.picture("--ldc-levels", "pyramid", "--ldc-build", build)) for build in ("peel", "lists")]
-        self.assertEqual(*pictures)
+    def test_the_same_picture_comes_of_every_build(self):
+        """Cells and lists are filled by many invocations at once, in whatever order."""
+        for levels in ("cells", "pyramid"):
+            pictures = [read_png(self.picture("--ldc-levels", levels, "--ldc-build", build))
+                        for build in ("peel", "lists", "lists", "lists")]
+            for picture in pictures[1:]:
+                self.assertEqual(picture, pictures[0])
 
     def test_all_levels_lead_to_the_same_samples(self):
         """In the mean over a cell of 300 pixels 0.85 of 255 is one pixel that went from black to white. Two of them: rays that
         pass within rounding of where a sample ends, of which there are many at 256 cells."""
         wanted = grid_means(self.picture())
-        for options in (["--ldc-levels", "blocks", "--ldc-block", "4"], ["--ldc-levels", "pyramid"], ["--ldc-levels", "cells"], ["--ldc-images", "one"],
+        for options in (["--ldc-levels", "blocks", "--ldc-block", "4"], ["--ldc-levels", "pyramid"], ["--ldc-levels", "cells"],
                         ["--ldc-rays", "4"]):
             with self.subTest(options=options):
                 for got, want in zip(grid_means(self.picture(*options)), wanted):
                     for channel in range(3):
                         self.assertAlmostEqual(got[channel], want[channel], delta=1.7)
+
+    def test_images_that_do_not_overlap_show_the_same_but_for_cracks(self):
+        errors = sorted(abs(a - b) for got, want in zip(grid_means(self.picture("--ldc-images", "one")),
+                                                        grid_means(self.picture())) for a, b in zip(got, want))
+        self.assertLess(errors[len(errors) // 2], 0.5)
+        self.assertLess(errors[-1], 10)
 
 
 class Cubes(Case):
@@ -118,6 +129,18 @@ class Cubes(Case):
         self.assertGreater(cube["samples_lost"], 0)
         for words in ("warning: frame 0: the static cube has 1 of ", f"{cube['samples_lost']} samples", "limits.ldc_layers"):
             self.assertIn(words, result.stderr)
+
+    def test_memory_is_a_limit_too(self):
+        arguments = ["render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", *SIZE, *LDC, "--ldc-resolution",
+                     "512", "--timings=json"]
+        result = self.expect(farlight(*arguments, env={**os.environ, "FARLIGHT_MEMORY_LDC": "12M"}), 0)
+        cube, = frames_of(result)[0]["cubes"]
+        self.assertLess(cube["layers_kept"], cube["layers_needed"])
+        self.assertGreater(cube["samples_lost"], 0)
+        self.assertIn("memory.ldc", result.stderr)
+        result = self.expect(farlight(*arguments, env={**os.environ, "FARLIGHT_MEMORY_LDC": "1M"}), 1)
+        self.assertIn("no room for one layer", result.stderr)
+        self.assertIn("take a lower resolution, or allow it more memory", result.stderr)
 
     def test_exr_metadata_holds_the_size_of_a_cell(self):
         path = self.folder / "x.exr"

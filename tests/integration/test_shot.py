@@ -19,7 +19,8 @@ EXAMPLES = {
         "frames": "1-240:2", "fps": 23.976, "shard": "3/8", "size": [64, 48], "samples": 4, "depth": 0, "seed": 7,
         "exposure": -1.5, "tone_map": "aces", "shutter": 0.5, "filter": "gaussian", "tracer": "bvh",
         "bvh_bounds": "sphere", "bvh_rays": 2, "ldc_resolution": 512, "ldc_block": 4, "ldc_build": "lists",
-        "ldc_levels": "pyramid", "ldc_images": "one", "ldc_tolerance": 0.001, "ldc_rays": 4, "integrator": "distributed", "primary": "trace", "encoding": "zstd",
+        "ldc_levels": "pyramid", "ldc_images": "one", "ldc_tolerance": 0.001, "ldc_rays": 4,
+        "integrator": "distributed", "primary": "trace", "encoding": "zstd",
         "quality": 3, "format": "exr", "half": True, "float": False, "output": "%04d.exr"},
     "movie": {
         "model": "teapot.glb", "camera": "a camera", "lossless": True, "frames": "5",
@@ -290,7 +291,8 @@ class Schema(Shots):
 
     def test_the_schema_lists_the_names_that_the_program_knows(self):
         properties = json.loads(SCHEMA.read_text())["properties"]
-        for name in ("tone_map", "filter", "tracer", "bvh_bounds", "ldc_build", "ldc_levels", "ldc_images", "integrator", "primary", "encoding"):
+        for name in ("tone_map", "filter", "tracer", "bvh_bounds", "ldc_build", "ldc_levels", "ldc_images", "integrator",
+                     "primary", "encoding"):
             with self.subTest(name=name):
                 result = self.expect(self.try_shot({"model": "teapot.glb", name: "nonsense"}), 2)
                 known = re.search(r"known: ([^)]*)\)", result.stderr).group(1)

@@ -33,7 +33,7 @@ CHOICES = {
     "bvh/refit_write.comp": [[{"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}]],
     "ldc/levels.comp": [[{"LDC_LEVEL_BITS": "2"}]],
     "ldc/cells.comp": [[{"CELLS_" + stage: "1"} for stage in
-                        "LIST BLOCKS PLACE MARK COUNT FILL FURTHER REACH_X REACH_Y REACH_Z".split()]],
+                        "LIST BLOCKS PLACE MARK COUNT FILL FURTHER SORT REACH_X REACH_Y REACH_Z".split()]],
     "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
     "ldc/build.vert": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
                        [{"BUILD_PASS": number} for number in "012"]],
