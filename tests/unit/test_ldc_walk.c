@@ -278,6 +278,54 @@ static void what_shares_cells_is_in_each_of_them_once(void **state)
     fixture_finish(&fixture);
 }
 
+/* What is small is met by rays that begin millions of its cells away, as those of a large scene meet what moves in
+ * it: a ball has no cracks, and is met where it is, but for what the floats round that tell where the ray begins,
+ * which is up to a quarter of a cell. */
+static void rays_from_afar_meet_what_is_small(void **state)
+{
+    (void)state;
+    const float centre[3] = {0.1f, 0.2f, -0.1f}, radius = 0.8f;
+    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
+    uint64_t seed = 41;
+    struct fixture fixture;
+    fixture_init(&fixture, NULL);
+    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    start_samples(s, 128, 2, -1, -1, -1);
+    add_sphere(s, centre, radius, 100, 0);
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        float o[3], d[3], length = 0;
+        for (int k = 0; k < 3; k++) {
+            o[k] = test_uniform(&seed, -1, 1);
+            length = fmaxf(length, fabsf(o[k]));
+        }
+        for (int k = 0; k < 3; k++) {
+            o[k] *= 4e6f * s->cell / length;
+            d[k] = centre[k] + test_uniform(&seed, -0.4f, 0.4f) - o[k];
+        }
+        rays[i] = ray_from(o, d, 0, FAR);
+    }
+    for (size_t f = 0; f < FORM_COUNT; f++) {
+        build(&fixture, &forms[f].options);
+        trace(&fixture, &forms[f].options, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
+        for (uint32_t i = 0; i < RAY_COUNT; i++) {
+            double from_centre = 0, along = 0;
+            for (int k = 0; k < 3; k++) {
+                const double off = (double)rays[i].origin_t_min[k] +
+                                   (double)hits[i].distance * rays[i].direction_t_max[k] - centre[k];
+                from_centre += off * off;
+                along += off * rays[i].direction_t_max[k];
+            }
+            /* On the side that is turned to the ray. */
+            if (hits[i].distance < 0 || fabs(sqrt(from_centre) - radius) > s->cell || along > 0)
+                fail_msg("%s: ray %u meets it at %g", forms[f].name, i, (double)hits[i].distance);
+        }
+    }
+    free(rays);
+    free(hits);
+    fixture_finish(&fixture);
+}
+
 /* Blocks over more samples than software GL lets a loop go round, and what is last of them is the only thing that
  * is far. */
 static void blocks_of_many_layers_hold_all_of_them(void **state)
@@ -446,6 +494,7 @@ int main(void)
         cmocka_unit_test(two_cubes_are_walked_as_one),
         cmocka_unit_test(where_cells_do_not_fit_a_pyramid_is_walked),
         cmocka_unit_test(what_shares_cells_is_in_each_of_them_once),
+        cmocka_unit_test(rays_from_afar_meet_what_is_small),
         cmocka_unit_test(blocks_of_many_layers_hold_all_of_them),
         cmocka_unit_test(rays_along_axes_and_borders_cross_samples_as_by_brute_force),
         cmocka_unit_test(what_lies_in_the_sides_of_the_cube_is_hit),
