@@ -10,8 +10,9 @@
 
 #define CELL_NODE_BYTES (4 * sizeof(uint32_t))
 #define ENTRY_BYTES (4 * sizeof(uint32_t))
-/* A plane that spans up to 2 LDC_SPAN cells is in so many; all but the first of a cell are listed once more. */
-#define SAMPLE_CELLS_MAX 4u
+/* A sample has a word, and one more for each cell that its plane passes in which another came first: for all of up
+ * to four, as a plane spans up to 2 LDC_SPAN cells. */
+#define SAMPLE_WORDS_MAX 5u
 
 /* counts of ldc/cells.comp */
 struct cell_counts {
@@ -85,7 +86,7 @@ static bool list_samples(struct cell_build *build, struct error *error)
     struct ldc_store *store = build->store;
     const struct ldc_cube *cube = &store->cubes[build->which];
     const uint64_t n = cube->resolution;
-    const uint64_t words = (uint64_t)cube->sample_count * SAMPLE_CELLS_MAX;
+    const uint64_t words = (uint64_t)cube->sample_count * SAMPLE_WORDS_MAX;
     if (words > store->device->facts.texture_buffer_texels_max || words > INT32_MAX)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
                          "the cells of %u samples are more than the device takes", cube->sample_count);
