@@ -58,8 +58,7 @@ static bool same_camera(const struct frame_camera *a, const struct frame_camera 
 static bool same_samples(const struct tracer_options *x, const struct tracer_options *y)
 {
     return x->ldc_resolution == y->ldc_resolution && x->ldc_block == y->ldc_block &&
-           x->ldc_build == y->ldc_build && x->ldc_levels == y->ldc_levels &&
-           x->ldc_images == y->ldc_images &&
+           x->ldc_build == y->ldc_build && x->ldc_levels == y->ldc_levels && x->ldc_images == y->ldc_images &&
            x->ldc_tolerance == y->ldc_tolerance && x->ldc_rays_together == y->ldc_rays_together &&
            x->ldc_layers_together == y->ldc_layers_together && x->ldc_layers_max == y->ldc_layers_max &&
            x->ldc_mebibytes_max == y->ldc_mebibytes_max;

@@ -10,8 +10,9 @@
 
 #define CELL_NODE_BYTES (4 * sizeof(uint32_t))
 #define ENTRY_BYTES (4 * sizeof(uint32_t))
-/* A plane that spans up to 2 LDC_SPAN cells is in so many; all but the first of a cell are listed once more. */
-#define SAMPLE_CELLS_MAX 4u
+/* A sample has a word, and one more for each cell that its plane passes in which another came first: for all of up
+ * to four, as a plane spans up to 2 LDC_SPAN cells. */
+#define SAMPLE_WORDS_MAX 5u
 
 /* counts of ldc/cells.comp */
 struct cell_counts {
@@ -85,7 +86,7 @@ static bool list_samples(struct cell_build *build, struct error *error)
     struct ldc_store *store = build->store;
     const struct ldc_cube *cube = &store->cubes[build->which];
     const uint64_t n = cube->resolution;
-    const uint64_t words = (uint64_t)cube->sample_count * SAMPLE_CELLS_MAX;
+    const uint64_t words = (uint64_t)cube->sample_count * SAMPLE_WORDS_MAX;
     if (words > store->device->facts.texture_buffer_texels_max || words > INT32_MAX)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
                          "the cells of %u samples are more than the device takes", cube->sample_count);
@@ -142,7 +143,7 @@ static bool fill_blocks(struct cell_build *build, struct error *error)
     gpu_buffer_read(store->device, &build->counter, 0, counts, sizeof *counts);
     if (!reserve_entries(build, error))
         return false;
-    bind_nodes(build, GL_R32UI);
+    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_2, GL_RGBA32UI);
     gpu_buffer_bind_image(store->device, &store->entries, IMAGE_LDC_ENTRIES, GL_RGBA32UI);
     if (!cells_pass(build, "CELLS_FILL", cube->sample_count, error))
         return false;

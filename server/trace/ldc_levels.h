@@ -3,12 +3,13 @@
  * cube, section 1.3) or over all sizes of blocks, a pyramid; or, and that is the default, which cells of all three
  * images together hold something (ldc_cells.h).
  *
- * Million rays a second on software GL at a resolution of 1024, reflections in a dragon of 47,000 triangles:
- * blocks below 0.1, a pyramid of 2 x 2 children 0.25, of 4 x 4 0.27, of 8 x 8 0.26, cells 4.2. Image by image a
- * ray walks three times, each time through texels whose depths it meets and whose planes it passes by; by cells it
- * walks once and ends with what it meets first. For that cells take a tenth of a second more to build and 16 bytes
- * for each cell that a sample's plane passes, two to three a sample. With a tolerance the paper's test takes a
- * pyramid: planes are what cells are of. */
+ * Million reflected rays a second on two cores of software GL, a dragon of 47,000 triangles at a resolution of
+ * 1024: blocks of 8 0.15, of 32 0.19, a pyramid of 2 x 2 children 0.25, of 4 x 4 0.29, of 8 x 8 0.26, cells 4.1.
+ * Image by image a ray looks at 130 nodes and 54 texels, whose depths it meets and whose planes it passes by; by
+ * cells, and that is all images at once, at 16 nodes and blocks and at 3 cells, and it ends with what it meets
+ * first. For that cells take 0.2 seconds to build where a pyramid takes 0.02, and 16 bytes for each cell that a
+ * sample's plane passes, about two a sample. The paper's test, a tolerance, takes a pyramid: cells are of planes.
+ */
 #ifndef FARLIGHT_TRACE_LDC_LEVELS_H
 #define FARLIGHT_TRACE_LDC_LEVELS_H
 

@@ -60,7 +60,11 @@ void main()
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer list;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer ldc_geometry;
+#if defined CELLS_BLOCKS || defined CELLS_MARK
 layout(binding = IMAGE_LDC_NODES, r32ui) uniform uimageBuffer nodes; // words
+#else
+layout(binding = UNIT_TRACER_2) uniform usamplerBuffer nodes_; // what only reads them is faster by it
+#endif
 
 #ifdef CELLS_MARK
 layout(binding = IMAGE_LDC_ENTRIES, r32ui) writeonly uniform uimageBuffer listed; // the list
@@ -76,14 +80,7 @@ uniform uint first_sample, sample_count, first_further, item_count;
 int node_of(ivec3 cell)
 {
     ivec3 n = cell >> LDC_NODE_SHIFT;
-    return 4 * (first_node + (n.z * grid + n.y) * grid + n.x);
-}
-
-// How many bits of a node's or block's 64 come before one.
-uint rank_of(int words, bool upper_half, uint bit)
-{
-    uint below = uint(bitCount(imageLoad(nodes, upper_half ? words + 1 : words).x & ((1u << bit) - 1u)));
-    return upper_half ? below + uint(bitCount(imageLoad(nodes, words).x)) : below;
+    return first_node + (n.z * grid + n.y) * grid + n.x;
 }
 
 #ifdef CELLS_BLOCKS
@@ -92,7 +89,7 @@ void mark_block(ivec3 cell)
 {
     uvec3 b = uvec3(cell);
     uint bit = 1u << ((b.x >> 2 & 3u) | (b.y & 12u) | (b.z & 4u) << 2);
-    int word = node_of(cell) + int(b.z >> 3 & 1u);
+    int word = 4 * node_of(cell) + int(b.z >> 3 & 1u);
     if ((imageLoad(nodes, word).x & bit) == 0u)
         imageAtomicOr(nodes, word, bit);
 }
@@ -104,19 +101,32 @@ uint bit_of(uvec3 part)
     return (part.x & 3u) | (part.y & 3u) << 2 | (part.z & 1u) << 4;
 }
 
-// Its first word.
+uvec3 words_at(int at)
+{
+#ifdef CELLS_MARK
+    return uvec3(imageLoad(nodes, 4 * at).x, imageLoad(nodes, 4 * at + 1).x, imageLoad(nodes, 4 * at + 2).x);
+#else
+    return texelFetch(nodes_, at).xyz;
+#endif
+}
+
+// Where what a part of a node or a block has lies: behind that of all parts that have something and come before it.
+uint place_of(uvec3 words, uvec3 part)
+{
+    uint below = (1u << bit_of(part)) - 1u;
+    bool upper_half = (part.z & 2u) != 0u;
+    return words.z + uint(bitCount((upper_half ? words.y : words.x) & below)) +
+           (upper_half ? uint(bitCount(words.x)) : 0u);
+}
+
 int block_of(ivec3 cell)
 {
-    uvec3 b = uvec3(cell);
-    int node = node_of(cell);
-    return int(4u * (imageLoad(nodes, node + 2).x + rank_of(node, (b.z & 8u) != 0u, bit_of(b >> 2))));
+    return int(place_of(words_at(node_of(cell)), uvec3(cell) >> 2));
 }
 
 uint entry_of(ivec3 cell)
 {
-    uvec3 b = uvec3(cell);
-    int block = block_of(cell);
-    return imageLoad(nodes, block + 2).x + rank_of(block, (b.z & 2u) != 0u, bit_of(b));
+    return place_of(words_at(block_of(cell)), uvec3(cell));
 }
 
 #endif
@@ -169,7 +179,7 @@ void handle(uint item)
     for (int k = s.first; k <= s.last; k++) {
         ivec3 cell = cell_of(s, k);
         uint bit = 1u << bit_of(uvec3(cell)), number = uint(k - s.first);
-        if ((imageAtomicOr(nodes, block_of(cell) + (cell.z >> 1 & 1), bit) & bit) == 0u)
+        if ((imageAtomicOr(nodes, 4 * block_of(cell) + (cell.z >> 1 & 1), bit) & bit) == 0u)
             s.place |= 1u << (LIST_FIRST_SHIFT + number);
         else
             imageStore(listed, int(sample_count + atomicAdd(counts.further_count, 1u)),

@@ -21,7 +21,7 @@ struct cell_walk {
     ivec3 cell;
     float s, s_end;
     float s_least, s_limit; // between which a crossing counts
-    float scale;            // s of a distance
+    float begin, scale; // cube_ray's
     int cube, grid, first_node, octant_shift;
     int at, shift; // texel of what it is in; log2 of the size of its parts: 2 a node, 0 a block
 };
@@ -58,9 +58,10 @@ void begin_cells(trace_ray r, float end, int pass, out cell_walk w)
     w.d = abs(c.d);
     w.inverse = 1.0 / w.d;
     w.scale = c.scale;
-    w.s_least = r.t_min * c.scale;
+    w.begin = c.begin;
+    w.s_least = r.t_min * c.scale - w.begin;
     w.s = w.s_least;
-    w.s_limit = min(end * c.scale, 1e30);
+    w.s_limit = min(end * c.scale, 1e30) - w.begin;
     w.s_end = w.s_limit;
     float cells = float(w.grid << LDC_NODE_SHIFT);
     vec3 lower = ldc_lower[CUBE(w.cube)], upper = ldc_upper[CUBE(w.cube)];
@@ -123,6 +124,8 @@ void step_on(inout cell_walk w, inout found_cell found, bvec3 down)
             bool leaves = (others.x | others.y | others.z) != 0;
             w.cell = next;
             w.s = w.s < s_out ? s_out : w.s;
+            // Cells only go up, so whatever is rounded the walk ends.
+            w.s = any(greaterThanEqual(next, ivec3(w.grid << LDC_NODE_SHIFT))) ? 1e30 : w.s;
             w.shift = leaves ? 2 : w.shift;
             w.at = leaves ? node_at(w, next) : w.at;
         }
@@ -152,8 +155,8 @@ void test_cell_sample(inout cell_walk w, int axis, ivec3 cell, uint sample_index
     if (cross_sample(in_image(w.o, axis), in_image(w.d, axis), w.cube, in_image(vec3(cell), axis).xy, turned,
                      in_image(normal, axis), s, side) &&
         s > w.s_least && s < w.s_limit) {
-        offer_sample(found, sample_index, s / w.scale, side, 1.0 / w.scale);
-        w.s_limit = found.end * w.scale;
+        offer_sample(found, sample_index, (s + w.begin) / w.scale, side, 1.0 / w.scale);
+        w.s_limit = found.end * w.scale - w.begin;
     }
 }
 

@@ -46,9 +46,14 @@ uniform float ldc_tolerance[LDC_CUBES]; // cells
 // no quotient is infinite.
 const float LDC_LEAST_SLOPE = 1e-8;
 
+// From so far away, in cells, floats round places by more than LDC_ROUNDING: a ray that comes from farther is taken to
+// begin nearer, or it would step and cross a little beside itself.
+const float LDC_FAR = 16384.0;
+
 struct cube_ray {
     vec3 o, d;
     float scale; // s of a distance; 0: the direction is no direction, and the ray goes nowhere
+    float begin; // s of the ray where it is taken to begin; less than where it comes to the cube by its length or more
 };
 
 vec3 without_zeros(vec3 d)
@@ -66,10 +71,16 @@ cube_ray cube_ray_of(trace_ray r, int cube)
     cube_ray c;
     c.scale = length_ / place.w;
     // Written so that what is no number, or too small or large for its inverse to be one, goes nowhere.
-    bool is_direction = length_ > 1e-30 && length_ < 1e30 && size.x + size.y + size.z < 1e30;
+    vec3 away = abs(r.origin);
+    bool is_direction = length_ > 1e-30 && size.x + size.y + size.z < 1e30 && away.x + away.y + away.z < 1e30;
     c.scale = is_direction ? c.scale : 0.0;
     c.o = (r.origin - place.xyz) / place.w;
     c.d = without_zeros(is_direction ? r.direction / length_ : vec3(1.0, 0.0, 0.0));
+    vec3 ahead = -c.o * c.d;
+    float along = size.x == length_ ? ahead.x : size.y == length_ ? ahead.y : ahead.z;
+    c.begin = along - 2.0 * float(ldc_resolution[CUBE(cube)]);
+    c.begin = c.begin > LDC_FAR ? c.begin : 0.0;
+    c.o += c.begin * c.d;
     return c;
 }
 

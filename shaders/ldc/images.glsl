@@ -23,7 +23,7 @@ struct image_walk {
     vec2 inverse;
     float s, s_end;
     float s_least, s_limit; // between which a crossing counts
-    float scale;   // s of a distance
+    float begin, scale; // cube_ray's
     ivec2 texel;
     int level;
     int cube, axis;
@@ -45,9 +45,10 @@ void begin_image(trace_ray r, float end, int pass, out image_walk w)
     vec3 inverse = 1.0 / w.d;
     w.inverse = inverse.xy;
     w.scale = c.scale;
-    w.s_least = r.t_min * c.scale;
+    w.begin = c.begin;
+    w.s_least = r.t_min * c.scale - w.begin;
     w.s = w.s_least;
-    w.s_limit = min(end * c.scale, 1e30);
+    w.s_limit = min(end * c.scale, 1e30) - w.begin;
     w.s_end = w.s_limit;
     int resolution = ldc_resolution[CUBE(w.cube)];
     float cells = float(resolution);
@@ -149,8 +150,8 @@ void test_sample(inout image_walk w, uint sample_index, float depth, uint normal
     vec3 normal = in_image(direction_from_octahedral(normal_bits), w.axis);
     float s, side;
     if (cross_sample(w.o, w.d, w.cube, vec2(w.texel), depth, normal, s, side) && s > w.s_least && s < w.s_limit) {
-        offer_sample(found, sample_index, s / w.scale, side, 1.0 / w.scale);
-        w.s_limit = found.end * w.scale;
+        offer_sample(found, sample_index, (s + w.begin) / w.scale, side, 1.0 / w.scale);
+        w.s_limit = found.end * w.scale - w.begin;
     }
 }
 

@@ -9,6 +9,10 @@
 #include "ldc/plane.glsl"
 
 #ifdef LDC_FROM_TEXELS
+// Of a texel's samples: of more, as far as a plane may go. Software GL ends an invocation's loops after 65,535 rounds,
+// and the largest block has 1,024 texels.
+const uint PLANES_MAX = 32u;
+
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer ldc_texels;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer ldc_geometry;
 #else
@@ -23,9 +27,12 @@ vec2 range_below(uint axis, uvec2 place)
 {
     int at = int(first_below + axis * image_below + place.y * row_below + place.x);
 #ifdef LDC_FROM_TEXELS
-    uvec2 words = texelFetch(ldc_texels, at).xy;
+    uvec4 words = texelFetch(ldc_texels, at);
+    uint count = words.y & LDC_TEXEL_COUNT_MASK;
+    if (count > PLANES_MAX)
+        return uintBitsToFloat(words.zw) + vec2(-LDC_SPAN - LDC_ROUNDING, LDC_SPAN + LDC_ROUNDING);
     vec2 range = vec2(LDC_NO_DEPTH, -LDC_NO_DEPTH);
-    for (uint i = words.x; i < words.x + (words.y & LDC_TEXEL_COUNT_MASK); i++) {
+    for (uint i = words.x; i < words.x + count; i++) {
         uvec2 g = texelFetch(ldc_geometry, int(i)).xy;
         float depth = uintBitsToFloat(g.x), reach = plane_reach(g.y, int(axis));
         range = vec2(min(range.x, depth - reach), max(range.y, depth + reach));

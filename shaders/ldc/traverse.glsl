@@ -4,7 +4,8 @@
 //
 // The host (trace/ldc_trace.c) sets, besides the defines of trace.comp, those that the files included here name.
 //
-// RAYS_TOGETHER rays are one invocation's, one behind the other: fewer invocations, each with more to do.
+// RAYS_TOGETHER rays are one invocation's, one behind the other: fewer invocations, each with more to do. (Rays that go on
+// with the next as soon as they are done, each at its own, were slower still: what begins a ray was then run each round.)
 //
 // Define: LDC_CELLS the walk is that of ldc/cells.glsl, else that of ldc/images.glsl.
 #include "ldc/cells.glsl"

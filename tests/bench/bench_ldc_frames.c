@@ -12,6 +12,8 @@
 #include <stdlib.h>
 
 #define STEP_S 0.1 /* of the clip, from run to run */
+/* The first compiles and builds; in the second it is seen what moves, and what stands still is built once more. */
+#define WARM_UPS 2
 
 static const enum stage_id shown[] = {STAGE_UPLOAD, STAGE_PRIMARY, STAGE_TRACE, STAGE_SHADE, STAGE_RESOLVE};
 enum { SHOWN = sizeof shown / sizeof shown[0] };
@@ -58,7 +60,7 @@ static bool render(struct frames *frames, const struct bench_form *form, const s
 static bool run_form(struct frames *frames, unsigned i, struct error *error)
 {
     struct bench_ldc *bench = frames->bench;
-    for (unsigned run = 0; run <= bench->runs; run++) {
+    for (unsigned run = 0; run < WARM_UPS + bench->runs; run++) {
         struct scene_motion motion = {0};
         if (bench->plays && !pose(frames, run, &motion, error))
             return false;
@@ -71,7 +73,7 @@ static bool run_form(struct frames *frames, unsigned i, struct error *error)
             return false;
         frame_result_finish(&frames->last[i]);
         frames->last[i] = result;
-        if (run == 0)
+        if (run < WARM_UPS)
             continue;
         bench_add(&frames->whole[i], frame_ns);
         bench_add(&frames->build[i], stage_times_sum_ns(&result.times, STAGE_BUILD, STAGE_CPU));
@@ -116,7 +118,7 @@ static bool render_truth(struct frames *frames, struct frame_result *truth, stru
     const struct bench_form reference = {.tracer = BENCH_TRACER_REFERENCE};
     struct scene_motion motion = {0};
     const bool plays = frames->bench->plays;
-    const bool done = (!plays || pose(frames, frames->bench->runs, &motion, error)) &&
+    const bool done = (!plays || pose(frames, WARM_UPS + frames->bench->runs - 1, &motion, error)) &&
                       render(frames, &reference, plays ? &motion : NULL, truth, error);
     scene_motion_finish(&motion);
     return done;

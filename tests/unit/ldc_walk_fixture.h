@@ -155,10 +155,7 @@ static inline void add_box(struct ldc_samples *s, const float lower[3], const fl
             p[k][u] = (k == 1 || k == 2) == (side % 2 == 1) ? upper[u] : lower[u];
             p[k][v] = k >= 2 ? upper[v] : lower[v];
         }
-        if (side % 2)
-            add_quad(s, p[0], p[1], p[2], p[3], material);
-        else
-            add_quad(s, p[0], p[1], p[2], p[3], material);
+        add_quad(s, p[0], p[1], p[2], p[3], material);
     }
 }
 

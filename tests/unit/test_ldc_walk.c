@@ -241,6 +241,117 @@ static void where_cells_do_not_fit_a_pyramid_is_walked(void **state)
     free(rays);
 }
 
+/* Planes that lean as much to one axis as to another, so close to each other that all pass the same cells: nothing
+ * is lost of them, and nothing is there twice. */
+static void what_shares_cells_is_in_each_of_them_once(void **state)
+{
+    (void)state;
+    const int layers = 12;
+    const float n = 24;
+    struct error error = {0};
+    struct fixture fixture;
+    fixture_init(&fixture, NULL);
+    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    start_samples(s, 24, n, 0, 0, 0);
+    for (int i = 0; i < layers; i++) {
+        /* Where u and v are a texel's middle the depth is nearly a whole number: four cells are passed. */
+        const float c = n + 0.006f * (float)i;
+        const float corners[3][3] = {{c - 4, 2, 2}, {2, c - 4, 2}, {2, 2, c - 4}};
+        ldc_add_triangle(s, corners, 0);
+    }
+    build(&fixture, &(struct tracer_options){.ldc_levels = LDC_LEVELS_CELLS});
+    const struct ldc_cube *cube = &fixture.store.cubes[TRACER_CUBE_STATIC];
+    uint32_t(*entries)[4] = malloc(cube->entry_count * sizeof *entries);
+    uint32_t *times = calloc(s->count, sizeof *times);
+    gpu_buffer_read(device, &fixture.store.entries, 0, entries, cube->entry_count * sizeof *entries);
+    expect_ok(gpu_check(device, "entries", &error), &error);
+    for (uint32_t i = 0; i < cube->entry_count; i++) {
+        const uint32_t sample = entries[i][0] & LDC_ENTRY_SAMPLE_MASK;
+        assert_true(sample < s->count);
+        times[sample]++;
+    }
+    for (size_t i = 0; i < s->count; i++)
+        if (times[i] != 4)
+            fail_msg("sample %zu is in %u cells", i, times[i]);
+    free(entries);
+    free(times);
+    fixture_finish(&fixture);
+}
+
+/* What is small is met by rays that begin millions of its cells away, as those of a large scene meet what moves in
+ * it: a ball has no cracks, and is met where it is, but for what the floats round that tell where the ray begins,
+ * which is up to a quarter of a cell. */
+static void rays_from_afar_meet_what_is_small(void **state)
+{
+    (void)state;
+    const float centre[3] = {0.1f, 0.2f, -0.1f}, radius = 0.8f;
+    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
+    uint64_t seed = 41;
+    struct fixture fixture;
+    fixture_init(&fixture, NULL);
+    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    start_samples(s, 128, 2, -1, -1, -1);
+    add_sphere(s, centre, radius, 100, 0);
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        float o[3], d[3], length = 0;
+        for (int k = 0; k < 3; k++) {
+            o[k] = test_uniform(&seed, -1, 1);
+            length = fmaxf(length, fabsf(o[k]));
+        }
+        for (int k = 0; k < 3; k++) {
+            o[k] *= 4e6f * s->cell / length;
+            d[k] = centre[k] + test_uniform(&seed, -0.4f, 0.4f) - o[k];
+        }
+        rays[i] = ray_from(o, d, 0, FAR);
+    }
+    for (size_t f = 0; f < FORM_COUNT; f++) {
+        build(&fixture, &forms[f].options);
+        trace(&fixture, &forms[f].options, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
+        for (uint32_t i = 0; i < RAY_COUNT; i++) {
+            double from_centre = 0, along = 0;
+            for (int k = 0; k < 3; k++) {
+                const double off = (double)rays[i].origin_t_min[k] +
+                                   (double)hits[i].distance * rays[i].direction_t_max[k] - centre[k];
+                from_centre += off * off;
+                along += off * rays[i].direction_t_max[k];
+            }
+            /* On the side that is turned to the ray. */
+            if (hits[i].distance < 0 || fabs(sqrt(from_centre) - radius) > s->cell || along > 0)
+                fail_msg("%s: ray %u meets it at %g", forms[f].name, i, (double)hits[i].distance);
+        }
+    }
+    free(rays);
+    free(hits);
+    fixture_finish(&fixture);
+}
+
+/* Blocks over more samples than software GL lets a loop go round, and what is last of them is the only thing that
+ * is far. */
+static void blocks_of_many_layers_hold_all_of_them(void **state)
+{
+    (void)state;
+    static const float up[3] = {0, 0, 1};
+    enum { n = 64, layers = 100, rays_along = 8 };
+    struct ray rays[rays_along * rays_along];
+    struct fixture fixture;
+    fixture_init(&fixture, NULL);
+    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    start_samples(s, n, n, 0, 0, 0);
+    for (uint32_t v = 0; v < n; v++)
+        for (uint32_t u = 0; u < n; u++)
+            for (int i = 0; i < layers; i++)
+                ldc_add_sample(s, 2, u, v, (v % 32 < 28 ? 5.0f : 40.0f) + 0.1f * (float)i, up, 0);
+    for (int i = 0; i < rays_along * rays_along; i++) {
+        const float step = (float)n / rays_along;
+        const float o[3] = {step * ((float)(i % rays_along) + 0.4f), step * ((float)(i / rays_along) + 0.9f), 30};
+        const float d[3] = {0.01f, 0.02f, 1};
+        rays[i] = ray_from(o, d, 0, FAR);
+    }
+    expect_like_brute_force(&fixture, rays, rays_along * rays_along, rays_along * 2);
+    fixture_finish(&fixture);
+}
+
 /* Along axes through the middles of texels, along their borders, through corners, and nearly so. */
 static void rays_along_axes_and_borders_cross_samples_as_by_brute_force(void **state)
 {
@@ -333,6 +444,9 @@ static void directions_that_are_none_and_dead_rays_hit_nothing(void **state)
         origin[k] = INFINITY;
         rays[count++] = ray_from(origin, direction, 0, FAR);
     }
+    /* From where a float's step is larger than the cube. */
+    rays[count++] = ray_from((const float[3]){-1e20f, -1e20f, -1e20f}, (const float[3]){1, 0.9f, 1.1f}, 0, FAR);
+    rays[count++] = ray_from((const float[3]){3e9f, 0.1f, 0.2f}, (const float[3]){-1, 0.2f, 0.1f}, 0, FAR);
     rays[count++] = ray_from(middle, right, 1, 1);
     rays[count++] = ray_from(middle, right, 0, -1);
     rays[count++] = ray_from(middle, right, 0, NAN);
@@ -382,6 +496,9 @@ int main(void)
         cmocka_unit_test(rays_cross_samples_as_by_brute_force),
         cmocka_unit_test(two_cubes_are_walked_as_one),
         cmocka_unit_test(where_cells_do_not_fit_a_pyramid_is_walked),
+        cmocka_unit_test(what_shares_cells_is_in_each_of_them_once),
+        cmocka_unit_test(rays_from_afar_meet_what_is_small),
+        cmocka_unit_test(blocks_of_many_layers_hold_all_of_them),
         cmocka_unit_test(rays_along_axes_and_borders_cross_samples_as_by_brute_force),
         cmocka_unit_test(what_lies_in_the_sides_of_the_cube_is_hit),
         cmocka_unit_test(directions_that_are_none_and_dead_rays_hit_nothing),
