@@ -109,7 +109,7 @@ static bool can_list(struct ldc_task *task)
 {
     struct ldc_builder *builder = task->builder;
     uint64_t texels_max = builder->device->facts.texture_buffer_texels_max, wanted = task->counts.places;
-    if (task->counts.layers_needed > LISTED_LAYERS_MAX ||
+    if (task->counts.fragments_wraps > 0 || task->counts.layers_needed > LISTED_LAYERS_MAX ||
         (uint64_t)task->slots * task->texel_count + wanted > texels_max)
         return false;
     if (wanted <= builder->fragments_max)

@@ -34,7 +34,8 @@ void main()
     }
     if (sum == 0u)
         return;
-    atomicAdd(build.fragments, sum);
+    if (atomicAdd(build.fragments, sum) > 0xffffffffu - sum)
+        atomicAdd(build.fragments_wraps, 1u);
     atomicAdd(build.samples_max, kept);
     atomicAdd(build.quads_max, quads);
     if (most > build.layers_needed) // rarely; the atomic is dear

@@ -13,8 +13,9 @@ struct ldc_build_counts {
     uint places;        /* for fragments without a slot, of those that are kept */
     uint samples_max, quads_max; /* if no two fragments coincide */
     uint samples, quads;         /* kept: coincident ones are one */
-    uint samples_lost; /* fragments behind the farthest sample that could be kept, of texels that have more */
-    uint pad0, pad1;
+    uint samples_lost;    /* fragments behind the farthest sample that could be kept, of texels that have more */
+    uint fragments_wraps; /* times that `fragments` came to 2^32: it and what is counted beside it say nothing */
+    uint pad0;
 };
 SHARED_SIZE(ldc_build_counts, 48)
 

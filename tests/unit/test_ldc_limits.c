@@ -5,6 +5,7 @@
 #include "ldc_fixture.h"
 
 #include "gpu/registry.h"
+#include "trace/ldc_build_state.h"
 
 #define RESOLUTION 32u
 
@@ -187,6 +188,41 @@ static void the_device_limits_the_layers(void **state)
     fixture_finish(&fixture);
 }
 
+/* More fragments than 32 bits count are told from few, or lists would take them. No device draws as many in the time
+ * that a test has: texels say that they have them. */
+static void more_fragments_than_can_be_counted_are_noticed(void **state)
+{
+    (void)state;
+    enum { texels = 3 * RESOLUTION * RESOLUTION };
+    uint32_t *counts = malloc(texels * sizeof(*counts));
+    struct error error = {0};
+    struct fixture fixture;
+    fixture_init(&fixture, stack_scene(1, FRONT_TO_BACK, false));
+    struct ldc_builder *builder = fixture.builder;
+    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
+    struct ldc_task task = {
+        .builder = builder,
+        .store = &fixture.store,
+        .cube = &fixture.store.cubes[TRACER_CUBE_STATIC],
+        .scene = &fixture.gpu,
+        .options = &fixture.options,
+        .texel_count = texels,
+    };
+    for (int i = 0; i < 2; i++) {
+        const uint32_t each = i == 0 ? 200 : 1u << 24; /* 2^24 * texels is 12 times 2^32 */
+        for (uint32_t k = 0; k < texels; k++)
+            counts[k] = each;
+        expect_ok(gpu_buffer_upload(device, &builder->counts, counts, texels * sizeof(*counts), &error), &error);
+        expect_ok(gpu_buffer_reserve(device, &builder->places, texels * sizeof(uint32_t), &error), &error);
+        expect_ok(gpu_buffer_reserve(device, &builder->occupied, texels * sizeof(uint32_t), &error), &error);
+        expect_ok(gpu_buffer_reserve(device, &builder->build, sizeof(task.counts), &error), &error);
+        expect_ok(ldc_give_places(&task, UINT32_MAX, &error), &error);
+        assert_int_equal(task.counts.fragments_wraps, ((uint64_t)each * texels) >> 32);
+    }
+    free(counts);
+    fixture_finish(&fixture);
+}
+
 /* The first half of the instances stand still, the others move. */
 static void cubes_leave_each_other_alone(void **state)
 {
@@ -312,6 +348,7 @@ int main(void)
         cmocka_unit_test(the_nearest_layers_are_kept),
         cmocka_unit_test(memory_limits_the_layers),
         cmocka_unit_test(the_device_limits_the_layers),
+        cmocka_unit_test(more_fragments_than_can_be_counted_are_noticed),
         cmocka_unit_test(cubes_leave_each_other_alone),
         cmocka_unit_test(a_cube_may_be_empty),
         cmocka_unit_test(what_lies_on_a_side_is_there),
