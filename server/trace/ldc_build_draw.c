@@ -43,6 +43,7 @@ static bool list_drawn(struct ldc_builder *builder, const struct scene_gpu *scen
                        uint32_t count, struct drawn *drawn, struct draw_command *commands, struct error *error)
 {
     uint64_t id = 0;
+    uint32_t command_count = 0;
     for (uint32_t i = 0; i < count; i++) {
         const struct instance *instance = &scene->instances[instances[i]];
         const struct geometry *geometry = &scene->geometries[instance->geometry].device;
@@ -52,11 +53,16 @@ static bool list_drawn(struct ldc_builder *builder, const struct scene_gpu *scen
             return error_set(error, ERROR_LIMIT, NULL, "more primitives than a layered depth cube can number");
         drawn[i] = (struct drawn){(uint32_t)id, (uint32_t)id - geometry->first_primitive, instances[i],
                                   flags_of(instance, geometry)};
-        commands[i] = (struct draw_command){geometry->primitive_count, 1, geometry->first_primitive, i};
         id += geometry->primitive_count;
+        if (i > 0 && instance->geometry == scene->instances[instances[i - 1]].geometry) {
+            commands[command_count - 1].instance_count++;
+            continue;
+        }
         if (builder->run_count == 0 || builder->runs[builder->run_count - 1].sort != sort)
-            builder->runs[builder->run_count++] = (struct ldc_run){sort, i, 0};
+            builder->runs[builder->run_count++] = (struct ldc_run){sort, command_count, 0};
         builder->runs[builder->run_count - 1].count++;
+        commands[command_count++] =
+            (struct draw_command){geometry->primitive_count, 1, geometry->first_primitive, i};
     }
     return true;
 }
