@@ -188,8 +188,8 @@ static void the_device_limits_the_layers(void **state)
     fixture_finish(&fixture);
 }
 
-/* More fragments than 32 bits count are told from few, or lists would take them. No device draws as many in the time
- * that a test has: texels say that they have them. */
+/* More fragments than 32 bits count are told from few, or lists would take them. No device draws as many in the
+ * time that a test has: texels say that they have them. */
 static void more_fragments_than_can_be_counted_are_noticed(void **state)
 {
     (void)state;
