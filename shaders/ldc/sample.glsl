@@ -62,8 +62,15 @@ placed_triangle place_triangle(point p)
 
 #if !defined HAS_TEXTURES && !defined HAS_BUMP
 // What surface_triangle() of common/surface.glsl finds, with half of its fetches: no texture coordinates, no tangent.
-hit plain_triangle(point p)
+struct plain_surface {
+    vec3 geometric, shading;
+    uint material_index;
+    vec4 colour;
+};
+
+plain_surface plain_triangle(point p)
 {
+    plain_surface found;
     placed_triangle t = place_triangle(p);
     float side = (p.flags & LDC_DRAWN_MIRRORED) != 0u ? -1.0 : 1.0;
     vec3 geometric = normalize(cross(t.e1, t.e2)) * side, shading = geometric;
@@ -81,15 +88,19 @@ hit plain_triangle(point p)
         if (squared > 0.0)
             shading = interpolated * inversesqrt(squared);
     }
-    vec4 colour = vec4(1.0);
+    found.geometric = geometric;
+    found.shading = same_hemisphere(shading, geometric);
+    found.material_index = t.vertices.w;
+    found.colour = vec4(1.0);
 #ifdef HAS_COLOURS
     if ((p.flags & LDC_DRAWN_COLOURS) != 0u)
-        colour = triangle_colour(t.vertices, GEOMETRY_HAS_COLOURS, weights);
+        found.colour = unpackUnorm4x8(packUnorm4x8(triangle_colour(t.vertices, GEOMETRY_HAS_COLOURS, weights)));
 #endif
-    return finish_hit(t.vertices.w, 0.0, vec3(0.0), geometric, shading, vec4(0.0), vec4(0.0), colour);
+    return found;
 }
 #endif
 
+#if defined HAS_TEXTURES || defined HAS_BUMP || defined HAS_SPHERES
 hit hit_at(point p, vec3 origin, vec3 direction)
 {
 #ifdef HAS_SPHERES
@@ -99,9 +110,12 @@ hit hit_at(point p, vec3 origin, vec3 direction)
 #if defined HAS_TEXTURES || defined HAS_BUMP
     return surface_triangle(p.instance_index, p.primitive, place_triangle(p).barycentrics, 0.0, direction, 0.0);
 #else
-    return plain_triangle(p);
+    plain_surface found = plain_triangle(p);
+    return finish_hit(found.material_index, 0.0, vec3(0.0), found.geometric, found.shading, vec4(0.0), vec4(0.0),
+                      found.colour);
 #endif
 }
+#endif
 
 uvec4 words_of(surface s, vec4 colour, uint material_index)
 {
@@ -123,18 +137,18 @@ uvec4 words_of(surface s, vec4 colour, uint material_index)
 
 void describe(point p, out uvec2 geometry_words, out uvec4 surface_words)
 {
+    surface s;
+    s.emission = vec3(1.0);
+    s.metallic = s.roughness = s.transmission = s.occlusion = 1.0;
+#if defined HAS_TEXTURES || defined HAS_BUMP || defined HAS_SPHERES
     vec3 origin = vec3(0.0), direction = vec3(0.0);
     origin[p.u] = p.middle.x * cell_world;
     origin[p.v] = p.middle.y * cell_world;
     origin += lower_world;
     direction[p.axis] = 1.0;
     hit h = hit_at(p, origin, direction);
-
-    surface s;
     s.geometric = unpack_unit(h.normal_geometric);
     s.normal = unpack_unit(h.normal_shading);
-    s.emission = vec3(1.0);
-    s.metallic = s.roughness = s.transmission = s.occlusion = 1.0;
     vec4 colour = unpackUnorm4x8(h.colour);
     material m = materials[h.material & HIT_MATERIAL_MASK];
     vec4 uv01 = vec4(h.u0, h.v0, h.u1, h.v1);
@@ -147,4 +161,10 @@ void describe(point p, out uvec2 geometry_words, out uvec4 surface_words)
 #endif
     geometry_words = uvec2(floatBitsToUint(p.depth_cells), h.normal_geometric);
     surface_words = words_of(s, colour, h.material);
+#else // nothing is packed to be unpacked
+    plain_surface found = plain_triangle(p);
+    s.normal = found.shading;
+    geometry_words = uvec2(floatBitsToUint(p.depth_cells), pack_unit(found.geometric));
+    surface_words = words_of(s, found.colour, found.material_index);
+#endif
 }

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The two ways to build a layered depth cube side by side: one pass with lists, and depth peeling.
- * Usage: bench_ldc_build [-r RESOLUTION] [-n RUNS] [MODEL ..]     (default: 512, 5)
- * First stacks of 8 and of 48 bumpy sheets that fill one image, then each model. Of RUNS builds of either kind, by
- * turns, after some that compile and allocate, the median is told. Exit status 1 if the two have not as many
- * samples, or GL reports an error. */
+ * Usage: bench_ldc_build [-r RESOLUTION] [-n RUNS] [-s SHEETS] [MODEL ..]     (default: 512, 5)
+ * First stacks of 8 and of 48 bumpy sheets that fill one image (-s: one of them, or none), then each model. Of
+ * RUNS builds of either kind, by turns, after some that compile and allocate, the median is told. Exit status 1 if
+ * the two have not as many samples, or GL reports an error. */
 #include "tests/accuracy/test_scenes.h"
 #include "tests/bench/bench_stats.h"
 #include "tests/bench/load_model.h"
