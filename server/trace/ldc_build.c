@@ -156,8 +156,12 @@ static bool build(struct ldc_task *task, struct error *error)
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
+    uint64_t texels = (uint64_t)task->cube->first_texel + task->texel_count;
+    if (texels > device->facts.texture_buffer_texels_max)
+        return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
+                         "%llu texels are more than the device takes", (unsigned long long)texels);
     return ldc_store_grow(device, &task->store->texels, (uint64_t)task->cube->first_texel * LDC_TEXEL_BYTES,
-                          ((uint64_t)task->cube->first_texel + task->texel_count) * LDC_TEXEL_BYTES, error) &&
+                          texels * LDC_TEXEL_BYTES, error) &&
            gpu_buffer_reserve(device, &builder->counts, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->places, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error) &&

@@ -54,7 +54,7 @@ struct tracer_cube {
     uint32_t layers_needed; /* greatest depth complexity of an image's texels */
     uint32_t layers_kept; /* fewer than are needed: there was no room for more, and the farther ones are missing */
     uint64_t samples;
-    uint64_t samples_lost; /* of those that are missing */
+    uint64_t samples_lost; /* of those that are missing; at most, as it is not known which coincide */
     bool rebuilt;          /* by the last update */
 };
 

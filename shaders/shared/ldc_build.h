@@ -13,7 +13,8 @@ struct ldc_build_counts {
     uint places;        /* for fragments without a slot, of those that are kept */
     uint samples_max, quads_max; /* if no two fragments coincide */
     uint samples, quads;         /* kept: coincident ones are one */
-    uint samples_lost;    /* fragments behind the farthest sample that could be kept, of texels that have more */
+    uint samples_lost;    /* fragments beyond the samples of texels that have as many as may be kept; those that
+                             coincide with one that is kept are among them */
     uint fragments_wraps; /* times that `fragments` came to 2^32: it and what is counted beside it say nothing */
     uint pad0;
 };

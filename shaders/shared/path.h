@@ -20,9 +20,8 @@ struct path {
 };
 SHARED_SIZE(path, 32)
 #define PATH_BOUNCES_MASK 0xffu
-#define PATH_ROUGHNESS_SHIFT                                                                                      \
-    16u                      /* bits 16..31: distributed: of what it was mirrored and refracted by, 65535: 1      \
-                              */
+/* Bits 16..31: distributed: of what it was mirrored and refracted by, 65535: 1. */
+#define PATH_ROUGHNESS_SHIFT 16u
 #define PATH_STRAIGHT 0x100u /* nothing but alpha lies between it and the eye: counts for the picture's alpha */
 
 /* A ray of the next wave at its parent's place, before it is moved to its own. */

@@ -188,8 +188,31 @@ static void the_device_limits_the_layers(void **state)
     fixture_finish(&fixture);
 }
 
-/* More fragments than 32 bits count are told from few, or lists would take them. No device draws as many in the time
- * that a test has: texels say that they have them. */
+/* Images of both cubes lie in one buffer, and each device has a size beyond which it reads nothing of one. */
+static void images_that_a_device_cannot_read_are_refused(void **state)
+{
+    (void)state;
+    const uint64_t texels_max = device->facts.texture_buffer_texels_max;
+    struct error error = {0};
+    struct fixture fixture;
+    fixture_init(&fixture, stack_scene(3, FRONT_TO_BACK, false));
+    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
+    build(&fixture, TRACER_CUBE_STATIC, fixture.instances, 1);
+    device->facts.texture_buffer_texels_max = 2 * 3 * RESOLUTION * RESOLUTION;
+    place(&fixture, TRACER_CUBE_DYNAMIC, RESOLUTION);
+    build(&fixture, TRACER_CUBE_DYNAMIC, fixture.instances, 1);
+    place(&fixture, TRACER_CUBE_DYNAMIC, RESOLUTION + 1);
+    assert_false(ldc_build(fixture.builder, &fixture.store, TRACER_CUBE_DYNAMIC, &fixture.gpu, fixture.instances,
+                           1, &fixture.options, &error));
+    device->facts.texture_buffer_texels_max = texels_max;
+    assert_int_equal(error.kind, ERROR_LIMIT);
+    assert_string_equal(error.field, "options.ldc_resolution");
+    assert_int_equal(fixture.store.cubes[TRACER_CUBE_DYNAMIC].resolution, 0);
+    fixture_finish(&fixture);
+}
+
+/* More fragments than 32 bits count are told from few, or lists would take them. No device draws as many in the
+ * time that a test has: texels say that they have them. */
 static void more_fragments_than_can_be_counted_are_noticed(void **state)
 {
     (void)state;
@@ -348,6 +371,7 @@ int main(void)
         cmocka_unit_test(the_nearest_layers_are_kept),
         cmocka_unit_test(memory_limits_the_layers),
         cmocka_unit_test(the_device_limits_the_layers),
+        cmocka_unit_test(images_that_a_device_cannot_read_are_refused),
         cmocka_unit_test(more_fragments_than_can_be_counted_are_noticed),
         cmocka_unit_test(cubes_leave_each_other_alone),
         cmocka_unit_test(a_cube_may_be_empty),
