@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "config.h"
 
+#include "base/host.h"
 #include "base/log.h"
 
 #include <ctype.h>
@@ -10,7 +11,6 @@
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #define KIB UINT64_C(1024)
 #define MIB (1024 * KIB)
@@ -61,7 +61,7 @@ static const struct option options[] = {
     {"memory", "frames", OPTION_BYTES, AT(limits.frame_bytes), "50%", MIB, 16 * TIB, "bytes",
      "Host memory that the frames of all jobs may take; a job that may need more has to wait for others to end"},
     {"memory", "device", OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
-     "Device memory; 0: 70 % of what the device tells it has"},
+     "Device memory; 0: 70 % of what the device tells it has, of the host's for software GL"},
     {"memory", "ldc", OPTION_BYTES, AT(limits.ldc_bytes), "0", 0, 16 * TIB, "bytes",
      "The part of it that the samples of one layered depth cube may take, in whole MiB; of more the nearest layers "
      "are kept, and the frame says so. 0: no limit of its own"},
@@ -129,12 +129,6 @@ static bool parse_bool(const char *text, bool *value)
 {
     *value = strcmp(text, "yes") == 0 || strcmp(text, "true") == 0 || strcmp(text, "1") == 0;
     return *value || strcmp(text, "no") == 0 || strcmp(text, "false") == 0 || strcmp(text, "0") == 0;
-}
-
-static uint64_t host_memory_bytes(void)
-{
-    long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
-    return pages > 0 && page_bytes > 0 ? (uint64_t)pages * (uint64_t)page_bytes : 8 * GIB;
 }
 
 /* "16M", "25%" (of the host's memory, for bytes), "1024" */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/device.h"
 
+#include "base/host.h"
 #include "base/log.h"
 #include "gpu/debug.h"
 #include "gpu/egl.h"
@@ -91,6 +92,8 @@ static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool 
     };
     if (epoxy_has_gl_extension("GL_NVX_gpu_memory_info"))
         facts->memory_bytes = get_integer(GL_GPU_MEMORY_INFO_TOTAL_AVAILABLE_MEMORY_NVX) * 1024;
+    else if (software)
+        facts->memory_bytes = host_memory_bytes();
 }
 
 /* What the shaders use beyond what every OpenGL 4.5 has; tests/tools/check_shaders.py holds them to it. */

@@ -30,7 +30,7 @@ struct gpu_facts {
     uint32_t work_groups_max;  /* on x; more is a GL error */
     uint32_t texture_size_max; /* texels along an edge of a 2D texture */
     uint32_t texture_layers_max;
-    uint64_t memory_bytes; /* device memory, 0: the driver does not tell */
+    uint64_t memory_bytes; /* device memory, of software GL the host's; 0: the driver does not tell */
 };
 
 struct gpu_device {

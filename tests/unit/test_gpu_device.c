@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Device, buffers, textures, programs and timers on whatever OpenGL there is. */
 #include "base/clock.h"
+#include "base/host.h"
 #include "base/log.h"
 #include "gpu/buffer.h"
 #include "gpu/device.h"
@@ -152,6 +153,15 @@ static void mapped_memory_reaches_the_buffer(void **state)
     for (uint32_t i = 0; i < 1000; i++)
         assert_int_equal(back[i], i * i);
     gpu_buffer_finish(device, &buffer);
+}
+
+/* No device is without a limit where one is known: software GL shares the host's memory with all else. */
+static void memory_is_limited_to_what_there_is(void **state)
+{
+    (void)state;
+    if (device->facts.software)
+        assert_int_equal(device->facts.memory_bytes, host_memory_bytes());
+    assert_int_equal(device->memory_limit_bytes, device->facts.memory_bytes);
 }
 
 static void memory_beyond_the_limit_is_refused_before_the_driver_is_asked(void **state)
@@ -389,6 +399,7 @@ int main(void)
         cmocka_unit_test(a_lost_context_is_why_whatever_fails_after_it),
         cmocka_unit_test(a_buffer_keeps_what_is_written_and_counts_its_memory),
         cmocka_unit_test(mapped_memory_reaches_the_buffer),
+        cmocka_unit_test(memory_is_limited_to_what_there_is),
         cmocka_unit_test(memory_beyond_the_limit_is_refused_before_the_driver_is_asked),
         cmocka_unit_test(textures_have_the_formats_of_the_table_and_no_others),
         cmocka_unit_test(an_empty_buffer_is_bound_as_zeros),
