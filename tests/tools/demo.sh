@@ -58,5 +58,7 @@ cp conf/examples/shot.json "$private/scenes/shot.json"
 echo "--- $out/lens.png, the clip at 0.7 s through a wide open lens, in focus on the nearest pot"
 "$bin/farlight" render "$carousel" --environment "$dusk" --server "$server" --clip ride --time 0.7 --size 640x360 \
     --samples 16 --aperture 0.3 --focus 7.4 --timings -o "$out/lens.png"
+echo "--- $out/ldc.png, the first scene by layered depth cubes beside an exact tracer, and where they differ"
+"$bin/farlight" compare "$scene" --environment "$sky" --server "$server" --size 480x270 --tracers ldc,bvh -o "$out/ldc.png"
 echo "--- the daemon, afterwards"
 "$bin/farlight" stats --server "$server"
