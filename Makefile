@@ -173,7 +173,7 @@ TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) $(EMBREE
 $(UNIT_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 # Programs of the benchmark; the rest of its folder is what they share. They hold us against Embree itself.
-BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_changes bench_ldc bench_ldc_build bench_parallel bench_tracers)
+BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_changes bench_ldc bench_parallel bench_tracers)
 $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -lembree3 -o $@
 MODEL_OBJ := $(B)/tests/bench/load_model.o
@@ -182,8 +182,7 @@ $(B)/tests/unit/test_load_model: $(MODEL_OBJ)
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
 $(B)/tests/bench/bench_changes: $(B)/tests/bench/bench_stats.o
-$(B)/tests/bench/bench_ldc_build: $(MODEL_OBJ) $(B)/tests/bench/bench_stats.o
-$(B)/tests/bench/bench_ldc: $(CONTEST_OBJ) $(call obj,$(addprefix tests/bench/bench_,ldc_frames.c ldc_rays.c options.c))
+$(B)/tests/bench/bench_ldc: $(CONTEST_OBJ) $(call obj,$(addprefix tests/bench/bench_,ldc_frames.c ldc_rays.c ldc_samples.c options.c))
 $(B)/tests/bench/bench_parallel: $(CONTEST_OBJ)
 $(B)/tests/bench/bench_bvh: $(MODEL_OBJ) $(B)/tests/bench/bench_scene.o $(B)/tests/bench/bench_sheets.o $(B)/tests/bench/bench_waves.o
 $(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3

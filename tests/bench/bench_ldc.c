@@ -13,13 +13,14 @@
 #include <string.h>
 
 static const char usage[] =
-    "usage: bench_ldc builds|waves|frames  --model FILE | --family TRIANGLES | --sheets N  --form FORM ..  "
-    "[options]\n"
-    "  builds: what making a structure takes; waves: rays of them, and how far answers are from the reference;\n"
+    "usage: bench_ldc builds|samples|waves|frames  --model FILE | --family TRIANGLES | --sheets N\n"
+    "                 --form FORM .. [options]\n"
+    "  builds: what making a structure takes; samples: making those of ldc, and not what leads over emptiness;\n"
+    "  waves: rays of them, and how far answers are from the reference;\n"
     "  frames: whole pictures, and how far they are from the reference's\n"
     "  --form TRACER[:KEY=VALUE,..]   bvh, reference or ldc; of ldc: resolution, block, build (auto peel lists),\n"
-    "                        levels (auto blocks pyramid cells), images (overlap one), tolerance (metres), rays, "
-    "layers (together)\n"
+    "                        levels (auto blocks pyramid cells), images (overlap one), tolerance (metres), rays,\n"
+    "                        layers (together)\n"
     "  --size WxH            multiples of 8; default 512x512\n"
     "  --eye X,Y,Z --look-at X,Y,Z [--up X,Y,Z] [--fov DEGREES]   else the model's first camera, or one that sees "
     "all\n"
@@ -255,17 +256,17 @@ static void finish(struct bench_ldc *bench)
 
 int main(int argc, char **argv)
 {
-    static json_t *(*const parts[])(struct bench_ldc *, struct error *) = {bench_ldc_builds, bench_ldc_waves,
-                                                                           bench_ldc_frames};
-    static const char *const names[] = {"builds", "waves", "frames"};
+    static json_t *(*const parts[])(struct bench_ldc *, struct error *) = {bench_ldc_builds, bench_ldc_samples,
+                                                                           bench_ldc_waves, bench_ldc_frames};
+    static const char *const names[] = {"builds", "samples", "waves", "frames"};
     struct bench_ldc bench;
     struct error error = {0};
-    unsigned part = 3;
+    unsigned part = 4;
     if (argc == 2 && strcmp(argv[1], "--help") == 0) {
         fputs(usage, stdout);
         return 0;
     }
-    if (argc < 2 || !is_word(argv[1], names, 3, &part) || !parse(&bench, argc - 1, argv + 1)) {
+    if (argc < 2 || !is_word(argv[1], names, 4, &part) || !parse(&bench, argc - 1, argv + 1)) {
         fputs(usage, stderr);
         return 2;
     }

@@ -35,6 +35,7 @@ struct bench_ldc {
 
 /* Each returns an array with an object a form, NULL and *error if it failed. */
 json_t *bench_ldc_builds(struct bench_ldc *bench, struct error *error);
+json_t *bench_ldc_samples(struct bench_ldc *bench, struct error *error);
 json_t *bench_ldc_waves(struct bench_ldc *bench, struct error *error);
 json_t *bench_ldc_frames(struct bench_ldc *bench, struct error *error);
 

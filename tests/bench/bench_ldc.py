@@ -6,7 +6,7 @@ beside `bvh` and `reference`, and in their variants. Its JSON:
   scenes     results of bench_ldc waves: bvh, and ldc at 512, 1024 and 2048
   pictures   how, and results of bench_ldc frames of the meshes that accuracy is wanted of: ldc at 512, 1024 and 2048
   family     results of bench_ldc waves over triangles, at one resolution
-  depths     results of bench_ldc builds: peeling and lists, at depth complexities and of models
+  depths     results of bench_ldc samples: peeling and lists, at depth complexities and of models
   variants   what, and results of bench_ldc waves: levels, images, layers and rays together, tolerance
   wanted     rows as in bench_reach.py
 
@@ -137,11 +137,11 @@ def measure_family(bench):
 def measure_depths(bench, left_out):
     resolution = 64 if bench.tiny else 512
     both = [*ldc(resolution, build=PEEL), *ldc(resolution, build=LISTS)]
-    results = [{"depth": depth, **call(bench, "builds", f"{depth} sheets", 3, "--sheets", depth, *both)}
+    results = [{"depth": depth, **call(bench, "samples", f"{depth} sheets", 3, "--sheets", depth, *both)}
                for depth in PEEL_WANTED]
     both = both if bench.tiny else [*ldc(build=PEEL), *ldc(build=LISTS)]
     for title, model in models(bench, [*CLOSED, *LARGE, ("car", "ldc/legocar.obj"), ("tree", "ldc/oaktree.gltf")], left_out):
-        results.append(call(bench, "builds", title, 3, *model, *both))
+        results.append(call(bench, "samples", title, 3, *model, *both))
     return results
 
 

@@ -125,6 +125,9 @@ def show(data):
         "distance in cells where both hit. Pictures by the Whitted integrator: as the model is, and all of it a mirror.",
         show_accuracy(data["scenes"], data["pictures"]),
         f"Time against triangles at {USUAL}", show_family(data["family"]),
-        "Peeling, as the paper builds, and one pass with lists", show_depths(data["depths"]),
+        "Peeling, as the paper builds, both targets with each layer, and one pass with lists: from triangles to samples, without\n"
+        "what leads over emptiness. Each sample's surface is found where its targets are written: by peeling in every layer for\n"
+        "all fragments that are not rejected, by lists once.",
+        show_depths(data["depths"]),
         f"Variants at {USUAL}", show_variants(data["variants"]),
         show_wanted({"rows": data["wanted"], "gpu": []})))
