@@ -289,7 +289,9 @@ static inline void oracle_init(struct oracle *oracle, const struct oracle_scene 
                 oracle_triangle(oracle, scene, instances[i], k);
     }
     for (size_t i = 0; i < texels; i++)
-        qsort(oracle->texels[i].samples, oracle->texels[i].count, sizeof(struct oracle_sample), oracle_compare);
+        if (oracle->texels[i].count > 1)
+            qsort(oracle->texels[i].samples, oracle->texels[i].count, sizeof(struct oracle_sample),
+                  oracle_compare);
 }
 
 #endif

@@ -154,7 +154,8 @@ static inline bool ldc_upload(struct ldc_samples *s, struct ldc_store *store, un
         cube->first_sample = before->first_sample + before->sample_count;
         cube->first_quad = before->first_quad + before->quad_count;
     }
-    qsort(s->list, s->count, sizeof *s->list, ldc_by_texel);
+    if (s->count > 1)
+        qsort(s->list, s->count, sizeof *s->list, ldc_by_texel);
     const size_t texel_count = 3 * (size_t)s->resolution * s->resolution;
     uint32_t(*texels)[4] = calloc(texel_count, sizeof *texels),
     (*geometry)[2] = malloc((s->count + 1) * sizeof *geometry);
