@@ -55,21 +55,10 @@ static bool same_camera(const struct frame_camera *a, const struct frame_camera 
            a->fov_y == b->fov_y && a->ortho_height == b->ortho_height && a->near == b->near;
 }
 
-static bool same_samples(const struct tracer_options *x, const struct tracer_options *y)
-{
-    return x->ldc_resolution == y->ldc_resolution && x->ldc_block == y->ldc_block &&
-           x->ldc_build == y->ldc_build && x->ldc_levels == y->ldc_levels && x->ldc_images == y->ldc_images &&
-           x->ldc_tolerance == y->ldc_tolerance && x->ldc_rays_together == y->ldc_rays_together &&
-           x->ldc_layers_together == y->ldc_layers_together && x->ldc_layers_max == y->ldc_layers_max &&
-           x->ldc_mebibytes_max == y->ldc_mebibytes_max;
-}
-
 static bool same_tracer(const struct frame_request *a, const struct frame_request *b)
 {
-    const struct tracer_options *x = &a->tracer_options, *y = &b->tracer_options;
-    return a->tracer == b->tracer && x->bvh_bounds == y->bvh_bounds && x->bvh_layout == y->bvh_layout &&
-           x->bvh_rays_together == y->bvh_rays_together && x->reference_rays_a_call == y->reference_rays_a_call &&
-           same_samples(x, y) && a->primary == b->primary && a->compare == b->compare;
+    return a->tracer == b->tracer && tracer_options_same(&a->tracer_options, &b->tracer_options) &&
+           a->primary == b->primary && a->compare == b->compare;
 }
 
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/tracer_set.h"
 
-#include <string.h>
-
 void tracer_set_note(struct tracer_set *set, const struct scene_changes *changes)
 {
     for (int i = 0; i < TRACERS_KEPT; i++) {
@@ -32,7 +30,7 @@ static struct tracer_slot *find_slot(struct tracer_set *set, const struct tracer
 {
     for (int i = 0; i < TRACERS_KEPT; i++)
         if (set->slots[i].tracer && set->slots[i].impl == impl &&
-            memcmp(&set->slots[i].options, options, sizeof(*options)) == 0)
+            tracer_options_same(&set->slots[i].options, options))
             return &set->slots[i];
     return NULL;
 }

@@ -3,6 +3,7 @@
  *
  * Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary Effects. 2007. */
 #include "gpu/timer.h"
+#include "shared/ldc.h"
 #include "trace/ldc_build.h"
 #include "trace/ldc_levels.h"
 #include "trace/ldc_parts.h"
@@ -18,7 +19,6 @@
 #define RESOLUTION_MIN 16
 #define RESOLUTION_MAX 4096
 #define RESOLUTION_DEFAULT 1024
-#define LAYERS_MAX 255
 
 struct ldc {
     struct tracer base;
@@ -69,9 +69,9 @@ static bool check_options(const struct tracer_options *options, struct error *er
     if (!is_one_of(options->ldc_layers_together, together, sizeof(together) / sizeof(together[0])))
         return error_set(error, ERROR_INVALID, "options.ldc_layers_together",
                          "1 or 4 layers are tested together, not %u", options->ldc_layers_together);
-    if (options->ldc_layers_max > LAYERS_MAX)
-        return error_set(error, ERROR_INVALID, "options.ldc_layers_max", "%u layers; at most %d can be kept",
-                         options->ldc_layers_max, LAYERS_MAX);
+    if (options->ldc_layers_max > LDC_LAYERS_MAX)
+        return error_set(error, ERROR_INVALID, "options.ldc_layers_max", "%u layers; at most %u can be kept",
+                         options->ldc_layers_max, LDC_LAYERS_MAX);
     return true;
 }
 
@@ -150,20 +150,8 @@ static void fill_stats(struct ldc *ldc)
     stats->nodes = 0;
     for (int i = 0; i < TRACER_CUBES_MAX; i++) {
         const struct ldc_cube *cube = &ldc->store.cubes[i];
-        bool rebuilt = stats->cubes[i].rebuilt;
-        stats->cubes[i] = (struct tracer_cube){0};
-        if (cube->resolution == 0)
-            continue;
-        stats->nodes += cube->node_count;
-        stats->cubes[i] = (struct tracer_cube){
-            .resolution = cube->resolution,
-            .cell_metres = cube->cell_world,
-            .layers_needed = cube->layers_needed,
-            .layers_kept = cube->layers_kept,
-            .samples = cube->sample_count,
-            .samples_lost = cube->samples_lost,
-            .rebuilt = rebuilt,
-        };
+        stats->nodes += cube->resolution ? cube->node_count : 0;
+        stats->cubes[i] = ldc_cube_stats(cube, stats->cubes[i].rebuilt);
     }
     stats->device_bytes = ldc_store_bytes(&ldc->store) + ldc_builder_bytes(ldc->builder);
 }

@@ -9,8 +9,6 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-#define LAYERS_MAX 255 /* a texel's count has eight bits */
-
 struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *error)
 {
     struct ldc_builder *builder = calloc(1, sizeof(*builder));
@@ -132,9 +130,8 @@ static void place_cube(struct ldc_store *store, unsigned which)
         store->cubes[behind].resolution = 0;
 }
 
-/* In one pass, which is the faster way wherever it was measured (bench_ldc samples, software GL: 9
- * times at 8 layers, 40 times at 48); by peeling where that is asked for, or the lists of one pass have no room.
- */
+/* In one pass, which is the faster way wherever it was measured (bench_ldc samples, software GL: 9 times at 8
+ * layers, 40 times at 48); by peeling where that is asked for, or the lists of one pass have no room. */
 static bool find_fragments(struct ldc_task *task, struct error *error)
 {
     struct error own = {0};
@@ -184,8 +181,9 @@ bool ldc_build(struct ldc_builder *builder, struct ldc_store *store, unsigned wh
         .scene = scene,
         .options = options,
         .texel_count = 3 * resolution * resolution,
-        .layers_max = options->ldc_layers_max > 0 && options->ldc_layers_max < LAYERS_MAX ? options->ldc_layers_max
-                                                                                          : LAYERS_MAX,
+        .layers_max = options->ldc_layers_max > 0 && options->ldc_layers_max < LDC_LAYERS_MAX
+                          ? options->ldc_layers_max
+                          : LDC_LAYERS_MAX,
     };
     scene_gpu_bind(scene);
     gpu_push_group(builder->device, "build a layered depth cube");

@@ -14,12 +14,13 @@ static bool count_fragments(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
+    uint32_t layers_allowed = task->layers_max;
     task->slots = 0;
     gpu_buffer_clear(device, &builder->counts, 0);
     gpu_buffer_bind_image(device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
     return ldc_draw_bind_plain(task, error) && ldc_draw(task, LDC_PASS_COUNT, NULL, error) &&
-           ldc_give_places(task, task->layers_max, error) && ldc_limit(task, error) &&
-           ldc_give_places(task, task->layers_max, error);
+           ldc_give_places(task, layers_allowed, error) && ldc_limit(task, error) &&
+           (task->layers_max == layers_allowed || ldc_give_places(task, task->layers_max, error));
 }
 
 static bool reserve(struct ldc_task *task, struct error *error)

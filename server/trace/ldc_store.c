@@ -25,6 +25,21 @@ uint64_t ldc_store_bytes(const struct ldc_store *store)
            store->surface.capacity_bytes + store->nodes.capacity_bytes + store->entries.capacity_bytes;
 }
 
+struct tracer_cube ldc_cube_stats(const struct ldc_cube *cube, bool rebuilt)
+{
+    if (cube->resolution == 0)
+        return (struct tracer_cube){0};
+    return (struct tracer_cube){
+        .resolution = cube->resolution,
+        .cell_metres = cube->cell_world,
+        .layers_needed = cube->layers_needed,
+        .layers_kept = cube->layers_kept,
+        .samples = cube->sample_count,
+        .samples_lost = cube->samples_lost,
+        .rebuilt = rebuilt,
+    };
+}
+
 bool ldc_store_grow(struct gpu_device *device, struct gpu_buffer *buffer, uint64_t kept_bytes, uint64_t size_bytes,
                     struct error *error)
 {

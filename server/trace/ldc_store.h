@@ -35,6 +35,8 @@ struct ldc_store {
 void ldc_store_init(struct ldc_store *store, struct gpu_device *device);
 void ldc_store_finish(struct ldc_store *store); /* leaves it empty */
 uint64_t ldc_store_bytes(const struct ldc_store *store);
+/* What is told of a cube; all zero where there is none. */
+struct tracer_cube ldc_cube_stats(const struct ldc_cube *cube, bool rebuilt);
 /* Makes room for size_bytes; the first kept_bytes stay what they are. On failure so does all of the buffer. */
 bool ldc_store_grow(struct gpu_device *device, struct gpu_buffer *buffer, uint64_t kept_bytes, uint64_t size_bytes,
                     struct error *error);

@@ -5,6 +5,7 @@
 #include "shared/ray.h"
 
 #include <stdio.h>
+#include <string.h>
 
 #define NUMBER_REFERENCE 2
 
@@ -18,6 +19,11 @@ static const struct tracer_impl *const tracers[] = {
     [3] = &tracer_ldc_impl,
 };
 #define TRACER_COUNT (sizeof(tracers) / sizeof(tracers[0]))
+
+bool tracer_options_same(const struct tracer_options *a, const struct tracer_options *b)
+{
+    return memcmp(a, b, sizeof(*a)) == 0;
+}
 
 const struct tracer_impl *tracer_impl_by_number(unsigned number)
 {

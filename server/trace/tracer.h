@@ -43,7 +43,11 @@ struct tracer_options {
     uint32_t ldc_count_steps;   /* 1: crossings say what the walk did (shaders/ldc/cube.glsl); for the benchmark */
     uint32_t ldc_layers_max;    /* 0: 255, more cannot be kept; of more the nearest are kept */
     uint32_t ldc_mebibytes_max; /* device memory of one cube's samples; 0: no limit but the device's */
+    /* Words only, without bytes between them: tracer_options_same() compares all. */
 };
+
+/* Whether one tracer serves both, and a picture by either goes on from one by the other. */
+bool tracer_options_same(const struct tracer_options *a, const struct tracer_options *b);
 
 enum { TRACER_CUBE_STATIC, TRACER_CUBE_DYNAMIC, TRACER_CUBES_MAX };
 

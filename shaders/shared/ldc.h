@@ -44,23 +44,30 @@
 #define LDC_NO_DEPTH 1e30f
 #define LDC_NO_DEPTH_BITS 0x7149f2cau
 #define LDC_TEXEL_COUNT_MASK 255u
+#define LDC_LAYERS_MAX LDC_TEXEL_COUNT_MASK
 #define LDC_TEXEL_QUAD_SHIFT 8u
 #define LDC_QUADS_MAX 0x01000000u /* of all cubes of a tracer */
 #define LDC_MATERIAL_MASK 0x00ffffffu
 #define LDC_METALLIC_SHIFT 24u
 #define LDC_TRANSMISSION_SHIFT 28u
 
-/* Cells: which of them a sample's plane passes, of whatever image. In the buffer of nodes, RGBA32UI, first the
- * nodes, row after row, each of 16 x 16 x 16 cells: x, y  which of its 64 blocks of 4 x 4 x 4 cells hold
- * something: bit x + 4 y + 16 z z     of a node with blocks the texel of its first, the others lie behind it in
- * the order of their bits; of one without 8 x 4 bits, for the octants of a direction (bit 0, 1, 2: x, y, z run
- * down): so many nodes along each side of a cube that begins with this one and reaches that way hold nothing
- * either w     while they are made: what is empty along x (2 x 4 bits), then of squares in x and y (4 x 4 bits)
+/* clang-format off */
+/* Cells: which of them a sample's plane passes, of whatever image. In the buffer of nodes, RGBA32UI, first the nodes,
+ * row after row, each of 16 x 16 x 16 cells:
+ *   x, y  which of its 64 blocks of 4 x 4 x 4 cells hold something: bit x + 4 y + 16 z
+ *   z     of a node with blocks: the texel of its first, the others lie behind it in the order of their bits.
+ *         Of one without: 8 x 4 bits, for the octants of a direction (bit 0, 1, 2: x, y, z run down): so many nodes
+ *         along each side of a cube that begins with this one and reaches that way hold nothing either
+ *   w     while they are made: what is empty along x (2 x 4 bits), then of squares in x and y (4 x 4 bits)
  * then the blocks:
  *   x, y  which of its 64 cells a plane passes
- *   z     entry of the first of these, the others lie behind it; w is unused
- * Entries, RGBA32UI: x sample, bits 30 and 31 its image; y a further entry of the same cell, 0: there is none; z,
- * w what the sample has in `geometry`. */
+ *   z     entry of the first of these, the others lie behind it
+ *   w     unused
+ * Entries, RGBA32UI:
+ *   x     sample, bits 30 and 31 its image
+ *   y     a further entry of the same cell, 0: there is none
+ *   z, w  what the sample has in `geometry` */
+/* clang-format on */
 #define LDC_NODE_SHIFT 4
 #define LDC_NODE_EIGHT 0x00330033u /* 2 x 2 x 2 of 32 bits */
 #define LDC_NODE_FAR 15u

@@ -69,16 +69,8 @@ static bool build_all(struct bench_ldc *bench, struct sampled *sampled, const ui
 
 static json_t *describe(const struct bench_form *form, const struct sampled *sampled)
 {
-    const struct ldc_cube *cube = &sampled->store.cubes[TRACER_CUBE_STATIC];
-    const struct tracer_cube cubes[TRACER_CUBES_MAX] = {{
-        .resolution = cube->resolution,
-        .cell_metres = cube->cell_world,
-        .layers_needed = cube->layers_needed,
-        .layers_kept = cube->layers_kept,
-        .samples = cube->sample_count,
-        .samples_lost = cube->samples_lost,
-        .rebuilt = true,
-    }};
+    const struct tracer_cube cubes[TRACER_CUBES_MAX] = {
+        ldc_cube_stats(&sampled->store.cubes[TRACER_CUBE_STATIC], true)};
     return json_pack("{s:s, s:o, s:I, s:o}", "name", form->name, "cubes", bench_cubes_json(cubes), "bytes",
                      (json_int_t)(ldc_store_bytes(&sampled->store) + ldc_builder_bytes(sampled->builder)),
                      "build_ns", bench_times_json(&sampled->runs));
