@@ -271,6 +271,18 @@ struct fl_job_options {
     /* A ray hits where it comes this near to a sample, metres; 0: where it crosses its plane. Not with cells. */
     float ldc_tolerance;
     unsigned ldc_rays_together; /* that walk as one: 1, 4; 0: chosen */
+    /* Of the tracer abuffer. */
+    uint32_t abuffer_resolution; /* texels along a side of the A-buffers, 16 to 4096; 0: 1280 */
+    unsigned abuffer_voxels;     /* along a side of the grid: 16, 32, 64, 128, 256; 0: chosen */
+    enum protocol_abuffer_search abuffer_search;
+    enum protocol_brdf brdf; /* of rough surfaces, for the integrator path */
+    float ao_distance;       /* metres; 0: a tenth of the scene's diagonal */
+    float ao_falloff;        /* as a power of 1 - distance / ao_distance; 0: all counts the same */
+    unsigned ao_rays;        /* for each sample; 0: 8 */
+    float layer_opacity;     /* of opaque surfaces, for the integrator raycast; 0: 0.5 */
+    /* Set of layers, 1 << enum protocol_layer each; 0: the picture alone. Others need format rgba32f, encoding raw or
+     * zstd. */
+    unsigned layers;
 };
 
 /* One picture and what it cost. */
@@ -286,6 +298,7 @@ struct fl_frame {
     float exposure_stops, world_from_view[12], fov_y, ortho_height, time_s;
     float aperture, focus; /* of the lens, metres; focus 0: there is none */
     float shutter_s;       /* how long the shutter was open, seconds */
+    unsigned layers;       /* set of layers that `pixels` has, in the order of their numbers */
     uint64_t primary_rays, shadow_rays, secondary_rays, splits, uploaded_bytes, structure_bytes;
     uint64_t wire_bytes;            /* of the encoded pixels */
     uint64_t receive_ns, decode_ns; /* first byte to last; decoding and checking */
@@ -296,7 +309,7 @@ struct fl_frame {
     struct record_wave_comparison *wave_comparisons; /* ascending by wave and kind of ray; see messages.def */
     size_t cube_count;                               /* 0: the tracer does not sample the scene */
     struct record_layered_cube cubes[PROTOCOL_CUBE_PART_COUNT]; /* static before dynamic; see messages.def */
-    size_t pixels_bytes;                                        /* width * height * 4, 8 or 16 */
+    size_t pixels_bytes;                                        /* layers times width * height * 4, 8 or 16 */
     uint8_t *pixels;                                            /* rows from the top, without gaps, in `format` */
 };
 

@@ -108,6 +108,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->aperture = begin->aperture;
     frame->focus = begin->focus;
     frame->shutter_s = begin->shutter_s;
+    frame->layers = begin->layers;
     frame->wire_bytes = begin->size_bytes;
     frame->pixels_bytes = (size_t)begin->width * begin->height * fl_bytes_per_pixel(begin->format);
     frame->pixels = malloc(frame->pixels_bytes);

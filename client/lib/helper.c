@@ -102,6 +102,7 @@ static void describe(struct message_frame_begin *begin, const struct fl_frame *f
     begin->aperture = frame->aperture;
     begin->focus = frame->focus;
     begin->shutter_s = frame->shutter_s;
+    begin->layers = frame->layers;
 }
 
 static void describe_costs(struct message_frame_end *end, const struct fl_frame *frame)

@@ -61,6 +61,15 @@ static void fill_render(struct message_render *render, const struct fl_job_optio
     render->ldc_images = options->ldc_images;
     render->ldc_tolerance = options->ldc_tolerance;
     render->ldc_rays_together = options->ldc_rays_together;
+    render->abuffer_resolution = options->abuffer_resolution;
+    render->abuffer_voxels = options->abuffer_voxels;
+    render->abuffer_search = options->abuffer_search;
+    render->brdf = options->brdf;
+    render->ao_distance = options->ao_distance;
+    render->ao_falloff = options->ao_falloff;
+    render->ao_rays = options->ao_rays;
+    render->layer_opacity = options->layer_opacity;
+    render->layers = options->layers;
     render->clips = (struct record_clip_use *)(uintptr_t)options->clips; /* only read */
     render->clips_count = (uint32_t)options->clip_count;
     render->keys = (struct record_camera_key *)(uintptr_t)options->keys; /* only read */

@@ -423,6 +423,7 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     result->height = request->height;
     result->format = request->format;
     result->samples = renderer->picture.samples;
+    result->layers = 1u << LAYER_BEAUTY;
     result->primary_rays = (uint64_t)request->width * request->height * request->samples;
     result->times = context->times;
     renderer->kept_request = *request;

@@ -14,10 +14,27 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum frame_format { FRAME_RGBA8, FRAME_RGBA16F, FRAME_RGBA32F }; /* protocol's numbers, here to FRAME_RASTER */
+enum frame_format { FRAME_RGBA8, FRAME_RGBA16F, FRAME_RGBA32F }; /* protocol's numbers, here to enum frame_layer */
 enum frame_tone_map { TONE_NEUTRAL, TONE_ACES, TONE_NONE };
 enum frame_primary { PRIMARY_RASTER, PRIMARY_TRACE };
-enum frame_integrator { INTEGRATOR_WHITTED, INTEGRATOR_DISTRIBUTED };
+enum frame_integrator {
+    INTEGRATOR_WHITTED,
+    INTEGRATOR_DISTRIBUTED,
+    INTEGRATOR_RAYCAST,
+    INTEGRATOR_AO,
+    INTEGRATOR_PATH
+};
+enum frame_brdf { FRAME_BRDF_GGX, FRAME_BRDF_WARD };
+enum frame_layer { /* bits of frame_request.layers are 1 << these */
+                   LAYER_BEAUTY,
+                   LAYER_ALBEDO,
+                   LAYER_NORMAL,
+                   LAYER_DEPTH,
+                   LAYER_POSITION,
+                   LAYER_AO,
+                   LAYER_ID,
+                   LAYER_COUNT
+};
 enum frame_filter { FILTER_BLACKMAN_HARRIS, FILTER_GAUSSIAN, FILTER_TENT, FILTER_BOX }; /* of pixels */
 
 struct frame_camera {
@@ -42,6 +59,12 @@ struct frame_request {
     float aperture; /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
     float focus;    /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
     enum frame_filter filter;
+    enum frame_brdf brdf; /* of rough surfaces; integrator path */
+    float ao_distance;    /* metres; 0: a tenth of the scene's diagonal */
+    float ao_falloff;     /* as a power of 1 - distance / ao_distance; 0: all counts the same */
+    uint32_t ao_rays;     /* a sample; 0: 8 */
+    float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
+    uint32_t layers;      /* bits; 0: the picture alone. More than it need FRAME_RGBA32F */
     /* The frame goes on where the one before it ended, if that showed the same and was to be gone on from: scene,
      * motion and request alike but for `samples` and what is done with the sum (format, tone map, exposure); it
      * adds its samples to those. n frames of k samples hold what one of n x k does, to the bit. */
@@ -66,7 +89,8 @@ struct frame_request {
  * the same revision and device gives the same bytes. Cut into other slices a frame may differ in rays within
  * rounding of an edge: how many rays `bvh` walks together follows the coherence of the slice's wave. */
 struct frame_result {
-    uint8_t *pixels; /* owned; free() */
+    uint8_t *pixels; /* owned; free(). Layer after layer, each of width x height pixels */
+    uint32_t layers; /* bits, at least one */
     size_t size_bytes;
     uint32_t width, height;
     uint32_t samples; /* held per pixel, with those of the frames before that it goes on from */

@@ -103,6 +103,7 @@ struct scene_mesh {
     uint32_t weight_count;
     struct material_range *ranges;
     uint32_t range_count;
+    bool closed;              /* its triangles bound a body; the client's word, which only sampled structures take */
     float lower[3], upper[3]; /* bounds in object space, of the mesh as its vertices are given */
 };
 
@@ -128,6 +129,7 @@ struct scene_material {
     bool double_sided, unlit;
     float base_colour[4], emission[3];
     float metallic, roughness, transmission, ior, alpha_cutoff;
+    float anisotropy, anisotropy_rotation; /* radians */
     struct texture_use textures[MATERIAL_TEXTURE_COUNT];
 };
 

@@ -82,6 +82,7 @@ static bool from_mesh(const struct session *session, const struct message_set_me
     mesh->triangle_count = message->triangle_count;
     mesh->influence_count = message->influence_count;
     mesh->target_count = message->target_count;
+    mesh->closed = message->closed != 0;
     for (uint32_t i = 0; i < MESH_ARRAY_COUNT; i++) {
         if (!take_blob(session, message->arrays, message->arrays_count, i, "set_mesh", message->mesh,
                        &mesh->arrays[i], error))
@@ -126,6 +127,8 @@ static void from_material(const struct message_set_material *message, struct sce
     material->transmission = message->transmission;
     material->ior = message->ior;
     material->alpha_cutoff = message->alpha_cutoff;
+    material->anisotropy = message->anisotropy;
+    material->anisotropy_rotation = message->anisotropy_rotation;
     for (uint32_t i = 0; i < message->textures_count && i < MATERIAL_TEXTURE_COUNT; i++) {
         const struct record_texture_use *from = &message->textures[i];
         struct texture_use *use = &material->textures[i];

@@ -124,6 +124,7 @@ static void fill_begin(struct message_frame_begin *begin, const struct engine_fr
     begin->aperture = frame->request.aperture;
     begin->focus = frame->request.focus;
     begin->shutter_s = frame->shutter_s;
+    begin->layers = frame->result.layers;
 }
 
 static uint32_t fill_comparisons(struct record_wave_comparison *records, const struct frame_result *result)

@@ -44,6 +44,9 @@ struct tracer_options tracer_settings(const struct session_limits *limits, const
         .ldc_images = (unsigned)render->ldc_images,
         .ldc_tolerance = render->ldc_tolerance,
         .ldc_rays_together = render->ldc_rays_together,
+        .abuffer_resolution = render->abuffer_resolution,
+        .abuffer_voxels = render->abuffer_voxels,
+        .abuffer_search = (unsigned)render->abuffer_search,
         .ldc_layers_max = limits->ldc_layers,
         /* A limit below 1 MiB is one still. */
         .ldc_mebibytes_max = limits->ldc_bytes == 0 ? 0

@@ -200,6 +200,7 @@ const struct tracer_impl tracer_ldc_impl = {
     .name = "ldc",
     .depends_on = TRACER_NEEDS_SCENE,
     .sampled = true,
+    .still = true,
     .create = ldc_create,
     .destroy = ldc_destroy,
     .update = ldc_update,

@@ -34,6 +34,8 @@ static uint32_t mesh_flags(const struct scene_mesh *mesh)
         flags |= GEOMETRY_HAS_TEXCOORDS_1;
     if (mesh->arrays[MESH_COLOURS])
         flags |= GEOMETRY_HAS_COLOURS;
+    if (mesh->closed)
+        flags |= GEOMETRY_CLOSED;
     return flags;
 }
 

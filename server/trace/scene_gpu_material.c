@@ -101,6 +101,8 @@ static void pack_material(const struct scene_gpu *gpu, const struct scene_materi
         .roughness = in->roughness,
         .transmission = in->transmission,
         .alpha_cutoff = in->alpha_cutoff,
+        .anisotropy = in->anisotropy,
+        .anisotropy_rotation = in->anisotropy_rotation,
     };
     memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
     out->flags = (in->alpha_mode == ALPHA_MASK ? MATERIAL_ALPHA_MASK : 0) |

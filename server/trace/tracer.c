@@ -53,7 +53,7 @@ const struct tracer_impl *tracer_find(unsigned number, const char *field, struct
 
 bool tracer_check_motion(const struct tracer_impl *impl, const struct scene_gpu *scene, struct error *error)
 {
-    if (!impl->sampled || !scene->has_motion)
+    if (!impl->still || !scene->has_motion)
         return true;
     error_set(error, ERROR_UNSUPPORTED, "shutter",
               "%s holds samples of the scene as the shutter opens, and something moves before it closes",

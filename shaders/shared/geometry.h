@@ -42,6 +42,7 @@ SHARED_SIZE(geometry, 32)
 #define GEOMETRY_HAS_TEXCOORDS_1 8u
 #define GEOMETRY_HAS_COLOURS 16u
 #define GEOMETRY_HAS_CUTOUT 32u /* some material of it is alpha mode mask */
+#define GEOMETRY_CLOSED 64u     /* its triangles bound a body */
 
 /* Buffers, each a texel buffer:
  *   triangles   RGBA32UI  i0, i1, i2 (scene-wide vertex numbers), material index

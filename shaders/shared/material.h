@@ -11,8 +11,10 @@ struct material {
     uint flags;                                                           /* MATERIAL_* */
     uint texture_base_colour, texture_normal, texture_metallic_roughness; /* index into texture_uses, 0: none */
     uint texture_occlusion, texture_emission, texture_transmission, texture_bump;
+    float anisotropy, anisotropy_rotation; /* of rough reflections; radians from the tangent */
+    float pad0, pad1;
 };
-SHARED_SIZE(material, 80)
+SHARED_SIZE(material, 96)
 #define MATERIAL_ALPHA_MASK 1u
 #define MATERIAL_ALPHA_BLEND 2u
 #define MATERIAL_DOUBLE_SIDED 4u

@@ -143,6 +143,7 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         .format = renderer->request.format,
         .revision = renderer->scene->revision,
         .samples = renderer->request.samples,
+        .layers = 1u << LAYER_BEAUTY,
         .primary_rays = 10,
         .shadow_rays = 5,
         .secondary_rays = 1,

@@ -384,6 +384,7 @@ static void tell_frame(struct daemon *daemon, uint32_t request, uint32_t number)
                                                        .width = EDGE,
                                                        .height = EDGE,
                                                        .samples = 1,
+                                                       .layers = 1,
                                                        .size_bytes = sizeof pixels,
                                                        .digest = XXH3_64bits(pixels, sizeof pixels)};
     tell(daemon, request, &message);

@@ -39,6 +39,7 @@ static struct message_frame_begin some_begin(enum protocol_encoding encoding, ui
                                         .width = WIDTH,
                                         .height = HEIGHT,
                                         .samples = 1,
+                                        .layers = 1,
                                         .size_bytes = size_bytes,
                                         .encoding = encoding,
                                         .digest = XXH3_64bits(pixels, sizeof pixels)};

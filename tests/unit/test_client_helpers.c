@@ -153,7 +153,7 @@ static bool find_exporter(void)
 
 static struct fl_frame some_frame(enum protocol_pixel_format format, uint8_t *pixels)
 {
-    struct fl_frame frame = {.width = EDGE, .height = EDGE, .samples = 1, .format = format, .fov_y = 1};
+    struct fl_frame frame = {.width = EDGE, .height = EDGE, .samples = 1, .layers = 1, .format = format, .fov_y = 1};
     frame.world_from_view[0] = frame.world_from_view[5] = frame.world_from_view[10] = 1;
     frame.pixels = pixels;
     frame.pixels_bytes = (size_t)EDGE * EDGE * fl_bytes_per_pixel(format);

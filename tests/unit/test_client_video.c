@@ -90,7 +90,7 @@ static const uint8_t *colour_at(uint32_t frame, uint32_t x, uint32_t y)
 
 static struct fl_frame make_frame(uint32_t number, uint32_t width, uint32_t height)
 {
-    struct fl_frame frame = {.frame = number, .width = width, .height = height, .samples = 1, .fov_y = 1};
+    struct fl_frame frame = {.frame = number, .width = width, .height = height, .samples = 1, .layers = 1, .fov_y = 1};
     frame.format = PROTOCOL_PIXEL_FORMAT_RGBA8;
     frame.pixels_bytes = (size_t)width * height * 4;
     frame.pixels = malloc(frame.pixels_bytes);
@@ -465,7 +465,7 @@ static void a_frame_that_does_not_fit_ends_the_video_and_nothing_is_left(void **
         if (rows[i].first[0] > 0)
             write_frames(video, 1, rows[i].first[0], rows[i].first[1]);
         struct fl_frame frame = {
-            .frame = 7, .width = rows[i].second[0], .height = rows[i].second[1], .samples = 1};
+            .frame = 7, .width = rows[i].second[0], .height = rows[i].second[1], .samples = 1, .layers = 1};
         frame.format = rows[i].format;
         frame.pixels_bytes = (size_t)frame.width * frame.height * fl_bytes_per_pixel(frame.format);
         frame.pixels = calloc(1, frame.pixels_bytes);
@@ -656,6 +656,7 @@ static void send_frame_begin(struct fl_helper *writer, uint32_t edge)
     struct message message = {.type = MESSAGE_FRAME_BEGIN};
     message.frame_begin.width = message.frame_begin.height = edge;
     message.frame_begin.samples = 1;
+    message.frame_begin.layers = 1;
     message.frame_begin.size_bytes = (uint64_t)edge * edge * 4;
     send(writer, &message);
 }
@@ -779,7 +780,7 @@ static void a_client_that_breaks_the_protocol_is_left_with_a_line_and_no_file(vo
             break;
         case 6: /* another size than that of its pixels */
             message = (struct message){.type = MESSAGE_FRAME_BEGIN};
-            message.frame_begin.width = message.frame_begin.height = message.frame_begin.samples = 1;
+            message.frame_begin.width = message.frame_begin.height = message.frame_begin.samples = message.frame_begin.layers = 1;
             message.frame_begin.size_bytes = 400000000;
             send(&writer, &message);
             break;

@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: MIT */
+/* Builds A-buffers by rasterising the scene along three axes, once: paper, section 3.1. */
+#ifndef FARLIGHT_TRACE_ABUFFER_BUILD_H
+#define FARLIGHT_TRACE_ABUFFER_BUILD_H
+
+#include "base/error.h"
+#include "trace/abuffer_store.h"
+#include "trace/scene_gpu.h"
+#include "trace/tracer.h"
+
+#include <stdbool.h>
+
+struct abuffer_builder;
+
+struct abuffer_builder *abuffer_builder_create(struct gpu_device *device, struct error *error);
+void abuffer_builder_destroy(struct abuffer_builder *builder); /* accepts NULL */
+uint64_t abuffer_builder_bytes(const struct abuffer_builder *builder);
+
+/* Everything of the store but `voxels`: lower_world, cell_world, resolution, voxels_along are set. The lists'
+ * buffer grows until all fragments fit, and the pass is repeated; where options->abuffer_mebibytes_max or the
+ * device forbid that, it fails with ERROR_LIMIT or ERROR_OUT_OF_MEMORY and the store is empty. */
+bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
+                   const struct tracer_options *options, struct error *error);
+
+#endif
