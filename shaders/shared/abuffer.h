@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* clang-format off */
 /* Voxels and A-buffers on the device: what the build (abuffer/build.*, abuffer/resolve.comp, abuffer/voxels.comp)
  * writes and the walk reads. Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014.
  *
@@ -32,21 +33,24 @@
  *   sums        0..2  sum of the geometric normals of the samples in it, ABUFFER_NORMAL_UNIT for 1: their direction is
  *                     that of the average. Of each sample once: that of the image which its normal leans to most
  *               3     ABUFFER_SUM_* bits of all of them */
+/* clang-format on */
 #ifndef FARLIGHT_SHARED_ABUFFER_H
 #define FARLIGHT_SHARED_ABUFFER_H
 #include "shared/axes.h"
 #include "shared/types.h"
 
 #define ABUFFER_NORMAL_UNIT 127
-#define ABUFFER_SUM_LEANS 1u  /* times 2 to the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP) */
-#define ABUFFER_SUM_STEEP 8u  /* times 2 to the axis: some sample is so steep in that image that its depths say little */
-#define ABUFFER_SUM_OPEN 64u  /* some sample bounds no body */
+/* Times 2 to the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP). */
+#define ABUFFER_SUM_LEANS 1u
+/* Times 2 to the axis: some sample is so steep in that image that its depths say little. */
+#define ABUFFER_SUM_STEEP 8u
+#define ABUFFER_SUM_OPEN 64u           /* some sample bounds no body */
 #define ABUFFER_STEEP FACE_STEEP_BELOW /* component of a unit normal along the axis below which it is */
 
 #define ABUFFER_BLOCK_TEXELS 3
-/* In which images the walk looks, bits 0..2; it does by winding where ABUFFER_VOXEL_BODY is set, and by the samples'
- * planes alone where it is not. A voxel of bodies whose samples can all be seen in the image that the average normal
- * leans to most (none is steep there) is looked for in that one, by winding. */
+/* In which images the walk looks, bits 0..2; it does by winding where ABUFFER_VOXEL_BODY is set, and by the
+ * samples' planes alone where it is not. A voxel of bodies whose samples can all be seen in the image that the
+ * average normal leans to most (none is steep there) is looked for in that one, by winding. */
 #define ABUFFER_VOXEL_IMAGES 7u
 #define ABUFFER_VOXEL_BODY 8u
 
