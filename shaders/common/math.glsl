@@ -59,6 +59,18 @@ vec3 unpack_unit(uint bits)
     return unit_from_octahedral(unpackSnorm2x16(bits));
 }
 
+// 2 x 12 bit snorm, in bits 0..23: exact to 0.05 degrees.
+uint pack_unit_24(vec3 unit)
+{
+    ivec2 p = ivec2(round(octahedral_from_unit(unit) * 2047.0));
+    return uint(p.x) & 0xfffu | (uint(p.y) & 0xfffu) << 12;
+}
+
+vec3 unpack_unit_24(uint bits)
+{
+    return unit_from_octahedral(vec2(bitfieldExtract(int(bits), 0, 12), bitfieldExtract(int(bits), 12, 12)) / 2047.0);
+}
+
 // struct hit's tangent: x 16 bits, y 15 bits, lowest bit set where the handedness is negative.
 // packSnorm2x16 puts y in the upper half; here x is the upper half and y's lowest bit makes room.
 uint pack_tangent(vec3 unit, float handedness)

@@ -7,8 +7,8 @@
 // them where a surface bends.
 const float LDC_SLACK = 0.05;
 // How far a plane may leave its sample's depth within its texel and the slack: half a cell and the slack along u, as far
-// along v, with the greatest slope, 1 / LDC_OVERLAP.
-const float LDC_SPAN = (1.0 + 2.0 * LDC_SLACK) / LDC_OVERLAP;
+// along v, with the greatest slope, 1 / AXES_OVERLAP.
+const float LDC_SPAN = (1.0 + 2.0 * LDC_SLACK) / AXES_OVERLAP;
 // What depths and places round, in cells: some units in the last place of 4096.
 const float LDC_ROUNDING = 0.002;
 

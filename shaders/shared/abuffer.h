@@ -34,13 +34,14 @@
  *               3     ABUFFER_SUM_* bits of all of them */
 #ifndef FARLIGHT_SHARED_ABUFFER_H
 #define FARLIGHT_SHARED_ABUFFER_H
+#include "shared/axes.h"
 #include "shared/types.h"
 
 #define ABUFFER_NORMAL_UNIT 127
 #define ABUFFER_SUM_LEANS 1u  /* times 2 to the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP) */
 #define ABUFFER_SUM_STEEP 8u  /* times 2 to the axis: some sample is so steep in that image that its depths say little */
 #define ABUFFER_SUM_OPEN 64u  /* some sample bounds no body */
-#define ABUFFER_STEEP 0.5f    /* component of a unit normal along the axis below which it is */
+#define ABUFFER_STEEP FACE_STEEP_BELOW /* component of a unit normal along the axis below which it is */
 
 #define ABUFFER_BLOCK_TEXELS 3
 /* In which images the walk looks, bits 0..2; it does by winding where ABUFFER_VOXEL_BODY is set, and by the samples'

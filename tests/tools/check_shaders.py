@@ -38,13 +38,13 @@ CHOICES = {
     "ldc/cells.comp": [[{"CELLS_" + stage: "1"} for stage in
                         "LIST BLOCKS PLACE MARK COUNT FILL FURTHER SORT REACH_X REACH_Y REACH_Z".split()]],
     "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
-    "ldc/build.vert": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
+    "axes/draw.vert": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
                        [{"BUILD_PASS": number} for number in "012"]],
 }
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION")}
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
-          "ldc/build.vert": ["ldc/build.vert", "ldc/build.geom", "ldc/build.frag"]}
+          "axes/draw.vert": ["axes/draw.vert", "axes/draw.geom", "ldc/build.frag"]}
 # Storage blocks of a stage; server/gpu/device.c asks a driver for as many.
 STORAGE_BLOCKS_MAX = {".comp": 16, ".vert": 4, ".geom": 0, ".frag": 8}
 
