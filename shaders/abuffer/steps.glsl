@@ -12,6 +12,9 @@
 #ifdef ABUFFER_STEPS
 
 const int BISECTIONS_MAX = 8;
+// From column to column towards where a plane is crossed: a curved surface is met after two or three.
+const int FOLLOWS_MAX = 4;
+const float FOLLOW_REACH = 4.0; // cells of depth in which a column's samples are of the surface that is followed
 
 // Of how many bodies the ray is inside, where it was last looked.
 struct ray_state {
@@ -34,35 +37,76 @@ vec3 place_in_image(voxel_walk w, int axis, float s)
     return in_image(w.ray.o + s * w.ray.d, axis);
 }
 
-// A ray that begins on a surface is on the side of it to which it goes, whatever of the two its origin was rounded to.
-int winding_at_origin(voxel_walk w, uint images)
+// A ray that begins on a surface is on the side of it to which it goes, whatever of the two its origin was rounded to. One
+// that goes along the surface is on the side where it is a little farther on: a sample's normal is not that of the place.
+const float OWN_ALONG = 0.15;
+
+int winding_at_origin(voxel_walk w, uint what)
 {
-    for (; images != 0u; images &= images - 1u) {
+    for (uint images = what & ABUFFER_VOXEL_IMAGES; images != 0u; images &= images - 1u) {
         int axis = findLSB(images);
         vec3 p = place_in_image(w, axis, w.s_least), d = in_image(w.ray.d, axis);
         ivec2 texel = texel_of(p.xy);
         column c = column_at(axis, texel);
         float nearest = OWN_BEHIND;
         int own_winding = 0;
-        bool is_own = false;
+        bool is_own = false, goes_along = false;
         for (int i = sample_from(c, p.z - SPAN); i < c.end; i++) {
             column_sample q = sample_at(i, axis);
             if (q.depth > p.z + SPAN)
                 break;
-            float height = dot(q.normal, p - vec3(vec2(texel) + 0.5, q.depth)) * inversesqrt(dot(q.normal, q.normal));
-            float side = dot(q.normal, d);
-            float distance_ = abs(height);
+            float inverse = inversesqrt(dot(q.normal, q.normal)), side = dot(q.normal, d) * inverse;
+            float distance_ = abs(dot(q.normal, p - vec3(vec2(texel) + 0.5, q.depth))) * inverse;
             if (q.step_ != 0 && distance_ < nearest) {
                 nearest = distance_;
                 is_own = true;
+                goes_along = abs(side) < OWN_ALONG;
                 own_winding = (side > 0.0) == (q.normal.z > 0.0) ? q.behind : q.behind - q.step_;
             }
         }
         if (is_own)
-            return own_winding;
+            return goes_along ? winding_at(axis, p + OWN_WAY * d) : own_winding;
     }
-    int axis = image_of(images, w.ray.d);
+    int axis = image_of(what, w.ray.d);
     return winding_at(axis, place_in_image(w, axis, w.s_least));
+}
+
+// Where the ray crosses a surface near s, by the plane of a sample there, then by that of a sample where it crosses this
+// one, and so on until the crossing is in the sample's own texel.
+bool follow(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis, bool only_leaning, float s, float lo,
+            float hi)
+{
+    vec3 o = in_image(w.ray.o, axis), d = in_image(w.ray.d, axis);
+    for (int k = 0; k < FOLLOWS_MAX; k++) {
+        vec3 p = o + s * d;
+        ivec2 texel = texel_of(p.xy);
+        column c = column_at(axis, texel);
+        float nearest = 1e30, nearest_side = 0.0;
+        int nearest_sample = 0;
+        for (int i = sample_from(c, p.z - FOLLOW_REACH); i < c.end; i++) {
+            column_sample q = sample_at(i, axis);
+            if (q.depth > p.z + FOLLOW_REACH)
+                break;
+            float s_plane, side;
+            if (cross_plane(o, d, w.s_least, texel, q, s_plane, side) && abs(s_plane - s) < abs(nearest - s) &&
+                (!only_leaning || leans(q))) {
+                nearest = s_plane;
+                nearest_side = side;
+                nearest_sample = i;
+            }
+        }
+        vec2 from_middle = abs(o.xy + nearest * d.xy - vec2(texel) - 0.5);
+        if (from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK) {
+            if (!(nearest < w.s_limit))
+                return false;
+            offer_at(r, w, found, nearest_sample, nearest, nearest_side);
+            return true;
+        }
+        if (!(nearest > lo - 1.0 && nearest < hi + 1.0))
+            return false;
+        s = nearest;
+    }
+    return false;
 }
 
 #ifndef ANYTHING_ENDS
@@ -81,6 +125,8 @@ int nearest_sample(int axis, vec3 p)
 // A surface is passed between lo and hi.
 void refine(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis, float lo, float hi, int winding_lo)
 {
+    if (follow(r, w, found, axis, false, hi, lo, hi))
+        return;
     for (int i = 0; i < BISECTIONS_MAX && hi - lo > 1.0; i++) {
         float middle = 0.5 * (lo + hi);
         bool is_before = winding_at(axis, place_in_image(w, axis, middle)) == winding_lo;
@@ -110,7 +156,7 @@ void search_body(trace_ray r, inout voxel_walk w, inout abuffer_found found, fou
     float lo = here.s_in, step_ = (end - lo) * (1.0 / float(ABUFFER_STEPS));
     if (!state.is_known) {
         state.is_known = true;
-        state.winding = here.s_in <= w.s_least ? winding_at_origin(w, here.what & ABUFFER_VOXEL_IMAGES)
+        state.winding = here.s_in <= w.s_least ? winding_at_origin(w, here.what)
                                                : winding_at(axis, place_in_image(w, axis, here.s_in));
     }
     for (int k = 1; k <= ABUFFER_STEPS; k++) {
@@ -150,12 +196,12 @@ void search_open(trace_ray r, inout voxel_walk w, inout abuffer_found found, fou
                 if (q.depth > p.z + reach)
                     break;
                 float s, side;
-                if (cross_plane(o, d, w.s_least, texel, q, s, side) && s > lo - 0.5 && s < hi + 0.5 && s < nearest &&
+                if (cross_plane(o, d, w.s_least, texel, q, s, side) && s > lo - 4.0 && s < hi + 4.0 && s < nearest &&
                     leans(q))
                     nearest = s;
             }
             if (nearest < w.s_limit)
-                search_image(r, w, found, axis, true, max(nearest - 0.7, w.s_least), nearest + 0.7);
+                follow(r, w, found, axis, true, nearest, lo, hi);
         }
         lo = hi;
     }

@@ -60,21 +60,75 @@ static void random_rays(struct ray *rays, uint32_t count, uint64_t seed)
     }
 }
 
+
+/* ---- shapes, from everywhere ---- */
+
+static void add_one_ball(struct abuffer_samples *s)
+{
+    add_ball(s, (const double[3]){101.3, 120.1, 118.7}, 60.4, 40, true);
+}
+
+static void add_one_box(struct abuffer_samples *s)
+{
+    add_box(s, (const double[3]){61.3, 50.1, 68.7}, (const double[3]){161.3, 150.1, 128.7}, true);
+}
+
+/* A ball within a ball, which is cut by a box, beside another in one. */
+static void add_nested(struct abuffer_samples *s)
+{
+    add_ball(s, (const double[3]){101.3, 120.1, 118.7}, 70.4, 40, true);
+    add_ball(s, (const double[3]){96.3, 110.1, 121.7}, 40.2, 30, true);
+    add_box(s, (const double[3]){81.3, 130.1, 28.7}, (const double[3]){221.3, 180.1, 98.7}, true);
+    add_ball(s, (const double[3]){170.3, 150.1, 60.7}, 15.3, 20, true);
+}
+
+static void add_open_ball(struct abuffer_samples *s)
+{
+    add_ball(s, (const double[3]){101.3, 120.1, 118.7}, 60.4, 40, false);
+}
+
+/* Askew, one behind the other, without thickness. */
+static void add_sheets(struct abuffer_samples *s)
+{
+    for (int i = 0; i < 5; i++) {
+        double x = 40 + 35 * i, lean = 11.3 * (i - 2);
+        const double p[4][3] = {
+            {x - lean, 22.2, 31.1}, {x + lean, 201.3, 31.1}, {x + lean, 201.3, 202.2}, {x - lean, 22.2, 202.2}};
+        add_quad(s, p, false);
+    }
+}
+
+/* As thick as a cell and a half. */
+static void add_plates(struct abuffer_samples *s)
+{
+    add_box(s, (const double[3]){61.3, 50.1, 68.7}, (const double[3]){62.8, 180.1, 198.7}, true);
+    add_box(s, (const double[3]){81.3, 50.1, 68.7}, (const double[3]){181.3, 51.6, 198.7}, true);
+    add_box(s, (const double[3]){81.3, 70.1, 100.7}, (const double[3]){181.3, 160.1, 102.2}, true);
+}
+
+/* A room: all walls are seen from within, and open. */
+static void add_room(struct abuffer_samples *s)
+{
+    add_box(s, (const double[3]){10.3, 20.4, 15.2}, (const double[3]){230.3, 209.1, 221.7}, false);
+    add_ball(s, (const double[3]){101.3, 60.1, 118.7}, 30.4, 30, true);
+}
+
 static void explore(void **state)
 {
     (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
-    for (int shape = 0; shape < 4; shape++) {
+    static const struct {
+        const char *name;
+        void (*add)(struct abuffer_samples *s);
+    } rows[] = {{"ball", add_one_ball}, {"box", add_one_box}, {"nested", add_nested}, {"open ball", add_open_ball},
+        {"sheets", add_sheets}, {"plates", add_plates}, {"room", add_room}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct fixture fixture;
         fixture_init(&fixture, NULL, CELLS, VOXELS);
-        struct abuffer_samples *s = &fixture.samples;
-        if (shape == 0 || shape == 3)
-            add_ball(s, (const double[3]){101.3, 120.1, 118.7}, 60.4, 40, shape == 0);
-        if (shape == 1 || shape == 2)
-            add_box(s, (const double[3]){61.3, 50.1, 68.7}, (const double[3]){161.3, 150.1, 128.7}, shape == 1);
+        rows[i].add(&fixture.samples);
         fixture_build(&fixture);
         random_rays(rays, RAY_COUNT, 7);
-        printf("shape %d\n", shape);
+        printf("%s\n", rows[i].name);
         for (int f = 0; f < FORM_COUNT; f++)
             compare(&fixture, f, rays, RAY_COUNT, 0.5);
         fixture_finish(&fixture);
@@ -82,10 +136,78 @@ static void explore(void **state)
     free(rays);
 }
 
+/* ---- rays that begin on surfaces ---- */
+
+/* As integrators move origins off surfaces: by 2^-16 of the coordinates, here of the size of the cube. */
+static void ray_on_ball(struct ray *ray, const double centre[3], double radius, bool inwards, double grazing,
+                        uint64_t *seed)
+{
+    double n[3], o[3], d[3], side = inwards ? -1 : 1, z = (double)test_uniform(seed, -0.999f, 0.999f),
+                             phi = (double)test_uniform(seed, 0, 2 * (float)PI_D), cosine = 0;
+    n[0] = sqrt(1 - z * z) * cos(phi), n[1] = z, n[2] = sqrt(1 - z * z) * sin(phi);
+    for (int k = 0; k < 3; k++) {
+        o[k] = centre[k] + n[k] * (radius + side * CELLS / 65536);
+        d[k] = (double)test_uniform(seed, -1, 1);
+        cosine += d[k] * n[k];
+    }
+    for (int k = 0; k < 3; k++) /* of the part along the normal only its size and side */
+        d[k] += n[k] * (side * fabs(cosine) * grazing - cosine);
+    *ray = ray_from(o, d, 0, FAR);
+}
+
+static void a_ray_does_not_hit_the_ball_that_it_leaves(void **state)
+{
+    (void)state;
+    const double centre[3] = {121.3, 118.1, 122.7}, radius = 80.2;
+    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
+    uint32_t *visibility = malloc(RAY_COUNT * sizeof *visibility);
+    for (int body = 0; body < 2; body++) {
+        struct fixture fixture;
+        uint64_t seed = 61;
+        fixture_init(&fixture, NULL, CELLS, VOXELS);
+        add_ball(&fixture.samples, centre, radius, 250, body == 1); /* facets as small as cells: it is round */
+        fixture_build(&fixture);
+        for (int inwards = 0; inwards < 2; inwards++) {
+            /* Steep; any; almost along the surface: a chord of a few cells says nothing there. */
+            for (int way = 0; way < (inwards ? 2 : 3); way++) {
+                for (uint32_t i = 0; i < RAY_COUNT; i++)
+                    ray_on_ball(&rays[i], centre, radius, inwards, way == 0 ? 3 : way == 1 ? 1 : 0.02, &seed);
+                for (int f = 0; f < FORM_COUNT; f++) {
+                    trace(&fixture, &forms[f].options, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
+                    trace(&fixture, &forms[f].options, WAVE_ANY, rays, RAY_COUNT, NULL, visibility);
+                    uint32_t wrong = 0, stopped = 0;
+                    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+                        double b = 0, c = 0, a = 0;
+                        for (int k = 0; k < 3; k++) {
+                            const double from = (double)rays[i].origin_t_min[k] - centre[k],
+                                         d = (double)rays[i].direction_t_max[k];
+                            a += d * d, b += from * d, c += from * from;
+                        }
+                        const double chord = (-b + sqrt(fmax(b * b - a * (c - radius * radius), 0))) / a;
+                        stopped += (visibility[i] == 0) != (inwards == 1) && (!inwards || chord * sqrt(a) > 4);
+                        if (!inwards)
+                            wrong += hits[i].distance >= 0;
+                        else if (chord * sqrt(a) > 4)
+                            wrong += (uint32_t) !(fabs((double)hits[i].distance - chord) * sqrt(a) < 0.5);
+                    }
+                    printf("body %d inwards %d way %d %s: %u wrong, any %u\n", body, inwards, way, forms[f].name,
+                           wrong, stopped);
+                }
+            }
+        }
+        fixture_finish(&fixture);
+    }
+    free(rays);
+    free(hits);
+    free(visibility);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(explore),
+        cmocka_unit_test(a_ray_does_not_hit_the_ball_that_it_leaves),
     };
     RUN_ON_A_DEVICE(tests);
 }
