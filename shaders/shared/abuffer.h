@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* clang-format off */
 /* Voxels and A-buffers on the device: what the build (abuffer/build.*, abuffer/resolve.comp, abuffer/voxels.comp)
  * writes and the walk reads. Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014.
  *
@@ -32,24 +33,27 @@
  *   sums        0..2  sum of the geometric normals of the samples in it, ABUFFER_NORMAL_UNIT for 1: their direction is
  *                     that of the average. Of each sample once: that of the image which its normal leans to most
  *               3     ABUFFER_SUM_* bits of all of them */
+/* clang-format on */
 #ifndef FARLIGHT_SHARED_ABUFFER_H
 #define FARLIGHT_SHARED_ABUFFER_H
 #include "shared/axes.h"
 #include "shared/types.h"
 
 #define ABUFFER_NORMAL_UNIT 127
-#define ABUFFER_SUM_LEANS 1u  /* times 2 to the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP) */
-#define ABUFFER_SUM_STEEP 8u  /* times 2 to the axis: some sample is so steep in that image that its depths say little */
-#define ABUFFER_SUM_OPEN 64u  /* some sample bounds no body */
-#define ABUFFER_SUM_UP 128u    /* times 2 to the axis: some sample leans to it and faces up it, .. */
-#define ABUFFER_SUM_DOWN 1024u /* .. or down: where both do, a body's sides are near each other */
+/* Times 2 to the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP). */
+#define ABUFFER_SUM_LEANS 1u
+/* Times 2 to the axis: some sample is so steep in that image that its depths say little. */
+#define ABUFFER_SUM_STEEP 8u
+#define ABUFFER_SUM_OPEN 64u           /* some sample bounds no body */
+#define ABUFFER_SUM_UP 128u            /* times 2 to the axis: some sample leans to it and looks up it, .. */
+#define ABUFFER_SUM_DOWN 1024u         /* .. or down: where both do, a body's sides are near each other */
 #define ABUFFER_STEEP FACE_STEEP_BELOW /* component of a unit normal along the axis below which it is */
 
 #define ABUFFER_BLOCK_TEXELS 3
-/* In which images the walk looks, bits 0..2; it does by winding where ABUFFER_VOXEL_BODY is set, and by the samples'
- * planes alone where it is not. A voxel of bodies whose samples can all be seen in the image that the average normal
- * leans to most (none is steep there) is looked for in that one, by winding. One in which samples face both ways along
- * an axis is none: a ray may pass both sides of a body in it, and winding would say nothing of them. */
+/* In which images the walk looks, bits 0..2; it does by winding where ABUFFER_VOXEL_BODY is set, and by the
+ * samples' planes alone where it is not. A voxel of bodies whose samples can all be seen in the image that the
+ * average normal leans to most (none is steep there) is looked for in that one, by winding. Where samples look both
+ * ways along an axis winding is no help: a ray may pass both sides of a body between two places that it is asked of. */
 #define ABUFFER_VOXEL_IMAGES 7u
 #define ABUFFER_VOXEL_BODY 8u
 
