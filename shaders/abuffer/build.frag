@@ -78,9 +78,12 @@ void add_normal(float depth_cells, vec3 normal_duv)
         imageAtomicAdd(sums, at + v, units.z);
 }
 
-int sum_bits(uint face, bool closed)
+// `leaves`: it looks towards greater depths of this image.
+int sum_bits(uint face, bool closed, bool leaves)
 {
-    return int(face >> 24 & 63u) | (closed ? 0 : int(ABUFFER_SUM_OPEN));
+    bool leans = (face & FACE_LEANS << gl_Layer) != 0u;
+    uint looks = leans ? (leaves ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN) << gl_Layer : 0u;
+    return int(face >> 24 & 63u | looks | (closed ? 0u : ABUFFER_SUM_OPEN));
 }
 
 #if PRIMITIVE_KIND == 0
@@ -101,7 +104,7 @@ void main()
         least_cells = max(least_cells, depths.y);
         most_cells = min(most_cells, depths.z);
     }
-    mark(least_cells, most_cells, sum_bits(face, (face & FACE_CLOSED) != 0u));
+    mark(least_cells, most_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves));
     if ((face & FACE_MOST) != 0u) {
         vec3 normal = vec3(1.0, -plane.xy) * inversesqrt(1.0 + dot(plane.xy, plane.xy));
         add_normal(depth_cells, leaves ? normal : -normal);
@@ -143,7 +146,7 @@ void main()
         if (!link(depth_cells, face & FACE_NORMAL_MASK | (closed ? ABUFFER_NODE_CLOSED : 0u) |
                                    (side == 1 ? ABUFFER_NODE_LEAVES : 0u)))
             continue;
-        mark(least_cells, most_cells, sum_bits(face, closed));
+        mark(least_cells, most_cells, sum_bits(face, closed, side == 1));
         if (axis_of(abs(normal)) == axis)
             add_normal(depth_cells, vec3(normal[axis], normal[u], normal[v]));
     }

@@ -51,6 +51,7 @@
 #define IMAGE_ABUFFER_SAMPLES 1
 #define IMAGE_ABUFFER_IDS 2
 #define IMAGE_ABUFFER_DEEP 3
+#define IMAGE_ABUFFER_VOXELS 0 /* abuffer/voxels.comp */
 
 /* texture units */
 #define UNIT_TRIANGLES 0
