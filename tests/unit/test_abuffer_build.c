@@ -126,7 +126,9 @@ static int bits_of(const struct patch *patch, bool certain)
 {
     const double *n = patch->normal, slack = certain ? NORMAL_SLACK : -NORMAL_SLACK;
     double most = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
-    int bits = patch->body ? 0 : (int)ABUFFER_SUM_OPEN;
+    int bits = patch->body ? 0 : (int)ABUFFER_SUM_OPEN, axis = patch->axis;
+    if (fabs(n[axis]) >= (double)AXES_OVERLAP * most + slack)
+        bits |= (int)(n[axis] > 0 ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN) << axis;
     for (int k = 0; k < 3; k++) {
         bits |= fabs(n[k]) >= (double)AXES_OVERLAP * most + slack ? (int)ABUFFER_SUM_LEANS << k : 0;
         bits |= fabs(n[k]) < (double)ABUFFER_STEEP - slack ? (int)ABUFFER_SUM_STEEP << k : 0;
