@@ -111,6 +111,7 @@ static void render(const struct engine_command *command)
         frame->request.focus = engine.job.frame.focus;
         frame->shutter_s = engine.job.shutter / 8;
         frame->result.samples = 5; /* with those of frames before */
+        frame->result.layers = engine.job.frame.layers ? engine.job.frame.layers : 1u << LAYER_BEAUTY;
         memcpy(frame->result.cubes, engine.cubes, sizeof engine.cubes);
         frame->size_bytes = FRAME_BYTES;
         frame->bytes = malloc(FRAME_BYTES);
