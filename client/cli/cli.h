@@ -96,12 +96,14 @@ void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t 
 /* `done` of `total` steps of unlike length are done; `what` is being done now. Without a terminal a line each,
  * once it has taken a second. */
 void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t total, const char *what);
+/* A picture that is refined has `held` samples a pixel; `total` 0: there is no end but an interruption. */
+void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t total);
 /* Removes the bar, so that something else can be written. */
 void cli_progress_clear(struct cli_progress *progress);
 /* The last bar of what is done stays; any other is removed. */
 void cli_progress_end(struct cli_progress *progress, bool done);
 
-/* ---- job_options.c, job_tracer.c: what render and animate have in common ---- */
+/* ---- job_options.c, job_tracer.c, job_light.c: what render and animate have in common ---- */
 
 enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
 
@@ -163,12 +165,14 @@ struct cli_job {
     double clip_speed;
     double time_s;         /* of `render`: the moment of the clips that is shown */
     bool progressive;      /* of `render`: the picture is written again and again, with more samples */
+    bool endless;          /* likewise, until it is interrupted */
     uint32_t pass_samples; /* more each time; 0: as many as there are */
     bool lens_changes;     /* clips open it: the integrator must know lenses */
     bool lossless;         /* of a video */
     bool has_aperture, has_focus;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, quiet, is_orbit;
+    char depth_field[24];  /* what said how deep, for people; empty: nothing */
     unsigned file_quality; /* of JPEG files; 0: default */
     enum cli_timings_form timings;
     struct record_camera_key key;
