@@ -280,8 +280,8 @@ struct fl_job_options {
     float ao_falloff;        /* as a power of 1 - distance / ao_distance; 0: all counts the same */
     unsigned ao_rays;        /* for each sample; 0: 8 */
     float layer_opacity;     /* of opaque surfaces, for the integrator raycast; 0: 0.5 */
-    /* Set of layers, 1 << enum protocol_layer each; 0: the picture alone. Others need format rgba32f, encoding raw or
-     * zstd. */
+    /* Set of layers, 1 << enum protocol_layer each; 0: the picture alone. Others need format rgba32f, encoding raw
+     * or zstd. */
     unsigned layers;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "metadata.hpp"
+#include "layers.hpp"
 
 #include <cinttypes>
 #include <cmath>
@@ -91,7 +92,7 @@ void add_count(std::vector<entry> &entries, const char *name, uint64_t value)
     add_text(entries, name, std::to_string(value));
 }
 
-/* What the tracer ldc sampled, and how finely. */
+// What a tracer sampled, and how finely.
 void add_cubes(std::vector<entry> &entries, const struct message_frame_end &end)
 {
     for (uint32_t i = 0; i < end.cubes_count; i++) {
@@ -138,6 +139,8 @@ std::vector<entry> collect(const struct image &image)
     add_text(entries, "integrator", protocol_integrator_text(begin.integrator));
     add_count(entries, "samples", begin.samples);
     add_text(entries, "digest", digest);
+    if (has_layers(begin))
+        add_text(entries, "layers", layer_names(begin.layers));
     add_number(entries, "exposure_stops", static_cast<double>(begin.exposure_stops));
     add_number(entries, "time_s", static_cast<double>(begin.time_s));
     add_number(entries, "fov_y_degrees", static_cast<double>(begin.fov_y * degrees_per_radian));
