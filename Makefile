@@ -179,6 +179,7 @@ $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 MODEL_OBJ := $(B)/tests/bench/load_model.o
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
 $(B)/tests/unit/test_load_model: $(MODEL_OBJ)
+$(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
 $(B)/tests/bench/bench_changes: $(B)/tests/bench/bench_stats.o

@@ -207,6 +207,7 @@ struct fl_model_note {
 struct fl_model_info {
     uint64_t nodes, meshes, triangles, sphere_sets, spheres, discs, materials, textures, lights;
     uint64_t skins, joints, morph_targets; /* joints of all skins, targets of all meshes */
+    uint64_t closed_meshes;                /* those whose triangles bound a body */
     struct fl_import_stats import;
     size_t camera_count, clip_count, note_count;
     struct fl_camera_info *cameras;

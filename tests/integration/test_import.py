@@ -80,8 +80,8 @@ def decode(kind, payload):
         return dict(id=node, parent=parent, kind=node_kind, object=thing, hidden=hidden, matrix=f.take("12f"),
                     skin=f.take("I"), weights=f.array("f"), name=f.string())
     if kind == SET_MESH:
-        mesh, vertices, triangles, influences, targets = f.take("5I")
-        return dict(id=mesh, vertices=vertices, triangles=triangles, influences=influences, targets=targets,
+        mesh, vertices, triangles, influences, targets, closed = f.take("6I")
+        return dict(id=mesh, vertices=vertices, triangles=triangles, influences=influences, targets=targets, closed=closed,
                     arrays=blob_refs(f), ranges=f.array("3I"), weights=f.array("f"), name=f.string())
     if kind == SET_SPHERES:
         spheres, count = f.take("2I")
@@ -89,11 +89,11 @@ def decode(kind, payload):
     if kind == SET_MATERIAL:
         material, alpha_mode, double_sided, unlit = f.take("4I")
         base, emission = f.take("4f"), f.take("3f")
-        metallic, roughness, transmission, ior, cutoff = f.take("5f")
+        metallic, roughness, transmission, ior, cutoff, *anisotropy = f.take("7f")
         uses = [dict(texture=u[0], texcoord=u[1], transform=u[2:8], strength=u[8]) for u in f.array("2I6ff")]
         return dict(id=material, alpha_mode=alpha_mode, double_sided=double_sided, unlit=unlit, base=base,
                     emission=emission, metallic=metallic, roughness=roughness, transmission=transmission, ior=ior,
-                    cutoff=cutoff, textures=uses, name=f.string())
+                    cutoff=cutoff, anisotropy=anisotropy, textures=uses, name=f.string())
     if kind == SET_TEXTURE:
         texture, width, height, form, wrap_u, wrap_v, nearest = f.take("7I")
         return dict(id=texture, width=width, height=height, format=form, wrap=(wrap_u, wrap_v), nearest=nearest,
@@ -716,6 +716,19 @@ class Written(unittest.TestCase):
         names = {m["id"]: m["name"] for m in result.of(SET_MATERIAL)}
         self.assertEqual([(first, count, names[m]) for first, count, m in mesh["ranges"]], [(0, 1, "b"), (1, 1, "a")])
         self.assertEqual((mesh["vertices"], mesh["triangles"]), (3, 2), "equal accessors share their vertices")
+
+    def test_gltf_primitives_that_bound_a_body_together_are_closed(self):
+        corners = struct.pack("<12f", 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1)
+        faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+        for kept, closed in ((4, 1), (3, 0)):
+            # Each face is a primitive with corners and a material of its own.
+            data = b"".join(corners[12 * c:12 * c + 12] for face in faces for c in face)
+            result = self.run_gltf(
+                {"nodes": [{"mesh": 0}], "materials": [{}, {}],
+                 "meshes": [{"primitives": [{"attributes": {"POSITION": i}, "material": i % 2} for i in range(kept)]}]},
+                data=data, accessors=[{"bufferView": 0, "byteOffset": 36 * i, "componentType": 5126, "count": 3,
+                                       "type": "VEC3"} for i in range(4)])
+            self.assertEqual([mesh["closed"] for mesh in result.of(SET_MESH)], [closed])
 
     def test_gltf_material_extensions(self):
         extensions = {"KHR_materials_transmission": {"transmissionFactor": 0.9}, "KHR_materials_ior": {"ior": 1.33},

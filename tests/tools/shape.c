@@ -143,9 +143,11 @@ void shape_sphere(struct shape *shape, const float centre[3], float radius, uint
     const uint32_t first = shape->vertex_count, rows = segments / 2 + 1;
     for (uint32_t row = 0; row < rows; row++) {
         const float polar = two_pi / 2 * (float)row / (float)(rows - 1);
+        const float across =
+            row + 1 < rows ? sinf(polar) : 0; /* a pole is one place: sinf() of PI leaves a hole */
         for (uint32_t i = 0; i <= segments; i++) {
             const float angle = two_pi * (float)(i % segments) / (float)segments;
-            const float normal[3] = {sinf(polar) * cosf(angle), -cosf(polar), sinf(polar) * sinf(angle)};
+            const float normal[3] = {across * cosf(angle), -cosf(polar), across * sinf(angle)};
             const float position[3] = {centre[0] + radius * normal[0], centre[1] + radius * normal[1],
                                        centre[2] + radius * normal[2]};
             add_vertex(shape, position, normal);
