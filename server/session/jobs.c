@@ -12,6 +12,7 @@
 /* More frames than this need not wait here: the engine renders the next ones meanwhile. */
 #define WINDOW_FRAMES_MAX 4
 #define ZSTD_LEVEL_MAX 19
+#define FRAME_BYTES_MAX (UINT64_C(1) << 32) /* of frame_begin.size_bytes */
 
 static uint32_t bytes_per_pixel(enum protocol_pixel_format format)
 {
@@ -57,9 +58,29 @@ static bool check_limits(const struct session *session, const struct message_ren
     return true;
 }
 
+/* Of all that a frame brings. */
 static uint64_t frame_bytes_of(const struct message_render *render)
 {
-    return (uint64_t)render->width * render->height * bytes_per_pixel(render->format);
+    const uint64_t layers = render->layers ? (uint64_t)__builtin_popcount(render->layers) : 1;
+    return layers * render->width * render->height * bytes_per_pixel(render->format);
+}
+
+static bool check_layers(const struct message_render *render, struct error *error)
+{
+    if (!(render->layers & ~(1u << PROTOCOL_LAYER_BEAUTY)))
+        return true;
+    if (render->format != PROTOCOL_PIXEL_FORMAT_RGBA32F) {
+        error_set(error, ERROR_INVALID, "render.layers", "%s does not hold them",
+                  protocol_pixel_format_text(render->format));
+        return error_remedy(error, "the format rgba32f, or the picture alone");
+    }
+    if (frame_bytes_of(render) > FRAME_BYTES_MAX) {
+        error_set(error, ERROR_LIMIT, "render.layers",
+                  "they are %" PRIu64 " bytes together, the limit is %" PRIu64, frame_bytes_of(render),
+                  FRAME_BYTES_MAX);
+        return error_remedy(error, "ask for some of them at a time, or for smaller frames");
+    }
+    return true;
 }
 
 /* How many frames of the job may wait in memory to be sent: at least one, whatever its size. */
@@ -128,8 +149,9 @@ static bool check(const struct session *session, const struct message_render *re
     if (render->encoding == PROTOCOL_ENCODING_ZSTD && render->quality > ZSTD_LEVEL_MAX)
         return error_set(error, ERROR_INVALID, "render.quality", "zstd has levels up to %u, not %u",
                          ZSTD_LEVEL_MAX, render->quality);
-    return tracer_settings_check(render, error) && check_limits(session, render, error) &&
-           check_camera(render, error) && check_room(session, render, error);
+    return tracer_settings_check(render, error) && check_layers(render, error) &&
+           check_limits(session, render, error) && check_camera(render, error) &&
+           check_room(session, render, error);
 }
 
 /* ---- start ------------------------------------------------------------------------------------------- */
