@@ -113,6 +113,12 @@ void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent)
     bitangent = vec3(b, s + normal.y * normal.y * a, -normal.y);
 }
 
+// Axes x y z as the image that looks along one of them has them: u v depth.
+vec3 in_image(vec3 p, int axis)
+{
+    return axis == 0 ? p.yzx : axis == 1 ? p.zxy : p;
+}
+
 // Moves a point off its surface, to the side the unit normal points to, by about as much as its coordinates
 // are uncertain: integer steps of the last places far from the origin, a fixed way near it.
 // Waechter and Binder, A Fast and Robust Method for Avoiding Self-Intersection, Ray Tracing Gems, chapter 6.

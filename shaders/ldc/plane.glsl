@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The plane of a sample, and how far it goes.
 #include "shared/ldc.h"
+#include "common/math.glsl"
 
 // How far beyond its texel a sample's plane still counts, in cells: what neighbours' planes may leave open between
 // them where a surface bends.
@@ -19,12 +20,6 @@ vec3 direction_from_octahedral(uint bits)
     vec2 folded = (1.0 - abs(v.yx)) * vec2(v.x >= 0.0 ? 1.0 : -1.0, v.y >= 0.0 ? 1.0 : -1.0);
     v.xy = v.z < 0.0 ? folded : v.xy;
     return v;
-}
-
-// World or cube axes x y z as the image of an axis has them: u v depth.
-vec3 in_image(vec3 p, int axis)
-{
-    return axis == 0 ? p.yzx : axis == 1 ? p.zxy : p;
 }
 
 // How far the plane of a sample of an axis's image leaves the sample's depth.
