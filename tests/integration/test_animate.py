@@ -601,6 +601,28 @@ class Progressive(OneDaemon):
         self.assertEqual(self.leftovers(), ["p.exr"])
         digest(path)
 
+    def test_without_a_number_an_interrupt_is_the_end_and_the_picture_says_how_many_samples_it_has(self):
+        path = self.folder / "p.exr"
+        child = subprocess.Popen([BIN / "farlight", "render", bundled_scenes() / "teapot.glb", "-o", path,
+                                  *self.ARGUMENTS, "--progressive=2"], stderr=subprocess.PIPE)
+        held, deadline = 0, time.monotonic() + farlight_test.TIMEOUT_S
+        while held < 6 and time.monotonic() < deadline and child.poll() is None:
+            with contextlib.suppress(FileNotFoundError):
+                held = self.samples(path)
+            time.sleep(0.02)
+        child.send_signal(signal.SIGINT)
+        errors = child.stderr.read().decode()
+        child.stderr.close()
+        self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 0, errors)
+        self.assertEqual(self.leftovers(), ["p.exr"])
+        self.assertGreaterEqual(self.samples(path), held)
+        self.assertIn(f"has {self.samples(path):.0f} samples a pixel", errors)
+        # What was refined is what the same number of samples gives at once.
+        whole = self.folder / "whole.exr"
+        self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", whole, *self.ARGUMENTS, "--samples",
+                             f"{self.samples(path):.0f}", "--progressive"), 0)
+        self.assertEqual(digest(path), digest(whole))
+
     def test_standard_output_is_written_once(self):
         result = self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", "-", "--progressive"), 2)
         self.assertIn("--progressive", result.stderr)
