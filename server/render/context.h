@@ -44,6 +44,7 @@ struct render_context {
     bool sampled_hits;                      /* but for those of discs, those of the wave are stored samples */
     struct gpu_buffer hit_list, hit_places; /* of those paths that hit something, see compact.h */
     uint32_t hit_count;
+    uint32_t asked; /* shadow rays of each hit of the wave in hand that are traced already */
     struct gpu_buffer block_offsets, wave_state; /* of the compaction */
     struct gpu_buffer slice_sums;                /* vec4 a sample of the slice: radiance so far, coverage */
     uint64_t shadow_rays, secondary_rays;        /* of the slice in hand */

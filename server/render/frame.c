@@ -31,7 +31,7 @@
 /* Textures of a picture that goes on and on are taken as if it had so many samples. */
 #define SAMPLES_GOING_ON 16
 
-enum frame_phase { PHASE_IDLE, PHASE_SAMPLE, PHASE_SLICE, PHASE_WAVE, PHASE_RESOLVE };
+enum frame_phase { PHASE_IDLE, PHASE_SAMPLE, PHASE_SLICE, PHASE_SHADE, PHASE_TRACE, PHASE_RESOLVE };
 
 struct frame_renderer {
     struct gpu_device *device;
@@ -344,7 +344,7 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
         renderer->phase = renderer->sample < context->request.samples ? PHASE_SAMPLE : PHASE_RESOLVE;
         return true;
     }
-    renderer->phase = PHASE_WAVE;
+    renderer->phase = PHASE_SHADE;
     return primary_slice(renderer->rasterise ? &renderer->primary : NULL, context, error) &&
            gpu_check(renderer->device, "primary hits", error);
 }
@@ -367,8 +367,9 @@ static bool split_slice(struct frame_renderer *renderer, struct error *error)
     return reserve_waves(renderer, error);
 }
 
-static bool trace_wave(struct render_context *context, struct error *error)
+static bool trace_wave(struct frame_renderer *renderer, struct error *error)
 {
+    struct render_context *context = &renderer->context;
     const struct wave wave = {
         .kind = WAVE_CLOSEST,
         .ray_count = context->ray_count,
@@ -376,6 +377,7 @@ static bool trace_wave(struct render_context *context, struct error *error)
         .hits = &context->hits,
         .times = context_ray_times(context),
     };
+    renderer->phase = PHASE_SHADE;
     if (!wave_trace(context, RAY_SECONDARY, &wave, error))
         return false;
     context->sampled_hits = context->tracer->impl->sampled;
@@ -389,8 +391,11 @@ static bool shade_wave(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->context;
     switch (renderer->integrator->impl->shade(renderer->integrator, context, error)) {
+    case INTEGRATOR_AGAIN:
+        return true;
     case INTEGRATOR_MORE:
-        return trace_wave(context, error);
+        renderer->phase = PHASE_TRACE;
+        return true;
     case INTEGRATOR_OVERFLOW:
         return split_slice(renderer, error);
     case INTEGRATOR_DONE:
@@ -445,8 +450,11 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
     case PHASE_SLICE:
         good = begin_slice(renderer, error);
         break;
-    case PHASE_WAVE:
+    case PHASE_SHADE:
         good = shade_wave(renderer, error);
+        break;
+    case PHASE_TRACE:
+        good = trace_wave(renderer, error);
         break;
     case PHASE_RESOLVE:
         renderer->context.wave_number = 0;

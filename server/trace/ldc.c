@@ -4,6 +4,7 @@
  * Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary Effects. 2007. */
 #include "gpu/timer.h"
 #include "shared/ldc.h"
+#include "trace/axes_draw.h"
 #include "trace/ldc_build.h"
 #include "trace/ldc_levels.h"
 #include "trace/ldc_parts.h"
@@ -139,7 +140,7 @@ static bool build_cube(struct ldc *ldc, unsigned which, struct scene_gpu *scene,
     glFinish(); /* the time of this cube on the CPU's clock is the time until it is there */
     gpu_timer_end(ldc->timer);
     ldc->base.stats.nodes_rebuilt += cube->node_count;
-    ldc->base.stats.uploaded_bytes += (uint64_t)part->count * LDC_BUILD_INSTANCE_BYTES;
+    ldc->base.stats.uploaded_bytes += (uint64_t)part->count * AXES_INSTANCE_BYTES;
     ldc->base.stats.cubes[which].rebuilt = true;
     return ok;
 }

@@ -95,5 +95,5 @@ void main()
     }
     bool seen = !straight && (p.flags & PATH_STRAIGHT) != 0u;
     radiance[k] = vec4(weight * sent, seen ? p.weight_r : 0.0);
-    child_counts[j] = child_count + (asked ? 4u : 0u);
+    note_children(j, true, asked ? 1u : 0u);
 }

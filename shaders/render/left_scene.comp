@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What the paths that left the scene bring home: the environment.
-// Defines: those of common/environment.glsl.
+// Defines: those of common/environment.glsl; OPEN it is 1 everywhere, whatever the environment.
 
 #include "shared/path.h"
 #include "shared/ray.h"
@@ -23,7 +23,10 @@ void main()
         return;
     path p = paths[k];
     bool seen = (p.flags & PATH_STRAIGHT) != 0u && frame.environment_kind != ENVIRONMENT_NONE;
+    vec3 arriving = vec3(1.0);
+#ifndef OPEN
+    arriving = environment_radiance(rays[k].direction_t_max.xyz);
+#endif
     // Pixels beyond the picture's edge have no weight.
-    vec3 arriving = environment_radiance(rays[k].direction_t_max.xyz);
     radiance[k] = vec4(vec3(p.weight_r, p.weight_g, p.weight_b) * arriving, seen ? p.weight_r : 0.0);
 }

@@ -18,6 +18,7 @@ uniform uint first_slot; // of the slice
 uniform uint wave_number;
 uniform uint last_wave;  // 1: no children
 uniform uint children_a_hit; // room for so many
+uniform uint shadow_rays_a_hit;
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
 layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
@@ -101,7 +102,7 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
 
 void no_shadow_ray(uint place)
 {
-    if (frame.light_count == 0u) // nor room for one
+    if (shadow_rays_a_hit == 0u) // nor room for one
         return;
     shadow_rays[place] = ray(vec4(0.0), vec4(0.0, 0.0, 1.0, -1.0));
     light_samples[place] = vec4(0.0); // a dead ray meets nothing, and so lets everything through
@@ -124,4 +125,10 @@ bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float dista
     shadow_times[place] = p.time;
 #endif
     return true;
+}
+
+// `first`: of the batches of shadow rays of the wave, with which the children come.
+void note_children(uint j, bool first, uint shadow_rays_alive)
+{
+    child_counts[j] = (first ? child_count : child_counts[j]) + (shadow_rays_alive << 2);
 }

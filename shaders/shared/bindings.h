@@ -42,6 +42,7 @@
 #define IMAGE_LDC_SURFACE 5
 #define IMAGE_LDC_NODES 0 /* ldc/levels.comp, ldc/cells.comp */
 #define IMAGE_LDC_ENTRIES 1
+#define IMAGE_ABUFFER_VOXELS 0 /* abuffer/voxels.comp */
 
 /* texture units */
 #define UNIT_TRIANGLES 0

@@ -115,7 +115,7 @@ enum oracle_lean { ORACLE_LEANS_AWAY, ORACLE_LEANS_TO, ORACLE_LEANS_SO_SO /* rou
 static inline enum oracle_lean oracle_lean(const double n[3], int axis, bool one)
 {
     double others = fmax(fabs(n[(axis + 1) % 3]), fabs(n[(axis + 2) % 3])), most = fmax(fabs(n[axis]), others);
-    double beyond = one ? (fabs(n[axis]) - others) / most : fabs(n[axis]) / most - (double)LDC_OVERLAP;
+    double beyond = one ? (fabs(n[axis]) - others) / most : fabs(n[axis]) / most - (double)AXES_OVERLAP;
     if (fabs(beyond) <= ORACLE_LEAN)
         return ORACLE_LEANS_SO_SO;
     return beyond > 0 ? ORACLE_LEANS_TO : ORACLE_LEANS_AWAY;
