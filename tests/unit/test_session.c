@@ -112,7 +112,6 @@ static void render(const struct engine_command *command)
         frame->shutter_s = engine.job.shutter / 8;
         frame->result.layers = engine.job.frame.layers ? engine.job.frame.layers : 1;
         frame->result.samples = 5; /* with those of frames before */
-        frame->result.layers = engine.job.frame.layers ? engine.job.frame.layers : 1u << LAYER_BEAUTY;
         memcpy(frame->result.cubes, engine.cubes, sizeof engine.cubes);
         frame->size_bytes = FRAME_BYTES;
         frame->bytes = malloc(FRAME_BYTES);
@@ -1186,15 +1185,11 @@ static void settings_that_no_a_buffer_has_are_refused_by_their_field(void **stat
     }
 }
 
-static void layers_need_floats_and_count_as_pictures(void **state)
+static void layers_count_as_pictures_in_the_memory_for_frames(void **state)
 {
     (void)state;
     open_scene(1, 1);
     struct message message = render_message(0, 1);
-    message.render.layers = 1u << PROTOCOL_LAYER_BEAUTY | 1u << PROTOCOL_LAYER_DEPTH;
-    send_message(2, 0, &message);
-    expect_error(2, PROTOCOL_ERROR_CODE_INVALID);
-    assert_string_equal(client.message.error.field, "render.layers");
     /* While a job runs, all layers are more than is left of the memory for frames; the picture is not. */
     message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     message.render.width = message.render.height = 128;
@@ -1513,7 +1508,7 @@ int main(void)
         BOTH(settings_that_no_cube_has_are_refused_by_their_field),
         BOTH(settings_of_a_buffers_and_light_go_to_the_engine),
         BOTH(settings_that_no_a_buffer_has_are_refused_by_their_field),
-        BOTH(layers_need_floats_and_count_as_pictures),
+        BOTH(layers_count_as_pictures_in_the_memory_for_frames),
         BOTH(cubes_of_a_frame_are_told),
         BOTH(a_job_whose_frames_have_no_room_waits_for_others_to_end),
         BOTH(a_full_engine_makes_clients_wait_and_loses_nothing),
