@@ -193,6 +193,7 @@ CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c 
 $(B)/tests/unit/test_load_model: $(MODEL_OBJ)
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
+$(B)/tests/unit/test_bench_svo: $(RIVAL_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
 $(B)/tests/bench/bench_changes: $(B)/tests/bench/bench_stats.o
 $(B)/tests/bench/bench_forms: $(CONTEST_OBJ) $(RIVAL_OBJ) $(call obj,$(addprefix tests/bench/bench_,forms_frames.c forms_parse.c forms_rays.c forms_samples.c options.c))

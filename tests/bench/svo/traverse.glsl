@@ -28,7 +28,7 @@ const float SKIP_CELLS = 1.0;
 const float SKIP_CELLS = 2.0;
 #endif
 // What is crossed a little outside of the cell counts, as the planes of two neighbours do not meet at their side.
-const float PLANE_MARGIN_CELLS = 0.25;
+const float PLANE_MARGIN_CELLS = 0.5;
 // Of a cell a length of the direction.
 const float SLOWEST = 1e-6;
 
@@ -167,7 +167,7 @@ bool is_hit(svo_walk w, int leaf, out float distance_)
     float approach = dot(normal, w.direction);
     float crossing = (plane.w - dot(normal, w.origin - (vec3(upper) - 0.5))) / approach;
     float margin = PLANE_MARGIN_CELLS * cell_world;
-    distance_ = clamp(crossing, w.t, leaves);
+    distance_ = crossing;
     return crossing >= w.t - margin && crossing <= leaves + margin;
 #else
     return true;
