@@ -188,7 +188,7 @@ BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_changes bench_forms ben
 $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -lembree3 -o $@
 MODEL_OBJ := $(B)/tests/bench/load_model.o
-RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c)) $(RIVAL_SOURCES)
+RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIVAL_SOURCES)
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
 $(B)/tests/unit/test_load_model: $(MODEL_OBJ)
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o

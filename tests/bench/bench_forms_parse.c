@@ -70,7 +70,8 @@ static bool set_tracer(struct bench_form *form, const char *name)
     static const struct {
         const char *name;
         const struct tracer_impl *impl;
-    } rivals[] = {{"svo-cells", &svo_cells_impl}, {"svo-planes", &svo_planes_impl}};
+    } rivals[] = {
+        {"svo-cells", &svo_cells_impl}, {"svo-planes", &svo_planes_impl}, {"svo-tiles", &svo_tiles_impl}};
     for (size_t i = 0; i < sizeof rivals / sizeof *rivals; i++) {
         if (strcmp(name, rivals[i].name) == 0) {
             form->tracer = BENCH_TRACER_RIVAL;

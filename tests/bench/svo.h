@@ -13,6 +13,7 @@
 
 extern const struct tracer_impl svo_cells_impl; /* whatever is in a leaf fills its cell */
 extern const struct tracer_impl svo_planes_impl;
+extern const struct tracer_impl svo_tiles_impl; /* as it was published: svo/svo.h */
 
 /* Of an svo tracer's last update: what the list and the tree hold, and the time until each part of it was done. */
 struct svo_build_facts {

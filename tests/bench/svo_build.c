@@ -20,9 +20,11 @@
 #define CELL_RELATIVE_MIN 1e-6
 #define CELL_MIN 1e-30
 
-void svo_tree_init(struct svo_tree *tree, struct gpu_device *device, uint32_t resolution, bool has_planes)
+void svo_tree_init(struct svo_tree *tree, struct gpu_device *device, uint32_t resolution, enum svo_kind kind)
 {
-    *tree = (struct svo_tree){.device = device, .resolution = resolution, .has_planes = has_planes};
+    *tree = (struct svo_tree){.device = device, .resolution = resolution, .kind = kind};
+    while (1u << tree->levels < resolution)
+        tree->levels++;
     while (4u << tree->top_shift < resolution)
         tree->top_shift += 2;
     axes_draw_init(&tree->draw, device);
@@ -92,17 +94,24 @@ static void set_list(const void *context, const struct gpu_program *program)
     gpu_uniform_uint(program, "fragments_max", ((const struct svo_tree *)context)->fragments_max);
 }
 
+static GLenum fragment_format(const struct svo_tree *tree)
+{
+    return tree->kind == SVO_KIND_CELLS ? GL_RG32UI : GL_RGBA32UI;
+}
+
 static uint32_t fragment_bytes(const struct svo_tree *tree)
 {
-    return tree->has_planes ? 16 : 8;
+    return tree->kind == SVO_KIND_CELLS ? 8 : 16;
 }
 
 /* Once more with room for all, where there was too little. */
 static bool voxelise(struct svo_tree *tree, const struct scene_gpu *scene, struct error *error)
 {
-    static const struct gpu_define planes[] = {{"SVO_PLANES", "1"}, {0}};
+    static const struct gpu_define defines[][2] = {[SVO_KIND_CELLS] = {{0}},
+                                                   [SVO_KIND_PLANES] = {{"SVO_PLANES", "1"}, {0}},
+                                                   [SVO_KIND_TILES] = {{"SVO_TILES", "1"}, {0}}};
     struct axes_pass pass = {.fragment = "svo/voxelise.frag",
-                             .defines = tree->has_planes ? planes : NULL,
+                             .defines = defines[tree->kind],
                              .cell_world = tree->cell_world,
                              .resolution = tree->resolution,
                              .overlap = 1,
@@ -122,8 +131,7 @@ static bool voxelise(struct svo_tree *tree, const struct scene_gpu *scene, struc
         tree->fragments_max = wanted;
         gpu_buffer_clear(device, &tree->counts, 0);
         gpu_buffer_bind_storage(&tree->counts, BIND_SVO_COUNTS);
-        gpu_buffer_bind_image(device, &tree->fragments, IMAGE_SVO_FRAGMENTS,
-                              tree->has_planes ? GL_RGBA32UI : GL_RG32UI);
+        gpu_buffer_bind_image(device, &tree->fragments, IMAGE_SVO_FRAGMENTS, fragment_format(tree));
         if (!axes_draw_bind_plain(&tree->draw, tree->resolution, error) ||
             !axes_draw(&tree->draw, scene, &pass, error))
             return false;
@@ -135,8 +143,7 @@ static bool voxelise(struct svo_tree *tree, const struct scene_gpu *scene, struc
 
 /* ---- the tree ---- */
 
-static const struct gpu_program *use(struct svo_tree *tree, const char *path, const char *define,
-                                     struct error *error)
+const struct gpu_program *svo_use(struct svo_tree *tree, const char *path, const char *define, struct error *error)
 {
     const struct gpu_define defines[] = {{define, "1"}, {0}};
     const struct gpu_program *program = gpu_program_get(
@@ -146,10 +153,9 @@ static const struct gpu_program *use(struct svo_tree *tree, const char *path, co
     return program;
 }
 
-/* Room for `count` records behind those that there are, marked with nothing yet. */
-static bool add_records(struct svo_tree *tree, uint32_t count, struct error *error)
+bool svo_add_records(struct svo_tree *tree, uint32_t count, uint32_t record_bytes, struct error *error)
 {
-    const uint64_t before = (uint64_t)tree->facts.records * RECORD_BYTES, bytes = (uint64_t)count * RECORD_BYTES;
+    const uint64_t before = (uint64_t)tree->facts.records * record_bytes, bytes = (uint64_t)count * record_bytes;
     if (before + bytes > tree->device->facts.storage_block_bytes_max)
         return error_set(error, ERROR_LIMIT, NULL, "an octree of more than %u records", tree->facts.records);
     if (!ldc_store_grow(tree->device, &tree->records, before, before + bytes, error))
@@ -160,22 +166,38 @@ static bool add_records(struct svo_tree *tree, uint32_t count, struct error *err
     return true;
 }
 
-static void bind_fragments(struct svo_tree *tree, const struct gpu_program *program)
+uint32_t svo_allocate(struct svo_tree *tree, const struct gpu_program *program, uint32_t first, uint32_t next)
 {
-    gpu_buffer_bind_texels(tree->device, &tree->fragments, UNIT_SVO_FRAGMENTS,
-                           tree->has_planes ? GL_RGBA32UI : GL_RG32UI);
+    struct svo_counts counts = {.fragments = tree->facts.fragments, .children = next};
+    gpu_buffer_write(tree->device, &tree->counts, 0, &counts, sizeof counts);
+    gpu_buffer_bind_storage(&tree->counts, BIND_SVO_COUNTS);
+    gpu_uniform_uint(program, "first_record", first);
+    gpu_uniform_uint(program, "record_count", tree->facts.records - first);
+    gpu_dispatch(tree->device, program, tree->facts.records - first);
+    read_counts(tree, &counts);
+    return counts.children;
+}
+
+void svo_bind_fragments(struct svo_tree *tree, const struct gpu_program *program)
+{
+    gpu_buffer_bind_texels(tree->device, &tree->fragments, UNIT_SVO_FRAGMENTS, fragment_format(tree));
+    gpu_uniform_uint(program, "fragment_count", tree->facts.fragments);
+}
+
+static void bind(struct svo_tree *tree, const struct gpu_program *program)
+{
+    svo_bind_fragments(tree, program);
     gpu_buffer_bind_texels(tree->device, &tree->records, UNIT_SVO_RECORDS, GL_RGBA32UI);
     gpu_buffer_bind_image(tree->device, &tree->current, IMAGE_SVO_CURRENT, GL_R32UI);
-    gpu_uniform_uint(program, "fragment_count", tree->facts.fragments);
 }
 
 static bool mark(struct svo_tree *tree, uint32_t shift, struct error *error)
 {
     const struct gpu_program *program =
-        use(tree, "svo/mark.comp", shift == tree->top_shift ? "SVO_TOP" : NULL, error);
+        svo_use(tree, "svo/mark.comp", shift == tree->top_shift ? "SVO_TOP" : NULL, error);
     if (!program)
         return false;
-    bind_fragments(tree, program);
+    bind(tree, program);
     gpu_buffer_bind_storage(&tree->records, BIND_SVO_MARKS);
     gpu_uniform_int(program, "shift", (int32_t)shift);
     gpu_dispatch(tree->device, program, tree->facts.fragments);
@@ -186,20 +208,12 @@ static bool mark(struct svo_tree *tree, uint32_t shift, struct error *error)
 static bool allocate(struct svo_tree *tree, uint32_t first, bool are_leaves, uint32_t *children,
                      struct error *error)
 {
-    const struct gpu_program *program = use(tree, "svo/allocate.comp", NULL, error);
-    struct svo_counts counts = {.fragments = tree->facts.fragments,
-                                .children = are_leaves ? 0 : tree->facts.records};
-    const uint32_t begin = counts.children;
+    const struct gpu_program *program = svo_use(tree, "svo/allocate.comp", NULL, error);
+    const uint32_t next = are_leaves ? 0 : tree->facts.records;
     if (!program)
         return false;
-    gpu_buffer_write(tree->device, &tree->counts, 0, &counts, sizeof counts);
-    gpu_buffer_bind_storage(&tree->counts, BIND_SVO_COUNTS);
     gpu_buffer_bind_image(tree->device, &tree->records, IMAGE_SVO_RECORDS, GL_RGBA32UI);
-    gpu_uniform_uint(program, "first_record", first);
-    gpu_uniform_uint(program, "record_count", tree->facts.records - first);
-    gpu_dispatch(tree->device, program, tree->facts.records - first);
-    read_counts(tree, &counts);
-    *children = counts.children - begin;
+    *children = svo_allocate(tree, program, first, next) - next;
     return true;
 }
 
@@ -209,7 +223,7 @@ static bool grow(struct svo_tree *tree, struct error *error)
     tree->facts.records = 0;
     for (uint32_t shift = tree->top_shift;; shift -= 2) {
         first = tree->facts.records;
-        if (!add_records(tree, children, error) || !mark(tree, shift, error) ||
+        if (!svo_add_records(tree, children, RECORD_BYTES, error) || !mark(tree, shift, error) ||
             !allocate(tree, first, shift == 0, &children, error))
             return false;
         if (shift == 0)
@@ -223,7 +237,7 @@ static bool grow(struct svo_tree *tree, struct error *error)
 
 static bool make_planes(struct svo_tree *tree, struct error *error)
 {
-    const struct gpu_program *program = use(tree, "svo/planes.comp", NULL, error);
+    const struct gpu_program *program = svo_use(tree, "svo/planes.comp", NULL, error);
     if (!program)
         return false;
     gpu_buffer_bind_image(tree->device, &tree->sums, IMAGE_SVO_SUMS, GL_R32I);
@@ -233,29 +247,46 @@ static bool make_planes(struct svo_tree *tree, struct error *error)
     return true;
 }
 
-static bool fill_leaves(struct svo_tree *tree, struct error *error)
+bool svo_reserve_leaves(struct svo_tree *tree, struct error *error)
 {
-    const size_t leaves = tree->facts.leaves;
+    const size_t leaves = tree->facts.leaves, planes = tree->kind == SVO_KIND_CELLS ? 0 : leaves;
     struct gpu_device *device = tree->device;
     if (leaves > device->facts.texture_buffer_texels_max / 4)
         return error_set(error, ERROR_LIMIT, NULL, "an octree of %zu leaves", leaves);
     if (!gpu_buffer_reserve(device, &tree->ids, leaves * sizeof(uint32_t), error) ||
-        !gpu_buffer_reserve(device, &tree->planes, tree->has_planes ? leaves * sizeof(uint32_t) : 0, error) ||
-        !gpu_buffer_reserve(device, &tree->sums, tree->has_planes ? leaves * SUMS_BYTES : 0, error))
+        !gpu_buffer_reserve(device, &tree->planes, planes * sizeof(uint32_t), error))
         return false;
     gpu_buffer_clear(device, &tree->ids, UINT32_MAX);
-    if (tree->has_planes)
+    if (planes > 0)
+        gpu_buffer_clear(device, &tree->planes, 0);
+    return true;
+}
+
+static bool fill_leaves(struct svo_tree *tree, struct error *error)
+{
+    struct gpu_device *device = tree->device;
+    const bool has_planes = tree->kind == SVO_KIND_PLANES;
+    if (!svo_reserve_leaves(tree, error) ||
+        (has_planes && !gpu_buffer_reserve(device, &tree->sums, (size_t)tree->facts.leaves * SUMS_BYTES, error)))
+        return false;
+    if (has_planes)
         gpu_buffer_clear(device, &tree->sums, 0);
-    const struct gpu_program *program =
-        use(tree, "svo/leaves.comp", tree->has_planes ? "SVO_PLANES" : NULL, error);
+    const struct gpu_program *program = svo_use(tree, "svo/leaves.comp", has_planes ? "SVO_PLANES" : NULL, error);
     if (!program)
         return false;
-    bind_fragments(tree, program);
+    bind(tree, program);
     gpu_buffer_bind_image(device, &tree->ids, IMAGE_SVO_IDS, GL_R32UI);
-    if (tree->has_planes)
+    if (has_planes)
         gpu_buffer_bind_image(device, &tree->sums, IMAGE_SVO_SUMS, GL_R32I);
     gpu_dispatch(device, program, tree->facts.fragments);
-    return !tree->has_planes || make_planes(tree, error);
+    return !has_planes || make_planes(tree, error);
+}
+
+/* From fragments to a tree of records. */
+static bool grow_records(struct svo_tree *tree, struct error *error)
+{
+    return gpu_buffer_reserve(tree->device, &tree->current, tree->facts.fragments * sizeof(uint32_t), error) &&
+           grow(tree, error) && fill_leaves(tree, error);
 }
 
 /* ---- all ---- */
@@ -269,8 +300,7 @@ static bool build(struct svo_tree *tree, struct scene_gpu *scene, struct error *
         return false;
     tree->facts.voxelise_ns = clock_now_ns() - start_ns;
     if (tree->facts.fragments > 0 &&
-        !(gpu_buffer_reserve(device, &tree->current, tree->facts.fragments * sizeof(uint32_t), error) &&
-          grow(tree, error) && fill_leaves(tree, error)))
+        !(tree->kind == SVO_KIND_TILES ? svo_tiles_grow(tree, error) : grow_records(tree, error)))
         return false;
     glFinish();
     tree->facts.tree_ns = clock_now_ns() - start_ns - tree->facts.voxelise_ns;

@@ -214,6 +214,7 @@ static void cells_are_hit_where_the_surface_is(void **state)
 {
     (void)state;
     hits_are_of(&svo_cells_impl, DIAGONAL_CELLS, DIAGONAL_CELLS / 2);
+    hits_are_of(&svo_tiles_impl, DIAGONAL_CELLS, DIAGONAL_CELLS / 2);
 }
 
 /* What a cell has of these spheres is a tenth of a cell from its plane: it bends by 1 / (2 radius) cells, where a
@@ -227,11 +228,11 @@ static void planes_are_hit_nearer_to_it(void **state)
 static void rays_to_anything_are_stopped_where_it_is(void **state)
 {
     (void)state;
-    static const struct tracer_impl *const impls[] = {&svo_cells_impl, &svo_planes_impl};
+    static const struct tracer_impl *const impls[] = {&svo_cells_impl, &svo_planes_impl, &svo_tiles_impl};
     struct stage stage;
     begin(&stage);
     uint32_t *visibility = malloc(RAYS * sizeof *visibility);
-    for (int which = 0; which < 2; which++) {
+    for (int which = 0; which < 3; which++) {
         struct tracer *tracer = build(&stage, impls[which], RESOLUTION);
         const float margin = DIAGONAL_CELLS * svo_facts(tracer).cell_world;
         trace(&stage, tracer, WAVE_ANY, visibility, RAYS * sizeof *visibility);

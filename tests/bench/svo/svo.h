@@ -21,8 +21,14 @@
  *              average distance of that along the normal from the middle of the cell, SVO_PLANE_UNIT cells for 1.
  *              SVO_NO_PLANE: what is in it faces all ways
  *
+ * Tiles: the tree as Crassin and Green have it, for comparison: nodes with pointers to tiles of eight children, found anew
+ * from the root by each fragment at each level and by each ray in each step, and normals averaged leaf by leaf.
+ *   records    R32UI, one a node: bits 0..30 the first of its children, 0: none; SVO_HOLDS. Nodes of the last level are
+ *              leaves, whether they hold something or not
+ *   planes     R32UI, one a leaf: average normal, unorm 3 x 8 bits, 0.5 for 0, and above them how many they are
+ *
  * While it is built:
- *   fragments  RG32UI: bits 0..9, 10..19, 20..29 x, y, z; id. With planes RGBA32UI: z the geometric normal, 2 x 16 bit
+ *   fragments  RG32UI: bits 0..9, 10..19, 20..29 x, y, z; id. With planes or tiles RGBA32UI: z the geometric normal, 2 x 16 bit
  *              octahedral snorm, w distance along it from the middle of the cell (float, cells)
  *   current    R32UI, one a fragment: the record that it has come to
  *   sums       R32I, four a leaf: normals, SVO_NORMAL_UNIT for 1, then distances, SVO_DISTANCE_UNIT for a cell, times
@@ -32,6 +38,7 @@
 #include "shared/types.h"
 
 #define SVO_SIDE_MAX 1024 /* cells; a cell's place has 30 bits */
+#define SVO_HOLDS 0x80000000u
 #define SVO_EIGHT 0x00330033u /* 2 x 2 x 2 of 32 bits */
 #define SVO_PLANE_BITS 11
 #define SVO_PLANE_UNIT 0.001953125f /* 1 / 512 */

@@ -8,17 +8,15 @@
 // Defines: SVO_PLANES  a leaf is hit where the ray crosses its plane, within the cell; else anywhere in it
 //          SVO_TOP_SHIFT  the root's grandchildren are cells of 2^SVO_TOP_SHIFT: 8 and less
 #include "common/candidate.glsl"
+#include "svo/held.glsl"
 #include "svo/plane.glsl"
 #include "svo/tree.glsl"
 
-layout(binding = UNIT_SVO_IDS) uniform usamplerBuffer ids;
 layout(binding = UNIT_SVO_PLANES) uniform usamplerBuffer planes;
-layout(binding = UNIT_SVO_DRAWN) uniform usamplerBuffer drawn;
 
 uniform vec3 lower_world;
 uniform float cell_world;
 uniform vec3 lower_cells, upper_cells; // whole numbers: nothing lies outside
-uniform uint drawn_count;
 
 const int SIDE = 4 << SVO_TOP_SHIFT;
 // A ray that begins on a surface begins within a cell that holds it, and often leaves it by another.
@@ -172,21 +170,6 @@ bool is_hit(svo_walk w, int leaf, out float distance_)
 #else
     return true;
 #endif
-}
-
-// What is in a leaf: primitive and instance, by the last instance whose first id is not behind (shared/axes.h).
-candidate candidate_of(int leaf, float distance_)
-{
-    uint id = texelFetch(ids, leaf).x, first = 0u, behind = drawn_count;
-    while (behind - first > 1u) {
-        uint middle = (first + behind) / 2u;
-        if (texelFetch(drawn, int(middle)).x <= id)
-            first = middle;
-        else
-            behind = middle;
-    }
-    uvec4 words = texelFetch(drawn, int(first));
-    return candidate(distance_, id - words.y, words.z, vec2(0.0));
 }
 
 // Cells side by side are taken to be one surface, which takes of the light once.

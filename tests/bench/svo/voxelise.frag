@@ -2,7 +2,7 @@
 // Cells that a primitive is in, noted in a list: the one under the middle of the texel, along the axis that the surface
 // leans to most. Such cells of a plane let no path from cell to neighbouring cell through. With planes all cells that
 // it is in under the texel, as a ray asks each for itself: up to three.
-// Defines: those of common/axes_fragment.glsl; SVO_PLANES
+// Defines: those of common/axes_fragment.glsl; SVO_PLANES; SVO_TILES
 
 #include "shared/bindings.h"
 #include "common/axes_fragment.glsl"
@@ -11,7 +11,7 @@
 
 uniform uint fragments_max;
 
-#ifdef SVO_PLANES
+#if defined SVO_PLANES || defined SVO_TILES
 layout(binding = IMAGE_SVO_FRAGMENTS, rgba32ui) writeonly uniform uimageBuffer fragments;
 #else
 layout(binding = IMAGE_SVO_FRAGMENTS, rg32ui) writeonly uniform uimageBuffer fragments;
@@ -27,7 +27,7 @@ void record(vec3 place_cells, int depth, vec3 normal)
     cell[gl_Layer] = depth;
     cell = clamp(cell, ivec3(0), ivec3(int(texels_along) - 1));
     uvec4 words = uvec4(cell.x | cell.y << 10 | cell.z << 20, primitive.x, 0u, 0u);
-#ifdef SVO_PLANES
+#if defined SVO_PLANES || defined SVO_TILES
     words.z = pack_unit(normal);
     words.w = floatBitsToUint(dot(normal, place_cells - (vec3(cell) + 0.5)));
 #endif
