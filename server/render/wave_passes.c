@@ -17,6 +17,11 @@
 #define WAVE_STATE_SHADOW_RAYS pad0
 #define DEFINES_MAX 12
 
+void wave_passes_init(struct wave_passes *passes, const struct wave_passes_kind *kind, struct gpu_device *device)
+{
+    *passes = (struct wave_passes){.base = {kind->impl, device}, .kind = kind};
+}
+
 struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struct gpu_device *device,
                                       struct error *error)
 {
@@ -25,7 +30,7 @@ struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struc
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the integrator");
         return NULL;
     }
-    *passes = (struct wave_passes){.base = {kind->impl, device}, .kind = kind};
+    wave_passes_init(passes, kind, device);
     return &passes->base;
 }
 
@@ -138,7 +143,7 @@ bool wave_passes_run(struct wave_passes *passes, struct render_context *context,
 /* What the paths that left the scene bring home. */
 static bool left_scene(struct wave_passes *passes, struct render_context *context, struct error *error)
 {
-    struct gpu_define defines[3] = {0};
+    struct gpu_define defines[4] = {0};
     size_t n = 0;
     if (context->hit_count == context->ray_count)
         return true;
@@ -146,7 +151,11 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (passes->kind->left_scene)
         defines[n++] = (struct gpu_define){passes->kind->left_scene, "1"};
+    if (passes->kind->left_scene && context->features.area_lights)
+        defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     context_bind(context);
+    gpu_buffer_bind_texels(context->device, environment_lights(&context->environment, context->scene),
+                           UNIT_SHADE_LIGHTS, GL_RGBA32F);
     const struct gpu_program *program = use(context, "render/left_scene.comp", defines, error);
     if (!program)
         return false;
