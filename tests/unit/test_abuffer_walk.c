@@ -26,9 +26,8 @@ static struct outcome compare(struct fixture *fixture, int form, const struct ra
             along[k] = (double)rays[i].direction_t_max[k];
             size = fmax(size, fabs(along[k]));
         }
-        const struct exact_hit exact =
-            abuffer_exact(&fixture->samples, from, along, (double)rays[i].origin_t_min[3],
-                          (double)rays[i].direction_t_max[3]);
+        const struct exact_hit exact = abuffer_exact(
+            &fixture->samples, from, along, (double)rays[i].origin_t_min[3], (double)rays[i].direction_t_max[3]);
         const bool hit = hits[i].distance >= 0, exact_hit = exact.distance < INFINITY;
         o.any_wrong += (visibility[i] == 0) != exact_hit;
         o.only_exact += exact_hit && !hit;
@@ -45,8 +44,8 @@ static struct outcome compare(struct fixture *fixture, int form, const struct ra
     return o;
 }
 
-/* Shares of all rays, in thousandths, that a search may get wrong: closest hits that are missed, or are where nothing
- * is; that are elsewhere; any-hit rays. */
+/* Shares of all rays, in thousandths, that a search may get wrong: closest hits that are missed, or are where
+ * nothing is; that are elsewhere; any-hit rays. */
 struct limits {
     double hit, far, any;
 };
@@ -63,8 +62,8 @@ static void expect_near(struct fixture *fixture, const char *name, const struct 
                name, forms[f].name, count, o.both, o.only_exact, o.only_walk, o.far, o.any_wrong);
         assert_true(o.both > count / 8); /* else little was tested */
         if (!(hit <= limits[f].hit && far <= limits[f].far && any <= limits[f].any))
-            fail_msg("%s, %s: %.2f, %.2f, %.2f of a thousand rays are wrong, at most %.2f, %.2f, %.2f may be", name,
-                     forms[f].name, hit, far, any, limits[f].hit, limits[f].far, limits[f].any);
+            fail_msg("%s, %s: %.2f, %.2f, %.2f of a thousand rays are wrong, at most %.2f, %.2f, %.2f may be",
+                     name, forms[f].name, hit, far, any, limits[f].hit, limits[f].far, limits[f].any);
     }
 }
 
@@ -79,7 +78,6 @@ static void random_rays(struct ray *rays, uint32_t count, uint64_t seed)
         rays[i] = ray_from(o, d, 0, i % 3 == 0 ? 0.7f : FAR);
     }
 }
-
 
 /* ---- shapes, from everywhere ---- */
 
@@ -133,9 +131,9 @@ static void add_room(struct abuffer_samples *s)
     add_ball(s, (const double[3]){101.3, 60.1, 118.7}, 30.4, 30, true);
 }
 
-/* Where an edge passes a texel a sample's plane goes on beyond it, by up to half a texel: of the searches that look at
- * all texels a few rays in a thousand see that. Steps miss what is passed twice between two of them, which is at edges
- * and rims, by the length of a step: a voxel is 15 cells wide here, and shapes are some 100. */
+/* Where an edge passes a texel a sample's plane goes on beyond it, by up to half a texel: of the searches that
+ * look at all texels a few rays in a thousand see that. Steps miss what is passed twice between two of them, which
+ * is at edges and rims, by the length of a step: a voxel is 15 cells wide here, and shapes are some 100. */
 static void rays_meet_shapes_where_they_are(void **state)
 {
     (void)state;
@@ -232,8 +230,8 @@ static void deep_columns_are_searched_at_their_depth(void **state)
     free(rays);
 }
 
-/* What is small is met by rays that begin millions of its cells away, but for what the floats round that tell where the
- * ray begins, which is up to half a cell. */
+/* What is small is met by rays that begin millions of its cells away, but for what the floats round that tell
+ * where the ray begins, which is up to half a cell. */
 static void rays_from_afar_meet_what_is_small(void **state)
 {
     (void)state;
