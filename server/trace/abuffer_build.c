@@ -72,17 +72,11 @@ void abuffer_read_counts(struct abuffer_task *task)
     gpu_buffer_read(task->builder->device, &task->builder->build, 0, &task->counts, sizeof(task->counts));
 }
 
-/* Those that have primitives. */
 static bool list_instances(struct abuffer_task *task, struct error *error)
 {
-    const struct scene_gpu *scene = task->scene;
-    uint32_t *instances = malloc(((size_t)scene->instance_count + 1) * sizeof(*instances)), count = 0;
-    if (!instances)
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u instances", scene->instance_count);
-    for (uint32_t i = 0; i < scene->instance_count; i++)
-        if (scene->geometries[scene->instances[i].geometry].device.primitive_count > 0)
-            instances[count++] = i;
-    bool listed = axes_draw_prepare(&task->builder->draw, scene, instances, count, error);
+    uint32_t *instances = NULL, count = 0;
+    bool listed = axes_list_instances(task->scene, &instances, &count, error) &&
+                  axes_draw_prepare(&task->builder->draw, task->scene, instances, count, error);
     free(instances);
     return listed;
 }

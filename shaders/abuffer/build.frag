@@ -17,7 +17,7 @@ layout(binding = IMAGE_ABUFFER_NODES, rgba32ui) writeonly uniform uimageBuffer n
 layout(binding = IMAGE_ABUFFER_SUMS, r32i) uniform iimageBuffer sums;
 layout(std430, binding = BIND_ABUFFER_BUILD_COUNTS) buffer build_block { abuffer_build_counts build; };
 
-// Whether there was room. Without, all is drawn once more: no more need be done for this one.
+// Whether there was room. Without, this one is only counted, as all is drawn once more.
 bool link(float depth_cells, uint bits)
 {
     uint node = atomicAdd(build.nodes, 1u);
@@ -145,7 +145,7 @@ void main()
         uint face = face_of(normal);
         if (!link(depth_cells, face & FACE_NORMAL_MASK | (closed ? ABUFFER_NODE_CLOSED : 0u) |
                                    (side == 1 ? ABUFFER_NODE_LEAVES : 0u)))
-            return;
+            continue;
         mark(least_cells, most_cells, sum_bits(face, closed, side == 1));
         if (axis_of(abs(normal)) == axis)
             add_normal(depth_cells, vec3(normal[axis], normal[u], normal[v]));
