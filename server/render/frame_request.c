@@ -8,6 +8,7 @@
 #include <string.h>
 
 #define SIZE_MAX_PIXELS 16384u /* width and height; keeps the number of a pixel in 32 bits */
+#define AO_RAYS_MAX 65536u     /* keeps the number of a sample's rays in 32 bits */
 
 static bool check_camera(const struct frame_request *request, struct error *error)
 {
@@ -29,6 +30,50 @@ static bool check_camera(const struct frame_request *request, struct error *erro
     return true;
 }
 
+static bool check_integrator(const struct frame_request *request, struct error *error)
+{
+    if (!integrator_impl_by_number(request->integrator))
+        return error_set(error, ERROR_UNSUPPORTED, "integrator", "there is no integrator number %u",
+                         (unsigned)request->integrator);
+    if (request->brdf > FRAME_BRDF_WARD)
+        return error_set(error, ERROR_UNSUPPORTED, "brdf", "there is no reflection model number %u",
+                         (unsigned)request->brdf);
+    if (!(request->ao_distance >= 0.0f && isfinite(request->ao_distance)))
+        return error_set(error, ERROR_INVALID, "ao_distance", "%g metres; 0 and more are possible",
+                         (double)request->ao_distance);
+    if (!(request->ao_falloff >= 0.0f && isfinite(request->ao_falloff)))
+        return error_set(error, ERROR_INVALID, "ao_falloff", "a power of %g; 0 and more are possible",
+                         (double)request->ao_falloff);
+    if (request->ao_rays > AO_RAYS_MAX)
+        return error_set(error, ERROR_INVALID, "ao_rays", "%u rays a sample; up to %u are possible",
+                         request->ao_rays, AO_RAYS_MAX);
+    if (!(request->layer_opacity >= 0.0f && request->layer_opacity <= 1.0f))
+        return error_set(error, ERROR_INVALID, "layer_opacity", "%g; 0 to 1 are possible",
+                         (double)request->layer_opacity);
+    return true;
+}
+
+uint32_t frame_request_layers(const struct frame_request *request)
+{
+    return request->layers ? request->layers : 1u << LAYER_BEAUTY;
+}
+
+uint64_t frame_request_bytes(const struct frame_request *request)
+{
+    return (uint64_t)request->width * request->height * picture_pixel_bytes(request->format) *
+           (uint64_t)__builtin_popcount(frame_request_layers(request));
+}
+
+static bool check_layers(const struct frame_request *request, struct error *error)
+{
+    if (request->layers >= 1u << LAYER_COUNT)
+        return error_set(error, ERROR_UNSUPPORTED, "layers", "there is no layer number %d",
+                         31 - __builtin_clz(request->layers));
+    if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != FRAME_RGBA32F)
+        return error_set(error, ERROR_UNSUPPORTED, "layers", "layers beside the beauty need the format rgba32f");
+    return true;
+}
+
 bool frame_request_check(const struct frame_request *request, struct error *error)
 {
     if (request->width == 0 || request->height == 0 || request->width > SIZE_MAX_PIXELS ||
@@ -37,16 +82,13 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
                          request->width, request->height, SIZE_MAX_PIXELS);
     if (request->samples == 0)
         return error_set(error, ERROR_INVALID, "samples", "a picture of no samples");
-    if (!integrator_impl_by_number(request->integrator))
-        return error_set(error, ERROR_UNSUPPORTED, "integrator", "there is no integrator number %u",
-                         (unsigned)request->integrator);
     if (request->filter > FILTER_BOX)
         return error_set(error, ERROR_UNSUPPORTED, "pixel_filter", "there is no pixel filter number %u",
                          (unsigned)request->filter);
     if (picture_pixel_bytes(request->format) == 0)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
-    return check_camera(request, error);
+    return check_integrator(request, error) && check_layers(request, error) && check_camera(request, error);
 }
 
 static bool same_camera(const struct frame_camera *a, const struct frame_camera *b)
@@ -61,10 +103,17 @@ static bool same_tracer(const struct frame_request *a, const struct frame_reques
            a->primary == b->primary && a->compare == b->compare;
 }
 
+/* Whether or not the integrator asks for them. */
+static bool same_light(const struct frame_request *a, const struct frame_request *b)
+{
+    return a->integrator == b->integrator && a->brdf == b->brdf && a->ao_distance == b->ao_distance &&
+           a->ao_falloff == b->ao_falloff && a->ao_rays == b->ao_rays && a->layer_opacity == b->layer_opacity;
+}
+
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b)
 {
     return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height &&
-           a->depth == b->depth && a->seed == b->seed && a->integrator == b->integrator &&
-           a->aperture == b->aperture && a->focus == b->focus && a->filter == b->filter &&
-           same_camera(&a->camera, &b->camera) && same_tracer(a, b);
+           a->depth == b->depth && a->seed == b->seed && same_light(a, b) && a->aperture == b->aperture &&
+           a->focus == b->focus && a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
+           same_tracer(a, b) && frame_request_layers(a) == frame_request_layers(b);
 }

@@ -13,22 +13,24 @@
 #include <epoxy/gl.h>
 #include <stdlib.h>
 
-/* Waves beyond the depth that are left to rays which go straight on through blended surfaces: those do not
- * count as bounces. */
-#define BLEND_LAYERS_MAX 16
 /* What the scan over the blocks leaves in the wave state's free words. */
 #define WAVE_STATE_SHADOW_RAYS pad0
 #define DEFINES_MAX 12
 
-struct integrator *wave_passes_create(const struct integrator_impl *impl, struct gpu_device *device,
-                                      uint32_t children_a_hit, uint32_t shadow_waves, struct error *error)
+void wave_passes_init(struct wave_passes *passes, const struct wave_passes_kind *kind, struct gpu_device *device)
+{
+    *passes = (struct wave_passes){.base = {kind->impl, device}, .kind = kind};
+}
+
+struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struct gpu_device *device,
+                                      struct error *error)
 {
     struct wave_passes *passes = calloc(1, sizeof(*passes));
     if (!passes) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the integrator");
         return NULL;
     }
-    *passes = (struct wave_passes){{impl, device}, .children_a_hit = children_a_hit, .shadow_waves = shadow_waves};
+    wave_passes_init(passes, kind, device);
     return &passes->base;
 }
 
@@ -36,8 +38,8 @@ bool wave_passes_reserve(struct integrator *integrator, struct render_context *c
 {
     struct wave_passes *passes = (struct wave_passes *)integrator;
     struct gpu_device *device = context->device;
-    size_t waves = context->wave_capacity, children = waves * passes->children_a_hit;
-    size_t shadows = context->uniforms.light_count > 0 ? waves * passes->shadow_waves : 0;
+    size_t waves = context->wave_capacity, children = waves * passes->kind->children_a_hit;
+    size_t shadows = passes->kind->shadow_rays_a_hit(context) > 0 ? waves * passes->kind->shadow_waves : 0;
     size_t shadow_times = context->scene->has_motion ? shadows : 0;
     return gpu_buffer_reserve(device, &passes->radiance, waves * sizeof(vec4), error) &&
            gpu_buffer_reserve(device, &passes->children, children * sizeof(struct child), error) &&
@@ -85,13 +87,9 @@ static const struct gpu_program *use(struct render_context *context, const char 
 
 static void bind_shading(struct wave_passes *passes, struct render_context *context)
 {
-    context_bind(context);
-    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
-    gpu_buffer_bind_texels(context->device, &context->paths, UNIT_SHADE_PATHS, GL_RGBA32UI);
+    context_bind_hits(context);
     gpu_buffer_bind_texels(context->device, environment_lights(&context->environment, context->scene),
                            UNIT_SHADE_LIGHTS, GL_RGBA32F);
-    gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     gpu_buffer_bind_storage(&passes->children, BIND_CHILDREN);
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
@@ -109,14 +107,7 @@ const struct gpu_program *wave_passes_shade_program(struct wave_passes *passes, 
     size_t n = 0;
     for (; own && own->name; own++)
         defines[n++] = *own;
-    /* Only discs have textures that are not applied already. */
-    bool sampled = context->sampled_hits, exact = !sampled || context->scene->disc_count > 0;
-    if (sampled)
-        defines[n++] = (struct gpu_define){"HAS_SAMPLED", "1"};
-    if (context->features.textures && exact)
-        defines[n++] = (struct gpu_define){"HAS_TEXTURES", "1"};
-    if (context->features.bump && exact)
-        defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
+    n += context_surface_defines(context, defines + n);
     if (context->features.area_lights)
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     if (context->scene->has_motion)
@@ -124,24 +115,48 @@ const struct gpu_program *wave_passes_shade_program(struct wave_passes *passes, 
     const struct gpu_program *program = use(context, compute, defines, error);
     if (!program)
         return NULL;
-    bool last = context->wave_number >= context->request.depth + BLEND_LAYERS_MAX;
+    bool last = context->wave_number >= context->request.depth + passes->kind->straight_waves;
     gpu_uniform_uint(program, "hit_count", context->hit_count);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
     gpu_uniform_uint(program, "wave_number", context->wave_number);
     gpu_uniform_uint(program, "last_wave", last);
-    gpu_uniform_uint(program, "children_a_hit", passes->children_a_hit);
+    gpu_uniform_uint(program, "children_a_hit", passes->kind->children_a_hit);
+    gpu_uniform_uint(program, "shadow_rays_a_hit", passes->kind->shadow_rays_a_hit(context));
     bind_shading(passes, context);
     return program;
 }
 
-bool wave_passes_left_scene(struct wave_passes *passes, struct render_context *context, struct error *error)
+bool wave_passes_run(struct wave_passes *passes, struct render_context *context, const char *compute,
+                     const struct gpu_define *defines, uint32_t first, uint32_t count, struct error *error)
 {
-    static const struct gpu_define image[] = {{"HAS_ENVIRONMENT_IMAGE", "1"}, {NULL, NULL}};
+    context_span_begin(context, STAGE_SHADE);
+    const struct gpu_program *program = wave_passes_shade_program(passes, context, compute, defines, error);
+    if (program) {
+        gpu_uniform_uint(program, "first_ray", first);
+        gpu_uniform_uint(program, "batch_rays", count);
+        gpu_dispatch(context->device, program, context->hit_count);
+    }
+    context_span_end(context);
+    return program != NULL;
+}
+
+/* What the paths that left the scene bring home. */
+static bool left_scene(struct wave_passes *passes, struct render_context *context, struct error *error)
+{
+    struct gpu_define defines[4] = {0};
+    size_t n = 0;
     if (context->hit_count == context->ray_count)
         return true;
+    if (context->environment.kind == ENVIRONMENT_IMAGE)
+        defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
+    if (passes->kind->left_scene)
+        defines[n++] = (struct gpu_define){passes->kind->left_scene, "1"};
+    if (passes->kind->left_scene && context->features.area_lights)
+        defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     context_bind(context);
-    const struct gpu_program *program = use(context, "render/left_scene.comp",
-                                            context->environment.kind == ENVIRONMENT_IMAGE ? image : NULL, error);
+    gpu_buffer_bind_texels(context->device, environment_lights(&context->environment, context->scene),
+                           UNIT_SHADE_LIGHTS, GL_RGBA32F);
+    const struct gpu_program *program = use(context, "render/left_scene.comp", defines, error);
     if (!program)
         return false;
     gpu_uniform_uint(program, "ray_count", context->ray_count);
@@ -155,8 +170,9 @@ bool wave_passes_left_scene(struct wave_passes *passes, struct render_context *c
     return true;
 }
 
-bool wave_passes_trace_shadows(struct wave_passes *passes, struct render_context *context, uint32_t rays_a_hit,
-                               struct error *error)
+/* The shadow rays that were made: hit_count times `rays_a_hit`. */
+static bool trace_shadows(struct wave_passes *passes, struct render_context *context, uint32_t rays_a_hit,
+                          struct error *error)
 {
     struct wave wave = {
         .kind = WAVE_ANY,
@@ -168,16 +184,18 @@ bool wave_passes_trace_shadows(struct wave_passes *passes, struct render_context
     return wave_trace(context, RAY_SHADOW, &wave, error);
 }
 
-bool wave_passes_gather(struct wave_passes *passes, struct render_context *context, bool first,
-                        uint32_t rays_a_hit, struct error *error)
+/* Adds the light that they let through to the wave's radiance, and after the last batch that to the samples. */
+static bool gather(struct wave_passes *passes, struct render_context *context, bool last, uint32_t rays_a_hit,
+                   struct error *error)
 {
-    const struct gpu_program *program = context_use(context, "render/gather.comp", error);
+    const struct gpu_define defines[2] = {{passes->kind->gather, "1"}, {NULL, NULL}};
+    const struct gpu_program *program = use(context, "render/gather.comp", defines, error);
     if (!program)
         return false;
     gpu_uniform_uint(program, "ray_count", context->ray_count);
     gpu_uniform_uint(program, "hit_count", context->hit_count);
-    gpu_uniform_uint(program, "batch_lights", rays_a_hit);
-    gpu_uniform_uint(program, "first_batch", first);
+    gpu_uniform_uint(program, "batch_rays", rays_a_hit);
+    gpu_uniform_uint(program, "last_batch", last);
     gpu_buffer_bind_storage(&context->paths, BIND_PATHS);
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     gpu_buffer_bind_storage(&context->hit_places, BIND_HIT_PLACES);
@@ -198,7 +216,7 @@ static bool move_children(struct wave_passes *passes, struct render_context *con
     if (!program)
         return false;
     gpu_uniform_uint(program, "hit_count", context->hit_count);
-    gpu_uniform_uint(program, "children_a_hit", passes->children_a_hit);
+    gpu_uniform_uint(program, "children_a_hit", passes->kind->children_a_hit);
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
     gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
     gpu_buffer_bind_texels(context->device, &passes->children, UNIT_MOVE_CHILDREN, GL_RGBA32UI);
@@ -235,12 +253,36 @@ static enum integrator_progress make_wave(struct wave_passes *passes, struct ren
     return INTEGRATOR_MORE;
 }
 
-enum integrator_progress wave_passes_next_wave(struct wave_passes *passes, struct render_context *context,
-                                               struct error *error)
+/* The children become the context's rays and paths; counts the wave. */
+static enum integrator_progress next_wave(struct wave_passes *passes, struct render_context *context,
+                                          struct error *error)
 {
     context_span_begin(context, STAGE_SHADE);
     enum integrator_progress progress = make_wave(passes, context, error);
     context_span_end(context);
+    context->asked = 0;
     context->wave_number++;
     return progress;
+}
+
+enum integrator_progress wave_passes_shade(struct integrator *integrator, struct render_context *context,
+                                           struct error *error)
+{
+    struct wave_passes *passes = (struct wave_passes *)integrator;
+    const struct wave_passes_kind *kind = passes->kind;
+    uint32_t hits = context->hit_count, first = context->asked;
+    uint32_t left = hits > 0 ? kind->shadow_rays_a_hit(context) - first : 0, count = left;
+    if (hits > 0) {
+        uint32_t together = context->wave_capacity * kind->shadow_waves / hits;
+        count = left < together ? left : together;
+    }
+    if (first == 0 && !left_scene(passes, context, error))
+        return INTEGRATOR_FAILED;
+    if (hits > 0 && (!kind->shade(passes, context, first, count, error) ||
+                     (count > 0 && !trace_shadows(passes, context, count, error))))
+        return INTEGRATOR_FAILED;
+    if (!gather(passes, context, count == left, count, error))
+        return INTEGRATOR_FAILED;
+    context->asked += count;
+    return count < left ? INTEGRATOR_AGAIN : next_wave(passes, context, error);
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Adds a wave's radiance and the light that its shadow rays let through to the samples of the slice. The paths of a
 // sample lie side by side; the first of them adds for all, in their order, so no two invocations share a sample and
-// the sum is the same to the bit every time.
+// the sum is the same to the bit every time. Shadow rays come in batches: each is added to its path's radiance, and the
+// last to the samples, so it does not matter how many there were.
+// Defines: GREY of what a shadow ray lets through, the mean of the channels counts.
 
 #include "shared/path.h"
 #include "common/dispatch.glsl"
@@ -9,12 +11,12 @@
 layout(local_size_x = 64) in;
 
 uniform uint ray_count, hit_count;
-uniform uint batch_lights;
-uniform uint first_batch; // 1: the radiance itself comes along
+uniform uint batch_rays;
+uniform uint last_batch;
 
 layout(std430, binding = BIND_PATHS) readonly buffer path_block { path paths[]; };
 layout(std430, binding = BIND_HIT_PLACES) readonly buffer place_block { uint hit_places[]; };
-layout(std430, binding = BIND_RADIANCE) readonly buffer radiance_block { vec4 radiance[]; };
+layout(std430, binding = BIND_RADIANCE) buffer radiance_block { vec4 radiance[]; };
 layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uint visibility[]; };
 layout(std430, binding = BIND_LIGHT_SAMPLES) readonly buffer sample_block { vec4 light_samples[]; };
 layout(std430, binding = BIND_SLICE_SUMS) buffer sum_block { vec4 slice_sums[]; };
@@ -28,17 +30,23 @@ vec4 finite(vec4 v)
     return mix(clamp(v, vec4(0.0), vec4(RADIANCE_MAX)), vec4(0.0), isnan(v));
 }
 
-vec3 lights_of(uint k)
+// With the light that the batch let through.
+vec4 radiance_of(uint k)
 {
-    vec3 sum = vec3(0.0);
+    vec4 sum = radiance[k];
     uint j = hit_places[k];
     if (j == HIT_PLACE_NONE)
         return sum;
-    for (uint i = 0u; i < batch_lights; i++) {
+    for (uint i = 0u; i < batch_rays; i++) {
         uint place = i * hit_count + j;
         uint through = visibility[place] & 0xffffffu;
-        if (through != 0u)
-            sum += light_samples[place].rgb * unpackUnorm4x8(through).rgb;
+        if (through != 0u) {
+            vec3 share = unpackUnorm4x8(through).rgb;
+#ifdef GREY
+            share = vec3(dot(share, vec3(1.0 / 3.0)));
+#endif
+            sum.rgb += light_samples[place].rgb * share;
+        }
     }
     return sum;
 }
@@ -48,15 +56,15 @@ void main()
     uint k = item_index();
     if (k >= ray_count)
         return;
+    if (last_batch == 0u) {
+        radiance[k] = radiance_of(k);
+        return;
+    }
     uint slot = paths[k].sample_slot;
     if (k > 0u && paths[k - 1u].sample_slot == slot)
         return;
     vec4 sum = slice_sums[slot];
-    for (; k < ray_count && paths[k].sample_slot == slot; k++) {
-        vec4 arriving = vec4(lights_of(k), 0.0);
-        if (first_batch != 0u)
-            arriving += radiance[k];
-        sum += finite(arriving);
-    }
+    for (; k < ray_count && paths[k].sample_slot == slot; k++)
+        sum += finite(radiance_of(k));
     slice_sums[slot] = sum;
 }

@@ -18,6 +18,7 @@ uniform uint first_slot; // of the slice
 uniform uint wave_number;
 uniform uint last_wave;  // 1: no children
 uniform uint children_a_hit; // room for so many
+uniform uint shadow_rays_a_hit;
 
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // in texels: software GL fetches those faster
 layout(binding = UNIT_SHADE_HITS) uniform usamplerBuffer hits;
@@ -51,10 +52,11 @@ hit hit_at(uint k)
 
 path path_at(uint k)
 {
-    uvec4 a = texelFetch(paths, int(2u * k)), b = texelFetch(paths, int(2u * k + 1u));
+    int texel = int(k) * PATH_TEXELS;
+    uvec4 a = texelFetch(paths, texel), b = texelFetch(paths, texel + 1), c = texelFetch(paths, texel + 2);
     vec3 weight = uintBitsToFloat(a.xyz);
-    return path(weight.r, weight.g, weight.b, a.w, uintBitsToFloat(b.x), uintBitsToFloat(b.y), b.z,
-                uintBitsToFloat(b.w));
+    return path(weight.r, weight.g, weight.b, a.w, uintBitsToFloat(b.x), uintBitsToFloat(b.y), b.z, uintBitsToFloat(b.w),
+                c.x, uintBitsToFloat(c.y), uintBitsToFloat(c.z), uintBitsToFloat(c.w));
 }
 
 // Of which pixel and sample a path is: for common/sequence.glsl.
@@ -76,7 +78,7 @@ vec3 off_surface(surface s, float distance_, vec3 side)
 
 uint child_count = 0u;
 
-// One that leads nowhere, has no direction or is beyond the depth is left out.
+// One that leads nowhere, has no direction or is beyond the depth is left out. What is not an argument is the parent's.
 void add_child(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
 {
     uint bounces = (parent.flags & PATH_BOUNCES_MASK) + (straight ? 0u : 1u);
@@ -95,13 +97,17 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     uint kept = straight ? ~PATH_BOUNCES_MASK : ~(PATH_BOUNCES_MASK | PATH_STRAIGHT);
     c.flags = bounces | parent.flags & kept;
     c.time = parent.time;
+    c.lamp = parent.lamp;
+    c.lamp_distance = parent.lamp_distance;
+    c.lamp_share = parent.lamp_share;
+    c.environment_share = parent.environment_share;
     children[j * children_a_hit + child_count] = c;
     child_count++;
 }
 
 void no_shadow_ray(uint place)
 {
-    if (frame.light_count == 0u) // nor room for one
+    if (shadow_rays_a_hit == 0u) // nor room for one
         return;
     shadow_rays[place] = ray(vec4(0.0), vec4(0.0, 0.0, 1.0, -1.0));
     light_samples[place] = vec4(0.0); // a dead ray meets nothing, and so lets everything through
@@ -124,4 +130,10 @@ bool add_shadow_ray(uint place, path p, vec3 origin, vec3 direction, float dista
     shadow_times[place] = p.time;
 #endif
     return true;
+}
+
+// `first`: of the batches of shadow rays of the wave, with which the children come.
+void note_children(uint j, bool first, uint shadow_rays_alive)
+{
+    child_counts[j] = (first ? child_count : child_counts[j]) + (shadow_rays_alive << 2);
 }

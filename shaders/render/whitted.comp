@@ -8,14 +8,14 @@
 //
 // Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl.
 //
-// Lights beyond the first batch come in further passes with first_light > 0, which make shadow rays alone.
+// Lights beyond the first batch come in further passes with first_ray > 0, which make shadow rays alone.
 
 #include "common/environment.glsl"
 #include "common/light.glsl"
 #include "common/scattering.glsl"
 #include "render/shade.glsl"
 
-uniform uint first_light, batch_lights;
+uniform uint first_ray, batch_rays; // a light each
 
 // A path that carries less than this to its pixel ends: a third of a step of an 8-bit picture.
 const float WEIGHT_MIN = 1.0 / 1024.0;
@@ -36,8 +36,8 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
     uint seed = path_seed(parent), sample_ = path_sample(parent);
 #endif
     uint alive = 0u;
-    for (uint i = 0u; i < batch_lights; i++) {
-        uint index = first_light + i;
+    for (uint i = 0u; i < batch_rays; i++) {
+        uint index = first_ray + i;
         vec2 u = vec2(0.5);
 #ifdef HAS_AREA_LIGHTS
         u = sequence_pair(seed, SEQUENCE_EVERY_LIGHT + (wave_number << 16 ^ index), sample_);
@@ -53,7 +53,7 @@ uint ask_for_lights(uint j, path parent, surface s, split parts, vec3 view, floa
 
 void no_lights(uint j)
 {
-    for (uint i = 0u; i < batch_lights; i++)
+    for (uint i = 0u; i < batch_rays; i++)
         no_shadow_ray(i * hit_count + j);
 }
 
@@ -85,7 +85,7 @@ void main()
     vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
     ray r = ray_at(k);
     hit h = hit_at(k);
-    bool first = first_light == 0u;
+    bool first = first_ray == 0u;
     float width = p.cone_width + p.cone_spread * h.distance;
     surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, width);
     vec3 view = -r.direction_t_max.xyz;
@@ -102,5 +102,5 @@ void main()
         no_lights(j);
     else
         shadows = ask_for_lights(j, p, s, parts, view, NoV, weight * s.alpha, h.distance);
-    child_counts[j] = (first ? child_count : child_counts[j]) + (shadows << 2);
+    note_children(j, first, shadows);
 }

@@ -2,15 +2,15 @@
 """The part `ldc` of the benchmark: layered depth cubes next to what their paper has ('GPU Rendering of Secondary Effects'),
 beside `bvh` and `reference`, and in their variants. Its JSON:
 
-  table1     the paper's table: name, instead (what stands for the paper's model), `builds` and `frames`, results of bench_ldc
-  scenes     results of bench_ldc waves: bvh, and ldc at 512, 1024 and 2048
-  pictures   how, and results of bench_ldc frames of the meshes that accuracy is wanted of: ldc at 512, 1024 and 2048
-  family     results of bench_ldc waves over triangles, at one resolution
-  depths     results of bench_ldc samples: peeling and lists, at depth complexities and of models
-  variants   what, and results of bench_ldc waves: levels, images, layers and rays together, tolerance
+  table1     the paper's table: name, instead (what stands for the paper's model), `builds` and `frames`, results of bench_forms
+  scenes     results of bench_forms waves: bvh, and ldc at 512, 1024 and 2048
+  pictures   how, and results of bench_forms frames of the meshes that accuracy is wanted of: ldc at 512, 1024 and 2048
+  family     results of bench_forms waves over triangles, at one resolution
+  depths     results of bench_forms samples: peeling and lists, at depth complexities and of models
+  variants   what, and results of bench_forms waves: levels, images, layers and rays together, tolerance
   wanted     rows as in bench_reach.py
 
-A result is what bench_ldc prints (its head says what), with "title" added.
+A result is what bench_forms prints (its head says what), with "title" added.
 """
 from bench_animated import run_json
 from bench_common import figure, paired_ratio, shared
@@ -53,7 +53,7 @@ def ldc(resolution=USUAL, **options):
 
 
 def call(bench, part, title, usual_runs, *arguments):
-    return {"title": title, **run_json(bench, "bench_ldc", part, *arguments, "--runs", bench.times(usual_runs))}
+    return {"title": title, **run_json(bench, "bench_forms", part, *arguments, "--runs", bench.times(usual_runs))}
 
 
 def resolutions(bench):

@@ -6,7 +6,7 @@
  * of rays that hit with both the difference of distances: "error_median", "error_p99", in metres; of ldc also what
  * a ray looked at in the mean: "nodes", "texels" (or cells) and "samples". Rays begin where the reference's camera
  * rays hit. */
-#include "tests/bench/bench_ldc.h"
+#include "tests/bench/bench_forms.h"
 
 #include "base/clock.h"
 
@@ -19,18 +19,23 @@
 
 /* ---- builds ---- */
 
-static bool make(struct bench_ldc *bench, struct bench_form *form, struct error *error)
+static bool make(struct bench_forms *bench, struct bench_form *form, struct error *error)
 {
-    const struct tracer_impl *impl = tracer_find(form->tracer, "--form", error);
+    const struct tracer_impl *impl = bench_form_impl(form, error);
     form->made = impl ? tracer_create(impl, bench->device, &form->options, error) : NULL;
     return form->made != NULL;
 }
 
-/* All that there is counts as changed. Cubes keep their buffers, as they do for what moves; others, which would
- * find that nothing changed, begin from nothing. */
-static bool build(struct bench_ldc *bench, struct bench_form *form, uint64_t *time_ns, struct error *error)
+static bool is_rasterised(const struct bench_form *form)
 {
-    if (form->tracer != BENCH_TRACER_LDC) {
+    return form->rival || form->tracer == BENCH_TRACER_LDC || form->tracer == BENCH_TRACER_ABUFFER;
+}
+
+/* All that there is counts as changed. What is rasterised keeps its buffers, as it does for what moves; others,
+ * which would find that nothing changed, begin from nothing. */
+static bool build(struct bench_forms *bench, struct bench_form *form, uint64_t *time_ns, struct error *error)
+{
+    if (!is_rasterised(form)) {
         tracer_destroy(form->made);
         if (!make(bench, form, error))
             return false;
@@ -54,7 +59,7 @@ static json_t *describe(const struct bench_form *form, const struct bench_runs *
 }
 
 /* The first build of each compiles, too. */
-static bool build_all(struct bench_ldc *bench, unsigned runs, struct bench_runs *builds, struct error *error)
+static bool build_all(struct bench_forms *bench, unsigned runs, struct bench_runs *builds, struct error *error)
 {
     for (unsigned run = 0; run <= runs; run++) {
         for (unsigned i = 0; i < bench->form_count; i++) {
@@ -66,10 +71,10 @@ static bool build_all(struct bench_ldc *bench, unsigned runs, struct bench_runs 
                 bench_add(&builds[i], time_ns);
         }
     }
-    return gpu_check(bench->device, "bench_ldc", error);
+    return gpu_check(bench->device, "bench_forms", error);
 }
 
-json_t *bench_ldc_builds(struct bench_ldc *bench, struct error *error)
+json_t *bench_forms_builds(struct bench_forms *bench, struct error *error)
 {
     struct bench_runs builds[BENCH_FORMS_MAX] = {0};
     if (!build_all(bench, bench->runs, builds, error))
@@ -135,7 +140,7 @@ static bool count_steps(struct bench_contest *contest, struct bench_form *form, 
 /* ---- waves ---- */
 
 struct waves {
-    struct bench_ldc *bench;
+    struct bench_forms *bench;
     struct bench_contest contest;
     struct bench_form reference; /* nothing made: this build has none */
     struct ray *camera_rays;
@@ -143,7 +148,7 @@ struct waves {
     json_t *lists[BENCH_FORMS_MAX];
 };
 
-static bool begin(struct waves *waves, struct bench_ldc *bench, struct error *error)
+static bool begin(struct waves *waves, struct bench_forms *bench, struct error *error)
 {
     const uint32_t pixels = bench->width * bench->height;
     *waves = (struct waves){.bench = bench,
@@ -184,7 +189,7 @@ static bool examine(struct waves *waves, struct bench_form *form, const struct b
 static bool measure(struct waves *waves, const struct bench_wave *wave, struct error *error)
 {
     const struct bench_wave_fact *fact = &bench_wave_facts[wave->kind];
-    struct bench_ldc *bench = waves->bench;
+    struct bench_forms *bench = waves->bench;
     if (!bench_contest_wave(&waves->contest, wave, error))
         return false;
     if (!fact->is_any && !bench_contest_hits(&waves->contest, waves->reference.made, wave, waves->truth, error))
@@ -207,7 +212,7 @@ static bool measure(struct waves *waves, const struct bench_wave *wave, struct e
 
 static bool run_wave(struct waves *waves, enum bench_wave_kind kind, struct error *error)
 {
-    const struct bench_ldc *bench = waves->bench;
+    const struct bench_forms *bench = waves->bench;
     const uint32_t pixels = bench->width * bench->height;
     struct ray *rays = malloc(pixels * sizeof *rays);
     struct bench_wave wave = {.kind = kind, .rays = rays, .ray_count = pixels};
@@ -233,7 +238,7 @@ static void end(struct waves *waves)
     free(waves->hits);
 }
 
-json_t *bench_ldc_waves(struct bench_ldc *bench, struct error *error)
+json_t *bench_forms_waves(struct bench_forms *bench, struct error *error)
 {
     struct waves waves;
     struct bench_runs builds[BENCH_FORMS_MAX] = {0};

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// Rays that ask how open a place is: ambient occlusion. Their mean over many is the cosine-weighted share of the
+// directions above a surface in which nothing is near.
+//
+// How far a ray looks is a choice like its direction: with u uniform, reach * (1 - u^(1 / falloff)) is beyond t as often
+// as (1 - t / reach)^falloff. So what is met at t counts that much in the mean, though all that is asked of each ray is
+// whether it meets anything.
+
+#include "common/math.glsl"
+
+// `u`: three numbers in [0, 1). Cosine-weighted about the shading normal; what would go below the surface itself is
+// mirrored at it. `geometric`, `normal`: unit, on one side.
+vec3 occlusion_direction(vec3 geometric, vec3 normal, vec2 u)
+{
+    vec3 x, y;
+    tangent_frame(normal, x, y);
+    float sine = sqrt(u.x), phi = TWO_PI * u.y;
+    vec3 direction = sine * (cos(phi) * x + sin(phi) * y) + sqrt(1.0 - u.x) * normal;
+    float below = min(dot(direction, geometric), 0.0);
+    return normalize(direction - 2.0 * below * geometric);
+}
+
+float occlusion_reach(float reach, float falloff, float u)
+{
+    return falloff > 0.0 ? reach * (1.0 - pow(u, 1.0 / falloff)) : reach;
+}
