@@ -11,6 +11,9 @@
 
 #ifdef ABUFFER_STEPS
 
+// Cells from a ray's origin within which it is looked for more closely what it meets.
+const float NEAR_ORIGIN = 4.0;
+
 const int BISECTIONS_MAX = 8;
 // From column to column towards where a plane is crossed: a curved surface is met after two or three.
 const int FOLLOWS_MAX = 4;
@@ -71,8 +74,10 @@ int winding_at_origin(voxel_walk w, uint what)
             return goes_along ? winding_at(axis, p + OWN_WAY * d) : own_winding;
     }
     int axis = image_of(what, w.ray.d);
-    return winding_at(axis, place_in_image(w, axis, w.s_least));
+    return winding_at(axis, place_in_image(w, axis, w.s_least + OWN_WAY));
 }
+
+#ifndef ANYTHING_ENDS
 
 // Where the ray crosses a surface near s, by the plane of a sample there, then by that of a sample where it crosses this
 // one, and so on until the crossing is in the sample's own texel.
@@ -112,8 +117,6 @@ bool follow(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis
     }
     return false;
 }
-
-#ifndef ANYTHING_ENDS
 
 int nearest_sample(int axis, vec3 p)
 {
@@ -190,8 +193,6 @@ void search_body(trace_ray r, inout voxel_walk w, inout abuffer_found found, fou
 
 // All images that a voxel names only near where the ray begins: along what stands on a surface light would leak. Farther on
 // the one that the ray runs along most, which shows most of what it meets.
-const float NEAR_ORIGIN = 4.0;
-
 uint images_from(voxel_walk w, uint what, float s)
 {
     return s <= w.s_least + NEAR_ORIGIN ? what & ABUFFER_VOXEL_IMAGES : 1u << image_of(what, w.ray.d);
@@ -212,6 +213,7 @@ void search_open(trace_ray r, inout voxel_walk w, inout abuffer_found found, fou
         ivec2 texel = texel_of(p.xy);
         float reach = follows > 0 ? FOLLOW_REACH : 2.0 * (hi - lo) + SPAN;
         float crossing = 1e30, crossing_side = 0.0, least_ = 1e30;
+        bool is_near = lo <= w.s_least + NEAR_ORIGIN;
         int crossed = 0;
         column c = column_at(axis, texel);
         for (int i = sample_from(c, p.z - reach); i < c.end; i++) {
@@ -219,7 +221,8 @@ void search_open(trace_ray r, inout voxel_walk w, inout abuffer_found found, fou
             if (depth_of(words) > p.z + reach)
                 break;
             float s_plane, side;
-            bool crosses = cross_plane(o, d, w.s_least, texel, sample_of(words, axis), s_plane, side);
+            column_sample q = sample_of(words, axis);
+            bool crosses = cross_plane(o, d, w.s_least, texel, q, s_plane, side) && (!is_near || leans(q));
             float away = follows > 0 ? abs(s_plane - s) : s_plane;
             if (crosses && away < least_ && s_plane > lo - FOLLOW_REACH && s_plane < hi + FOLLOW_REACH) {
                 least_ = away;
