@@ -119,9 +119,11 @@ static void what_stands_on_a_floor_is_met_from_a_cell_on(void **state)
                     first = i;
                 }
             }
-            printf("floor, body %d, %s: %u wrong, one at %g of %g rise %g\n", body, forms[f].name, wrong,
-                   (double)hits[first].distance, wall - (double)rays[first].origin_t_min[0],
-                   (double)rays[first].direction_t_max[1]);
+            /* Beside an edge a step may end in the next texel, which its plane does not reach. */
+            if (wrong > (f == DDA ? 0 : RAY_COUNT / 1000))
+                fail_msg("%s, body %d: %u rays are wrong; one, %g from the wall, meets something at %g",
+                         forms[f].name, body, wrong, wall - (double)rays[first].origin_t_min[0],
+                         (double)hits[first].distance);
         }
         fixture_finish(&fixture);
     }
@@ -172,7 +174,12 @@ static void a_wall_beside_the_origin_is_not_passed(void **state)
                     open += visibility[i] != 0;
                 }
             }
-            printf("corner, body %d, %s: %u wrong, any %u\n", body, forms[f].name, wrong, open);
+            /* So near the origin steps do not look: what began in the wall is met where it leaves that, or, with
+             * light, not at all. */
+            const uint32_t most = f == DDA ? 0 : RAY_COUNT / 12;
+            if (wrong > most || open > (f == DDA ? 0 : RAY_COUNT / 40))
+                fail_msg("%s, body %d: %u closest hits are wrong, %u rays pass the wall", forms[f].name, body,
+                         wrong, open);
         }
         fixture_finish(&fixture);
     }
@@ -242,7 +249,10 @@ static void glass_tints_once_for_each_crossing(void **state)
             trace(&fixture, &forms[f].options, WAVE_ANY, rays, RAY_COUNT, NULL, visibility);
             for (uint32_t i = 0; i < RAY_COUNT; i++)
                 wrong += !is_tint(visibility[i], shape == 0 ? 3 : 2);
-            printf("tint, shape %d, %s: %u wrong\n", shape, forms[f].name, wrong);
+            /* Where it is grazed, and in cracks where images meet: a few rays in a thousand. */
+            if (wrong > (shape == 0 ? 0 : RAY_COUNT / 500))
+                fail_msg("%s, shape %d: %u of %u rays are not tinted once for each crossing", forms[f].name, shape,
+                         wrong, RAY_COUNT);
         }
         fixture_finish(&fixture);
     }
