@@ -63,8 +63,8 @@ static void a_lamp(struct fixture *fixture, enum scene_light_kind kind)
     light->size[0] = light->size[1] = kind == LIGHT_RECTANGLE ? 2.0f * HALF : HALF;
 }
 
-/* The same rectangle as a surface; it looks down, and glows on both sides. A light that gives none keeps the default
- * sky away. */
+/* The same rectangle as a surface; it looks down, and glows on both sides. A light that gives none keeps the
+ * default sky away. */
 static void a_glowing_square(struct fixture *fixture)
 {
     const float above[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, HEIGHT};
@@ -326,7 +326,7 @@ static void a_small_bright_sun_converges(void **state)
 {
     struct fixture *fixture = *state;
     const uint32_t u = 4, v = 12;
-    /* By a texel of 4096 among 0.125 the sun brings some 90 % of the light, from a thousandth of the directions.
+    /* By a texel of 4096 among 0.125 the sun brings nearly all of the light, from a thousandth of the directions.
      */
     expected_value = under_the_image(0.125, u, v, 4096.0);
     for (uint32_t depth = 0; depth < 2; depth++)
@@ -341,9 +341,12 @@ static void a_small_bright_sun_converges(void **state)
                           depth ? "both ways" : "shadow rays", samples, mean.value, mean.error,
                           relative_deviation);
             assert_mean(mean, 0.0, 1e-3); /* the sum's own steps */
-            /* Where radiance goes as a product of two ramps over cells of one probability, a sample's deviation is
-             * below sqrt(E[(x y)^2] / E[x y]^2 - 1) = sqrt(16 / 9 - 1) of what the cell brings; at most 1. */
-            assert_true(relative_deviation < 1.0 / sqrt(samples));
+            /* Between texels radiance goes as a ramp, from all over half a cell to a half at its edge, and on to
+             * nothing in the middle of the next, while a cell has one probability: three quarters of the samples
+             * have a mean square of 28/27 and a quarter 8/3, of both ramps (13/9)^2. So one deviates by 1.04; the
+             * rest of the image and the scatter of this measure, over 1024 pixels and 16 pictures, stay below a
+             * fifth. */
+            assert_true(relative_deviation < 1.25 / sqrt(samples));
         }
 }
 
