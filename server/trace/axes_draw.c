@@ -86,6 +86,18 @@ static bool list_drawn(struct axes_draw *draw, const struct scene_gpu *scene, co
     return true;
 }
 
+bool axes_list_instances(const struct scene_gpu *scene, uint32_t **instances, uint32_t *count, struct error *error)
+{
+    *count = 0;
+    *instances = malloc(((size_t)scene->instance_count + 1) * sizeof(**instances));
+    if (!*instances)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u instances", scene->instance_count);
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (scene->geometries[scene->instances[i].geometry].device.primitive_count > 0)
+            (*instances)[(*count)++] = i;
+    return true;
+}
+
 bool axes_draw_prepare(struct axes_draw *draw, const struct scene_gpu *scene, const uint32_t *instances,
                        uint32_t instance_count, struct error *error)
 {

@@ -40,6 +40,10 @@ struct axes_draw {
 void axes_draw_init(struct axes_draw *draw, struct gpu_device *device);
 void axes_draw_finish(struct axes_draw *draw); /* leaves it empty */
 
+/* Those of the scene's instances that have primitives, ascending; the caller frees the list. */
+bool axes_list_instances(const struct scene_gpu *scene, uint32_t **instances, uint32_t *count,
+                         struct error *error);
+
 /* Lists instances[0 .. count - 1] (scene_gpu's), which need not ascend, for the passes that follow. */
 bool axes_draw_prepare(struct axes_draw *draw, const struct scene_gpu *scene, const uint32_t *instances,
                        uint32_t instance_count, struct error *error);

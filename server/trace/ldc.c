@@ -127,8 +127,8 @@ static bool build_cube(struct ldc *ldc, unsigned which, struct scene_gpu *scene,
 {
     const struct ldc_part *part = &ldc->parts.parts[which];
     struct ldc_cube *cube = &ldc->store.cubes[which];
-    *cube = (struct ldc_cube){.cell_world = part->cell_world, .resolution = ldc->resolution};
-    memcpy(cube->lower_world, part->lower_world, sizeof(cube->lower_world));
+    *cube = (struct ldc_cube){.cell_world = part->box.cell_world, .resolution = ldc->resolution};
+    memcpy(cube->lower_world, part->box.lower_world, sizeof(cube->lower_world));
     if (part->count == 0) {
         cube->resolution = 0;
         return true;

@@ -26,7 +26,8 @@ uint judged(ivec4 sum)
     // Opposite normals, of a thin body's sides, say nothing together.
     first = bitCount(leaned) == 1 ? uint(findLSB(leaned)) : first;
     bool shows_all = (bits & ABUFFER_SUM_STEEP << first) == 0u;
-    uint body = (bits & ABUFFER_SUM_OPEN) == 0u ? ABUFFER_VOXEL_BODY : 0u;
+    bool is_thin = (bits / ABUFFER_SUM_UP & bits / ABUFFER_SUM_DOWN & 7u) != 0u;
+    uint body = (bits & ABUFFER_SUM_OPEN) == 0u && !is_thin ? ABUFFER_VOXEL_BODY : 0u;
     return body | (shows_all ? 1u << first : leaned);
 }
 

@@ -45,12 +45,15 @@
 /* Times 2 to the axis: some sample is so steep in that image that its depths say little. */
 #define ABUFFER_SUM_STEEP 8u
 #define ABUFFER_SUM_OPEN 64u           /* some sample bounds no body */
+#define ABUFFER_SUM_UP 128u            /* times 2 to the axis: some sample leans to it and looks up it, .. */
+#define ABUFFER_SUM_DOWN 1024u         /* .. or down: where both do, a body's sides are near each other */
 #define ABUFFER_STEEP FACE_STEEP_BELOW /* component of a unit normal along the axis below which it is */
 
 #define ABUFFER_BLOCK_TEXELS 3
 /* In which images the walk looks, bits 0..2; it does by winding where ABUFFER_VOXEL_BODY is set, and by the
  * samples' planes alone where it is not. A voxel of bodies whose samples can all be seen in the image that the
- * average normal leans to most (none is steep there) is looked for in that one, by winding. */
+ * average normal leans to most (none is steep there) is looked for in that one, by winding. Where samples look both
+ * ways along an axis winding is no help: a ray may pass both sides of a body between two places that it is asked of. */
 #define ABUFFER_VOXEL_IMAGES 7u
 #define ABUFFER_VOXEL_BODY 8u
 

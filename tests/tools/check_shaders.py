@@ -38,13 +38,16 @@ CHOICES = {
     "ldc/cells.comp": [[{"CELLS_" + stage: "1"} for stage in
                         "LIST BLOCKS PLACE MARK COUNT FILL FURTHER SORT REACH_X REACH_Y REACH_Z".split()]],
     "render/primary.vert": [[{"PRIMITIVE_KIND": kind, "HAS_SPHERES": "1"} for kind in "012"]],
-    "axes/draw.vert": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
+    "ldc/build.frag": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}],
                        [{"BUILD_PASS": number} for number in "012"]],
+    "abuffer/build.frag": [[{"PRIMITIVE_KIND": "0", "ALL_IMAGES": "1"},
+                            {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1", "ALL_IMAGES": "1"}]],
 }
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION")}
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
-          "axes/draw.vert": ["axes/draw.vert", "axes/draw.geom", "ldc/build.frag"]}
+          "ldc/build.frag": ["axes/draw.vert", "axes/draw.geom", "ldc/build.frag"],
+          "abuffer/build.frag": ["axes/draw.vert", "axes/draw.geom", "abuffer/build.frag"]}
 # Storage blocks of a stage; server/gpu/device.c asks a driver for as many.
 STORAGE_BLOCKS_MAX = {".comp": 16, ".vert": 4, ".geom": 0, ".frag": 8}
 
@@ -146,7 +149,9 @@ def complaints_of(variant):
 
 def main():
     found = sorted(str(path.relative_to(ROOT)) for path in ROOT.rglob("*.comp"))
-    found += sorted(str(path.relative_to(ROOT)) for path in ROOT.rglob("*.vert"))
+    stages = {stage for program, stages in STAGES.items() for stage in stages if stage != program}
+    found += sorted(str(path.relative_to(ROOT)) for suffix in ("vert", "frag") for path in ROOT.rglob("*." + suffix))
+    found = [program for program in found if program not in stages]
     all_variants = [variant for program in found for variant in variants(program)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         complaints = [line for lines in pool.map(complaints_of, all_variants) for line in lines]

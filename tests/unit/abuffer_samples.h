@@ -33,6 +33,7 @@ struct abuffer_triangle {
 
 struct abuffer_samples {
     uint32_t resolution, voxels_along;
+    bool all_of_one; /* primitive of the scene on the device, the first */
     struct abuffer_triangle *triangles;
     struct abuffer_sample *list;
     size_t triangle_count, triangle_room, count, room;
@@ -173,7 +174,8 @@ static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[
     }
     uint32_t bits = at->is_body ? 0 : ABUFFER_SUM_OPEN;
     for (uint32_t k = 0; k < 3; k++) {
-        bits |= size[k] >= AXES_OVERLAP * most ? ABUFFER_SUM_LEANS << k : 0;
+        if (size[k] >= AXES_OVERLAP * most)
+            bits |= (ABUFFER_SUM_LEANS | (at->normal[k] > 0 ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN)) << k;
         bits |= size[k] < ABUFFER_STEEP ? ABUFFER_SUM_STEEP << k : 0;
     }
     const int along = (int)s->voxels_along;
@@ -216,7 +218,7 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
             samples[i][1] = abuffer_pack_normal(at->normal) |
                             (uint32_t)(winding + ABUFFER_WINDING_ZERO) << ABUFFER_WINDING_SHIFT |
                             (at->is_body ? ABUFFER_SAMPLE_BODY : 0);
-            ids[i] = at->id;
+            ids[i] = s->all_of_one ? 0 : at->id;
             abuffer_sum(s, sums, at);
         }
         texels[t][0] = (uint32_t)first;
