@@ -5,9 +5,9 @@
 #include <string.h>
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
-#define FRAME_BYTES_MAX (UINT64_C(1) << 32) /* the protocol's */
-#define PATH_SAMPLES 64u                    /* where nothing is said */
-#define AO_SAMPLES 16u                      /* of 8 rays: 128 a pixel, as in the paper */
+#define FRAME_BYTES_MAX (UINT64_C(4080) << 20) /* as the daemon has it */
+#define PATH_SAMPLES 64u                       /* where nothing is said */
+#define AO_SAMPLES 16u                         /* of 8 rays: 128 a pixel, as in the paper */
 
 /* ---- where pictures go ---- */
 

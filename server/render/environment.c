@@ -17,7 +17,7 @@ struct row_sums {
     double one[3], x[3], z[3], xz[3], xx[3]; /* of colour times 1, sx, sz, sx sz, sx sx; s: unit circle */
 };
 
-static float float_from_half(uint16_t half)
+float environment_float_from_half(uint16_t half)
 {
     uint32_t sign = (uint32_t)(half & 0x8000u) << 16, exponent = half >> 10 & 31u, mantissa = half & 0x3ffu;
     uint32_t bits;
@@ -102,7 +102,7 @@ static bool add_image(double sums[9][3], const struct scene_environment *image, 
             uint16_t halves[4];
             memcpy(halves, texels + ((size_t)v * width + u) * 8, sizeof(halves));
             for (int c = 0; c < 3; c++) {
-                double value = (double)float_from_half(halves[c]);
+                double value = (double)environment_float_from_half(halves[c]);
                 row.one[c] += value;
                 row.x[c] += value * x;
                 row.z[c] += value * z;

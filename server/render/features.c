@@ -10,6 +10,7 @@ struct scene_features scene_features_of(const struct scene *scene)
         const struct scene_material *material = value;
         for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
             features.textures |= material->textures[i].texture != 0;
+        features.anisotropy |= material->anisotropy > 0.0f;
         features.bump |= material->textures[MATERIAL_BUMP].texture != 0;
     }
     for (size_t cursor = 0; hashmap_next(&scene->objects[SCENE_LIGHT], &cursor, &id, &value);) {

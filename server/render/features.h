@@ -12,6 +12,7 @@ struct scene_features {
     bool textures;    /* some material has a texture */
     bool bump;        /* one of them is a bump map */
     bool area_lights; /* some light is a rectangle or a sphere */
+    bool anisotropy;  /* some material has a grain */
 };
 
 struct scene_features scene_features_of(const struct scene *scene);

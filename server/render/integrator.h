@@ -32,7 +32,8 @@ struct integrator_impl {
                                       struct error *error);
 };
 
-extern const struct integrator_impl integrator_whitted_impl, integrator_distributed_impl, integrator_ao_impl;
+extern const struct integrator_impl integrator_whitted_impl, integrator_distributed_impl, integrator_raycast_impl,
+    integrator_ao_impl, integrator_path_impl;
 
 /* By frame_request's number; NULL: there is none. */
 const struct integrator_impl *integrator_impl_by_number(unsigned number);

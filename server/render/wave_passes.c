@@ -17,6 +17,11 @@
 #define WAVE_STATE_SHADOW_RAYS pad0
 #define DEFINES_MAX 12
 
+void wave_passes_init(struct wave_passes *passes, const struct wave_passes_kind *kind, struct gpu_device *device)
+{
+    *passes = (struct wave_passes){.base = {kind->impl, device}, .kind = kind};
+}
+
 struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struct gpu_device *device,
                                       struct error *error)
 {
@@ -25,7 +30,7 @@ struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struc
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the integrator");
         return NULL;
     }
-    *passes = (struct wave_passes){.base = {kind->impl, device}, .kind = kind};
+    wave_passes_init(passes, kind, device);
     return &passes->base;
 }
 
@@ -82,13 +87,9 @@ static const struct gpu_program *use(struct render_context *context, const char 
 
 static void bind_shading(struct wave_passes *passes, struct render_context *context)
 {
-    context_bind(context);
-    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
-    gpu_buffer_bind_texels(context->device, &context->paths, UNIT_SHADE_PATHS, GL_RGBA32UI);
+    context_bind_hits(context);
     gpu_buffer_bind_texels(context->device, environment_lights(&context->environment, context->scene),
                            UNIT_SHADE_LIGHTS, GL_RGBA32F);
-    gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     gpu_buffer_bind_storage(&passes->children, BIND_CHILDREN);
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
@@ -106,14 +107,7 @@ const struct gpu_program *wave_passes_shade_program(struct wave_passes *passes, 
     size_t n = 0;
     for (; own && own->name; own++)
         defines[n++] = *own;
-    /* Only discs have textures that are not applied already. */
-    bool sampled = context->sampled_hits, exact = !sampled || context->scene->disc_count > 0;
-    if (sampled)
-        defines[n++] = (struct gpu_define){"HAS_SAMPLED", "1"};
-    if (context->features.textures && exact)
-        defines[n++] = (struct gpu_define){"HAS_TEXTURES", "1"};
-    if (context->features.bump && exact)
-        defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
+    n += context_surface_defines(context, defines + n);
     if (context->features.area_lights)
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     if (context->scene->has_motion)
@@ -149,7 +143,7 @@ bool wave_passes_run(struct wave_passes *passes, struct render_context *context,
 /* What the paths that left the scene bring home. */
 static bool left_scene(struct wave_passes *passes, struct render_context *context, struct error *error)
 {
-    struct gpu_define defines[3] = {0};
+    struct gpu_define defines[4] = {0};
     size_t n = 0;
     if (context->hit_count == context->ray_count)
         return true;
@@ -157,7 +151,11 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (passes->kind->left_scene)
         defines[n++] = (struct gpu_define){passes->kind->left_scene, "1"};
+    if (passes->kind->left_scene && context->features.area_lights)
+        defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     context_bind(context);
+    gpu_buffer_bind_texels(context->device, environment_lights(&context->environment, context->scene),
+                           UNIT_SHADE_LIGHTS, GL_RGBA32F);
     const struct gpu_program *program = use(context, "render/left_scene.comp", defines, error);
     if (!program)
         return false;

@@ -34,10 +34,11 @@ struct wave_passes {
 /* Rays that go straight on through blended surfaces do not count as bounces; so many waves are left to them. */
 #define STRAIGHT_WAVES 16
 
-/* What integrators of this kind have in their tables; the integrator is a struct wave_passes. */
+/* What integrators of this kind have in their tables; the integrator begins with a struct wave_passes. */
+void wave_passes_init(struct wave_passes *passes, const struct wave_passes_kind *kind, struct gpu_device *device);
 struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struct gpu_device *device,
                                       struct error *error);
-void wave_passes_destroy(struct integrator *integrator); /* accepts NULL */
+void wave_passes_destroy(struct integrator *integrator); /* and frees it; accepts NULL */
 bool wave_passes_reserve(struct integrator *integrator, struct render_context *context, struct error *error);
 uint64_t wave_passes_device_bytes(const struct integrator *integrator);
 /* One batch of shadow rays a call: as many of each hit as the buffers hold. */

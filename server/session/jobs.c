@@ -12,7 +12,9 @@
 /* More frames than this need not wait here: the engine renders the next ones meanwhile. */
 #define WINDOW_FRAMES_MAX 4
 #define ZSTD_LEVEL_MAX 19
-#define FRAME_BYTES_MAX (UINT64_C(1) << 32) /* of frame_begin.size_bytes */
+/* Of the 4 GiB that a frame_begin may announce; the rest is left to what zstd adds to noise. */
+#define FRAME_BYTES_MAX (UINT64_C(4080) << 20)
+#define BEAUTY_ALONE (1u << PROTOCOL_LAYER_BEAUTY)
 
 static uint32_t bytes_per_pixel(enum protocol_pixel_format format)
 {
@@ -39,6 +41,30 @@ static struct job *job_on_channel(const struct session *session, uint32_t channe
     return NULL;
 }
 
+static uint64_t frame_bytes_of(const struct message_render *render)
+{
+    uint32_t layers = render->layers ? render->layers : BEAUTY_ALONE;
+    return (uint64_t)render->width * render->height * bytes_per_pixel(render->format) *
+           (uint64_t)__builtin_popcount(layers);
+}
+
+static bool check_layers(const struct message_render *render, struct error *error)
+{
+    if (!render->layers || render->layers == BEAUTY_ALONE)
+        return true;
+    if (render->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || render->encoding == PROTOCOL_ENCODING_JPEG) {
+        error_set(error, ERROR_UNSUPPORTED, "render.layers", "%s in %s carries the beauty alone",
+                  protocol_pixel_format_text(render->format), protocol_encoding_text(render->encoding));
+        return error_remedy(error, "layers need the format rgba32f and the encoding raw or zstd");
+    }
+    if (frame_bytes_of(render) > FRAME_BYTES_MAX) {
+        error_set(error, ERROR_LIMIT, "render.layers", "frames of %" PRIu64 " bytes, the limit is %" PRIu64,
+                  frame_bytes_of(render), FRAME_BYTES_MAX);
+        return error_remedy(error, "ask for fewer layers, or for a smaller picture");
+    }
+    return true;
+}
+
 static bool check_limits(const struct session *session, const struct message_render *render, struct error *error)
 {
     const struct session_limits *limits = &session->hub->options.limits;
@@ -54,31 +80,6 @@ static bool check_limits(const struct session *session, const struct message_ren
         error_remedy(error, "wait for one to end, or cancel it");
         error->retryable = true;
         return false;
-    }
-    return true;
-}
-
-/* Of all that a frame brings. */
-static uint64_t frame_bytes_of(const struct message_render *render)
-{
-    const uint64_t layers = render->layers ? (uint64_t)__builtin_popcount(render->layers) : 1;
-    return layers * render->width * render->height * bytes_per_pixel(render->format);
-}
-
-static bool check_layers(const struct message_render *render, struct error *error)
-{
-    if (!(render->layers & ~(1u << PROTOCOL_LAYER_BEAUTY)))
-        return true;
-    if (render->format != PROTOCOL_PIXEL_FORMAT_RGBA32F) {
-        error_set(error, ERROR_INVALID, "render.layers", "%s does not hold them",
-                  protocol_pixel_format_text(render->format));
-        return error_remedy(error, "the format rgba32f, or the picture alone");
-    }
-    if (frame_bytes_of(render) > FRAME_BYTES_MAX) {
-        error_set(error, ERROR_LIMIT, "render.layers",
-                  "they are %" PRIu64 " bytes together, the limit is %" PRIu64, frame_bytes_of(render),
-                  FRAME_BYTES_MAX);
-        return error_remedy(error, "ask for some of them at a time, or for smaller frames");
     }
     return true;
 }
@@ -141,6 +142,8 @@ static bool check(const struct session *session, const struct message_render *re
     if (render->last_frame < render->first_frame)
         return error_set(error, ERROR_INVALID, "render.last_frame", "%u is before the first frame %u",
                          render->last_frame, render->first_frame);
+    if (!check_layers(render, error))
+        return false;
     if (!encoder_supports((enum encoding)render->encoding, bytes_per_pixel(render->format))) {
         error_set(error, ERROR_UNSUPPORTED, "render.encoding", "%s does not carry %s",
                   protocol_encoding_text(render->encoding), protocol_pixel_format_text(render->format));
@@ -149,9 +152,8 @@ static bool check(const struct session *session, const struct message_render *re
     if (render->encoding == PROTOCOL_ENCODING_ZSTD && render->quality > ZSTD_LEVEL_MAX)
         return error_set(error, ERROR_INVALID, "render.quality", "zstd has levels up to %u, not %u",
                          ZSTD_LEVEL_MAX, render->quality);
-    return tracer_settings_check(render, error) && check_layers(render, error) &&
-           check_limits(session, render, error) && check_camera(render, error) &&
-           check_room(session, render, error);
+    return tracer_settings_check(render, error) && check_limits(session, render, error) &&
+           check_camera(render, error) && check_room(session, render, error);
 }
 
 /* ---- start ------------------------------------------------------------------------------------------- */

@@ -15,18 +15,30 @@ vec3 environment_sky(float up)
     return mix(vec3(SKY_HORIZON), vec3(SKY_ZENITH), up);
 }
 
+// Where on an equirectangular image a direction is, 0..1: rows from +y down, the middle column is -z; turned by w of the
+// colour about +y.
+vec2 environment_place(vec3 direction)
+{
+    float c = cos(frame.environment_colour.w), s = sin(frame.environment_colour.w);
+    vec3 d = vec3(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z);
+    return vec2(azimuth(d.x, -d.z) / TWO_PI + 0.5, acos(clamp(d.y, -1.0, 1.0)) / PI);
+}
+
+// From the image's own axes to the world's.
+vec3 environment_turned_back(vec3 d)
+{
+    float c = cos(frame.environment_colour.w), s = sin(frame.environment_colour.w);
+    return vec3(c * d.x + s * d.z, d.y, c * d.z - s * d.x);
+}
+
 #ifdef HAS_ENVIRONMENT_IMAGE
-// Equirectangular, rows from +y down, the middle column is -z; turned by w of the colour about +y. Filtered here,
-// as the columns wrap and the rows do not, whatever the texture's own state is.
+// Filtered here, as the columns wrap and the rows do not, whatever the texture's own state is.
 layout(binding = UNIT_ENVIRONMENT) uniform sampler2D environment_image;
 
 vec3 environment_image_radiance(vec3 direction)
 {
-    float c = cos(frame.environment_colour.w), s = sin(frame.environment_colour.w);
-    vec3 d = vec3(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z);
     ivec2 size = textureSize(environment_image, 0);
-    vec2 place = vec2(azimuth(d.x, -d.z) / TWO_PI + 0.5, acos(clamp(d.y, -1.0, 1.0)) / PI);
-    vec2 texel = place * vec2(size) - 0.5;
+    vec2 texel = environment_place(direction) * vec2(size) - 0.5;
     ivec2 lower = ivec2(floor(texel));
     vec2 f = texel - vec2(lower);
     int x0 = (lower.x + size.x) % size.x, x1 = (lower.x + 1) % size.x;

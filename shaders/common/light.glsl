@@ -75,6 +75,43 @@ light_sample light_sample_sphere(light l, vec3 position, vec2 u)
     return light_sample(direction, reach, l.colour.rgb * (TWO_PI * one_minus_cos_max));
 }
 
+
+// Where a ray (unit direction) meets a light that has an extent, on the side that shines; -1: nowhere. `probability`:
+// per steradian, with which light_sample_at() finds that direction from the ray's origin.
+float light_meet(light l, vec3 origin, vec3 direction, out float probability)
+{
+    vec3 to_middle = l.position_kind.xyz - origin;
+    probability = 0.0;
+    if (int(l.position_kind.w) == LIGHT_KIND_RECTANGLE) {
+        vec3 half_u = l.half_u_inner.xyz, half_v = l.half_v_outer.xyz, normal = l.direction_range.xyz;
+        float facing = -dot(normal, direction), distance_ = -dot(normal, to_middle) / facing;
+        vec3 from_middle = distance_ * direction - to_middle, across = cross(half_u, half_v);
+        float area = dot(across, across); // of a quarter, squared
+        vec2 place = vec2(dot(cross(from_middle, half_v), across), dot(cross(half_u, from_middle), across)) / area;
+        if (!(facing > 0.0 && distance_ > 0.0 && abs(place.x) <= 1.0 && abs(place.y) <= 1.0))
+            return -1.0;
+        probability = square(distance_) / (facing * 4.0 * sqrt(area));
+        return distance_;
+    }
+    float middle2 = dot(to_middle, to_middle), radius2 = square(l.colour.w), along = dot(to_middle, direction);
+    vec3 off = to_middle - along * direction;
+    float inside = radius2 - dot(off, off);
+    if (int(l.position_kind.w) != LIGHT_KIND_SPHERE || middle2 <= radius2 || along <= 0.0 || inside < 0.0)
+        return -1.0;
+    float sin2_max = radius2 / middle2;
+    probability = 1.0 / (TWO_PI * (sin2_max / (1.0 + sqrt(1.0 - sin2_max))));
+    return along - sqrt(inside);
+}
+
+// The same of the direction of a sample; 0: nothing but light_sample_at() finds it, as the light has no extent.
+float light_probability(light l, light_sample lamp)
+{
+    int kind = int(l.position_kind.w);
+    if (kind != LIGHT_KIND_RECTANGLE && kind != LIGHT_KIND_SPHERE)
+        return 0.0;
+    float shining = greatest(l.colour.rgb), arriving = greatest(lamp.irradiance);
+    return arriving > 0.0 ? shining / arriving : 0.0; // irradiance is radiance by it
+}
 #endif
 
 // `u`: two numbers in [0, 1) that choose the point of a light that has an extent.

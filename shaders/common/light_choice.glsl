@@ -52,12 +52,13 @@ float light_estimate(uint index, light_receiver r)
     return cosine + reach > 0.0 ? power * (r.scattered * min(cosine + reach, 1.0) + highlight) : 0.0;
 }
 
-// One of all lights, as probable as its estimate. `number` in [0, 1) chooses it and comes back stretched to [0, 1)
-// again. Probability 0: none shines here.
-uint light_choose(light_receiver r, uint light_count, inout float number, out float probability)
+// One of all lights, as probable as its estimate is a share of their sum. `number` in [0, 1) chooses it and comes back
+// stretched to [0, 1) again. Probability 0: none shines here.
+uint light_choose(light_receiver r, uint light_count, inout float number, out float probability, out float sum)
 {
     uint chosen = 0u;
-    float sum = 0.0, own = 0.0;
+    float own = 0.0;
+    sum = 0.0;
     // Each light takes the lower end of what is left of the interval from those before it.
     for (uint i = 0u; i < light_count; i++) {
         float estimate = light_estimate(i, r);

@@ -5,26 +5,13 @@
 // the alpha that glTF has, the square of the roughness. Where the surface is smooth, the ray goes where and weighs what
 // whitted's do in the mean.
 
+#include "common/facets.glsl"
 #include "common/scattering.glsl"
-
-// Below this the facets are the surface itself.
-const float LOBE_ALPHA_MIN = 1e-4;
 
 struct lobe {
     vec3 direction; // unit
     vec3 weight;    // of what comes from there; 0: there is no ray
 };
-
-// A facet's normal in the frame of the surface (normal z), as probable as it is large seen from there. Dupuy, Benyoub.
-// Sampling Visible GGX Normals with Spherical Caps. 2023.
-vec3 visible_facet(vec3 view, float alpha, vec2 u)
-{
-    vec3 stretched = normalize(vec3(view.xy * alpha, view.z));
-    float phi = TWO_PI * u.x, z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
-    float sine = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
-    vec3 facet = vec3(sine * cos(phi), sine * sin(phi), z) + stretched;
-    return normalize(vec3(facet.xy * alpha, facet.z));
-}
 
 // Of the facets that the view sees the share that the light reaches. Heitz. Understanding the Masking-Shadowing
 // Function. 2014: height-correlated as in V_SmithGGXCorrelated() on the view's side, on the other independent.
@@ -40,13 +27,13 @@ float lit_share(float NoV, float NoL, float alpha)
 lobe lobe_choose(surface s, float NoV, vec3 direction, inout float choice, vec2 u)
 {
     float alpha = square(s.roughness);
-    bool rough = alpha > LOBE_ALPHA_MIN;
+    bool rough = alpha > FACET_ALPHA_MIN;
     vec3 facet = s.normal;
     if (rough) {
         vec3 x, y;
         tangent_frame(s.normal, x, y);
         vec3 view = normalize(vec3(-dot(direction, x), -dot(direction, y), NoV));
-        vec3 found = visible_facet(view, alpha, u);
+        vec3 found = visible_facet(view, vec2(alpha), u);
         facet = found.x * x + found.y * y + found.z * s.normal;
     }
     bool leaves = s.inside && s.transmission > 0.0;

@@ -57,9 +57,8 @@ vec4 disc_texcoords(disc d, vec3 position_world)
 
 // Where a triangle's texture runs: tangent along u and the handedness of the frame, for meshes that bring no
 // tangents. v grows downwards in an image while a normal map's green points up, hence the sign.
-bool texture_tangent(uvec4 triangle, vec3 corners[3], uint slot_index, vec3 normal_object, out vec4 tangent_object)
+bool texture_tangent(uvec4 triangle, vec3 corners[3], bool second, vec3 normal_object, out vec4 tangent_object)
 {
-    bool second = (texture_slots[slot_index].texture & 0x80000000u) != 0u;
     vec3 e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
     vec4 t0 = texelFetch(texcoords, int(triangle.x));
     vec4 t1 = texelFetch(texcoords, int(triangle.y)) - t0;
@@ -93,9 +92,10 @@ bool triangle_tangent(uvec4 triangle, vec3 corners[3], geometry g, float time, v
     tangent_object = vec4(0.0);
     material m = materials[triangle.w & HIT_MATERIAL_MASK];
     uint slot_index = m.texture_normal != 0u ? m.texture_normal : m.texture_bump;
-    if (slot_index == 0u || (g.flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
+    if (slot_index == 0u && m.anisotropy == 0.0 || (g.flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1)) == 0u)
         return false;
-    return texture_tangent(triangle, corners, slot_index, normal_object, tangent_object);
+    bool second = slot_index != 0u && (texture_slots[slot_index].texture & 0x80000000u) != 0u;
+    return texture_tangent(triangle, corners, second, normal_object, tangent_object);
 }
 
 // The interpolated normal, mirrored at the surface where it points to the wrong side of it: a normal that is

@@ -14,7 +14,7 @@ uniform uint children_a_hit; // room for so many
 
 layout(std430, binding = BIND_CHILD_COUNTS) readonly buffer count_block { uint child_counts[]; };
 layout(std430, binding = BIND_BLOCK_OFFSETS) readonly buffer offset_block { uvec2 block_offsets[]; };
-layout(binding = UNIT_MOVE_CHILDREN) uniform usamplerBuffer children; // four texels each
+layout(binding = UNIT_MOVE_CHILDREN) uniform usamplerBuffer children;
 layout(std430, binding = BIND_RAYS) writeonly buffer ray_block { ray rays[]; };
 layout(std430, binding = BIND_PATHS) writeonly buffer path_block { path paths[]; };
 #ifdef HAS_TIMES
@@ -33,13 +33,15 @@ void main()
     for (uint before = block * COMPACT_BLOCK; before < j; before++)
         place += child_counts[before] & 3u;
     for (uint i = 0u; i < count; i++) {
-        int texel = int(4u * (j * children_a_hit + i));
+        int texel = int(j * children_a_hit + i) * CHILD_TEXELS;
         uvec4 third = texelFetch(children, texel + 2), fourth = texelFetch(children, texel + 3);
+        uvec4 fifth = texelFetch(children, texel + 4);
         vec3 weight = uintBitsToFloat(third.xyz);
         float time = uintBitsToFloat(fourth.w);
         rays[place + i] = ray(uintBitsToFloat(texelFetch(children, texel)), uintBitsToFloat(texelFetch(children, texel + 1)));
         paths[place + i] = path(weight.r, weight.g, weight.b, third.w, uintBitsToFloat(fourth.x),
-                                uintBitsToFloat(fourth.y), fourth.z, time);
+                                uintBitsToFloat(fourth.y), fourth.z, time, fifth.x, uintBitsToFloat(fifth.y),
+                                uintBitsToFloat(fifth.z), uintBitsToFloat(fifth.w));
 #ifdef HAS_TIMES
         times[place + i] = time;
 #endif

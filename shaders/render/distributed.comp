@@ -44,10 +44,10 @@ void add_lobe(uint j, path p, surface s, float NoV, float distance_, vec3 direct
 bool ask_for_light(uint j, path p, surface s, split parts, vec3 view, float NoV, vec3 weight, float distance_, vec2 u)
 {
     vec3 origin = off_surface(s, distance_, s.geometric);
-    float probability;
+    float probability, all_lights;
     s.roughness = max(s.roughness, path_roughness(p));
     light_receiver receiver = light_receiver_of(s, parts, origin, view, NoV);
-    uint index = light_choose(receiver, frame.light_count, u.x, probability);
+    uint index = light_choose(receiver, frame.light_count, u.x, probability, all_lights);
     if (probability <= 0.0) {
         no_shadow_ray(j);
         return false;

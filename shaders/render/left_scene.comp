@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 // What the paths that left the scene bring home: the environment.
-// Defines: those of common/environment.glsl; OPEN it is 1 everywhere, whatever the environment.
+// Defines: those of common/environment.glsl; OPEN it is 1 everywhere, whatever the environment;
+// SHARES paths say how much of it counts, and which lamp they met; HAS_AREA_LIGHTS with SHARES: there are lamps to meet.
 
 #include "shared/path.h"
 #include "shared/ray.h"
 #include "common/dispatch.glsl"
 #include "common/environment.glsl"
+#include "common/light.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -26,6 +28,13 @@ void main()
     vec3 arriving = vec3(1.0);
 #ifndef OPEN
     arriving = environment_radiance(rays[k].direction_t_max.xyz);
+#endif
+#ifdef SHARES
+    arriving *= p.environment_share;
+#ifdef HAS_AREA_LIGHTS
+    if (p.lamp != 0u)
+        arriving += light_at(p.lamp - 1u).colour.rgb * p.lamp_share;
+#endif
 #endif
     // Pixels beyond the picture's edge have no weight.
     radiance[k] = vec4(vec3(p.weight_r, p.weight_g, p.weight_b) * arriving, seen ? p.weight_r : 0.0);

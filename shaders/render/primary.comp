@@ -57,7 +57,7 @@ void main()
     float weight = in_picture ? 1.0 : 0.0;
     // Dead beyond the picture's edge.
     rays[k] = ray(vec4(origin, t_min), vec4(direction, in_picture ? 1e30 : -1.0));
-    paths[k] = path(weight, weight, weight, k, cone.x, cone.y, PATH_STRAIGHT, time);
+    paths[k] = path(weight, weight, weight, k, cone.x, cone.y, PATH_STRAIGHT, time, 0u, 0.0, 0.0, 1.0);
     slice_sums[k] = vec4(0.0);
 #ifdef VISIBILITY
     uvec2 visible = in_picture ? texelFetch(visible_primitives, ivec2(pixel), 0).xy : uvec2(0u);

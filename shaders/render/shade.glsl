@@ -52,10 +52,11 @@ hit hit_at(uint k)
 
 path path_at(uint k)
 {
-    uvec4 a = texelFetch(paths, int(2u * k)), b = texelFetch(paths, int(2u * k + 1u));
+    int texel = int(k) * PATH_TEXELS;
+    uvec4 a = texelFetch(paths, texel), b = texelFetch(paths, texel + 1), c = texelFetch(paths, texel + 2);
     vec3 weight = uintBitsToFloat(a.xyz);
-    return path(weight.r, weight.g, weight.b, a.w, uintBitsToFloat(b.x), uintBitsToFloat(b.y), b.z,
-                uintBitsToFloat(b.w));
+    return path(weight.r, weight.g, weight.b, a.w, uintBitsToFloat(b.x), uintBitsToFloat(b.y), b.z, uintBitsToFloat(b.w),
+                c.x, uintBitsToFloat(c.y), uintBitsToFloat(c.z), uintBitsToFloat(c.w));
 }
 
 // Of which pixel and sample a path is: for common/sequence.glsl.
@@ -77,7 +78,7 @@ vec3 off_surface(surface s, float distance_, vec3 side)
 
 uint child_count = 0u;
 
-// One that leads nowhere, has no direction or is beyond the depth is left out.
+// One that leads nowhere, has no direction or is beyond the depth is left out. What is not an argument is the parent's.
 void add_child(uint j, path parent, surface s, float distance_, vec3 direction, vec3 weight, bool straight)
 {
     uint bounces = (parent.flags & PATH_BOUNCES_MASK) + (straight ? 0u : 1u);
@@ -96,6 +97,10 @@ void add_child(uint j, path parent, surface s, float distance_, vec3 direction, 
     uint kept = straight ? ~PATH_BOUNCES_MASK : ~(PATH_BOUNCES_MASK | PATH_STRAIGHT);
     c.flags = bounces | parent.flags & kept;
     c.time = parent.time;
+    c.lamp = parent.lamp;
+    c.lamp_distance = parent.lamp_distance;
+    c.lamp_share = parent.lamp_share;
+    c.environment_share = parent.environment_share;
     children[j * children_a_hit + child_count] = c;
     child_count++;
 }

@@ -85,6 +85,7 @@
 #define UNIT_SHADE_HITS UNIT_TRACER_0 /* in passes without a tracer */
 #define UNIT_SHADE_PATHS UNIT_TRACER_1
 #define UNIT_SHADE_LIGHTS UNIT_TRACER_2
+#define UNIT_SHADE_ENVIRONMENT UNIT_TRACER_3 /* choice among its directions: common/environment_choice.glsl */
 #define UNIT_MOVE_CHILDREN UNIT_TRACER_0
 #define UNIT_LDC_COUNTS UNIT_TRACER_0
 #define UNIT_LDC_PLACES UNIT_TRACER_1

@@ -46,6 +46,14 @@ SHARED_SIZE(frame_uniforms, 576)
 #define SEQUENCE_LIGHT 0u          /* 2: which light and where on it */
 #define SEQUENCE_LOBE 1u           /* 1: what the surface does with the ray */
 #define SEQUENCE_LOBE_DIRECTION 2u /* 2 */
+#define SEQUENCE_PATH 0x8000u      /* integrator path has waves of its own from here on, of so many: */
+#define SEQUENCE_PATH_SIZE 8u
+#define SEQUENCE_PATH_LIGHT 0u       /* 2: which light and where on it */
+#define SEQUENCE_PATH_ENVIRONMENT 1u /* 2 */
+#define SEQUENCE_PATH_LOBE 2u        /* 1: what the surface does with the ray */
+#define SEQUENCE_PATH_DIRECTION 3u   /* 2 */
+#define SEQUENCE_PATH_END 4u         /* 1: whether it goes on */
+#define SEQUENCE_PATH_LAMP 5u        /* 1: which of the lamps that it meets counts */
 #define SEQUENCE_EVERY_LIGHT                                                                                      \
     0x10000u /* plus wave number * 0x10000 + light number, 2: for every light at every hit */
 

@@ -17,12 +17,19 @@ struct path {
     float cone_width, cone_spread;      /* ray cone: width at the origin, growth per unit of length */
     uint flags;                         /* PATH_* */
     float time;                         /* 0: the shutter opens .. 1: it closes */
+    /* integrator path: what the ray brings beside what it hits, as shares of what the light has */
+    uint lamp;           /* number of the light that it meets, plus 1; 0: none counts */
+    float lamp_distance; /* where, if nothing is hit before */
+    float lamp_share, environment_share;
 };
-SHARED_SIZE(path, 32)
+SHARED_SIZE(path, 48)
+#define PATH_TEXELS 3 /* RGBA32UI */
 #define PATH_BOUNCES_MASK 0xffu
 /* Bits 16..31: distributed: of what it was mirrored and refracted by, 65535: 1. */
 #define PATH_ROUGHNESS_SHIFT 16u
 #define PATH_STRAIGHT 0x100u /* nothing but alpha lies between it and the eye: counts for the picture's alpha */
+#define PATH_ASKED 0x200u    /* path: where it comes from has asked for the light of lamps and environment */
+#define PATH_COVERED 0x400u  /* path: such a place has had that light already, through the glass that it is in */
 
 /* A ray of the next wave at its parent's place, before it is moved to its own. */
 struct child {
@@ -33,8 +40,11 @@ struct child {
     float cone_width, cone_spread;
     uint flags;
     float time;
+    uint lamp;
+    float lamp_distance, lamp_share, environment_share;
 };
-SHARED_SIZE(child, 64)
+SHARED_SIZE(child, 80)
+#define CHILD_TEXELS 5       /* RGBA32UI */
 #define CHILDREN_MAX 3u      /* of whitted: straight on, reflected, refracted */
 #define COMPACT_BLOCK 16u    /* paths whose hits, and then children, are counted together */
 #define COMPACT_SCAN_SIZE 64 /* invocations of the one group that scans the counts */

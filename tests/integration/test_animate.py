@@ -21,20 +21,8 @@ from farlight_test import BIN, Case, Daemon, SHARED_SCENES, bundled_scenes, farl
 SIZE = ["--size", "96x64"]
 
 
-def exr_attributes(path):
-    """name -> bytes of the header of an EXR file."""
-    data, at, found = path.read_bytes(), 8, {}
-    while data[at]:
-        name_end = data.index(b"\0", at)
-        kind_end = data.index(b"\0", name_end + 1)
-        size = struct.unpack_from("<I", data, kind_end + 1)[0]
-        found[data[at:name_end].decode()] = data[kind_end + 5:kind_end + 5 + size]
-        at = kind_end + 5 + size
-    return found
-
-
 def digest(path):
-    return exr_attributes(path)["farlight/digest"]
+    return farlight_test.exr_attributes(path)["farlight/digest"]
 
 
 def children(pid, name):
@@ -572,7 +560,7 @@ class Progressive(OneDaemon):
     ARGUMENTS = [*SIZE, "--aperture", "0.2"]
 
     def samples(self, path):
-        return float(exr_attributes(path)["farlight/samples"].decode(errors="replace").strip("\0") or 0)
+        return float(farlight_test.exr_attributes(path)["farlight/samples"].decode(errors="replace").strip("\0") or 0)
 
     def test_passes_add_up_to_the_samples(self):
         path = self.folder / "p.exr"

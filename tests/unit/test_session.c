@@ -110,8 +110,8 @@ static void render(const struct engine_command *command)
         frame->request.aperture = engine.job.frame.aperture;
         frame->request.focus = engine.job.frame.focus;
         frame->shutter_s = engine.job.shutter / 8;
+        frame->result.layers = engine.job.frame.layers ? engine.job.frame.layers : 1;
         frame->result.samples = 5; /* with those of frames before */
-        frame->result.layers = engine.job.frame.layers ? engine.job.frame.layers : 1u << LAYER_BEAUTY;
         memcpy(frame->result.cubes, engine.cubes, sizeof engine.cubes);
         frame->size_bytes = FRAME_BYTES;
         frame->bytes = malloc(FRAME_BYTES);
@@ -1042,6 +1042,61 @@ static void settings_of_cubes_go_to_the_engine_with_the_daemons_limits(void **st
         continue;
 }
 
+static void layers_go_to_the_engine_and_come_with_the_frame(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.encoding = PROTOCOL_ENCODING_ZSTD;
+    message.render.layers = 1u << PROTOCOL_LAYER_BEAUTY | 1u << PROTOCOL_LAYER_DEPTH;
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    assert_int_equal(engine.job.frame.layers, 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH);
+    assert_int_equal(client.message.frame_begin.layers, message.render.layers);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+    message = render_message(0, 1); /* the picture alone has any format, named or not */
+    message.render.layers = 1u << PROTOCOL_LAYER_BEAUTY;
+    message.render.encoding = PROTOCOL_ENCODING_JPEG;
+    send_message(3, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 3);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+}
+
+static void layers_that_pixels_or_messages_do_not_hold_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t layers, edge_pixels;
+        enum protocol_pixel_format format;
+        enum protocol_encoding encoding;
+        enum protocol_error_code code;
+        const char *remedy;
+    } cases[] = {
+        {3, 16, PROTOCOL_PIXEL_FORMAT_RGBA8, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_CODE_UNSUPPORTED, "rgba32f"},
+        {2, 16, PROTOCOL_PIXEL_FORMAT_RGBA16F, PROTOCOL_ENCODING_ZSTD, PROTOCOL_ERROR_CODE_UNSUPPORTED, "rgba32f"},
+        {64, 16, PROTOCOL_PIXEL_FORMAT_RGBA8, PROTOCOL_ENCODING_JPEG, PROTOCOL_ERROR_CODE_UNSUPPORTED, "zstd"},
+        {2, 16, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_JPEG, PROTOCOL_ERROR_CODE_UNSUPPORTED, "zstd"},
+        /* 8192 x 8192 x 16 bytes are 1 GiB */
+        {15, 8192, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_CODE_LIMIT,
+         "fewer layers"},
+    };
+    open_scene(1, 1);
+    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct message message = render_message(0, 1);
+        message.render.width = message.render.height = cases[i].edge_pixels;
+        message.render.layers = cases[i].layers;
+        message.render.format = cases[i].format;
+        message.render.encoding = cases[i].encoding;
+        send_message(2 + i, 0, &message);
+        expect_error(2 + i, cases[i].code);
+        assert_string_equal(client.message.error.field, "render.layers");
+        assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
+    }
+}
+
 static void settings_that_no_cube_has_are_refused_by_their_field(void **state)
 {
     (void)state;
@@ -1130,15 +1185,11 @@ static void settings_that_no_a_buffer_has_are_refused_by_their_field(void **stat
     }
 }
 
-static void layers_need_floats_and_count_as_pictures(void **state)
+static void layers_count_as_pictures_in_the_memory_for_frames(void **state)
 {
     (void)state;
     open_scene(1, 1);
     struct message message = render_message(0, 1);
-    message.render.layers = 1u << PROTOCOL_LAYER_BEAUTY | 1u << PROTOCOL_LAYER_DEPTH;
-    send_message(2, 0, &message);
-    expect_error(2, PROTOCOL_ERROR_CODE_INVALID);
-    assert_string_equal(client.message.error.field, "render.layers");
     /* While a job runs, all layers are more than is left of the memory for frames; the picture is not. */
     message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     message.render.width = message.render.height = 128;
@@ -1203,6 +1254,7 @@ static void a_job_whose_frames_have_no_room_waits_for_others_to_end(void **state
     message = render_message(0, 1);
     message.render.width = message.render.height = 512;
     message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F; /* more than there is, but it is the only one */
+    message.render.layers = 127;
     send_message(5, 0, &message);
     message = made(MESSAGE_CANCEL);
     message.cancel.target_request = 5;
@@ -1451,10 +1503,12 @@ int main(void)
         BOTH(weights_count_as_memory_of_a_transaction),
         BOTH(a_job_takes_its_clips_and_its_lens_along),
         BOTH(settings_of_cubes_go_to_the_engine_with_the_daemons_limits),
+        BOTH(layers_go_to_the_engine_and_come_with_the_frame),
+        BOTH(layers_that_pixels_or_messages_do_not_hold_are_refused),
         BOTH(settings_that_no_cube_has_are_refused_by_their_field),
         BOTH(settings_of_a_buffers_and_light_go_to_the_engine),
         BOTH(settings_that_no_a_buffer_has_are_refused_by_their_field),
-        BOTH(layers_need_floats_and_count_as_pictures),
+        BOTH(layers_count_as_pictures_in_the_memory_for_frames),
         BOTH(cubes_of_a_frame_are_told),
         BOTH(a_job_whose_frames_have_no_room_waits_for_others_to_end),
         BOTH(a_full_engine_makes_clients_wait_and_loses_nothing),

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: MIT
+// What each hit of a wave sends towards the eye, and the rays that it asks for: Kajiya. The Rendering Equation. 1986,
+// by paths from the eye. There is no ambient term: what arrives, arrives over bounces.
+//
+//   radiance    emission; the lamp that the ray met on its way
+//   shadow rays one to one point of one light, and one to the environment. Two, as nothing tells before they are traced
+//               which of them is in the shadow: chosen between, one would often be wasted
+//   child       at most one: straight on (alpha blending), scattered, mirrored or refracted
+//
+// Light that has an extent is found by shadow rays and by children, which cost nothing more: rectangles, spheres and the
+// environment are met by them as they go on. What both find is weighed by how probable each was to find it: Veach,
+// Guibas. Optimally Combining Sampling Techniques for Monte Carlo Rendering. 1995, with the power heuristic. The last
+// hits of a path have no child; there shadow rays bring everything. Straight rays from the eye meet no lamp.
+//
+// Glass. Shadow rays go straight through it, tinted (common/alpha.glsl), smooth or not; so a lamp in a room with panes
+// lights it without waiting for a path to find it. A path that asked for light and then went through glass would bring
+// the light behind it again, bent: it brings none until it was scattered or mirrored outside of it (PATH_COVERED), but for
+// what emissive surfaces send. Paths from the eye, or a mirror, see everything through glass. Surfaces of glass ask for
+// no light from inside.
+//
+// Defines: those of common/bsdf.glsl, common/light.glsl, common/environment_choice.glsl and render/shade.glsl.
+
+#include "common/bsdf.glsl"
+#include "common/environment_choice.glsl"
+#include "common/light_choice.glsl"
+#include "render/shade.glsl"
+
+// From this bounce on a path ends as often as its weight is below 1, and weighs 1 where it does not.
+const uint ROULETTE_BOUNCES = 3u;
+
+uniform uint asks_lights, asks_environment; // 1: there are some; their shadow rays come in this order
+
+// Share of what a technique finds that is left to it, beside another that might have found it.
+float heuristic(float own, float other)
+{
+    float ratio = other / own;
+    return own > 0.0 ? 1.0 / (1.0 + ratio * ratio) : 0.0;
+}
+
+struct eye_hit {
+    uint j;
+    path p;
+    surface s;
+    bsdf b;
+    vec3 origin; // of shadow rays
+    vec3 weight;
+    float distance_;
+    bool last;   // no child follows
+    light_receiver receiver;
+    float all_lights; // sum of their estimates
+};
+
+uint numbers_of(uint choice)
+{
+    return SEQUENCE_PATH + wave_number * SEQUENCE_PATH_SIZE + choice;
+}
+
+bool ask_for_light(inout eye_hit e, uint place, uint seed, uint index)
+{
+    vec2 u = sequence_pair_sorted(seed, numbers_of(SEQUENCE_PATH_LIGHT), index, frame.group_shift);
+    float chance, found;
+    uint number = light_choose(e.receiver, frame.light_count, u.x, chance, e.all_lights);
+    if (chance <= 0.0) {
+        no_shadow_ray(place);
+        return false;
+    }
+    light_sample lamp = light_sample_at(number, e.origin, u);
+    vec3 arriving = e.weight * bsdf_evaluate(e.b, e.s, lamp.direction, found) * (lamp.irradiance / chance);
+#ifdef HAS_AREA_LIGHTS
+    float probability = chance * light_probability(light_at(number), lamp);
+    if (!e.last && probability > 0.0)
+        arriving *= heuristic(probability, found);
+#endif
+    return add_shadow_ray(place, e.p, e.origin, lamp.direction, lamp.distance_, arriving);
+}
+
+bool ask_for_environment(eye_hit e, uint place, uint seed, uint index)
+{
+    float probability, found;
+    vec2 u = sequence_pair(seed, numbers_of(SEQUENCE_PATH_ENVIRONMENT), index);
+    vec3 direction = environment_choose(e.s.normal, u, probability);
+    vec3 arriving = vec3(0.0), sent = bsdf_evaluate(e.b, e.s, direction, found);
+    if (probability > 0.0 && greatest(sent) > 0.0)
+        arriving = e.weight * sent * environment_radiance(direction) / probability;
+    if (!e.last)
+        arriving *= heuristic(probability, found);
+    return add_shadow_ray(place, e.p, e.origin, direction, FAR, arriving);
+}
+
+#ifdef HAS_AREA_LIGHTS
+// One of the lights that the ray of a child will meet if nothing is in the way, and what of it counts. `found`: how
+// probable its direction was per steradian; 0: nothing else might have found them.
+void meet_lamps(inout path p, eye_hit e, vec3 origin, vec3 direction, float found, float choice)
+{
+    float sum = 0.0;
+    for (uint i = 0u; i < frame.light_count; i++) {
+        light l = light_at(i);
+        float probability, distance_ = light_meet(l, origin, direction, probability), share = 1.0;
+        if (distance_ < 0.0)
+            continue;
+        if (found > 0.0 && e.all_lights > 0.0)
+            share = heuristic(found, probability * light_estimate(i, e.receiver) / e.all_lights);
+        float size = share * greatest(l.colour.rgb);
+        sum += size;
+        if (!(size > choice * sum)) {
+            choice = (choice * sum - size) / (sum - size);
+            continue;
+        }
+        choice = choice * sum / size;
+        p.lamp = i + 1u;
+        p.lamp_distance = distance_ * (1.0 - 4.0 * OFFSET); // as shadow rays end before it
+        p.lamp_share = share / size;
+    }
+    p.lamp_share *= sum;
+}
+#endif
+
+// The child that the surface sends on.
+void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
+{
+    path p = e.p;
+    vec2 u = sequence_pair(seed, numbers_of(SEQUENCE_PATH_DIRECTION), index);
+    bsdf_choice chosen = bsdf_choose(e.b, e.s, choice, u);
+    vec3 carried = e.weight * chosen.weight;
+    float survival = 1.0, end = sequence_number(seed, numbers_of(SEQUENCE_PATH_END), index);
+    if ((p.flags & PATH_BOUNCES_MASK) >= ROULETTE_BOUNCES)
+        survival = min(greatest(carried), 1.0);
+    if (!(end < survival)) // not a number: likewise
+        return;
+    bool of_glass = chosen.lobe == BSDF_REFRACTED || e.b.leaves && chosen.lobe == BSDF_MIRRORED;
+    bool covered = of_glass && (p.flags & (PATH_ASKED | PATH_COVERED)) != 0u;
+    // What shadow rays might have found.
+    float found = asked && !of_glass ? chosen.probability : 0.0;
+    p.flags &= ~(PATH_ASKED | PATH_COVERED);
+    p.flags |= (found > 0.0 ? PATH_ASKED : 0u) | (covered ? PATH_COVERED : 0u);
+    p.lamp = 0u;
+    p.lamp_share = 0.0;
+    p.environment_share = covered ? 0.0 : 1.0;
+    if (found > 0.0 && asks_environment != 0u)
+        p.environment_share = heuristic(found, environment_probability(e.s.normal, chosen.direction));
+#ifdef HAS_AREA_LIGHTS
+    float side = dot(chosen.direction, e.s.geometric) > 0.0 ? 1.0 : -1.0;
+    if (!covered)
+        meet_lamps(p, e, off_surface(e.s, e.distance_, side * e.s.geometric), chosen.direction, found,
+                   sequence_number(seed, numbers_of(SEQUENCE_PATH_LAMP), index));
+#endif
+    add_child(e.j, p, e.s, e.distance_, chosen.direction, carried / survival, false);
+}
+
+// The lamp that the ray met before it hit.
+vec3 met_lamp(path p, float distance_)
+{
+#ifdef HAS_AREA_LIGHTS
+    if (p.lamp != 0u && p.lamp_distance <= distance_)
+        return light_at(p.lamp - 1u).colour.rgb * p.lamp_share;
+#endif
+    return vec3(0.0);
+}
+
+void main()
+{
+    uint j = item_index();
+    if (j >= hit_count)
+        return;
+    uint k = hit_list[j];
+    eye_hit e;
+    e.j = j;
+    e.p = path_at(k);
+    e.weight = vec3(e.p.weight_r, e.p.weight_g, e.p.weight_b);
+    ray r = ray_at(k);
+    hit h = hit_at(k);
+    vec3 direction = r.direction_t_max.xyz, view = -direction;
+    e.distance_ = h.distance;
+    e.s = surface_at(h, r.origin_t_min.xyz, direction, e.p.cone_width + e.p.cone_spread * h.distance);
+    e.origin = off_surface(e.s, h.distance, e.s.geometric);
+    e.last = last_wave != 0u || (e.p.flags & PATH_BOUNCES_MASK) >= frame.depth;
+    e.all_lights = 0.0;
+    float NoV = clamp(dot(e.s.normal, view), 1e-4, 1.0); // a shading normal may lean away
+    split parts = split_light(e.s, NoV);
+    vec3 along, across;
+    float anisotropy = 0.0;
+#ifdef HAS_ANISOTROPY
+    material m = materials[h.material & HIT_MATERIAL_MASK];
+    anisotropy = m.anisotropy;
+    along = grain_of(h, e.s, m);
+#else
+    tangent_frame(e.s.normal, along, across);
+#endif
+    e.b = bsdf_of(e.s, parts, view, NoV, along, anisotropy);
+    e.receiver = light_receiver_of(e.s, parts, e.origin, view, NoV);
+    uint seed = path_seed(e.p), index = path_sample(e.p);
+    float choice = sequence_number(seed, numbers_of(SEQUENCE_PATH_LOBE), index);
+    bool straight = choice >= e.s.alpha;
+    vec3 sent = met_lamp(e.p, h.distance);
+    bool asks = !straight && !e.s.unlit && !e.b.leaves;
+    uint place = j, alive = 0u;
+    if (!straight)
+        sent += e.s.unlit ? e.s.base : e.s.emission;
+    if (asks_lights != 0u) {
+        if (!asks)
+            no_shadow_ray(place);
+        else if (ask_for_light(e, place, seed, index))
+            alive++;
+        place += hit_count;
+    }
+    if (asks_environment != 0u) {
+        if (!asks)
+            no_shadow_ray(place);
+        else if (ask_for_environment(e, place, seed, index))
+            alive++;
+    }
+    if (straight) {
+        e.p.lamp = e.p.lamp_distance > h.distance ? e.p.lamp : 0u;
+        e.p.lamp_distance -= h.distance;
+        add_child(j, e.p, e.s, h.distance, direction, e.weight, true);
+    } else if (!e.s.unlit) {
+        go_on(e, seed, index, asks, min(choice / e.s.alpha, 0.99999994));
+    }
+    bool seen = !straight && (e.p.flags & PATH_STRAIGHT) != 0u;
+    radiance[k] = vec4(e.weight * sent, seen ? e.p.weight_r : 0.0);
+    note_children(j, true, alive);
+}

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// All surfaces along a ray, blended front to back: Levoy. Display of Surfaces from Volume Data. 1988, with surfaces for
+// samples. What each hit of a wave sends towards the eye:
+//
+//   radiance    emission, the light of every lamp as if nothing were in the way, and the environment's irradiance, also
+//               in place of what a mirror would show; times how opaque the surface is
+//   child       straight on, with what is left
+//
+// Blended surfaces and glass are as opaque as they are: alpha, and what is not transmitted; what goes through glass is
+// tinted as shadow rays are. All others are made translucent: `layer_opacity`.
+//
+// Defines: those of common/material.glsl, common/light.glsl and common/environment.glsl.
+
+#include "common/environment.glsl"
+#include "common/light.glsl"
+#include "common/scattering.glsl"
+#include "render/shade.glsl"
+
+uniform float layer_opacity; // 0..1
+
+// A ray ends when less than this is left of it: a third of a step of an 8-bit picture.
+const float WEIGHT_MIN = 1.0 / 1024.0;
+
+vec3 lit(path p, surface s, vec3 direction, float distance_)
+{
+    vec3 view = -direction;
+    float NoV = clamp(dot(s.normal, view), 1e-4, 1.0); // a shading normal may lean away
+    split parts = split_light(s, NoV);
+    vec3 origin = off_surface(s, distance_, s.geometric);
+    vec3 mirror = parts.mirror + parts.refracted; // as if what is behind glass were as bright as what is before it
+    vec3 sum = s.emission + s.occlusion * (parts.scattered * environment_irradiance(s.normal) +
+                                           mirror * environment_irradiance(mirror_direction(s, direction)));
+    if (s.inside && s.transmission > 0.0)
+        return sum; // glass asks for no lamps from inside
+#ifdef HAS_AREA_LIGHTS
+    uint seed = path_seed(p), sample_ = path_sample(p);
+#endif
+    for (uint i = 0u; i < frame.light_count; i++) {
+        vec2 u = vec2(0.5);
+#ifdef HAS_AREA_LIGHTS
+        u = sequence_pair(seed, SEQUENCE_EVERY_LIGHT + (wave_number << 16 ^ i), sample_);
+#endif
+        light_sample lamp = light_sample_at(i, origin, u);
+        sum += brdf(s, parts, view, NoV, lamp.direction) * lamp.irradiance * max(dot(s.normal, lamp.direction), 0.0);
+    }
+    return sum;
+}
+
+void main()
+{
+    uint j = item_index();
+    if (j >= hit_count)
+        return;
+    uint k = hit_list[j];
+    path p = path_at(k);
+    vec3 weight = vec3(p.weight_r, p.weight_g, p.weight_b);
+    ray r = ray_at(k);
+    hit h = hit_at(k);
+    vec3 direction = r.direction_t_max.xyz;
+    surface s = surface_at(h, r.origin_t_min.xyz, direction, p.cone_width + p.cone_spread * h.distance);
+    float transmission = s.transmission * (1.0 - s.metallic), opacity = s.alpha * (1.0 - transmission);
+    vec3 through = mix(vec3(1.0), transmission * s.base, s.alpha);
+    if ((materials[h.material & HIT_MATERIAL_MASK].flags & MATERIAL_ALPHA_BLEND) == 0u && transmission == 0.0) {
+        opacity = layer_opacity;
+        through = vec3(1.0 - layer_opacity);
+    }
+    vec3 rest = weight * through;
+    bool goes_on = greatest(rest) >= WEIGHT_MIN; // not if it is not a number
+    if (goes_on)
+        add_child(j, p, s, h.distance, direction, rest, true);
+    radiance[k] = vec4(weight * opacity * (s.unlit ? s.base : lit(p, s, direction, h.distance)),
+                       goes_on ? weight.r - rest.r : weight.r);
+    note_children(j, true, 0u);
+}
