@@ -143,6 +143,14 @@ $(B)/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) Makefil
 $(B)/shader_sources.o: $(B)/shader_sources.c
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) -c $< -o $@
 
+# Programs that measure or test the rival of tests/bench/svo have its shaders too.
+RIVAL_SHADERS := $(sort $(patsubst tests/bench/%,%,$(wildcard $(addprefix tests/bench/svo/*.,h glsl comp frag))))
+$(B)/tests/bench/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) $(addprefix tests/bench/,$(RIVAL_SHADERS)) Makefile
+	@mkdir -p $(@D)
+	shaders/embed.sh $(CURDIR)/shaders $(SHADERS) -- $(CURDIR)/tests/bench $(RIVAL_SHADERS) >$@.new && mv $@.new $@
+$(B)/tests/bench/shader_sources.o: $(B)/tests/bench/shader_sources.c
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) -Iserver $(OPT) $(CFLAGS_ALL) $(WARN_C) -c $< -o $@
+
 # ---- programs --------------------------------------------------------------------------------------
 EMBREE_LIBS := $(if $(filter 1,$(EMBREE)),-lembree3)
 SERVER_LIBS = $(call pkg_libs,$(SERVER_PKGS)) $(EMBREE_LIBS) -lm
@@ -167,22 +175,28 @@ $(B)/protocol.md: $(B)/protocol-docgen
 	$< >$@.new && mv $@.new $@
 
 # ---- tests -----------------------------------------------------------------------------------------
+# What has shaders of its own has them in place of the daemon's alone.
+RIVAL_SOURCES := $(B)/tests/bench/shader_sources.o
+LINKED = $(if $(filter $(RIVAL_SOURCES),$^),$(filter-out $(B)/shader_sources.o,$^),$^)
 # A unit or accuracy test is one file with a main(); it may use everything but the programs' main().
 UNIT_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accuracy/test_*.c))
 TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) $(EMBREE_LIBS) -lm
 $(UNIT_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -o $@
 # Programs of the benchmark; the rest of its folder is what they share. They hold us against Embree itself.
-BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_changes bench_ldc bench_parallel bench_tracers)
+BENCHES := $(addprefix $(B)/tests/bench/,bench_bvh bench_changes bench_forms bench_parallel bench_tracers)
 $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -lembree3 -o $@
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -lembree3 -o $@
 MODEL_OBJ := $(B)/tests/bench/load_model.o
+RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIVAL_SOURCES)
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
 $(B)/tests/unit/test_load_model: $(MODEL_OBJ)
+$(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
+$(B)/tests/unit/test_bench_svo: $(RIVAL_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
 $(B)/tests/bench/bench_changes: $(B)/tests/bench/bench_stats.o
-$(B)/tests/bench/bench_ldc: $(CONTEST_OBJ) $(call obj,$(addprefix tests/bench/bench_,ldc_frames.c ldc_rays.c ldc_samples.c options.c))
+$(B)/tests/bench/bench_forms: $(CONTEST_OBJ) $(RIVAL_OBJ) $(call obj,$(addprefix tests/bench/bench_,forms_frames.c forms_parse.c forms_rays.c forms_samples.c options.c) tests/bench/plain_pass.c)
 $(B)/tests/bench/bench_parallel: $(CONTEST_OBJ)
 $(B)/tests/bench/bench_bvh: $(MODEL_OBJ) $(B)/tests/bench/bench_scene.o $(B)/tests/bench/bench_sheets.o $(B)/tests/bench/bench_waves.o
 $(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3

@@ -65,6 +65,9 @@ static const struct option options[] = {
     {"memory", "ldc", OPTION_BYTES, AT(limits.ldc_bytes), "0", 0, 16 * TIB, "bytes",
      "The part of it that the samples of one layered depth cube may take, in whole MiB; of more the nearest layers "
      "are kept, and the frame says so. 0: no limit of its own"},
+    {"memory", "abuffer", OPTION_BYTES, AT(limits.abuffer_bytes), "0", 0, 16 * TIB, "bytes",
+     "The part of it that the lists of the tracer abuffer may take, in whole MiB; a scene that needs more is refused. "
+     "0: no limit of its own"},
 
     {"limits", "clients", OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
     {"limits", "unauthenticated", OPTION_U32, AT(limits.unauthenticated), "64", 1, 65536, "",

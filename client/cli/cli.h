@@ -96,12 +96,14 @@ void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t 
 /* `done` of `total` steps of unlike length are done; `what` is being done now. Without a terminal a line each,
  * once it has taken a second. */
 void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t total, const char *what);
+/* A picture that is refined has `held` samples a pixel; `total` 0: there is no end but an interruption. */
+void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t total);
 /* Removes the bar, so that something else can be written. */
 void cli_progress_clear(struct cli_progress *progress);
 /* The last bar of what is done stays; any other is removed. */
 void cli_progress_end(struct cli_progress *progress, bool done);
 
-/* ---- job_options.c, job_tracer.c: what render and animate have in common ---- */
+/* ---- job_options.c, job_tracer.c, job_light.c: what render and animate have in common ---- */
 
 enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
 
@@ -163,12 +165,14 @@ struct cli_job {
     double clip_speed;
     double time_s;         /* of `render`: the moment of the clips that is shown */
     bool progressive;      /* of `render`: the picture is written again and again, with more samples */
+    bool endless;          /* likewise, until it is interrupted */
     uint32_t pass_samples; /* more each time; 0: as many as there are */
     bool lens_changes;     /* clips open it: the integrator must know lenses */
     bool lossless;         /* of a video */
     bool has_aperture, has_focus;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, quiet, is_orbit;
+    char depth_field[24];  /* what said how deep, for people; empty: nothing */
     unsigned file_quality; /* of JPEG files; 0: default */
     enum cli_timings_form timings;
     struct record_camera_key key;
@@ -225,10 +229,15 @@ json_t *cli_waves_json(const struct fl_frame *frame);      /* an object a wave a
 json_t *cli_wave_total_json(const struct fl_frame *frame); /* all of them together */
 double cli_wave_agreement(const struct fl_frame *frame);   /* likewise; see fl_wave_agreement */
 
-/* ---- cubes.c: what the tracer ldc made of a scene ---- */
+/* ---- cubes.c: what the tracers ldc and abuffer made of a scene ---- */
 
-/* "1024 cells of 1.2 mm; 6 layers, 812345 samples" */
-void cli_cube_print(FILE *out, const struct record_layered_cube *cube);
+/* What a tracer's records are: "cubes" or "lists"; and which one that is: "static", "dynamic", or "" of only one.
+ */
+const char *cli_cube_title(enum protocol_tracer tracer);
+const char *cli_cube_name(enum protocol_tracer tracer, enum protocol_cube_part part);
+/* "1024 cells of 1.2 mm; 6 layers, 812345 samples", "1280 texels of 1.2 mm; 812345 samples, at most 9 in a list"
+ */
+void cli_cube_print(FILE *out, enum protocol_tracer tracer, const struct record_layered_cube *cube);
 json_t *cli_cubes_json(const struct fl_frame *frame);
 /* On standard error, where a limit keeps surfaces from the picture; once for each part of the scene. */
 void cli_cubes_warn(const struct fl_frame *frame, bool warned[PROTOCOL_CUBE_PART_COUNT],

@@ -270,8 +270,9 @@ static bool is_within(const struct tracer_comparison *comparison)
 static void print_cubes(const struct fl_frame *frame)
 {
     for (size_t i = 0; i < frame->cube_count; i++) {
-        printf("  %s cube: ", protocol_cube_part_text(frame->cubes[i].part));
-        cli_cube_print(stdout, &frame->cubes[i]);
+        const char *name = cli_cube_name(frame->tracer, frame->cubes[i].part);
+        printf("  %s%s: ", name, name[0] != '\0' ? " cube" : cli_cube_title(frame->tracer));
+        cli_cube_print(stdout, frame->tracer, &frame->cubes[i]);
         putchar('\n');
     }
 }

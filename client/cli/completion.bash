@@ -8,17 +8,18 @@ _farlight()
         --tone-map --camera --eye --look-at --up --fov --tracer --bvh-bounds --integrator --primary --encoding
         --quality --timings --timings=json --trace-file --quiet --help --filter --aperture --focus --shutter --clip
         --clip-once --clip-start --clip-speed --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels --ldc-images
-        --ldc-block --ldc-rays"
+        --ldc-block --ldc-rays --abuffer-resolution --voxels --search --bounces --brdf --ao-distance --ao-falloff
+        --ao-rays --layer-opacity --layers"
     local words=
 
     if [ "$COMP_CWORD" -eq 1 ]; then
         words="render animate info compare stats ping bridge help --version"
     else
         case $before in
-        --tracer) words="bvh naive reference ldc" ;;
-        --tracers) words="bvh,reference ldc,reference bvh,naive naive,reference ldc,bvh" ;;
+        --tracer) words="bvh naive reference ldc abuffer" ;;
+        --tracers) words="bvh,reference ldc,reference abuffer,reference bvh,naive naive,reference ldc,bvh" ;;
         --bvh-bounds) words="auto box sphere" ;;
-        --integrator) words="whitted distributed" ;;
+        --integrator) words="whitted distributed raycast ao path" ;;
         --filter) words="blackman-harris gaussian tent box" ;;
         --bvh-rays) words="0 1 2 3 4 8" ;;
         --ldc-resolution) words="512 1024 2048" ;;
@@ -27,6 +28,11 @@ _farlight()
         --ldc-images) words="overlap one" ;;
         --ldc-block) words="2 4 8 16 32" ;;
         --ldc-rays) words="0 1 4" ;;
+        --abuffer-resolution) words="640 1280 2560" ;;
+        --voxels) words="auto 16 32 64 128 256" ;;
+        --search) words="auto dda linear3 linear1" ;;
+        --brdf) words="ggx ward" ;;
+        --layers) words="beauty,albedo,normal beauty,depth beauty,albedo,normal,depth,position,ao,id" ;;
         --primary) words="raster trace" ;;
         --encoding) words="raw zstd jpeg" ;;
         --tone-map) words="neutral aces none" ;;
@@ -43,6 +49,7 @@ _farlight()
                 --tracers --far --server --size --samples --depth --seed --environment --exposure --camera --eye --look-at
                 --up --fov --aperture --focus --shutter --filter --clip --clip-once --clip-start --clip-speed --time
                 --bvh-bounds --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels --ldc-images --ldc-block --ldc-rays
+                --abuffer-resolution --voxels --search --bounces --brdf --ao-distance --ao-falloff --ao-rays --layer-opacity
                 --integrator --encoding --quality --quiet" ;;
             stats) words="--server --json --help" ;;
             ping) words="--server --count --help" ;;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the tracer ldc made of a scene: how finely it is sampled, and whether all of it is there. */
+/* What the tracers ldc and abuffer made of a scene: how finely it is sampled, and whether all of it is there. */
 #include "cli/cli.h"
 
 #include <inttypes.h>
@@ -18,8 +18,29 @@ static void print_length(FILE *out, double metres)
         fprintf(out, "%.4g mm", metres * 1e3);
 }
 
-void cli_cube_print(FILE *out, const struct record_layered_cube *cube)
+static void print_lists(FILE *out, const struct record_layered_cube *lists)
 {
+    fprintf(out, "%u texels of ", lists->resolution);
+    print_length(out, (double)lists->cell_metres);
+    fprintf(out, "; %" PRIu64 " samples, at most %u in a list", lists->samples, lists->layers_kept);
+}
+
+const char *cli_cube_title(enum protocol_tracer tracer)
+{
+    return tracer == PROTOCOL_TRACER_ABUFFER ? "lists" : "cubes";
+}
+
+const char *cli_cube_name(enum protocol_tracer tracer, enum protocol_cube_part part)
+{
+    return tracer == PROTOCOL_TRACER_ABUFFER ? "" : protocol_cube_part_text(part);
+}
+
+void cli_cube_print(FILE *out, enum protocol_tracer tracer, const struct record_layered_cube *cube)
+{
+    if (tracer == PROTOCOL_TRACER_ABUFFER) {
+        print_lists(out, cube);
+        return;
+    }
     fprintf(out, "%u cells of ", cube->resolution);
     print_length(out, (double)cube->cell_metres);
     fprintf(out, "; %u", cube->layers_kept);

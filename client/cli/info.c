@@ -69,6 +69,7 @@ static void print_json(const struct info_options *wanted, const struct fl_model_
         uint64_t value;
     } numbers[] = {{"nodes", info->nodes},
                    {"meshes", info->meshes},
+                   {"closed_meshes", info->closed_meshes},
                    {"triangles", info->triangles},
                    {"sphere_sets", info->sphere_sets},
                    {"spheres", info->spheres},
@@ -106,10 +107,11 @@ static void print_table(const struct info_options *wanted, const struct fl_model
     const struct {
         const char *name;
         uint64_t value;
-    } rows[] = {{"nodes", info->nodes},       {"meshes", info->meshes},         {"triangles", info->triangles},
-                {"spheres", info->spheres},   {"discs", info->discs},           {"materials", info->materials},
-                {"textures", info->textures}, {"lights", info->lights},         {"cameras", info->camera_count},
-                {"skins", info->skins},       {"targets", info->morph_targets}, {"clips", info->clip_count}};
+    } rows[] = {{"nodes", info->nodes},          {"meshes", info->meshes},     {"closed", info->closed_meshes},
+                {"triangles", info->triangles},  {"spheres", info->spheres},   {"discs", info->discs},
+                {"materials", info->materials},  {"textures", info->textures}, {"lights", info->lights},
+                {"cameras", info->camera_count}, {"skins", info->skins},       {"targets", info->morph_targets},
+                {"clips", info->clip_count}};
     print_text(wanted->model != NULL ? wanted->model : wanted->environment);
     printf("\n");
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)

@@ -5,6 +5,9 @@
 #include <string.h>
 
 #define RADIANS_PER_DEGREE 0.017453292519943295
+#define FRAME_BYTES_MAX (UINT64_C(4080) << 20) /* as the daemon has it */
+#define PATH_SAMPLES 64u                       /* where nothing is said */
+#define AO_SAMPLES 16u                         /* of 8 rays: 128 a pixel, as in the paper */
 
 /* ---- where pictures go ---- */
 
@@ -57,6 +60,33 @@ static bool is_linear(enum cli_image image)
     return image == CLI_IMAGE_EXR || image == CLI_IMAGE_HDR;
 }
 
+/* Of all formats only EXR has channels by name; what they hold is more than half floats can. */
+static bool complete_layers(struct cli_job *job)
+{
+    struct fl_job_options *wanted = &job->options;
+    const uint64_t bytes = (uint64_t)wanted->width * wanted->height * 16;
+    if (wanted->layers == 0)
+        return true;
+    for (size_t i = 0; i < job->output_count; i++) {
+        if (job->outputs[i].image == CLI_IMAGE_EXR)
+            continue;
+        cli_usage(job, job->outputs[i].path, "%s files do not have the layers of --layers",
+                  cli_image_name(job->outputs[i].image));
+        return fl_error_remedy(&job->error, "write an .exr file, or leave out --layers");
+    }
+    if (wanted->encoding == PROTOCOL_ENCODING_JPEG) {
+        cli_usage(job, "--encoding", "jpeg does not carry the layers of --layers");
+        return fl_error_remedy(&job->error, "choose raw or zstd");
+    }
+    if (bytes * (unsigned)__builtin_popcount(wanted->layers) > FRAME_BYTES_MAX) {
+        cli_usage(job, "--layers", "so many layers of %ux%u pixels are more than a frame can have", wanted->width,
+                  wanted->height);
+        return fl_error_remedy(&job->error, "render some of them at a time, or a smaller --size");
+    }
+    wanted->format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    return true;
+}
+
 /* All outputs are made of the same frames. */
 static bool complete_pixels(struct cli_job *job)
 {
@@ -78,7 +108,7 @@ static bool complete_pixels(struct cli_job *job)
         job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     else if (has[CLI_IMAGE_EXR])
         job->options.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
-    return true;
+    return complete_layers(job);
 }
 
 static bool complete_outputs(struct cli_job *job, bool is_series)
@@ -172,9 +202,41 @@ static bool complete_camera(struct cli_job *job)
 static void complete_integrator(struct cli_job *job)
 {
     const struct fl_job_options *wanted = &job->options;
-    const bool spreads = wanted->samples > 1 || wanted->aperture > 0 || wanted->shutter > 0 || job->lens_changes;
+    const bool spreads =
+        wanted->samples > 1 || wanted->aperture > 0 || wanted->shutter > 0 || job->lens_changes || job->endless;
     if (!job->has_integrator)
         job->options.integrator = spreads ? PROTOCOL_INTEGRATOR_DISTRIBUTED : PROTOCOL_INTEGRATOR_WHITTED;
+}
+
+/* What is chosen by chance is seen as noise in one sample. Pictures that are refined without an end have no
+ * number. */
+static void complete_samples(struct cli_job *job)
+{
+    struct fl_job_options *wanted = &job->options;
+    job->endless = job->progressive && wanted->samples == 0;
+    if (wanted->samples == 0 && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
+        wanted->samples = PATH_SAMPLES;
+    else if (wanted->samples == 0 && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
+        wanted->samples = AO_SAMPLES;
+}
+
+static bool complete_tracer(struct cli_job *job)
+{
+    struct fl_job_options *wanted = &job->options;
+    const uint32_t resolution = wanted->abuffer_resolution > 0 ? wanted->abuffer_resolution : 1280;
+    if (wanted->ldc_levels == PROTOCOL_LDC_LEVELS_CELLS && wanted->ldc_tolerance > 0) {
+        cli_usage(job, "--ldc-levels", "cells know nothing of --ldc-tolerance");
+        return fl_error_remedy(&job->error, "leave out one of them");
+    }
+    if (wanted->abuffer_voxels > resolution) {
+        cli_usage(job, "--voxels", "%u are more than the %u texels of --abuffer-resolution",
+                  wanted->abuffer_voxels, resolution);
+        return fl_error_remedy(&job->error, "choose fewer, auto, or a higher --abuffer-resolution");
+    }
+    /* Else most of the "truth" would be the rasteriser's. */
+    if (!job->has_primary && wanted->tracer == PROTOCOL_TRACER_REFERENCE)
+        wanted->primary = PROTOCOL_PRIMARY_TRACE;
+    return true;
 }
 
 static bool complete_clips(struct cli_job *job)
@@ -202,18 +264,12 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (job->model == NULL)
         return cli_usage(job, "MODEL", "no model file is named") == 0;
-    if (job->options.ldc_levels == PROTOCOL_LDC_LEVELS_CELLS && job->options.ldc_tolerance > 0) {
-        cli_usage(job, "--ldc-levels", "cells know nothing of --ldc-tolerance");
-        return fl_error_remedy(&job->error, "leave out one of them");
-    }
-    /* Else most of the "truth" would be the rasteriser's. */
-    if (!job->has_primary && job->options.tracer == PROTOCOL_TRACER_REFERENCE)
-        job->options.primary = PROTOCOL_PRIMARY_TRACE;
     if (job->options.width == 0) {
         job->options.width = 1280;
         job->options.height = 720;
     }
+    complete_samples(job);
     complete_integrator(job);
-    return complete_clips(job) && complete_outputs(job, is_series) && complete_encoding(job) &&
-           complete_camera(job);
+    return complete_tracer(job) && complete_clips(job) && complete_outputs(job, is_series) &&
+           complete_encoding(job) && complete_camera(job);
 }

@@ -22,14 +22,15 @@ static const struct argp_option options[] = {
      "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: a private daemon for this command)", 0},
     {NULL, 0, NULL, 0, "Picture:", 1},
     {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x720)", 0},
-    {"samples", KEY_SAMPLES, "N", 0, "Samples per pixel (default 1)", 0},
+    {"samples", KEY_SAMPLES, "N", 0, "Samples per pixel (default 1; 16 for the integrator ao, 64 for path)", 0},
     {"filter", KEY_FILTER, "NAME", 0,
      "How samples are spread about a pixel: blackman-harris (default), gaussian, tent, box", 0},
-    {"depth", KEY_DEPTH, "N", 0, "Bounces after the first hit, 0 to 32 (default 8)", 0},
     {"seed", KEY_SEED, "N", 0, "Same seed, same picture (default 0)", 0},
     {"environment", KEY_ENVIRONMENT, "FILE", 0, "Equirectangular image (HDR or EXR) that lights the scene", 0},
     {"exposure", KEY_EXPOSURE, "STOPS", 0, "Multiply the picture by 2 to this power (default 0)", 0},
     {"tone-map", KEY_TONE_MAP, "NAME", 0, "neutral, aces or none, for PNG and JPEG (default neutral)", 0},
+    {"layers", KEY_LAYERS, "NAME,..", 0,
+     "What an EXR file has: beauty (the picture, default), albedo, normal, depth, position, ao, id", 0},
     {NULL, 0, NULL, 0, "Camera (default: the model's first, else one that sees all of it):", 2},
     {"camera", KEY_CAMERA, "NAME|INDEX", 0, "A camera of the model ('farlight info' lists them)", 0},
     {"eye", KEY_EYE, "X,Y,Z", 0, "Place of the camera; needs --look-at", 0},
@@ -48,20 +49,36 @@ static const struct argp_option options[] = {
     {"clip-start", KEY_CLIP_START, "SECONDS", 0, "When they begin (default 0; negative: they run already)", 0},
     {"clip-speed", KEY_CLIP_SPEED, "FACTOR", 0, "How fast they run (default 1)", 0},
     {NULL, 0, NULL, 0, "Method:", 4},
-    {"tracer", KEY_TRACER, "NAME", 0, "bvh (default), naive, reference, ldc", 0},
-    {"integrator", KEY_INTEGRATOR, "NAME", 0,
-     "whitted, distributed (default: distributed for several samples, a lens or a shutter)", 0},
+    {"tracer", KEY_TRACER, "NAME", 0, "bvh (default), naive, reference, ldc, abuffer", 0},
     {"primary", KEY_PRIMARY, "NAME", 0,
      "First hits: raster, trace (default: raster, but trace for the tracer reference)", 0},
     {"encoding", KEY_ENCODING, "NAME", 0,
      "How pixels travel: raw, zstd, jpeg (default: raw on this machine, zstd over a network)", 0},
     {"quality", KEY_QUALITY, "N", 0,
      "JPEG quality 1 to 100, zstd level 1 to 19, or rate factor of a video, 1 (best) to 51", 0},
-    {NULL, 0, NULL, 0, "Tracer bvh, a hierarchy of bounding volumes:", 5},
+    {NULL, 0, NULL, 0, "Light:", 5},
+    {"integrator", KEY_INTEGRATOR, "NAME", 0,
+     "whitted, distributed, raycast, ao, path (default: distributed for several samples, a lens or a shutter, "
+     "else "
+     "whitted)",
+     0},
+    {"depth", KEY_DEPTH, "N", 0, "Bounces after the first hit, 0 to 32 (default 8)", 0},
+    {"bounces", KEY_BOUNCES, "N", 0, "The same as --depth", 0},
+    {"brdf", KEY_BRDF, "NAME", 0, "How rough surfaces reflect, for path: ggx (default), ward", 0},
+    {"ao-distance", KEY_AO_DISTANCE, "METRES", 0,
+     "What is farther away does not occlude, for ao (default 0: a tenth of the scene's diagonal)", 0},
+    {"ao-falloff", KEY_AO_FALLOFF, "POWER", 0,
+     "How much less counts what is farther: a power of 1 - distance / --ao-distance, 0 to 64 (default 0: all the "
+     "same)",
+     0},
+    {"ao-rays", KEY_AO_RAYS, "N", 0, "Rays for each sample, for ao, 1 to 256 (default 8)", 0},
+    {"layer-opacity", KEY_LAYER_OPACITY, "SHARE", 0,
+     "Of opaque surfaces, for raycast: how much of what lies behind they hide, up to 1 (default 0.5)", 0},
+    {NULL, 0, NULL, 0, "Tracer bvh, a hierarchy of bounding volumes:", 6},
     {"bvh-bounds", KEY_BVH_BOUNDS, "NAME", 0, "auto (default), box, sphere", 0},
     {"bvh-rays", KEY_BVH_RAYS, "N", 0,
      "Rays that walk the bvh as one: 1, 2, 3, 4, 8 (default 0: chosen for each wave)", 0},
-    {NULL, 0, NULL, 0, "Tracer ldc, surfaces sampled along three axes:", 6},
+    {NULL, 0, NULL, 0, "Tracer ldc, surfaces sampled along three axes:", 7},
     {"ldc-resolution", KEY_LDC_RESOLUTION, "N", 0,
      "Cells along the longest side of the sampled box, 16 to 4096 (default 1024)", 0},
     {"ldc-tolerance", KEY_LDC_TOLERANCE, "METRES", 0,
@@ -75,7 +92,14 @@ static const struct argp_option options[] = {
      "overlap (default): no cracks between the three images, one: a surface is in one of them alone", 0},
     {"ldc-block", KEY_LDC_BLOCK, "N", 0, "Texels along a side of a block: 2, 4, 8, 16, 32 (default 8)", 0},
     {"ldc-rays", KEY_LDC_RAYS, "N", 0, "Rays that walk as one: 1, 4 (default 0: chosen)", 0},
-    {NULL, 0, NULL, 0, "Talk:", 7},
+    {NULL, 0, NULL, 0, "Tracer abuffer, a voxel grid over lists of surfaces:", 8},
+    {"abuffer-resolution", KEY_ABUFFER_RESOLUTION, "N", 0,
+     "Texels along a side of the lists' images, 16 to 4096 (default 1280)", 0},
+    {"voxels", KEY_VOXELS, "N", 0,
+     "Along a side of the grid: auto (default: by the resolution), 16, 32, 64, 128, 256", 0},
+    {"search", KEY_SEARCH, "NAME", 0,
+     "How a crossing is found in a voxel: dda (default), the most exact, linear3, linear1, the fastest", 0},
+    {NULL, 0, NULL, 0, "Talk:", 9},
     {"timings", KEY_TIMINGS, "json", OPTION_ARG_OPTIONAL,
      "Print the time of every stage, as a table or as JSON, one object a line", 0},
     {"trace-file", KEY_TRACE_FILE, "FILE", 0,
@@ -130,11 +154,6 @@ static error_t set_name(struct cli_job *job, int key, const char *field, const c
 {
     struct fl_job_options *wanted = &job->options;
     switch (key) {
-    case KEY_INTEGRATOR:
-        job->has_integrator = true;
-        return protocol_integrator_parse(value, &wanted->integrator)
-                   ? 0
-                   : job_unknown_value(job, field, "integrator", value);
     case KEY_PRIMARY:
         job->has_primary = true;
         return protocol_primary_parse(value, &wanted->primary) ? 0
@@ -213,10 +232,6 @@ static error_t set_number(struct cli_job *job, int key, const char *field, const
         status = job_set_integer(job, field, value, 1, 65536, &number);
         wanted->samples = (uint32_t)number;
         return status;
-    case KEY_DEPTH:
-        status = job_set_integer(job, field, value, 0, 32, &number);
-        wanted->depth = number == 0 ? FL_DEPTH_NONE : (int)number;
-        return status;
     case KEY_SEED:
         return job_set_integer(job, field, value, 0, UINT64_MAX, &wanted->seed);
     case KEY_QUALITY:
@@ -289,6 +304,7 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     default: {
         error_t status = set_name(job, key, field, value);
         status = status == ARGP_ERR_UNKNOWN ? job_set_tracer(job, key, field, value) : status;
+        status = status == ARGP_ERR_UNKNOWN ? job_set_light(job, key, field, value) : status;
         return status == ARGP_ERR_UNKNOWN ? set_number(job, key, field, value) : status;
     }
     }
@@ -324,8 +340,8 @@ const struct argp cli_job_argp = {.options = options, .parser = parse};
 
 const struct argp *cli_picture_argp(void)
 {
-    static const int left_out[] = {KEY_OUTPUT, KEY_FORMAT,  KEY_HALF,    KEY_FLOAT,     KEY_TONE_MAP,
-                                   KEY_TRACER, KEY_PRIMARY, KEY_TIMINGS, KEY_TRACE_FILE};
+    static const int left_out[] = {KEY_OUTPUT, KEY_FORMAT,  KEY_HALF,    KEY_FLOAT,      KEY_TONE_MAP,
+                                   KEY_TRACER, KEY_PRIMARY, KEY_TIMINGS, KEY_TRACE_FILE, KEY_LAYERS};
     static struct argp_option kept[sizeof options / sizeof options[0]];
     static const struct argp argp = {.options = kept, .parser = parse};
     size_t count = 0;
@@ -342,12 +358,18 @@ const struct argp *cli_picture_argp(void)
 /* FARLIGHT_SIZE for --size, and so on. */
 static bool read_environment(struct cli_job *job)
 {
-    static const int keys[] = {
-        KEY_SERVER,    KEY_SIZE,           KEY_SAMPLES,       KEY_DEPTH,      KEY_SEED,       KEY_EXPOSURE,
-        KEY_TONE_MAP,  KEY_TRACER,         KEY_BVH_BOUNDS,    KEY_INTEGRATOR, KEY_PRIMARY,    KEY_ENCODING,
-        KEY_QUALITY,   KEY_ENVIRONMENT,    KEY_APERTURE,      KEY_FOCUS,      KEY_SHUTTER,    KEY_FILTER,
-        KEY_BVH_RAYS,  KEY_LDC_RESOLUTION, KEY_LDC_TOLERANCE, KEY_LDC_BUILD,  KEY_LDC_LEVELS, KEY_LDC_IMAGES,
-        KEY_LDC_BLOCK, KEY_LDC_RAYS};
+    static const int keys[] = {KEY_SERVER,      KEY_SIZE,           KEY_SAMPLES,
+                               KEY_DEPTH,       KEY_SEED,           KEY_EXPOSURE,
+                               KEY_TONE_MAP,    KEY_TRACER,         KEY_BVH_BOUNDS,
+                               KEY_INTEGRATOR,  KEY_PRIMARY,        KEY_ENCODING,
+                               KEY_QUALITY,     KEY_ENVIRONMENT,    KEY_APERTURE,
+                               KEY_FOCUS,       KEY_SHUTTER,        KEY_FILTER,
+                               KEY_BVH_RAYS,    KEY_LDC_RESOLUTION, KEY_LDC_TOLERANCE,
+                               KEY_LDC_BUILD,   KEY_LDC_LEVELS,     KEY_LDC_IMAGES,
+                               KEY_LDC_BLOCK,   KEY_LDC_RAYS,       KEY_ABUFFER_RESOLUTION,
+                               KEY_VOXELS,      KEY_SEARCH,         KEY_BOUNCES,
+                               KEY_AO_DISTANCE, KEY_AO_FALLOFF,     KEY_AO_RAYS,
+                               KEY_BRDF,        KEY_LAYER_OPACITY};
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
         char field[40] = "FARLIGHT_";
         size_t length = strlen(field);

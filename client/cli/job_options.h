@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The options of a job (job_options.c), and those of its tracers (job_tracer.c). */
+/* The options of a job (job_options.c), those of its tracers (job_tracer.c) and of its light (job_light.c). */
 #ifndef FARLIGHT_CLIENT_CLI_JOB_OPTIONS_H
 #define FARLIGHT_CLIENT_CLI_JOB_OPTIONS_H
 
@@ -47,11 +47,23 @@ enum job_key {
     KEY_LDC_LEVELS,
     KEY_LDC_IMAGES,
     KEY_LDC_TOLERANCE,
-    KEY_LDC_RAYS
+    KEY_LDC_RAYS,
+    KEY_ABUFFER_RESOLUTION,
+    KEY_VOXELS,
+    KEY_SEARCH,
+    KEY_BOUNCES,
+    KEY_AO_DISTANCE,
+    KEY_AO_FALLOFF,
+    KEY_AO_RAYS,
+    KEY_BRDF,
+    KEY_LAYER_OPACITY,
+    KEY_LAYERS
 };
 
 /* Of one option, typed as `value`; `field` is its name for people. ARGP_ERR_UNKNOWN: it is no tracer's. */
 error_t job_set_tracer(struct cli_job *job, int key, const char *field, const char *value);
+/* Likewise of integrators and of what a frame brings. */
+error_t job_set_light(struct cli_job *job, int key, const char *field, const char *value);
 
 /* "unknown bvh bounds 'cube'", and which are known. */
 error_t job_unknown_value(struct cli_job *job, const char *field, const char *enum_name, const char *value);

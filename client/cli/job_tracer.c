@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/job_options.h"
+#include "lib/text.h"
 
 #include <errno.h>
+#include <stdio.h>
+#include <string.h>
 
 #define RESOLUTION_LEAST 16u
 
@@ -27,23 +30,44 @@ static error_t set_name(struct cli_job *job, int key, const char *field, const c
         return protocol_ldc_images_parse(value, &wanted->ldc_images)
                    ? 0
                    : job_unknown_value(job, field, "ldc_images", value);
+    case KEY_SEARCH:
+        return protocol_abuffer_search_parse(value, &wanted->abuffer_search)
+                   ? 0
+                   : job_unknown_value(job, field, "abuffer_search", value);
     default:
         return ARGP_ERR_UNKNOWN;
     }
 }
 
-/* 0: it is left to the daemon. */
-static error_t set_resolution(struct cli_job *job, const char *field, const char *value)
+/* 0: it is left to the daemon, which takes `usual`. */
+static error_t set_resolution(struct cli_job *job, const char *field, const char *value, uint32_t usual,
+                              uint32_t *resolution)
 {
     uint64_t cells = 0;
     const error_t status = job_set_integer(job, field, value, 0, 4096, &cells);
     if (status == 0 && cells > 0 && cells < RESOLUTION_LEAST) {
-        cli_usage(job, field, "%s cells are too few", value);
-        fl_error_remedy(&job->error, "%u to 4096, or 0 for 1024", RESOLUTION_LEAST);
+        cli_usage(job, field, "%s are too few", value);
+        fl_error_remedy(&job->error, "%u to 4096, or 0 for %u", RESOLUTION_LEAST, usual);
         return EINVAL;
     }
-    job->options.ldc_resolution = (uint32_t)cells;
+    *resolution = (uint32_t)cells;
     return status;
+}
+
+static error_t set_voxels(struct cli_job *job, const char *field, const char *value)
+{
+    uint64_t voxels = 0;
+    const bool chosen = strcmp(value, "auto") == 0;
+    if (!chosen && fl_text_integer(value, 0, UINT64_MAX, &voxels, &job->error) &&
+        (voxels < 16 || voxels > 256 || (voxels & (voxels - 1)) != 0) && voxels != 0)
+        cli_usage(job, field, "a grid has no side of %s voxels", value);
+    if (job->error.code != FL_ERROR_NONE) {
+        snprintf(job->error.field, sizeof job->error.field, "%s", field);
+        fl_error_remedy(&job->error, "known: auto, 16, 32, 64, 128, 256");
+        return EINVAL;
+    }
+    job->options.abuffer_voxels = (unsigned)voxels;
+    return 0;
 }
 
 static error_t set_block(struct cli_job *job, const char *field, const char *value)
@@ -87,7 +111,11 @@ error_t job_set_tracer(struct cli_job *job, int key, const char *field, const ch
     case KEY_BVH_RAYS:
         return set_bvh_rays(job, field, value);
     case KEY_LDC_RESOLUTION:
-        return set_resolution(job, field, value);
+        return set_resolution(job, field, value, 1024, &job->options.ldc_resolution);
+    case KEY_ABUFFER_RESOLUTION:
+        return set_resolution(job, field, value, 1280, &job->options.abuffer_resolution);
+    case KEY_VOXELS:
+        return set_voxels(job, field, value);
     case KEY_LDC_BLOCK:
         return set_block(job, field, value);
     case KEY_LDC_RAYS:

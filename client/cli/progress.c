@@ -114,6 +114,28 @@ void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t to
     progress->drawn = true;
 }
 
+void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t total)
+{
+    char text[80];
+    if (progress->silent || !is_due(progress, held == total))
+        return;
+    int length = 0;
+    if (total > 0)
+        length = snprintf(text, sizeof text, "%u of %u samples a pixel", held, total);
+    else
+        length = snprintf(text, sizeof text, "%u sample%s a pixel; Ctrl-C ends it", held, held == 1 ? "" : "s");
+    if (!progress->bar) {
+        fprintf(stderr, "%s\n", text);
+        return;
+    }
+    cli_progress_clear(progress);
+    if (total > 0)
+        draw_bar(held, total, text, (size_t)length);
+    else
+        fputs(text, stderr);
+    progress->drawn = true;
+}
+
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total)
 {
     const uint64_t now = now_ns();

@@ -11,7 +11,9 @@ enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE };
 static const struct argp_option options[] = {
     {"time", KEY_TIME, "SECONDS", 0, "The moment of the clips that is shown (default 0)", -1},
     {"progressive", KEY_PROGRESSIVE, "N", OPTION_ARG_OPTIONAL,
-     "Write the picture again after every N samples (default: after 1, 2, 4, 8 ..) until --samples are reached",
+     "Write the picture again after every N samples (default: after 1, 2, 4, 8 ..) until --samples are reached, "
+     "or "
+     "without --samples until Ctrl-C",
      -1},
     {0}};
 

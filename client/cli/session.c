@@ -13,6 +13,7 @@
 
 #define FIRST_PAUSE_MS 500u
 #define LONGEST_PAUSE_MS 30000u
+#define LONG_PASS_NS 1000000000u
 
 struct session {
     struct cli_job *job;
@@ -173,28 +174,59 @@ static bool take_frames(struct session *session, const struct fl_frame_run *run,
     return error->code == FL_ERROR_NONE;
 }
 
+/* Of the next pass: without a number given, as many as there are already, so that little is spent on writing
+ * files; where there is no end, no more than before once a pass takes long, so that the picture does not stand
+ * still. */
+static uint32_t pass_samples(const struct cli_job *job, uint32_t held, uint32_t total, uint32_t last,
+                             uint64_t last_ns)
+{
+    uint32_t samples = job->pass_samples > 0 ? job->pass_samples : held > 0 ? held : 1;
+    if (job->endless && job->pass_samples == 0 && last_ns > LONG_PASS_NS)
+        samples = last;
+    return samples < total - held ? samples : total - held;
+}
+
+/* After an interruption: the file that is being written gets complete. False: that was not meant to be the end. */
+static bool end_passes(struct session *session, uint32_t held, struct fl_error *error)
+{
+    const struct cli_job *job = session->job;
+    struct fl_error failure = {0};
+    if (error->code != FL_ERROR_INTERRUPTED || held == 0)
+        return false;
+    if (!finish_sinks(session, &failure)) {
+        *error = failure;
+        return false;
+    }
+    cli_progress_clear(&session->progress);
+    if (!job->quiet)
+        fprintf(stderr, "farlight: %s has %u sample%s a pixel\n", job->outputs[0].path, held,
+                held == 1 ? "" : "s");
+    if (job->endless)
+        *error = (struct fl_error){0};
+    return job->endless;
+}
+
 /* One picture with more and more samples: a job for each pass, which the daemon adds to those before. */
 static bool render_passes(struct session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
     struct fl_job_options options = job->options;
-    const uint32_t samples = options.samples > 0 ? options.samples : 1;
+    const uint32_t total = job->endless ? UINT32_MAX : options.samples > 0 ? options.samples : 1;
     const struct fl_frame_run still = {.step = 1};
-    bool done = true;
+    uint64_t pass_ns = 0;
     options.accumulate = true;
-    for (uint32_t held = 0; held < samples && done; held += options.samples) {
-        options.samples = job->pass_samples > 0 ? job->pass_samples : held > 0 ? held : 1;
-        if (options.samples > samples - held)
-            options.samples = samples - held;
+    for (uint32_t held = 0; held < total; held += options.samples) {
+        const uint64_t begin_ns = now_ns();
+        options.samples = pass_samples(job, held, total, options.samples, pass_ns);
         session->rendering = fl_render_start(session->loading.scene, &options, error);
-        done = session->rendering != NULL && take_frames(session, &still, error);
-        if (!done)
-            break;
+        if (session->rendering == NULL || !take_frames(session, &still, error))
+            return end_passes(session, held, error);
         fl_render_destroy(session->rendering);
         session->rendering = NULL;
-        cli_progress_step(&session->progress, held + options.samples, samples, "samples");
+        pass_ns = now_ns() - begin_ns;
+        cli_progress_samples(&session->progress, held + options.samples, job->endless ? 0 : total);
     }
-    return done;
+    return true;
 }
 
 /* What is left of one run, as one job. */

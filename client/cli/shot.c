@@ -3,6 +3,7 @@
 #include "cli/shot_read.h"
 #include "lib/text.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -14,7 +15,7 @@
 
 /* ---- settings: what the command line has, too ---- */
 
-enum type { WORD, WHOLE, REAL, SIZE, FLAG };
+enum type { WORD, WHOLE, REAL, SIZE, FLAG, WHOLE_OR_WORD, WORDS };
 
 static const struct setting {
     const char *name, *option;
@@ -42,7 +43,17 @@ static const struct setting {
     {"ldc_images", "ldc-images", WORD, "\"one\""},
     {"ldc_tolerance", "ldc-tolerance", REAL, "0.001"},
     {"ldc_rays", "ldc-rays", WHOLE, "4"},
+    {"abuffer_resolution", "abuffer-resolution", WHOLE, "1280"},
+    {"voxels", "voxels", WHOLE_OR_WORD, "128"},
+    {"search", "search", WORD, "\"linear3\""},
     {"integrator", "integrator", WORD, "\"distributed\""},
+    {"bounces", "bounces", WHOLE, "8"},
+    {"brdf", "brdf", WORD, "\"ward\""},
+    {"ao_distance", "ao-distance", REAL, "0.5"},
+    {"ao_falloff", "ao-falloff", REAL, "1"},
+    {"ao_rays", "ao-rays", WHOLE, "8"},
+    {"layer_opacity", "layer-opacity", REAL, "0.5"},
+    {"layers", "layers", WORDS, "[\"beauty\", \"depth\"]"},
     {"primary", "primary", WORD, "\"raster\""},
     {"encoding", "encoding", WORD, "\"zstd\""},
     {"quality", "quality", WHOLE, "90"},
@@ -60,7 +71,9 @@ static bool wrong_type(const struct shot_reader *reader, const struct shot_value
                                          [WHOLE] = "a whole number, not less than 0",
                                          [REAL] = "a number",
                                          [SIZE] = "an array of two whole numbers",
-                                         [FLAG] = "true or false"};
+                                         [FLAG] = "true or false",
+                                         [WHOLE_OR_WORD] = "a whole number or a word",
+                                         [WORDS] = "an array of strings"};
     char remedy[80];
     snprintf(remedy, sizeof remedy, "such as \"%s\": %s", setting->name, setting->example);
     return shot_wrong(reader, at, remedy, "must be %s", wanted[setting->type]);
@@ -71,6 +84,19 @@ static bool is_whole(const json_t *value)
 {
     const double number = json_number_value(value);
     return json_is_number(value) && number >= 0 && number <= 9007199254740992.0 && floor(number) == number;
+}
+
+/* "a,b"; NULL: not all are strings, or there is none. */
+static const char *joined(const json_t *array, char *text, size_t text_bytes)
+{
+    size_t used = 0;
+    for (size_t i = 0; i < json_array_size(array); i++) {
+        const char *word = json_string_value(json_array_get(array, i));
+        if (word == NULL || strchr(word, ',') != NULL || strlen(word) + 2 > text_bytes - used)
+            return NULL;
+        used += (size_t)snprintf(text + used, text_bytes - used, "%s%s", i > 0 ? "," : "", word);
+    }
+    return used > 0 ? text : NULL;
 }
 
 /* As it would be typed; NULL: it has the wrong type. */
@@ -89,6 +115,13 @@ static const char *typed(const struct setting *setting, const json_t *value, cha
     case SIZE:
         snprintf(text, text_bytes, "%.0fx%.0f", json_number_value(width), json_number_value(height));
         return json_array_size(value) == 2 && is_whole(width) && is_whole(height) ? text : NULL;
+    case WHOLE_OR_WORD:
+        snprintf(text, text_bytes, "%.0f", json_number_value(value));
+        if (json_is_string(value))
+            return isdigit((unsigned char)json_string_value(value)[0]) ? NULL : json_string_value(value);
+        return is_whole(value) ? text : NULL;
+    case WORDS:
+        return joined(value, text, text_bytes);
     default:
         return json_is_boolean(value) ? "" : NULL;
     }
@@ -97,7 +130,7 @@ static const char *typed(const struct setting *setting, const json_t *value, cha
 static bool apply_setting(const struct shot_reader *reader, const struct shot_value *at,
                           const struct setting *setting)
 {
-    char text[64], remedy[sizeof reader->job->error.remedy];
+    char text[256], remedy[sizeof reader->job->error.remedy];
     const char *value = typed(setting, at->value, text, sizeof text);
     if (value == NULL)
         return wrong_type(reader, at, setting);

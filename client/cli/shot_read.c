@@ -30,7 +30,7 @@ static bool is_root(const struct shot_value *at)
 bool shot_wrong(const struct shot_reader *reader, const struct shot_value *at, const char *remedy,
                 const char *format, ...)
 {
-    char text[500], path[100];
+    char text[640], path[100];
     const struct fl_json_place *place = is_root(at) ? NULL : &at->place;
     const size_t length = strlen(reader->shot->path);
     va_list arguments;
@@ -71,7 +71,7 @@ static unsigned distance(const char *a, const char *b)
 static bool unknown_member(const struct shot_reader *reader, const struct shot_value *object, const char *name,
                            const char *const *known)
 {
-    char list[420] = "", remedy[80];
+    char list[560] = "", remedy[80];
     const char *nearest = NULL;
     unsigned least = 3; /* further off it is another word */
     for (size_t i = 0; known[i] != NULL; i++) {

@@ -105,11 +105,12 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
     if (cli_image_is_video(sink->output.image))
         return start_video(sink, error);
     const struct cli_job *job = sink->job;
+    /* An interruption is how progressive pictures end: a file that has begun is finished. */
     const struct fl_exporter_options options = {.folder = sink->folder,
                                                 .model = job->model,
                                                 .frames_per_second =
                                                     sink->is_series ? job->options.frames_per_second : 0,
-                                                .interrupt_fd = cli_interrupt_fd()};
+                                                .interrupt_fd = job->progressive ? 0 : cli_interrupt_fd()};
     sink->exporter = fl_exporter_start(&options, error);
     return sink->exporter != NULL;
 }

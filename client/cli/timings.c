@@ -25,9 +25,10 @@ struct cli_timings {
     uint64_t pixels_bytes, wait_ns, receive_ns, decode_ns;
     struct sum stages[STAGES][CLOCKS];
     struct sum waves[2][WAVES_SHOWN][CLOCKS]; /* trace, shade */
-    struct sum cubes[PARTS][CLOCKS];          /* build, of the tracer ldc */
+    struct sum cubes[PARTS][CLOCKS];          /* build, of those below */
     struct record_layered_cube cube[PARTS];   /* of the last frame that has it; resolution 0: none has */
     uint64_t cube_builds[PARTS];
+    enum protocol_tracer tracer; /* of the first frame */
     char title[160];
 };
 
@@ -87,6 +88,8 @@ static void add_cubes(struct cli_timings *timings, const struct fl_frame *frame)
 
 static void add_frame(struct cli_timings *timings, const struct fl_frame *frame)
 {
+    if (timings->frames == 0)
+        timings->tracer = frame->tracer;
     if (timings->frames++ == 0)
         snprintf(timings->title, sizeof timings->title, "%ux%u, %u sample%s, %s, %s, %s %s", frame->width,
                  frame->height, frame->samples, frame->samples == 1 ? "" : "s",
@@ -211,6 +214,14 @@ static void print_row(const struct cli_timings *timings, const char *indent, con
     fputc('\n', timings->out);
 }
 
+/* Where there is only one, the row above says the same. */
+static void print_cube_row(const struct cli_timings *timings, enum protocol_cube_part part)
+{
+    const char *name = cli_cube_name(timings->tracer, part);
+    if (name[0] != '\0')
+        print_row(timings, "  ", name, timings->cubes[part]);
+}
+
 static void print_stages(const struct cli_timings *timings)
 {
     fprintf(timings->out, "  %-16s%12s%12s\n", "daemon", "CPU ms", "GPU ms");
@@ -218,8 +229,7 @@ static void print_stages(const struct cli_timings *timings)
         print_row(timings, "", protocol_stage_text((enum protocol_stage)stage), timings->stages[stage]);
         if (stage == PROTOCOL_STAGE_BUILD)
             for (unsigned part = 0; part < PARTS; part++)
-                print_row(timings, "  ", protocol_cube_part_text((enum protocol_cube_part)part),
-                          timings->cubes[part]);
+                print_cube_row(timings, (enum protocol_cube_part)part);
         if (stage != PROTOCOL_STAGE_TRACE && stage != PROTOCOL_STAGE_SHADE)
             continue;
         for (unsigned wave = 0; wave < WAVES_SHOWN; wave++) {
@@ -260,9 +270,10 @@ static void print_cubes(const struct cli_timings *timings)
     for (unsigned part = 0; part < PARTS; part++) {
         if (timings->cube[part].resolution == 0)
             continue;
-        fprintf(timings->out, "  %-9s%-8s", part == 0 || timings->cube[0].resolution == 0 ? "cubes" : "",
-                protocol_cube_part_text((enum protocol_cube_part)part));
-        cli_cube_print(timings->out, &timings->cube[part]);
+        fprintf(timings->out, "  %-9s%-8s",
+                part == 0 || timings->cube[0].resolution == 0 ? cli_cube_title(timings->tracer) : "",
+                cli_cube_name(timings->tracer, (enum protocol_cube_part)part));
+        cli_cube_print(timings->out, timings->tracer, &timings->cube[part]);
         fprintf(timings->out, "; sampled for %" PRIu64 " of %" PRIu64 " frame%s\n", timings->cube_builds[part],
                 timings->frames, timings->frames == 1 ? "" : "s");
     }

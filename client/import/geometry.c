@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Meshes and sphere sets of the growing scene: checked as the server will check them. */
+#include "closed.h"
 #include "model.h"
 
 #include <math.h>
@@ -241,6 +242,7 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
     edit->message.set_mesh.vertex_count = mesh->vertex_count;
     edit->message.set_mesh.triangle_count = mesh->triangle_count;
     edit->message.set_mesh.name = import_copy_name(scene, mesh->name);
+    edit->message.set_mesh.closed = import_triangles_closed(mesh->positions, mesh->indices, mesh->triangle_count);
     edit->message.set_mesh.ranges = mesh->ranges;
     edit->message.set_mesh.ranges_count = mesh->range_count;
     edit->message.set_mesh.influence_count = mesh->influence_count;

@@ -207,6 +207,7 @@ struct fl_model_note {
 struct fl_model_info {
     uint64_t nodes, meshes, triangles, sphere_sets, spheres, discs, materials, textures, lights;
     uint64_t skins, joints, morph_targets; /* joints of all skins, targets of all meshes */
+    uint64_t closed_meshes;                /* those whose triangles bound a body */
     struct fl_import_stats import;
     size_t camera_count, clip_count, note_count;
     struct fl_camera_info *cameras;
@@ -280,8 +281,8 @@ struct fl_job_options {
     float ao_falloff;        /* as a power of 1 - distance / ao_distance; 0: all counts the same */
     unsigned ao_rays;        /* for each sample; 0: 8 */
     float layer_opacity;     /* of opaque surfaces, for the integrator raycast; 0: 0.5 */
-    /* Set of layers, 1 << enum protocol_layer each; 0: the picture alone. Others need format rgba32f, encoding raw or
-     * zstd. */
+    /* Set of layers, 1 << enum protocol_layer each; 0: the picture alone. Others need format rgba32f, encoding raw
+     * or zstd. */
     unsigned layers;
 };
 

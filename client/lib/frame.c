@@ -25,6 +25,14 @@ uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format)
     }
 }
 
+/* Of all layers together; 0: more than there can be. */
+static size_t pixels_bytes_of(const struct message_frame_begin *begin)
+{
+    const uint64_t layers = (uint64_t)__builtin_popcount(begin->layers); /* at most 7, of 8192 x 8192 x 16 bytes */
+    const uint64_t bytes = layers * begin->width * begin->height * fl_bytes_per_pixel(begin->format);
+    return bytes <= SIZE_MAX ? (size_t)bytes : 0;
+}
+
 void fl_frame_destroy(struct fl_frame *frame)
 {
     if (frame == NULL)
@@ -75,7 +83,10 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
                             protocol_encoding_text(begin->encoding), expected->width, expected->height,
                             protocol_pixel_format_text(expected->format),
                             protocol_encoding_text(expected->encoding));
-    const size_t pixels_bytes = (size_t)begin->width * begin->height * fl_bytes_per_pixel(begin->format);
+    if (begin->layers != expected->layers)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.layers", "the layers %#x came in place of %#x",
+                            begin->layers, expected->layers);
+    const size_t pixels_bytes = pixels_bytes_of(begin);
     const uint64_t most = encoded_bytes_max(expected, pixels_bytes);
     const bool exact = begin->encoding == PROTOCOL_ENCODING_RAW;
     if (begin->size_bytes == 0 || begin->size_bytes > most || (exact && begin->size_bytes != most))
@@ -110,7 +121,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->shutter_s = begin->shutter_s;
     frame->layers = begin->layers;
     frame->wire_bytes = begin->size_bytes;
-    frame->pixels_bytes = (size_t)begin->width * begin->height * fl_bytes_per_pixel(begin->format);
+    frame->pixels_bytes = pixels_bytes_of(begin);
     frame->pixels = malloc(frame->pixels_bytes);
     if (frame->pixels == NULL) {
         free(frame);

@@ -10,6 +10,7 @@ struct fl_frame_expected {
     uint32_t width, height;
     enum protocol_pixel_format format;
     enum protocol_encoding encoding;
+    unsigned layers; /* set of them, at least one; see struct fl_frame */
 };
 
 struct fl_assembly {
@@ -28,5 +29,8 @@ bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_d
 struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct message_frame_end *end,
                                  uint64_t now_ns, struct fl_error *error);
 void fl_assembly_finish(struct fl_assembly *assembly);
+
+/* Of a picture: what comes where nothing was said of layers. */
+#define FL_LAYERS_PICTURE (1u << PROTOCOL_LAYER_BEAUTY)
 
 #endif

@@ -85,6 +85,11 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_optio
         fl_error_set(error, FL_ERROR_ARGUMENT, "", "another job runs on this connection");
         return NULL;
     }
+    if ((options->layers & ~FL_LAYERS_PICTURE) != 0 &&
+        (options->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || options->encoding == PROTOCOL_ENCODING_JPEG)) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, "layers", "need the pixel format rgba32f, raw or by zstd");
+        return NULL;
+    }
     struct fl_job *job = calloc(1, sizeof *job);
     if (job == NULL) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
@@ -101,7 +106,12 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_optio
     job->last_frame = render->last_frame;
     job->frame_step = render->frame_step;
     job->assembly.expected = (struct fl_frame_expected){
-        .width = render->width, .height = render->height, .format = render->format, .encoding = render->encoding};
+        .width = render->width,
+        .height = render->height,
+        .format = render->format,
+        .encoding = render->encoding,
+        .layers = render->layers != 0 ? render->layers : FL_LAYERS_PICTURE,
+    };
     render->scene = scene->scene;
     render->channel = job->channel;
     if (!fl_connection_send(connection, job->request, 0, &message, error)) {

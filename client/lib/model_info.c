@@ -42,6 +42,7 @@ static bool list(struct listing *listing, const struct message *message, struct 
         break;
     case MESSAGE_SET_MESH:
         info->meshes++;
+        info->closed_meshes += message->set_mesh.closed;
         info->triangles += message->set_mesh.triangle_count;
         info->morph_targets += message->set_mesh.target_count;
         break;

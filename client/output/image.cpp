@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "image.h"
+#include "layers.hpp"
 #include "metadata.hpp"
 
 #include <OpenImageIO/filesystem.h>
@@ -77,6 +78,8 @@ OIIO::ImageSpec make_spec(const struct image &image)
     }
     if (image.format == IMAGE_EXR)
         spec.attribute("compression", "zip");
+    if (has_layers(*image.begin))
+        set_layer_channels(spec, image.begin->layers, image.half);
     add_metadata(spec, image);
     return spec;
 }
@@ -108,7 +111,15 @@ struct pixel_source {
     OIIO::TypeDesc type;
     const void *pixels;
     size_t pixel_bytes;
+    const struct image *layers; // NULL: there are none, and the three above count
 };
+
+bool write_source(OIIO::ImageOutput &output, const struct pixel_source &source)
+{
+    if (source.layers != nullptr)
+        return write_layers(output, *source.layers);
+    return output.write_image(source.type, source.pixels, static_cast<OIIO::stride_t>(source.pixel_bytes));
+}
 
 bool write_pixels(enum image_format format, const OIIO::ImageSpec &spec, const struct pixel_source &source,
                   std::vector<unsigned char> &file, std::string &why)
@@ -119,8 +130,7 @@ bool write_pixels(enum image_format format, const OIIO::ImageSpec &spec, const s
         why = OIIO::geterror();
     else if (!output->set_ioproxy(&memory))
         why = "this build of OpenImageIO cannot write it to memory";
-    else if (!output->open(std::string("image.") + plugin_of(format), spec) ||
-             !output->write_image(source.type, source.pixels, static_cast<OIIO::stride_t>(source.pixel_bytes)) ||
+    else if (!output->open(std::string("image.") + plugin_of(format), spec) || !write_source(*output, source) ||
              !output->close())
         why = output->geterror();
     else
@@ -131,8 +141,11 @@ bool write_pixels(enum image_format format, const OIIO::ImageSpec &spec, const s
 bool encode(const struct image &image, std::vector<unsigned char> &file, char *reason, size_t reason_bytes)
 {
     const OIIO::TypeDesc type = stored_type(image.begin->format);
+    const struct image *layers = has_layers(*image.begin) ? &image : nullptr;
     std::string why;
-    if (!write_pixels(image.format, make_spec(image), {type, image.pixels, 4 * type.size()}, file, why))
+    if (layers != nullptr && (image.format != IMAGE_EXR || image.begin->format != PROTOCOL_PIXEL_FORMAT_RGBA32F))
+        return fail(reason, reason_bytes, "only an EXR file, of 32-bit floats, takes layers");
+    if (!write_pixels(image.format, make_spec(image), {type, image.pixels, 4 * type.size(), layers}, file, why))
         return fail(reason, reason_bytes, why);
     if (image.format == IMAGE_HDR)
         insert_comments(file, image);
@@ -150,7 +163,8 @@ bool encode(const struct plain_image &image, std::vector<unsigned char> &file, c
     spec.attribute("Software", "farlight " FARLIGHT_VERSION);
     spec.attribute("ImageDescription", image.description);
     std::string why;
-    return write_pixels(image.format, spec, {OIIO::TypeDesc::FLOAT, image.pixels, 3 * sizeof(float)}, file, why) ||
+    return write_pixels(image.format, spec, {OIIO::TypeDesc::FLOAT, image.pixels, 3 * sizeof(float), nullptr},
+                        file, why) ||
            fail(reason, reason_bytes, why);
 }
 
@@ -194,6 +208,7 @@ bool image_prepare(char *reason, size_t reason_bytes)
         struct message_frame_begin begin = {};
         struct message_frame_end end = {};
         begin.width = begin.height = begin.samples = 4;
+        begin.layers = 1u << PROTOCOL_LAYER_BEAUTY;
         begin.fov_y = 1;
         for (const known_format &each : known) {
             struct image image = {};

@@ -14,7 +14,7 @@ struct incoming {
 };
 
 /* False: the sender breaks the protocol: a frame has begun already, is encoded, or has another number of bytes
- * than its size and format say. With `keep`, `pixels` is NULL afterwards only where there is no memory. */
+ * than its size, format and layers say. With `keep`, `pixels` is NULL afterwards only where there is no memory. */
 bool incoming_begin(struct incoming *incoming, const struct message_frame_begin *begin, bool keep);
 /* False: not the next bytes of a frame that has begun, or more than it has. */
 bool incoming_take(struct incoming *incoming, const struct message_frame_data *data);

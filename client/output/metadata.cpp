@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "metadata.hpp"
+#include "layers.hpp"
 
 #include <cinttypes>
 #include <cmath>
@@ -91,12 +92,14 @@ void add_count(std::vector<entry> &entries, const char *name, uint64_t value)
     add_text(entries, name, std::to_string(value));
 }
 
-/* What the tracer ldc sampled, and how finely. */
-void add_cubes(std::vector<entry> &entries, const struct message_frame_end &end)
+// What a tracer sampled, and how finely.
+void add_cubes(std::vector<entry> &entries, enum protocol_tracer tracer, const struct message_frame_end &end)
 {
     for (uint32_t i = 0; i < end.cubes_count; i++) {
         const struct record_layered_cube &cube = end.cubes[i];
-        const std::string part = std::string("cube/") + protocol_cube_part_text(cube.part) + "/";
+        const bool has_parts = tracer != PROTOCOL_TRACER_ABUFFER;
+        const std::string part =
+            has_parts ? std::string("cube/") + protocol_cube_part_text(cube.part) + "/" : "abuffer/";
         add_number(entries, (part + "cell_metres").c_str(), static_cast<double>(cube.cell_metres));
         add_count(entries, (part + "resolution").c_str(), cube.resolution);
         add_count(entries, (part + "layers_needed").c_str(), cube.layers_needed);
@@ -138,13 +141,15 @@ std::vector<entry> collect(const struct image &image)
     add_text(entries, "integrator", protocol_integrator_text(begin.integrator));
     add_count(entries, "samples", begin.samples);
     add_text(entries, "digest", digest);
+    if (has_layers(begin))
+        add_text(entries, "layers", layer_names(begin.layers));
     add_number(entries, "exposure_stops", static_cast<double>(begin.exposure_stops));
     add_number(entries, "time_s", static_cast<double>(begin.time_s));
     add_number(entries, "fov_y_degrees", static_cast<double>(begin.fov_y * degrees_per_radian));
     add_count(entries, "primary_rays", end.primary_rays);
     add_count(entries, "shadow_rays", end.shadow_rays);
     add_count(entries, "secondary_rays", end.secondary_rays);
-    add_cubes(entries, end);
+    add_cubes(entries, begin.tracer, end);
     add_stages(entries, end);
     return entries;
 }

@@ -75,9 +75,33 @@ bool check_spec(const OIIO::ImageSpec &spec, std::string &reason)
     if (spec.width > edge_max || spec.height > edge_max)
         return fail(reason, "is " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
                                 " pixels, more than " + std::to_string(edge_max) + " one way");
-    if (spec.nchannels < 1 || spec.nchannels > channels_max)
-        return fail(reason, "has " + std::to_string(spec.nchannels) + " channels, at most " +
+    return true;
+}
+
+struct channel_range {
+    int first, count;
+    int alpha; // counted from the first; -1: none
+};
+
+// Of a file with layers, the picture: the library puts red, green, blue and alpha of no layer next to each other.
+// Else all that there is.
+bool choose_channels(const OIIO::ImageSpec &spec, struct channel_range &chosen, std::string &reason)
+{
+    const std::vector<std::string> &names = spec.channelnames;
+    chosen = {0, spec.nchannels,
+              spec.nchannels > 1 ? spec.alpha_channel : -1}; // alpha alone is looked at like grey
+    for (size_t i = 0; i + 2 < names.size(); i++) {
+        if (names[i] != "R" || names[i + 1] != "G" || names[i + 2] != "B")
+            continue;
+        const bool has_alpha = i + 3 < names.size() && names[i + 3] == "A";
+        chosen = {static_cast<int>(i), has_alpha ? 4 : 3, has_alpha ? 3 : -1};
+    }
+    if (chosen.count < 1 || chosen.count > channels_max)
+        return fail(reason, "has " + std::to_string(spec.nchannels) + " channels, and not R, G and B: at most " +
                                 std::to_string(channels_max) + " are compared");
+    for (int i = 0; i < chosen.count; i++)
+        if (spec.channelformat(chosen.first + i) == OIIO::TypeDesc::UINT32)
+            return fail(reason, "has numbers of objects in place of a picture");
     return true;
 }
 
@@ -160,13 +184,15 @@ bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made
     hints.attribute("oiio:reorient", 0);
     if (!input->set_ioproxy(&memory) || !input->open(std::string("image.") + kind->reader, spec, hints))
         return fail(reason, input->geterror());
-    if (!check_spec(spec, reason))
+    struct channel_range chosen = {};
+    if (!check_spec(spec, reason) || !choose_channels(spec, chosen, reason))
         return false;
+    const auto names = spec.channelnames.begin() + chosen.first;
     made.linear = kind->linear;
-    made.alpha = spec.nchannels > 1 ? spec.alpha_channel : -1; // alpha alone is looked at like grey
-    made.pixels = make_plane(spec.width, spec.height, spec.nchannels);
-    made.pixels.specmod().channelnames = harmless(spec.channelnames);
-    if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, made.data()))
+    made.alpha = chosen.alpha;
+    made.pixels = make_plane(spec.width, spec.height, chosen.count);
+    made.pixels.specmod().channelnames = harmless({names, names + chosen.count});
+    if (!input->read_image(0, 0, chosen.first, chosen.first + chosen.count, OIIO::TypeDesc::FLOAT, made.data()))
         return fail(reason, input->geterror());
     return true;
 }

@@ -81,6 +81,8 @@ static bool check_frame(const struct session *session, const struct message_fram
     if (begin->format != PROTOCOL_PIXEL_FORMAT_RGBA8)
         return video_fail(failure, "format", "render with the pixel format rgba8", "a video has no %s pixels",
                           protocol_pixel_format_text(begin->format));
+    if (begin->layers != 1u << PROTOCOL_LAYER_BEAUTY)
+        return video_fail(failure, "layers", "render without layers", "a video has the picture alone");
     if (session->frames > 0 && (begin->width != session->width || begin->height != session->height))
         return video_fail(failure, "size", "all frames of a video have the size of its first",
                           "frame %u has %ux%u pixels, but the video has %ux%u", begin->frame, begin->width,

@@ -5,6 +5,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "job/shot.h"
+#include "render/frame_request.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -54,8 +55,7 @@ static bool jobs_reserve(struct engine *engine)
 /* Frames in flight: fewer of them where they are large, or a few jobs would fill the host's memory. */
 static uint32_t window_of(const struct engine *engine, const struct frame_request *frame)
 {
-    uint64_t frame_bytes = (uint64_t)frame->width * frame->height * bytes_per_pixel(frame->format);
-    uint64_t frames = engine->options.frame_window_bytes / frame_bytes;
+    uint64_t frames = engine->options.frame_window_bytes / frame_request_bytes(frame);
     return frames < 1                                  ? 1
            : frames < engine->options.frames_in_flight ? (uint32_t)frames
                                                        : engine->options.frames_in_flight;

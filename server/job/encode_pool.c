@@ -38,10 +38,12 @@ static void task_destroy(void *item)
 static bool encode(struct encode_pool *pool, struct engine_frame *frame, unsigned quality, struct error *error)
 {
     struct frame_result *result = &frame->result;
+    /* Layers lie one behind the other: one picture of their common height. */
+    uint32_t rows = result->height * (uint32_t)__builtin_popcount(result->layers);
     struct picture picture = {
         .width = result->width,
-        .height = result->height,
-        .bytes_per_pixel = (uint32_t)(result->size_bytes / ((size_t)result->width * result->height)),
+        .height = rows,
+        .bytes_per_pixel = (uint32_t)(result->size_bytes / ((size_t)result->width * rows)),
         .pixels = result->pixels,
     };
     uint64_t start_ns = clock_now_ns();

@@ -3,27 +3,16 @@
  * Some any-hit rays a sample, and no light. What a hit asks for is in shaders/render/ao.comp. */
 #include "render/wave_passes.h"
 
-#define RAYS_DEFAULT 8               /* lambda of the paper on voxels and A-buffers */
-#define DISTANCE_DEFAULT (1 / 10.0f) /* of the scene's diagonal */
-
-static uint32_t shadow_rays_a_hit(const struct render_context *context)
-{
-    return context->request.ao_rays > 0 ? context->request.ao_rays : RAYS_DEFAULT;
-}
-
 static bool shade(struct wave_passes *passes, struct render_context *context, uint32_t first, uint32_t count,
                   struct error *error)
 {
-    const struct frame_request *request = &context->request;
     context_span_begin(context, STAGE_SHADE);
     const struct gpu_program *program = wave_passes_shade_program(passes, context, "render/ao.comp", NULL, error);
     if (program) {
         gpu_uniform_uint(program, "first_ray", first);
         gpu_uniform_uint(program, "batch_rays", count);
-        gpu_uniform_float(program, "reach",
-                          request->ao_distance > 0.0f ? request->ao_distance
-                                                      : context->scene->diagonal * DISTANCE_DEFAULT);
-        gpu_uniform_float(program, "falloff", request->ao_falloff);
+        gpu_uniform_float(program, "reach", context_ao_distance(context));
+        gpu_uniform_float(program, "falloff", context->request.ao_falloff);
         gpu_dispatch(context->device, program, context->hit_count);
     }
     context_span_end(context);
@@ -36,7 +25,7 @@ static struct integrator *create(struct gpu_device *device, struct error *error)
         .impl = &integrator_ao_impl,
         .children_a_hit = 1,
         .shadow_waves = 1,
-        .shadow_rays_a_hit = shadow_rays_a_hit,
+        .shadow_rays_a_hit = context_ao_rays,
         .shade = shade,
         .straight_waves = STRAIGHT_WAVES,
         .left_scene = "OPEN",

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/context.h"
 
+#include "shared/bindings.h"
 #include "shared/hit.h"
 #include "shared/path.h"
 #include "shared/ray.h"
@@ -10,6 +11,9 @@
 
 /* A little below what the timer's ring holds: spans beyond it would lose their GPU time. */
 #define SPANS_MAX 240
+
+#define AO_RAYS_DEFAULT 8               /* lambda of the paper on voxels and A-buffers */
+#define AO_DISTANCE_DEFAULT (1 / 10.0f) /* of the scene's diagonal */
 
 void context_span_begin(struct render_context *context, enum stage_id stage)
 {
@@ -62,6 +66,40 @@ void context_bind(struct render_context *context)
 {
     scene_gpu_bind(context->scene);
     gpu_buffer_bind_uniform(&context->uniform_buffer, UNIFORM_FRAME);
+}
+
+size_t context_surface_defines(const struct render_context *context, struct gpu_define *defines)
+{
+    /* Only discs have textures that are not applied already. */
+    bool exact = !context->sampled_hits || context->scene->disc_count > 0;
+    size_t n = 0;
+    if (context->sampled_hits)
+        defines[n++] = (struct gpu_define){"HAS_SAMPLED", "1"};
+    if (context->features.textures && exact)
+        defines[n++] = (struct gpu_define){"HAS_TEXTURES", "1"};
+    if (context->features.bump && exact)
+        defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
+    return n;
+}
+
+void context_bind_hits(struct render_context *context)
+{
+    context_bind(context);
+    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
+    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
+    gpu_buffer_bind_texels(context->device, &context->paths, UNIT_SHADE_PATHS, GL_RGBA32UI);
+    gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
+}
+
+uint32_t context_ao_rays(const struct render_context *context)
+{
+    return context->request.ao_rays > 0 ? context->request.ao_rays : AO_RAYS_DEFAULT;
+}
+
+float context_ao_distance(const struct render_context *context)
+{
+    float asked = context->request.ao_distance;
+    return asked > 0.0f ? asked : context->scene->diagonal * AO_DISTANCE_DEFAULT;
 }
 
 bool context_upload_uniforms(struct render_context *context, struct error *error)

@@ -61,6 +61,15 @@ const struct gpu_program *context_use(struct render_context *context, const char
 void context_bind(struct render_context *context);
 bool context_upload_uniforms(struct render_context *context, struct error *error);
 uint64_t context_device_bytes(const struct render_context *context);
+/* For passes that read hits (common/material.glsl): at most CONTEXT_SURFACE_DEFINES to `defines`. Returns how
+ * many. */
+#define CONTEXT_SURFACE_DEFINES 3
+size_t context_surface_defines(const struct render_context *context, struct gpu_define *defines);
+/* Likewise the scene, the frame's uniforms, and rays, hits, paths and hit list of the wave in hand. */
+void context_bind_hits(struct render_context *context);
+/* Of ambient occlusion: rays a sample, and how far they look, metres. */
+uint32_t context_ao_rays(const struct render_context *context);
+float context_ao_distance(const struct render_context *context);
 /* For slices of so many samples and waves of wave_capacity rays. */
 bool context_reserve(struct render_context *context, uint32_t slice_samples, struct error *error);
 /* When the rays of the wave in hand are; NULL: nothing moves. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The order of a frame: update; for each sample, or for some together, the raster pass, then slice by slice
- * primary hits and waves; at last band by band resolve and readback. */
+ * primary hits, layers and waves; at last band by band resolve and readback. */
 #include "render/frame.h"
 
 #include "base/clock.h"
@@ -10,6 +10,7 @@
 #include "render/context.h"
 #include "render/frame_request.h"
 #include "render/integrator.h"
+#include "render/layers.h"
 #include "render/picture.h"
 #include "render/pixel_filter.h"
 #include "render/primary.h"
@@ -32,7 +33,7 @@
 /* Textures of a picture that goes on and on are taken as if it had so many samples. */
 #define SAMPLES_GOING_ON 16
 
-enum frame_phase { PHASE_IDLE, PHASE_SAMPLE, PHASE_SLICE, PHASE_SHADE, PHASE_TRACE, PHASE_RESOLVE };
+enum frame_phase { PHASE_IDLE, PHASE_SAMPLE, PHASE_SLICE, PHASE_LAYERS, PHASE_SHADE, PHASE_TRACE, PHASE_RESOLVE };
 
 struct frame_renderer {
     struct gpu_device *device;
@@ -42,6 +43,7 @@ struct frame_renderer {
     struct render_context context;
     struct primary primary;
     struct picture picture;
+    struct layers layers;
     struct comparison *comparison; /* NULL: no frame has asked for one */
     const struct tracer_impl *stand_in;
     unsigned stand_in_number;
@@ -50,7 +52,8 @@ struct frame_renderer {
     enum frame_phase phase;
     bool rasterise;
     uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
-    uint32_t sample, band;   /* samples of this frame that are done */
+    uint32_t sample;         /* samples of this frame that are done */
+    uint32_t plane, band;    /* of the picture that is handed out next */
     struct slices slices;
     /* the last frame that was finished, whose sum the picture holds */
     struct frame_request kept_request;
@@ -101,6 +104,7 @@ void frame_renderer_destroy(struct frame_renderer *renderer)
     tracer_set_finish(&renderer->tracers);
     primary_finish(&renderer->primary, renderer->device);
     picture_finish(&renderer->picture, renderer->device);
+    layers_finish(&renderer->layers, renderer->device);
     context_finish(&renderer->context);
     gpu_timer_destroy(renderer->context.timer);
     scene_gpu_finish(&renderer->scene);
@@ -130,9 +134,8 @@ uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer)
 {
     uint64_t sum = scene_gpu_device_bytes(&renderer->scene) + tracer_set_device_bytes(&renderer->tracers) +
                    context_device_bytes(&renderer->context) + renderer->primary.visible.size_bytes +
-                   renderer->primary.depth.size_bytes + renderer->picture.resolved.capacity_bytes;
-    for (uint32_t i = 0; i < renderer->picture.band_count; i++)
-        sum += renderer->picture.bands[i].capacity_bytes;
+                   renderer->primary.depth.size_bytes + picture_device_bytes(&renderer->picture) +
+                   layers_device_bytes(&renderer->layers);
     if (renderer->integrator)
         sum += renderer->integrator->impl->device_bytes(renderer->integrator);
     if (renderer->comparison)
@@ -222,6 +225,7 @@ static bool reserve_waves(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->context;
     return context_reserve(context, renderer->slices.slice_rays, error) &&
+           layers_reserve(&renderer->layers, context, renderer->slices.slice_rays, error) &&
            renderer->integrator->impl->reserve(renderer->integrator, context, error);
 }
 
@@ -292,7 +296,7 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
     if (!reserve_frame(renderer, error) || !gpu_check(renderer->device, "beginning a frame", error))
         return false;
     renderer->result.revision = renderer->scene.revision;
-    renderer->sample = renderer->band = 0;
+    renderer->sample = renderer->plane = renderer->band = 0;
     renderer->phase = PHASE_SAMPLE;
     return true;
 }
@@ -345,7 +349,8 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
         renderer->phase = renderer->sample < context->request.samples ? PHASE_SAMPLE : PHASE_RESOLVE;
         return true;
     }
-    renderer->phase = PHASE_SHADE;
+    layers_begin_slice(&renderer->layers);
+    renderer->phase = renderer->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
     return primary_slice(renderer->rasterise ? &renderer->primary : NULL, context, error) &&
            gpu_check(renderer->device, "primary hits", error);
 }
@@ -388,6 +393,31 @@ static bool trace_wave(struct frame_renderer *renderer, struct error *error)
     return listed;
 }
 
+static bool finish_slice(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->context;
+    renderer->result.shadow_rays += context->shadow_rays;
+    renderer->result.secondary_rays += context->secondary_rays;
+    renderer->phase = PHASE_SLICE;
+    bool has_beauty = renderer->picture.layers & 1u << LAYER_BEAUTY; /* then it is the first plane */
+    return (!context->comparison || comparison_keep_slice(context->comparison, error)) &&
+           (!has_beauty || picture_accumulate(&renderer->picture, context, 0, &context->slice_sums, 0, error)) &&
+           layers_accumulate(&renderer->layers, &renderer->picture, context, error);
+}
+
+static bool note_layers(struct frame_renderer *renderer, struct error *error)
+{
+    bool done = false;
+    if (!layers_step(&renderer->layers, &renderer->context, &done, error))
+        return false;
+    if (!done)
+        return true;
+    if (!(renderer->picture.layers & 1u << LAYER_BEAUTY))
+        return finish_slice(renderer, error);
+    renderer->phase = PHASE_SHADE;
+    return true;
+}
+
 static bool shade_wave(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->context;
@@ -400,15 +430,25 @@ static bool shade_wave(struct frame_renderer *renderer, struct error *error)
     case INTEGRATOR_OVERFLOW:
         return split_slice(renderer, error);
     case INTEGRATOR_DONE:
-        renderer->result.shadow_rays += context->shadow_rays;
-        renderer->result.secondary_rays += context->secondary_rays;
-        renderer->phase = PHASE_SLICE;
-        return (!context->comparison || comparison_keep_slice(context->comparison, error)) &&
-               picture_accumulate(&renderer->picture, context, error);
+        return finish_slice(renderer, error);
     case INTEGRATOR_FAILED:
         break;
     }
     return false;
+}
+
+/* One band of one plane; the last one is followed by none. */
+static bool read_band(struct frame_renderer *renderer, struct error *error)
+{
+    struct picture *picture = &renderer->picture;
+    renderer->context.wave_number = 0;
+    bool good = picture_resolve_band(picture, &renderer->context, renderer->plane, renderer->band, error) &&
+                picture_read_band(picture, &renderer->context, renderer->plane, renderer->band, error);
+    if (++renderer->band == picture->band_count) {
+        renderer->band = 0;
+        renderer->plane++;
+    }
+    return good;
 }
 
 static bool hand_out(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
@@ -429,7 +469,7 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     result->height = request->height;
     result->format = request->format;
     result->samples = renderer->picture.samples;
-    result->layers = 1u << LAYER_BEAUTY;
+    result->layers = renderer->picture.layers;
     result->primary_rays = (uint64_t)request->width * request->height * request->samples;
     result->times = context->times;
     renderer->kept_request = *request;
@@ -451,6 +491,9 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
     case PHASE_SLICE:
         good = begin_slice(renderer, error);
         break;
+    case PHASE_LAYERS:
+        good = note_layers(renderer, error);
+        break;
     case PHASE_SHADE:
         good = shade_wave(renderer, error);
         break;
@@ -458,17 +501,14 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
         good = trace_wave(renderer, error);
         break;
     case PHASE_RESOLVE:
-        renderer->context.wave_number = 0;
-        good = picture_resolve_band(&renderer->picture, &renderer->context, renderer->band, error) &&
-               picture_read_band(&renderer->picture, &renderer->context, renderer->band, error);
-        renderer->band++;
+        good = read_band(renderer, error);
         break;
     }
     if (!good) {
         frame_abandon(renderer);
         return FRAME_FAILED;
     }
-    if (renderer->phase != PHASE_RESOLVE || renderer->band < renderer->picture.band_count)
+    if (renderer->phase != PHASE_RESOLVE || renderer->plane < renderer->picture.plane_count)
         return FRAME_MORE;
     if (hand_out(renderer, result, error))
         return FRAME_DONE;

@@ -83,6 +83,8 @@ struct frame_request {
  * What a picture holds:
  *   linear formats  mean radiance of the samples times 2^exposure_stops, premultiplied by alpha
  *   RGBA8           the same divided by alpha, tone-mapped, sRGB
+ *   layers          those beside the beauty are what protocol/messages.def says of them (LAYER), and know of no
+ *                   exposure
  *   alpha           1 where there is a surface (what blended surfaces leave open goes on to what lies behind) and
  *                   where the environment is seen; 0 where there is neither
  * A scene with no light and a black environment is lit by the default of shaders/shared/sky.h. The same request on

@@ -53,6 +53,27 @@ static bool check_integrator(const struct frame_request *request, struct error *
     return true;
 }
 
+uint32_t frame_request_layers(const struct frame_request *request)
+{
+    return request->layers ? request->layers : 1u << LAYER_BEAUTY;
+}
+
+uint64_t frame_request_bytes(const struct frame_request *request)
+{
+    return (uint64_t)request->width * request->height * picture_pixel_bytes(request->format) *
+           (uint64_t)__builtin_popcount(frame_request_layers(request));
+}
+
+static bool check_layers(const struct frame_request *request, struct error *error)
+{
+    if (request->layers >= 1u << LAYER_COUNT)
+        return error_set(error, ERROR_UNSUPPORTED, "layers", "there is no layer number %d",
+                         31 - __builtin_clz(request->layers));
+    if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != FRAME_RGBA32F)
+        return error_set(error, ERROR_UNSUPPORTED, "layers", "layers beside the beauty need the format rgba32f");
+    return true;
+}
+
 bool frame_request_check(const struct frame_request *request, struct error *error)
 {
     if (request->width == 0 || request->height == 0 || request->width > SIZE_MAX_PIXELS ||
@@ -67,7 +88,7 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (picture_pixel_bytes(request->format) == 0)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
-    return check_integrator(request, error) && check_camera(request, error);
+    return check_integrator(request, error) && check_layers(request, error) && check_camera(request, error);
 }
 
 static bool same_camera(const struct frame_camera *a, const struct frame_camera *b)
@@ -94,5 +115,5 @@ bool frame_request_adds_to(const struct frame_request *a, const struct frame_req
     return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height &&
            a->depth == b->depth && a->seed == b->seed && same_light(a, b) && a->aperture == b->aperture &&
            a->focus == b->focus && a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
-           same_tracer(a, b);
+           same_tracer(a, b) && frame_request_layers(a) == frame_request_layers(b);
 }

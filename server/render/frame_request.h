@@ -8,6 +8,10 @@
 /* The session has checked what a client sent; this is what would go wrong here all the same. Tracers are left out.
  */
 bool frame_request_check(const struct frame_request *request, struct error *error);
+/* As bits, with that of the beauty where the request names none. */
+uint32_t frame_request_layers(const struct frame_request *request);
+/* Of the frame's pixels, all layers. */
+uint64_t frame_request_bytes(const struct frame_request *request);
 /* Whether their samples may be added up: they are alike but for their number and for what becomes of the sum. */
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b);
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/picture.h"
 
+#include "render/frame_request.h"
 #include "shared/path.h"
 
 #include <stdlib.h>
@@ -11,11 +12,32 @@
 
 static void free_bands(struct picture *picture, struct gpu_device *device)
 {
-    for (uint32_t i = 0; i < picture->band_count; i++)
+    for (uint32_t i = 0; i < picture->band_count * picture->plane_count; i++)
         gpu_buffer_finish(device, &picture->bands[i]);
     free(picture->bands);
     picture->bands = NULL;
     picture->band_count = 0;
+}
+
+enum frame_layer picture_plane_layer(const struct picture *picture, uint32_t plane)
+{
+    uint32_t left = picture->layers;
+    for (; plane > 0; plane--)
+        left &= left - 1;
+    return (enum frame_layer)__builtin_ctz(left);
+}
+
+struct gpu_buffer *picture_band(const struct picture *picture, uint32_t plane, uint32_t band)
+{
+    return &picture->bands[plane * picture->band_count + band];
+}
+
+uint64_t picture_device_bytes(const struct picture *picture)
+{
+    uint64_t sum = picture->resolved.capacity_bytes;
+    for (uint32_t i = 0; i < picture->band_count * picture->plane_count; i++)
+        sum += picture->bands[i].capacity_bytes;
+    return sum;
 }
 
 uint32_t picture_band_first_row(const struct picture *picture, uint32_t band)
@@ -56,12 +78,12 @@ static bool make_bands(struct picture *picture, struct gpu_device *device, struc
     if (picture->band_rows > padded_rows)
         picture->band_rows = padded_rows;
     uint32_t count = (padded_rows + picture->band_rows - 1) / picture->band_rows;
-    picture->bands = calloc(count, sizeof(*picture->bands));
+    picture->bands = calloc((size_t)count * picture->plane_count, sizeof(*picture->bands));
     if (!picture->bands)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the picture");
     picture->band_count = count;
-    for (uint32_t i = 0; i < count; i++) {
-        uint32_t rows = (picture_band_row_count(picture, i) + 7) & ~7u;
+    for (uint32_t i = 0; i < count * picture->plane_count; i++) {
+        uint32_t rows = (picture_band_row_count(picture, i % count) + 7) & ~7u;
         if (!gpu_buffer_reserve(device, &picture->bands[i], (size_t)rows * row_slots * sizeof(vec4), error))
             return false;
     }
@@ -72,9 +94,13 @@ bool picture_begin(struct picture *picture, struct render_context *context, uint
                    struct error *error)
 {
     const struct frame_request *request = &context->request;
+    uint32_t layers = frame_request_layers(request);
     picture_drop_pixels(picture);
-    if (!picture->bands || picture->width != request->width || picture->height != request->height) {
+    if (!picture->bands || picture->width != request->width || picture->height != request->height ||
+        picture->layers != layers) {
         free_bands(picture, context->device);
+        picture->layers = layers;
+        picture->plane_count = (uint32_t)__builtin_popcount(layers);
         picture->width = request->width;
         picture->height = request->height;
         picture->tiles_across = (request->width + 7) / 8;
@@ -84,19 +110,21 @@ bool picture_begin(struct picture *picture, struct render_context *context, uint
         }
     }
     picture->samples = samples_before + request->samples;
-    for (uint32_t i = 0; i < picture->band_count && samples_before == 0; i++)
+    for (uint32_t i = 0; i < picture->band_count * picture->plane_count && samples_before == 0; i++)
         gpu_buffer_clear(context->device, &picture->bands[i], 0);
     return true;
 }
 
-bool picture_accumulate(struct picture *picture, struct render_context *context, struct error *error)
+bool picture_accumulate(struct picture *picture, struct render_context *context, uint32_t plane,
+                        struct gpu_buffer *sums, uint32_t first_sum, struct error *error)
 {
     const struct gpu_program *program = context_use(context, "render/accumulate.comp", error);
     if (!program)
         return false;
     uint32_t band = context->slice.first_slot / band_slots(picture);
-    gpu_buffer_bind_storage(&picture->bands[band], BIND_ACCUMULATION);
-    gpu_buffer_bind_storage(&context->slice_sums, BIND_SLICE_SUMS);
+    gpu_buffer_bind_storage(picture_band(picture, plane, band), BIND_ACCUMULATION);
+    gpu_buffer_bind_storage(sums, BIND_SLICE_SUMS);
+    gpu_uniform_uint(program, "first_sum", first_sum);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot - band * band_slots(picture));
     gpu_uniform_uint(program, "slot_count", context->slice.slot_count);
     gpu_uniform_uint(program, "sample_shift", context->uniforms.sample_shift);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The sum of a picture's samples on the device, and its way to pixels on the host. */
+/* The sums of a picture's samples on the device, and their way to pixels on the host. */
 #ifndef FARLIGHT_RENDER_PICTURE_H
 #define FARLIGHT_RENDER_PICTURE_H
 
@@ -12,9 +12,11 @@ struct picture {
     uint32_t samples;   /* of every pixel that the sums hold, or will when the frame in hand is done */
     uint32_t band_rows; /* pixel rows of every band but the last; a multiple of 8 */
     uint32_t band_count;
-    struct gpu_buffer *bands;   /* vec4 a slot: radiance and coverage, summed */
-    struct gpu_buffer resolved; /* one band in the output's format */
-    uint8_t *pixels;            /* what has been read back so far */
+    uint32_t layers;            /* bits; each layer is a plane, in the order of their numbers */
+    uint32_t plane_count;       /* of them */
+    struct gpu_buffer *bands;   /* plane after plane; vec4 a slot, of the beauty radiance and coverage, summed */
+    struct gpu_buffer resolved; /* one band of a plane in the output's format */
+    uint8_t *pixels;            /* what has been read back so far, plane after plane */
     size_t size_bytes;
 };
 
@@ -25,13 +27,17 @@ bool picture_begin(struct picture *picture, struct render_context *context, uint
 uint32_t picture_slot_count(const struct picture *picture);
 /* First slot of the band after the one that `slot` is in. */
 uint32_t picture_band_end(const struct picture *picture, uint32_t slot);
-/* Adds the slice in hand. */
-bool picture_accumulate(struct picture *picture, struct render_context *context, struct error *error);
-/* resolve.c: band -> picture->resolved; readback.c: from there to picture->pixels. */
-bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t band,
+/* Adds the slice in hand to a plane: of `sums` the slice's samples from first_sum on. */
+bool picture_accumulate(struct picture *picture, struct render_context *context, uint32_t plane,
+                        struct gpu_buffer *sums, uint32_t first_sum, struct error *error);
+/* resolve.c: band of a plane -> picture->resolved; readback.c: from there to picture->pixels. */
+bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                           struct error *error);
-bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t band,
+bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                        struct error *error);
+enum frame_layer picture_plane_layer(const struct picture *picture, uint32_t plane);
+struct gpu_buffer *picture_band(const struct picture *picture, uint32_t plane, uint32_t band);
+uint64_t picture_device_bytes(const struct picture *picture);
 uint32_t picture_band_first_row(const struct picture *picture, uint32_t band);
 uint32_t picture_band_row_count(const struct picture *picture, uint32_t band);
 size_t picture_pixel_bytes(enum frame_format format);

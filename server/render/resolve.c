@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* From the sum of samples to pixels: mean, exposure and, for 8 bits, tone map and sRGB. */
+#include "render/layers.h"
 #include "render/picture.h"
 
 #include "shared/path.h"
@@ -19,9 +20,19 @@ size_t picture_pixel_bytes(enum frame_format format)
     return 0;
 }
 
-bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t band,
+/* Of the sum of a layer's samples what its pixels show. */
+static float scale_of(const struct picture *picture, const struct frame_request *request, enum frame_layer layer)
+{
+    float mean = 1.0f / (float)picture->samples;
+    if (layer == LAYER_BEAUTY)
+        return exp2f(request->exposure_stops) * mean;
+    return layers_of_first_sample(layer) ? 1.0f : mean;
+}
+
+bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                           struct error *error)
 {
+    enum frame_layer layer = picture_plane_layer(picture, plane);
     const struct frame_request *request = &context->request;
     uint32_t pixel_count = picture_band_row_count(picture, band) * picture->width;
     if (!gpu_buffer_reserve(context->device, &picture->resolved,
@@ -31,13 +42,13 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
     context_bind(context);
     const struct gpu_program *program = context_use(context, "render/resolve.comp", error);
     if (program) {
-        float coverage_scale = 1.0f / (float)picture->samples;
-        gpu_buffer_bind_storage(&picture->bands[band], BIND_ACCUMULATION);
+        float coverage_scale = layers_of_first_sample(layer) ? 1.0f : 1.0f / (float)picture->samples;
+        gpu_buffer_bind_storage(picture_band(picture, plane, band), BIND_ACCUMULATION);
         gpu_buffer_bind_storage(&picture->resolved, BIND_RESOLVED);
         gpu_uniform_uint(program, "pixel_count", pixel_count);
         gpu_uniform_uint(program, "format_number", request->format);
         gpu_uniform_uint(program, "tone_map_kind", request->tone_map);
-        gpu_uniform_float(program, "scale", exp2f(request->exposure_stops) * coverage_scale);
+        gpu_uniform_float(program, "scale", scale_of(picture, request, layer));
         gpu_uniform_float(program, "coverage_scale", coverage_scale);
         gpu_dispatch(context->device, program, pixel_count);
     }

@@ -87,13 +87,9 @@ static const struct gpu_program *use(struct render_context *context, const char 
 
 static void bind_shading(struct wave_passes *passes, struct render_context *context)
 {
-    context_bind(context);
-    gpu_buffer_bind_texels(context->device, &context->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_buffer_bind_texels(context->device, &context->hits, UNIT_SHADE_HITS, GL_RGBA32UI);
-    gpu_buffer_bind_texels(context->device, &context->paths, UNIT_SHADE_PATHS, GL_RGBA32UI);
+    context_bind_hits(context);
     gpu_buffer_bind_texels(context->device, environment_lights(&context->environment, context->scene),
                            UNIT_SHADE_LIGHTS, GL_RGBA32F);
-    gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     gpu_buffer_bind_storage(&passes->children, BIND_CHILDREN);
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
@@ -111,14 +107,7 @@ const struct gpu_program *wave_passes_shade_program(struct wave_passes *passes, 
     size_t n = 0;
     for (; own && own->name; own++)
         defines[n++] = *own;
-    /* Only discs have textures that are not applied already. */
-    bool sampled = context->sampled_hits, exact = !sampled || context->scene->disc_count > 0;
-    if (sampled)
-        defines[n++] = (struct gpu_define){"HAS_SAMPLED", "1"};
-    if (context->features.textures && exact)
-        defines[n++] = (struct gpu_define){"HAS_TEXTURES", "1"};
-    if (context->features.bump && exact)
-        defines[n++] = (struct gpu_define){"HAS_BUMP", "1"};
+    n += context_surface_defines(context, defines + n);
     if (context->features.area_lights)
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     if (context->scene->has_motion)

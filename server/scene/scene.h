@@ -103,7 +103,7 @@ struct scene_mesh {
     uint32_t weight_count;
     struct material_range *ranges;
     uint32_t range_count;
-    bool closed;              /* its triangles bound a body; the client's word, which only sampled structures take */
+    bool closed; /* its triangles bound a body; the client's word, which only sampled structures take */
     float lower[3], upper[3]; /* bounds in object space, of the mesh as its vertices are given */
 };
 

@@ -12,6 +12,9 @@
 /* More frames than this need not wait here: the engine renders the next ones meanwhile. */
 #define WINDOW_FRAMES_MAX 4
 #define ZSTD_LEVEL_MAX 19
+/* Of the 4 GiB that a frame_begin may announce; the rest is left to what zstd adds to noise. */
+#define FRAME_BYTES_MAX (UINT64_C(4080) << 20)
+#define BEAUTY_ALONE (1u << PROTOCOL_LAYER_BEAUTY)
 
 static uint32_t bytes_per_pixel(enum protocol_pixel_format format)
 {
@@ -38,6 +41,30 @@ static struct job *job_on_channel(const struct session *session, uint32_t channe
     return NULL;
 }
 
+static uint64_t frame_bytes_of(const struct message_render *render)
+{
+    uint32_t layers = render->layers ? render->layers : BEAUTY_ALONE;
+    return (uint64_t)render->width * render->height * bytes_per_pixel(render->format) *
+           (uint64_t)__builtin_popcount(layers);
+}
+
+static bool check_layers(const struct message_render *render, struct error *error)
+{
+    if (!render->layers || render->layers == BEAUTY_ALONE)
+        return true;
+    if (render->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || render->encoding == PROTOCOL_ENCODING_JPEG) {
+        error_set(error, ERROR_UNSUPPORTED, "render.layers", "%s in %s carries the beauty alone",
+                  protocol_pixel_format_text(render->format), protocol_encoding_text(render->encoding));
+        return error_remedy(error, "layers need the format rgba32f and the encoding raw or zstd");
+    }
+    if (frame_bytes_of(render) > FRAME_BYTES_MAX) {
+        error_set(error, ERROR_LIMIT, "render.layers", "frames of %" PRIu64 " bytes, the limit is %" PRIu64,
+                  frame_bytes_of(render), FRAME_BYTES_MAX);
+        return error_remedy(error, "ask for fewer layers, or for a smaller picture");
+    }
+    return true;
+}
+
 static bool check_limits(const struct session *session, const struct message_render *render, struct error *error)
 {
     const struct session_limits *limits = &session->hub->options.limits;
@@ -55,11 +82,6 @@ static bool check_limits(const struct session *session, const struct message_ren
         return false;
     }
     return true;
-}
-
-static uint64_t frame_bytes_of(const struct message_render *render)
-{
-    return (uint64_t)render->width * render->height * bytes_per_pixel(render->format);
 }
 
 /* How many frames of the job may wait in memory to be sent: at least one, whatever its size. */
@@ -120,6 +142,8 @@ static bool check(const struct session *session, const struct message_render *re
     if (render->last_frame < render->first_frame)
         return error_set(error, ERROR_INVALID, "render.last_frame", "%u is before the first frame %u",
                          render->last_frame, render->first_frame);
+    if (!check_layers(render, error))
+        return false;
     if (!encoder_supports((enum encoding)render->encoding, bytes_per_pixel(render->format))) {
         error_set(error, ERROR_UNSUPPORTED, "render.encoding", "%s does not carry %s",
                   protocol_encoding_text(render->encoding), protocol_pixel_format_text(render->format));

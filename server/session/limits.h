@@ -20,6 +20,7 @@ struct session_limits {
     uint32_t samples;
     uint32_t ldc_layers;        /* of a layered depth cube; of more the farther ones are left out */
     uint64_t ldc_bytes;         /* device memory of a cube's samples, likewise; 0: no limit but the device's */
+    uint64_t abuffer_bytes;     /* device memory of A-buffers; 0: no limit but the device's */
     uint64_t blob_bytes;        /* all blobs of all clients, arriving ones included */
     uint64_t blob_cache_bytes;  /* of them: blobs that nobody uses now */
     uint64_t transaction_bytes; /* of them: memory */

@@ -16,10 +16,22 @@ struct abuffer_builder *abuffer_builder_create(struct gpu_device *device, struct
 void abuffer_builder_destroy(struct abuffer_builder *builder); /* accepts NULL */
 uint64_t abuffer_builder_bytes(const struct abuffer_builder *builder);
 
-/* Everything of the store but `voxels`: lower_world, cell_world, resolution, voxels_along are set. The lists'
+/* For tests: gives back what lists have room for; the next build begins with as many fragments. */
+void abuffer_builder_start_with(struct abuffer_builder *builder, uint32_t fragments);
+/* Over the scene, that the last build took: 1, or 2 where there was no room for the lists at first. */
+uint32_t abuffer_builder_passes(const struct abuffer_builder *builder);
+
+/* Everything of the store but `voxels`: lower_world, cell_world, resolution, voxels_along are set. Waits for
+ * the device. The lists'
  * buffer grows until all fragments fit, and the pass is repeated; where options->abuffer_mebibytes_max or the
- * device forbid that, it fails with ERROR_LIMIT or ERROR_OUT_OF_MEMORY and the store is empty. */
+ * device forbid that, it fails with ERROR_LIMIT or ERROR_OUT_OF_MEMORY and the store is empty; so it is where the
+ * scene has nothing to draw. */
 bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
                    const struct tracer_options *options, struct error *error);
+
+/* For the benchmark, what a build is measured by: the same primitives through the same stages into the depths of
+ * three images, and nothing else. The store says where; it is not written to. Queues the work. */
+bool abuffer_build_plain(struct abuffer_builder *builder, const struct abuffer_store *store,
+                         struct scene_gpu *scene, struct error *error);
 
 #endif

@@ -4,6 +4,7 @@
  * Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary Effects. 2007. */
 #include "gpu/timer.h"
 #include "shared/ldc.h"
+#include "trace/axes_draw.h"
 #include "trace/ldc_build.h"
 #include "trace/ldc_levels.h"
 #include "trace/ldc_parts.h"
@@ -126,8 +127,8 @@ static bool build_cube(struct ldc *ldc, unsigned which, struct scene_gpu *scene,
 {
     const struct ldc_part *part = &ldc->parts.parts[which];
     struct ldc_cube *cube = &ldc->store.cubes[which];
-    *cube = (struct ldc_cube){.cell_world = part->cell_world, .resolution = ldc->resolution};
-    memcpy(cube->lower_world, part->lower_world, sizeof(cube->lower_world));
+    *cube = (struct ldc_cube){.cell_world = part->box.cell_world, .resolution = ldc->resolution};
+    memcpy(cube->lower_world, part->box.lower_world, sizeof(cube->lower_world));
     if (part->count == 0) {
         cube->resolution = 0;
         return true;
@@ -139,7 +140,7 @@ static bool build_cube(struct ldc *ldc, unsigned which, struct scene_gpu *scene,
     glFinish(); /* the time of this cube on the CPU's clock is the time until it is there */
     gpu_timer_end(ldc->timer);
     ldc->base.stats.nodes_rebuilt += cube->node_count;
-    ldc->base.stats.uploaded_bytes += (uint64_t)part->count * LDC_BUILD_INSTANCE_BYTES;
+    ldc->base.stats.uploaded_bytes += (uint64_t)part->count * AXES_INSTANCE_BYTES;
     ldc->base.stats.cubes[which].rebuilt = true;
     return ok;
 }

@@ -2,7 +2,6 @@
 #include "trace/ldc_build.h"
 
 #include "base/log.h"
-#include "gpu/registry.h"
 #include "shared/bindings.h"
 #include "trace/ldc_build_state.h"
 
@@ -12,10 +11,12 @@
 struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *error)
 {
     struct ldc_builder *builder = calloc(1, sizeof(*builder));
-    if (!builder)
+    if (!builder) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a builder of layered depth cubes");
-    else
-        builder->device = device;
+        return NULL;
+    }
+    builder->device = device;
+    axes_draw_init(&builder->draw, device);
     return builder;
 }
 
@@ -23,10 +24,10 @@ struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *
 
 static void list_buffers(struct ldc_builder *builder, struct gpu_buffer *buffers[BUFFER_COUNT])
 {
-    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->counts,   &builder->occupied,  &builder->ordered,
-                                            &builder->places,   &builder->fragments, &builder->found,
-                                            &builder->visible,  &builder->drawn,     &builder->build,
-                                            &builder->commands, &builder->histogram, &builder->peeled};
+    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->counts,  &builder->occupied,   &builder->ordered,
+                                            &builder->places,  &builder->fragments,  &builder->found,
+                                            &builder->visible, &builder->build,      &builder->histogram,
+                                            &builder->peeled,  &builder->draw.drawn, &builder->draw.commands};
     for (size_t i = 0; i < BUFFER_COUNT; i++)
         buffers[i] = all[i];
 }
@@ -39,15 +40,13 @@ void ldc_builder_destroy(struct ldc_builder *builder)
     list_buffers(builder, buffers);
     for (size_t i = 0; i < BUFFER_COUNT; i++)
         gpu_buffer_finish(builder->device, buffers[i]);
-    gpu_framebuffer_finish(builder->device, &builder->plain);
     for (int i = 0; i < 2; i++) {
         gpu_framebuffer_finish(builder->device, &builder->layer_framebuffers[i]);
         gpu_texture_finish(builder->device, &builder->layers[i]);
     }
     gpu_texture_finish(builder->device, &builder->layer_surface);
     gpu_texture_finish(builder->device, &builder->depth);
-    gpu_object_destroy(builder->device->registry, GPU_VERTEX_ARRAY, builder->vertex_array);
-    free(builder->runs);
+    axes_draw_finish(&builder->draw);
     free(builder);
 }
 
@@ -130,7 +129,7 @@ static void place_cube(struct ldc_store *store, unsigned which)
         store->cubes[behind].resolution = 0;
 }
 
-/* In one pass, which is the faster way wherever it was measured (bench_ldc samples, software GL: 8.5 times at 8
+/* In one pass, which is the faster way wherever it was measured (bench_forms samples, software GL: 8.5 times at 8
  * layers, 40 times at 48); by peeling where that is asked for, or the lists of one pass have no room. */
 static bool find_fragments(struct ldc_task *task, struct error *error)
 {
@@ -187,7 +186,7 @@ bool ldc_build(struct ldc_builder *builder, struct ldc_store *store, unsigned wh
     };
     scene_gpu_bind(scene);
     gpu_push_group(builder->device, "build a layered depth cube");
-    bool built = ldc_draw_prepare(builder, scene, instances, instance_count, error) && build(&task, error);
+    bool built = axes_draw_prepare(&builder->draw, scene, instances, instance_count, error) && build(&task, error);
     gpu_pop_group(builder->device);
     if (!built) {
         cube->resolution = 0;

@@ -12,9 +12,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* What a build uploads for each instance: its place among the primitives, and its draw. */
-#define LDC_BUILD_INSTANCE_BYTES 32
-
 /* Private buffers and images of the build, kept between builds; all-zero is empty. */
 struct ldc_builder;
 

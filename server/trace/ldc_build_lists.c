@@ -49,8 +49,9 @@ static bool reserve_fragments(struct ldc_task *task, uint32_t count, struct erro
     return true;
 }
 
-static void set_lists(const struct ldc_task *task, const struct gpu_program *program)
+static void set_lists(const void *context, const struct gpu_program *program)
 {
+    const struct ldc_task *task = context;
     gpu_uniform_uint(program, "texel_count", task->texel_count);
     gpu_uniform_uint(program, "slots", task->slots);
     gpu_uniform_uint(program, "fragments_max", task->builder->fragments_max);
@@ -67,8 +68,8 @@ static bool draw_lists(struct ldc_task *task, struct error *error)
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
     gpu_buffer_bind_image(device, &builder->fragments, IMAGE_LDC_FRAGMENTS, GL_RGBA32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
-    return ldc_draw_bind_plain(task, error) && ldc_draw(task, LDC_PASS_LISTS, set_lists, error) &&
-           ldc_give_places(task, UINT32_MAX, error);
+    return axes_draw_bind_plain(&builder->draw, task->cube->resolution, error) &&
+           ldc_draw(task, LDC_PASS_LISTS, set_lists, error) && ldc_give_places(task, UINT32_MAX, error);
 }
 
 /* Those without slots, to behind those with. */

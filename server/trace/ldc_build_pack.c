@@ -94,12 +94,12 @@ static bool sample(struct ldc_task *task, struct error *error)
     if (!program)
         return false;
     gpu_buffer_bind_texels(device, &task->builder->visible, UNIT_LDC_VISIBLE, GL_RGBA32UI);
-    gpu_buffer_bind_texels(device, &task->builder->drawn, UNIT_LDC_DRAWN, GL_RGBA32UI);
+    gpu_buffer_bind_texels(device, &task->builder->draw.drawn, UNIT_LDC_DRAWN, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &task->store->geometry, IMAGE_LDC_GEOMETRY, GL_RG32UI);
     gpu_buffer_bind_image(device, &task->store->surface, IMAGE_LDC_SURFACE, GL_RGBA32UI);
     gpu_uniform_uint(program, "sample_count", task->counts.samples);
     gpu_uniform_uint(program, "first_sample", task->cube->first_sample);
-    gpu_uniform_uint(program, "drawn_count", task->builder->drawn_count);
+    gpu_uniform_uint(program, "drawn_count", task->builder->draw.drawn_count);
     gpu_uniform_uint(program, "texels_along", task->cube->resolution);
     gpu_uniform_vec(program, "lower_world", 3, task->cube->lower_world);
     gpu_uniform_float(program, "cell_world", task->cube->cell_world);

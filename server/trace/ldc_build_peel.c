@@ -18,8 +18,9 @@ static bool count_fragments(struct ldc_task *task, struct error *error)
     task->slots = 0;
     gpu_buffer_clear(device, &builder->counts, 0);
     gpu_buffer_bind_image(device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
-    return ldc_draw_bind_plain(task, error) && ldc_draw(task, LDC_PASS_COUNT, NULL, error) &&
-           ldc_give_places(task, layers_allowed, error) && ldc_limit(task, error) &&
+    return axes_draw_bind_plain(&builder->draw, task->cube->resolution, error) &&
+           ldc_draw(task, LDC_PASS_COUNT, NULL, error) && ldc_give_places(task, layers_allowed, error) &&
+           ldc_limit(task, error) &&
            (task->layers_max == layers_allowed || ldc_give_places(task, task->layers_max, error));
 }
 
@@ -50,8 +51,9 @@ static bool reserve(struct ldc_task *task, struct error *error)
 }
 
 /* A power of two, by which depths in cells stay exact and below 1. */
-static void set_peel(const struct ldc_task *task, const struct gpu_program *program)
+static void set_peel(const void *context, const struct gpu_program *program)
 {
+    const struct ldc_task *task = context;
     int exponent;
     frexpf((float)task->cube->resolution, &exponent);
     gpu_uniform_float(program, "unit_per_cell", ldexpf(1.0f, -exponent - 1));

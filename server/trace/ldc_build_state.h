@@ -7,35 +7,21 @@
 #include "gpu/texture.h"
 #include "shared/ldc.h"
 #include "shared/ldc_build.h"
+#include "trace/axes_draw.h"
 #include "trace/ldc_build.h"
-
-/* What is drawn by one program. */
-enum ldc_sort { LDC_TRIANGLES, LDC_TRIANGLES_CUTOUT, LDC_SPHERES, LDC_SORT_COUNT };
-
-/* Instances of one sort, drawn with one call: commands first .. first + count - 1. */
-struct ldc_run {
-    enum ldc_sort sort;
-    uint32_t first, count;
-};
 
 struct ldc_builder {
     struct gpu_device *device;
-    unsigned vertex_array;
-    struct gpu_framebuffer plain; /* without attachments, three layers */
-    uint32_t plain_along;         /* its texels along a side; 0: not made yet */
+    struct axes_draw draw;
     /* shared/ldc_build.h */
-    struct gpu_buffer counts, occupied, ordered, places, fragments, found, visible, drawn, build, histogram;
+    struct gpu_buffer counts, occupied, ordered, places, fragments, found, visible, build, histogram;
     struct gpu_buffer peeled;
-    struct gpu_buffer commands;
     /* Peeling: geometry of the layer that is drawn and of the one before it, by turns. */
     struct gpu_texture layers[2], layer_surface, depth;
     struct gpu_framebuffer layer_framebuffers[2];
     uint32_t slots;         /* of a texel: what the last build in one pass suggests */
     uint32_t slots_texels;  /* of how many texels that was */
     uint32_t fragments_max; /* for which there is room in `fragments` */
-    /* Of the present build. */
-    struct ldc_run *runs;
-    uint32_t run_count, drawn_count;
 };
 
 /* One call of ldc_build(). */
@@ -54,13 +40,10 @@ struct ldc_task {
 
 enum ldc_pass { LDC_PASS_LISTS, LDC_PASS_COUNT, LDC_PASS_PEEL };
 
-/* ldc_build_draw.c. Lists what is to be drawn, for one build. */
-bool ldc_draw_prepare(struct ldc_builder *builder, const struct scene_gpu *scene, const uint32_t *instances,
-                      uint32_t instance_count, struct error *error);
-/* Draws it. The framebuffer and the pass's own images are bound already; `set` (may be NULL) sets its uniforms. */
+/* ldc_build_draw.c. Draws what is listed. The framebuffer and the pass's own images are bound already; `set` (may
+ * be NULL) sets its uniforms, and is given the task. */
 bool ldc_draw(struct ldc_task *task, enum ldc_pass pass,
-              void (*set)(const struct ldc_task *task, const struct gpu_program *program), struct error *error);
-bool ldc_draw_bind_plain(struct ldc_task *task, struct error *error);
+              void (*set)(const void *task, const struct gpu_program *program), struct error *error);
 
 /* ldc_build_lists.c. Leaves the fragments in `ordered`, and what was counted in task->counts. False and no error
  * where there are more than lists can hold: to be peeled. */

@@ -1,17 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/ldc_parts.h"
 
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Squares of the lengths in a larger box would not fit a float, and walks have such. */
-#define PLACE_MAX 1e18
-/* Of a coordinate: a cell below this could not be told from its neighbours, as positions are floats. */
-#define CELL_RELATIVE_MIN 0x1p-22
-#define CELL_MIN 1e-12 /* metres; keeps squares of cells far from zero, too */
-#define MARGIN_CELLS 1
 /* Nodes that are not there any more are forgotten when they are more than those that are, and than this. */
 #define RECORDS_KEPT 1024
 
@@ -125,51 +117,6 @@ static bool note(struct ldc_parts *parts, const struct ldc_member *member, bool 
     return true;
 }
 
-/* ---- boxes ---- */
-
-struct bounds {
-    double lower[3], upper[3];
-};
-
-/* Of the part's instances; false: there are none that have a size. */
-static bool bounds_of(const struct ldc_part *part, const struct scene_gpu *scene, struct bounds *bounds)
-{
-    bool any = false;
-    for (uint32_t i = 0; i < part->count; i++) {
-        float lower[3], upper[3];
-        scene_gpu_instance_bounds(scene, part->instances[i], lower, upper);
-        for (int k = 0; k < 3; k++) {
-            bounds->lower[k] = any ? fmin(bounds->lower[k], (double)lower[k]) : (double)lower[k];
-            bounds->upper[k] = any ? fmax(bounds->upper[k], (double)upper[k]) : (double)upper[k];
-        }
-        any = true;
-    }
-    return any;
-}
-
-static bool place_box(struct ldc_part *part, const struct scene_gpu *scene, uint32_t resolution,
-                      struct error *error)
-{
-    struct bounds bounds;
-    part->cell_world = 0;
-    memset(part->lower_world, 0, sizeof(part->lower_world));
-    if (!bounds_of(part, scene, &bounds))
-        return true;
-    double longest = 0, farthest = 0;
-    for (int k = 0; k < 3; k++) {
-        if (!(bounds.lower[k] >= -PLACE_MAX && bounds.upper[k] <= PLACE_MAX))
-            return error_set(error, ERROR_LIMIT, "scene",
-                             "layered depth cubes hold a scene up to %g metres from its origin", PLACE_MAX);
-        longest = fmax(longest, bounds.upper[k] - bounds.lower[k]);
-        farthest = fmax(farthest, fmax(fabs(bounds.lower[k]), fabs(bounds.upper[k])));
-    }
-    double cell = fmax(longest / (resolution - 2 * MARGIN_CELLS), fmax(CELL_RELATIVE_MIN * farthest, CELL_MIN));
-    part->cell_world = (float)cell;
-    for (int k = 0; k < 3; k++)
-        part->lower_world[k] = (float)(bounds.lower[k] - MARGIN_CELLS * cell);
-    return true;
-}
-
 /* ---- parts ---- */
 
 static bool part_reserve(struct ldc_part *part, uint32_t count)
@@ -209,8 +156,7 @@ static bool deal_out(struct ldc_parts *parts, struct ldc_part fresh[TRACER_CUBES
 
 static bool same_part(const struct ldc_part *a, const struct ldc_part *b)
 {
-    return a->count == b->count && a->cell_world == b->cell_world &&
-           memcmp(a->lower_world, b->lower_world, sizeof(a->lower_world)) == 0 &&
+    return a->count == b->count && memcmp(&a->box, &b->box, sizeof(a->box)) == 0 &&
            (a->count == 0 || memcmp(a->members, b->members, a->count * sizeof(*a->members)) == 0);
 }
 
@@ -225,7 +171,7 @@ bool ldc_parts_update(struct ldc_parts *parts, const struct scene_gpu *scene, ui
         ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the parts of a scene of %u instances",
                        scene->instance_count);
     for (int i = 0; i < TRACER_CUBES_MAX; i++) {
-        ok = ok && place_box(&fresh[i], scene, resolution, error);
+        ok = ok && axes_box_place(&fresh[i].box, scene, fresh[i].instances, fresh[i].count, resolution, error);
         stale[i] = !same_part(&parts->parts[i], &fresh[i]);
         part_finish(&parts->parts[i]);
         parts->parts[i] = fresh[i];

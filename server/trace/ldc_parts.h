@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/hashmap.h"
+#include "trace/axes_box.h"
 #include "trace/scene_gpu.h"
 #include "trace/tracer.h"
 
@@ -28,11 +29,7 @@ struct ldc_part {
     uint32_t *instances; /* indices into the scene's, ascending */
     struct ldc_member *members;
     uint32_t count;
-    /* The cube's box, in cells that are cubes: it begins at the lower corner of the instances' bounds, less a
-     * cell, and is as long on every side as they are on the longest. It moves with them without a change of the
-     * cells, so a body that is only moved is sampled where it was sampled before. cell_world is 0 if there is
-     * none. */
-    float lower_world[3], cell_world;
+    struct axes_box box; /* the cube's */
 };
 
 /* All-zero is empty. */

@@ -103,6 +103,7 @@ static void pack_material(const struct scene_gpu *gpu, const struct scene_materi
         .alpha_cutoff = in->alpha_cutoff,
         .anisotropy = in->anisotropy,
         .anisotropy_rotation = in->anisotropy_rotation,
+        .id = in->base.id,
     };
     memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
     out->flags = (in->alpha_mode == ALPHA_MASK ? MATERIAL_ALPHA_MASK : 0) |

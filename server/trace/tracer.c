@@ -17,6 +17,7 @@ static const struct tracer_impl *const tracers[] = {
     [NUMBER_REFERENCE] = &tracer_reference_impl,
 #endif
     [3] = &tracer_ldc_impl,
+    [4] = &tracer_abuffer_impl,
 };
 #define TRACER_COUNT (sizeof(tracers) / sizeof(tracers[0]))
 

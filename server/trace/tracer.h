@@ -44,8 +44,13 @@ struct tracer_options {
     uint32_t ldc_layers_max;    /* 0: 255, more cannot be kept; of more the nearest are kept */
     uint32_t ldc_mebibytes_max; /* device memory of one cube's samples; 0: no limit but the device's */
     uint32_t abuffer_resolution; /* texels along a side of an A-buffer; 0: 1280; 16 to 4096 */
-    uint32_t abuffer_voxels;     /* along a side of the grid: 16, 32, 64, 128, 256; 0: chosen from the resolution */
-    enum { ABUFFER_SEARCH_AUTO, ABUFFER_SEARCH_DDA, ABUFFER_SEARCH_LINEAR3, ABUFFER_SEARCH_LINEAR1 } abuffer_search;
+    uint32_t abuffer_voxels; /* along a side of the grid: 16, 32, 64, 128, 256; 0: chosen from the resolution */
+    enum {
+        ABUFFER_SEARCH_AUTO,
+        ABUFFER_SEARCH_DDA,
+        ABUFFER_SEARCH_LINEAR3,
+        ABUFFER_SEARCH_LINEAR1
+    } abuffer_search;
     uint32_t abuffer_count_steps;   /* 1: crossings say what the walk did; for the benchmark */
     uint32_t abuffer_mebibytes_max; /* device memory of the lists and samples; 0: no limit but the device's */
     /* Words only, without bytes between them: tracer_options_same() compares all. */
@@ -89,9 +94,9 @@ struct tracer {
 struct tracer_impl {
     const char *name;
     unsigned depends_on; /* tracer_dependency bits */
-    bool sampled; /* hits of meshes and spheres are stored samples (HIT_SAMPLED) */
-    /* The structure knows the scene as the shutter opens: rays of a scene in which something moves meanwhile must have
-     * no times. */
+    bool sampled;        /* hits of meshes and spheres are stored samples (HIT_SAMPLED) */
+    /* The structure knows the scene as the shutter opens: rays of a scene in which something moves meanwhile must
+     * have no times. */
     bool still;
     struct tracer *(*create)(struct gpu_device *device, const struct tracer_options *options, struct error *error);
     void (*destroy)(struct tracer *tracer);

@@ -59,6 +59,18 @@ vec3 unpack_unit(uint bits)
     return unit_from_octahedral(unpackSnorm2x16(bits));
 }
 
+// 2 x 12 bit snorm, in bits 0..23: exact to 0.05 degrees.
+uint pack_unit_24(vec3 unit)
+{
+    ivec2 p = ivec2(round(octahedral_from_unit(unit) * 2047.0));
+    return uint(p.x) & 0xfffu | (uint(p.y) & 0xfffu) << 12;
+}
+
+vec3 unpack_unit_24(uint bits)
+{
+    return unit_from_octahedral(vec2(bitfieldExtract(int(bits), 0, 12), bitfieldExtract(int(bits), 12, 12)) / 2047.0);
+}
+
 // struct hit's tangent: x 16 bits, y 15 bits, lowest bit set where the handedness is negative.
 // packSnorm2x16 puts y in the upper half; here x is the upper half and y's lowest bit makes room.
 uint pack_tangent(vec3 unit, float handedness)
@@ -99,6 +111,12 @@ void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent)
     float b = normal.x * normal.y * a;
     tangent = vec3(1.0 + s * normal.x * normal.x * a, s * b, -s * normal.x);
     bitangent = vec3(b, s + normal.y * normal.y * a, -normal.y);
+}
+
+// Axes x y z as the image that looks along one of them has them: u v depth.
+vec3 in_image(vec3 p, int axis)
+{
+    return axis == 0 ? p.yzx : axis == 1 ? p.zxy : p;
 }
 
 // Moves a point off its surface, to the side the unit normal points to, by about as much as its coordinates

@@ -2,28 +2,15 @@
 // Where a primitive lies under the middle of a texel. For the lists only its depth and its id are noted: of what it is
 // made is found out once for each sample that stays (sample.comp). Peeling writes the paper's two targets in each pass.
 // Defines:
-//   PRIMITIVE_KIND  as in build.geom
-//   HAS_CUTOUT      triangles or spheres may have holes
-//   HAS_SPHERES     with PRIMITIVE_KIND 1
+//   those of common/axes_fragment.glsl
 //   BUILD_PASS      0: each texel's fragments are noted; 1: they are counted only; 2: of those behind the layer
 //                   before, the nearest is kept (depth peeling)
 //   with BUILD_PASS 2 those of ldc/sample.glsl
 
 #include "shared/bindings.h"
-#include "common/alpha.glsl"
-#include "ldc/image.glsl"
+#include "common/axes_fragment.glsl"
+#include "common/axes_image.glsl"
 #include "ldc/sample.glsl"
-
-uniform uint texels_along; // a side of the images
-
-#if PRIMITIVE_KIND == 0
-layout(location = 0) flat in vec4 plane;
-layout(location = 1) flat in vec3 depths;
-#ifdef HAS_CUTOUT
-layout(location = 3) in vec2 barycentrics;
-#endif
-#endif
-layout(location = 2) flat in uvec4 primitive; // id, instance, scene-wide number, LDC_DRAWN_*
 
 #if BUILD_PASS == 2
 uniform float unit_per_cell; // a power of two, so that nothing is rounded
@@ -41,17 +28,6 @@ layout(binding = IMAGE_LDC_ORDERED, rg32ui) writeonly uniform uimageBuffer order
 layout(binding = IMAGE_LDC_FRAGMENTS, rgba32ui) writeonly uniform uimageBuffer fragments;
 layout(std430, binding = BIND_LDC_BUILD_COUNTS) buffer build_block { ldc_build_counts build; };
 #endif
-
-uint texel_number()
-{
-    return (uint(gl_Layer) * texels_along + uint(gl_FragCoord.y)) * texels_along + uint(gl_FragCoord.x);
-}
-
-// Depths of what lies on the sides of the cube may be rounded out of it.
-float depth_in_cube(float depth_cells)
-{
-    return min(max(depth_cells, 0.0), float(texels_along));
-}
 
 #if BUILD_PASS == 0
 void record(float depth_cells)
@@ -97,49 +73,22 @@ void finish()
 #if PRIMITIVE_KIND == 0
 void main()
 {
-#ifdef HAS_CUTOUT
-    candidate found = candidate(0.0, primitive.z, primitive.y, barycentrics);
-    if (is_cut_out(found, vec3(0.0), vec3(0.0), 0.0))
+    if (is_triangle_cut_out())
         discard;
-#endif
-    precise float along_u = (gl_FragCoord.x - plane.z) * plane.x;
-    precise float along_v = (gl_FragCoord.y - plane.w) * plane.y;
-    precise float depth_cells = depths.x + along_u + along_v;
-    // Not behind nor before the triangle, where it is thin and its plane uncertain; and on the cube.
-    depth_cells = min(max(depth_cells, depths.y), depths.z);
-    record(depth_in_cube(depth_cells));
+    record(triangle_depth_cells());
     finish();
 }
 #else
-// Along the axis through the texel's middle; what leans more to another axis is in that one's image.
+// What leans more to another axis is in that one's image.
 void main()
 {
-    int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
-    vec3 origin = vec3(0.0), direction = vec3(0.0);
-    origin[u] = gl_FragCoord.x * cell_world;
-    origin[v] = gl_FragCoord.y * cell_world;
-    origin += lower_world;
-    direction[axis] = cell_world; // depths are in cells
-    vec4 rows[3] = instance_at(primitive.y).object_from_world;
-    vec4 sphere = texelFetch(spheres, int(primitive.z));
-    precise vec3 from_centre = affine_point(rows, origin) - sphere.xyz;
-    precise vec3 step_object = affine_vector(rows, direction);
-    precise float squared = dot(step_object, step_object);
-    precise float nearest = -dot(from_centre, step_object) / squared;
-    precise vec3 closest = from_centre + nearest * step_object;
-    precise float half_chord = sqrt((sphere.w * sphere.w - dot(closest, closest)) / squared);
-    if (!(half_chord >= 0.0)) // passes it
+    sphere_chord chord = chord_of_sphere();
+    if (!(chord.half_chord >= 0.0)) // passes it
         discard;
     for (int side = 0; side < 2; side++) {
-        precise float reach = side == 0 ? -half_chord : half_chord;
-        precise float depth_cells = nearest + reach;
-        vec3 lean = abs(affine_covector(rows, closest + reach * step_object));
-        bool there = is_in_image(lean, axis);
-#ifdef HAS_CUTOUT
-        candidate found = candidate(depth_cells, primitive.z, primitive.y, vec2(0.0));
-        there = there && !is_cut_out(found, origin, direction, 0.0);
-#endif
-        if (there)
+        vec3 normal;
+        float depth_cells = crossing_of(chord, side, normal);
+        if (is_in_image(abs(normal), gl_Layer) && !is_sphere_cut_out(chord, depth_cells))
             record(depth_in_cube(depth_cells));
     }
     finish();

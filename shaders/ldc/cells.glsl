@@ -21,7 +21,7 @@ struct cell_walk {
     ivec3 cell;
     float s, s_end;
     float s_least, s_limit; // between which a crossing counts
-    float begin, scale; // cube_ray's
+    float begin, scale; // cell_ray's
     int cube, grid, first_node, octant_shift;
     int at, shift; // texel of what it is in; log2 of the size of its parts: 2 a node, 0 a block
 };
@@ -48,7 +48,7 @@ int node_at(cell_walk w, ivec3 cell)
 void begin_cells(trace_ray r, float end, int pass, out cell_walk w)
 {
     w.cube = pass;
-    cube_ray c = cube_ray_of(r, w.cube);
+    cell_ray c = cube_ray_of(r, w.cube);
     w.grid = ldc_grid[CUBE(w.cube)];
     w.first_node = ldc_first_node[CUBE(w.cube)];
     bvec3 down = lessThan(c.d, vec3(0.0));

@@ -4,15 +4,14 @@
 // A wave's cubes are walked one behind the other; `ldc_cubes` of them there are, of which each has a lower corner, a
 // size of cell and places in the buffers of its own.
 //
-// In a cube a ray is p(s) = o + s d, in cells, and the greatest component of d is 1 (or -1), so `s` too counts cells,
-// along the axis that the ray runs along most. In an image the components are u, v, depth.
+// Rays in a cube are those of common/cell_ray.glsl.
 //
 // Defines: LDC_CUBES 1 or 2; LDC_TOLERANCE a hit is where the ray comes as near to a sample's depth, else where it
 // crosses the sample's plane; LDC_COUNT_STEPS crossings are not samples but, for the benchmark, what the walk did: nodes,
 // blocks and texels looked at in place of the distance, samples tested in that of the primitive, texels or cells whose
 // samples were in that of the instance.
 #include "shared/bindings.h"
-#include "common/candidate.glsl"
+#include "common/cell_ray.glsl"
 #include "ldc/plane.glsl"
 
 #ifdef LDC_COUNT_STEPS
@@ -42,55 +41,9 @@ uniform float ldc_tolerance[LDC_CUBES]; // cells
 #define CUBE(number) number
 #endif
 
-// A ray's component where it has none: it moves by less than a thousandth of a cell on its way through a cube, and
-// no quotient is infinite.
-const float LDC_LEAST_SLOPE = 1e-8;
-
-// From so far away, in cells, floats round places by more than LDC_ROUNDING: a ray that comes from farther is taken to
-// begin nearer, or it would step and cross a little beside itself.
-const float LDC_FAR = 16384.0;
-
-struct cube_ray {
-    vec3 o, d;
-    float scale; // s of a distance; 0: the direction is no direction, and the ray goes nowhere
-    float begin; // s of the ray where it is taken to begin; less than where it comes to the cube by its length or more
-};
-
-vec3 without_zeros(vec3 d)
+cell_ray cube_ray_of(trace_ray r, int cube)
 {
-    vec3 least_ = vec3(d.x < 0.0 ? -LDC_LEAST_SLOPE : LDC_LEAST_SLOPE, d.y < 0.0 ? -LDC_LEAST_SLOPE : LDC_LEAST_SLOPE,
-                       d.z < 0.0 ? -LDC_LEAST_SLOPE : LDC_LEAST_SLOPE);
-    return mix(d, least_, lessThan(abs(d), vec3(LDC_LEAST_SLOPE)));
-}
-
-cube_ray cube_ray_of(trace_ray r, int cube)
-{
-    vec4 place = ldc_place[CUBE(cube)];
-    vec3 size = abs(r.direction);
-    float length_ = greatest(size);
-    cube_ray c;
-    c.scale = length_ / place.w;
-    // Written so that what is no number, or too small or large for its inverse to be one, goes nowhere.
-    vec3 away = abs(r.origin);
-    bool is_direction = length_ > 1e-30 && size.x + size.y + size.z < 1e30 && away.x + away.y + away.z < 1e30;
-    c.scale = is_direction ? c.scale : 0.0;
-    c.o = (r.origin - place.xyz) / place.w;
-    c.d = without_zeros(is_direction ? r.direction / length_ : vec3(1.0, 0.0, 0.0));
-    vec3 ahead = -c.o * c.d;
-    float along = size.x == length_ ? ahead.x : size.y == length_ ? ahead.y : ahead.z;
-    c.begin = along - 2.0 * float(ldc_resolution[CUBE(cube)]);
-    c.begin = c.begin > LDC_FAR ? c.begin : 0.0;
-    c.o += c.begin * c.d;
-    return c;
-}
-
-// Where [lower, upper] of the ray is inside a box; all of it behind the other where it is not.
-void clip(inout float s_first, inout float s_end, vec3 o, vec3 inverse, vec3 lower, vec3 upper)
-{
-    vec3 a = (lower - o) * inverse, b = (upper - o) * inverse;
-    vec3 near = min(a, b), far = max(a, b);
-    s_first = max(s_first, greatest(near));
-    s_end = min(s_end, least(far));
+    return cell_ray_of(r, ldc_place[CUBE(cube)], float(ldc_resolution[CUBE(cube)]));
 }
 
 // ---- samples ----

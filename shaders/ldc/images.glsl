@@ -23,7 +23,7 @@ struct image_walk {
     vec2 inverse;
     float s, s_end;
     float s_least, s_limit; // between which a crossing counts
-    float begin, scale; // cube_ray's
+    float begin, scale; // cell_ray's
     ivec2 texel;
     int level;
     int cube, axis;
@@ -34,7 +34,7 @@ void begin_image(trace_ray r, float end, int pass, out image_walk w)
 {
     w.cube = pass / 3;
     int rank = pass - 3 * w.cube;
-    cube_ray c = cube_ray_of(r, w.cube);
+    cell_ray c = cube_ray_of(r, w.cube);
     vec3 size = abs(c.d);
     int most = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
     int least_ = size.z < size.y ? (size.z < size.x ? 2 : 0) : (size.y < size.x ? 1 : 0);

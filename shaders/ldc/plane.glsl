@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 // The plane of a sample, and how far it goes.
 #include "shared/ldc.h"
+#include "common/math.glsl"
 
 // How far beyond its texel a sample's plane still counts, in cells: what neighbours' planes may leave open between
 // them where a surface bends.
 const float LDC_SLACK = 0.05;
 // How far a plane may leave its sample's depth within its texel and the slack: half a cell and the slack along u, as far
-// along v, with the greatest slope, 1 / LDC_OVERLAP.
-const float LDC_SPAN = (1.0 + 2.0 * LDC_SLACK) / LDC_OVERLAP;
+// along v, with the greatest slope, 1 / AXES_OVERLAP.
+const float LDC_SPAN = (1.0 + 2.0 * LDC_SLACK) / AXES_OVERLAP;
 // What depths and places round, in cells: some units in the last place of 4096.
 const float LDC_ROUNDING = 0.002;
 
@@ -19,12 +20,6 @@ vec3 direction_from_octahedral(uint bits)
     vec2 folded = (1.0 - abs(v.yx)) * vec2(v.x >= 0.0 ? 1.0 : -1.0, v.y >= 0.0 ? 1.0 : -1.0);
     v.xy = v.z < 0.0 ? folded : v.xy;
     return v;
-}
-
-// World or cube axes x y z as the image of an axis has them: u v depth.
-vec3 in_image(vec3 p, int axis)
-{
-    return axis == 0 ? p.yzx : axis == 1 ? p.zxy : p;
 }
 
 // How far the plane of a sample of an axis's image leaves the sample's depth.

@@ -5,11 +5,9 @@
 
 #include "shared/ldc.h"
 #include "shared/ldc_build.h"
+#include "common/axes_cube.glsl"
 #include "common/material.glsl"
 #include "common/sampled.glsl"
-
-uniform vec3 lower_world; // of the cube
-uniform float cell_world;
 
 float cross_2d(vec2 a, vec2 b)
 {
@@ -19,7 +17,7 @@ float cross_2d(vec2 a, vec2 b)
 // Of a primitive under the middle of a texel.
 struct point {
     uint instance_index, primitive;
-    uint flags; // LDC_DRAWN_*
+    uint flags; // DRAWN_*
     int axis, u, v;
     vec2 middle; // u, v in cells
     float depth_cells;
@@ -72,10 +70,10 @@ plain_surface plain_triangle(point p)
 {
     plain_surface found;
     placed_triangle t = place_triangle(p);
-    float side = (p.flags & LDC_DRAWN_MIRRORED) != 0u ? -1.0 : 1.0;
+    float side = (p.flags & DRAWN_MIRRORED) != 0u ? -1.0 : 1.0;
     vec3 geometric = normalize(cross(t.e1, t.e2)) * side, shading = geometric;
     vec3 weights = triangle_weights(t.barycentrics);
-    if ((p.flags & LDC_DRAWN_NORMALS) != 0u) {
+    if ((p.flags & DRAWN_NORMALS) != 0u) {
         vec3 sum = texelFetch(normals, int(t.vertices.x)).xyz * weights.x +
                    texelFetch(normals, int(t.vertices.y)).xyz * weights.y +
                    texelFetch(normals, int(t.vertices.z)).xyz * weights.z;
@@ -93,7 +91,7 @@ plain_surface plain_triangle(point p)
     found.material_index = t.vertices.w;
     found.colour = vec4(1.0);
 #ifdef HAS_COLOURS
-    if ((p.flags & LDC_DRAWN_COLOURS) != 0u)
+    if ((p.flags & DRAWN_COLOURS) != 0u)
         found.colour = unpackUnorm4x8(packUnorm4x8(triangle_colour(t.vertices, GEOMETRY_HAS_COLOURS, weights)));
 #endif
     return found;
@@ -104,7 +102,7 @@ plain_surface plain_triangle(point p)
 hit hit_at(point p, vec3 origin, vec3 direction)
 {
 #ifdef HAS_SPHERES
-    if ((p.flags & LDC_DRAWN_SPHERES) != 0u)
+    if ((p.flags & DRAWN_SPHERES) != 0u)
         return surface_sphere(p.instance_index, p.primitive, p.depth_cells * cell_world, origin, direction, 0.0);
 #endif
 #if defined HAS_TEXTURES || defined HAS_BUMP

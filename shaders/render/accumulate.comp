@@ -9,6 +9,7 @@ layout(local_size_x = 64) in;
 uniform uint slot_count;
 uniform uint first_slot; // of the slice, in its band
 uniform uint sample_shift;
+uniform uint first_sum; // of the slice's samples
 
 layout(std430, binding = BIND_SLICE_SUMS) readonly buffer sum_block { vec4 slice_sums[]; };
 layout(std430, binding = BIND_ACCUMULATION) buffer accumulation_block { vec4 accumulation[]; };
@@ -21,6 +22,6 @@ void main()
     vec4 sum = accumulation[first_slot + k];
     uint end = (k + 1u) << sample_shift;
     for (uint i = k << sample_shift; i < end; i++)
-        sum += slice_sums[i];
+        sum += slice_sums[first_sum + i];
     accumulation[first_slot + k] = sum;
 }

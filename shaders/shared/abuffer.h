@@ -1,48 +1,59 @@
 /* SPDX-License-Identifier: MIT */
+/* clang-format off */
 /* Voxels and A-buffers on the device: what the build (abuffer/build.*, abuffer/resolve.comp, abuffer/voxels.comp)
  * writes and the walk reads. Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014.
  *
- * The structure is a cube of N x N x N cells of one size over a box of the world. It has three A-buffers, one an
- * axis: image a looks along axis a (0 x, 1 y, 2 z) towards greater values; a texel's u runs along axis (a + 1) % 3
- * and its v along axis (a + 2) % 3. Places are in cells from the cube's lower corner: p_cell = (p_world - lower) /
- * cell; texel (u, v) covers [u, u + 1) x [v, v + 1) and was sampled at its middle. Every triangle is in all three
- * images, so a texel's samples are all surfaces along its line.
+ * The structure is a cube of N x N x N cells of one size over a box of the world. It has three A-buffers, one an axis:
+ * image a looks along axis a (0 x, 1 y, 2 z) towards greater values; a texel's u runs along axis (a + 1) % 3 and its v
+ * along axis (a + 2) % 3. Places are in cells from the cube's lower corner: p_cell = (p_world - lower) / cell; texel
+ * (u, v) covers [u, u + 1) x [v, v + 1) and was sampled at its middle. Every triangle is in all three images, so a
+ * texel's samples are all surfaces along its line.
  *
  * Over the same cube lies a grid of V x V x V voxels, V a power of two, each N / V cells wide.
  *
  *   texels      RG32UI, one a texel, image after image, row (v) after row: first sample, number of samples
- *   samples     RG32UI, one a sample; those of a texel lie together and ascend in depth, of equal depths in the
- * order of instances and primitives x  depth (float, cells) y  bits 0..11, 12..23 geometric normal, octahedral
- * snorm, world space, to the outside (winding); 24..30 winding behind it: of how many bodies a point between it
- * and the next sample is inside, plus ABUFFER_WINDING_ZERO; 31: it bounds a body (others leave the winding as it
- * is) ids         R32UI, one a sample: what it is of; the instance and the primitive are found by `drawn` drawn
- * RGBA32UI, one an instance that was drawn: first id; what is added to a primitive's scene-wide number to make its
- * id; the instance; DRAWN_* (shared/axes.h). First ids ascend voxels      RGBA32UI, ABUFFER_BLOCK_TEXELS a block
- * of 4 x 4 x 4 voxels, blocks row after row 0  x, y  which of the 64 hold something: bit x + 4 y + 16 z z     of
- * an empty block: 8 x 4 bits, for the octants of a direction (bit 0, 1, 2: x, y, z run down): so many blocks along
- * each side of a cube that begins with this one and reaches that way are empty w     unused 1, 2  4 bits a voxel,
- * ABUFFER_VOXEL_*: voxel i in texel 1 + i / 32, component i / 8 % 4, bits 4 (i % 8)
+ *   samples     RG32UI, one a sample; those of a texel lie together and ascend in depth, of equal depths in the order of
+ *               instances and primitives
+ *                 x  depth (float, cells)
+ *                 y  bits 0..11, 12..23 geometric normal, octahedral snorm, world space, to the outside (winding);
+ *                    24..30 winding behind it: of how many bodies a point between it and the next sample is inside, plus
+ *                    ABUFFER_WINDING_ZERO; 31: it bounds a body (others leave the winding as it is)
+ *   ids         R32UI, one a sample: what it is of; the instance and the primitive are found by `drawn`
+ *   drawn       RGBA32UI, one an instance that was drawn: first id; what is added to a primitive's scene-wide number to
+ *               make its id; the instance; DRAWN_* (shared/axes.h). First ids ascend
+ *   voxels      RGBA32UI, ABUFFER_BLOCK_TEXELS a block of 4 x 4 x 4 voxels, blocks row after row
+ *                 0  x, y  which of the 64 hold something: bit x + 4 y + 16 z
+ *                    z     of an empty block: 8 x 4 bits, for the octants of a direction (bit 0, 1, 2: x, y, z run down):
+ *                          so many blocks along each side of a cube that begins with this one and reaches that way are
+ *                          empty
+ *                    w     unused
+ *                 1, 2  4 bits a voxel, ABUFFER_VOXEL_*: voxel i in texel 1 + i / 32, component i / 8 % 4, bits 4 (i % 8)
  *
  * While it is built, in R32I texels (image atomics), four a voxel, x fastest:
- *   sums        0..2  sum of the geometric normals of the samples in it, ABUFFER_NORMAL_UNIT for 1: their
- * direction is that of the average. Of each sample once: that of the image which its normal leans to most 3
- * ABUFFER_SUM_* bits of all of them */
+ *   sums        0..2  sum of the geometric normals of the samples in it, ABUFFER_NORMAL_UNIT for 1: their direction is
+ *                     that of the average. Of each sample once: that of the image which its normal leans to most
+ *               3     ABUFFER_SUM_* bits of all of them */
+/* clang-format on */
 #ifndef FARLIGHT_SHARED_ABUFFER_H
 #define FARLIGHT_SHARED_ABUFFER_H
+#include "shared/axes.h"
 #include "shared/types.h"
 
 #define ABUFFER_NORMAL_UNIT 127
-#define ABUFFER_SUM_LEANS                                                                                         \
-    1u /* times 2 to the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP) */
-#define ABUFFER_SUM_STEEP                                                                                         \
-    8u /* times 2 to the axis: some sample is so steep in that image that its depths say little */
-#define ABUFFER_SUM_OPEN 64u /* some sample bounds no body */
-#define ABUFFER_STEEP 0.5f   /* component of a unit normal along the axis below which it is */
+/* Times 2 to the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP). */
+#define ABUFFER_SUM_LEANS 1u
+/* Times 2 to the axis: some sample is so steep in that image that its depths say little. */
+#define ABUFFER_SUM_STEEP 8u
+#define ABUFFER_SUM_OPEN 64u           /* some sample bounds no body */
+#define ABUFFER_SUM_UP 128u            /* times 2 to the axis: some sample leans to it and looks up it, .. */
+#define ABUFFER_SUM_DOWN 1024u         /* .. or down: where both do, a body's sides are near each other */
+#define ABUFFER_STEEP FACE_STEEP_BELOW /* component of a unit normal along the axis below which it is */
 
 #define ABUFFER_BLOCK_TEXELS 3
 /* In which images the walk looks, bits 0..2; it does by winding where ABUFFER_VOXEL_BODY is set, and by the
  * samples' planes alone where it is not. A voxel of bodies whose samples can all be seen in the image that the
- * average normal leans to most (none is steep there) is looked for in that one, by winding. */
+ * average normal leans to most (none is steep there) is looked for in that one, by winding. Where samples look both
+ * ways along an axis winding is no help: a ray may pass both sides of a body between two places that it is asked of. */
 #define ABUFFER_VOXEL_IMAGES 7u
 #define ABUFFER_VOXEL_BODY 8u
 

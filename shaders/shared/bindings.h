@@ -22,6 +22,7 @@
 #define BIND_PASS_4 15
 #define BIND_LDC_BUILD_COUNTS BIND_TRACER_0 /* struct ldc_build_counts */
 #define BIND_LDC_HISTOGRAM BIND_TRACER_1
+#define BIND_ABUFFER_BUILD_COUNTS BIND_TRACER_0 /* struct abuffer_build_counts */
 
 /* image units */
 #define IMAGE_HITS 0
@@ -42,6 +43,15 @@
 #define IMAGE_LDC_SURFACE 5
 #define IMAGE_LDC_NODES 0 /* ldc/levels.comp, ldc/cells.comp */
 #define IMAGE_LDC_ENTRIES 1
+#define IMAGE_ABUFFER_HEADS 0 /* abuffer/build.frag, and the passes behind it: shared/abuffer_build.h */
+#define IMAGE_ABUFFER_NODES 1
+#define IMAGE_ABUFFER_SUMS 2
+#define IMAGE_ABUFFER_OCCUPIED 0
+#define IMAGE_ABUFFER_TEXELS 0
+#define IMAGE_ABUFFER_SAMPLES 1
+#define IMAGE_ABUFFER_IDS 2
+#define IMAGE_ABUFFER_DEEP 3
+#define IMAGE_ABUFFER_VOXELS 0 /* abuffer/voxels.comp */
 
 /* texture units */
 #define UNIT_TRIANGLES 0
@@ -87,6 +97,10 @@
 #define UNIT_LDC_OCCUPIED UNIT_TRACER_6
 #define UNIT_LDC_LAYER_SURFACE UNIT_TRACER_0 /* of peeling too */
 #define UNIT_LDC_PEELED_SURFACE UNIT_TRACER_3
+#define UNIT_ABUFFER_HEADS UNIT_TRACER_0 /* while they are built */
+#define UNIT_ABUFFER_NODES UNIT_TRACER_1
+#define UNIT_ABUFFER_OCCUPIED UNIT_TRACER_2
+#define UNIT_ABUFFER_TEXELS UNIT_TRACER_3
 #define UNIT_PASS_0 16
 #define UNIT_PASS_1 17
 #define UNIT_RAYS 18

@@ -2,6 +2,7 @@
 /* What the passes that build a layered depth cube leave to each other and to the host. */
 #ifndef FARLIGHT_SHARED_LDC_BUILD_H
 #define FARLIGHT_SHARED_LDC_BUILD_H
+#include "shared/axes.h"
 #include "shared/types.h"
 
 /* Counted while a cube is built. */
@@ -27,21 +28,16 @@ SHARED_SIZE(ldc_build_counts, 48)
 /* Texels that one invocation looks at to see what is occupied. */
 #define LDC_PLACES_TEXELS 32u
 
-#define LDC_DRAWN_NORMALS 1u /* what its vertices have */
-#define LDC_DRAWN_COLOURS 2u
-#define LDC_DRAWN_SPHERES 4u
-#define LDC_DRAWN_MIRRORED 8u
-
-/* A drawn primitive has an id: primitives of all instances are counted through, in the order of the instances. Ids
- * ascend as instances and primitives do.
- *   drawn      RGBA32UI, one an instance: first id; what is added to a primitive's scene-wide number to make its
- *              id; the instance; LDC_DRAWN_*
+/* clang-format off */
+/* Ids are those of shared/axes.h.
  *   counts     R32UI, one a texel: its fragments
  *   occupied   R32UI: texels that have fragments, as bits: 0..11 u, 12..23 v, 24..25 axis
  *   ordered    RG32UI: depth (float, cells), id. The first `slots` fragments of each texel have a slot: texels
- * side by side, slot after slot. Then the others' places, those of a texel together places     R32UI, one a texel
- * with more fragments than slots: the first of the others fragments  RGBA32UI, those others as they came: texel,
- * which one of the texel it is, depth, id found      R32UI, one a texel: layers that were peeled off it visible
- * RGBA32UI, one a sample: texel, depth, id, 0 */
+ *              side by side, slot after slot. Then the others' places, those of a texel together
+ *   places     R32UI, one a texel with more fragments than slots: the first of the others
+ *   fragments  RGBA32UI, those others as they came: texel, which one of the texel it is, depth, id
+ *   found      R32UI, one a texel: layers that were peeled off it
+ *   visible    RGBA32UI, one a sample: texel, depth, id, 0 */
+/* clang-format on */
 
 #endif

@@ -12,7 +12,8 @@ struct material {
     uint texture_base_colour, texture_normal, texture_metallic_roughness; /* index into texture_uses, 0: none */
     uint texture_occlusion, texture_emission, texture_transmission, texture_bump;
     float anisotropy, anisotropy_rotation; /* of rough reflections; radians from the tangent */
-    float pad0, pad1;
+    uint id;                               /* the client's; 0: the default material */
+    uint pad0;
 };
 SHARED_SIZE(material, 96)
 #define MATERIAL_ALPHA_MASK 1u

@@ -75,6 +75,7 @@ static inline uint32_t add_shape_mesh(struct fixture *fixture, enum shape shape,
     mesh->base.id = fixture->next_id++;
     mesh->vertex_count = vertices;
     mesh->triangle_count = triangles;
+    mesh->closed = true;
     mesh->arrays[MESH_POSITIONS] = fixture_blob(positions, vertices * sizeof(*positions));
     mesh->arrays[MESH_NORMALS] = fixture_blob(normals, vertices * sizeof(*normals));
     mesh->arrays[MESH_TEXCOORDS_0] = fixture_blob(texcoords, vertices * sizeof(*texcoords));

@@ -24,20 +24,20 @@ const char bench_usage[] =
     "  --size WxH            multiples of 8; default 512x512\n"
     "  --eye X,Y,Z --look-at X,Y,Z [--up X,Y,Z] [--fov DEGREES]   else the model's first camera, or one that sees "
     "all\n"
-    "  --waves LIST          of primary,reflection,shadow,occlusion,bounce,shuffled; default: all\n"
+    "  --waves LIST          of primary,reflection,shadow,refraction,occlusion,bounce,shuffled; default: all\n"
     "  --rays-per-pixel N    of every wave but primary and shuffled; default 1\n"
     "  --tracers LIST        default: all but naive\n"
     "  --runs N              after one warm-up; default 5, at most 64\n"
     "  --quick               of bvh only its own choice, of Embree only 1 ray a call\n"
     "  --device N            which OpenGL device; default: the first hardware, else software\n";
 
-static bool parse_vector(const char *text, float v[3])
+bool bench_parse_vector(const char *text, float v[3])
 {
     char rest;
     return sscanf(text, "%f,%f,%f%c", &v[0], &v[1], &v[2], &rest) == 3;
 }
 
-static bool parse_number(const char *text, uint32_t least, uint32_t most, uint32_t *value)
+bool bench_parse_number(const char *text, uint32_t least, uint32_t most, uint32_t *value)
 {
     char *end;
     unsigned long parsed = strtoul(text, &end, 10);
@@ -45,62 +45,76 @@ static bool parse_number(const char *text, uint32_t least, uint32_t most, uint32
     return *text >= '0' && *text <= '9' && *end == '\0' && parsed >= least && parsed <= most;
 }
 
-static bool parse_size(const char *text, struct bench_options *options)
+bool bench_parse_word(const char *text, const char *const words[], uint32_t count, uint32_t *found)
 {
-    char rest;
-    return sscanf(text, "%ux%u%c", &options->width, &options->height, &rest) == 2 && options->width % 8 == 0 &&
-           options->height % 8 == 0 && options->width >= 8 && options->height >= 8 && options->width <= 4096 &&
-           options->height <= 4096;
+    for (*found = 0; *found < count; ++*found)
+        if (strcmp(text, words[*found]) == 0)
+            return true;
+    return false;
 }
 
-static bool parse_waves(const char *text, struct bench_options *options)
+bool bench_parse_size(const char *text, uint32_t *width, uint32_t *height)
+{
+    char rest;
+    return sscanf(text, "%ux%u%c", width, height, &rest) == 2 && *width % 8 == 0 && *height % 8 == 0 &&
+           *width >= 8 && *height >= 8 && *width <= 4096 && *height <= 4096;
+}
+
+bool bench_parse_waves(const char *text, bool waves[BENCH_WAVE_KINDS])
 {
     unsigned found = 0, asked = 1;
     for (const char *at = text; *at; at++)
         asked += *at == ',';
     for (enum bench_wave_kind kind = 0; kind < BENCH_WAVE_KINDS; kind++)
-        found += options->waves[kind] = bench_is_named(text, bench_wave_facts[kind].name);
+        found += waves[kind] = bench_is_named(text, bench_wave_facts[kind].name);
     return found == asked;
 }
 
-static bool parse_option(int option, const char *text, struct bench_options *options, struct gpu_options *gpu)
+bool bench_parse_scene(int option, const char *text, struct bench_scene_options *scene)
 {
-    struct bench_scene_options *scene = &options->scene;
-    uint32_t number;
     char *end;
     switch (option) {
     case 'm':
         scene->model = text;
         return true;
     case 'f':
-        return parse_number(text, 1, 50000000, &scene->family_triangles);
-    case 's':
-        return parse_size(text, options);
+        return bench_parse_number(text, 1, 50000000, &scene->family_triangles);
     case 'e':
-        return scene->has_eye = parse_vector(text, scene->eye);
+        return scene->has_eye = bench_parse_vector(text, scene->eye);
     case 'l':
-        return parse_vector(text, scene->look_at);
+        return bench_parse_vector(text, scene->look_at);
     case 'u':
-        return parse_vector(text, scene->up);
+        return bench_parse_vector(text, scene->up);
     case 'v':
         scene->fov_y = strtof(text, &end) * 0.0174532925f;
         return *end == '\0' && scene->fov_y > 0 && scene->fov_y < 3.1f;
+    default:
+        return false;
+    }
+}
+
+static bool parse_option(int option, const char *text, struct bench_options *options, struct gpu_options *gpu)
+{
+    uint32_t number;
+    switch (option) {
+    case 's':
+        return bench_parse_size(text, &options->width, &options->height);
     case 'w':
-        return parse_waves(text, options);
+        return bench_parse_waves(text, options->waves);
     case 'p':
-        return parse_number(text, 1, 256, &options->rays_each);
+        return bench_parse_number(text, 1, 256, &options->rays_each);
     case 't':
         options->tracers = text;
         return true;
     case 'r':
-        return parse_number(text, 1, BENCH_RUNS_MAX, &options->runs);
+        return bench_parse_number(text, 1, BENCH_RUNS_MAX, &options->runs);
     case 'q':
         return options->quick = true;
     case 'd':
-        gpu->index = parse_number(text, 0, 63, &number) ? (int)number : -1;
+        gpu->index = bench_parse_number(text, 0, 63, &number) ? (int)number : -1;
         return gpu->index >= 0;
     default:
-        return false;
+        return bench_parse_scene(option, text, &options->scene);
     }
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The command line of bench_tracers. */
+/* The command line of bench_tracers, and what it has in common with others. */
 #ifndef FARLIGHT_TESTS_BENCH_OPTIONS_H
 #define FARLIGHT_TESTS_BENCH_OPTIONS_H
 
@@ -23,6 +23,15 @@ extern const char bench_usage[];
 
 /* False: what is wrong was said on standard error, the usage was not. Strings of argv stay in use. */
 bool bench_parse(int argc, char **argv, struct bench_options *options, struct gpu_options *gpu);
+/* Values of options; false: the text is none. */
+bool bench_parse_vector(const char *text, float v[3]);
+bool bench_parse_number(const char *text, uint32_t least, uint32_t most, uint32_t *value);
+bool bench_parse_size(const char *text, uint32_t *width, uint32_t *height); /* WxH, multiples of 8 up to 4096 */
+bool bench_parse_waves(const char *text, bool waves[BENCH_WAVE_KINDS]);     /* names with commas in between */
+/* --model m, --family f, --eye e, --look-at l, --up u and --fov v; false for others, too. */
+bool bench_parse_scene(int option, const char *text, struct bench_scene_options *scene);
+/* *found: the place of the text among the words. */
+bool bench_parse_word(const char *text, const char *const words[], uint32_t count, uint32_t *found);
 /* Whether `name` is one of a list of names with commas in between. */
 bool bench_is_named(const char *list, const char *name);
 

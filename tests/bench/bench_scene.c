@@ -127,7 +127,8 @@ bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
                                                        : bench_family_scene(options->family_triangles))) {
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the scene");
     }
-    if (options->mirrors && !bench_make_mirrors(scene->loaded.scene, error))
+    if ((options->mirrors || options->glass) &&
+        !bench_make_alike(scene->loaded.scene, options->mirrors ? BENCH_MIRROR : BENCH_GLASS, error))
         return false;
     if (!scene_gpu_update(&scene->gpu, scene->loaded.scene, NULL, &changes, NULL, error) ||
         !choose_camera(scene, options, error))

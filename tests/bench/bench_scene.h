@@ -14,7 +14,7 @@ struct bench_scene_options {
     const char *model;         /* a file; NULL: the family */
     uint32_t family_triangles; /* about so many */
     uint32_t sheets;           /* bench_sheets.h, in place of either; 0: none */
-    bool mirrors;              /* everything is one */
+    bool mirrors, glass;       /* everything is one, or of it */
     bool has_eye;              /* else the model's first camera, or one that sees all */
     float eye[3], look_at[3], up[3], fov_y;
     float aspect;

@@ -7,8 +7,9 @@
 
 #define STEPS 32u /* of a sheet, each way */
 #define WAVE 0.004f
-#define MIRROR_ID 0xfffffff0u
-#define MIRROR_COLOUR 0.85f
+#define MATERIAL_ID 0xfffffff0u
+#define COLOUR 0.85f
+#define INDEX_OF_REFRACTION 1.5f
 
 /* ---- sheets ---- */
 
@@ -48,11 +49,21 @@ struct scene *bench_sheets_scene(uint32_t count)
     return edits.scene;
 }
 
-/* ---- mirrors ---- */
+/* ---- one material for all ---- */
+
+static void add_glass(struct test_edits *edits)
+{
+    struct scene_material *glass = test_material(edits, MATERIAL_ID, COLOUR, COLOUR, COLOUR);
+    glass->metallic = 0;
+    glass->roughness = 0;
+    glass->transmission = 1;
+    glass->ior = INDEX_OF_REFRACTION;
+    glass->double_sided = true;
+}
 
 static void add_mirror(struct test_edits *edits)
 {
-    struct scene_material *mirror = test_material(edits, MIRROR_ID, MIRROR_COLOUR, MIRROR_COLOUR, MIRROR_COLOUR);
+    struct scene_material *mirror = test_material(edits, MATERIAL_ID, COLOUR, COLOUR, COLOUR);
     mirror->metallic = 1;
     mirror->roughness = 0;
     mirror->double_sided = true;
@@ -66,32 +77,35 @@ static float *copy_weights(const float *weights, uint32_t count)
     return copy;
 }
 
-static void mirror_mesh(struct test_edits *edits, const struct scene_mesh *from)
+static void remake_mesh(struct test_edits *edits, const struct scene_mesh *from)
 {
     struct scene_mesh *mesh = &test_add(edits, SCENE_MESH)->set.mesh;
     *mesh = *from;
     for (int i = 0; i < MESH_ARRAY_COUNT; i++)
         mesh->arrays[i] = blob_ref(from->arrays[i]);
     mesh->weights = copy_weights(from->weights, from->weight_count);
-    mesh->ranges = test_ranges(&(struct material_range){0, from->triangle_count, MIRROR_ID}, 1);
+    mesh->ranges = test_ranges(&(struct material_range){0, from->triangle_count, MATERIAL_ID}, 1);
     mesh->range_count = 1;
 }
 
-static void mirror_spheres(struct test_edits *edits, const struct scene_spheres *from)
+static void remake_spheres(struct test_edits *edits, const struct scene_spheres *from)
 {
     struct scene_spheres *spheres = &test_add(edits, SCENE_SPHERES)->set.spheres;
     *spheres = *from;
     spheres->centres_radii = blob_ref(from->centres_radii);
-    spheres->ranges = test_ranges(&(struct material_range){0, from->sphere_count, MIRROR_ID}, 1);
+    spheres->ranges = test_ranges(&(struct material_range){0, from->sphere_count, MATERIAL_ID}, 1);
     spheres->range_count = 1;
 }
 
 /* In several transactions, if it is many: each stands on what is there. */
-bool bench_make_mirrors(struct scene *scene, struct error *error)
+bool bench_make_alike(struct scene *scene, enum bench_material material, struct error *error)
 {
     static const enum scene_object_kind kinds[] = {SCENE_MESH, SCENE_SPHERES};
     struct test_edits edits = {.scene = scene};
-    add_mirror(&edits);
+    if (material == BENCH_MIRROR)
+        add_mirror(&edits);
+    else
+        add_glass(&edits);
     test_commit(&edits);
     for (int i = 0; i < 2; i++) {
         const size_t count = scene->objects[kinds[i]].count;
@@ -99,14 +113,14 @@ bool bench_make_mirrors(struct scene *scene, struct error *error)
         void *value;
         size_t cursor = 0, found = 0;
         if (!ids)
-            return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for mirrors");
+            return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the scene's objects");
         while (found < count && hashmap_next(&scene->objects[kinds[i]], &cursor, &key, &value))
             ids[found++] = key;
         for (size_t k = 0; k < found; k++) {
             if (kinds[i] == SCENE_MESH)
-                mirror_mesh(&edits, scene_mesh(scene, (uint32_t)ids[k]));
+                remake_mesh(&edits, scene_mesh(scene, (uint32_t)ids[k]));
             else
-                mirror_spheres(&edits, scene_spheres(scene, (uint32_t)ids[k]));
+                remake_spheres(&edits, scene_spheres(scene, (uint32_t)ids[k]));
         }
         test_commit(&edits);
         free(ids);

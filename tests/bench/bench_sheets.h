@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A scene of a known depth complexity, and mirrors of any scene: for the benchmark of layered depth cubes. */
+/* A scene of a known depth complexity, and any scene of one material: for the benchmark of sampled tracers. */
 #ifndef FARLIGHT_TESTS_BENCH_SHEETS_H
 #define FARLIGHT_TESTS_BENCH_SHEETS_H
 
@@ -11,7 +11,8 @@
 /* `count` waved sheets one behind the other along z, each over all of a unit square: seen along z there are
  * `count` surfaces everywhere, and along x and y none that leans there most. NULL: out of memory. */
 struct scene *bench_sheets_scene(uint32_t count);
-/* All that has a surface becomes a mirror, so that a picture asks for reflections everywhere. */
-bool bench_make_mirrors(struct scene *scene, struct error *error);
+/* All that has a surface becomes a mirror, or glass, so that a picture asks for secondary rays everywhere. */
+enum bench_material { BENCH_MIRROR, BENCH_GLASS };
+bool bench_make_alike(struct scene *scene, enum bench_material material, struct error *error);
 
 #endif

@@ -10,10 +10,12 @@
 #define OFFSET 1e-5f
 #define OCCLUSION_REACH 0.1f /* of the diagonal */
 #define FAR 1e30f
+#define INDEX_OF_REFRACTION 1.5f
 
 const struct bench_wave_fact bench_wave_facts[BENCH_WAVE_KINDS] = {
     [BENCH_PRIMARY] = {"primary", "coherent", false, true, true},
     [BENCH_REFLECTION] = {"reflection", "partly", false, false, false},
+    [BENCH_REFRACTION] = {"refraction", "partly", false, false, false},
     [BENCH_SHADOW] = {"shadow", "coherent", true, true, false},
     [BENCH_OCCLUSION] = {"occlusion", "incoherent", true, false, false},
     [BENCH_BOUNCE] = {"bounce", "incoherent", false, false, false},
@@ -59,6 +61,19 @@ static void unpack_unit(float out[3], uint32_t bits)
         out[k] /= length;
 }
 
+/* By Snell's law, `n` looking to the outside; false: nothing passes. */
+static bool refract_ray(float out[3], const float d[3], const float n[3], float cosine)
+{
+    const float side = cosine > 0 ? -1.0f : 1.0f,
+                ratio = cosine > 0 ? INDEX_OF_REFRACTION : 1 / INDEX_OF_REFRACTION;
+    const float squared = 1 - ratio * ratio * (1 - cosine * cosine);
+    if (!(squared > 0))
+        return false;
+    for (int k = 0; k < 3; k++)
+        out[k] = ratio * d[k] + (ratio * fabsf(cosine) - sqrtf(squared)) * side * n[k];
+    return true;
+}
+
 static void from_hit(struct ray *ray, enum bench_wave_kind kind, const struct ray *from, const struct hit *hit,
                      const struct bench_scene *scene, uint64_t *seed)
 {
@@ -69,9 +84,14 @@ static void from_hit(struct ray *ray, enum bench_wave_kind kind, const struct ra
     /* A point on the unit sphere around the tip of the normal: directions in proportion to their cosine. */
     float z = test_uniform(seed, -0.999f, 0.999f), phi = test_uniform(seed, 0, 2 * PI_F), r = sqrtf(1 - z * z);
     const float on_sphere[3] = {r * cosf(phi), r * sinf(phi), z};
+    float through[3];
+    const bool passes = kind == BENCH_REFRACTION && refract_ray(through, d, n, cosine);
     for (int k = 0; k < 3; k++) {
-        origin[k] = from->origin_t_min[k] + hit->distance * d[k] + OFFSET * diagonal * side * n[k];
-        if (kind == BENCH_REFLECTION)
+        origin[k] =
+            from->origin_t_min[k] + hit->distance * d[k] + OFFSET * diagonal * (passes ? -side : side) * n[k];
+        if (passes)
+            direction[k] = through[k];
+        else if (kind == BENCH_REFLECTION || kind == BENCH_REFRACTION)
             direction[k] = d[k] - 2 * cosine * n[k];
         else if (kind == BENCH_SHADOW)
             direction[k] = scene->light_world[k] - origin[k];

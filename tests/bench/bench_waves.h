@@ -13,6 +13,8 @@
 enum bench_wave_kind {
     BENCH_PRIMARY,    /* of the camera, 8x8 tiles in Morton order: coherent, closest */
     BENCH_REFLECTION, /* mirrored where those hit: partly coherent, closest */
+    BENCH_REFRACTION, /* through the surface where those hit, as into glass or out of it: partly coherent, closest
+                       */
     BENCH_SHADOW,     /* to one point: coherent, any */
     BENCH_OCCLUSION,  /* cosine-weighted, a tenth of the diagonal long: incoherent, any */
     BENCH_BOUNCE,     /* cosine-weighted, without end: incoherent, closest */

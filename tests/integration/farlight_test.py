@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What the integration tests share: the programs, a daemon, the bundled scenes, and a PNG reader."""
+"""What the integration tests share: the programs, a daemon, the bundled scenes, and readers of PNG and EXR."""
+import json
 import os
 import pathlib
 import shutil
@@ -127,6 +128,59 @@ def read_png(path):
     return width, height, rows, channels
 
 
+def exr_attributes(path):
+    """name -> bytes of the header of an EXR file; "" -> where it ends."""
+    data, at, found = pathlib.Path(path).read_bytes(), 8, {}
+    while data[at]:
+        name_end = data.index(b"\0", at)
+        kind_end = data.index(b"\0", name_end + 1)
+        size = struct.unpack_from("<I", data, kind_end + 1)[0]
+        found[data[at:name_end].decode()] = data[kind_end + 5:kind_end + 5 + size]
+        at = kind_end + 5 + size
+    found[""] = at + 1
+    return found
+
+
+def exr_channels(path):
+    """name -> 0 whole numbers, 1 half floats, 2 floats; in the order of the file."""
+    listing, found = exr_attributes(path)["channels"], {}
+    while listing[0]:
+        name, rest = listing.split(b"\0", 1)
+        found[name.decode()] = struct.unpack_from("<i", rest)[0]
+        listing = rest[16:]
+    return found
+
+
+def read_exr(path):
+    """(width, height, name -> values row by row) of an EXR file of scan lines, zip-compressed or not."""
+    data, head, channels = pathlib.Path(path).read_bytes(), exr_attributes(path), exr_channels(path)
+    left, top, right, bottom = struct.unpack("<4i", head["dataWindow"])
+    width, height, compression = right - left + 1, bottom - top + 1, head["compression"][0]
+    lines = {0: 1, 2: 1, 3: 16}[compression]
+    formats = {name: f"<{width}{'Ief'[kind]}" for name, kind in channels.items()}
+    values = {name: [] for name in channels}
+    for chunk in range(-(-height // lines)):
+        at = struct.unpack_from("<Q", data, head[""] + 8 * chunk)[0]
+        first, size = struct.unpack_from("<ii", data, at)
+        rows = min(lines, bottom + 1 - first)
+        plain_bytes = rows * sum(map(struct.calcsize, formats.values()))
+        body = data[at + 8:at + 8 + size]
+        if size < plain_bytes:  # what would not get smaller is stored as it is
+            packed = bytearray(zlib.decompress(body))
+            for i in range(1, len(packed)):
+                packed[i] = (packed[i - 1] + packed[i] - 128) & 255
+            half = (len(packed) + 1) // 2
+            body = bytearray(len(packed))
+            body[0::2], body[1::2] = packed[:half], packed[half:]
+        assert len(body) == plain_bytes, path
+        at = 0
+        for _ in range(rows):
+            for name, form in formats.items():
+                values[name].extend(struct.unpack_from(form, body, at))
+                at += struct.calcsize(form)
+    return width, height, values
+
+
 def grid_means(path, cells=8):
     """Mean red, green and blue of cells x cells parts of a PNG, row by row: a picture's stored figures."""
     width, height, rows, channels = read_png(path)
@@ -139,6 +193,11 @@ def grid_means(path, cells=8):
             means.append([round(sum(sum(rows[y][x0 * channels + c:x1 * channels:channels]) for y in range(y0, y1))
                                 / count, 1) for c in range(3)])
     return means
+
+
+def frames_of(result):
+    """The frames of --timings=json."""
+    return [record for record in map(json.loads, result.stdout.splitlines()) if record["kind"] == "frame"]
 
 
 def needs_shared_scenes(test):

@@ -21,20 +21,8 @@ from farlight_test import BIN, Case, Daemon, SHARED_SCENES, bundled_scenes, farl
 SIZE = ["--size", "96x64"]
 
 
-def exr_attributes(path):
-    """name -> bytes of the header of an EXR file."""
-    data, at, found = path.read_bytes(), 8, {}
-    while data[at]:
-        name_end = data.index(b"\0", at)
-        kind_end = data.index(b"\0", name_end + 1)
-        size = struct.unpack_from("<I", data, kind_end + 1)[0]
-        found[data[at:name_end].decode()] = data[kind_end + 5:kind_end + 5 + size]
-        at = kind_end + 5 + size
-    return found
-
-
 def digest(path):
-    return exr_attributes(path)["farlight/digest"]
+    return farlight_test.exr_attributes(path)["farlight/digest"]
 
 
 def children(pid, name):
@@ -572,7 +560,7 @@ class Progressive(OneDaemon):
     ARGUMENTS = [*SIZE, "--aperture", "0.2"]
 
     def samples(self, path):
-        return float(exr_attributes(path)["farlight/samples"].decode(errors="replace").strip("\0") or 0)
+        return float(farlight_test.exr_attributes(path)["farlight/samples"].decode(errors="replace").strip("\0") or 0)
 
     def test_passes_add_up_to_the_samples(self):
         path = self.folder / "p.exr"
@@ -600,6 +588,28 @@ class Progressive(OneDaemon):
         self.assertGreaterEqual(len(seen), 3, errors)
         self.assertEqual(self.leftovers(), ["p.exr"])
         digest(path)
+
+    def test_without_a_number_an_interrupt_is_the_end_and_the_picture_says_how_many_samples_it_has(self):
+        path = self.folder / "p.exr"
+        child = subprocess.Popen([BIN / "farlight", "render", bundled_scenes() / "teapot.glb", "-o", path,
+                                  *self.ARGUMENTS, "--progressive=2"], stderr=subprocess.PIPE)
+        held, deadline = 0, time.monotonic() + farlight_test.TIMEOUT_S
+        while held < 6 and time.monotonic() < deadline and child.poll() is None:
+            with contextlib.suppress(FileNotFoundError):
+                held = self.samples(path)
+            time.sleep(0.02)
+        child.send_signal(signal.SIGINT)
+        errors = child.stderr.read().decode()
+        child.stderr.close()
+        self.assertEqual(child.wait(farlight_test.TIMEOUT_S), 0, errors)
+        self.assertEqual(self.leftovers(), ["p.exr"])
+        self.assertGreaterEqual(self.samples(path), held)
+        self.assertIn(f"has {self.samples(path):.0f} samples a pixel", errors)
+        # What was refined is what the same number of samples gives at once.
+        whole = self.folder / "whole.exr"
+        self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", whole, *self.ARGUMENTS, "--samples",
+                             f"{self.samples(path):.0f}", "--progressive"), 0)
+        self.assertEqual(digest(path), digest(whole))
 
     def test_standard_output_is_written_once(self):
         result = self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", "-", "--progressive"), 2)

@@ -353,6 +353,19 @@ class BadFiles(Compare):
         other = self.png("other.png", [0] * 600, 20, 10)
         self.refused(self.good, other, says=("good.png", "16x16", "other.png", "20x10"))
 
+    def test_of_a_file_with_layers_the_picture_is_compared(self):
+        generator = random.Random(5)
+        names = ("A", "B", "G", "R", "Z", "albedo.R", "normal.X", "position.Y")
+        picture = [generator.random() for _ in range(16 * 16 * 4)]
+        layered = self.exr("layered.exr", [value for i in range(256) for value in
+                                           (*picture[4 * i:4 * i + 4], *(generator.random() for _ in range(4)))], names=names)
+        plain = self.exr("plain.exr", picture, names=names[:4])
+        got = self.compare(layered, plain)
+        self.assertEqual((got["max"], got["channels"], got["identical"]), (0, "R,G,B,A", True))
+        for some in (names[4:], names):  # five or more, and no picture among them
+            values = [0.5] * (256 * (len(some) + 1))
+            self.refused(self.exr("a.exr", values, names=[f"layer.{n}" for n in (*some, "W")]), plain, says=("a.exr", "channels"))
+
     def test_two_sets_of_channels_are_both_said_and_alpha_can_be_left_out(self):
         opaque = [v for p in zip(*[iter(noise(768, 1))] * 3) for v in (*p, 7)]
         other = self.png("other.png", opaque, channels=4)

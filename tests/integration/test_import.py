@@ -80,8 +80,8 @@ def decode(kind, payload):
         return dict(id=node, parent=parent, kind=node_kind, object=thing, hidden=hidden, matrix=f.take("12f"),
                     skin=f.take("I"), weights=f.array("f"), name=f.string())
     if kind == SET_MESH:
-        mesh, vertices, triangles, influences, targets = f.take("5I")
-        return dict(id=mesh, vertices=vertices, triangles=triangles, influences=influences, targets=targets,
+        mesh, vertices, triangles, influences, targets, closed = f.take("6I")
+        return dict(id=mesh, vertices=vertices, triangles=triangles, influences=influences, targets=targets, closed=closed,
                     arrays=blob_refs(f), ranges=f.array("3I"), weights=f.array("f"), name=f.string())
     if kind == SET_SPHERES:
         spheres, count = f.take("2I")
@@ -89,11 +89,11 @@ def decode(kind, payload):
     if kind == SET_MATERIAL:
         material, alpha_mode, double_sided, unlit = f.take("4I")
         base, emission = f.take("4f"), f.take("3f")
-        metallic, roughness, transmission, ior, cutoff = f.take("5f")
+        metallic, roughness, transmission, ior, cutoff, *anisotropy = f.take("7f")
         uses = [dict(texture=u[0], texcoord=u[1], transform=u[2:8], strength=u[8]) for u in f.array("2I6ff")]
         return dict(id=material, alpha_mode=alpha_mode, double_sided=double_sided, unlit=unlit, base=base,
                     emission=emission, metallic=metallic, roughness=roughness, transmission=transmission, ior=ior,
-                    cutoff=cutoff, textures=uses, name=f.string())
+                    cutoff=cutoff, anisotropy=anisotropy, textures=uses, name=f.string())
     if kind == SET_TEXTURE:
         texture, width, height, form, wrap_u, wrap_v, nearest = f.take("7I")
         return dict(id=texture, width=width, height=height, format=form, wrap=(wrap_u, wrap_v), nearest=nearest,
@@ -717,6 +717,19 @@ class Written(unittest.TestCase):
         self.assertEqual([(first, count, names[m]) for first, count, m in mesh["ranges"]], [(0, 1, "b"), (1, 1, "a")])
         self.assertEqual((mesh["vertices"], mesh["triangles"]), (3, 2), "equal accessors share their vertices")
 
+    def test_gltf_primitives_that_bound_a_body_together_are_closed(self):
+        corners = struct.pack("<12f", 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1)
+        faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+        for kept, closed in ((4, 1), (3, 0)):
+            # Each face is a primitive with corners and a material of its own.
+            data = b"".join(corners[12 * c:12 * c + 12] for face in faces for c in face)
+            result = self.run_gltf(
+                {"nodes": [{"mesh": 0}], "materials": [{}, {}],
+                 "meshes": [{"primitives": [{"attributes": {"POSITION": i}, "material": i % 2} for i in range(kept)]}]},
+                data=data, accessors=[{"bufferView": 0, "byteOffset": 36 * i, "componentType": 5126, "count": 3,
+                                       "type": "VEC3"} for i in range(4)])
+            self.assertEqual([mesh["closed"] for mesh in result.of(SET_MESH)], [closed])
+
     def test_gltf_material_extensions(self):
         extensions = {"KHR_materials_transmission": {"transmissionFactor": 0.9}, "KHR_materials_ior": {"ior": 1.33},
                       "KHR_materials_emissive_strength": {"emissiveStrength": 4}, "KHR_materials_unlit": {}}
@@ -732,6 +745,23 @@ class Written(unittest.TestCase):
         self.assertEqual((material["alpha_mode"], material["cutoff"]), (1, 0.25))
         self.assertAlmostEqual(material["transmission"], 0.9, 6)
         self.assertAlmostEqual(material["ior"], 1.33, 6)
+
+    def test_gltf_anisotropy(self):
+        def materials(*brushed):
+            result = self.run_gltf({
+                "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "extensionsRequired": ["KHR_materials_anisotropy"],
+                "images": [{"uri": "nowhere.png"}], "textures": [{"source": 0}],
+                "materials": [{"extensions": {"KHR_materials_anisotropy": one}} for one in brushed],
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": i} for i in range(len(brushed))]}]})
+            return [m["anisotropy"] for m in result.of(SET_MATERIAL)], result
+        got, result = materials({"anisotropyStrength": 0.5, "anisotropyRotation": -1.5}, {}, {"anisotropyRotation": 2})
+        self.assertEqual(got, [[0.5, -1.5], [0, 0], [0, 2]])
+        self.assertEqual(result.notes, [])
+        got, result = materials({"anisotropyStrength": 3, "anisotropyRotation": "east", "anisotropyTexture": {"index": 0}})
+        self.assertEqual(got, [[1, 0]])
+        self.assertIn("anisotropyStrength", result.text())
+        self.assertIn("texture of anisotropy is not shown", result.text())
+        self.assertNotIn("nowhere.png", result.text(), "what is not shown is not read either")
 
     def test_gltf_missing_image_is_marked(self):
         result = self.run_gltf({
@@ -781,6 +811,7 @@ class Written(unittest.TestCase):
     def test_obj_faces_and_materials(self):
         with open(os.path.join(self.folder.name, "m.mtl"), "w", encoding="utf-8") as file:
             file.write("newmtl red\nKd 1 0 0\nNs 10\nd 0.5\n\nnewmtl mirror\nKd 0 0 0\nKs 0.9 0.9 0.9\nNs 1000\nillum 3\n"
+                       "aniso 0.5\nanisor 0.25\n"
                        "newmtl glass\nKd 0 0 0\nd 0.1\nNi 1.5\nillum 7\n")
         result = self.run_text("model.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0.25\n"
                                "usemtl red\nf 1/1 2/1 3/1 4/1\nusemtl mirror\nf -4 -3 -2\nusemtl glass\nf 1 2 4\n")
@@ -790,6 +821,9 @@ class Written(unittest.TestCase):
         self.assertEqual((red["base"], red["alpha_mode"]), ((1, 0, 0, 0.5), 2))
         self.assertAlmostEqual(red["roughness"], (2 / 12) ** 0.5, 5)
         self.assertEqual((mirror["metallic"], mirror["roughness"]), (1, 0))
+        self.assertEqual(mirror["anisotropy"][0], 0.5)
+        self.assertAlmostEqual(mirror["anisotropy"][1], 1.5707963, 5, "a quarter of a turn")
+        self.assertEqual(red["anisotropy"], [0, 0])
         self.assertAlmostEqual(glass["transmission"], 0.9, 6)
         self.assertEqual(glass["base"][:3], (1, 1, 1))
         self.assertEqual(self.floats(result, mesh, 4)[1], 0.75, "v runs downwards here")

@@ -4,15 +4,10 @@ import json
 import os
 
 import farlight_test
-from farlight_test import Case, bundled_scenes, farlight, grid_means, read_png
+from farlight_test import Case, bundled_scenes, farlight, frames_of, grid_means, read_png
 
 SIZE = ["--size", "160x120"]
 LDC = ["--tracer", "ldc"]
-
-
-def frames_of(result):
-    """The frames of --timings=json."""
-    return [record for record in map(json.loads, result.stdout.splitlines()) if record["kind"] == "frame"]
 
 
 def build_ms(frame, cube):

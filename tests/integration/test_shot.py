@@ -20,7 +20,8 @@ EXAMPLES = {
         "exposure": -1.5, "tone_map": "aces", "shutter": 0.5, "filter": "gaussian", "tracer": "bvh",
         "bvh_bounds": "sphere", "bvh_rays": 2, "ldc_resolution": 512, "ldc_block": 4, "ldc_build": "lists",
         "ldc_levels": "pyramid", "ldc_images": "one", "ldc_tolerance": 0.001, "ldc_rays": 4,
-        "integrator": "distributed", "primary": "trace", "encoding": "zstd",
+        "abuffer_resolution": 512, "voxels": 16, "search": "linear3", "brdf": "ward", "ao_distance": 0.5, "ao_falloff": 1,
+        "ao_rays": 4, "layer_opacity": 0.25, "layers": ["beauty", "depth", "id"], "integrator": "path", "primary": "trace", "encoding": "zstd",
         "quality": 3, "format": "exr", "half": True, "float": False, "output": "%04d.exr"},
     "movie": {
         "model": "teapot.glb", "camera": "a camera", "lossless": True, "frames": "5",
@@ -53,7 +54,7 @@ EXAMPLES = {
         "outputs": ["%04d.png", "movie.mp4"]},
     "orbit": {"model": "teapot.glb", "camera": {"eye": [0, 1, 5], "look_at": [0, 0, 0], "fov": 40,
                                                 "orbit": {"degrees": -90, "seconds": 2}}, "output": "%d.jpg"},
-    "dolly": {"model": "teapot.glb", "camera": {"eye": [0, 1, 5], "look_at": [0, 0, 0],
+    "dolly": {"model": "teapot.glb", "bounces": 3, "voxels": "auto", "camera": {"eye": [0, 1, 5], "look_at": [0, 0, 0],
                                                 "dolly": {"by": 2, "seconds": 2, "ease": True}}, "output": "%d.png"},
     "dolly to": {"model": "teapot.glb", "camera": {"eye": [0, 1, 5], "look_at": [0, 0, 0],
                                                    "dolly": {"to": [1, 1, 1]}}, "output": "-"},
@@ -77,6 +78,7 @@ BEYOND_THE_SCHEMA = [
     ("stills", ("shard",), "9/8", "shard: '9/8': there is no part 9 of 8"),
     ("stills", ("output",), "frames.exr", "output: 'frames.exr' has no place for the frame's number"),
     ("stills", ("output",), "%d/0001.exr", "output: '%d/0001.exr': the frame's number may only stand in the file's"),
+    ("dolly", ("depth",), 2, "contradicts"),
     ("movie", ("outputs", 0), "movie.webm", "outputs[0]: its ending names no format"),
 ]
 
@@ -269,6 +271,15 @@ class Schema(Shots):
                 ("stills", ("ldc_block",), range(34)),
                 ("stills", ("ldc_rays",), range(6)),
                 ("stills", ("ldc_tolerance",), (0, 1e6, 1.1e6, -0.1)),
+                ("stills", ("abuffer_resolution",), (0, 1, 15, 16, 4096, 4097, 512.5)),
+                ("stills", ("voxels",), (0, 8, 16, 17, 32, 64, 100, 128, 256, 512, -1, "auto", "all", "64", 16.5)),
+                ("stills", ("search",), ("auto", "dda", "linear1", "linear2")),
+                ("stills", ("ao_distance",), (0, 1e12, 1.1e12, -0.1)),
+                ("stills", ("ao_falloff",), (0, 64, 64.5, -0.1)),
+                ("stills", ("ao_rays",), (0, 1, 256, 257)),
+                ("stills", ("layer_opacity",), (0, 0.001, 1, 1.01)),
+                ("stills", ("layers",), ([], ["beauty"], ["ao", "ao"], ["beauty,ao"], ["z"], "beauty", [1])),
+                ("dolly", ("bounces",), (0, 32, 33, -1)),
                 ("stills", ("quality",), (0, 1, 19)),
                 ("stills", ("frames",), ("1", "1-2", "1-2:1", "1:2", "1-", "a", "1-2:", " 1")),
                 ("stills", ("shard",), ("1/1", "1", "/1", "1/1/1")),
@@ -292,11 +303,14 @@ class Schema(Shots):
     def test_the_schema_lists_the_names_that_the_program_knows(self):
         properties = json.loads(SCHEMA.read_text())["properties"]
         for name in ("tone_map", "filter", "tracer", "bvh_bounds", "ldc_build", "ldc_levels", "ldc_images", "integrator",
-                     "primary", "encoding"):
+                     "search", "brdf", "primary", "encoding"):
             with self.subTest(name=name):
                 result = self.expect(self.try_shot({"model": "teapot.glb", name: "nonsense"}), 2)
                 known = re.search(r"known: ([^)]*)\)", result.stderr).group(1)
                 self.assertEqual(sorted(known.split(", ")), sorted(properties[name]["enum"]))
+        result = self.expect(self.try_shot({"model": "teapot.glb", "layers": ["nonsense"]}), 2)
+        known = re.search(r"known: ([^)]*)\)", result.stderr).group(1)
+        self.assertEqual(sorted(known.split(", ")), sorted(properties["layers"]["items"]["enum"]))
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@
 
 #include "job/backend.h"
 #include "job/engine.h"
+#include "render/frame_request.h"
 
 #include <poll.h>
 #include <setjmp.h>
@@ -139,11 +140,11 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
     *result = (struct frame_result){
         .width = renderer->request.width,
         .height = renderer->request.height,
-        .size_bytes = (size_t)renderer->request.width * renderer->request.height * 4,
+        .size_bytes = (size_t)frame_request_bytes(&renderer->request),
         .format = renderer->request.format,
         .revision = renderer->scene->revision,
         .samples = renderer->request.samples,
-        .layers = 1u << LAYER_BEAUTY,
+        .layers = frame_request_layers(&renderer->request),
         .primary_rays = 10,
         .shadow_rays = 5,
         .secondary_rays = 1,

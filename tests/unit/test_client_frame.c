@@ -30,7 +30,8 @@ static int fill_pixels(void **state)
 static struct fl_assembly some_assembly(enum protocol_encoding encoding)
 {
     error = (struct fl_error){0};
-    return (struct fl_assembly){.expected = {.width = WIDTH, .height = HEIGHT, .encoding = encoding}};
+    return (struct fl_assembly){
+        .expected = {.width = WIDTH, .height = HEIGHT, .encoding = encoding, .layers = FL_LAYERS_PICTURE}};
 }
 
 static struct message_frame_begin some_begin(enum protocol_encoding encoding, uint64_t size_bytes)
@@ -213,6 +214,51 @@ static void declared_sizes_beyond_all_reason_are_refused_before_memory_is_taken(
     }
 }
 
+/* Beauty and albedo, in one piece after zstd. */
+static void layers_arrive_one_behind_the_other_under_one_digest(void **state)
+{
+    (void)state;
+    static uint8_t both[2 * PIXELS_BYTES], packed[2 * PIXELS_BYTES + 4096];
+    memcpy(both, pixels, PIXELS_BYTES);
+    for (size_t i = 0; i < PIXELS_BYTES; i++)
+        both[PIXELS_BYTES + i] = (uint8_t)(pixels[i] ^ 0x5a);
+    const size_t packed_bytes = ZSTD_compress(packed, sizeof packed, both, sizeof both, 1);
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_ZSTD);
+    struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_ZSTD, packed_bytes);
+    assembly.expected.layers = message.layers = 3;
+    message.digest = XXH3_64bits(both, sizeof both);
+    assert_true(begin(&assembly, &message));
+    assert_true(give(&assembly, packed, packed_bytes, 0));
+    struct fl_frame *frame = end(&assembly);
+    assert_non_null(frame);
+    assert_int_equal(frame->layers, 3);
+    assert_int_equal(frame->pixels_bytes, sizeof both);
+    assert_memory_equal(frame->pixels, both, sizeof both);
+    assert_true(frame->digest_checked);
+    fl_frame_destroy(frame);
+}
+
+static void other_layers_than_were_asked_for_are_refused_before_memory_is_taken(void **state)
+{
+    (void)state;
+    static const unsigned came[] = {2, 3, 127};
+    for (size_t i = 0; i < sizeof came / sizeof came[0]; i++) {
+        struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+        struct message_frame_begin message =
+            some_begin(PROTOCOL_ENCODING_RAW, (uint64_t)__builtin_popcount(came[i]) * PIXELS_BYTES);
+        message.layers = came[i];
+        assert_false(begin(&assembly, &message));
+        assert_null(assembly.frame);
+        assert_string_equal(error.field, "frame_begin.layers");
+    }
+    /* The bytes of one layer in place of those of two. */
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+    struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+    assembly.expected.layers = message.layers = 5;
+    assert_false(begin(&assembly, &message));
+    assert_null(assembly.frame);
+}
+
 static void pieces_out_of_place_are_refused(void **state)
 {
     (void)state;
@@ -310,6 +356,8 @@ int main(void)
         cmocka_unit_test(a_zstd_frame_that_unpacks_to_more_or_less_is_refused),
         cmocka_unit_test(a_frame_that_was_not_asked_for_is_refused),
         cmocka_unit_test(declared_sizes_beyond_all_reason_are_refused_before_memory_is_taken),
+        cmocka_unit_test(layers_arrive_one_behind_the_other_under_one_digest),
+        cmocka_unit_test(other_layers_than_were_asked_for_are_refused_before_memory_is_taken),
         cmocka_unit_test(pieces_out_of_place_are_refused),
         cmocka_unit_test(comparisons_of_waves_arrive),
         cmocka_unit_test(cubes_arrive_and_no_more_than_there_is_room_for),

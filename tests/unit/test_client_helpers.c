@@ -153,7 +153,8 @@ static bool find_exporter(void)
 
 static struct fl_frame some_frame(enum protocol_pixel_format format, uint8_t *pixels)
 {
-    struct fl_frame frame = {.width = EDGE, .height = EDGE, .samples = 1, .layers = 1, .format = format, .fov_y = 1};
+    struct fl_frame frame = {
+        .width = EDGE, .height = EDGE, .samples = 1, .layers = 1, .format = format, .fov_y = 1};
     frame.world_from_view[0] = frame.world_from_view[5] = frame.world_from_view[10] = 1;
     frame.pixels = pixels;
     frame.pixels_bytes = (size_t)EDGE * EDGE * fl_bytes_per_pixel(format);
@@ -216,6 +217,107 @@ static void one_exporter_writes_every_format(void **state)
     free(pixels);
     fl_exporter_destroy(exporter);
     assert_int_equal(count_files(folder), before);
+}
+
+/* ---- layers ---- */
+
+#define LAYER_SET(name) (1u << PROTOCOL_LAYER_##name)
+
+/* "A:1 B:1 .." as the header of an EXR file lists channels: by name; 0 whole numbers, 1 half floats, 2 floats. */
+static void read_channels(const char *path, char *text, size_t text_bytes)
+{
+    static const char attribute[] = "channels\0chlist";
+    static char head[8192];
+    size_t used = 0;
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    const size_t count = fread(head, 1, sizeof head, file);
+    fclose(file);
+    const char *at = memmem(head, count, attribute, sizeof attribute);
+    assert_non_null(at);
+    for (at += sizeof attribute + 4; at[0] != '\0'; at += strlen(at) + 17) /* type, linear, sampling */
+        used += (size_t)snprintf(text + used, text_bytes - used, "%s%s:%d", used > 0 ? " " : "", at,
+                                 at[strlen(at) + 1]);
+}
+
+static void layers_become_channels_by_name(void **state)
+{
+    (void)state;
+    static const struct {
+        unsigned layers;
+        bool half;
+        const char *channels;
+    } cases[] = {
+        {LAYER_SET(BEAUTY) | LAYER_SET(DEPTH), true, "A:1 B:1 G:1 R:1 Z:2"},
+        {LAYER_SET(NORMAL) | LAYER_SET(AO), false, "ao.Y:2 normal.X:2 normal.Y:2 normal.Z:2"},
+        {LAYER_SET(ID), true, "id.material:0 id.node:0"},
+        {(1u << PROTOCOL_LAYER_COUNT) - 1, true,
+         "A:1 B:1 G:1 R:1 Z:2 albedo.B:1 albedo.G:1 albedo.R:1 ao.Y:1 id.material:0 id.node:0 normal.X:1 "
+         "normal.Y:1 "
+         "normal.Z:1 position.X:2 position.Y:2 position.Z:2"},
+    };
+    if (!find_exporter()) {
+        print_message("skipped: farlight-export is not built\n");
+        skip();
+    }
+    char path[128], found[512];
+    uint8_t *pixels = calloc(PROTOCOL_LAYER_COUNT, EDGE * EDGE * 16);
+    struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, &error);
+    assert_non_null(exporter);
+    snprintf(path, sizeof path, "%s/layers.exr", folder);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct fl_frame frame = some_frame(PROTOCOL_PIXEL_FORMAT_RGBA32F, pixels);
+        frame.layers = cases[i].layers;
+        frame.pixels_bytes *= (size_t)__builtin_popcount(frame.layers);
+        error = (struct fl_error){0};
+        if (!fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path, .half = cases[i].half},
+                               &error) ||
+            !fl_exporter_wait(exporter, &error))
+            fail_msg("%#x: %s", frame.layers, error.text);
+        read_channels(path, found, sizeof found);
+        assert_string_equal(found, cases[i].channels);
+        unlink(path);
+    }
+    fl_exporter_destroy(exporter);
+    free(pixels);
+}
+
+static void layers_that_a_file_cannot_have_are_refused_and_the_next_picture_is_written(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        enum protocol_pixel_format format;
+    } wrong[] = {{"a.png", PROTOCOL_PIXEL_FORMAT_RGBA8},
+                 {"a.hdr", PROTOCOL_PIXEL_FORMAT_RGBA32F},
+                 {"a.exr", PROTOCOL_PIXEL_FORMAT_RGBA16F}};
+    if (!find_exporter()) {
+        print_message("skipped: farlight-export is not built\n");
+        skip();
+    }
+    const size_t before = count_files(folder);
+    uint8_t *pixels = calloc(2, EDGE * EDGE * 16);
+    struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, &error);
+    assert_non_null(exporter);
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        char path[128];
+        struct fl_frame frame = some_frame(wrong[i].format, pixels);
+        snprintf(path, sizeof path, "%s/%s", folder, wrong[i].name);
+        frame.layers = LAYER_SET(BEAUTY) | LAYER_SET(ALBEDO);
+        frame.pixels_bytes *= 2;
+        error = (struct fl_error){0};
+        assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
+        assert_false(fl_exporter_wait(exporter, &error));
+        check_error(FL_ERROR_FILE, "layers");
+        assert_int_equal(count_files(folder), before);
+        frame = some_frame(wrong[i].format, pixels);
+        error = (struct fl_error){0};
+        assert_true(fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path}, &error));
+        assert_true(fl_exporter_wait(exporter, &error));
+        unlink(path);
+    }
+    fl_exporter_destroy(exporter);
+    free(pixels);
 }
 
 static void a_file_that_cannot_be_written_is_named_and_nothing_is_left(void **state)
@@ -291,6 +393,8 @@ int main(void)
         cmocka_unit_test(a_model_that_is_missing_or_no_file_starts_nothing),
         cmocka_unit_test(a_helper_that_is_not_installed_is_named),
         cmocka_unit_test(one_exporter_writes_every_format),
+        cmocka_unit_test(layers_become_channels_by_name),
+        cmocka_unit_test(layers_that_a_file_cannot_have_are_refused_and_the_next_picture_is_written),
         cmocka_unit_test(a_file_that_cannot_be_written_is_named_and_nothing_is_left),
         cmocka_unit_test(a_full_disk_is_told_and_nothing_is_left),
     };

@@ -90,7 +90,8 @@ static const uint8_t *colour_at(uint32_t frame, uint32_t x, uint32_t y)
 
 static struct fl_frame make_frame(uint32_t number, uint32_t width, uint32_t height)
 {
-    struct fl_frame frame = {.frame = number, .width = width, .height = height, .samples = 1, .layers = 1, .fov_y = 1};
+    struct fl_frame frame = {
+        .frame = number, .width = width, .height = height, .samples = 1, .layers = 1, .fov_y = 1};
     frame.format = PROTOCOL_PIXEL_FORMAT_RGBA8;
     frame.pixels_bytes = (size_t)width * height * 4;
     frame.pixels = malloc(frame.pixels_bytes);
@@ -780,7 +781,8 @@ static void a_client_that_breaks_the_protocol_is_left_with_a_line_and_no_file(vo
             break;
         case 6: /* another size than that of its pixels */
             message = (struct message){.type = MESSAGE_FRAME_BEGIN};
-            message.frame_begin.width = message.frame_begin.height = message.frame_begin.samples = message.frame_begin.layers = 1;
+            message.frame_begin.width = message.frame_begin.height = message.frame_begin.samples =
+                message.frame_begin.layers = 1;
             message.frame_begin.size_bytes = 400000000;
             send(&writer, &message);
             break;

@@ -40,6 +40,7 @@ static void the_defaults_are_within_their_own_bounds(void **state)
     assert_int_equal(config.limits.samples, 65536);
     assert_int_equal(config.limits.ldc_layers, 255);
     assert_int_equal(config.limits.ldc_bytes, 0);
+    assert_int_equal(config.limits.abuffer_bytes, 0);
     assert_int_equal(config.limits.upload_window_bytes, 16 << 20);
     assert_int_not_equal(config.scene_bytes, 0);
     assert_string_equal(config.device, "auto");
@@ -54,6 +55,7 @@ static void a_file_sets_numbers_with_units_texts_and_switches(void **state)
     assert_true(read_text(&config,
                           "[limits]\nclients = 3\nupload_window=2M\n; note\n[server]\ninsecure = yes\n"
                           "listen = unix:/a tcp:[::1]:0\nlog_level = debug\n[memory]\nblob_cache = 0%\nldc = 96M\n"
+                          "abuffer = 1G\n"
                           "[limits]\nldc_layers = 12\n",
                           &error));
     assert_int_equal(config.limits.clients, 3);
@@ -63,6 +65,7 @@ static void a_file_sets_numbers_with_units_texts_and_switches(void **state)
     assert_int_equal(config.log_level, 3);
     assert_int_equal(config.limits.blob_cache_bytes, 0);
     assert_int_equal(config.limits.ldc_bytes, 96 << 20);
+    assert_int_equal(config.limits.abuffer_bytes, 1 << 30);
     assert_int_equal(config.limits.ldc_layers, 12);
 }
 

@@ -5,6 +5,7 @@
 #include "base/clock.h"
 
 #include <xxhash.h>
+#include <zstd.h>
 
 /* ---- frames ------------------------------------------------------------------------------------- */
 
@@ -37,6 +38,38 @@ static void frames_come_in_order_with_what_they_cost(void **state)
     }
     expect_done(engine, 1, 3);
     expect_silence(engine);
+    stop(engine);
+}
+
+static void layers_are_encoded_as_one_picture(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){.encode_threads = 1});
+    const uint32_t layers = 1u << LAYER_BEAUTY | 1u << LAYER_NORMAL | 1u << LAYER_ID;
+    open_scene(engine, 1, 1);
+    for (uint32_t encoding = ENCODING_RAW; encoding <= ENCODING_ZSTD; encoding++) {
+        struct engine_command *made = render(1, 2 + encoding, 0, 0);
+        made->job.encoding = (enum encoding)encoding;
+        made->job.frame.format = FRAME_RGBA32F;
+        made->job.frame.layers = layers;
+        submit(engine, made);
+        struct engine_event *event = expect_frame(engine, 1, 2 + encoding, 0);
+        const struct engine_frame *got = event->frame;
+        uint8_t pixels[4 * 3 * 16 * 3];
+        memset(pixels, (int)encoding, sizeof pixels); /* the fake's frames count up */
+        assert_int_equal(got->result.layers, layers);
+        assert_true(got->digest == XXH3_64bits(pixels, sizeof pixels));
+        if (encoding == ENCODING_RAW) {
+            assert_int_equal(got->size_bytes, sizeof pixels);
+            assert_memory_equal(got->bytes, pixels, sizeof pixels);
+        } else {
+            uint8_t back[sizeof pixels + 1];
+            assert_int_equal(ZSTD_decompress(back, sizeof back, got->bytes, got->size_bytes), sizeof pixels);
+            assert_memory_equal(back, pixels, sizeof pixels);
+        }
+        engine_event_destroy(event);
+        expect_done(engine, 1, 2 + encoding);
+    }
     stop(engine);
 }
 
@@ -365,6 +398,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(frames_come_in_order_with_what_they_cost),
+        cmocka_unit_test(layers_are_encoded_as_one_picture),
         cmocka_unit_test(no_frame_goes_out_beyond_its_credit),
         cmocka_unit_test(large_frames_are_fewer_in_flight_but_always_one),
         cmocka_unit_test(frames_that_nobody_takes_stop_the_rendering),

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Layered depth cubes hold what is in the scene: each texel of the three images against the triangles and spheres
- * under its middle, found without a rasteriser (ldc_oracle.h); and both builds give the same samples. */
+ * under its middle, found without a rasteriser (axes_oracle.h); and both builds give the same samples. */
 #include "../accuracy/motion_scenes.h"
 #include "../accuracy/test_scenes.h"
+#include "axes_oracle.h"
 #include "ldc_fixture.h"
-#include "ldc_oracle.h"
 
 #define RESOLUTION 96u
 /* Of the images' texels: so many at least were compared, or the test shows nothing. */
@@ -60,7 +60,10 @@ static uint32_t expect_like_oracle(struct fixture *fixture, unsigned which, cons
     contents_read(&contents, &fixture->store, which);
     expect_consistent(&contents);
     oracle_scene_init(&scene, &fixture->gpu);
-    oracle_init(&oracle, &scene, &contents.cube, fixture->options.ldc_images == LDC_IMAGES_ONE, instances, count);
+    struct oracle_cube cube = {.resolution = contents.cube.resolution, .cell_world = contents.cube.cell_world};
+    memcpy(cube.lower_world, contents.cube.lower_world, sizeof(cube.lower_world));
+    oracle_init(&oracle, &scene, &cube,
+                fixture->options.ldc_images == LDC_IMAGES_ONE ? ORACLE_ONE : ORACLE_LEANING, instances, count);
     for (uint32_t i = 0; i < 3 * oracle.resolution * oracle.resolution; i++) {
         const struct oracle_texel *expected = &oracle.texels[i];
         if (expected->open || !are_apart(expected))

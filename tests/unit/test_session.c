@@ -110,6 +110,7 @@ static void render(const struct engine_command *command)
         frame->request.aperture = engine.job.frame.aperture;
         frame->request.focus = engine.job.frame.focus;
         frame->shutter_s = engine.job.shutter / 8;
+        frame->result.layers = engine.job.frame.layers ? engine.job.frame.layers : 1;
         frame->result.samples = 5; /* with those of frames before */
         memcpy(frame->result.cubes, engine.cubes, sizeof engine.cubes);
         frame->size_bytes = FRAME_BYTES;
@@ -360,6 +361,7 @@ static void start(const struct connection_limits *connection_limits)
                    .jobs_per_client = 2,
                    .ldc_layers = 7,
                    .ldc_bytes = (3 << 20) + 1, /* whole MiB are told on */
+                   .abuffer_bytes = 1000,      /* less than one is a limit still */
                    .blobs_per_client = 8,
                    .transaction_edits = 10,
                    .transaction_bytes = 64 << 10,
@@ -1040,6 +1042,61 @@ static void settings_of_cubes_go_to_the_engine_with_the_daemons_limits(void **st
         continue;
 }
 
+static void layers_go_to_the_engine_and_come_with_the_frame(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.encoding = PROTOCOL_ENCODING_ZSTD;
+    message.render.layers = 1u << PROTOCOL_LAYER_BEAUTY | 1u << PROTOCOL_LAYER_DEPTH;
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    assert_int_equal(engine.job.frame.layers, 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH);
+    assert_int_equal(client.message.frame_begin.layers, message.render.layers);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+    message = render_message(0, 1); /* the picture alone has any format, named or not */
+    message.render.layers = 1u << PROTOCOL_LAYER_BEAUTY;
+    message.render.encoding = PROTOCOL_ENCODING_JPEG;
+    send_message(3, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 3);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+}
+
+static void layers_that_pixels_or_messages_do_not_hold_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t layers, edge_pixels;
+        enum protocol_pixel_format format;
+        enum protocol_encoding encoding;
+        enum protocol_error_code code;
+        const char *remedy;
+    } cases[] = {
+        {3, 16, PROTOCOL_PIXEL_FORMAT_RGBA8, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_CODE_UNSUPPORTED, "rgba32f"},
+        {2, 16, PROTOCOL_PIXEL_FORMAT_RGBA16F, PROTOCOL_ENCODING_ZSTD, PROTOCOL_ERROR_CODE_UNSUPPORTED, "rgba32f"},
+        {64, 16, PROTOCOL_PIXEL_FORMAT_RGBA8, PROTOCOL_ENCODING_JPEG, PROTOCOL_ERROR_CODE_UNSUPPORTED, "zstd"},
+        {2, 16, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_JPEG, PROTOCOL_ERROR_CODE_UNSUPPORTED, "zstd"},
+        /* 8192 x 8192 x 16 bytes are 1 GiB */
+        {15, 8192, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_CODE_LIMIT,
+         "fewer layers"},
+    };
+    open_scene(1, 1);
+    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct message message = render_message(0, 1);
+        message.render.width = message.render.height = cases[i].edge_pixels;
+        message.render.layers = cases[i].layers;
+        message.render.format = cases[i].format;
+        message.render.encoding = cases[i].encoding;
+        send_message(2 + i, 0, &message);
+        expect_error(2 + i, cases[i].code);
+        assert_string_equal(client.message.error.field, "render.layers");
+        assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
+    }
+}
+
 static void settings_that_no_cube_has_are_refused_by_their_field(void **state)
 {
     (void)state;
@@ -1068,6 +1125,84 @@ static void settings_that_no_cube_has_are_refused_by_their_field(void **state)
     send_message(20, 0, &message);
     expect_error(20, PROTOCOL_ERROR_CODE_INVALID);
     assert_string_equal(client.message.error.field, "render.ldc_levels");
+}
+
+static void settings_of_a_buffers_and_light_go_to_the_engine(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.tracer = PROTOCOL_TRACER_ABUFFER;
+    message.render.abuffer_resolution = 64;
+    message.render.abuffer_voxels = 64;
+    message.render.abuffer_search = PROTOCOL_ABUFFER_SEARCH_LINEAR1;
+    message.render.integrator = PROTOCOL_INTEGRATOR_PATH;
+    message.render.brdf = PROTOCOL_BRDF_WARD;
+    message.render.ao_distance = 2;
+    message.render.ao_falloff = 0.5f;
+    message.render.ao_rays = 256;
+    message.render.layer_opacity = 0.75f;
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.layers = 1u << PROTOCOL_LAYER_ALBEDO | 1u << PROTOCOL_LAYER_ID;
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    assert_int_equal(client.message.frame_begin.tracer, PROTOCOL_TRACER_ABUFFER);
+    assert_int_equal(client.message.frame_begin.layers, message.render.layers);
+    const struct frame_request *request = &engine.job.frame;
+    assert_int_equal(request->tracer_options.abuffer_resolution, 64);
+    assert_int_equal(request->tracer_options.abuffer_voxels, 64);
+    assert_int_equal(request->tracer_options.abuffer_search, ABUFFER_SEARCH_LINEAR1);
+    assert_int_equal(request->tracer_options.abuffer_mebibytes_max, 1);
+    assert_int_equal(request->integrator, INTEGRATOR_PATH);
+    assert_int_equal(request->brdf, FRAME_BRDF_WARD);
+    assert_true(request->ao_distance == 2 && request->ao_falloff == 0.5f && request->layer_opacity == 0.75f);
+    assert_int_equal(request->ao_rays, 256);
+    assert_int_equal(request->layers, message.render.layers);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+}
+
+static void settings_that_no_a_buffer_has_are_refused_by_their_field(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t resolution, voxels;
+        const char *field, *remedy;
+    } cases[] = {
+        {1, 0, "render.abuffer_resolution", "16 to 4096"}, {15, 0, "render.abuffer_resolution", "16 to 4096"},
+        {0, 8, "render.abuffer_voxels", "16, 32, 64"},     {0, 100, "render.abuffer_voxels", "16, 32, 64"},
+        {32, 64, "render.abuffer_voxels", "higher"},
+    };
+    open_scene(1, 1);
+    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct message message = render_message(0, 1);
+        message.render.abuffer_resolution = cases[i].resolution;
+        message.render.abuffer_voxels = cases[i].voxels;
+        send_message(2 + i, 0, &message);
+        expect_error(2 + i, PROTOCOL_ERROR_CODE_INVALID);
+        assert_string_equal(client.message.error.field, cases[i].field);
+        assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
+    }
+}
+
+static void layers_count_as_pictures_in_the_memory_for_frames(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    /* While a job runs, all layers are more than is left of the memory for frames; the picture is not. */
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.width = message.render.height = 128;
+    message.render.layers = 0;
+    atomic_store(&engine.keep_jobs, true);
+    send_message(3, 0, &message);
+    for (uint32_t request = 4; request < 6; request++) {
+        message.render.channel++;
+        message.render.layers = request == 4 ? 127 : 0;
+        send_message(request, 0, &message);
+    }
+    expect_error(4, PROTOCOL_ERROR_CODE_BUSY);
+    expect_alive(6);
 }
 
 static void cubes_of_a_frame_are_told(void **state)
@@ -1119,6 +1254,7 @@ static void a_job_whose_frames_have_no_room_waits_for_others_to_end(void **state
     message = render_message(0, 1);
     message.render.width = message.render.height = 512;
     message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F; /* more than there is, but it is the only one */
+    message.render.layers = 127;
     send_message(5, 0, &message);
     message = made(MESSAGE_CANCEL);
     message.cancel.target_request = 5;
@@ -1367,7 +1503,12 @@ int main(void)
         BOTH(weights_count_as_memory_of_a_transaction),
         BOTH(a_job_takes_its_clips_and_its_lens_along),
         BOTH(settings_of_cubes_go_to_the_engine_with_the_daemons_limits),
+        BOTH(layers_go_to_the_engine_and_come_with_the_frame),
+        BOTH(layers_that_pixels_or_messages_do_not_hold_are_refused),
         BOTH(settings_that_no_cube_has_are_refused_by_their_field),
+        BOTH(settings_of_a_buffers_and_light_go_to_the_engine),
+        BOTH(settings_that_no_a_buffer_has_are_refused_by_their_field),
+        BOTH(layers_count_as_pictures_in_the_memory_for_frames),
         BOTH(cubes_of_a_frame_are_told),
         BOTH(a_job_whose_frames_have_no_room_waits_for_others_to_end),
         BOTH(a_full_engine_makes_clients_wait_and_loses_nothing),

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Which of a cube's images a surface is in.
-#include "shared/ldc.h"
+// Which of the images along the axes a surface is in, where it is not in all.
+#include "shared/axes.h"
 
-uniform float overlap; // LDC_OVERLAP, or 1: the paper's one image a triangle
+uniform float overlap; // AXES_OVERLAP, or 1: one image a triangle
 
 // `lean`: absolute values of its normal's components.
 bool is_in_image(vec3 lean, int axis)

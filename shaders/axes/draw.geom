@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: MIT
-// Sends a triangle to the image whose axis its normal leans to most (paper, figure 5), or to those where images overlap,
-// with its plane in cells; a sphere to all three, as the square round it.
-// Defines: PRIMITIVE_KIND 0 triangles, 1 spheres; HAS_CUTOUT: triangles may have holes.
+// Sends a triangle to the image whose axis its normal leans to most, or to those where images overlap, with its plane
+// in cells; a sphere to all three, as the square round it.
+// Burger, Hertel, Kruger, Westermann. GPU Rendering of Secondary Effects. 2007, figure 5.
+// Defines:
+//   PRIMITIVE_KIND  0 triangles, 1 spheres
+//   HAS_CUTOUT      triangles may have holes
+//   ALL_IMAGES      a triangle is in all three images, wherever it has an area, and comes with FACE_* bits; it faces the
+//                   front (gl_FrontFacing) where its outside does, towards greater depths
 
 #include "shared/bindings.h"
 #include "shared/geometry.h"
+#include "common/axes_cube.glsl"
+#include "common/axes_face.glsl"
+#include "common/axes_image.glsl"
 #include "common/math.glsl"
-#include "ldc/image.glsl"
 
 uniform float resolution; // cells along a side of the cube
-uniform vec3 lower_world; // of the cube
-uniform float cell_world;
 
 // Of common/geometry.glsl, whose storage blocks a geometry shader need not have.
 layout(binding = UNIT_INSTANCES) uniform usamplerBuffer instances;
@@ -89,34 +94,76 @@ bool may_cover(vec2 a, vec2 b, vec2 c)
            side * cross_2d(ca, middle - c) >= -SNAP_CELLS * (abs(ca.x) + abs(ca.y));
 }
 
+// What of a plane is so steep that slopes say nothing: far from where it passes more cells than there are.
+const float SLOPE_MAX = 65536.0;
+
+// Slopes of the depth along u and v.
+vec2 slopes_of(vec3 normal, int axis, int u, int v)
+{
+#ifdef ALL_IMAGES
+    vec2 slopes = -vec2(normal[u], normal[v]) / normal[axis];
+    return normal[axis] != 0.0 ? clamp(slopes, vec2(-SLOPE_MAX), vec2(SLOPE_MAX)) : vec2(0.0);
+#else
+    return vec2(-normal[u] / normal[axis], -normal[v] / normal[axis]);
+#endif
+}
+
+#ifdef ALL_IMAGES
+// Of a normal of any length, which for a needle may be none: that one is steep everywhere.
+uint face_of_triangle(vec3 normal)
+{
+    float most = greatest(abs(normal));
+    uint closed = (primitive_in[0].w & DRAWN_CLOSED) != 0u ? FACE_CLOSED : 0u;
+    return most > 0.0 ? face_of(normalize(normal / most)) | closed : FACE_NEEDLE | closed;
+}
+#endif
+
 void main()
 {
     vec4 rows[3];
     fetch_world_from_object(rows);
     uvec4 triangle = texelFetch(triangles, int(primitive_in[0].z));
+    int second = 1;
+#ifdef ALL_IMAGES
+    if ((primitive_in[0].w & DRAWN_MIRRORED) != 0u) { // the outside is on the left of its edges
+        triangle.yz = triangle.zy;
+        second = 2;
+    }
+#endif
     vec3 corners[3];
     for (int i = 0; i < 3; i++)
         corners[i] = place_in_cells(rows, texelFetch(positions, int(triangle[i])).xyz);
     vec3 normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
     vec3 lean = abs(normal), lower = min(corners[0], min(corners[1], corners[2])),
          upper = max(corners[0], max(corners[1], corners[2]));
+#ifdef ALL_IMAGES
+    // What has no area to rounding may have one to the rasteriser, and a body its whole surface.
+    uint face = face_of_triangle(normal);
+    int most = axis_of(lean);
+#else
     if (!(greatest(lean) > 0.0)) // no area
         return;
+#endif
     for (int axis = 0; axis < 3; axis++) {
         int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+#ifndef ALL_IMAGES
         if (!is_in_image(lean, axis))
             continue;
+#endif
         if (!may_cover(vec2(corners[0][u], corners[0][v]), vec2(corners[1][u], corners[1][v]),
                        vec2(corners[2][u], corners[2][v])))
             continue;
-        vec4 plane_ = vec4(-normal[u] / normal[axis], -normal[v] / normal[axis], corners[0][u], corners[0][v]);
+        vec4 plane_ = vec4(slopes_of(normal, axis, u, v), corners[0][u], corners[0][v]);
         vec3 depths_ = vec3(corners[0][axis], lower[axis], upper[axis]);
         for (int i = 0; i < 3; i++) {
             plane = plane_;
             depths = depths_;
             primitive = primitive_in[0];
+#ifdef ALL_IMAGES
+            primitive.w = face | (axis == most ? FACE_MOST : 0u);
+#endif
 #ifdef HAS_CUTOUT
-            barycentrics = vec2(i == 1 ? 1.0 : 0.0, i == 2 ? 1.0 : 0.0);
+            barycentrics = vec2(i == second ? 1.0 : 0.0, i == 3 - second ? 1.0 : 0.0);
 #endif
             emit(vec2(corners[i][u], corners[i][v]), corners[i][axis], axis);
         }

@@ -2,7 +2,7 @@
 /* Samples: {"name", "cubes", "bytes", "build_ns": [..]} of a cube's samples alone, from triangles to packed and
  * sorted samples with their surfaces: what peeling and lists do each in its way. What leads over emptiness, which
  * is built behind either, is left out. */
-#include "tests/bench/bench_ldc.h"
+#include "tests/bench/bench_forms.h"
 
 #include "base/clock.h"
 #include "trace/ldc_build.h"
@@ -35,7 +35,7 @@ static void place(struct ldc_cube *cube, const struct scene_gpu *gpu, uint32_t r
         cube->lower_world[k] = gpu->lower_world[k] - cube->cell_world;
 }
 
-static bool build(struct bench_ldc *bench, const struct bench_form *form, struct sampled *sampled,
+static bool build(struct bench_forms *bench, const struct bench_form *form, struct sampled *sampled,
                   const uint32_t *instances, bool counts, struct error *error)
 {
     struct scene_gpu *gpu = &bench->scene.gpu;
@@ -51,7 +51,7 @@ static bool build(struct bench_ldc *bench, const struct bench_form *form, struct
 }
 
 /* The forms take turns. */
-static bool build_all(struct bench_ldc *bench, struct sampled *sampled, const uint32_t *instances,
+static bool build_all(struct bench_forms *bench, struct sampled *sampled, const uint32_t *instances,
                       struct error *error)
 {
     for (unsigned run = 0; run < WARM_UPS_LISTS + bench->runs; run++) {
@@ -64,7 +64,7 @@ static bool build_all(struct bench_ldc *bench, struct sampled *sampled, const ui
                 return false;
         }
     }
-    return gpu_check(bench->device, "bench_ldc samples", error);
+    return gpu_check(bench->device, "bench_forms samples", error);
 }
 
 static json_t *describe(const struct bench_form *form, const struct sampled *sampled)
@@ -76,7 +76,7 @@ static json_t *describe(const struct bench_form *form, const struct sampled *sam
                      "build_ns", bench_times_json(&sampled->runs));
 }
 
-static bool begin(struct bench_ldc *bench, struct sampled *sampled, struct error *error)
+static bool begin(struct bench_forms *bench, struct sampled *sampled, struct error *error)
 {
     for (unsigned i = 0; i < bench->form_count; i++) {
         if (bench->forms[i].tracer != BENCH_TRACER_LDC)
@@ -89,7 +89,7 @@ static bool begin(struct bench_ldc *bench, struct sampled *sampled, struct error
     return true;
 }
 
-json_t *bench_ldc_samples(struct bench_ldc *bench, struct error *error)
+json_t *bench_forms_samples(struct bench_forms *bench, struct error *error)
 {
     const uint32_t count = bench->scene.gpu.instance_count;
     struct sampled sampled[BENCH_FORMS_MAX] = {0};

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* What a layered depth cube has to hold, worked out in double precision from the scene's own buffers: no
+/* What images along the three axes have to hold, worked out in double precision from the scene's own buffers: no
  * rasteriser, no shader. Texels whose middle lies so near to an edge that rounding decides are left out. */
-#ifndef FARLIGHT_TESTS_LDC_ORACLE_H
-#define FARLIGHT_TESTS_LDC_ORACLE_H
+#ifndef FARLIGHT_TESTS_AXES_ORACLE_H
+#define FARLIGHT_TESTS_AXES_ORACLE_H
 
-#include "shared/ldc.h"
+#include "shared/axes.h"
 #include "shared/material.h"
-#include "trace/ldc_store.h"
 #include "trace/scene_gpu.h"
 
 #include <math.h>
@@ -24,6 +23,7 @@ struct oracle_sample {
     double depth_cells;
     double normal[3]; /* unit, world, to the outside */
     double weights[3];
+    double slope; /* of its plane along u and v, both together: what a cell aside changes of the depth */
     uint32_t instance, primitive; /* scene-wide */
 };
 
@@ -45,10 +45,16 @@ struct oracle_scene {
     struct material *materials;
 };
 
+enum oracle_images {
+    ORACLE_LEANING, /* those that a surface leans to */
+    ORACLE_ONE,     /* the one that it leans to most */
+    ORACLE_ALL
+};
+
 struct oracle {
     uint32_t resolution;
     double lower_world[3], cell_world;
-    bool one_image;              /* as the paper has it: images do not overlap */
+    enum oracle_images images;   /* that a surface is in */
     struct oracle_texel *texels; /* 3 * resolution^2 */
 };
 
@@ -111,11 +117,14 @@ static inline double oracle_dot(const double a[3], const double b[3])
 
 enum oracle_lean { ORACLE_LEANS_AWAY, ORACLE_LEANS_TO, ORACLE_LEANS_SO_SO /* rounding decides */ };
 
-/* Whether a surface with this normal is in the image of an axis; `one`: and of no other. */
-static inline enum oracle_lean oracle_lean(const double n[3], int axis, bool one)
+/* Whether a surface with this normal is in the image of an axis. */
+static inline enum oracle_lean oracle_lean(const double n[3], int axis, enum oracle_images images)
 {
+    if (images == ORACLE_ALL)
+        return ORACLE_LEANS_TO;
     double others = fmax(fabs(n[(axis + 1) % 3]), fabs(n[(axis + 2) % 3])), most = fmax(fabs(n[axis]), others);
-    double beyond = one ? (fabs(n[axis]) - others) / most : fabs(n[axis]) / most - (double)LDC_OVERLAP;
+    double beyond =
+        images == ORACLE_ONE ? (fabs(n[axis]) - others) / most : fabs(n[axis]) / most - (double)AXES_OVERLAP;
     if (fabs(beyond) <= ORACLE_LEAN)
         return ORACLE_LEANS_SO_SO;
     return beyond > 0 ? ORACLE_LEANS_TO : ORACLE_LEANS_AWAY;
@@ -132,11 +141,13 @@ static inline void oracle_colour(double out[4], const struct oracle_scene *scene
     }
 }
 
-/* -1: cut out, 0: for rounding to say, 1: there. No textures. */
+/* -1: cut out, 0: for rounding to say, 1: there. No textures, and colours of vertices only. */
 static inline int oracle_cutout(const struct oracle_scene *scene, const struct oracle_sample *sample)
 {
-    const struct material *m = &scene->materials[scene->triangles[sample->primitive][3]];
     const struct geometry *g = &scene->gpu->geometries[scene->gpu->instances[sample->instance].geometry].device;
+    const struct material *m =
+        &scene->materials[g->kind == GEOMETRY_SPHERES ? scene->sphere_materials[sample->primitive]
+                                                      : scene->triangles[sample->primitive][3]];
     double colour[4] = {1, 1, 1, 1};
     if ((m->flags & MATERIAL_ALPHA_MASK) == 0)
         return 1;
@@ -153,6 +164,8 @@ static inline void oracle_cover(struct oracle *oracle, const struct oracle_scene
     int u = (axis + 1) % 3, v = (axis + 2) % 3, size = (int)oracle->resolution;
     double low_u = fmin(p[0][u], fmin(p[1][u], p[2][u])), high_u = fmax(p[0][u], fmax(p[1][u], p[2][u]));
     double low_v = fmin(p[0][v], fmin(p[1][v], p[2][v])), high_v = fmax(p[0][v], fmax(p[1][v], p[2][v]));
+    if (n[axis] == 0)
+        return;
     double area = (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
     for (int y = (int)fmax(0, floor(low_v) - 1); y < size && y <= high_v + 1; y++)
         for (int x = (int)fmax(0, floor(low_u) - 1); x < size && x <= high_u + 1; x++) {
@@ -172,6 +185,7 @@ static inline void oracle_cover(struct oracle *oracle, const struct oracle_scene
             struct oracle_sample sample = *base;
             memcpy(sample.weights, weights, sizeof(weights));
             sample.depth_cells = p[0][axis] - (n[u] * (x + 0.5 - p[0][u]) + n[v] * (y + 0.5 - p[0][v])) / n[axis];
+            sample.slope = (fabs(n[u]) + fabs(n[v])) / fabs(n[axis]);
             int there = oracle_cutout(scene, &sample);
             texel->open |= there == 0;
             if (there > 0)
@@ -208,7 +222,7 @@ static inline void oracle_triangle(struct oracle *oracle, const struct oracle_sc
     for (int k = 0; k < 3; k++)
         base.normal[k] = side * n[k] / length;
     for (int axis = 0; axis < 3; axis++) {
-        enum oracle_lean lean = oracle_lean(n, axis, oracle->one_image);
+        enum oracle_lean lean = oracle_lean(n, axis, oracle->images);
         if (lean != ORACLE_LEANS_AWAY)
             oracle_cover(oracle, scene, axis, p, &base, n, lean == ORACLE_LEANS_SO_SO);
     }
@@ -251,10 +265,11 @@ static inline void oracle_sphere(struct oracle *oracle, const struct oracle_scen
             }
             for (int k = 0; k < 3; k++)
                 sample.normal[k] /= sqrt(length);
-            enum oracle_lean lean = oracle_lean(sample.normal, axis, oracle->one_image);
+            sample.slope = (fabs(sample.normal[u]) + fabs(sample.normal[v])) / fabs(sample.normal[axis]);
+            enum oracle_lean lean = oracle_lean(sample.normal, axis, oracle->images);
             if (lean == ORACLE_LEANS_SO_SO)
                 oracle->texels[i].open = true;
-            else if (lean == ORACLE_LEANS_TO)
+            else if (lean == ORACLE_LEANS_TO && oracle_cutout(scene, &sample) > 0)
                 oracle_add(&oracle->texels[i], &sample);
         }
     }
@@ -270,12 +285,16 @@ static inline int oracle_compare(const void *a, const void *b)
     return (left->primitive > right->primitive) - (left->primitive < right->primitive);
 }
 
+struct oracle_cube {
+    uint32_t resolution;
+    float lower_world[3], cell_world;
+};
+
 static inline void oracle_init(struct oracle *oracle, const struct oracle_scene *scene,
-                               const struct ldc_cube *cube, bool one_image, const uint32_t *instances,
-                               uint32_t count)
+                               const struct oracle_cube *cube, enum oracle_images images,
+                               const uint32_t *instances, uint32_t count)
 {
-    *oracle =
-        (struct oracle){.resolution = cube->resolution, .cell_world = cube->cell_world, .one_image = one_image};
+    *oracle = (struct oracle){.resolution = cube->resolution, .cell_world = cube->cell_world, .images = images};
     for (int k = 0; k < 3; k++)
         oracle->lower_world[k] = cube->lower_world[k];
     size_t texels = (size_t)3 * cube->resolution * cube->resolution;

@@ -1,0 +1,202 @@
+/* SPDX-License-Identifier: MIT */
+#include "render/layers.h"
+
+#include "render/frame_request.h"
+#include "render/wave_trace.h"
+#include "shared/layers.h"
+#include "shared/ray.h"
+
+#include <epoxy/gl.h>
+
+_Static_assert(LAYER_BIT_BEAUTY == 1 << LAYER_BEAUTY && LAYER_BIT_ALBEDO == 1 << LAYER_ALBEDO &&
+                   LAYER_BIT_NORMAL == 1 << LAYER_NORMAL && LAYER_BIT_DEPTH == 1 << LAYER_DEPTH &&
+                   LAYER_BIT_POSITION == 1 << LAYER_POSITION && LAYER_BIT_AO == 1 << LAYER_AO &&
+                   LAYER_BIT_ID == 1 << LAYER_ID && LAYER_ID + 1 == LAYER_COUNT,
+               "shaders know the layers by other numbers");
+
+bool layers_of_first_sample(enum frame_layer layer)
+{
+    return layer == LAYER_DEPTH || layer == LAYER_POSITION || layer == LAYER_ID;
+}
+
+bool layers_reserve(struct layers *layers, struct render_context *context, uint32_t slice_samples,
+                    struct error *error)
+{
+    struct gpu_device *device = context->device;
+    layers->wanted = frame_request_layers(&context->request) & ~LAYER_BIT_BEAUTY;
+    if (!layers->wanted) {
+        layers_finish(layers, device);
+        return true;
+    }
+    size_t planes = (size_t)__builtin_popcount(layers->wanted);
+    size_t rays = layers->wanted & LAYER_BIT_AO ? context->wave_capacity : 0;
+    size_t times = context->scene->has_motion ? rays : 0;
+    return gpu_buffer_reserve(device, &layers->sums, planes * slice_samples * sizeof(vec4), error) &&
+           gpu_buffer_reserve(device, &layers->ao_rays, rays * sizeof(struct ray), error) &&
+           gpu_buffer_reserve(device, &layers->ao_times, times * sizeof(float), error) &&
+           gpu_buffer_reserve(device, &layers->ao_visibility, rays * sizeof(uint), error);
+}
+
+void layers_begin_slice(struct layers *layers)
+{
+    layers->noted = false;
+    layers->asked = 0;
+}
+
+/* A program that reads hits, in use, with all that these have bound; `own`: a define of its own, or NULL. */
+static const struct gpu_program *use(struct render_context *context, const char *compute, const char *own,
+                                     struct error *error)
+{
+    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 3] = {0};
+    size_t n = context_surface_defines(context, defines);
+    if (own)
+        defines[n++] = (struct gpu_define){own, "1"};
+    if (context->scene->has_motion)
+        defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
+    const struct gpu_program_source source = {.compute = compute, .defines = defines};
+    const struct gpu_program *program = gpu_program_get(context->device, &source, error);
+    if (!program)
+        return NULL;
+    glUseProgram(program->name);
+    context_bind_hits(context);
+    gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
+    gpu_uniform_uint(program, "hit_count", context->hit_count);
+    return program;
+}
+
+/* All but how open a place is, which begins with 0. */
+static bool note_hits(struct layers *layers, struct render_context *context, struct error *error)
+{
+    bool needs_surface = layers->wanted & (LAYER_BIT_ALBEDO | LAYER_BIT_NORMAL);
+    layers->plane_samples = context->ray_count;
+    context_span_begin(context, STAGE_SHADE);
+    const struct gpu_program *program =
+        use(context, "render/layers.comp", needs_surface ? "NEEDS_SURFACE" : NULL, error);
+    if (program) {
+        gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
+        gpu_uniform_uint(program, "ray_count", context->ray_count);
+        gpu_uniform_uint(program, "layers", layers->wanted);
+        gpu_dispatch(context->device, program, context->ray_count);
+    }
+    context_span_end(context);
+    return program && gpu_check(context->device, "layers", error);
+}
+
+static bool make_ao_rays(struct layers *layers, struct render_context *context, uint32_t count,
+                         struct error *error)
+{
+    context_span_begin(context, STAGE_SHADE);
+    const struct gpu_program *program = use(context, "render/layers_ao.comp", NULL, error);
+    if (program) {
+        gpu_buffer_bind_storage(&layers->ao_rays, BIND_SHADOW_RAYS);
+        if (context->scene->has_motion)
+            gpu_buffer_bind_storage(&layers->ao_times, BIND_RAY_TIMES);
+        gpu_uniform_uint(program, "first_ray", layers->asked);
+        gpu_uniform_uint(program, "batch_rays", count);
+        gpu_uniform_uint(program, "all_rays", context_ao_rays(context));
+        gpu_uniform_float(program, "reach", context_ao_distance(context));
+        gpu_uniform_float(program, "falloff", context->request.ao_falloff);
+        gpu_dispatch(context->device, program, context->hit_count);
+    }
+    context_span_end(context);
+    return program != NULL;
+}
+
+static bool trace_ao_rays(struct layers *layers, struct render_context *context, uint32_t count,
+                          struct error *error)
+{
+    const struct wave wave = {
+        .kind = WAVE_ANY,
+        .ray_count = context->hit_count * count,
+        .rays = &layers->ao_rays,
+        .visibility = &layers->ao_visibility,
+        .times = context->scene->has_motion ? &layers->ao_times : NULL,
+    };
+    context->shadow_rays += wave.ray_count;
+    return wave_trace(context, RAY_SHADOW, &wave, error);
+}
+
+static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
+{
+    return (uint32_t)__builtin_popcount(layers->wanted & (layer_bit - 1));
+}
+
+static bool gather_ao(struct layers *layers, struct render_context *context, uint32_t count, struct error *error)
+{
+    context_span_begin(context, STAGE_SHADE);
+    const struct gpu_program *program = context_use(context, "render/layers_gather.comp", error);
+    if (program) {
+        gpu_buffer_bind_storage(&context->hit_list, BIND_HIT_LIST);
+        gpu_buffer_bind_storage(&layers->ao_visibility, BIND_VISIBILITY);
+        gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
+        gpu_uniform_uint(program, "hit_count", context->hit_count);
+        gpu_uniform_uint(program, "ray_count", context->ray_count);
+        gpu_uniform_uint(program, "batch_rays", count);
+        gpu_uniform_uint(program, "all_rays", context_ao_rays(context));
+        gpu_uniform_uint(program, "plane", plane_of(layers, LAYER_BIT_AO));
+        gpu_dispatch(context->device, program, context->hit_count);
+    }
+    context_span_end(context);
+    return program && gpu_check(context->device, "ambient occlusion", error);
+}
+
+/* Whether the slice in hand has anything to add: other samples than the first have only zeros for some. */
+static bool adds(const struct render_context *context, enum frame_layer layer)
+{
+    return context->uniforms.sample_index == 0 || !layers_of_first_sample(layer);
+}
+
+static bool any_adds(const struct layers *layers, const struct render_context *context)
+{
+    for (enum frame_layer layer = LAYER_ALBEDO; layer < LAYER_COUNT; layer++)
+        if (layers->wanted & 1u << layer && adds(context, layer))
+            return true;
+    return false;
+}
+
+bool layers_step(struct layers *layers, struct render_context *context, bool *done, struct error *error)
+{
+    uint32_t all = layers->wanted & LAYER_BIT_AO && context->hit_count > 0 ? context_ao_rays(context) : 0;
+    if (!layers->noted) {
+        layers->noted = true;
+        *done = all == 0;
+        return !any_adds(layers, context) || note_hits(layers, context, error);
+    }
+    uint32_t left = all - layers->asked, together = context->wave_capacity / context->hit_count;
+    uint32_t count = left < together ? left : together;
+    if (!make_ao_rays(layers, context, count, error) || !trace_ao_rays(layers, context, count, error) ||
+        !gather_ao(layers, context, count, error))
+        return false;
+    layers->asked += count;
+    *done = layers->asked == all;
+    return true;
+}
+
+bool layers_accumulate(struct layers *layers, struct picture *picture, struct render_context *context,
+                       struct error *error)
+{
+    for (uint32_t plane = 0; plane < picture->plane_count; plane++) {
+        enum frame_layer layer = picture_plane_layer(picture, plane);
+        if (layer == LAYER_BEAUTY || !adds(context, layer))
+            continue;
+        uint32_t first_sum = plane_of(layers, 1u << layer) * layers->plane_samples;
+        if (!picture_accumulate(picture, context, plane, &layers->sums, first_sum, error))
+            return false;
+    }
+    return true;
+}
+
+uint64_t layers_device_bytes(const struct layers *layers)
+{
+    return layers->sums.capacity_bytes + layers->ao_rays.capacity_bytes + layers->ao_times.capacity_bytes +
+           layers->ao_visibility.capacity_bytes;
+}
+
+void layers_finish(struct layers *layers, struct gpu_device *device)
+{
+    gpu_buffer_finish(device, &layers->sums);
+    gpu_buffer_finish(device, &layers->ao_rays);
+    gpu_buffer_finish(device, &layers->ao_times);
+    gpu_buffer_finish(device, &layers->ao_visibility);
+    *layers = (struct layers){0};
+}

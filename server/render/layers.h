@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: MIT */
+/* What a picture's samples saw beside its light: layers of the first surface that each ray met, also where that
+ * lets light through. One sample of the slice in hand after the other is noted in sums of the slice, which reach
+ * the picture when the slice does; what a layer holds is said in protocol/messages.def, ENUMERATION(LAYER). */
+#ifndef FARLIGHT_RENDER_LAYERS_H
+#define FARLIGHT_RENDER_LAYERS_H
+
+#include "render/context.h"
+#include "render/picture.h"
+
+struct layers {
+    uint32_t wanted;        /* bits, without LAYER_BEAUTY; 0: nothing is done, and no memory is held */
+    struct gpu_buffer sums; /* shared/layers.h */
+    struct gpu_buffer ao_rays, ao_times, ao_visibility;
+    bool noted;             /* of the slice in hand: what its hits are */
+    uint32_t asked;         /* likewise: rays of ao that each hit has been given */
+    uint32_t plane_samples; /* likewise: its samples, so many in each plane of the sums */
+};
+
+/* Room for those that the request asks for, for slices of so many samples and waves of wave_capacity rays. */
+bool layers_reserve(struct layers *layers, struct render_context *context, uint32_t slice_samples,
+                    struct error *error);
+/* The context has rays and hits of a new slice. */
+void layers_begin_slice(struct layers *layers);
+/* A part of a slice's work, no longer than a wave; *done: there is no more. Leaves rays and hits as they are, and
+ * the rays that it traces count as shadow rays. Inside no span. */
+bool layers_step(struct layers *layers, struct render_context *context, bool *done, struct error *error);
+/* Adds the slice in hand to the picture, which may be done once it is certain that it is not done again. */
+bool layers_accumulate(struct layers *layers, struct picture *picture, struct render_context *context,
+                       struct error *error);
+/* Whether the layer holds the first sample of each pixel in place of the mean of all. */
+bool layers_of_first_sample(enum frame_layer layer);
+uint64_t layers_device_bytes(const struct layers *layers);
+void layers_finish(struct layers *layers, struct gpu_device *device);
+
+#endif

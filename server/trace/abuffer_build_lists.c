@@ -1,0 +1,146 @@
+/* SPDX-License-Identifier: MIT */
+/* The pass over the scene: every fragment becomes a node, linked into the list of its texel. Yang, Hensley, Gruen,
+ * Thibieroz. Real-Time Concurrent Linked List Construction on the GPU. 2010. Where there is no room for all of
+ * them, they are counted, room is made, and the pass is repeated. */
+#include "shared/bindings.h"
+#include "trace/abuffer_build_state.h"
+
+#include <epoxy/gl.h>
+#include <string.h>
+
+/* Of a scene that is seen for the first time: nodes for so many of all texels. */
+#define TEXELS_A_NODE 4
+#define NODES_MIN 1024u
+
+/* What lists and samples need on the device. */
+static uint64_t bytes_of(const struct abuffer_task *task, uint64_t nodes)
+{
+    uint64_t each = ABUFFER_NODE_BYTES + ABUFFER_SAMPLE_BYTES + ABUFFER_ID_BYTES;
+    uint64_t texel = ABUFFER_TEXEL_BYTES + 2 * sizeof(uint32_t);
+    return nodes * each + task->texel_count * texel;
+}
+
+/* That the options and the device allow. */
+static uint64_t nodes_allowed(const struct abuffer_task *task)
+{
+    uint64_t allowed = (uint64_t)task->options->abuffer_mebibytes_max << 20, fixed = bytes_of(task, 0);
+    uint64_t most = task->builder->device->facts.texture_buffer_texels_max;
+    if (allowed == 0)
+        return most;
+    uint64_t fitting = allowed > fixed ? (allowed - fixed) / (bytes_of(task, 1) - fixed) : 0;
+    return fitting < most ? fitting : most;
+}
+
+static bool refuse(const struct abuffer_task *task, uint64_t nodes, struct error *error)
+{
+    uint64_t needed = (bytes_of(task, nodes) + ((uint64_t)1 << 20) - 1) >> 20;
+    if (nodes > task->builder->device->facts.texture_buffer_texels_max)
+        error_set(error, ERROR_LIMIT, "abuffer", "%s%llu samples; this device's texel buffers hold %llu",
+                  task->counts.wraps > 0 ? "more than " : "", (unsigned long long)nodes,
+                  (unsigned long long)task->builder->device->facts.texture_buffer_texels_max);
+    else
+        error_set(error, ERROR_LIMIT, "abuffer", "%llu samples need %llu MiB; %u MiB are allowed",
+                  (unsigned long long)nodes, (unsigned long long)needed, task->options->abuffer_mebibytes_max);
+    return error_remedy(error, "take a lower resolution, or raise memory.abuffer");
+}
+
+/* Exactly so many: there is a limit, and buffers that grow take more than they are asked for. */
+static bool reserve_nodes(struct abuffer_task *task, uint64_t nodes, struct error *error)
+{
+    struct abuffer_builder *builder = task->builder;
+    builder->nodes_max = 0;
+    gpu_buffer_finish(builder->device, &builder->nodes);
+    if (!gpu_buffer_reserve(builder->device, &builder->nodes, (size_t)nodes * ABUFFER_NODE_BYTES, error))
+        return false;
+    builder->nodes_max = (uint32_t)nodes;
+    return true;
+}
+
+static bool reserve_first(struct abuffer_task *task, struct error *error)
+{
+    struct abuffer_builder *builder = task->builder;
+    uint64_t allowed = nodes_allowed(task), wanted = builder->nodes_first;
+    if (builder->nodes_max > 0 && builder->nodes_max <= allowed)
+        return true;
+    if (wanted == 0)
+        wanted = task->texel_count / TEXELS_A_NODE > NODES_MIN ? task->texel_count / TEXELS_A_NODE : NODES_MIN;
+    wanted = wanted < allowed ? wanted : allowed;
+    return reserve_nodes(task, wanted > 0 ? wanted : 1, error);
+}
+
+static void set_lists(const void *context, const struct gpu_program *program)
+{
+    const struct abuffer_task *task = context;
+    gpu_uniform_uint(program, "nodes_max", task->builder->nodes_max);
+    gpu_uniform_uint(program, "voxels_along", task->store->voxels_along);
+    gpu_uniform_float(program, "voxels_per_cell",
+                      (float)task->store->voxels_along / (float)task->store->resolution);
+}
+
+static bool draw(struct abuffer_task *task, struct error *error)
+{
+    static const struct gpu_define defines[] = {{"ALL_IMAGES", "1"}, {0}};
+    struct abuffer_builder *builder = task->builder;
+    struct gpu_device *device = builder->device;
+    const struct abuffer_store *store = task->store;
+    struct axes_pass pass = {
+        .fragment = "abuffer/build.frag",
+        .defines = defines,
+        .cell_world = store->cell_world,
+        .resolution = store->resolution,
+        .set = set_lists,
+        .context = task,
+    };
+    memcpy(pass.lower_world, store->lower_world, sizeof(pass.lower_world));
+    gpu_buffer_clear(device, &builder->heads, 0);
+    gpu_buffer_clear(device, &builder->build, 0);
+    gpu_buffer_clear(device, &task->store->sums, 0);
+    gpu_buffer_bind_image(device, &builder->heads, IMAGE_ABUFFER_HEADS, GL_R32UI);
+    gpu_buffer_bind_image(device, &builder->nodes, IMAGE_ABUFFER_NODES, GL_RGBA32UI);
+    gpu_buffer_bind_image(device, &task->store->sums, IMAGE_ABUFFER_SUMS, GL_R32I);
+    gpu_buffer_bind_storage(&builder->build, BIND_ABUFFER_BUILD_COUNTS);
+    builder->passes++;
+    return axes_draw_bind_plain(&builder->draw, store->resolution, error) &&
+           axes_draw(&builder->draw, task->scene, &pass, error);
+}
+
+static bool list_occupied(struct abuffer_task *task, struct error *error)
+{
+    struct abuffer_builder *builder = task->builder;
+    struct gpu_device *device = builder->device;
+    const struct gpu_program *program =
+        gpu_program_get(device, &(struct gpu_program_source){.compute = "abuffer/occupied.comp"}, error);
+    if (!program)
+        return false;
+    glUseProgram(program->name);
+    gpu_buffer_bind_texels(device, &builder->heads, UNIT_ABUFFER_HEADS, GL_R32UI);
+    gpu_buffer_bind_image(device, &builder->occupied, IMAGE_ABUFFER_OCCUPIED, GL_R32UI);
+    gpu_buffer_bind_storage(&builder->build, BIND_ABUFFER_BUILD_COUNTS);
+    gpu_uniform_uint(program, "texel_count", task->texel_count);
+    gpu_dispatch(device, program, (task->texel_count + ABUFFER_OCCUPIED_TEXELS - 1) / ABUFFER_OCCUPIED_TEXELS);
+    abuffer_read_counts(task);
+    return true;
+}
+
+static bool draw_and_count(struct abuffer_task *task, struct error *error)
+{
+    return draw(task, error) && list_occupied(task, error);
+}
+
+bool abuffer_lists(struct abuffer_task *task, struct error *error)
+{
+    if (!reserve_first(task, error) || !draw_and_count(task, error))
+        return false;
+    if (task->counts.wraps == 0 && task->counts.nodes <= task->builder->nodes_max)
+        return true;
+    uint64_t needed = task->counts.wraps > 0 ? UINT32_MAX : task->counts.nodes, allowed = nodes_allowed(task);
+    if (needed > allowed)
+        return refuse(task, needed, error);
+    uint64_t wanted = needed + needed / 8; /* a scene that changes has a few more the next time */
+    if (!reserve_nodes(task, wanted < allowed ? wanted : allowed, error) || !draw_and_count(task, error))
+        return false;
+    if (task->counts.nodes > task->builder->nodes_max)
+        return error_set(error, ERROR_INTERNAL, "abuffer", "%u fragments, where there were %llu before",
+                         task->counts.nodes, (unsigned long long)needed);
+    return true;
+}

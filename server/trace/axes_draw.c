@@ -1,0 +1,232 @@
+/* SPDX-License-Identifier: MIT */
+/* Instances as draws: one call for all of a sort. An instance's number comes to the vertices as an attribute that
+ * advances with the instance, so that no uniform has to be set between two of them; a primitive is one vertex. */
+#include "trace/axes_draw.h"
+
+#include "gpu/registry.h"
+
+#include <epoxy/gl.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct draw_command { /* as GL has it */
+    uint32_t vertex_count, instance_count, first_vertex, base_instance;
+};
+
+struct drawn { /* shared/axes.h */
+    uint32_t first_id, id_offset, instance, flags;
+};
+
+_Static_assert(sizeof(struct drawn) + sizeof(struct draw_command) == AXES_INSTANCE_BYTES, "an instance");
+
+void axes_draw_init(struct axes_draw *draw, struct gpu_device *device)
+{
+    *draw = (struct axes_draw){.device = device};
+}
+
+void axes_draw_finish(struct axes_draw *draw)
+{
+    gpu_buffer_finish(draw->device, &draw->drawn);
+    gpu_buffer_finish(draw->device, &draw->commands);
+    gpu_framebuffer_finish(draw->device, &draw->plain);
+    gpu_object_destroy(draw->device->registry, GPU_VERTEX_ARRAY, draw->vertex_array);
+    free(draw->runs);
+    axes_draw_init(draw, draw->device);
+}
+
+static enum axes_sort sort_of(const struct geometry *geometry)
+{
+    if (geometry->kind == GEOMETRY_SPHERES)
+        return AXES_SPHERES;
+    return geometry->flags & GEOMETRY_HAS_CUTOUT ? AXES_TRIANGLES_CUTOUT : AXES_TRIANGLES;
+}
+
+static uint32_t flags_of(const struct instance *instance, const struct geometry *geometry)
+{
+    bool closed = geometry->kind == GEOMETRY_SPHERES || (geometry->flags & GEOMETRY_CLOSED) != 0;
+    return (closed && (geometry->flags & GEOMETRY_HAS_CUTOUT) == 0 ? DRAWN_CLOSED : 0) |
+           (geometry->flags & GEOMETRY_HAS_NORMALS ? DRAWN_NORMALS : 0) |
+           (geometry->flags & GEOMETRY_HAS_COLOURS ? DRAWN_COLOURS : 0) |
+           (geometry->kind == GEOMETRY_SPHERES ? DRAWN_SPHERES : 0) |
+           (instance->flags & INSTANCE_MIRRORED ? DRAWN_MIRRORED : 0);
+}
+
+static int compare_uint(const void *a, const void *b)
+{
+    uint32_t left = *(const uint32_t *)a, right = *(const uint32_t *)b;
+    return (left > right) - (left < right);
+}
+
+/* Fills both tables from `instances`, which ascend. */
+static bool list_drawn(struct axes_draw *draw, const struct scene_gpu *scene, const uint32_t *instances,
+                       uint32_t count, struct drawn *drawn, struct draw_command *commands, struct error *error)
+{
+    uint64_t id = 0;
+    uint32_t command_count = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        const struct instance *instance = &scene->instances[instances[i]];
+        const struct geometry *geometry = &scene->geometries[instance->geometry].device;
+        enum axes_sort sort = sort_of(geometry);
+        if (id + geometry->primitive_count > UINT32_MAX ||
+            (uint64_t)geometry->first_primitive + geometry->primitive_count > INT32_MAX)
+            return error_set(error, ERROR_LIMIT, NULL, "more primitives than can be numbered");
+        drawn[i] = (struct drawn){(uint32_t)id, (uint32_t)id - geometry->first_primitive, instances[i],
+                                  flags_of(instance, geometry)};
+        id += geometry->primitive_count;
+        if (i > 0 && instance->geometry == scene->instances[instances[i - 1]].geometry) {
+            commands[command_count - 1].instance_count++;
+            continue;
+        }
+        if (draw->run_count == 0 || draw->runs[draw->run_count - 1].sort != sort)
+            draw->runs[draw->run_count++] = (struct axes_run){sort, command_count, 0};
+        draw->runs[draw->run_count - 1].count++;
+        commands[command_count++] =
+            (struct draw_command){geometry->primitive_count, 1, geometry->first_primitive, i};
+    }
+    return true;
+}
+
+bool axes_list_instances(const struct scene_gpu *scene, uint32_t **instances, uint32_t *count, struct error *error)
+{
+    *count = 0;
+    *instances = malloc(((size_t)scene->instance_count + 1) * sizeof(**instances));
+    if (!*instances)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u instances", scene->instance_count);
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (scene->geometries[scene->instances[i].geometry].device.primitive_count > 0)
+            (*instances)[(*count)++] = i;
+    return true;
+}
+
+bool axes_draw_prepare(struct axes_draw *draw, const struct scene_gpu *scene, const uint32_t *instances,
+                       uint32_t instance_count, struct error *error)
+{
+    size_t count = instance_count ? instance_count : 1;
+    uint32_t *ascending = malloc(count * sizeof(*ascending));
+    struct drawn *drawn = calloc(count, sizeof(*drawn));
+    struct draw_command *commands = calloc(count, sizeof(*commands));
+    free(draw->runs);
+    draw->runs = calloc(count, sizeof(*draw->runs));
+    draw->run_count = 0;
+    draw->drawn_count = instance_count;
+    bool listed = false;
+    if (!ascending || !drawn || !commands || !draw->runs) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u instances", instance_count);
+        goto out;
+    }
+    for (uint32_t i = 0; i < instance_count; i++)
+        ascending[i] = instances[i];
+    qsort(ascending, instance_count, sizeof(*ascending), compare_uint);
+    listed = list_drawn(draw, scene, ascending, instance_count, drawn, commands, error) &&
+             gpu_buffer_upload(draw->device, &draw->drawn, drawn, instance_count * sizeof(*drawn), error) &&
+             gpu_buffer_upload(draw->device, &draw->commands, commands, instance_count * sizeof(*commands), error);
+out:
+    free(ascending);
+    free(drawn);
+    free(commands);
+    return listed;
+}
+
+bool axes_draw_bind_plain(struct axes_draw *draw, uint32_t along, struct error *error)
+{
+    if (!draw->plain.name) {
+        draw->plain.name = gpu_object_create(draw->device->registry, GPU_FRAMEBUFFER);
+        if (!draw->plain.name)
+            return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more framebuffer names");
+    }
+    if (draw->plain_along != along) {
+        glNamedFramebufferParameteri(draw->plain.name, GL_FRAMEBUFFER_DEFAULT_WIDTH, (GLint)along);
+        glNamedFramebufferParameteri(draw->plain.name, GL_FRAMEBUFFER_DEFAULT_HEIGHT, (GLint)along);
+        glNamedFramebufferParameteri(draw->plain.name, GL_FRAMEBUFFER_DEFAULT_LAYERS, 3);
+        draw->plain_along = along;
+    }
+    glBindFramebuffer(GL_FRAMEBUFFER, draw->plain.name);
+    return true;
+}
+
+static bool make_vertex_array(struct axes_draw *draw, struct error *error)
+{
+    if (!draw->vertex_array) {
+        draw->vertex_array = gpu_object_create(draw->device->registry, GPU_VERTEX_ARRAY);
+        if (!draw->vertex_array)
+            return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more vertex array names");
+        glEnableVertexArrayAttrib(draw->vertex_array, 0);
+        glVertexArrayAttribIFormat(draw->vertex_array, 0, 4, GL_UNSIGNED_INT, 0);
+        glVertexArrayAttribBinding(draw->vertex_array, 0, 0);
+        glVertexArrayBindingDivisor(draw->vertex_array, 0, 1);
+    }
+    glVertexArrayVertexBuffer(draw->vertex_array, 0, draw->drawn.name, 0, sizeof(struct drawn));
+    return true;
+}
+
+static const struct gpu_program *get_program(const struct axes_draw *draw, const struct scene_gpu *scene,
+                                             const struct axes_pass *pass, enum axes_sort sort,
+                                             struct error *error)
+{
+    bool spheres = sort == AXES_SPHERES, has_spheres = false;
+    bool cutout = spheres ? scene->has_cutout : sort == AXES_TRIANGLES_CUTOUT;
+    struct gpu_define defines[AXES_PASS_DEFINES_MAX + 4] = {{"PRIMITIVE_KIND", spheres ? "1" : "0"}};
+    size_t n = 1;
+    if (cutout && !pass->cutouts_ignored)
+        defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
+    for (size_t i = 0; i < AXES_PASS_DEFINES_MAX && pass->defines && pass->defines[i].name; i++) {
+        defines[n++] = pass->defines[i];
+        has_spheres |= strcmp(pass->defines[i].name, "HAS_SPHERES") == 0;
+    }
+    if (spheres && !has_spheres)
+        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    const struct gpu_program_source source = {
+        .vertex = "axes/draw.vert", .geometry = "axes/draw.geom", .fragment = pass->fragment, .defines = defines};
+    return gpu_program_get(draw->device, &source, error);
+}
+
+static void set_uniforms(const struct axes_pass *pass, const struct gpu_program *program)
+{
+    gpu_uniform_vec(program, "lower_world", 3, pass->lower_world);
+    gpu_uniform_float(program, "cell_world", pass->cell_world);
+    gpu_uniform_float(program, "resolution", (float)pass->resolution);
+    gpu_uniform_uint(program, "texels_along", pass->resolution);
+    gpu_uniform_float(program, "overlap", pass->overlap);
+    if (pass->set)
+        pass->set(pass->context, program);
+}
+
+static void set_state(uint32_t along)
+{
+    glViewport(0, 0, (GLsizei)along, (GLsizei)along);
+    glDisable(GL_BLEND);
+    glDisable(GL_SCISSOR_TEST);
+    glDisable(GL_CULL_FACE);
+    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+}
+
+bool axes_draw(struct axes_draw *draw, const struct scene_gpu *scene, const struct axes_pass *pass,
+               struct error *error)
+{
+    GLint vertex_array = 0;
+    bool drawn = true;
+    if (draw->run_count == 0)
+        return true;
+    if (!make_vertex_array(draw, error))
+        return false;
+    set_state(pass->resolution);
+    glGetIntegerv(GL_VERTEX_ARRAY_BINDING, &vertex_array);
+    glBindVertexArray(draw->vertex_array);
+    glBindBuffer(GL_DRAW_INDIRECT_BUFFER, draw->commands.name);
+    for (uint32_t i = 0; i < draw->run_count && drawn; i++) {
+        const struct axes_run *run = &draw->runs[i];
+        const struct gpu_program *program = get_program(draw, scene, pass, run->sort, error);
+        drawn = program != NULL;
+        if (!drawn)
+            break;
+        glUseProgram(program->name);
+        set_uniforms(pass, program);
+        glMultiDrawArraysIndirect(GL_POINTS, (const void *)(run->first * sizeof(struct draw_command)),
+                                  (GLsizei)run->count, sizeof(struct draw_command));
+    }
+    glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
+    glBindVertexArray((GLuint)vertex_array);
+    glBindFramebuffer(GL_FRAMEBUFFER, 0);
+    glMemoryBarrier(GL_ALL_BARRIER_BITS);
+    return drawn && gpu_check(draw->device, "drawing along the axes", error);
+}

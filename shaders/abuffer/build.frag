@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+// Links what falls on a texel into its list, and adds it to the voxels that it touches.
+// Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014, section 3.1.
+// Defines: those of common/axes_fragment.glsl; ALL_IMAGES, of axes/draw.geom, always.
+
+#include "shared/abuffer_build.h"
+#include "shared/bindings.h"
+#include "common/axes_face.glsl"
+#include "common/axes_fragment.glsl"
+
+uniform uint nodes_max;         // that there is room for
+uniform uint voxels_along;      // a side of the grid
+uniform float voxels_per_cell;
+
+layout(binding = IMAGE_ABUFFER_HEADS, r32ui) uniform uimageBuffer heads;
+layout(binding = IMAGE_ABUFFER_NODES, rgba32ui) writeonly uniform uimageBuffer nodes;
+layout(binding = IMAGE_ABUFFER_SUMS, r32i) uniform iimageBuffer sums;
+layout(std430, binding = BIND_ABUFFER_BUILD_COUNTS) buffer build_block { abuffer_build_counts build; };
+
+// Whether there was room. Without, this one is only counted, as all is drawn once more.
+bool link(float depth_cells, uint bits)
+{
+    uint node = atomicAdd(build.nodes, 1u);
+    if (node >= nodes_max) {
+        if (node == 0xffffffffu)
+            atomicAdd(build.wraps, 1u);
+        return false;
+    }
+    uint before = imageAtomicExchange(heads, int(texel_number()), node + 1u);
+    imageStore(nodes, int(node), uvec4(before, floatBitsToUint(depth_cells), bits, primitive.x));
+    return true;
+}
+
+// Of voxels along depth, u and v: how far it is from one to the next, in texels of the sums.
+ivec3 strides()
+{
+    int along = int(voxels_along), square_ = along * along;
+    ivec3 s = gl_Layer == 0 ? ivec3(1, along, square_) : gl_Layer == 1 ? ivec3(along, square_, 1) : ivec3(square_, 1, along);
+    return 4 * s;
+}
+
+// Nothing of a patch is lost to rounding; and one that ends where a voxel does, does not touch the next one. Sides of
+// voxels lie at least 1 / 256 of a cell from those of texels, if they do not coincide.
+const float DEPTH_MARGIN_CELLS = 1.0 / 64.0;
+const float HALF_TEXEL = 0.5 - 1.0 / 1024.0;
+
+// The patch of a surface that is seen through a texel, and reaches from one depth to the other. A load is cheaper than an
+// atomic, and mostly the bits are there.
+void mark(float least_cells, float greatest_cells, int bits)
+{
+    ivec3 first = ivec3(vec3(least_cells - DEPTH_MARGIN_CELLS, gl_FragCoord.xy - HALF_TEXEL) * voxels_per_cell);
+    ivec3 last = ivec3(vec3(greatest_cells + DEPTH_MARGIN_CELLS, gl_FragCoord.xy + HALF_TEXEL) * voxels_per_cell);
+    ivec3 far = ivec3(int(voxels_along) - 1), step_ = strides();
+    first = clamp(first, ivec3(0), far);
+    last = clamp(last, ivec3(0), far);
+    for (int v = first.z; v <= last.z; v++)
+        for (int u = first.y; u <= last.y; u++)
+            for (int d = first.x; d <= last.x; d++) {
+                int at = d * step_.x + u * step_.y + v * step_.z + 3;
+                if ((imageLoad(sums, at).x & bits) != bits)
+                    imageAtomicOr(sums, at, bits);
+            }
+}
+
+// A unit normal's components along depth, u and v, to the voxel that the texel's middle is in at this depth.
+void add_normal(float depth_cells, vec3 normal_duv)
+{
+    ivec3 voxel = ivec3(vec3(depth_cells, gl_FragCoord.xy) * voxels_per_cell), step_ = strides();
+    voxel = min(voxel, ivec3(int(voxels_along) - 1));
+    ivec3 units = ivec3(round(normal_duv * float(ABUFFER_NORMAL_UNIT)));
+    int at = voxel.x * step_.x + voxel.y * step_.y + voxel.z * step_.z;
+    int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+    if (units.x != 0)
+        imageAtomicAdd(sums, at + axis, units.x);
+    if (units.y != 0)
+        imageAtomicAdd(sums, at + u, units.y);
+    if (units.z != 0)
+        imageAtomicAdd(sums, at + v, units.z);
+}
+
+// `leaves`: it looks towards greater depths of this image.
+int sum_bits(uint face, bool closed, bool leaves)
+{
+    bool leans = (face & FACE_LEANS << gl_Layer) != 0u;
+    uint looks = leans ? (leaves ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN) << gl_Layer : 0u;
+    return int(face >> 24 & 63u | looks | (closed ? 0u : ABUFFER_SUM_OPEN));
+}
+
+#if PRIMITIVE_KIND == 0
+void main()
+{
+    if (is_triangle_cut_out())
+        discard;
+    uint face = primitive.w;
+    float depth_cells = triangle_depth_cells();
+    // What the rasteriser says covers the texel it also says faces so: of a closed surface as many fragments of a
+    // texel lead in as out.
+    bool leaves = gl_FrontFacing;
+    if (!link(depth_cells, face & (FACE_NORMAL_MASK | FACE_CLOSED) | (leaves ? ABUFFER_NODE_LEAVES : 0u)))
+        return;
+    // The plane through all of the texel; where it is so steep that this is far, no farther than the triangle reaches.
+    float reach = 0.5 * (abs(plane.x) + abs(plane.y)), least_cells = depth_cells - reach, most_cells = depth_cells + reach;
+    if ((face & FACE_STEEP << gl_Layer) != 0u) {
+        least_cells = max(least_cells, depths.y);
+        most_cells = min(most_cells, depths.z);
+    }
+    mark(least_cells, most_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves));
+    if ((face & FACE_MOST) != 0u) {
+        vec3 normal = vec3(1.0, -plane.xy) * inversesqrt(1.0 + dot(plane.xy, plane.xy));
+        add_normal(depth_cells, leaves ? normal : -normal);
+    }
+}
+#else
+// How far a sphere's surface goes through the texel's square, from where its middle's line crosses it: outwards from the
+// sphere's middle no farther than its tangent, nor than where the square comes nearest to the middle; inwards to its rim
+// at most, if that is in the square.
+void reach_of(sphere_chord c, vec3 normal, int side, float depth_cells, out float least_cells,
+              out float most_cells)
+{
+    int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+    vec3 half_u = 0.5 * cell_world * vec3(c.rows[0][u], c.rows[1][u], c.rows[2][u]);
+    vec3 half_v = 0.5 * cell_world * vec3(c.rows[0][v], c.rows[1][v], c.rows[2][v]);
+    float nearer = 2.0 * length(c.closest) * (length(half_u) + length(half_v)) / dot(c.step_object, c.step_object);
+    float tangent = 0.5 * (abs(normal[u]) + abs(normal[v])) / max(abs(normal[axis]), 1e-6 * greatest(abs(normal)));
+    float outwards = min(tangent, sqrt(nearer)), inwards = min(c.half_chord, 2.0 * tangent + 0.75);
+    least_cells = depth_cells - (side == 0 ? outwards : inwards);
+    most_cells = depth_cells + (side == 0 ? inwards : outwards);
+}
+
+void main()
+{
+    sphere_chord chord = chord_of_sphere();
+    if (!(chord.half_chord >= 0.0)) // passes it
+        discard;
+    int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+    bool closed = (primitive.w & DRAWN_CLOSED) != 0u;
+    for (int side = 0; side < 2; side++) {
+        vec3 normal;
+        float depth_cells = crossing_of(chord, side, normal), least_cells, most_cells;
+        if (is_sphere_cut_out(chord, depth_cells))
+            continue;
+        reach_of(chord, normal, side, depth_cells, least_cells, most_cells);
+        depth_cells = depth_in_cube(depth_cells);
+        normal = normalize(normal / greatest(abs(normal)));
+        uint face = face_of(normal);
+        if (!link(depth_cells, face & FACE_NORMAL_MASK | (closed ? ABUFFER_NODE_CLOSED : 0u) |
+                                   (side == 1 ? ABUFFER_NODE_LEAVES : 0u)))
+            continue;
+        mark(least_cells, most_cells, sum_bits(face, closed, side == 1));
+        if (axis_of(abs(normal)) == axis)
+            add_normal(depth_cells, vec3(normal[axis], normal[u], normal[v]));
+    }
+}
+#endif

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// A texel of an A-buffer: the samples of its column, and of how many bodies a point of it is inside.
+//
+// A sample is taken for the plane through it, as far as its texel goes: a depth alone would make steps of every slope.
+//
+// Define: ABUFFER_COUNT_STEPS crossings are not samples but, for the benchmark, what the walk did: blocks of voxels looked
+// at in place of the distance, samples looked at in that of the primitive, texels in that of the instance.
+#include "shared/abuffer.h"
+#include "shared/axes.h"
+#include "shared/bindings.h"
+#include "common/cell_ray.glsl"
+
+#ifdef ABUFFER_COUNT_STEPS
+uvec3 abuffer_counts = uvec3(0u);
+#define ABUFFER_COUNT(what) abuffer_counts.what++
+#else
+#define ABUFFER_COUNT(what)
+#endif
+
+layout(binding = UNIT_TRACER_0) uniform usamplerBuffer abuffer_texels;
+layout(binding = UNIT_TRACER_1) uniform usamplerBuffer abuffer_samples;
+
+uniform int abuffer_resolution;
+
+// How far beyond its texel a sample's plane still counts, in cells: what neighbours' planes may leave open between
+// them where a surface bends.
+const float SLACK = 0.05;
+// How far a plane leaves its sample's depth within its texel and the slack, in cells. Steeper ones are cut off there.
+const float SPAN = (1.0 + 2.0 * SLACK) / AXES_OVERLAP;
+
+struct column {
+    int first, end; // of its samples
+};
+
+column column_at(int axis, ivec2 texel)
+{
+    ABUFFER_COUNT(y);
+    uvec2 words = texelFetch(abuffer_texels, (axis * abuffer_resolution + texel.y) * abuffer_resolution + texel.x).xy;
+    return column(int(words.x), int(words.x + words.y));
+}
+
+// The texel that a point of the image is in.
+ivec2 texel_of(vec2 p)
+{
+    return clamp(ivec2(p), ivec2(0), ivec2(abuffer_resolution - 1));
+}
+
+struct column_sample {
+    float depth;
+    vec3 normal; // u v depth, of any length
+    int step_;   // what a way through it, towards greater depths, adds to the winding
+    int behind;  // winding there
+};
+
+uvec2 words_at(int index)
+{
+    ABUFFER_COUNT(z);
+    return texelFetch(abuffer_samples, index).xy;
+}
+
+float depth_of(uvec2 words)
+{
+    return uintBitsToFloat(words.x);
+}
+
+column_sample sample_of(uvec2 words, int axis)
+{
+    vec2 p = vec2(bitfieldExtract(int(words.y), 0, 12), bitfieldExtract(int(words.y), 12, 12)) * (1.0 / 2047.0);
+    vec3 normal = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+    vec2 folded = (1.0 - abs(p.yx)) * vec2(p.x >= 0.0 ? 1.0 : -1.0, p.y >= 0.0 ? 1.0 : -1.0);
+    normal.xy = normal.z < 0.0 ? folded : normal.xy;
+    column_sample s;
+    s.depth = depth_of(words);
+    s.normal = in_image(normal, axis);
+    s.step_ = (words.y & ABUFFER_SAMPLE_BODY) == 0u ? 0 : s.normal.z < 0.0 ? 1 : -1;
+    s.behind = int(words.y >> ABUFFER_WINDING_SHIFT & ABUFFER_WINDING_MASK) - ABUFFER_WINDING_ZERO;
+    return s;
+}
+
+// Of the sample's plane, so far from the texel's middle.
+float plane_depth(column_sample s, vec2 from_middle)
+{
+    float shift = -dot(s.normal.xy, from_middle) / s.normal.z;
+    // Written so that what is no number is something too.
+    return s.depth + (shift < SPAN ? shift > -SPAN ? shift : -SPAN : SPAN);
+}
+
+// From which of a column's samples on to look for those that are not before a depth. A few before it are as soon passed
+// as found.
+const int PASSED = 4;
+
+int sample_from(column c, float depth)
+{
+    while (c.end - c.first > PASSED) {
+        int middle = (c.first + c.end) >> 1;
+        bool is_before = depth_of(words_at(middle)) < depth;
+        c.first = is_before ? middle + 1 : c.first;
+        c.end = is_before ? c.end : middle;
+    }
+    return c.first;
+}
+
+// Of how many bodies a point of the image is inside.
+int winding_at(int axis, vec3 p)
+{
+    ivec2 texel = texel_of(p.xy);
+    vec2 from_middle = p.xy - vec2(texel) - 0.5;
+    column c = column_at(axis, texel);
+    int winding = 0; // behind all samples
+    bool is_first = true;
+    for (int i = sample_from(c, p.z - SPAN); i < c.end; i++) {
+        uvec2 words = words_at(i);
+        if (depth_of(words) < p.z - SPAN)
+            continue;
+        column_sample s = sample_of(words, axis);
+        winding = is_first ? s.behind - s.step_ : winding;
+        is_first = false;
+        if (s.depth > p.z + SPAN)
+            break;
+        winding += plane_depth(s, from_middle) < p.z ? s.step_ : 0;
+    }
+    return winding;
+}

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+// Linear search by 2D DDA: the texels of one image that a part of a ray passes, one after the other, and in each of them
+// the samples whose planes the ray crosses there.
+#include "abuffer/found.glsl"
+
+// A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit what it leaves. So
+// near its origin a ray does not cross planes that pass the origin as near as this. From behind, which is how a ray that
+// goes away outside meets what it leaves, that is generous; from the front, which is how it meets another wall in a
+// corner, and how a ray that was refracted meets what it has entered by, it is what a surface needs that bends by a
+// radius of six cells: 1.5^2 / (2 * 6).
+const float OWN_WAY = 1.5;
+const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.2;
+
+// Where a ray (o, d in the image) crosses a sample's plane; whether that is not the plane which it begins on. `side` is
+// positive where it comes from behind.
+bool cross_plane(vec3 o, vec3 d, float s_least, ivec2 texel, column_sample p, out float s, out float side)
+{
+    float height = dot(p.normal, vec3(vec2(texel) + 0.5, p.depth) - o);
+    side = dot(p.normal, d);
+    s = height / side;
+    float own = side > 0.0 ? OWN_BEHIND * OWN_BEHIND : OWN_BEFORE * OWN_BEFORE;
+    return s > s_least && !(s < s_least + OWN_WAY && height * height < own * dot(p.normal, p.normal));
+}
+
+// Some surfaces are in several images, and are looked for in those that show them.
+bool leans(column_sample p)
+{
+    vec3 size = abs(p.normal);
+    return size.z >= AXES_OVERLAP * greatest(size);
+}
+
+// The part [s_in, s_out] of the ray. `only_leaning`: what does not lean to this axis is looked for in another image.
+// Whether anything was crossed.
+bool search_image(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis, bool only_leaning, float s_in,
+                  float s_out)
+{
+    vec3 o = in_image(w.ray.o, axis), d = in_image(w.ray.d, axis);
+    ivec2 texel = texel_of(o.xy + s_in * d.xy);
+    ivec2 forward = ivec2(greaterThan(d.xy, vec2(0.0)));
+    vec2 inverse = 1.0 / d.xy;
+    vec2 border = (vec2(texel + forward) - o.xy) * inverse;
+    float s = s_in;
+    bool any_crossed = false;
+    for (;;) {
+        bool along_u = border.x < border.y;
+        float s_next = along_u ? border.x : border.y;
+        float s_here = s_next < s_out ? s_next : s_out;
+        float z_in = o.z + s * d.z, z_out = o.z + s_here * d.z;
+        float least_ = (z_in < z_out ? z_in : z_out) - SPAN, greatest_ = (z_in < z_out ? z_out : z_in) + SPAN;
+        column c = column_at(axis, texel);
+        for (int i = sample_from(c, least_); i < c.end; i++) {
+            uvec2 words = words_at(i);
+            if (depth_of(words) > greatest_)
+                break;
+            if (depth_of(words) < least_)
+                continue;
+            column_sample p = sample_of(words, axis);
+            float s_plane, side;
+            bool crosses = cross_plane(o, d, w.s_least, texel, p, s_plane, side);
+            vec2 from_middle = abs(o.xy + s_plane * d.xy - vec2(texel) - 0.5);
+            if (crosses && from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK && s_plane < w.s_limit &&
+                (!only_leaning || leans(p))) {
+                offer_at(r, w, found, i, s_plane, side);
+                any_crossed = true;
+            }
+        }
+        if (!(s_next < s_out && s_next < w.s_limit))
+            break;
+        s = s_next;
+        texel += along_u ? ivec2(2 * forward.x - 1, 0) : ivec2(0, 2 * forward.y - 1);
+        if (any(notEqual(texel, texel_of(vec2(texel)))))
+            break;
+        border = (vec2(texel + forward) - o.xy) * inverse;
+    }
+    return any_crossed;
+}
+
+// All images that a voxel names, one behind the other; what is found in one ends the search in the next there.
+void search_planes(trace_ray r, inout voxel_walk w, inout abuffer_found found, found_voxel here)
+{
+    uint images = here.what & ABUFFER_VOXEL_IMAGES;
+    bool only_leaning = bitCount(images) > 1;
+    for (; images != 0u; images &= images - 1u)
+        search_image(r, w, found, findLSB(images), only_leaning, here.s_in,
+                     here.s_out < w.s_limit ? here.s_out : w.s_limit);
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// From the crossings of a closest-hit wave to hits: the second half of the walk through A-buffers, in the place of
+// surface.comp. A sample's own primitive tells what is there, at its place nearest to the crossing.
+//
+// Defines: HAS_SPHERES, HAS_DISCS as the scene has them.
+#include "common/dispatch.glsl"
+#include "abuffer/sample_primitive.glsl"
+
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
+layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; a crossing is the first
+
+uniform uint ray_count;
+
+void main()
+{
+    uint k = item_index();
+    if (k >= ray_count)
+        return;
+    uvec4 crossing = imageLoad(hits, int(3u * k));
+    float distance_ = uintBitsToFloat(crossing.x);
+    hit h = surface_miss();
+    if (crossing.z != HIT_NO_PRIMITIVE) {
+        vec3 origin = texelFetch(rays, int(2u * k)).xyz, direction = texelFetch(rays, int(2u * k + 1u)).xyz;
+#ifdef HAS_DISCS
+        if (crossing.w == HIT_NO_PRIMITIVE)
+            h = surface_disc(crossing.z, distance_, origin, direction);
+        else
+#endif
+        {
+            candidate found = candidate_of_sample(int(crossing.z), distance_);
+            found.barycentrics = nearest_barycentrics(found, origin, direction);
+            h = surface_of(found, origin, direction, 0.0);
+        }
+    }
+    imageStore(hits, int(3u * k), uvec4(floatBitsToUint(h.distance), h.material, h.primitive, h.instance));
+    imageStore(hits, int(3u * k + 1u), floatBitsToUint(vec4(h.u0, h.v0, h.u1, h.v1)));
+    imageStore(hits, int(3u * k + 2u), uvec4(h.normal_geometric, h.normal_shading, h.tangent, h.colour));
+}

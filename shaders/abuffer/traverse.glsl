@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+// The walk through voxels and A-buffers (shared/abuffer.h). Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization.
+// 2014.
+//
+// The host (trace/abuffer_trace.c) sets, besides the defines of trace.comp, those that the files included here name.
+//
+// Defines: ABUFFER_STEPS the search is by so many steps a voxel (abuffer/steps.glsl), else by 2D DDA (abuffer/planes.glsl);
+// ABUFFER_EMPTY there is nothing to be found.
+#include "abuffer/steps.glsl"
+
+void walk_ray(trace_ray r, inout abuffer_found found)
+{
+#ifndef ABUFFER_EMPTY
+    voxel_walk w;
+    begin_walk(r, found.end, w);
+#ifdef ABUFFER_STEPS
+    // All is outside of what is beyond the voxels.
+    ray_state state = ray_state(0, w.s > w.s_least);
+#endif
+    while (w.s < w.s_end) {
+        found_voxel here = next_voxel(w);
+        if (here.what != 0u) {
+#ifdef ABUFFER_STEPS
+            search_steps(r, w, found, here, state);
+#else
+            search_planes(r, w, found, here);
+#endif
+        }
+    }
+#endif
+}
+
+// What trace.comp calls.
+#ifdef ANY_HIT
+
+bool trace_any(trace_ray r, inout vec3 taken)
+{
+    abuffer_found found = found_of(r, taken);
+    walk_ray(r, found);
+    taken = found.taken;
+    return least(taken) >= TAKEN_BLACK;
+}
+
+#else
+
+void trace_closest(trace_ray r, inout candidate best)
+{
+    abuffer_found found = found_of(r, best);
+    walk_ray(r, found);
+#ifdef ABUFFER_COUNT_STEPS
+    best = candidate(float(abuffer_counts.x), abuffer_counts.z, abuffer_counts.y, vec2(0.0));
+#else
+    if (found.sample_index >= 0)
+        best = candidate(found.end, uint(found.sample_index), HIT_NO_PRIMITIVE - 1u, vec2(0.0));
+#endif
+}
+
+#endif

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+// From what was summed of each voxel's samples to what a ray has to know of it (shared/abuffer.h), and how far it is empty
+// around blocks that hold nothing. One invocation a block.
+//
+// Defines, one a pass, in this order: VOXELS_JUDGE; VOXELS_REACH_X, VOXELS_REACH_Y, VOXELS_REACH_Z.
+#include "shared/abuffer.h"
+#include "shared/bindings.h"
+#include "common/dispatch.glsl"
+
+layout(binding = IMAGE_ABUFFER_VOXELS, rgba32ui) uniform uimageBuffer voxels;
+
+uniform int grid; // blocks along a side
+
+#ifdef VOXELS_JUDGE
+
+layout(binding = UNIT_TRACER_0) uniform isamplerBuffer sums; // a voxel's four as one texel
+
+// ABUFFER_VOXEL_*; 0: it holds nothing.
+uint judged(ivec4 sum)
+{
+    uint bits = uint(sum.w), leaned = bits & ABUFFER_VOXEL_IMAGES;
+    if (bits == 0u)
+        return 0u;
+    vec3 average = abs(vec3(sum.xyz));
+    uint first = average.x >= average.y && average.x >= average.z ? 0u : average.y >= average.z ? 1u : 2u;
+    // Opposite normals, of a thin body's sides, say nothing together.
+    first = bitCount(leaned) == 1 ? uint(findLSB(leaned)) : first;
+    bool shows_all = (bits & ABUFFER_SUM_STEEP << first) == 0u;
+    bool is_thin = (bits / ABUFFER_SUM_UP & bits / ABUFFER_SUM_DOWN & 7u) != 0u;
+    uint body = (bits & ABUFFER_SUM_OPEN) == 0u && !is_thin ? ABUFFER_VOXEL_BODY : 0u;
+    return body | (shows_all ? 1u << first : leaned);
+}
+
+void settle(int at, ivec3 place)
+{
+    uvec2 occupied = uvec2(0u);
+    for (int half_ = 0; half_ < 2; half_++) {
+        uvec4 words = uvec4(0u);
+        uint holds = 0u;
+        for (int i = 0; i < 32; i++) {
+            ivec3 voxel = 4 * place + ivec3(i & 3, i >> 2 & 3, 2 * half_ + (i >> 4));
+            uint what = judged(texelFetch(sums, (voxel.z * 4 * grid + voxel.y) * 4 * grid + voxel.x));
+            uint nibble = what << 4 * (i & 7);
+            uvec4 part = uvec4(equal(ivec4(i >> 3), ivec4(0, 1, 2, 3)));
+            words |= part * nibble;
+            holds |= what != 0u ? 1u << i : 0u;
+        }
+        occupied[half_] = holds;
+        imageStore(voxels, at + 1 + half_, words);
+    }
+    imageStore(voxels, at, uvec4(occupied, 0u, 0u));
+}
+
+#else
+
+const uint FAR = 15u;
+
+// How many blocks from this one on, one way along an axis, are empty, squares, cubes of them: as many as each of so many
+// rows, squares beside it has. Of up to four octants at once, whose 4 bits are from `shift` on. A block's own words are
+// written by no other invocation. `step_` is in texels.
+uint reach(int at, int left, int step_, uint shift)
+{
+    uvec4 counts = uvec4(FAR);
+    for (uint k = 0u; any(greaterThan(counts, uvec4(k))); k++) {
+        // Beyond the grid all is empty.
+        uvec4 beside = uvec4(FAR);
+        if (int(k) < left) {
+            uvec4 block = imageLoad(voxels, at + int(k) * step_);
+#ifdef VOXELS_REACH_X
+            beside = uvec4((block.x | block.y) == 0u ? FAR : 0u);
+#else
+            beside = uvec4(block.w) >> (shift + uvec4(0u, 4u, 8u, 12u)) & FAR;
+#endif
+        }
+        counts = min(counts, max(beside, uvec4(k)));
+    }
+    return counts.x | counts.y << 4 | counts.z << 8 | counts.w << 12;
+}
+
+void settle(int at, ivec3 place)
+{
+    uvec4 block = imageLoad(voxels, at);
+    bool is_empty = (block.x | block.y) == 0u;
+    int row = ABUFFER_BLOCK_TEXELS * grid;
+#ifdef VOXELS_REACH_X
+    block.w = is_empty ? (reach(at, grid - place.x, ABUFFER_BLOCK_TEXELS, 0u) & 0xfu) |
+                             (reach(at, place.x + 1, -ABUFFER_BLOCK_TEXELS, 0u) & 0xfu) << 4
+                       : 0u;
+#elif defined VOXELS_REACH_Y
+    if (is_empty)
+        block.w |= (reach(at, grid - place.y, row, 0u) & 0xffu) << 8 | (reach(at, place.y + 1, -row, 0u) & 0xffu) << 16;
+#else
+    if (is_empty)
+        block.z = reach(at, grid - place.z, row * grid, 8u) | reach(at, place.z + 1, -row * grid, 8u) << 16;
+#endif
+    imageStore(voxels, at, block);
+}
+
+#endif
+
+void main()
+{
+    int item = int(item_index());
+    if (item >= grid * grid * grid)
+        return;
+    settle(ABUFFER_BLOCK_TEXELS * item, ivec3(item % grid, item / grid % grid, item / (grid * grid)));
+}

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// Sorts a run in place: by insertion where its items come nearly in order, as those of things drawn front to back do,
+// else as a heap. No loop here runs more than a few rounds for each item and each doubling of their number: software GL
+// ends an invocation's loops after 65,535 rounds.
+// Who includes it defines before: SORT_ITEM, a type; struct run with a member `count`; SORT_ITEM load(run, uint), void
+// store(run, uint, SORT_ITEM), bool before(SORT_ITEM, SORT_ITEM).
+
+const uint MOVES_EACH = 4u; // an item: more than the heap is worth
+
+// Whether it was done: false leaves them in another order.
+bool insert_all(run r)
+{
+    uint moves = MOVES_EACH * r.count;
+    for (uint i = 1u; i < r.count; i++) {
+        SORT_ITEM moved = load(r, i);
+        uint k = i;
+        for (; k > 0u; k--) {
+            SORT_ITEM above = load(r, k - 1u);
+            if (!before(moved, above) || moves == 0u)
+                break;
+            store(r, k, above);
+            moves--;
+        }
+        if (k != i)
+            store(r, k, moved);
+        if (moves == 0u)
+            return false;
+    }
+    return true;
+}
+
+// Down from `at` to where what is below it comes before it.
+void sift(run r, uint at, uint count)
+{
+    SORT_ITEM own = load(r, at);
+    for (;;) {
+        uint below = 2u * at + 1u;
+        if (below >= count)
+            break;
+        SORT_ITEM most = load(r, below);
+        if (below + 1u < count) {
+            SORT_ITEM other = load(r, below + 1u);
+            bool greater = before(most, other);
+            most = greater ? other : most;
+            below += greater ? 1u : 0u;
+        }
+        if (!before(own, most))
+            break;
+        store(r, at, most);
+        at = below;
+    }
+    store(r, at, own);
+}
+
+void sort(run r)
+{
+    if (insert_all(r))
+        return;
+    for (uint i = r.count / 2u; i > 0u; i--)
+        sift(r, i - 1u, r.count);
+    for (uint left = r.count - 1u; left > 0u; left--) {
+        SORT_ITEM last = load(r, left);
+        store(r, left, load(r, 0u));
+        store(r, 0u, last);
+        sift(r, 0u, left);
+    }
+}

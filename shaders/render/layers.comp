@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// What layers say of each sample of a slice: of the surface that its ray met first, whether or not it lets light
+// through. Of a sample that met nothing, and in layers of the first sample of all others, they are 0.
+//
+// Defines: NEEDS_SURFACE albedo or normal are among them; those of common/material.glsl.
+
+#include "shared/layers.h"
+#include "render/shade.glsl"
+
+uniform uint ray_count;
+uniform uint layers; // of the frame, without the beauty
+
+layout(std430, binding = BIND_LAYER_SUMS) writeonly buffer layer_block { vec4 layer_sums[]; };
+
+void put(uint layer_bit, uint k, vec4 value)
+{
+    uint plane = uint(bitCount(layers & layer_bit - 1u));
+    if ((layers & layer_bit) != 0u)
+        layer_sums[plane * ray_count + k] = value;
+}
+
+uint node_of(hit h)
+{
+    // Discs stand below no node; which one a stored sample is of is not stored.
+    return h.instance == HIT_NO_PRIMITIVE ? 0u : instance_at(h.instance).node;
+}
+
+void main()
+{
+    uint k = item_index();
+    if (k >= ray_count)
+        return;
+    hit h = hit_at(k);
+    if (!(h.distance >= 0.0)) {
+        for (uint layer_bit = LAYER_BIT_ALBEDO; layer_bit <= LAYER_BIT_ID; layer_bit <<= 1)
+            put(layer_bit, k, vec4(0.0));
+        return;
+    }
+    path p = path_at(k);
+    ray r = ray_at(k);
+    vec3 place = r.origin_t_min.xyz + h.distance * r.direction_t_max.xyz;
+#ifdef NEEDS_SURFACE
+    surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, p.cone_width + p.cone_spread * h.distance);
+    put(LAYER_BIT_ALBEDO, k, vec4(s.base, 1.0));
+    put(LAYER_BIT_NORMAL, k, vec4(s.normal, 1.0));
+#endif
+    vec4 depth = vec4(0.0), position = vec4(0.0), id = vec4(0.0);
+    if (path_sample(p) == 0u) {
+        depth = vec4(vec3(-view_from_world_point(place).z), 1.0);
+        position = vec4(place, 1.0);
+        id = vec4(node_of(h), materials[h.material & HIT_MATERIAL_MASK].id, 0.0, 1.0);
+    }
+    put(LAYER_BIT_DEPTH, k, depth);
+    put(LAYER_BIT_POSITION, k, position);
+    put(LAYER_BIT_AO, k, vec4(vec3(0.0), 1.0)); // layers_gather.comp adds
+    put(LAYER_BIT_ID, k, id);
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// The rays that the layer `ao` asks from each hit of a slice; those of the integrator of that name at first hits, so
+// that the two agree.
+//
+// Defines: those of common/material.glsl and render/shade.glsl.
+
+#include "common/occlusion.glsl"
+#include "render/shade.glsl"
+
+uniform uint first_ray, batch_rays; // of all_rays that a sample has
+uniform uint all_rays;
+uniform float reach, falloff;       // metres; see common/occlusion.glsl
+
+void main()
+{
+    uint j = item_index();
+    if (j >= hit_count)
+        return;
+    uint k = hit_list[j];
+    path p = path_at(k);
+    ray r = ray_at(k);
+    hit h = hit_at(k);
+    surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, p.cone_width + p.cone_spread * h.distance);
+    s.normal = same_hemisphere(s.normal, s.geometric);
+    vec3 origin = off_surface(s, h.distance, s.geometric);
+    uint seed = path_seed(p);
+    for (uint i = 0u; i < batch_rays; i++) {
+        uint index = path_sample(p) * all_rays + first_ray + i;
+        vec2 u = sequence_pair(seed, SEQUENCE_WAVE + SEQUENCE_LOBE_DIRECTION, index);
+        vec3 direction = occlusion_direction(s.geometric, s.normal, u);
+        float far = occlusion_reach(reach, falloff, sequence_number(seed, SEQUENCE_WAVE + SEQUENCE_LOBE, index));
+        uint place = i * hit_count + j;
+        shadow_rays[place] = ray(vec4(origin, 0.0), vec4(direction, far * (1.0 - 4.0 * OFFSET)));
+#ifdef HAS_TIMES
+        shadow_times[place] = p.time;
+#endif
+    }
+}

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// Adds what the rays of layers_ao.comp let through to the layer's samples, those of a sample in their order.
+
+#include "shared/layers.h"
+#include "common/dispatch.glsl"
+
+layout(local_size_x = 64) in;
+
+uniform uint hit_count, ray_count;
+uniform uint batch_rays, all_rays;
+uniform uint plane; // of the layer
+
+layout(std430, binding = BIND_HIT_LIST) readonly buffer list_block { uint hit_list[]; };
+layout(std430, binding = BIND_VISIBILITY) readonly buffer visibility_block { uint visibility[]; };
+layout(std430, binding = BIND_LAYER_SUMS) buffer layer_block { vec4 layer_sums[]; };
+
+void main()
+{
+    uint j = item_index();
+    if (j >= hit_count)
+        return;
+    uint place = plane * ray_count + hit_list[j];
+    float open_share = layer_sums[place].r; // ray by ray, so that it is the same however they are batched
+    for (uint i = 0u; i < batch_rays; i++) { // what has a colour lets its mean through
+        vec3 through = unpackUnorm4x8(visibility[i * hit_count + j]).rgb;
+        open_share += dot(through, vec3(1.0 / 3.0)) / float(all_rays);
+    }
+    layer_sums[place].rgb = vec3(open_share);
+}

@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: MIT */
+/* Layers of a picture beside its light, in a slice. */
+#ifndef FARLIGHT_SHARED_LAYERS_H
+#define FARLIGHT_SHARED_LAYERS_H
+#include "shared/path.h"
+
+/* Sets of layers: 1 << enum frame_layer (server/render/frame.h). */
+#define LAYER_BIT_BEAUTY 1u
+#define LAYER_BIT_ALBEDO 2u
+#define LAYER_BIT_NORMAL 4u
+#define LAYER_BIT_DEPTH 8u
+#define LAYER_BIT_POSITION 16u
+#define LAYER_BIT_AO 32u
+#define LAYER_BIT_ID 64u
+
+/* Storage buffer: a plane for each layer of the frame but the beauty, in their order; in it a vec4 for each sample
+ * of the slice. */
+#define BIND_LAYER_SUMS BIND_PASS_0
+
+#endif

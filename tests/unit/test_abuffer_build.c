@@ -1,0 +1,315 @@
+/* SPDX-License-Identifier: MIT */
+/* A-buffers hold what is in the scene: each texel of the three images against the triangles and spheres under its
+ * middle, found without a rasteriser (axes_oracle.h); and voxels know of what is in them. */
+#include "abuffer_fixture.h"
+#include "abuffer_scenes.h"
+#include "axes_oracle.h"
+
+#include "gpu/registry.h"
+
+#define RESOLUTION 96u
+#define VOXELS 16u
+/* Of the images' texels: so many at least were compared, or the test shows nothing. */
+#define COMPARED_MIN 1000
+
+/* A rounding of places of about `resolution` cells in 24 bits, some of them added up: of places aside it counts as
+ * often as the plane rises with them. */
+#define PLACE_TOLERANCE_CELLS 1e-3
+/* A normal of 2 x 12 bits is exact to 0.05 degrees; that of a small triangle is rounded before it is packed. */
+#define NORMAL_COSINE 0.99999
+
+static double depth_tolerance(const struct oracle_sample *sample)
+{
+    return PLACE_TOLERANCE_CELLS * (1 + sample->slope);
+}
+
+/* Two samples nearer to each other than rounding may change places. */
+static bool are_apart(const struct oracle_texel *texel)
+{
+    for (uint32_t k = 1; k < texel->count; k++)
+        if (texel->samples[k].depth_cells - texel->samples[k - 1].depth_cells <
+            depth_tolerance(&texel->samples[k]) + depth_tolerance(&texel->samples[k - 1]))
+            return false;
+    return true;
+}
+
+static bool is_body(const struct oracle_scene *scene, const struct oracle_sample *sample)
+{
+    const struct geometry *g = &scene->gpu->geometries[scene->gpu->instances[sample->instance].geometry].device;
+    bool closed = g->kind == GEOMETRY_SPHERES || g->flags & GEOMETRY_CLOSED;
+    return closed && (g->flags & GEOMETRY_HAS_CUTOUT) == 0;
+}
+
+static void expect_texel(const struct contents *contents, const struct oracle_scene *scene,
+                         const struct oracle_texel *expected, uint32_t texel)
+{
+    int winding = 0, axis = (int)(texel / (contents->store.resolution * contents->store.resolution));
+    assert_int_equal(contents->texels[texel][1], expected->count);
+    for (uint32_t i = 0; i < expected->count; i++) {
+        const struct oracle_sample *sample = &expected->samples[i];
+        uint32_t k = contents->texels[texel][0] + i;
+        double normal[3];
+        assert_true(fabs(depth_of(contents, k) - sample->depth_cells) < depth_tolerance(sample));
+        normal_of(normal, contents, k);
+        assert_true(oracle_dot(normal, sample->normal) > NORMAL_COSINE);
+        assert_int_equal(drawn_of(contents, k)[2], sample->instance);
+        assert_int_equal(primitive_of(contents, k), sample->primitive);
+        assert_int_equal(bounds_body(contents, k), is_body(scene, sample));
+        if (is_body(scene, sample))
+            winding += sample->normal[axis] < 0 ? 1 : -1;
+        assert_int_equal(winding_of(contents, k), winding);
+    }
+}
+
+/* Texels that were compared. */
+static uint32_t expect_like_oracle(struct fixture *fixture, const struct contents *contents)
+{
+    struct oracle_scene scene;
+    struct oracle oracle;
+    struct oracle_cube cube = {.resolution = contents->store.resolution, .cell_world = contents->store.cell_world};
+    uint32_t compared = 0, count = fixture->gpu.instance_count;
+    uint32_t *instances = malloc((count + 1) * sizeof(*instances));
+    for (uint32_t i = 0; i < count; i++)
+        instances[i] = i;
+    memcpy(cube.lower_world, contents->store.lower_world, sizeof(cube.lower_world));
+    oracle_scene_init(&scene, &fixture->gpu);
+    oracle_init(&oracle, &scene, &cube, ORACLE_ALL, instances, count);
+    for (uint32_t i = 0; i < texel_count_of(contents); i++) {
+        const struct oracle_texel *expected = &oracle.texels[i];
+        if (expected->open || !are_apart(expected))
+            continue;
+        expect_texel(contents, &scene, expected, i);
+        compared += expected->count > 0;
+    }
+    oracle_finish(&oracle);
+    oracle_scene_finish(&scene);
+    free(instances);
+    return compared;
+}
+
+/* Who goes through a body comes out of it, whatever rounding has made of its sides. */
+static void expect_balance(const struct contents *contents)
+{
+    for (uint32_t i = 0; i < texel_count_of(contents); i++)
+        if (contents->texels[i][1] > 0)
+            assert_int_equal(winding_of(contents, contents->texels[i][0] + contents->texels[i][1] - 1), 0);
+}
+
+/* ---- voxels ---- */
+
+/* What is known of a sample: where it is, and how its plane lies. */
+struct patch {
+    double middle[3], normal[3];
+    double half_depth; /* how far its plane reaches in depth over the texel */
+    int axis;
+    bool body;
+};
+
+static struct patch patch_of(const struct contents *contents, uint32_t texel, uint32_t sample)
+{
+    uint32_t along = contents->store.resolution;
+    struct patch patch = {.axis = (int)(texel / (along * along)), .body = bounds_body(contents, sample)};
+    int u = (patch.axis + 1) % 3, v = (patch.axis + 2) % 3;
+    patch.middle[patch.axis] = depth_of(contents, sample);
+    patch.middle[u] = texel % along + 0.5;
+    patch.middle[v] = texel / along % along + 0.5;
+    normal_of(patch.normal, contents, sample);
+    patch.half_depth = 0.5 * (fabs(patch.normal[u]) + fabs(patch.normal[v])) / fabs(patch.normal[patch.axis]);
+    return patch;
+}
+
+/* Of a normal of 24 bits; what is as near to a bound may be on either side of it. */
+#define NORMAL_SLACK 2e-3
+
+/* Bits that a sample sets (`certain`), or may set. */
+static int bits_of(const struct patch *patch, bool certain)
+{
+    const double *n = patch->normal, slack = certain ? NORMAL_SLACK : -NORMAL_SLACK;
+    double most = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+    int bits = patch->body ? 0 : (int)ABUFFER_SUM_OPEN, axis = patch->axis;
+    if (fabs(n[axis]) >= (double)AXES_OVERLAP * most + slack)
+        bits |= (int)(n[axis] > 0 ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN) << axis;
+    for (int k = 0; k < 3; k++) {
+        bits |= fabs(n[k]) >= (double)AXES_OVERLAP * most + slack ? (int)ABUFFER_SUM_LEANS << k : 0;
+        bits |= fabs(n[k]) < (double)ABUFFER_STEEP - slack ? (int)ABUFFER_SUM_STEEP << k : 0;
+    }
+    return bits;
+}
+
+/* Adds the bits to the voxels that the patch touches, grown by `margin` cells. */
+static void spread(int *marks, const struct contents *contents, const struct patch *patch, int bits, double half,
+                   double half_depth)
+{
+    int along = (int)contents->store.voxels_along, first[3], last[3];
+    double scale = along / (double)contents->store.resolution;
+    for (int k = 0; k < 3; k++) {
+        double reach = k == patch->axis ? half_depth : half;
+        first[k] = (int)fmax(0, floor((patch->middle[k] - reach) * scale));
+        last[k] = (int)fmin(along - 1, floor((patch->middle[k] + reach) * scale));
+    }
+    for (int z = first[2]; z <= last[2]; z++)
+        for (int y = first[1]; y <= last[1]; y++)
+            for (int x = first[0]; x <= last[0]; x++)
+                marks[(z * along + y) * along + x] |= bits;
+}
+
+/* Each voxel has all bits of the patches that touch it, and no others. What is steep may be cut off where its
+ * triangle ends, so of that only the middle is certain, and of a curved sphere the reach is larger than that of
+ * the plane. */
+static void expect_marks(const struct contents *contents, bool has_spheres)
+{
+    uint32_t along = contents->store.voxels_along, voxels = along * along * along, set = 0;
+    int *certain = calloc(voxels, sizeof(int)), *possible = calloc(voxels, sizeof(int));
+    for (uint32_t i = 0; i < texel_count_of(contents); i++)
+        for (uint32_t k = 0; k < contents->texels[i][1]; k++) {
+            struct patch patch = patch_of(contents, i, contents->texels[i][0] + k);
+            bool steep = fabs(patch.normal[patch.axis]) < (double)ABUFFER_STEEP + NORMAL_SLACK;
+            spread(certain, contents, &patch, bits_of(&patch, true), 0.499, steep ? 0 : patch.half_depth - 0.01);
+            double most = steep || has_spheres ? 2 * patch.half_depth + 1 : patch.half_depth;
+            spread(possible, contents, &patch, bits_of(&patch, false), 0.501, most * 1.02 + 0.03);
+        }
+    for (uint32_t i = 0; i < voxels; i++) {
+        int bits = contents->sums[i][3];
+        assert_int_equal(certain[i] & ~bits, 0);
+        assert_int_equal(bits & ~possible[i], 0);
+        set += bits != 0;
+    }
+    assert_in_range(set, 1, voxels);
+    free(certain);
+    free(possible);
+}
+
+/* Normals' sums of each voxel: of samples in the image that they lean to most. Rounding to whole numbers takes
+ * half of one of each, and the stored normal's 12 bits a quarter. What may be in either of two voxels or images is
+ * allowed for. */
+static void expect_sums(const struct contents *contents)
+{
+    uint32_t along = contents->store.voxels_along, voxels = along * along * along;
+    double(*sums)[3] = calloc(voxels, sizeof(*sums)), *slack = calloc(voxels, sizeof(*slack));
+    double scale = along / (double)contents->store.resolution, total = 0;
+    for (uint32_t i = 0; i < texel_count_of(contents); i++)
+        for (uint32_t k = 0; k < contents->texels[i][1]; k++) {
+            struct patch patch = patch_of(contents, i, contents->texels[i][0] + k);
+            const double *n = patch.normal;
+            double own = fabs(n[patch.axis]);
+            double other = fmax(fabs(n[(patch.axis + 1) % 3]), fabs(n[(patch.axis + 2) % 3]));
+            if (own < other - NORMAL_SLACK)
+                continue;
+            double at = patch.middle[patch.axis] * scale;
+            bool doubtful = own < other + NORMAL_SLACK || fabs(at - round(at)) < 1e-4;
+            for (int side = -1; side <= 1; side += 2) {
+                int voxel[3];
+                for (int d = 0; d < 3; d++)
+                    voxel[d] = (int)floor(patch.middle[d] * scale + (d == patch.axis ? side * 1e-4 : 0));
+                uint32_t index = (uint32_t)((voxel[2] * (int)along + voxel[1]) * (int)along + voxel[0]);
+                slack[index] += doubtful ? ABUFFER_NORMAL_UNIT + 1 : 0.75;
+                for (int d = 0; d < 3 && side > 0; d++)
+                    sums[index][d] += ABUFFER_NORMAL_UNIT * n[d];
+            }
+        }
+    for (uint32_t i = 0; i < voxels; i++)
+        for (int d = 0; d < 3; d++) {
+            assert_true(fabs(sums[i][d] - contents->sums[i][d]) <= slack[i]);
+            total += abs(contents->sums[i][d]);
+        }
+    assert_true(total > 0);
+    free(sums);
+    free(slack);
+}
+
+/* ---- scenes ---- */
+
+static void expect_scene_like_oracle(struct scene *scene,
+                                     void (*move)(struct scene_motion *motion, uint32_t poses), bool balanced)
+{
+    struct fixture fixture;
+    struct contents contents;
+    fixture_init(&fixture, scene);
+    if (move) {
+        struct scene_motion motion = {0};
+        move(&motion, 1);
+        fixture_update(&fixture, &motion);
+        scene_motion_finish(&motion);
+    }
+    build(&fixture, RESOLUTION, VOXELS);
+    contents_read(&contents, &fixture.store);
+    expect_consistent(&contents);
+    uint32_t compared = expect_like_oracle(&fixture, &contents);
+    print_message("%llu samples, at most %u of a texel, %u texels compared\n",
+                  (unsigned long long)contents.store.sample_count, contents.store.depth_max, compared);
+    assert_in_range(compared, COMPARED_MIN, 3 * RESOLUTION * RESOLUTION);
+    if (balanced)
+        expect_balance(&contents);
+    expect_marks(&contents, fixture.gpu.has_spheres);
+    expect_sums(&contents);
+    contents_free(&contents);
+    fixture_finish(&fixture);
+}
+
+/* Instances as they are, mirrored, scaled unevenly, nested. */
+static void a_soup_is_where_it_is(void **state)
+{
+    (void)state;
+    expect_scene_like_oracle(test_scene_soup(), NULL, true); /* nothing bounds anything */
+}
+
+static void spheres_are_where_they_are_and_balance(void **state)
+{
+    (void)state;
+    expect_scene_like_oracle(test_scene_spheres(), NULL, true);
+}
+
+static void bodies_balance(void **state)
+{
+    (void)state;
+    expect_scene_like_oracle(scene_of_bodies(), NULL, true);
+}
+
+static void bodies_balance_among_what_is_none(void **state)
+{
+    (void)state;
+    expect_scene_like_oracle(scene_of_bodies_and_others(), NULL, true);
+}
+
+/* Skins and morph targets, as the shutter opens; some of it cut out by the alpha of vertices. */
+static void what_deforms_is_where_it_went(void **state)
+{
+    (void)state;
+    expect_scene_like_oracle(test_scene_deformed(), test_motion_of_deformed, true);
+}
+
+static void a_crumpled_body_balances(void **state)
+{
+    (void)state;
+    expect_scene_like_oracle(scene_of_a_crumpled_body(), NULL, true);
+}
+
+static void what_is_cut_out_bounds_no_body(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents contents;
+    fixture_init(&fixture, scene_of_cut_bodies());
+    build(&fixture, RESOLUTION, VOXELS);
+    contents_read(&contents, &fixture.store);
+    expect_consistent(&contents);
+    assert_in_range(expect_like_oracle(&fixture, &contents), COMPARED_MIN, 3 * RESOLUTION * RESOLUTION);
+    for (uint32_t i = 0; i < contents.store.sample_count; i++)
+        assert_false(bounds_body(&contents, i));
+    contents_free(&contents);
+    fixture_finish(&fixture);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_soup_is_where_it_is),
+        cmocka_unit_test(spheres_are_where_they_are_and_balance),
+        cmocka_unit_test(bodies_balance),
+        cmocka_unit_test(bodies_balance_among_what_is_none),
+        cmocka_unit_test(what_deforms_is_where_it_went),
+        cmocka_unit_test(a_crumpled_body_balances),
+        cmocka_unit_test(what_is_cut_out_bounds_no_body),
+    };
+    return cmocka_run_group_tests(tests, open_device, close_device);
+}

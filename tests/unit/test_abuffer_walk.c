@@ -1,0 +1,356 @@
+/* SPDX-License-Identifier: MIT */
+/* The walk through A-buffers made on the CPU, against the triangles that they were made of. */
+#include "tests/unit/abuffer_walk_fixture.h"
+
+#define CELLS 240u
+#define VOXELS 16u
+
+/* Of rays that the triangles' own answer is known of. */
+struct outcome {
+    uint32_t both, only_exact, only_walk; /* hit */
+    uint32_t far;                         /* of both: farther than half a cell from where it is */
+    uint32_t any_wrong;                   /* of the any-hit wave */
+};
+
+static struct outcome compare(struct fixture *fixture, int form, const struct ray *rays, uint32_t count)
+{
+    struct hit *hits = malloc(count * sizeof *hits);
+    uint32_t *visibility = malloc(count * sizeof *visibility);
+    struct outcome o = {0};
+    trace(fixture, &forms[form].options, WAVE_CLOSEST, rays, count, hits, NULL);
+    trace(fixture, &forms[form].options, WAVE_ANY, rays, count, NULL, visibility);
+    for (uint32_t i = 0; i < count; i++) {
+        double from[3], along[3], size = 0;
+        for (int k = 0; k < 3; k++) {
+            from[k] = (double)rays[i].origin_t_min[k];
+            along[k] = (double)rays[i].direction_t_max[k];
+            size = fmax(size, fabs(along[k]));
+        }
+        const struct exact_hit exact =
+            abuffer_exact(&fixture->samples, from, along, (double)rays[i].origin_t_min[3],
+                          (double)rays[i].direction_t_max[3]);
+        const bool hit = hits[i].distance >= 0, exact_hit = exact.distance < INFINITY;
+        o.any_wrong += (visibility[i] == 0) != exact_hit;
+        o.only_exact += exact_hit && !hit;
+        o.only_walk += hit && !exact_hit;
+        o.both += hit && exact_hit;
+        o.far += hit && exact_hit && fabs((double)hits[i].distance - exact.distance) * size > 0.5;
+        if (hit) {
+            assert_int_equal(hits[i].instance, HIT_NO_PRIMITIVE - 1);
+            assert_true(hits[i].primitive < fixture->samples.count);
+        }
+    }
+    free(hits);
+    free(visibility);
+    return o;
+}
+
+/* Shares of all rays, in thousandths, that a search may get wrong: closest hits that are missed, or are where nothing
+ * is; that are elsewhere; any-hit rays. */
+struct limits {
+    double hit, far, any;
+};
+
+static void expect_near(struct fixture *fixture, const char *name, const struct ray *rays, uint32_t count,
+                        const struct limits limits[FORM_COUNT])
+{
+    for (int f = 0; f < FORM_COUNT; f++) {
+        const struct outcome o = compare(fixture, f, rays, count);
+        const double each = 1000.0 / count, hit = (o.only_exact + o.only_walk) * each, far = o.far * each,
+                     any = o.any_wrong * each;
+        printf("%s, %s: of %u rays hit %u both, %u the shape alone, %u the samples alone; %u farther than half a "
+               "cell; any-hit: %u wrong\n",
+               name, forms[f].name, count, o.both, o.only_exact, o.only_walk, o.far, o.any_wrong);
+        assert_true(o.both > count / 8); /* else little was tested */
+        if (!(hit <= limits[f].hit && far <= limits[f].far && any <= limits[f].any))
+            fail_msg("%s, %s: %.2f, %.2f, %.2f of a thousand rays are wrong, at most %.2f, %.2f, %.2f may be", name,
+                     forms[f].name, hit, far, any, limits[f].hit, limits[f].far, limits[f].any);
+    }
+}
+
+static void random_rays(struct ray *rays, uint32_t count, uint64_t seed)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        double o[3], d[3];
+        for (int k = 0; k < 3; k++) {
+            o[k] = CELLS * (double)test_uniform(&seed, i % 2 ? 0 : -1, i % 2 ? 1 : 2);
+            d[k] = CELLS * (double)test_uniform(&seed, 0.2f, 0.8f) - o[k];
+        }
+        rays[i] = ray_from(o, d, 0, i % 3 == 0 ? 0.7f : FAR);
+    }
+}
+
+
+/* ---- shapes, from everywhere ---- */
+
+static void add_one_ball(struct abuffer_samples *s)
+{
+    add_ball(s, (const double[3]){101.3, 120.1, 118.7}, 60.4, 40, true);
+}
+
+static void add_one_box(struct abuffer_samples *s)
+{
+    add_box(s, (const double[3]){61.3, 50.1, 68.7}, (const double[3]){161.3, 150.1, 128.7}, true);
+}
+
+/* A ball within a ball, which is cut by a box, beside another in one. */
+static void add_nested(struct abuffer_samples *s)
+{
+    add_ball(s, (const double[3]){101.3, 120.1, 118.7}, 70.4, 40, true);
+    add_ball(s, (const double[3]){96.3, 110.1, 121.7}, 40.2, 30, true);
+    add_box(s, (const double[3]){81.3, 130.1, 28.7}, (const double[3]){221.3, 180.1, 98.7}, true);
+    add_ball(s, (const double[3]){170.3, 150.1, 60.7}, 15.3, 20, true);
+}
+
+static void add_open_ball(struct abuffer_samples *s)
+{
+    add_ball(s, (const double[3]){101.3, 120.1, 118.7}, 60.4, 40, false);
+}
+
+/* Askew, one behind the other, without thickness. */
+static void add_sheets(struct abuffer_samples *s)
+{
+    for (int i = 0; i < 5; i++) {
+        double x = 40 + 35 * i, lean = 11.3 * (i - 2);
+        const double p[4][3] = {
+            {x - lean, 22.2, 31.1}, {x + lean, 201.3, 31.1}, {x + lean, 201.3, 202.2}, {x - lean, 22.2, 202.2}};
+        add_quad(s, p, false);
+    }
+}
+
+/* As thick as a cell and a half. */
+static void add_plates(struct abuffer_samples *s)
+{
+    add_box(s, (const double[3]){61.3, 50.1, 68.7}, (const double[3]){62.8, 180.1, 198.7}, true);
+    add_box(s, (const double[3]){81.3, 50.1, 68.7}, (const double[3]){181.3, 51.6, 198.7}, true);
+    add_box(s, (const double[3]){81.3, 70.1, 100.7}, (const double[3]){181.3, 160.1, 102.2}, true);
+}
+
+/* A room: all walls are seen from within, and open. */
+static void add_room(struct abuffer_samples *s)
+{
+    add_box(s, (const double[3]){10.3, 20.4, 15.2}, (const double[3]){230.3, 209.1, 221.7}, false);
+    add_ball(s, (const double[3]){101.3, 60.1, 118.7}, 30.4, 30, true);
+}
+
+/* Where an edge passes a texel a sample's plane goes on beyond it, by up to half a texel: of the searches that look at
+ * all texels a few rays in a thousand see that. Steps miss what is passed twice between two of them, which is at edges
+ * and rims, by the length of a step: a voxel is 15 cells wide here, and shapes are some 100. */
+static void rays_meet_shapes_where_they_are(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        void (*add)(struct abuffer_samples *s);
+        struct limits limits[FORM_COUNT];
+    } rows[] = {
+        {"a ball", add_one_ball, {{1, 1, 1}, {2, 2, 2}, {4, 4, 4}}},
+        {"a box", add_one_box, {{4, 3, 4}, {10, 10, 10}, {30, 10, 30}}},
+        {"bodies in bodies", add_nested, {{1, 2, 1}, {3, 15, 3}, {8, 25, 8}}},
+        {"an open ball", add_open_ball, {{1, 1, 1}, {2, 3, 2}, {6, 12, 6}}},
+        {"open sheets", add_sheets, {{1, 5, 1}, {2, 8, 2}, {8, 8, 8}}},
+        {"plates", add_plates, {{7, 4, 7}, {10, 6, 10}, {20, 15, 20}}},
+        {"a room", add_room, {{3, 3, 3}, {3, 4, 3}, {10, 5, 10}}},
+    };
+    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct fixture fixture;
+        fixture_init(&fixture, NULL, CELLS, VOXELS);
+        rows[i].add(&fixture.samples);
+        fixture_build(&fixture);
+        random_rays(rays, RAY_COUNT, 7);
+        expect_near(&fixture, rows[i].name, rays, RAY_COUNT, rows[i].limits);
+        fixture_finish(&fixture);
+    }
+    free(rays);
+}
+
+/* Voxels that are no whole number of cells wide, of a cell, and of nearly all of them. */
+static void voxels_of_any_size_lead_to_the_same(void **state)
+{
+    (void)state;
+    static const uint32_t grids[][2] = {{97, 16}, {100, 64}, {64, 64}, {33, 16}, {130, 32}};
+    static const struct limits limits[FORM_COUNT] = {{3, 5, 3}, {12, 40, 12}, {16, 50, 16}};
+    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    for (size_t i = 0; i < sizeof grids / sizeof *grids; i++) {
+        const double n = grids[i][0];
+        struct fixture fixture;
+        uint64_t seed = 5 + i;
+        char name[64];
+        snprintf(name, sizeof name, "%u cells, %u voxels", grids[i][0], grids[i][1]);
+        fixture_init(&fixture, NULL, grids[i][0], grids[i][1]);
+        add_ball(&fixture.samples, (const double[3]){0.45 * n, 0.52 * n, 0.5 * n}, 0.38 * n, 24, true);
+        fixture_build(&fixture);
+        for (uint32_t k = 0; k < RAY_COUNT; k++) {
+            double o[3], d[3];
+            for (int axis = 0; axis < 3; axis++) {
+                o[axis] = n * (double)test_uniform(&seed, -1, 2);
+                d[axis] = n * (double)test_uniform(&seed, 0, 1) - o[axis];
+            }
+            rays[k] = ray_from(o, d, 0, FAR);
+        }
+        expect_near(&fixture, name, rays, RAY_COUNT, limits);
+        fixture_finish(&fixture);
+    }
+    free(rays);
+}
+
+/* Hundreds of sheets behind each texel, of which the rays begin between any two. */
+static void deep_columns_are_searched_at_their_depth(void **state)
+{
+    (void)state;
+    enum { sheets = 150 };
+    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    for (int body = 0; body < 2; body++) {
+        struct fixture fixture;
+        uint64_t seed = 9;
+        fixture_init(&fixture, NULL, CELLS, VOXELS);
+        for (int i = 0; i < sheets; i++) {
+            const double low = 20.2 + 1.3 * i; /* body: every other gap is inside */
+            const double p[4][3] = {{20, 20, low}, {220, 20, low}, {220, 220, low}, {20, 220, low}};
+            const double turned[4][3] = {{20, 220, low}, {220, 220, low}, {220, 20, low}, {20, 20, low}};
+            add_quad(&fixture.samples, i % 2 ? p : turned, body == 1);
+        }
+        fixture_build(&fixture);
+        assert_true(fixture.store.depth_max == sheets);
+        for (uint32_t i = 0; i < RAY_COUNT; i++) {
+            const double sheet = floor((double)test_uniform(&seed, 0, sheets - 1));
+            const double o[3] = {(double)test_uniform(&seed, 40, 200), (double)test_uniform(&seed, 40, 200),
+                                 20.2 + 1.3 * (sheet + 0.5)};
+            const double d[3] = {(double)test_uniform(&seed, -1, 1), (double)test_uniform(&seed, -1, 1),
+                                 i % 2 ? 1.0 : -1.0};
+            rays[i] = ray_from(o, d, 0, FAR);
+        }
+        for (int f = 0; f < FORM_COUNT; f++) {
+            const struct outcome o = compare(&fixture, f, rays, RAY_COUNT);
+            if (o.both < RAY_COUNT / 2 || o.only_exact + o.only_walk + o.far + o.any_wrong > 0)
+                fail_msg("%s, body %d: %u missed, %u where nothing is, %u elsewhere, %u any-hit rays wrong",
+                         forms[f].name, body, o.only_exact, o.only_walk, o.far, o.any_wrong);
+        }
+        fixture_finish(&fixture);
+    }
+    free(rays);
+}
+
+/* What is small is met by rays that begin millions of its cells away, but for what the floats round that tell where the
+ * ray begins, which is up to half a cell. */
+static void rays_from_afar_meet_what_is_small(void **state)
+{
+    (void)state;
+    const double centre[3] = {121.3, 118.1, 122.7}, radius = 80.2;
+    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
+    struct fixture fixture;
+    uint64_t seed = 41;
+    fixture_init(&fixture, NULL, CELLS, VOXELS);
+    add_ball(&fixture.samples, centre, radius, 100, true);
+    fixture_build(&fixture);
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        double o[3], d[3], length = 0;
+        for (int k = 0; k < 3; k++) {
+            o[k] = (double)test_uniform(&seed, -1, 1);
+            length = fmax(length, fabs(o[k]));
+        }
+        for (int k = 0; k < 3; k++) {
+            o[k] = (double)(float)(o[k] * 2e6 / length);
+            d[k] = centre[k] + radius * (double)test_uniform(&seed, -0.5f, 0.5f) - o[k];
+        }
+        rays[i] = ray_from(o, d, 0, FAR);
+    }
+    for (int f = 0; f < FORM_COUNT; f++) {
+        trace(&fixture, &forms[f].options, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
+        for (uint32_t i = 0; i < RAY_COUNT; i++) {
+            double from_centre = 0, along = 0;
+            for (int k = 0; k < 3; k++) {
+                const double off = (double)rays[i].origin_t_min[k] +
+                                   (double)hits[i].distance * (double)rays[i].direction_t_max[k] - centre[k];
+                from_centre += off * off;
+                along += off * (double)rays[i].direction_t_max[k];
+            }
+            /* On the side that is turned to the ray. */
+            if (hits[i].distance < 0 || fabs(sqrt(from_centre) - radius) > 1 || along > 0)
+                fail_msg("%s: ray %u meets it at %g", forms[f].name, i, (double)hits[i].distance);
+        }
+    }
+    free(rays);
+    free(hits);
+    fixture_finish(&fixture);
+}
+
+static void directions_that_are_none_and_dead_rays_hit_nothing(void **state)
+{
+    (void)state;
+    const double bad[] = {NAN, INFINITY, -INFINITY, 0, 1e-42, (double)FLT_MAX};
+    const double middle[3] = {120.1, 120.2, 120.3}, right[3] = {1, 0, 0};
+    struct ray rays[64];
+    struct hit hits[64];
+    uint32_t count = 0;
+    struct fixture fixture;
+    fixture_init(&fixture, NULL, CELLS, VOXELS);
+    add_ball(&fixture.samples, middle, 80.2, 30, true);
+    fixture_build(&fixture);
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        rays[count++] = ray_from(middle, (const double[3]){bad[i], bad[i], bad[i]}, 0, FAR);
+    for (int k = 0; k < 3; k++) {
+        double origin[3] = {120.1, 120.2, 120.3}, direction[3] = {0.5, 0.6, 0.7};
+        direction[k] = NAN;
+        rays[count++] = ray_from(middle, direction, 0, FAR);
+        direction[k] = 0.5;
+        origin[k] = NAN;
+        rays[count++] = ray_from(origin, direction, 0, FAR);
+        origin[k] = INFINITY;
+        rays[count++] = ray_from(origin, direction, 0, FAR);
+    }
+    /* From where a float's step is larger than the cube. */
+    rays[count++] = ray_from((const double[3]){-1e20, -1e20, -1e20}, (const double[3]){1, 0.9, 1.1}, 0, FAR);
+    rays[count++] = ray_from((const double[3]){3e11, 0.1, 0.2}, (const double[3]){-1, 0.2, 0.1}, 0, FAR);
+    rays[count++] = ray_from(middle, right, 1, 1);
+    rays[count++] = ray_from(middle, right, 0, -1);
+    rays[count++] = ray_from(middle, right, 0, NAN);
+    rays[count++] = ray_from(middle, right, NAN, FAR);
+    const uint32_t living = count;
+    rays[count++] = ray_from(middle, right, 0, FAR); /* beside them */
+    rays[count++] = ray_from(middle, right, 0, INFINITY);
+    for (int f = 0; f < FORM_COUNT; f++) {
+        trace(&fixture, &forms[f].options, WAVE_CLOSEST, rays, count, hits, NULL);
+        for (uint32_t i = 0; i < count; i++)
+            if ((hits[i].distance < 0) != (i < living))
+                fail_msg("%s: ray %u: %g", forms[f].name, i, (double)hits[i].distance);
+    }
+    fixture_finish(&fixture);
+}
+
+static void where_there_is_nothing_nothing_is_hit(void **state)
+{
+    (void)state;
+    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
+    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
+    random_rays(rays, RAY_COUNT, 51);
+    for (int with_cube = 0; with_cube < 2; with_cube++) {
+        struct fixture fixture;
+        fixture_init(&fixture, NULL, CELLS, VOXELS);
+        if (with_cube) /* without a sample in it */
+            fixture_build(&fixture);
+        for (int f = 0; f < FORM_COUNT; f++) {
+            trace(&fixture, &forms[f].options, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
+            for (uint32_t i = 0; i < RAY_COUNT; i++)
+                assert_true(hits[i].distance < 0);
+        }
+        fixture_finish(&fixture);
+    }
+    free(rays);
+    free(hits);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rays_meet_shapes_where_they_are),
+        cmocka_unit_test(voxels_of_any_size_lead_to_the_same),
+        cmocka_unit_test(deep_columns_are_searched_at_their_depth),
+        cmocka_unit_test(rays_from_afar_meet_what_is_small),
+        cmocka_unit_test(directions_that_are_none_and_dead_rays_hit_nothing),
+        cmocka_unit_test(where_there_is_nothing_nothing_is_hit),
+    };
+    RUN_ON_A_DEVICE(tests);
+}
