@@ -25,8 +25,9 @@
 #include <string.h>
 
 /* Rays of a slice. Software GL has no latency to hide, and its caches are the CPU's; a GPU wants enough rays to
- * fill itself. Waves have room for twice as many: mirrors and glass rarely fill a slice. */
-#define SLICE_RAYS_SOFTWARE (1u << 16)
+ * fill itself. Waves have room for twice as many: mirrors and glass rarely fill a slice. A step traces no more than
+ * that: on software GL, where incoherent rays take about half a microsecond each, a few milliseconds. */
+#define SLICE_RAYS_SOFTWARE (1u << 14)
 #define SLICE_RAYS_HARDWARE (1u << 18)
 #define WAVE_PER_SLICE 2
 /* Textures of a picture that goes on and on are taken as if it had so many samples. */

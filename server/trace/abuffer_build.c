@@ -72,11 +72,11 @@ void abuffer_read_counts(struct abuffer_task *task)
     gpu_buffer_read(task->builder->device, &task->builder->build, 0, &task->counts, sizeof(task->counts));
 }
 
-static bool list_instances(struct abuffer_task *task, struct error *error)
+bool abuffer_list_instances(struct abuffer_builder *builder, const struct scene_gpu *scene, struct error *error)
 {
     uint32_t *instances = NULL, count = 0;
-    bool listed = axes_list_instances(task->scene, &instances, &count, error) &&
-                  axes_draw_prepare(&task->builder->draw, task->scene, instances, count, error);
+    bool listed = axes_list_instances(scene, &instances, &count, error) &&
+                  axes_draw_prepare(&builder->draw, scene, instances, count, error);
     free(instances);
     return listed;
 }
@@ -115,7 +115,7 @@ static bool copy_drawn(struct abuffer_task *task, struct error *error)
 
 static bool build(struct abuffer_task *task, struct error *error)
 {
-    if (!list_instances(task, error))
+    if (!abuffer_list_instances(task->builder, task->scene, error))
         return false;
     if (task->builder->draw.drawn_count == 0) {
         abuffer_store_finish(task->store);

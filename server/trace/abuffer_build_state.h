@@ -44,6 +44,8 @@ bool abuffer_runs(struct abuffer_task *task, struct error *error);
 /* abuffer_build_deep.c. Those of texels that have more than the device's passes sort. */
 bool abuffer_runs_deep(struct abuffer_task *task, struct error *error);
 
+/* abuffer_build.c. Of the whole scene, for the draws that follow. */
+bool abuffer_list_instances(struct abuffer_builder *builder, const struct scene_gpu *scene, struct error *error);
 /* abuffer_build.c. Reads task->counts back. */
 void abuffer_read_counts(struct abuffer_task *task);
 

@@ -52,16 +52,25 @@ struct column_sample {
     int behind;  // winding there
 };
 
-column_sample sample_at(int index, int axis)
+uvec2 words_at(int index)
 {
     ABUFFER_COUNT(z);
-    uvec2 words = texelFetch(abuffer_samples, index).xy;
+    return texelFetch(abuffer_samples, index).xy;
+}
+
+float depth_of(uvec2 words)
+{
+    return uintBitsToFloat(words.x);
+}
+
+column_sample sample_of(uvec2 words, int axis)
+{
     vec2 p = vec2(bitfieldExtract(int(words.y), 0, 12), bitfieldExtract(int(words.y), 12, 12)) * (1.0 / 2047.0);
     vec3 normal = vec3(p, 1.0 - abs(p.x) - abs(p.y));
     vec2 folded = (1.0 - abs(p.yx)) * vec2(p.x >= 0.0 ? 1.0 : -1.0, p.y >= 0.0 ? 1.0 : -1.0);
     normal.xy = normal.z < 0.0 ? folded : normal.xy;
     column_sample s;
-    s.depth = uintBitsToFloat(words.x);
+    s.depth = depth_of(words);
     s.normal = in_image(normal, axis);
     s.step_ = (words.y & ABUFFER_SAMPLE_BODY) == 0u ? 0 : s.normal.z < 0.0 ? 1 : -1;
     s.behind = int(words.y >> ABUFFER_WINDING_SHIFT & ABUFFER_WINDING_MASK) - ABUFFER_WINDING_ZERO;
@@ -76,13 +85,15 @@ float plane_depth(column_sample s, vec2 from_middle)
     return s.depth + (shift < SPAN ? shift > -SPAN ? shift : -SPAN : SPAN);
 }
 
-// The first of a column's samples that is not before a depth.
+// From which of a column's samples on to look for those that are not before a depth. A few before it are as soon passed
+// as found.
+const int PASSED = 4;
+
 int sample_from(column c, float depth)
 {
-    while (c.first < c.end) {
+    while (c.end - c.first > PASSED) {
         int middle = (c.first + c.end) >> 1;
-        ABUFFER_COUNT(z);
-        bool is_before = uintBitsToFloat(texelFetch(abuffer_samples, middle).x) < depth;
+        bool is_before = depth_of(words_at(middle)) < depth;
         c.first = is_before ? middle + 1 : c.first;
         c.end = is_before ? c.end : middle;
     }
@@ -96,17 +107,17 @@ int winding_at(int axis, vec3 p)
     vec2 from_middle = p.xy - vec2(texel) - 0.5;
     column c = column_at(axis, texel);
     int winding = 0; // behind all samples
-    int i = sample_from(c, p.z - SPAN);
-    if (i < c.end) {
-        column_sample s = sample_at(i, axis);
-        winding = s.behind - s.step_;
-        while (s.depth <= p.z + SPAN) {
-            winding += plane_depth(s, from_middle) < p.z ? s.step_ : 0;
-            i++;
-            if (i >= c.end)
-                break;
-            s = sample_at(i, axis);
-        }
+    bool is_first = true;
+    for (int i = sample_from(c, p.z - SPAN); i < c.end; i++) {
+        uvec2 words = words_at(i);
+        if (depth_of(words) < p.z - SPAN)
+            continue;
+        column_sample s = sample_of(words, axis);
+        winding = is_first ? s.behind - s.step_ : winding;
+        is_first = false;
+        if (s.depth > p.z + SPAN)
+            break;
+        winding += plane_depth(s, from_middle) < p.z ? s.step_ : 0;
     }
     return winding;
 }

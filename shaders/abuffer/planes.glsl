@@ -15,12 +15,11 @@ const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.2;
 // positive where it comes from behind.
 bool cross_plane(vec3 o, vec3 d, float s_least, ivec2 texel, column_sample p, out float s, out float side)
 {
-    float height = dot(p.normal, vec3(vec2(texel) + 0.5, p.depth) - o) - s_least * dot(p.normal, d);
+    float height = dot(p.normal, vec3(vec2(texel) + 0.5, p.depth) - o);
     side = dot(p.normal, d);
-    float way = height / side;
-    s = way + s_least;
+    s = height / side;
     float own = side > 0.0 ? OWN_BEHIND * OWN_BEHIND : OWN_BEFORE * OWN_BEFORE;
-    return way > 0.0 && !(way < OWN_WAY && height * height < own * dot(p.normal, p.normal));
+    return s > s_least && !(s < s_least + OWN_WAY && height * height < own * dot(p.normal, p.normal));
 }
 
 // Some surfaces are in several images, and are looked for in those that show them.
@@ -50,9 +49,12 @@ bool search_image(trace_ray r, inout voxel_walk w, inout abuffer_found found, in
         float least_ = (z_in < z_out ? z_in : z_out) - SPAN, greatest_ = (z_in < z_out ? z_out : z_in) + SPAN;
         column c = column_at(axis, texel);
         for (int i = sample_from(c, least_); i < c.end; i++) {
-            column_sample p = sample_at(i, axis);
-            if (p.depth > greatest_)
+            uvec2 words = words_at(i);
+            if (depth_of(words) > greatest_)
                 break;
+            if (depth_of(words) < least_)
+                continue;
+            column_sample p = sample_of(words, axis);
             float s_plane, side;
             bool crosses = cross_plane(o, d, w.s_least, texel, p, s_plane, side);
             vec2 from_middle = abs(o.xy + s_plane * d.xy - vec2(texel) - 0.5);

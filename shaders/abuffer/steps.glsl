@@ -52,9 +52,12 @@ int winding_at_origin(voxel_walk w, uint what)
         int own_winding = 0;
         bool is_own = false, goes_along = false;
         for (int i = sample_from(c, p.z - SPAN); i < c.end; i++) {
-            column_sample q = sample_at(i, axis);
-            if (q.depth > p.z + SPAN)
+            uvec2 words = words_at(i);
+            if (depth_of(words) > p.z + SPAN)
                 break;
+            if (depth_of(words) < p.z - SPAN)
+                continue;
+            column_sample q = sample_of(words, axis);
             float inverse = inversesqrt(dot(q.normal, q.normal)), side = dot(q.normal, d) * inverse;
             float distance_ = abs(dot(q.normal, p - vec3(vec2(texel) + 0.5, q.depth))) * inverse;
             if (q.step_ != 0 && distance_ < nearest) {
@@ -84,9 +87,10 @@ bool follow(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis
         float nearest = 1e30, nearest_side = 0.0;
         int nearest_sample = 0;
         for (int i = sample_from(c, p.z - FOLLOW_REACH); i < c.end; i++) {
-            column_sample q = sample_at(i, axis);
-            if (q.depth > p.z + FOLLOW_REACH)
+            uvec2 words = words_at(i);
+            if (depth_of(words) > p.z + FOLLOW_REACH)
                 break;
+            column_sample q = sample_of(words, axis);
             float s_plane, side;
             if (cross_plane(o, d, w.s_least, texel, q, s_plane, side) && abs(s_plane - s) < abs(nearest - s) &&
                 (!only_leaning || leans(q))) {
@@ -114,12 +118,14 @@ bool follow(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis
 int nearest_sample(int axis, vec3 p)
 {
     column c = column_at(axis, texel_of(p.xy));
-    int i = sample_from(c, p.z);
-    if (c.first == c.end)
-        return -1;
-    float before = i > c.first ? p.z - sample_at(i - 1, axis).depth : 1e30;
-    float behind = i < c.end ? sample_at(i, axis).depth - p.z : 1e30;
-    return before < behind ? i - 1 : i;
+    int nearest = -1;
+    float least_ = 1e30;
+    for (int i = c.first; i < c.end; i++) {
+        float away = abs(depth_of(words_at(i)) - p.z);
+        nearest = away < least_ ? i : nearest;
+        least_ = away < least_ ? away : least_;
+    }
+    return nearest;
 }
 
 // A surface is passed between lo and hi.
@@ -143,7 +149,7 @@ void refine(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis
         int i = nearest_sample(axis, place_in_image(w, axis, hi));
         i = i < 0 ? nearest_sample(axis, place_in_image(w, axis, lo)) : i;
         if (i >= 0)
-            offer_at(r, w, found, i, hi, dot(sample_at(i, axis).normal, in_image(w.ray.d, axis)));
+            offer_at(r, w, found, i, hi, dot(sample_of(words_at(i), axis).normal, in_image(w.ray.d, axis)));
     }
 }
 
@@ -185,23 +191,23 @@ void search_open(trace_ray r, inout voxel_walk w, inout abuffer_found found, fou
     float lo = here.s_in, step_ = (end - lo) * (1.0 / float(ABUFFER_STEPS));
     for (int k = 1; k <= ABUFFER_STEPS && lo < w.s_limit; k++) {
         float hi = here.s_in + float(k) * step_;
-        for (uint images = here.what & ABUFFER_VOXEL_IMAGES; images != 0u; images &= images - 1u) {
-            int axis = findLSB(images);
+        {
+            int axis = image_of(here.what, w.ray.d);
             vec3 o = in_image(w.ray.o, axis), d = in_image(w.ray.d, axis), p = o + hi * d;
             ivec2 texel = texel_of(p.xy);
             float reach = 2.0 * (hi - lo) + SPAN, nearest = w.s_limit;
             column c = column_at(axis, texel);
             for (int i = sample_from(c, p.z - reach); i < c.end; i++) {
-                column_sample q = sample_at(i, axis);
-                if (q.depth > p.z + reach)
+                uvec2 words = words_at(i);
+                if (depth_of(words) > p.z + reach)
                     break;
+                column_sample q = sample_of(words, axis);
                 float s, side;
-                if (cross_plane(o, d, w.s_least, texel, q, s, side) && s > lo - 4.0 && s < hi + 4.0 && s < nearest &&
-                    leans(q))
+                if (cross_plane(o, d, w.s_least, texel, q, s, side) && s > lo - 4.0 && s < hi + 4.0 && s < nearest)
                     nearest = s;
             }
             if (nearest < w.s_limit)
-                follow(r, w, found, axis, true, nearest, lo, hi);
+                follow(r, w, found, axis, false, nearest, lo, hi);
         }
         lo = hi;
     }

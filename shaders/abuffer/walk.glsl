@@ -29,6 +29,10 @@ void begin_walk(trace_ray r, float end, out voxel_walk w)
 {
     float along = float(abuffer_grid << 2), voxels_a_cell = along / float(abuffer_resolution);
     w.ray = cell_ray_of(r, abuffer_place, float(abuffer_resolution));
+    // Its origin is where it begins, unless that is far away.
+    float s_begin = w.ray.begin > 0.0 ? 0.0 : r.t_min * w.ray.scale;
+    w.ray.o += s_begin * w.ray.d;
+    w.ray.begin += s_begin;
     bvec3 down = lessThan(w.ray.d, vec3(0.0));
     w.flip = -ivec3(down);
     w.octant_shift = 4 * (int(down.x) + 2 * int(down.y) + 4 * int(down.z));
