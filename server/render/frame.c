@@ -25,15 +25,24 @@
 #include <string.h>
 
 /* Rays of a slice. Software GL has no latency to hide, and its caches are the CPU's; a GPU wants enough rays to
- * fill itself. Waves have room for twice as many: mirrors and glass rarely fill a slice. A step traces no more than
- * that: on software GL, where incoherent rays take about half a microsecond each, a few milliseconds. */
+ * fill itself. Waves have room for twice as many: mirrors and glass rarely fill a slice. A step traces no more
+ * than that: on software GL, where incoherent rays take about half a microsecond each, a few milliseconds. */
 #define SLICE_RAYS_SOFTWARE (1u << 14)
 #define SLICE_RAYS_HARDWARE (1u << 18)
 #define WAVE_PER_SLICE 2
 /* Textures of a picture that goes on and on are taken as if it had so many samples. */
 #define SAMPLES_GOING_ON 16
 
-enum frame_phase { PHASE_IDLE, PHASE_SAMPLE, PHASE_SLICE, PHASE_LAYERS, PHASE_SHADE, PHASE_TRACE, PHASE_RESOLVE };
+enum frame_phase {
+    PHASE_IDLE,
+    PHASE_SAMPLE,
+    PHASE_RASTER,
+    PHASE_SLICE,
+    PHASE_LAYERS,
+    PHASE_SHADE,
+    PHASE_TRACE,
+    PHASE_RESOLVE
+};
 
 struct frame_renderer {
     struct gpu_device *device;
@@ -335,9 +344,18 @@ static bool begin_sample(struct frame_renderer *renderer, struct error *error)
     place_sample(renderer);
     context->wave_number = 0;
     slices_restart(&renderer->slices);
-    renderer->phase = PHASE_SLICE;
-    return context_upload_uniforms(context, error) &&
-           (!renderer->rasterise || primary_rasterise(&renderer->primary, context, error));
+    renderer->phase = renderer->rasterise ? PHASE_RASTER : PHASE_SLICE;
+    primary_rasterise_begin(&renderer->primary);
+    return context_upload_uniforms(context, error);
+}
+
+static bool rasterise(struct frame_renderer *renderer, struct error *error)
+{
+    bool done = false;
+    if (!primary_rasterise(&renderer->primary, &renderer->context, &done, error))
+        return false;
+    renderer->phase = done ? PHASE_SLICE : PHASE_RASTER;
+    return true;
 }
 
 static bool begin_slice(struct frame_renderer *renderer, struct error *error)
@@ -487,6 +505,9 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
         return FRAME_FAILED;
     case PHASE_SAMPLE:
         good = begin_sample(renderer, error);
+        break;
+    case PHASE_RASTER:
+        good = rasterise(renderer, error);
         break;
     case PHASE_SLICE:
         good = begin_slice(renderer, error);
