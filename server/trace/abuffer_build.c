@@ -94,7 +94,8 @@ static bool reserve(struct abuffer_task *task, struct error *error)
         return error_set(error, ERROR_LIMIT, "options.abuffer_voxels",
                          "%llu voxels are more than the device takes", (unsigned long long)voxels);
     size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
-    return gpu_buffer_reserve(device, &builder->heads, texel_numbers, error) &&
+    return abuffer_texels_allowed(task, error) &&
+           gpu_buffer_reserve(device, &builder->heads, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->build, sizeof(task->counts), error) &&
            gpu_buffer_reserve(device, &store->sums, (size_t)voxels * ABUFFER_SUM_BYTES, error) &&

@@ -78,7 +78,7 @@ void mark(float least_cells, float greatest_cells, int bits)
 void add_normal(float depth_cells, vec3 normal_duv)
 {
     ivec3 voxel = ivec3(vec3(depth_cells, gl_FragCoord.xy) * voxels_per_cell), step_ = strides();
-    voxel = min(voxel, ivec3(int(voxels_along) - 1));
+    voxel = clamp(voxel, ivec3(0), ivec3(int(voxels_along) - 1));
     ivec3 units = ivec3(round(normal_duv * float(ABUFFER_NORMAL_UNIT)));
     int at = voxel.x * step_.x + voxel.y * step_.y + voxel.z * step_.z;
     int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
