@@ -190,7 +190,7 @@ $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 MODEL_OBJ := $(B)/tests/bench/load_model.o
 RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIVAL_SOURCES)
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
-$(B)/tests/unit/test_load_model: $(MODEL_OBJ)
+$(B)/tests/unit/test_load_model $(B)/tests/accuracy/test_abuffer_against_reference: $(MODEL_OBJ)
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/unit/test_bench_svo: $(RIVAL_OBJ)

@@ -197,6 +197,7 @@ static void set_state(uint32_t along)
     glDisable(GL_BLEND);
     glDisable(GL_SCISSOR_TEST);
     glDisable(GL_CULL_FACE);
+    glFrontFace(GL_CCW); /* gl_FrontFacing: others leave it either way */
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
 }
 

@@ -102,6 +102,8 @@ void meet_lamps(inout path p, eye_hit e, vec3 origin, vec3 direction, float foun
         if (found > 0.0 && e.all_lights > 0.0)
             share = heuristic(found, probability * light_estimate(i, e.receiver) / e.all_lights);
         float size = share * greatest(l.colour.rgb);
+        if (!(size > 0.0)) // brings nothing, and would be divided by
+            continue;
         sum += size;
         if (!(size > choice * sum)) {
             choice = (choice * sum - size) / (sum - size);

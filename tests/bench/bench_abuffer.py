@@ -105,7 +105,7 @@ def measure_table1(bench, left_out):
 def measure_accuracy(bench, left_out):
     rays = 8 if bench.tiny else ACCURATE_RAYS
     names = forms(abuffer(resolution(bench) if bench.tiny else None, search=search) for search in SEARCHES)
-    return [call(bench, "frames", title, 1, *model, "--integrator", "ao", "--ao-rays", rays, *size(bench, "256x256"), "--once",
+    return [call(bench, "frames", title, 1, *model, "--integrator", "ao", "--ao-rays", rays, *size(bench, "128x128"), "--once",
                  *names)
             for title, model in models(bench, [*OCCLUDED, *ROOM], left_out)]
 
@@ -115,7 +115,7 @@ def measure_voxels(bench, left_out):
     grids = (16, 32) if bench.tiny else GRIDS
     texels = resolution(bench) if bench.tiny else None
     names = forms([*(abuffer(texels, voxels=n) for n in grids), abuffer(texels)])
-    return call(bench, "frames", title, 2, *model, "--integrator", "ao", "--ao-rays", 8, *size(bench, "256x256"), *names)
+    return call(bench, "frames", title, 2, *model, "--integrator", "ao", "--ao-rays", 8, *size(bench, "160x160"), *names)
 
 
 def measure(bench):
@@ -135,7 +135,7 @@ def measure(bench):
 
 def by_search(result):
     """{search: form} of one of `searches`, and bvh."""
-    return {**{search: form for form in result["forms"] for search in SEARCHES if form["name"].endswith("search=" + search)},
+    return {**{search: form for search in SEARCHES for form in result["forms"] if form["name"].endswith("=" + search)},
             "bvh": form_of(result, "bvh")}
 
 
@@ -199,8 +199,9 @@ def even_row(result):
 def build_rows(results):
     for result in results:
         for texels, ours, plain in build_pairs(result):
-            yield row("abuffer, build / a pass for depths alone", BUILD_MOST, paired_ratio(ours["build_ns"], plain["build_ns"]),
-                      f"{result['title']}, {texels} texels", at_most=True)
+            yield row("abuffer, build / a pass for depths alone", BUILD_MOST,
+                      paired_ratio(ours["build_ns"], plain["build_ns"]), f"{result['title']}, {texels} texels",
+                      at_most=True)
 
 
 def octree_rows(rows):

@@ -94,14 +94,16 @@ def show_voxels(result):
 
 def show(data):
     return "\n\n".join((
-        "Searches, whole pictures and their rays (figure 6): depth 3, or 8 rays of ambient occlusion a pixel. A ratio above 1 is\n"
-        "faster than dda.", show_searches(data["searches"]),
+        "Searches, whole pictures and their rays (figure 6): depth 3, or 8 rays of ambient occlusion a pixel. A ratio above\n"
+        "1 is faster than dda.", show_searches(data["searches"]),
         f"Waves of {', '.join(WAVES)} rays by themselves; nodes are blocks of voxels.", show_waves(data["searches"]),
         f"Ambient occlusion with more rays, {data['rays']['title']}", show_rays(data["rays"]),
-        "Building, beside a pass over the same triangles that keeps the nearest depths and nothing else", show_builds(data["builds"]),
-        "Beside an octree of as many cells (table 1): svo-tiles as Crassin and Green have it, and walked from the root in each\n"
-        "step; svo-cells the same hits, with records of two levels, a stack, and fragments that know where they have come to;\n"
-        "svo-planes with a plane in each leaf, as near to the surface as A-buffers are. abuffer: linear3, as in the paper.",
+        "Building, beside a pass over the same triangles that keeps the nearest depths and nothing else",
+        show_builds(data["builds"]),
+        "Beside an octree of as many cells (table 1): svo-tiles as Crassin and Green have it, and walked from the root in\n"
+        "each step; svo-cells the same hits, with records of two levels, a stack, and fragments that know where they have\n"
+        "come to; svo-planes with a plane in each leaf, as near to the surface as A-buffers are. abuffer: linear3, as in the\n"
+        "paper. Others: all of the picture but its rays.",
         show_table1(data["table1"]),
         f"Ambient occlusion with {ACCURATE_RAYS} rays, beside the reference", show_accuracy(data["accuracy"]),
         f"Voxels along a side, {data['voxels']['title']}", show_voxels(data["voxels"]),

@@ -143,7 +143,8 @@ static inline uint32_t abuffer_pack_normal(const float n[3])
     return ((uint32_t)lrintf(p[0] * 2047) & 0xfff) | ((uint32_t)lrintf(p[1] * 2047) & 0xfff) << 12;
 }
 
-static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[4], const struct abuffer_sample *at)
+static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[4],
+                               const struct abuffer_sample *at)
 {
     const uint32_t n = s->resolution, axis = at->texel / (n * n), iu = (axis + 1) % 3, iv = (axis + 2) % 3;
     const float voxel = (float)n / (float)s->voxels_along;

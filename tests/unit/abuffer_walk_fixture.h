@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A-buffers of shapes, every way in which they are searched, and waves through them: for the tests of the walk. All is
- * in cells, which are as wide as the world's unit. */
+/* A-buffers of shapes, every way in which they are searched, and waves through them: for the tests of the walk.
+ * All is in cells, which are as wide as the world's unit. */
 #ifndef FARLIGHT_TESTS_ABUFFER_WALK_FIXTURE_H
 #define FARLIGHT_TESTS_ABUFFER_WALK_FIXTURE_H
 
@@ -101,7 +101,8 @@ static inline void trace(struct fixture *fixture, const struct tracer_options *o
 
 static inline void add_quad(struct abuffer_samples *s, const double p[4][3], bool is_body)
 {
-    const double first[3][3] = {{p[0][0], p[0][1], p[0][2]}, {p[1][0], p[1][1], p[1][2]}, {p[2][0], p[2][1], p[2][2]}};
+    const double first[3][3] = {
+        {p[0][0], p[0][1], p[0][2]}, {p[1][0], p[1][1], p[1][2]}, {p[2][0], p[2][1], p[2][2]}};
     const double second[3][3] = {
         {p[0][0], p[0][1], p[0][2]}, {p[2][0], p[2][1], p[2][2]}, {p[3][0], p[3][1], p[3][2]}};
     abuffer_add_triangle(s, first, is_body);
@@ -109,7 +110,8 @@ static inline void add_quad(struct abuffer_samples *s, const double p[4][3], boo
 }
 
 /* Outside is outside. */
-static inline void add_ball(struct abuffer_samples *s, const double centre[3], double radius, int steps, bool is_body)
+static inline void add_ball(struct abuffer_samples *s, const double centre[3], double radius, int steps,
+                            bool is_body)
 {
     for (int i = 0; i < steps; i++) {
         for (int j = 0; j < 2 * steps; j++) {
@@ -145,9 +147,8 @@ static inline void add_box(struct abuffer_samples *s, const double lower[3], con
 
 static inline struct ray ray_from(const double origin[3], const double direction[3], float t_min, float t_max)
 {
-    return (struct ray){
-        .origin_t_min = {(float)origin[0], (float)origin[1], (float)origin[2], t_min},
-        .direction_t_max = {(float)direction[0], (float)direction[1], (float)direction[2], t_max}};
+    return (struct ray){.origin_t_min = {(float)origin[0], (float)origin[1], (float)origin[2], t_min},
+                        .direction_t_max = {(float)direction[0], (float)direction[1], (float)direction[2], t_max}};
 }
 
 /* Runs the tests on a device of their own. Returns main()'s status. */

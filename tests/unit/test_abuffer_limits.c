@@ -23,9 +23,7 @@ static void build_and_read(struct fixture *fixture, struct contents *contents, u
 static void many_layers_are_sorted(void **state)
 {
     (void)state;
-    static const uint32_t counts[] = {
-        3,   4, 5, ABUFFER_RESOLVE_SORTS, ABUFFER_RESOLVE_SORTS + 1, 251, ABUFFER_LIST_MAX, ABUFFER_LIST_MAX + 1,
-        3001};
+    static const uint32_t counts[] = {3, 4, 5, 7, 8, 9, 33, 251, ABUFFER_LIST_MAX, ABUFFER_LIST_MAX + 1, 3001};
     for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++)
         for (int order = FRONT_TO_BACK; order <= SHUFFLED; order++) {
             struct fixture fixture;
@@ -176,6 +174,24 @@ static void more_than_is_allowed_is_refused_with_what_it_needs(void **state)
     fixture_finish(&fixture);
 }
 
+/* Of a high resolution the texels are most of it, and are refused before there is memory for any. */
+static void texels_alone_may_be_more_than_is_allowed(void **state)
+{
+    (void)state;
+    const uint32_t resolution = 512; /* 12 MiB */
+    struct fixture fixture;
+    fixture_init(&fixture, stack_scene(1, FRONT_TO_BACK, false));
+    fixture.options.abuffer_mebibytes_max = 11;
+    place(&fixture, resolution, VOXELS);
+    uint64_t before = device->memory_used_bytes;
+    expect_refused(&fixture, ERROR_LIMIT, "abuffer");
+    assert_in_range(device->memory_used_bytes, before, before + ((uint64_t)1 << 20)); /* the list of instances */
+    fixture.options.abuffer_mebibytes_max = 64;
+    build(&fixture, resolution, VOXELS);
+    assert_in_range(fixture.store.sample_count, (resolution - 1) * (resolution - 1), UINT32_MAX);
+    fixture_finish(&fixture);
+}
+
 /* Each device has a size beyond which it reads nothing of a buffer, and only so much memory. */
 static void what_a_device_cannot_hold_is_refused(void **state)
 {
@@ -289,6 +305,7 @@ int main(void)
         cmocka_unit_test(coincident_surfaces_keep_their_order),
         cmocka_unit_test(lists_that_do_not_fit_are_made_anew),
         cmocka_unit_test(more_than_is_allowed_is_refused_with_what_it_needs),
+        cmocka_unit_test(texels_alone_may_be_more_than_is_allowed),
         cmocka_unit_test(what_a_device_cannot_hold_is_refused),
         cmocka_unit_test(a_scene_may_hold_nothing),
         cmocka_unit_test(what_lies_on_a_side_is_there),

@@ -63,10 +63,12 @@ static void a_ray_does_not_hit_the_ball_that_it_leaves(void **state)
                     }
                     /* Steps see of an open surface what goes on from a step's end; a ball's does not, of steps
                      * that end far beyond it. */
-                    const uint32_t most = body || f == DDA ? RAY_COUNT / 500 : RAY_COUNT / (f == LINEAR3 ? 250 : 15);
+                    const uint32_t most =
+                        body || f == DDA ? RAY_COUNT / 500 : RAY_COUNT / (f == LINEAR3 ? 250 : 15);
                     if (wrong > most || stopped > most)
-                        fail_msg("%s: %u of %u rays are wrong, %u any-hit ones, %s, %s, way %d", forms[f].name, wrong,
-                                 RAY_COUNT, stopped, body ? "body" : "open", inwards ? "inwards" : "outwards", way);
+                        fail_msg("%s: %u of %u rays are wrong, %u any-hit ones, %s, %s, way %d", forms[f].name,
+                                 wrong, RAY_COUNT, stopped, body ? "body" : "open",
+                                 inwards ? "inwards" : "outwards", way);
                 }
             }
         }
@@ -77,8 +79,9 @@ static void a_ray_does_not_hit_the_ball_that_it_leaves(void **state)
     free(visibility);
 }
 
-/* A floor with a box that stands on it in the middle of a cell: from the floor, a cell and more from the box, straight
- * and steeply towards it. And along the floor, as low as integrators begin, which the floor must not stop. */
+/* A floor with a box that stands on it in the middle of a cell: from the floor, a cell and more from the box,
+ * straight and steeply towards it. And along the floor, as low as integrators begin, which the floor must not
+ * stop. */
 static void what_stands_on_a_floor_is_met_from_a_cell_on(void **state)
 {
     (void)state;
@@ -94,7 +97,8 @@ static void what_stands_on_a_floor_is_met_from_a_cell_on(void **state)
             add_box(&fixture.samples, (const double[3]){2, 20.2, 2}, (const double[3]){238, low, 238}, true);
         else
             add_quad(&fixture.samples, floor_, false);
-        add_box(&fixture.samples, (const double[3]){wall, low, 80.2}, (const double[3]){182.7, 120.2, 160.3}, body);
+        add_box(&fixture.samples, (const double[3]){wall, low, 80.2}, (const double[3]){182.7, 120.2, 160.3},
+                body);
         fixture_build(&fixture);
         for (uint32_t i = 0; i < RAY_COUNT; i++) {
             const double away = (double)(i % 2 ? test_uniform(&seed, 1, 4) : test_uniform(&seed, 4, 110));
@@ -115,9 +119,11 @@ static void what_stands_on_a_floor_is_met_from_a_cell_on(void **state)
                     first = i;
                 }
             }
-            printf("floor, body %d, %s: %u wrong, one at %g of %g rise %g\n", body, forms[f].name, wrong,
-                   (double)hits[first].distance, wall - (double)rays[first].origin_t_min[0],
-                   (double)rays[first].direction_t_max[1]);
+            /* Beside an edge a step may end in the next texel, which its plane does not reach. */
+            if (wrong > (f == DDA ? 0 : RAY_COUNT / 1000))
+                fail_msg("%s, body %d: %u rays are wrong; one, %g from the wall, meets something at %g",
+                         forms[f].name, body, wrong, wall - (double)rays[first].origin_t_min[0],
+                         (double)hits[first].distance);
         }
         fixture_finish(&fixture);
     }
@@ -125,8 +131,8 @@ static void what_stands_on_a_floor_is_met_from_a_cell_on(void **state)
     free(hits);
 }
 
-/* In the corner of a room: from beside a wall, nearer than a cell, into it. What would look through it would see the sky
- * along all its corners. */
+/* In the corner of a room: from beside a wall, nearer than a cell, into it. What would look through it would see
+ * the sky along all its corners. */
 static void a_wall_beside_the_origin_is_not_passed(void **state)
 {
     (void)state;
@@ -168,7 +174,12 @@ static void a_wall_beside_the_origin_is_not_passed(void **state)
                     open += visibility[i] != 0;
                 }
             }
-            printf("corner, body %d, %s: %u wrong, any %u\n", body, forms[f].name, wrong, open);
+            /* So near the origin steps do not look: what began in the wall is met where it leaves that, or, with
+             * light, not at all. */
+            const uint32_t most = f == DDA ? 0 : RAY_COUNT / 12;
+            if (wrong > most || open > (f == DDA ? 0 : RAY_COUNT / 40))
+                fail_msg("%s, body %d: %u closest hits are wrong, %u rays pass the wall", forms[f].name, body,
+                         wrong, open);
         }
         fixture_finish(&fixture);
     }
@@ -179,7 +190,8 @@ static void a_wall_beside_the_origin_is_not_passed(void **state)
 
 /* ---- light that passes ---- */
 
-/* Glass whose every crossing leaves half of red, a quarter of green, all of blue. All samples are of its triangle. */
+/* Glass whose every crossing leaves half of red, a quarter of green, all of blue. All samples are of its triangle.
+ */
 static struct scene *scene_of_glass(void)
 {
     struct test_edits edits = {.scene = test_scene_create()};
@@ -204,8 +216,8 @@ static bool is_tint(uint32_t visibility, int crossings)
     return true;
 }
 
-/* Panes across and askew: neighbouring samples' planes overlap, but a pane tints once. A ball, which a ray enters and
- * leaves, does it twice. */
+/* Panes across and askew: neighbouring samples' planes overlap, but a pane tints once. A ball, which a ray enters
+ * and leaves, does it twice. */
 static void glass_tints_once_for_each_crossing(void **state)
 {
     (void)state;
@@ -218,7 +230,8 @@ static void glass_tints_once_for_each_crossing(void **state)
         assert_true(fixture.gpu.has_transmission);
         for (int pane = 0; pane < 3 && shape == 0; pane++) {
             const double x = 60 + 48 * pane, lean = 36 * (pane - 1);
-            const double p[4][3] = {{x - lean, 8, 8}, {x - lean, 8, 232}, {x + lean, 232, 232}, {x + lean, 232, 8}};
+            const double p[4][3] = {
+                {x - lean, 8, 8}, {x - lean, 8, 232}, {x + lean, 232, 232}, {x + lean, 232, 8}};
             add_quad(&fixture.samples, p, false);
         }
         if (shape > 0)
@@ -236,7 +249,10 @@ static void glass_tints_once_for_each_crossing(void **state)
             trace(&fixture, &forms[f].options, WAVE_ANY, rays, RAY_COUNT, NULL, visibility);
             for (uint32_t i = 0; i < RAY_COUNT; i++)
                 wrong += !is_tint(visibility[i], shape == 0 ? 3 : 2);
-            printf("tint, shape %d, %s: %u wrong\n", shape, forms[f].name, wrong);
+            /* Where it is grazed, and in cracks where images meet: a few rays in a thousand. */
+            if (wrong > (shape == 0 ? 0 : RAY_COUNT / 500))
+                fail_msg("%s, shape %d: %u of %u rays are not tinted once for each crossing", forms[f].name, shape,
+                         wrong, RAY_COUNT);
         }
         fixture_finish(&fixture);
     }
