@@ -19,12 +19,12 @@ struct abuffer_builder *abuffer_builder_create(struct gpu_device *device, struct
     return builder;
 }
 
-#define BUFFER_COUNT 5
+#define BUFFER_COUNT 6
 
 static void list_buffers(struct abuffer_builder *builder, struct gpu_buffer *buffers[BUFFER_COUNT])
 {
-    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->heads, &builder->nodes, &builder->occupied, &builder->deep,
-                                            &builder->build};
+    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->heads,  &builder->nodes, &builder->occupied,
+                                            &builder->longer, &builder->deep,  &builder->build};
     for (int i = 0; i < BUFFER_COUNT; i++)
         buffers[i] = all[i];
 }

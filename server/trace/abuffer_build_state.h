@@ -10,9 +10,8 @@
 struct abuffer_builder {
     struct gpu_device *device;
     struct axes_draw draw;
-    /* shared/abuffer_build.h; `deep`, R32UI: texels that are left to the host */
-    struct gpu_buffer heads, nodes, occupied, deep, build;
-    uint32_t nodes_max;   /* for which there is room in `nodes` */
+    struct gpu_buffer heads, nodes, occupied, longer, deep, build; /* shared/abuffer_build.h */
+    uint32_t nodes_max;                                            /* for which there is room in `nodes` */
     uint32_t nodes_first; /* so many at first; 0: chosen from the number of texels */
     uint32_t passes;      /* over the scene, of the last build */
     /* abuffer_build_plain() */
