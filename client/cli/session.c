@@ -14,6 +14,7 @@
 #define FIRST_PAUSE_MS 500u
 #define LONGEST_PAUSE_MS 30000u
 #define LONG_PASS_NS 1000000000u
+#define PASS_SAMPLES_MAX 65536u /* of one request, in the protocol */
 
 struct session {
     struct cli_job *job;
@@ -183,6 +184,7 @@ static uint32_t pass_samples(const struct cli_job *job, uint32_t held, uint32_t 
     uint32_t samples = job->pass_samples > 0 ? job->pass_samples : held > 0 ? held : 1;
     if (job->endless && job->pass_samples == 0 && last_ns > LONG_PASS_NS)
         samples = last;
+    samples = samples < PASS_SAMPLES_MAX ? samples : PASS_SAMPLES_MAX;
     return samples < total - held ? samples : total - held;
 }
 

@@ -66,6 +66,14 @@ bool shot_channel(const struct shot_reader *reader, const struct shot_value *at,
 bool shot_add_channel(const struct shot_reader *reader, const struct shot_value *at,
                       const struct fl_channel *channel, enum protocol_object_kind kind, const char *target);
 
+/* ---- shot_settings.c ---- */
+
+#define SHOT_SETTINGS_MAX 64
+/* Into `names`, which has room for SHOT_SETTINGS_MAX. Returns how many there are. */
+size_t shot_setting_names(const char **names);
+/* Those that the file's object has. */
+bool shot_settings(const struct shot_reader *reader, const struct shot_value *root);
+
 /* ---- shot_camera.c ---- */
 
 bool shot_camera(const struct shot_reader *reader, const struct shot_value *at);

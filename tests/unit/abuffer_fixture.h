@@ -3,27 +3,14 @@
 #ifndef FARLIGHT_TESTS_ABUFFER_FIXTURE_H
 #define FARLIGHT_TESTS_ABUFFER_FIXTURE_H
 
-#include "gpu/device.h"
+#include "tests/unit/device_fixture.h"
+
 #include "shared/abuffer.h"
 #include "trace/abuffer_build.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static struct gpu_device *device;
-
-static inline void expect_ok(bool ok, const struct error *error)
-{
-    if (!ok)
-        fail_msg("%s: %s", error->field, error->text);
-}
 
 struct fixture {
     struct scene *scene;
@@ -224,23 +211,6 @@ static inline void expect_same(const struct contents *a, const struct contents *
         assert_memory_equal(&a->ids[first], &b->ids[other], 4 * count);
     }
     assert_memory_equal(a->sums, b->sums, 16 * voxels);
-}
-
-static inline int open_device(void **state)
-{
-    (void)state;
-    struct error error = {0};
-    device = gpu_device_create(&(struct gpu_options){.index = -1, .debug = true}, &error);
-    if (!device)
-        print_message("no device: %s\n", error.text);
-    return device ? 0 : -1;
-}
-
-static inline int close_device(void **state)
-{
-    (void)state;
-    gpu_device_destroy(device);
-    return 0;
 }
 
 #endif

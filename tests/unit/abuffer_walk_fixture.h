@@ -5,24 +5,16 @@
 #define FARLIGHT_TESTS_ABUFFER_WALK_FIXTURE_H
 
 #include "tests/accuracy/test_scenes.h"
+#include "tests/unit/device_fixture.h"
 #include "tests/unit/abuffer_samples.h"
 
-#include "gpu/device.h"
-#include "shared/hit.h"
-#include "shared/ray.h"
 #include "trace/abuffer_trace.h"
 
 #include <float.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #define RAY_COUNT 4096u
 #define FAR 1e30f
 #define PI_D 3.14159265358979
-static struct gpu_device *device;
 
 static const struct form {
     const char *name;
@@ -40,12 +32,6 @@ struct fixture {
     struct abuffer_store store;
     struct abuffer_samples samples;
 };
-
-static inline void expect_ok(bool ok, const struct error *error)
-{
-    if (!ok)
-        fail_msg("%s: %s", error->field, error->text);
-}
 
 static inline void fixture_init(struct fixture *fixture, struct scene *scene, uint32_t resolution, uint32_t voxels)
 {
@@ -73,28 +59,22 @@ static inline void fixture_finish(struct fixture *fixture)
     abuffer_free(&fixture->samples);
 }
 
+struct walk {
+    struct fixture *fixture;
+    const struct tracer_options *options;
+};
+
+static inline bool walk_wave(void *user, const struct wave *wave, struct error *error)
+{
+    const struct walk *walk = user;
+    scene_gpu_bind(&walk->fixture->gpu);
+    return abuffer_trace(&walk->fixture->store, &walk->fixture->gpu, wave, walk->options, error);
+}
+
 static inline void trace(struct fixture *fixture, const struct tracer_options *options, enum wave_kind kind,
                          const struct ray *rays, uint32_t count, struct hit *hits, uint32_t *visibility)
 {
-    struct error error = {0};
-    struct gpu_buffer ray_buffer = {0}, answers = {0};
-    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, count * sizeof *rays, &error), &error);
-    expect_ok(gpu_buffer_reserve(device, &answers, count * sizeof *hits, &error), &error);
-    const struct wave wave = {.kind = kind,
-                              .ray_count = count,
-                              .rays = &ray_buffer,
-                              .hits = &answers,
-                              .visibility = &answers,
-                              .crossings_only = true};
-    scene_gpu_bind(&fixture->gpu);
-    expect_ok(abuffer_trace(&fixture->store, &fixture->gpu, &wave, options, &error), &error);
-    if (kind == WAVE_ANY)
-        gpu_buffer_read(device, &answers, 0, visibility, count * sizeof *visibility);
-    else
-        gpu_buffer_read(device, &answers, 0, hits, count * sizeof *hits);
-    expect_ok(gpu_check(device, "the walk", &error), &error);
-    gpu_buffer_finish(device, &ray_buffer);
-    gpu_buffer_finish(device, &answers);
+    trace_rays(walk_wave, &(struct walk){fixture, options}, kind, true, rays, count, hits, visibility);
 }
 
 /* ---- shapes ---- */
@@ -150,19 +130,5 @@ static inline struct ray ray_from(const double origin[3], const double direction
     return (struct ray){.origin_t_min = {(float)origin[0], (float)origin[1], (float)origin[2], t_min},
                         .direction_t_max = {(float)direction[0], (float)direction[1], (float)direction[2], t_max}};
 }
-
-/* Runs the tests on a device of their own. Returns main()'s status. */
-#define RUN_ON_A_DEVICE(tests)                                                                                    \
-    do {                                                                                                          \
-        struct error error = {0};                                                                                 \
-        device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);                                   \
-        if (!device) {                                                                                            \
-            printf("SKIP: no OpenGL device: %s\n", error.text);                                                   \
-            return 0;                                                                                             \
-        }                                                                                                         \
-        int failures = cmocka_run_group_tests(tests, NULL, NULL);                                                 \
-        gpu_device_destroy(device);                                                                               \
-        return failures;                                                                                          \
-    } while (0)
 
 #endif

@@ -3,27 +3,14 @@
 #ifndef FARLIGHT_TESTS_LDC_FIXTURE_H
 #define FARLIGHT_TESTS_LDC_FIXTURE_H
 
-#include "gpu/device.h"
+#include "tests/unit/device_fixture.h"
+
 #include "shared/ldc.h"
 #include "trace/ldc_build.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static struct gpu_device *device;
-
-static inline void expect_ok(bool ok, const struct error *error)
-{
-    if (!ok)
-        fail_msg("%s: %s", error->field, error->text);
-}
 
 /* A scene and cubes of it. */
 struct fixture {
@@ -201,23 +188,6 @@ static inline void expect_same(const struct contents *a, const struct contents *
         assert_memory_equal(a->geometry[sample_of(a, i)], b->geometry[sample_of(b, i)], 8 * count);
         assert_memory_equal(a->surface[sample_of(a, i)], b->surface[sample_of(b, i)], 16 * count);
     }
-}
-
-static inline int open_device(void **state)
-{
-    (void)state;
-    struct error error = {0};
-    device = gpu_device_create(&(struct gpu_options){.index = -1, .debug = true}, &error);
-    if (!device)
-        print_message("no device: %s\n", error.text);
-    return device ? 0 : -1;
-}
-
-static inline int close_device(void **state)
-{
-    (void)state;
-    gpu_device_destroy(device);
-    return 0;
 }
 
 #endif

@@ -129,14 +129,14 @@ static inline int ldc_by_texel(const void *a, const void *b)
     return x->depth < y->depth ? -1 : x->depth > y->depth;
 }
 
-static inline bool ldc_append(struct gpu_device *device, struct gpu_buffer *buffer, size_t kept_bytes,
+static inline bool ldc_append(struct gpu_device *on, struct gpu_buffer *buffer, size_t kept_bytes,
                               const void *data, size_t bytes, struct error *error)
 {
     char *whole = malloc(kept_bytes + bytes + 16);
     if (kept_bytes)
-        gpu_buffer_read(device, buffer, 0, whole, kept_bytes);
+        gpu_buffer_read(on, buffer, 0, whole, kept_bytes);
     memcpy(whole + kept_bytes, data, bytes);
-    bool ok = gpu_buffer_upload(device, buffer, whole, kept_bytes + bytes, error);
+    bool ok = gpu_buffer_upload(on, buffer, whole, kept_bytes + bytes, error);
     free(whole);
     return ok;
 }

@@ -4,25 +4,17 @@
 #define FARLIGHT_TESTS_LDC_WALK_FIXTURE_H
 
 #include "tests/accuracy/test_scenes.h"
+#include "tests/unit/device_fixture.h"
 #include "tests/unit/ldc_samples.h"
 
-#include "gpu/device.h"
-#include "shared/hit.h"
-#include "shared/ray.h"
 #include "trace/ldc_levels.h"
 #include "trace/ldc_trace.h"
 
 #include <float.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #define RAY_COUNT 4096u
 #define PI_F 3.14159265f
 #define FAR 1e30f
-static struct gpu_device *device;
 
 static const struct form {
     const char *name;
@@ -48,12 +40,6 @@ struct fixture {
     struct ldc_store store;
     struct ldc_samples samples[TRACER_CUBES_MAX];
 };
-
-static inline void expect_ok(bool ok, const struct error *error)
-{
-    if (!ok)
-        fail_msg("%s: %s", error->field, error->text);
-}
 
 static inline void start_samples(struct ldc_samples *s, uint32_t resolution, float size, float x, float y, float z)
 {
@@ -90,28 +76,22 @@ static inline void build(struct fixture *fixture, const struct tracer_options *o
         expect_ok(ldc_levels_build(&fixture->store, i, options, &error), &error);
 }
 
+struct walk {
+    struct fixture *fixture;
+    const struct tracer_options *options;
+};
+
+static inline bool walk_wave(void *user, const struct wave *wave, struct error *error)
+{
+    const struct walk *walk = user;
+    scene_gpu_bind(&walk->fixture->gpu);
+    return ldc_trace(&walk->fixture->store, &walk->fixture->gpu, wave, walk->options, error);
+}
+
 static inline void trace(struct fixture *fixture, const struct tracer_options *options, enum wave_kind kind,
                          const struct ray *rays, uint32_t count, struct hit *hits, uint32_t *visibility)
 {
-    struct error error = {0};
-    struct gpu_buffer ray_buffer = {0}, answers = {0};
-    expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, count * sizeof *rays, &error), &error);
-    expect_ok(gpu_buffer_reserve(device, &answers, count * sizeof *hits, &error), &error);
-    const struct wave wave = {.kind = kind,
-                              .ray_count = count,
-                              .rays = &ray_buffer,
-                              .hits = &answers,
-                              .visibility = &answers,
-                              .crossings_only = true};
-    scene_gpu_bind(&fixture->gpu);
-    expect_ok(ldc_trace(&fixture->store, &fixture->gpu, &wave, options, &error), &error);
-    if (kind == WAVE_ANY)
-        gpu_buffer_read(device, &answers, 0, visibility, count * sizeof *visibility);
-    else
-        gpu_buffer_read(device, &answers, 0, hits, count * sizeof *hits);
-    expect_ok(gpu_check(device, "the walk", &error), &error);
-    gpu_buffer_finish(device, &ray_buffer);
-    gpu_buffer_finish(device, &answers);
+    trace_rays(walk_wave, &(struct walk){fixture, options}, kind, true, rays, count, hits, visibility);
 }
 
 static inline void add_quad(struct ldc_samples *s, const float a[3], const float b[3], const float c[3],
@@ -164,19 +144,5 @@ static inline struct ray ray_from(const float origin[3], const float direction[3
     return (struct ray){.origin_t_min = {origin[0], origin[1], origin[2], t_min},
                         .direction_t_max = {direction[0], direction[1], direction[2], t_max}};
 }
-
-/* Runs the tests on a device of their own. Returns main()'s status. */
-#define RUN_ON_A_DEVICE(tests)                                                                                    \
-    do {                                                                                                          \
-        struct error error = {0};                                                                                 \
-        device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);                                   \
-        if (!device) {                                                                                            \
-            printf("SKIP: no OpenGL device: %s\n", error.text);                                                   \
-            return 0;                                                                                             \
-        }                                                                                                         \
-        int failures = cmocka_run_group_tests(tests, NULL, NULL);                                                 \
-        gpu_device_destroy(device);                                                                               \
-        return failures;                                                                                          \
-    } while (0)
 
 #endif

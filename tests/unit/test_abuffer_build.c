@@ -319,5 +319,5 @@ int main(void)
         cmocka_unit_test(a_crumpled_body_balances),
         cmocka_unit_test(what_is_cut_out_bounds_no_body),
     };
-    return cmocka_run_group_tests(tests, open_device, close_device);
+    RUN_ON_A_DEVICE(tests);
 }

@@ -311,5 +311,5 @@ int main(void)
         cmocka_unit_test(what_lies_on_a_side_is_there),
         cmocka_unit_test(a_build_again_allocates_nothing),
     };
-    return cmocka_run_group_tests(tests, open_device, close_device);
+    RUN_ON_A_DEVICE(tests);
 }

@@ -2,77 +2,17 @@
 /* What the tracer `abuffer` promises beside its answers: it is built when what it holds has changed and at no
  * other time, says how large it is, and is at hand again after a failure. */
 #include "abuffer_scenes.h"
-
-#include "gpu/device.h"
-#include "shared/hit.h"
-#include "shared/ray.h"
-#include "trace/scene_gpu.h"
-#include "trace/tracer.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
+#include "tracer_fixture.h"
 
 #define RESOLUTION 64u
 #define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
 #define NUMBER_ABUFFER 4
 
-static struct gpu_device *device;
 static const struct tracer_options small = {.abuffer_resolution = RESOLUTION};
-
-struct fixture {
-    struct scene *scene;
-    struct scene_gpu gpu;
-    struct test_edits edits;
-    struct tracer *tracer;
-    struct stage_times times; /* of the last update */
-    struct scene_motion motion;
-    uint64_t memory_before_bytes; /* of the device */
-};
-
-static void expect_ok(bool ok, const struct error *error)
-{
-    if (!ok)
-        fail_msg("%s: %s", error->field, error->text);
-}
-
-static bool try_update(struct fixture *fixture, struct error *error)
-{
-    struct scene_changes changes;
-    if (fixture->edits.count > 0)
-        test_commit(&fixture->edits);
-    const struct scene_motion *motion = fixture->motion.pose_count ? &fixture->motion : NULL;
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, error), error);
-    stage_times_begin(&fixture->times);
-    return tracer_update(fixture->tracer, &fixture->gpu, &changes, &fixture->times, error);
-}
-
-static void update(struct fixture *fixture)
-{
-    struct error error = {0};
-    expect_ok(try_update(fixture, &error), &error);
-}
 
 static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)
 {
-    struct error error = {0};
-    *fixture = (struct fixture){
-        .scene = scene, .edits = {.scene = scene}, .memory_before_bytes = device->memory_used_bytes};
-    scene_gpu_init(&fixture->gpu, device);
-    fixture->tracer = tracer_create(tracer_impl_by_number(NUMBER_ABUFFER), device, options, &error);
-    expect_ok(fixture->tracer != NULL, &error);
-    update(fixture);
-}
-
-static void fixture_finish(struct fixture *fixture)
-{
-    tracer_destroy(fixture->tracer);
-    scene_gpu_finish(&fixture->gpu);
-    scene_motion_finish(&fixture->motion);
-    scene_destroy(fixture->scene);
-    assert_int_equal(device->memory_used_bytes, fixture->memory_before_bytes);
+    fixture_init_by(fixture, NUMBER_ABUFFER, scene, options);
 }
 
 static const struct tracer_cube *cube(const struct fixture *fixture)
@@ -93,25 +33,6 @@ static void expect_built(const struct fixture *fixture, bool expected)
     assert_int_equal(timed[STAGE_GPU], expected);
     assert_int_equal(fixture->tracer->stats.uploaded_bytes > 0, expected);
     assert_int_equal(fixture->tracer->stats.nodes_rebuilt, expected ? fixture->tracer->stats.nodes : 0);
-}
-
-/* How far something is below a point at a height of 10, a little askew so that no ray lies on an edge between
- * cells; negative where nothing is. */
-static float distance_below(struct fixture *fixture, float x, float y)
-{
-    struct ray ray = {.origin_t_min = {x + 0.013f, y + 0.017f, 10, 0}, .direction_t_max = {0, 0, -1, 1e9f}};
-    struct gpu_buffer rays = {0}, hits = {0};
-    struct error error = {0};
-    struct hit hit;
-    expect_ok(gpu_buffer_upload(device, &rays, &ray, sizeof(ray), &error), &error);
-    expect_ok(gpu_buffer_reserve(device, &hits, sizeof(hit), &error), &error);
-    const struct wave wave = {.rays = &rays, .hits = &hits, .ray_count = 1};
-    scene_gpu_bind(&fixture->gpu);
-    expect_ok(tracer_trace(fixture->tracer, &fixture->gpu, &wave, &error), &error);
-    gpu_buffer_read(device, &hits, 0, &hit, sizeof(hit));
-    gpu_buffer_finish(device, &rays);
-    gpu_buffer_finish(device, &hits);
-    return hit.distance;
 }
 
 static void expect_distance(const struct fixture *fixture, float distance, double expected)
@@ -141,10 +62,7 @@ static struct scene *scene_of_boxes(uint32_t count)
 static void options_out_of_range_are_refused_by_name(void **state)
 {
     (void)state;
-    static const struct {
-        const char *field;
-        struct tracer_options options;
-    } rows[] = {
+    static const struct refused_options rows[] = {
         {"options.abuffer_resolution", {.abuffer_resolution = 15}},
         {"options.abuffer_resolution", {.abuffer_resolution = 4097}},
         {"options.abuffer_voxels", {.abuffer_voxels = 8}},
@@ -153,12 +71,7 @@ static void options_out_of_range_are_refused_by_name(void **state)
         {"options.abuffer_voxels", {.abuffer_resolution = 64, .abuffer_voxels = 128}},
         {"options.abuffer_search", {.abuffer_search = ABUFFER_SEARCH_LINEAR1 + 1}},
     };
-    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
-        struct error error = {0};
-        assert_null(tracer_create(tracer_impl_by_number(NUMBER_ABUFFER), device, &rows[i].options, &error));
-        assert_int_equal(error.kind, ERROR_INVALID);
-        assert_string_equal(error.field, rows[i].field);
-    }
+    expect_options_refused(NUMBER_ABUFFER, rows, sizeof(rows) / sizeof(rows[0]));
 }
 
 static void it_says_how_large_it_is(void **state)
@@ -322,23 +235,6 @@ static void voxels_follow_the_resolution(void **state)
     }
 }
 
-static int open_device(void **state)
-{
-    (void)state;
-    struct error error = {0};
-    device = gpu_device_create(&(struct gpu_options){.index = -1, .debug = true}, &error);
-    if (!device)
-        print_message("no device: %s\n", error.text);
-    return device ? 0 : -1;
-}
-
-static int close_device(void **state)
-{
-    (void)state;
-    gpu_device_destroy(device);
-    return 0;
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -351,5 +247,5 @@ int main(void)
         cmocka_unit_test(after_a_failure_the_next_update_starts_anew),
         cmocka_unit_test(voxels_follow_the_resolution),
     };
-    return cmocka_run_group_tests(tests, open_device, close_device);
+    RUN_ON_A_DEVICE(tests);
 }

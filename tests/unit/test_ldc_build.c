@@ -181,5 +181,5 @@ int main(void)
         cmocka_unit_test(a_surface_is_in_one_image_if_that_is_asked_for),
         cmocka_unit_test(both_builds_give_the_same_samples),
     };
-    return cmocka_run_group_tests(tests, open_device, close_device);
+    RUN_ON_A_DEVICE(tests);
 }

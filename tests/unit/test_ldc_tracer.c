@@ -2,81 +2,20 @@
 /* What the tracer `ldc` promises beside its answers: what stands still is built once, what moves alone costs its
  * frame, and it says how large its cells are and what was lost. That its answers are right to the size of a cell
  * is shown by tests/accuracy/test_ldc_against_reference.c. */
-#include "../accuracy/motion_scenes.h"
-#include "../accuracy/test_scenes.h"
+#include "tracer_fixture.h"
 
-#include "gpu/device.h"
 #include "render/tracer_set.h"
-#include "shared/hit.h"
-#include "shared/ray.h"
-#include "trace/scene_gpu.h"
-#include "trace/tracer.h"
-
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #define RESOLUTION 64u
 #define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
 #define NUMBER_BVH 0
 #define NUMBER_LDC 3
 
-static struct gpu_device *device;
 static const struct tracer_options small = {.ldc_resolution = RESOLUTION};
-
-struct fixture {
-    struct scene *scene;
-    struct scene_gpu gpu;
-    struct test_edits edits;
-    struct tracer *tracer;
-    struct stage_times times; /* of the last update */
-    struct scene_motion motion;
-    uint64_t memory_before_bytes; /* of the device */
-};
-
-static void expect_ok(bool ok, const struct error *error)
-{
-    if (!ok)
-        fail_msg("%s: %s", error->field, error->text);
-}
-
-static bool try_update(struct fixture *fixture, struct error *error)
-{
-    struct scene_changes changes;
-    if (fixture->edits.count > 0)
-        test_commit(&fixture->edits);
-    const struct scene_motion *motion = fixture->motion.pose_count ? &fixture->motion : NULL;
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, error), error);
-    stage_times_begin(&fixture->times);
-    return tracer_update(fixture->tracer, &fixture->gpu, &changes, &fixture->times, error);
-}
-
-static void update(struct fixture *fixture)
-{
-    struct error error = {0};
-    expect_ok(try_update(fixture, &error), &error);
-}
 
 static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)
 {
-    struct error error = {0};
-    *fixture = (struct fixture){
-        .scene = scene, .edits = {.scene = scene}, .memory_before_bytes = device->memory_used_bytes};
-    scene_gpu_init(&fixture->gpu, device);
-    fixture->tracer = tracer_create(tracer_impl_by_number(NUMBER_LDC), device, options, &error);
-    expect_ok(fixture->tracer != NULL, &error);
-    update(fixture);
-}
-
-static void fixture_finish(struct fixture *fixture)
-{
-    tracer_destroy(fixture->tracer);
-    scene_gpu_finish(&fixture->gpu);
-    scene_motion_finish(&fixture->motion);
-    scene_destroy(fixture->scene);
-    assert_int_equal(device->memory_used_bytes, fixture->memory_before_bytes);
+    fixture_init_by(fixture, NUMBER_LDC, scene, options);
 }
 
 static const struct tracer_cube *cube(const struct fixture *fixture, unsigned which)
@@ -150,28 +89,6 @@ static struct scene *scene_of_boxes(uint32_t count)
     return edits.scene;
 }
 
-static struct hit trace_one(struct fixture *fixture, struct ray ray)
-{
-    struct error error = {0};
-    struct gpu_buffer rays = {0}, hits = {0};
-    struct hit hit;
-    expect_ok(gpu_buffer_upload(device, &rays, &ray, sizeof(ray), &error), &error);
-    expect_ok(gpu_buffer_reserve(device, &hits, sizeof(hit), &error), &error);
-    scene_gpu_bind(&fixture->gpu);
-    const struct wave wave = {.ray_count = 1, .rays = &rays, .hits = &hits};
-    expect_ok(tracer_trace(fixture->tracer, &fixture->gpu, &wave, &error), &error);
-    gpu_buffer_read(device, &hits, 0, &hit, sizeof(hit));
-    gpu_buffer_finish(device, &rays);
-    gpu_buffer_finish(device, &hits);
-    return hit;
-}
-
-/* Down along z from z = 10, a little askew so that no ray lies on an edge between cells. */
-static float distance_below(struct fixture *fixture, float x, float y)
-{
-    return trace_one(fixture, (struct ray){{x + 0.013f, y + 0.017f, 10, 0}, {0, 0, -1, 1e9f}}).distance;
-}
-
 /* Boxes' tops are flat: the plane of a sample is the face, so distances are right to the rounding of cells. */
 static void expect_distance(float distance, double expected)
 {
@@ -184,10 +101,7 @@ static void expect_distance(float distance, double expected)
 static void options_out_of_range_are_refused_by_name(void **state)
 {
     (void)state;
-    static const struct {
-        const char *field;
-        struct tracer_options options;
-    } rows[] = {
+    static const struct refused_options rows[] = {
         {"options.ldc_resolution", {.ldc_resolution = 15}},
         {"options.ldc_resolution", {.ldc_resolution = 4097}},
         {"options.ldc_block", {.ldc_block = 1}},
@@ -204,12 +118,7 @@ static void options_out_of_range_are_refused_by_name(void **state)
         {"options.ldc_layers_together", {.ldc_layers_together = 3}},
         {"options.ldc_layers_max", {.ldc_layers_max = 256}},
     };
-    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
-        struct error error = {0};
-        assert_null(tracer_create(tracer_impl_by_number(NUMBER_LDC), device, &rows[i].options, &error));
-        assert_int_equal(error.kind, ERROR_INVALID);
-        assert_string_equal(error.field, rows[i].field);
-    }
+    expect_options_refused(NUMBER_LDC, rows, sizeof(rows) / sizeof(rows[0]));
 }
 
 static void the_size_of_a_cell_is_that_of_the_longest_side(void **state)
@@ -623,13 +532,5 @@ int main(void)
         cmocka_unit_test(rays_that_have_times_are_refused_where_something_moves),
         cmocka_unit_test(a_tracer_that_was_away_builds_what_has_changed_meanwhile),
     };
-    struct error error = {0};
-    device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);
-    if (!device) {
-        printf("SKIP: no OpenGL device: %s\n", error.text);
-        return 0;
-    }
-    int failures = cmocka_run_group_tests_name("layered depth cubes", tests, NULL, NULL);
-    gpu_device_destroy(device);
-    return failures;
+    RUN_ON_A_DEVICE(tests);
 }

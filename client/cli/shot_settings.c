@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: MIT */
+/* Members of a request file that the command line has, too: each is set as if it had been typed. */
+#include "cli/shot_read.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum type { WORD, WHOLE, REAL, SIZE, FLAG, WHOLE_OR_WORD, WORDS };
+
+static const struct setting {
+    const char *name, *option;
+    enum type type;
+    const char *example;
+} settings[] = {
+    {"frames", "frames", WORD, "\"1-240\""},
+    {"fps", "fps", REAL, "24"},
+    {"shard", "shard", WORD, "\"3/8\""},
+    {"size", "size", SIZE, "[1920, 1080]"},
+    {"samples", "samples", WHOLE, "16"},
+    {"depth", "depth", WHOLE, "8"},
+    {"seed", "seed", WHOLE, "1"},
+    {"exposure", "exposure", REAL, "0.5"},
+    {"tone_map", "tone-map", WORD, "\"neutral\""},
+    {"shutter", "shutter", REAL, "0.5"},
+    {"filter", "filter", WORD, "\"gaussian\""},
+    {"tracer", "tracer", WORD, "\"bvh\""},
+    {"bvh_bounds", "bvh-bounds", WORD, "\"box\""},
+    {"bvh_rays", "bvh-rays", WHOLE, "2"},
+    {"ldc_resolution", "ldc-resolution", WHOLE, "1024"},
+    {"ldc_block", "ldc-block", WHOLE, "8"},
+    {"ldc_build", "ldc-build", WORD, "\"lists\""},
+    {"ldc_levels", "ldc-levels", WORD, "\"pyramid\""},
+    {"ldc_images", "ldc-images", WORD, "\"one\""},
+    {"ldc_tolerance", "ldc-tolerance", REAL, "0.001"},
+    {"ldc_rays", "ldc-rays", WHOLE, "4"},
+    {"abuffer_resolution", "abuffer-resolution", WHOLE, "1280"},
+    {"voxels", "voxels", WHOLE_OR_WORD, "128"},
+    {"search", "search", WORD, "\"linear3\""},
+    {"integrator", "integrator", WORD, "\"distributed\""},
+    {"bounces", "bounces", WHOLE, "8"},
+    {"brdf", "brdf", WORD, "\"ward\""},
+    {"ao_distance", "ao-distance", REAL, "0.5"},
+    {"ao_falloff", "ao-falloff", REAL, "1"},
+    {"ao_rays", "ao-rays", WHOLE, "8"},
+    {"layer_opacity", "layer-opacity", REAL, "0.5"},
+    {"layers", "layers", WORDS, "[\"beauty\", \"depth\"]"},
+    {"primary", "primary", WORD, "\"raster\""},
+    {"encoding", "encoding", WORD, "\"zstd\""},
+    {"quality", "quality", WHOLE, "90"},
+    {"format", "format", WORD, "\"exr\""},
+    {"half", "half", FLAG, "true"},
+    {"float", "float", FLAG, "true"},
+    {"lossless", "lossless", FLAG, "true"},
+};
+#define SETTING_COUNT (sizeof settings / sizeof settings[0])
+_Static_assert(SETTING_COUNT <= SHOT_SETTINGS_MAX, "room for all names");
+
+static bool wrong_type(const struct shot_reader *reader, const struct shot_value *at,
+                       const struct setting *setting)
+{
+    static const char *const wanted[] = {[WORD] = "a string",
+                                         [WHOLE] = "a whole number, not less than 0",
+                                         [REAL] = "a number",
+                                         [SIZE] = "an array of two whole numbers",
+                                         [FLAG] = "true or false",
+                                         [WHOLE_OR_WORD] = "a whole number or a word",
+                                         [WORDS] = "an array of strings"};
+    char remedy[80];
+    snprintf(remedy, sizeof remedy, "such as \"%s\": %s", setting->name, setting->example);
+    return shot_wrong(reader, at, remedy, "must be %s", wanted[setting->type]);
+}
+
+/* 16.0 is a whole number, too. */
+static bool is_whole(const json_t *value)
+{
+    const double number = json_number_value(value);
+    return json_is_number(value) && number >= 0 && number <= 9007199254740992.0 && floor(number) == number;
+}
+
+/* "a,b"; NULL: not all are strings, or there is none. */
+static const char *joined(const json_t *array, char *text, size_t text_bytes)
+{
+    size_t used = 0;
+    for (size_t i = 0; i < json_array_size(array); i++) {
+        const char *word = json_string_value(json_array_get(array, i));
+        if (word == NULL || strchr(word, ',') != NULL || strlen(word) + 2 > text_bytes - used)
+            return NULL;
+        used += (size_t)snprintf(text + used, text_bytes - used, "%s%s", i > 0 ? "," : "", word);
+    }
+    return used > 0 ? text : NULL;
+}
+
+/* As it would be typed; NULL: it has the wrong type. */
+static const char *typed(const struct setting *setting, const json_t *value, char *text, size_t text_bytes)
+{
+    const json_t *width = json_array_get(value, 0), *height = json_array_get(value, 1);
+    switch (setting->type) {
+    case WORD:
+        return json_string_value(value);
+    case WHOLE:
+        snprintf(text, text_bytes, "%.0f", json_number_value(value));
+        return is_whole(value) ? text : NULL;
+    case REAL:
+        snprintf(text, text_bytes, "%.17g", json_number_value(value));
+        return json_is_number(value) ? text : NULL;
+    case SIZE:
+        snprintf(text, text_bytes, "%.0fx%.0f", json_number_value(width), json_number_value(height));
+        return json_array_size(value) == 2 && is_whole(width) && is_whole(height) ? text : NULL;
+    case WHOLE_OR_WORD:
+        snprintf(text, text_bytes, "%.0f", json_number_value(value));
+        if (json_is_string(value))
+            return isdigit((unsigned char)json_string_value(value)[0]) ? NULL : json_string_value(value);
+        return is_whole(value) ? text : NULL;
+    case WORDS:
+        return joined(value, text, text_bytes);
+    default:
+        return json_is_boolean(value) ? "" : NULL;
+    }
+}
+
+static bool apply_setting(const struct shot_reader *reader, const struct shot_value *at,
+                          const struct setting *setting)
+{
+    char text[256], remedy[sizeof reader->job->error.remedy];
+    const char *value = typed(setting, at->value, text, sizeof text);
+    if (value == NULL)
+        return wrong_type(reader, at, setting);
+    if (json_is_false(at->value))
+        return true;
+    value = setting->type == FLAG ? NULL : value;
+    error_t status = reader->set(reader->user, setting->option, value);
+    if (status == ARGP_ERR_UNKNOWN)
+        status = cli_job_set(reader->job, setting->option, value);
+    if (status == 0)
+        return true;
+    const struct fl_error why = reader->job->error;
+    snprintf(remedy, sizeof remedy, "such as \"%s\": %s", setting->name, setting->example);
+    return shot_wrong(reader, at, why.remedy[0] != '\0' ? why.remedy : remedy, "%s", why.text);
+}
+
+size_t shot_setting_names(const char **names)
+{
+    for (size_t i = 0; i < SETTING_COUNT; i++)
+        names[i] = settings[i].name;
+    return SETTING_COUNT;
+}
+
+bool shot_settings(const struct shot_reader *reader, const struct shot_value *root)
+{
+    for (size_t i = 0; i < SETTING_COUNT; i++) {
+        const struct shot_value at = shot_member(root, settings[i].name);
+        if (at.value != NULL && !apply_setting(reader, &at, &settings[i]))
+            return false;
+    }
+    return true;
+}
