@@ -196,7 +196,7 @@ $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/unit/test_bench_svo: $(RIVAL_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
 $(B)/tests/bench/bench_changes: $(B)/tests/bench/bench_stats.o
-$(B)/tests/bench/bench_forms: $(CONTEST_OBJ) $(RIVAL_OBJ) $(call obj,$(addprefix tests/bench/bench_,forms_frames.c forms_parse.c forms_rays.c forms_samples.c options.c))
+$(B)/tests/bench/bench_forms: $(CONTEST_OBJ) $(RIVAL_OBJ) $(call obj,$(addprefix tests/bench/bench_,forms_frames.c forms_parse.c forms_rays.c forms_samples.c options.c) tests/bench/plain_pass.c)
 $(B)/tests/bench/bench_parallel: $(CONTEST_OBJ)
 $(B)/tests/bench/bench_bvh: $(MODEL_OBJ) $(B)/tests/bench/bench_scene.o $(B)/tests/bench/bench_sheets.o $(B)/tests/bench/bench_waves.o
 $(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3

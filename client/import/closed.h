@@ -11,8 +11,7 @@ extern "C" {
 #endif
 
 /* `positions` are 3 floats a vertex, `indices` 3 a triangle, all of them in range; a corner is the place where it
- * is
- * (-0 is 0), whatever number it has, so that seams of normals and texture coordinates are none here. True:
+ * is (-0 is 0), whatever number it has, so that seams of normals and texture coordinates are none here. True:
  * - every edge has as many triangles that run along it one way as the other,
  * - no triangle is there both ways round: sheets that were given two sides, and parts that were simplified until
  * they had no thickness, bound nothing and would be lost,

@@ -262,6 +262,20 @@ void transmission(const building &b)
     b.set.unlit = extension(b.source.extensions, "KHR_materials_unlit") != nullptr;
 }
 
+void anisotropy(const building &b)
+{
+    const tinygltf::Value *brushed = extension(b.source.extensions, "KHR_materials_anisotropy");
+    if (!brushed)
+        return;
+    b.set.anisotropy =
+        limited(b.r, b.where, "anisotropyStrength", number(*brushed, "anisotropyStrength", 0), 0, 1);
+    b.set.anisotropy_rotation =
+        limited(b.r, b.where, "anisotropyRotation", number(*brushed, "anisotropyRotation", 0), -1000, 1000);
+    if (source_of(*brushed, "anisotropyTexture").index >= 0 && !b.all.collecting)
+        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
+                    "a texture of anisotropy is not shown; its strength and rotation are the same everywhere");
+}
+
 // The old model, approximately: what reflects more than a dielectric's 4 % is taken for metal.
 void specular_glossiness(const building &b)
 {
@@ -305,6 +319,7 @@ uint32_t material(reader &r, images &all, int index)
     emission(b);
     alpha(b);
     transmission(b);
+    anisotropy(b);
     specular_glossiness(b);
     if (all.collecting)
         return 0;

@@ -304,7 +304,8 @@ uint32_t import_add_material(struct import_scene *scene, const struct message_se
     if (!within(material->base_colour, 4, 0, 1) || !within(material->emission, 3, 0, 1e6f) ||
         !within(&material->metallic, 1, 0, 1) || !within(&material->roughness, 1, 0, 1) ||
         !within(&material->transmission, 1, 0, 1) || !within(&material->ior, 1, 1, 10) ||
-        !within(&material->alpha_cutoff, 1, 0, 1)) {
+        !within(&material->alpha_cutoff, 1, 0, 1) || !within(&material->anisotropy, 1, 0, 1) ||
+        !within(&material->anisotropy_rotation, 1, -1000, 1000)) {
         import_fail(scene, material->name, "a material has a number that is not allowed");
         return 0;
     }

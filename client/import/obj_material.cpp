@@ -256,6 +256,16 @@ void reflection(const tinyobj::material_t &m, message_set_material &set)
         set.metallic = 1;
 }
 
+// `anisor` counts turns.
+void anisotropy(const tinyobj::material_t &m, message_set_material &set)
+{
+    constexpr float turn = 6.28318531f;
+
+    set.anisotropy = unit(m.anisotropy);
+    if (std::fabs(m.anisotropy_rotation) <= 100) // NaN is not
+        set.anisotropy_rotation = m.anisotropy_rotation * turn;
+}
+
 void transparency(const tinyobj::material_t &m, message_set_material &set)
 {
     const float through = 1 - unit(m.dissolve), filter = greatest(m.transmittance);
@@ -333,6 +343,7 @@ uint32_t add_material(building &b, const tinyobj::material_t &m)
     set.double_sided = 1; // OBJ has no notion of sides
     set.name = m.name.c_str();
     reflection(m, set);
+    anisotropy(m, set);
     transparency(m, set);
     for (size_t c = 0; c < 3; c++)
         set.emission[c] = m.emission[c] > 0 ? std::min(m.emission[c], 1e6f) : 0;

@@ -352,8 +352,8 @@ struct fl_exporter_options {
 struct fl_export_options {
     const char *path;
     const char *format; /* "png", "jpeg", "exr", "hdr" where the path's ending does not say; may be NULL */
-    bool half;          /* EXR: half floats */
-    unsigned quality;   /* JPEG; 0: 95 */
+    bool half; /* EXR: half floats; of layers where they suffice: never distances, places, numbers of objects */
+    unsigned quality; /* JPEG; 0: 95 */
 };
 
 FL_API struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error);

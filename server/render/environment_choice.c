@@ -70,7 +70,7 @@ static void image_row(float *row, float *scratch, const struct scene_environment
         row[u] = 0.125f * (scratch[(u + width - 1) % width] + scratch[(u + 1) % width]) + 0.75f * scratch[u];
 }
 
-/* Means of the texels whose middles are in each cell. */
+/* Sums of the texels whose middles are in each cell. */
 static bool image_luminances(float *cells, const struct scene_environment *image, uint32_t rows, uint32_t columns)
 {
     uint32_t width = image->width, height = image->height;

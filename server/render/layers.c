@@ -43,11 +43,14 @@ void layers_begin_slice(struct layers *layers)
     layers->asked = 0;
 }
 
-/* A program that reads hits, in use, with all that these have bound. */
-static const struct gpu_program *use(struct render_context *context, const char *compute, struct error *error)
+/* A program that reads hits, in use, with all that these have bound; `own`: a define of its own, or NULL. */
+static const struct gpu_program *use(struct render_context *context, const char *compute, const char *own,
+                                     struct error *error)
 {
-    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 2] = {0};
+    struct gpu_define defines[CONTEXT_SURFACE_DEFINES + 3] = {0};
     size_t n = context_surface_defines(context, defines);
+    if (own)
+        defines[n++] = (struct gpu_define){own, "1"};
     if (context->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
     const struct gpu_program_source source = {.compute = compute, .defines = defines};
@@ -64,9 +67,11 @@ static const struct gpu_program *use(struct render_context *context, const char 
 /* All but how open a place is, which begins with 0. */
 static bool note_hits(struct layers *layers, struct render_context *context, struct error *error)
 {
+    bool needs_surface = layers->wanted & (LAYER_BIT_ALBEDO | LAYER_BIT_NORMAL);
     layers->plane_samples = context->ray_count;
     context_span_begin(context, STAGE_SHADE);
-    const struct gpu_program *program = use(context, "render/layers.comp", error);
+    const struct gpu_program *program =
+        use(context, "render/layers.comp", needs_surface ? "NEEDS_SURFACE" : NULL, error);
     if (program) {
         gpu_buffer_bind_storage(&layers->sums, BIND_LAYER_SUMS);
         gpu_uniform_uint(program, "ray_count", context->ray_count);
@@ -81,7 +86,7 @@ static bool make_ao_rays(struct layers *layers, struct render_context *context, 
                          struct error *error)
 {
     context_span_begin(context, STAGE_SHADE);
-    const struct gpu_program *program = use(context, "render/layers_ao.comp", error);
+    const struct gpu_program *program = use(context, "render/layers_ao.comp", NULL, error);
     if (program) {
         gpu_buffer_bind_storage(&layers->ao_rays, BIND_SHADOW_RAYS);
         if (context->scene->has_motion)
@@ -135,13 +140,27 @@ static bool gather_ao(struct layers *layers, struct render_context *context, uin
     return program && gpu_check(context->device, "ambient occlusion", error);
 }
 
+/* Whether the slice in hand has anything to add: other samples than the first have only zeros for some. */
+static bool adds(const struct render_context *context, enum frame_layer layer)
+{
+    return context->uniforms.sample_index == 0 || !layers_of_first_sample(layer);
+}
+
+static bool any_adds(const struct layers *layers, const struct render_context *context)
+{
+    for (enum frame_layer layer = LAYER_ALBEDO; layer < LAYER_COUNT; layer++)
+        if (layers->wanted & 1u << layer && adds(context, layer))
+            return true;
+    return false;
+}
+
 bool layers_step(struct layers *layers, struct render_context *context, bool *done, struct error *error)
 {
     uint32_t all = layers->wanted & LAYER_BIT_AO && context->hit_count > 0 ? context_ao_rays(context) : 0;
     if (!layers->noted) {
         layers->noted = true;
         *done = all == 0;
-        return note_hits(layers, context, error);
+        return !any_adds(layers, context) || note_hits(layers, context, error);
     }
     uint32_t left = all - layers->asked, together = context->wave_capacity / context->hit_count;
     uint32_t count = left < together ? left : together;
@@ -158,8 +177,7 @@ bool layers_accumulate(struct layers *layers, struct picture *picture, struct re
 {
     for (uint32_t plane = 0; plane < picture->plane_count; plane++) {
         enum frame_layer layer = picture_plane_layer(picture, plane);
-        /* Other samples than the first have only zeros to add. */
-        if (layer == LAYER_BEAUTY || (layers_of_first_sample(layer) && context->uniforms.sample_index > 0))
+        if (layer == LAYER_BEAUTY || !adds(context, layer))
             continue;
         uint32_t first_sum = plane_of(layers, 1u << layer) * layers->plane_samples;
         if (!picture_accumulate(picture, context, plane, &layers->sums, first_sum, error))

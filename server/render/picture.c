@@ -6,8 +6,9 @@
 
 #include <stdlib.h>
 
-/* Slots of a band: 64 MiB of sums, half of what software GL takes as one storage block. */
-#define BAND_SLOTS_MAX (1u << 22)
+/* Slots of a band: few enough that software GL turns them into pixels within some ten milliseconds, a step of the
+ * frame. It takes 32 times as many as one storage block. */
+#define BAND_SLOTS_MAX (1u << 18)
 
 static void free_bands(struct picture *picture, struct gpu_device *device)
 {

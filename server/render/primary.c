@@ -9,8 +9,10 @@
 
 #include <epoxy/gl.h>
 
-/* Keeps the number of a vertex in an int with room to spare. */
-#define DRAW_PRIMITIVES_MAX (1u << 24)
+/* Vertices that are drawn at once, in one step of the frame: on software GL they take some ten milliseconds where
+ * triangles are small. On a GPU as many as an int numbers, with room to spare. */
+#define DRAW_VERTICES_SOFTWARE (3u << 16)
+#define DRAW_VERTICES_HARDWARE (3u << 24)
 
 enum primitive_kind { PRIMITIVE_TRIANGLES, PRIMITIVE_SPHERES, PRIMITIVE_DISCS };
 static const unsigned vertices_per_primitive[] = {3, 36, 6};
@@ -52,72 +54,98 @@ static const struct gpu_program *use_program(struct render_context *context, enu
     return program;
 }
 
-static void draw(const struct gpu_program *program, enum primitive_kind kind, uint32_t instance, uint32_t first,
-                 uint32_t count)
+/* What is drawn one after the other, each under one program. */
+enum primitive_sort { SORT_WHOLE, SORT_WITH_HOLES, SORT_DISCS, SORT_SPHERES, SORT_COUNT };
+static const enum primitive_kind kind_of_sort[SORT_COUNT] = {PRIMITIVE_TRIANGLES, PRIMITIVE_TRIANGLES,
+                                                             PRIMITIVE_DISCS, PRIMITIVE_SPHERES};
+
+/* Primitives of an instance (all discs count as one) that are of a sort. */
+static uint32_t primitives_of(const struct scene_gpu *scene, enum primitive_sort sort, uint32_t instance,
+                              uint32_t *first)
 {
-    gpu_uniform_uint(program, "instance_index", instance);
-    while (count > 0) {
-        uint32_t part = count < DRAW_PRIMITIVES_MAX ? count : DRAW_PRIMITIVES_MAX;
-        gpu_uniform_uint(program, "first_primitive", first);
-        glDrawArrays(GL_TRIANGLES, 0, (GLsizei)(part * vertices_per_primitive[kind]));
-        first += part;
-        count -= part;
-    }
+    *first = 0;
+    if (sort == SORT_DISCS)
+        return scene->disc_count;
+    const struct geometry *geometry = &scene->geometries[scene->instances[instance].geometry].device;
+    enum primitive_sort own = SORT_SPHERES;
+    if (geometry->kind != GEOMETRY_SPHERES)
+        own = geometry->flags & GEOMETRY_HAS_CUTOUT ? SORT_WITH_HOLES : SORT_WHOLE;
+    *first = geometry->first_primitive;
+    return own == sort ? geometry->primitive_count : 0;
 }
 
-/* One of the three sorts of instances: meshes without holes, with holes, spheres; each under one program. */
-static bool draw_instances(struct render_context *context, enum primitive_kind kind, bool cutout,
-                           struct error *error)
+static bool has_cutout(const struct render_context *context, enum primitive_sort sort)
+{
+    return sort == SORT_WITH_HOLES || (sort != SORT_WHOLE && context->scene->has_cutout);
+}
+
+/* Goes on with a sort where the last part ended; what is left of `budget` vertices comes back. */
+static bool draw_sort(struct primary *primary, struct render_context *context, uint32_t *budget,
+                      struct error *error)
 {
     const struct scene_gpu *scene = context->scene;
+    enum primitive_sort sort = (enum primitive_sort)primary->sort;
+    enum primitive_kind kind = kind_of_sort[sort];
+    uint32_t end = sort == SORT_DISCS ? 1 : scene->instance_count;
     const struct gpu_program *program = NULL;
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
-        const struct instance *instance = &scene->instances[i];
-        const struct geometry *geometry = &scene->geometries[instance->geometry].device;
-        bool spheres = geometry->kind == GEOMETRY_SPHERES;
-        if (spheres != (kind == PRIMITIVE_SPHERES))
+    for (; primary->instance < end; primary->instance++, primary->primitive = 0) {
+        uint32_t first, count = primitives_of(scene, sort, primary->instance, &first) - primary->primitive;
+        if (count == 0)
             continue;
-        if (!spheres && ((geometry->flags & GEOMETRY_HAS_CUTOUT) != 0) != cutout)
-            continue;
-        if (!program) {
-            program = use_program(context, kind, cutout, error);
-            if (!program)
-                return false;
+        if (!program && !(program = use_program(context, kind, has_cutout(context, sort), error)))
+            return false;
+        uint32_t most = *budget / vertices_per_primitive[kind], part = count < most ? count : most;
+        if (sort == SORT_SPHERES) /* the picture's y runs down, which turns every winding round */
+            glFrontFace(scene->instances[primary->instance].flags & INSTANCE_MIRRORED ? GL_CCW : GL_CW);
+        gpu_uniform_uint(program, "instance_index", primary->instance);
+        gpu_uniform_uint(program, "first_primitive", first + primary->primitive);
+        if (part > 0)
+            glDrawArrays(GL_TRIANGLES, 0, (GLsizei)(part * vertices_per_primitive[kind]));
+        *budget -= part * vertices_per_primitive[kind];
+        primary->primitive += part;
+        if (part < count) {
+            *budget = 0;
+            return true;
         }
-        if (spheres) /* the picture's y runs down, which turns every winding round */
-            glFrontFace(instance->flags & INSTANCE_MIRRORED ? GL_CCW : GL_CW);
-        draw(program, kind, i, geometry->first_primitive, geometry->primitive_count);
     }
+    primary->instance = 0;
+    primary->sort++;
     return true;
 }
 
-static bool draw_discs(struct render_context *context, struct error *error)
+static bool draw_part(struct primary *primary, struct render_context *context, struct error *error)
 {
-    if (context->scene->disc_count == 0)
-        return true;
-    const struct gpu_program *program = use_program(context, PRIMITIVE_DISCS, context->scene->has_cutout, error);
-    if (program)
-        draw(program, PRIMITIVE_DISCS, 0, 0, context->scene->disc_count);
-    return program != NULL;
-}
-
-static bool draw_scene(struct render_context *context, struct error *error)
-{
-    if (!draw_instances(context, PRIMITIVE_TRIANGLES, false, error) ||
-        !draw_instances(context, PRIMITIVE_TRIANGLES, true, error) || !draw_discs(context, error))
-        return false;
-    /* Of a sphere's box the inner sides: they are there also when the eye is in the box. */
-    glEnable(GL_CULL_FACE);
-    glCullFace(GL_FRONT);
-    bool drawn = draw_instances(context, PRIMITIVE_SPHERES, context->scene->has_cutout, error);
-    glDisable(GL_CULL_FACE);
+    uint32_t budget = context->device->facts.software ? DRAW_VERTICES_SOFTWARE : DRAW_VERTICES_HARDWARE;
+    bool drawn = true;
+    while (drawn && budget > 0 && primary->sort < SORT_COUNT) {
+        if (primary->sort == SORT_SPHERES) { /* of a sphere's box the inner sides: they are there also when the eye
+                                              * is in the box */
+            glEnable(GL_CULL_FACE);
+            glCullFace(GL_FRONT);
+        }
+        drawn = draw_sort(primary, context, &budget, error);
+        glDisable(GL_CULL_FACE);
+    }
     return drawn;
 }
 
-bool primary_rasterise(struct primary *primary, struct render_context *context, struct error *error)
+static void clear(const struct primary *primary)
 {
     static const GLuint nothing[4] = {0};
     static const GLfloat farthest = 0.0f;
+    glClearNamedFramebufferuiv(primary->framebuffer.name, GL_COLOR, 0, nothing);
+    glClearNamedFramebufferfv(primary->framebuffer.name, GL_DEPTH, 0, &farthest);
+}
+
+void primary_rasterise_begin(struct primary *primary)
+{
+    primary->sort = SORT_WHOLE;
+    primary->instance = primary->primitive = 0;
+    primary->cleared = false;
+}
+
+bool primary_rasterise(struct primary *primary, struct render_context *context, bool *done, struct error *error)
+{
     context_span_begin(context, STAGE_PRIMARY);
     gpu_push_group(context->device, "rasterise primary");
     context_bind(context);
@@ -129,12 +157,16 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
     glDepthMask(GL_TRUE);
     glDepthFunc(GL_GREATER);
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-    glClearNamedFramebufferuiv(primary->framebuffer.name, GL_COLOR, 0, nothing);
-    glClearNamedFramebufferfv(primary->framebuffer.name, GL_DEPTH, 0, &farthest);
-    bool drawn = draw_scene(context, error);
+    if (!primary->cleared)
+        clear(primary);
+    primary->cleared = true;
+    bool drawn = draw_part(primary, context, error);
     glDisable(GL_DEPTH_TEST);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glMemoryBarrier(GL_ALL_BARRIER_BITS);
+    *done = primary->sort == SORT_COUNT;
+    if (!*done || context->device->facts.software)
+        glFinish(); /* else all parts would be waited for at the end, at once */
     gpu_pop_group(context->device);
     context_span_end(context);
     return drawn && gpu_check(context->device, "rasterising primary hits", error);

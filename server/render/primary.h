@@ -11,12 +11,17 @@ struct primary {
     struct gpu_texture visible; /* RG32UI: instance + 1 (0: nothing), primitive; row 0 is the uppermost */
     struct gpu_texture depth;   /* reversed, 32-bit float */
     struct gpu_framebuffer framebuffer;
+    /* where drawing goes on */
+    uint32_t sort, instance, primitive;
+    bool cleared;
 };
 
 /* Makes the buffer fit the request's size. */
 bool primary_reserve(struct primary *primary, struct render_context *context, struct error *error);
-/* Draws the whole picture for the sample that the uniforms describe. */
-bool primary_rasterise(struct primary *primary, struct render_context *context, struct error *error);
+/* Draws the whole picture for the sample that the uniforms describe, a part of the scene a call until it is done.
+ */
+void primary_rasterise_begin(struct primary *primary);
+bool primary_rasterise(struct primary *primary, struct render_context *context, bool *done, struct error *error);
 /* Rays, paths and black pixels of context->slice; also its hits, from the visibility buffer, or, where `primary`
  * is NULL, from the tracer. */
 bool primary_slice(const struct primary *primary, struct render_context *context, struct error *error);

@@ -19,12 +19,12 @@ struct abuffer_builder *abuffer_builder_create(struct gpu_device *device, struct
     return builder;
 }
 
-#define BUFFER_COUNT 5
+#define BUFFER_COUNT 6
 
 static void list_buffers(struct abuffer_builder *builder, struct gpu_buffer *buffers[BUFFER_COUNT])
 {
-    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->heads, &builder->nodes, &builder->occupied, &builder->deep,
-                                            &builder->build};
+    struct gpu_buffer *all[BUFFER_COUNT] = {&builder->heads,  &builder->nodes, &builder->occupied,
+                                            &builder->longer, &builder->deep,  &builder->build};
     for (int i = 0; i < BUFFER_COUNT; i++)
         buffers[i] = all[i];
 }
@@ -72,11 +72,11 @@ void abuffer_read_counts(struct abuffer_task *task)
     gpu_buffer_read(task->builder->device, &task->builder->build, 0, &task->counts, sizeof(task->counts));
 }
 
-static bool list_instances(struct abuffer_task *task, struct error *error)
+bool abuffer_list_instances(struct abuffer_builder *builder, const struct scene_gpu *scene, struct error *error)
 {
     uint32_t *instances = NULL, count = 0;
-    bool listed = axes_list_instances(task->scene, &instances, &count, error) &&
-                  axes_draw_prepare(&task->builder->draw, task->scene, instances, count, error);
+    bool listed = axes_list_instances(scene, &instances, &count, error) &&
+                  axes_draw_prepare(&builder->draw, scene, instances, count, error);
     free(instances);
     return listed;
 }
@@ -94,7 +94,8 @@ static bool reserve(struct abuffer_task *task, struct error *error)
         return error_set(error, ERROR_LIMIT, "options.abuffer_voxels",
                          "%llu voxels are more than the device takes", (unsigned long long)voxels);
     size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
-    return gpu_buffer_reserve(device, &builder->heads, texel_numbers, error) &&
+    return abuffer_texels_allowed(task, error) &&
+           gpu_buffer_reserve(device, &builder->heads, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->build, sizeof(task->counts), error) &&
            gpu_buffer_reserve(device, &store->sums, (size_t)voxels * ABUFFER_SUM_BYTES, error) &&
@@ -115,7 +116,7 @@ static bool copy_drawn(struct abuffer_task *task, struct error *error)
 
 static bool build(struct abuffer_task *task, struct error *error)
 {
-    if (!list_instances(task, error))
+    if (!abuffer_list_instances(task->builder, task->scene, error))
         return false;
     if (task->builder->draw.drawn_count == 0) {
         abuffer_store_finish(task->store);

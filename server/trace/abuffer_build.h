@@ -21,12 +21,16 @@ void abuffer_builder_start_with(struct abuffer_builder *builder, uint32_t fragme
 /* Over the scene, that the last build took: 1, or 2 where there was no room for the lists at first. */
 uint32_t abuffer_builder_passes(const struct abuffer_builder *builder);
 
-/* Everything of the store but `voxels`: lower_world, cell_world, resolution, voxels_along are set. Waits for
- * the device. The lists'
- * buffer grows until all fragments fit, and the pass is repeated; where options->abuffer_mebibytes_max or the
- * device forbid that, it fails with ERROR_LIMIT or ERROR_OUT_OF_MEMORY and the store is empty; so it is where the
- * scene has nothing to draw. */
+/* Fills all of the store but `voxels`; the caller has set lower_world, cell_world (metres), resolution and
+ * voxels_along. Waits for the device. Where the lists' buffer is too small it is made larger, and the pass is
+ * repeated; where options->abuffer_mebibytes_max or the device forbid that, it fails with ERROR_LIMIT or
+ * ERROR_OUT_OF_MEMORY and the store is empty. It is empty, too, where the scene has nothing to draw. */
 bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
                    const struct tracer_options *options, struct error *error);
+
+/* For the benchmark, what a build is measured by: the same primitives through the same stages into the depths of
+ * three images, and nothing else. The store says where; it is not written to. Queues the work. */
+bool abuffer_build_plain(struct abuffer_builder *builder, const struct abuffer_store *store,
+                         struct scene_gpu *scene, struct error *error);
 
 #endif

@@ -12,7 +12,7 @@
 #define TEXELS_A_NODE 4
 #define NODES_MIN 1024u
 
-/* What lists and samples need on the device. */
+/* What lists and samples need on the device, with the texels that they hang from. */
 static uint64_t bytes_of(const struct abuffer_task *task, uint64_t nodes)
 {
     uint64_t each = ABUFFER_NODE_BYTES + ABUFFER_SAMPLE_BYTES + ABUFFER_ID_BYTES;
@@ -41,6 +41,17 @@ static bool refuse(const struct abuffer_task *task, uint64_t nodes, struct error
     else
         error_set(error, ERROR_LIMIT, "abuffer", "%llu samples need %llu MiB; %u MiB are allowed",
                   (unsigned long long)nodes, (unsigned long long)needed, task->options->abuffer_mebibytes_max);
+    return error_remedy(error, "take a lower resolution, or raise memory.abuffer");
+}
+
+bool abuffer_texels_allowed(const struct abuffer_task *task, struct error *error)
+{
+    uint32_t allowed = task->options->abuffer_mebibytes_max;
+    uint64_t needed = (bytes_of(task, 0) + ((uint64_t)1 << 20) - 1) >> 20;
+    if (allowed == 0 || needed <= allowed)
+        return true;
+    error_set(error, ERROR_LIMIT, "abuffer", "%u texels alone need %llu MiB; %u MiB are allowed",
+              task->texel_count, (unsigned long long)needed, allowed);
     return error_remedy(error, "take a lower resolution, or raise memory.abuffer");
 }
 
@@ -116,8 +127,11 @@ static bool list_occupied(struct abuffer_task *task, struct error *error)
     gpu_buffer_bind_texels(device, &builder->heads, UNIT_ABUFFER_HEADS, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->occupied, IMAGE_ABUFFER_OCCUPIED, GL_R32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_ABUFFER_BUILD_COUNTS);
-    gpu_uniform_uint(program, "texel_count", task->texel_count);
-    gpu_dispatch(device, program, (task->texel_count + ABUFFER_OCCUPIED_TEXELS - 1) / ABUFFER_OCCUPIED_TEXELS);
+    uint64_t along = task->store->resolution;
+    gpu_uniform_uint(program, "texels_along", task->store->resolution);
+    gpu_dispatch(device, program,
+                 3 * ((along + ABUFFER_TILE_U - 1) / ABUFFER_TILE_U) *
+                     ((along + ABUFFER_TILE_V - 1) / ABUFFER_TILE_V));
     abuffer_read_counts(task);
     return true;
 }

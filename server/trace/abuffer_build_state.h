@@ -10,9 +10,8 @@
 struct abuffer_builder {
     struct gpu_device *device;
     struct axes_draw draw;
-    /* shared/abuffer_build.h; `deep`, R32UI: texels that are left to the host */
-    struct gpu_buffer heads, nodes, occupied, deep, build;
-    uint32_t nodes_max;   /* for which there is room in `nodes` */
+    struct gpu_buffer heads, nodes, occupied, longer, deep, build; /* shared/abuffer_build.h */
+    uint32_t nodes_max;                                            /* for which there is room in `nodes` */
     uint32_t nodes_first; /* so many at first; 0: chosen from the number of texels */
     uint32_t passes;      /* over the scene, of the last build */
     /* abuffer_build_plain() */
@@ -36,14 +35,18 @@ struct abuffer_task {
 #define ABUFFER_NODE_BYTES 16
 #define ABUFFER_SUM_BYTES 16
 
-/* abuffer_build_lists.c. Draws the scene into `heads`, `nodes` and the store's sums, and lists what is occupied.
- */
+/* abuffer_build_lists.c. Draws the scene into `heads`, `nodes` and the store's sums, and lists the texels that
+ * have any. */
 bool abuffer_lists(struct abuffer_task *task, struct error *error);
+/* abuffer_build_lists.c. Whether the options allow as many texels, empty ones too. */
+bool abuffer_texels_allowed(const struct abuffer_task *task, struct error *error);
 /* abuffer_build_runs.c. From lists to the store's texels, samples and ids. */
 bool abuffer_runs(struct abuffer_task *task, struct error *error);
 /* abuffer_build_deep.c. Those of texels that have more than the device's passes sort. */
 bool abuffer_runs_deep(struct abuffer_task *task, struct error *error);
 
+/* abuffer_build.c. Of the whole scene, for the draws that follow. */
+bool abuffer_list_instances(struct abuffer_builder *builder, const struct scene_gpu *scene, struct error *error);
 /* abuffer_build.c. Reads task->counts back. */
 void abuffer_read_counts(struct abuffer_task *task);
 

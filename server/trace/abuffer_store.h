@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The structure of the tracer `abuffer` on the device (shaders/shared/abuffer.h), filled by abuffer_build.c and
- * abuffer_voxels.c, read by abuffer_trace.c. */
+/* The structure of the tracer `abuffer` on the device (shaders/shared/abuffer.h), filled by abuffer_build.c, its
+ * voxels by abuffer_trace.c, which also reads it. */
 #ifndef FARLIGHT_TRACE_ABUFFER_STORE_H
 #define FARLIGHT_TRACE_ABUFFER_STORE_H
 

@@ -62,7 +62,7 @@ static bool make_surfaces(struct abuffer_store *store, const struct scene_gpu *s
 bool abuffer_trace(struct abuffer_store *store, struct scene_gpu *scene, const struct wave *wave,
                    const struct tracer_options *options, struct error *error)
 {
-    struct gpu_define defines[4] = {{"TRACER_ABUFFER", "1"}};
+    struct gpu_define defines[5] = {{"TRACER_ABUFFER", "1"}};
     size_t n = 1;
     if (store->resolution == 0)
         defines[n++] = (struct gpu_define){"ABUFFER_EMPTY", "1"};

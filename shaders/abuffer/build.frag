@@ -44,8 +44,15 @@ ivec3 strides()
 const float DEPTH_MARGIN_CELLS = 1.0 / 64.0;
 const float HALF_TEXEL = 0.5 - 1.0 / 1024.0;
 
-// The patch of a surface that is seen through a texel, and reaches from one depth to the other. A load is cheaper than an
-// atomic, and mostly the bits are there.
+// A load is cheaper than an atomic, and mostly the bits are there.
+void mark_voxel(int at, int bits)
+{
+    if ((imageLoad(sums, at).x & bits) != bits)
+        imageAtomicOr(sums, at, bits);
+}
+
+// The patch of a surface that is seen through a texel, and reaches from one depth to the other: mostly in one voxel, or
+// in two behind each other.
 void mark(float least_cells, float greatest_cells, int bits)
 {
     ivec3 first = ivec3(vec3(least_cells - DEPTH_MARGIN_CELLS, gl_FragCoord.xy - HALF_TEXEL) * voxels_per_cell);
@@ -53,20 +60,25 @@ void mark(float least_cells, float greatest_cells, int bits)
     ivec3 far = ivec3(int(voxels_along) - 1), step_ = strides();
     first = clamp(first, ivec3(0), far);
     last = clamp(last, ivec3(0), far);
-    for (int v = first.z; v <= last.z; v++)
-        for (int u = first.y; u <= last.y; u++)
-            for (int d = first.x; d <= last.x; d++) {
-                int at = d * step_.x + u * step_.y + v * step_.z + 3;
-                if ((imageLoad(sums, at).x & bits) != bits)
-                    imageAtomicOr(sums, at, bits);
-            }
+    int at = first.x * step_.x + first.y * step_.y + first.z * step_.z + 3;
+    mark_voxel(at, bits);
+    ivec3 more = last - first;
+    if (more.y == 0 && more.z == 0 && more.x <= 1) {
+        if (more.x == 1)
+            mark_voxel(at + step_.x, bits);
+        return;
+    }
+    for (int v = 0; v <= more.z; v++)
+        for (int u = 0; u <= more.y; u++)
+            for (int d = 0; d <= more.x; d++)
+                mark_voxel(at + d * step_.x + u * step_.y + v * step_.z, bits);
 }
 
 // A unit normal's components along depth, u and v, to the voxel that the texel's middle is in at this depth.
 void add_normal(float depth_cells, vec3 normal_duv)
 {
     ivec3 voxel = ivec3(vec3(depth_cells, gl_FragCoord.xy) * voxels_per_cell), step_ = strides();
-    voxel = min(voxel, ivec3(int(voxels_along) - 1));
+    voxel = clamp(voxel, ivec3(0), ivec3(int(voxels_along) - 1));
     ivec3 units = ivec3(round(normal_duv * float(ABUFFER_NORMAL_UNIT)));
     int at = voxel.x * step_.x + voxel.y * step_.y + voxel.z * step_.z;
     int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
@@ -78,11 +90,11 @@ void add_normal(float depth_cells, vec3 normal_duv)
         imageAtomicAdd(sums, at + v, units.z);
 }
 
-// `leaves`: it looks towards greater depths of this image.
+// Of what leans to this image's axis: in others it has no more samples, nor such that tell more. `leaves`: it looks
+// towards greater depths.
 int sum_bits(uint face, bool closed, bool leaves)
 {
-    bool leans = (face & FACE_LEANS << gl_Layer) != 0u;
-    uint looks = leans ? (leaves ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN) << gl_Layer : 0u;
+    uint looks = (leaves ? ABUFFER_SUM_UP : ABUFFER_SUM_DOWN) << gl_Layer;
     return int(face >> 24 & 63u | looks | (closed ? 0u : ABUFFER_SUM_OPEN));
 }
 
@@ -104,7 +116,8 @@ void main()
         least_cells = max(least_cells, depths.y);
         most_cells = min(most_cells, depths.z);
     }
-    mark(least_cells, most_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves));
+    if ((face & FACE_LEANS << gl_Layer) != 0u)
+        mark(least_cells, most_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves));
     if ((face & FACE_MOST) != 0u) {
         vec3 normal = vec3(1.0, -plane.xy) * inversesqrt(1.0 + dot(plane.xy, plane.xy));
         add_normal(depth_cells, leaves ? normal : -normal);
@@ -146,7 +159,8 @@ void main()
         if (!link(depth_cells, face & FACE_NORMAL_MASK | (closed ? ABUFFER_NODE_CLOSED : 0u) |
                                    (side == 1 ? ABUFFER_NODE_LEAVES : 0u)))
             continue;
-        mark(least_cells, most_cells, sum_bits(face, closed, side == 1));
+        if ((face & FACE_LEANS << axis) != 0u)
+            mark(least_cells, most_cells, sum_bits(face, closed, side == 1));
         if (axis_of(abs(normal)) == axis)
             add_normal(depth_cells, vec3(normal[axis], normal[u], normal[v]));
     }

@@ -1,31 +1,26 @@
 // SPDX-License-Identifier: MIT
 // From lists to runs: the nodes of a texel together and sorted, with the winding behind each.
-// Paper, section 3.1: the second pass.
+// Paper, section 3.1: the second pass. A list of up to four is sorted as it is taken; longer ones get their places, and
+// are listed for who does them.
+// Define: RESOLVE_EIGHT  lists of five to eight, which were listed so, are sorted
 
 #include "common/dispatch.glsl"
+#include "abuffer/list.glsl"
 #include "abuffer/run.glsl"
 
-uniform uint occupied_count;
+uniform uint item_count;
 
-layout(binding = UNIT_ABUFFER_HEADS) uniform usamplerBuffer heads;
-layout(binding = UNIT_ABUFFER_NODES) uniform usamplerBuffer nodes;
+#ifdef RESOLVE_EIGHT
+layout(binding = UNIT_ABUFFER_LONGER) uniform usamplerBuffer longer;
+layout(binding = UNIT_ABUFFER_TEXELS) uniform usamplerBuffer texels;
+#else
+uniform uint longer_max;
 layout(binding = UNIT_ABUFFER_OCCUPIED) uniform usamplerBuffer occupied;
 layout(binding = IMAGE_ABUFFER_TEXELS, rg32ui) writeonly uniform uimageBuffer texels;
+layout(binding = IMAGE_ABUFFER_LONGER, r32ui) writeonly uniform uimageBuffer longer;
 layout(binding = IMAGE_ABUFFER_DEEP, r32ui) writeonly uniform uimageBuffer deep;
 layout(std430, binding = BIND_ABUFFER_BUILD_COUNTS) buffer build_block { abuffer_build_counts build; };
-
-const uvec3 NOTHING = uvec3(0xffffffffu); // behind everything
-const uint TOGETHER = 4u;
-
-// The next node of a list, and on; NOTHING at its end.
-uvec3 take(inout uint node)
-{
-    if (node == 0u)
-        return NOTHING;
-    uvec4 words = texelFetch(nodes, int(node) - 1);
-    node = words.x;
-    return words.ywz;
-}
+#endif
 
 void exchange(inout uvec3 a, inout uvec3 b)
 {
@@ -43,10 +38,46 @@ void finish(run r, uint i, uvec3 item, inout int winding)
     store(r, i, uvec3(item.xy, sample_bits(item.z, winding)));
 }
 
-// Of at most TOGETHER.
-void resolve_few(run r, uint node)
+#ifndef RESOLVE_EIGHT
+// The list is longer than what was taken of it: counts the rest, as far as it may be gone over.
+uint count_rest(uint node, uint count)
 {
+    for (; node != 0u && count <= ABUFFER_LIST_MAX; count++)
+        node = next_of(node);
+    return count;
+}
+
+// Who does a list that is not done here. Lists up to eight from the first place on, longer ones from the last back.
+void list_longer(uint texel, uint count)
+{
+    if (count > ABUFFER_LIST_MAX)
+        imageStore(deep, int(atomicAdd(build.deep, 1u)), uvec4(texel));
+    else if (count <= ABUFFER_EIGHT)
+        imageStore(longer, int(atomicAdd(build.up_to_eight, 1u)), uvec4(texel));
+    else
+        imageStore(longer, int(longer_max - 1u - atomicAdd(build.beyond_eight, 1u)), uvec4(texel));
+}
+
+void main()
+{
+    uint k = item_index();
+    if (k >= item_count)
+        return;
+    uint texel = texelFetch(occupied, int(k)).x, node = head_of(texel);
     uvec3 a = take(node), b = take(node), c = take(node), d = take(node);
+    uint count = b.x == ABUFFER_NO_DEPTH ? 1u : c.x == ABUFFER_NO_DEPTH ? 2u : d.x == ABUFFER_NO_DEPTH ? 3u : 4u;
+    if (node != 0u) {
+        count = count_rest(node, count);
+        list_longer(texel, count);
+        if (count > ABUFFER_LIST_MAX)
+            return;
+    }
+    if (count > build.depth_max) // rarely; the atomic is dear
+        atomicMax(build.depth_max, count);
+    run r = run(atomicAdd(build.samples, count), count);
+    imageStore(texels, int(texel), uvec4(r.first, count, 0u, 0u));
+    if (count > ABUFFER_FOUR)
+        return;
     exchange(a, b);
     exchange(c, d);
     exchange(a, c);
@@ -58,69 +89,45 @@ void resolve_few(run r, uint node)
     finish(r, 2u, c, winding);
     finish(r, 3u, d, winding);
 }
-
-// By insertion, as they come.
-void resolve_some(run r, uint node)
-{
-    for (uint i = 0u; i < r.count; i++) {
-        uvec3 item = take(node);
-        uint k = i;
-        for (; k > 0u; k--) {
-            uvec3 above = load(r, k - 1u);
-            if (!before(item, above))
-                break;
-            store(r, k, above);
-        }
-        store(r, k, item);
-    }
-    wind(r);
-}
-
-void resolve(run r, uint node)
-{
-    if (r.count <= TOGETHER)
-        resolve_few(r, node);
-    else if (r.count <= ABUFFER_RESOLVE_SORTS)
-        resolve_some(r, node);
-    else // sort.comp does
-        for (uint i = 0u; i < r.count; i++)
-            store(r, i, take(node));
-}
-
-// Whether there are no more than ABUFFER_LIST_MAX.
-bool count_list(uint node, out uint count)
-{
-    count = 0u;
-    for (; node != 0u && count < ABUFFER_LIST_MAX; count++)
-        node = texelFetch(nodes, int(node) - 1).x;
-    return node == 0u;
-}
-
+#else
+// Batcher's network for eight.
 void main()
 {
-    uint first = item_index() * ABUFFER_RESOLVE_TEXELS;
-    if (first >= occupied_count)
+    uint k = item_index();
+    if (k >= item_count)
         return;
-    uint end = first + ABUFFER_RESOLVE_TEXELS < occupied_count ? first + ABUFFER_RESOLVE_TEXELS : occupied_count;
-    uint sum = 0u, most = 0u;
-    for (uint k = first; k < end; k++) {
-        uint texel = texelFetch(occupied, int(k)).x, count;
-        if (count_list(texelFetch(heads, int(texel)).x, count)) {
-            sum += count;
-            most = count > most ? count : most;
-        }
-    }
-    if (most > build.depth_max) // rarely; the atomic is dear
-        atomicMax(build.depth_max, most);
-    uint place = atomicAdd(build.samples, sum);
-    for (uint k = first; k < end; k++) {
-        uint texel = texelFetch(occupied, int(k)).x, node = texelFetch(heads, int(texel)).x, count;
-        if (count_list(node, count)) {
-            imageStore(texels, int(texel), uvec4(place, count, 0u, 0u));
-            resolve(run(place, count), node);
-            place += count;
-        } else {
-            imageStore(deep, int(atomicAdd(build.deep, 1u)), uvec4(texel));
-        }
-    }
+    uint texel = texelFetch(longer, int(k)).x, node = head_of(texel);
+    uvec2 words = texelFetch(texels, int(texel)).xy;
+    run r = run(words.x, words.y);
+    uvec3 a = take(node), b = take(node), c = take(node), d = take(node);
+    uvec3 e = take(node), f = take(node), g = take(node), h = take(node);
+    exchange(a, b);
+    exchange(c, d);
+    exchange(e, f);
+    exchange(g, h);
+    exchange(a, c);
+    exchange(b, d);
+    exchange(e, g);
+    exchange(f, h);
+    exchange(b, c);
+    exchange(f, g);
+    exchange(a, e);
+    exchange(b, f);
+    exchange(c, g);
+    exchange(d, h);
+    exchange(c, e);
+    exchange(d, f);
+    exchange(b, c);
+    exchange(d, e);
+    exchange(f, g);
+    int winding = 0;
+    finish(r, 0u, a, winding);
+    finish(r, 1u, b, winding);
+    finish(r, 2u, c, winding);
+    finish(r, 3u, d, winding);
+    finish(r, 4u, e, winding);
+    finish(r, 5u, f, winding);
+    finish(r, 6u, g, winding);
+    finish(r, 7u, h, winding);
 }
+#endif

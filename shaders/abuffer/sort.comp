@@ -1,25 +1,28 @@
 // SPDX-License-Identifier: MIT
-// Sorts the runs of texels that have many samples (resolve.comp does the others).
+// From lists to runs, those that are longer than resolve.comp does.
 
 #define SORT_ITEM uvec3
 #include "common/dispatch.glsl"
+#include "abuffer/list.glsl"
 #include "abuffer/run.glsl"
 #include "common/sort.glsl"
 
-uniform uint occupied_count;
+uniform uint item_count;
+uniform uint first_item;
 
-layout(binding = UNIT_ABUFFER_OCCUPIED) uniform usamplerBuffer occupied;
+layout(binding = UNIT_ABUFFER_LONGER) uniform usamplerBuffer longer;
 layout(binding = UNIT_ABUFFER_TEXELS) uniform usamplerBuffer texels;
 
 void main()
 {
     uint k = item_index();
-    if (k >= occupied_count)
+    if (k >= item_count)
         return;
-    uvec2 words = texelFetch(texels, int(texelFetch(occupied, int(k)).x)).xy; // nothing, of those left to the host
+    uint texel = texelFetch(longer, int(first_item + k)).x, node = head_of(texel);
+    uvec2 words = texelFetch(texels, int(texel)).xy;
     run r = run(words.x, words.y);
-    if (r.count <= ABUFFER_RESOLVE_SORTS)
-        return;
+    for (uint i = 0u; i < r.count; i++)
+        store(r, i, take(node));
     sort(r);
     wind(r);
 }

@@ -68,6 +68,27 @@ vec3 bsdf_world(bsdf b, vec3 local)
     return local.x * b.x + local.y * b.y + local.z * b.z;
 }
 
+// Share that the boundary mirrors and keeps from what is scattered, and its mean. Ward's facets do not hide each other at
+// grazing angles, so Fresnel's rise there does not fade as it does with GGX's.
+float boundary_share(float cosine, float ior, float roughness)
+{
+#ifdef WARD
+    float f0 = square((ior - 1.0) / (ior + 1.0));
+    return fresnel_dielectric(cosine * (1.0 - 0.5 * square(roughness * (1.0 - f0))), ior);
+#else
+    return fresnel_rough_dielectric(cosine, ior, roughness);
+#endif
+}
+
+float boundary_share_mean(float ior, float roughness)
+{
+#ifdef WARD
+    return fresnel_rough_dielectric_mean(ior, 0.0);
+#else
+    return fresnel_rough_dielectric_mean(ior, roughness);
+#endif
+}
+
 // `view`: towards the eye; `parts`: split_light() of the same surface and NoV, which is not 0.
 bsdf bsdf_of(surface s, split parts, vec3 view, float NoV, vec3 along, float anisotropy)
 {
@@ -82,7 +103,10 @@ bsdf bsdf_of(surface s, split parts, vec3 view, float NoV, vec3 along, float ani
     b.alpha = max(b.alpha, vec2(FACET_ALPHA_MIN));
     b.leaves = s.inside && s.transmission > 0.0;
     b.eta = b.leaves ? 1.0 / s.ior : s.ior;
-    float enters_mean = b.leaves ? 1.0 : 1.0 - fresnel_rough_dielectric_mean(s.ior, s.roughness);
+    if (!b.leaves)
+        parts.scattered = s.base * ((1.0 - s.metallic) * (1.0 - s.transmission) *
+                                    (1.0 - boundary_share(NoV, s.ior, s.roughness)));
+    float enters_mean = b.leaves ? 1.0 : 1.0 - boundary_share_mean(s.ior, s.roughness);
     b.scattered = parts.scattered * (INVERSE_PI / enters_mean);
     float scattered = greatest(parts.scattered), facets = greatest(parts.mirror) + greatest(parts.refracted);
     facets = facets > 0.0 ? max(facets, LOBE_CHANCE_MIN) : 0.0;
@@ -121,7 +145,7 @@ vec3 bsdf_evaluate(bsdf b, surface s, vec3 light_world, out float probability)
     probability = 0.0;
     if (light.z <= 0.0 || dot(s.geometric, light_world) <= 0.0)
         return vec3(0.0);
-    float enters = b.leaves ? 1.0 : 1.0 - fresnel_rough_dielectric(light.z, s.ior, s.roughness);
+    float enters = b.leaves ? 1.0 : 1.0 - boundary_share(light.z, s.ior, s.roughness);
     vec3 sent = b.scattered * (enters * light.z);
     probability = b.scattered_chance * light.z * INVERSE_PI;
     if (!b.rough)

@@ -2,7 +2,7 @@
 // What layers say of each sample of a slice: of the surface that its ray met first, whether or not it lets light
 // through. Of a sample that met nothing, and in layers of the first sample of all others, they are 0.
 //
-// Defines: those of common/material.glsl.
+// Defines: NEEDS_SURFACE albedo or normal are among them; those of common/material.glsl.
 
 #include "shared/layers.h"
 #include "render/shade.glsl"
@@ -38,15 +38,18 @@ void main()
     }
     path p = path_at(k);
     ray r = ray_at(k);
+    vec3 place = r.origin_t_min.xyz + h.distance * r.direction_t_max.xyz;
+#ifdef NEEDS_SURFACE
     surface s = surface_at(h, r.origin_t_min.xyz, r.direction_t_max.xyz, p.cone_width + p.cone_spread * h.distance);
-    vec4 depth = vec4(0.0), position = vec4(0.0), id = vec4(0.0);
-    if (path_sample(p) == 0u) {
-        depth = vec4(vec3(-view_from_world_point(s.position).z), 1.0);
-        position = vec4(s.position, 1.0);
-        id = vec4(node_of(h), materials[h.material & HIT_MATERIAL_MASK].id, 0.0, 1.0);
-    }
     put(LAYER_BIT_ALBEDO, k, vec4(s.base, 1.0));
     put(LAYER_BIT_NORMAL, k, vec4(s.normal, 1.0));
+#endif
+    vec4 depth = vec4(0.0), position = vec4(0.0), id = vec4(0.0);
+    if (path_sample(p) == 0u) {
+        depth = vec4(vec3(-view_from_world_point(place).z), 1.0);
+        position = vec4(place, 1.0);
+        id = vec4(node_of(h), materials[h.material & HIT_MATERIAL_MASK].id, 0.0, 1.0);
+    }
     put(LAYER_BIT_DEPTH, k, depth);
     put(LAYER_BIT_POSITION, k, position);
     put(LAYER_BIT_AO, k, vec4(vec3(0.0), 1.0)); // layers_gather.comp adds

@@ -12,11 +12,12 @@
 // Guibas. Optimally Combining Sampling Techniques for Monte Carlo Rendering. 1995, with the power heuristic. The last
 // hits of a path have no child; there shadow rays bring everything. Straight rays from the eye meet no lamp.
 //
-// Glass. Shadow rays go straight through it, tinted (common/alpha.glsl), smooth or not; so a lamp in a room with panes
-// lights it without waiting for a path to find it. A path that asked for light and then went through glass would bring
-// the light behind it again, bent: it brings none until it was scattered or mirrored outside of it (PATH_COVERED), but for
-// what emissive surfaces send. Paths from the eye, or a mirror, see everything through glass. Surfaces of glass ask for
-// no light from inside.
+// Glass. Shadow rays go straight through it, tinted (common/alpha.glsl), smooth or not; so a lamp behind a pane lights a
+// room without waiting for a path to find it. The rays that go on have to find the same light for both ways to be weighed:
+// where one from a place that asked for light meets glass, a shadow ray goes straight on in its place, with its share. Its
+// child, which is bent, would bring that light once more: it brings none until it was scattered, or mirrored outside
+// (PATH_COVERED), but for what emissive surfaces send. Paths from the eye, or a mirror, see everything through glass.
+// Surfaces of glass ask for no light from inside.
 //
 // Defines: those of common/bsdf.glsl, common/light.glsl, common/environment_choice.glsl and render/shade.glsl.
 
@@ -101,6 +102,8 @@ void meet_lamps(inout path p, eye_hit e, vec3 origin, vec3 direction, float foun
         if (found > 0.0 && e.all_lights > 0.0)
             share = heuristic(found, probability * light_estimate(i, e.receiver) / e.all_lights);
         float size = share * greatest(l.colour.rgb);
+        if (!(size > 0.0)) // brings nothing, and would be divided by
+            continue;
         sum += size;
         if (!(size > choice * sum)) {
             choice = (choice * sum - size) / (sum - size);
@@ -114,6 +117,49 @@ void meet_lamps(inout path p, eye_hit e, vec3 origin, vec3 direction, float foun
     p.lamp_share *= sum;
 }
 #endif
+
+// The light that the ray was to find behind glass, straight on. Returns how many of its shadow rays are alive.
+uint ask_straight_on(eye_hit e, vec3 direction, vec3 through)
+{
+    uint place = e.j, alive = 0u;
+    vec3 origin = off_surface(e.s, e.distance_, -e.s.geometric), carried = e.weight * through;
+    if (asks_lights != 0u) {
+        vec3 arriving = vec3(0.0);
+        float rest = e.p.lamp_distance - e.distance_;
+#ifdef HAS_AREA_LIGHTS
+        if (e.p.lamp != 0u && rest > 0.0)
+            arriving = carried * light_at(e.p.lamp - 1u).colour.rgb * e.p.lamp_share;
+#endif
+        if (add_shadow_ray(place, e.p, origin, direction, rest, arriving))
+            alive++;
+        place += hit_count;
+    }
+    if (asks_environment != 0u) {
+        vec3 arriving = carried * environment_radiance(direction) * e.p.environment_share;
+        if (add_shadow_ray(place, e.p, origin, direction, FAR, arriving))
+            alive++;
+    }
+    return alive;
+}
+
+uint ask(inout eye_hit e, uint seed, uint index)
+{
+    uint place = e.j, alive = 0u;
+    if (asks_lights != 0u) {
+        if (ask_for_light(e, place, seed, index))
+            alive++;
+        place += hit_count;
+    }
+    if (asks_environment != 0u && ask_for_environment(e, place, seed, index))
+        alive++;
+    return alive;
+}
+
+void ask_nothing(uint j)
+{
+    for (uint i = 0u; i < shadow_rays_a_hit; i++)
+        no_shadow_ray(i * hit_count + j);
+}
 
 // The child that the surface sends on.
 void go_on(eye_hit e, uint seed, uint index, bool asked, float choice)
@@ -193,22 +239,24 @@ void main()
     bool straight = choice >= e.s.alpha;
     vec3 sent = met_lamp(e.p, h.distance);
     bool asks = !straight && !e.s.unlit && !e.b.leaves;
-    uint place = j, alive = 0u;
+    uint alive = 0u;
     if (!straight)
         sent += e.s.unlit ? e.s.base : e.s.emission;
-    if (asks_lights != 0u) {
-        if (!asks)
-            no_shadow_ray(place);
-        else if (ask_for_light(e, place, seed, index))
-            alive++;
-        place += hit_count;
+    float passes = 0.0; // share of its shadow rays that are for light behind it
+    vec3 through = e.s.base * (e.s.transmission * (1.0 - e.s.metallic));
+    if (!straight && !e.s.unlit && (e.p.flags & PATH_ASKED) != 0u && greatest(through) > 0.0)
+        passes = asks ? 0.5 : 1.0; // one or the other
+    vec3 weight = e.weight;
+    if (sequence_number(seed, numbers_of(SEQUENCE_PATH_PASS), index) < passes) {
+        e.weight = weight / passes;
+        alive = ask_straight_on(e, direction, through);
+    } else if (asks) {
+        e.weight = weight / (1.0 - passes);
+        alive = ask(e, seed, index);
+    } else {
+        ask_nothing(j);
     }
-    if (asks_environment != 0u) {
-        if (!asks)
-            no_shadow_ray(place);
-        else if (ask_for_environment(e, place, seed, index))
-            alive++;
-    }
+    e.weight = weight;
     if (straight) {
         e.p.lamp = e.p.lamp_distance > h.distance ? e.p.lamp : 0u;
         e.p.lamp_distance -= h.distance;

@@ -32,7 +32,8 @@
  * While it is built, in R32I texels (image atomics), four a voxel, x fastest:
  *   sums        0..2  sum of the geometric normals of the samples in it, ABUFFER_NORMAL_UNIT for 1: their direction is
  *                     that of the average. Of each sample once: that of the image which its normal leans to most
- *               3     ABUFFER_SUM_* bits of all of them */
+ *               3     ABUFFER_SUM_* bits: of samples in the images that they lean to, in each voxel that the square of
+ *                     plane touches which is seen through their texel */
 /* clang-format on */
 #ifndef FARLIGHT_SHARED_ABUFFER_H
 #define FARLIGHT_SHARED_ABUFFER_H

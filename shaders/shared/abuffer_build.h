@@ -4,7 +4,9 @@
  *   heads     R32UI, one a texel: the node that was linked last, plus 1; 0: none
  *   nodes     RGBA32UI, one a fragment: the node that was there before it, plus 1; depth (float, cells); bits of
  *             ABUFFER_NODE_*; id
- *   occupied  R32UI: texels that have nodes */
+ *   occupied  R32UI: texels that have nodes
+ *   longer    R32UI: texels with more than ABUFFER_FOUR, from the first place on; with more than ABUFFER_EIGHT,
+ * from the last one back deep      R32UI: texels with more than ABUFFER_LIST_MAX */
 #ifndef FARLIGHT_SHARED_ABUFFER_BUILD_H
 #define FARLIGHT_SHARED_ABUFFER_BUILD_H
 #include "shared/abuffer.h"
@@ -21,20 +23,21 @@ struct abuffer_build_counts {
     uint occupied; /* texels with any */
     uint samples;  /* that have a place */
     uint depth_max;
-    uint deep; /* texels with more than ABUFFER_LIST_MAX fragments: these are left to the host */
-    uint pad0, pad1;
+    uint up_to_eight, beyond_eight; /* texels with more than ABUFFER_FOUR fragments */
+    uint deep;                      /* with more than ABUFFER_LIST_MAX: these are left to the host */
+    uint pad0, pad1, pad2, pad3;
 };
-SHARED_SIZE(abuffer_build_counts, 32)
+SHARED_SIZE(abuffer_build_counts, 48)
 
-/* Texels that one invocation looks at to see what is occupied. */
-#define ABUFFER_OCCUPIED_TEXELS 32u
-/* Occupied texels that one invocation of resolve.comp does: their samples lie together, and places are asked for
- * once. */
-#define ABUFFER_RESOLVE_TEXELS 8u
-/* And it sorts those that have no more samples than this itself; sort.comp does the others. */
-#define ABUFFER_RESOLVE_SORTS 32u
-/* Software GL ends the loops of an invocation after 65,535 rounds: resolve.comp goes over eight such lists twice,
- * and a heap of as many takes about 25,000. */
+/* Texels that one invocation looks at to see what is occupied: drivers rasterise in small squares, too, so nodes
+ * of a tile lie near each other. */
+#define ABUFFER_TILE_U 8u
+#define ABUFFER_TILE_V 4u
+/* Lists that resolve.comp sorts as it takes them: most have no more than four. */
+#define ABUFFER_FOUR 4u
+#define ABUFFER_EIGHT 8u
+/* Software GL ends the loops of an invocation after 65,535 rounds: a heap of as many
+ * takes about 25,000. */
 #define ABUFFER_LIST_MAX 1024u
 
 #endif

@@ -54,6 +54,7 @@ SHARED_SIZE(frame_uniforms, 576)
 #define SEQUENCE_PATH_DIRECTION 3u   /* 2 */
 #define SEQUENCE_PATH_END 4u         /* 1: whether it goes on */
 #define SEQUENCE_PATH_LAMP 5u        /* 1: which of the lamps that it meets counts */
+#define SEQUENCE_PATH_PASS 6u        /* 1: glass: whose light is asked for */
 #define SEQUENCE_EVERY_LIGHT                                                                                      \
     0x10000u /* plus wave number * 0x10000 + light number, 2: for every light at every hit */
 

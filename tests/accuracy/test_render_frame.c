@@ -298,7 +298,7 @@ static void a_picture_of_several_bands_has_no_seam(void **state)
 {
     struct fixture *fixture = *state;
     fixture->request.width = 4096;
-    fixture->request.height = 1040; /* bands hold 4M pixels: 1024 rows, and the rest */
+    fixture->request.height = 1040; /* bands hold 256 Ki pixels: 64 rows, and the rest */
     fixture->request.format = FRAME_RGBA8;
     fixture->request.camera.fov_y = 2.0f;
     struct frame_result result = fixture_render(fixture);

@@ -3,7 +3,7 @@
 """`make bench`: where the time goes, in tables and as JSON. Usage: bench.py BUILD_FOLDER [PART ..] [--out FOLDER]
 
 Parts: start, oneshot, frames, animation, tracers, forms, family, pixels, rays, parallel, instances, refit, flake, distributed,
-ldc, reach; all of them where none is named. Each figure is the median of several runs after a warm-up, with the median absolute
+ldc, abuffer, reach; all of them where none is named. Each figure is the median of several runs after a warm-up, with the median absolute
 deviation beside it; what is compared takes turns, run by run. Scenes of FARLIGHT_SCENES (default: ../shared/scenes beside the
 checkout) are left out, and named, where missing.
 
@@ -13,7 +13,7 @@ embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are obje
 and runs; keys end with their unit. tracers, reach, family, pixels and rays have `results`, one for each call of
 bench_tracers: title, triangles, spheres, instances, width, height, rays_per_pixel, `structures` (tracer, form, build,
 memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, form, way, time, rays_per_s, agreement).
-`distributed` is described in bench_frames.py, `ldc` in bench_ldc.py. `wanted` has the lines that are to be reached: line,
+`distributed` is described in bench_frames.py, `ldc` in bench_ldc.py, `abuffer` in bench_abuffer.py. `wanted` has the lines that are to be reached: line,
 wanted, measured, met, within_spread (missed by no more than twice its deviation), where.
 
 Exit status 1 if something failed, or a tracer gave wrong answers; a line that was missed is no failure.
@@ -26,6 +26,8 @@ import sys
 import tempfile
 import time
 
+import bench_abuffer
+import bench_abuffer_show
 import bench_animated
 import bench_client
 import bench_frames
@@ -53,6 +55,7 @@ PARTS = {
     "distributed": ("Distributed ray tracing, whole frames", bench_frames.measure_distributed,
                     bench_frames.show_distributed),
     "ldc": ("Layered depth cubes", bench_ldc.measure, bench_ldc_show.show),
+    "abuffer": ("Voxels and A-buffers", bench_abuffer.measure, bench_abuffer_show.show),
     "reach": ("bvh beside Embree", bench_rays.measure_reach, bench_rays.show_reach),
 }
 WANTED_TITLE = "What is wanted"

@@ -36,6 +36,7 @@ static const char usage[] =
     "  --depth N             of frames: bounces, default 1\n"
     "  --mirrors | --glass   everything becomes a mirror, or glass\n"
     "  --play                of frames: the model's first clip, 0.1 s further each run\n"
+    "  --once                of frames: one run without a warm-up, for what it shows\n"
     "  --runs N              after one warm-up; default 5, at most 64\n";
 
 /* ---- JSON ---- */
@@ -117,6 +118,9 @@ static bool parse_option(struct bench_forms *bench, int option, char *text)
         return scene->glass = true;
     case 'p':
         return bench->plays = true;
+    case '1':
+        bench->runs = 1;
+        return bench->once = true;
     case 'r':
         return bench_parse_number(text, 1, BENCH_RUNS_MAX, &bench->runs);
     default:
@@ -133,7 +137,7 @@ static bool parse(struct bench_forms *bench, int argc, char **argv)
         {"waves", 1, NULL, 'w'},     {"depth", 1, NULL, 'd'},      {"mirrors", 0, NULL, 'i'},
         {"glass", 0, NULL, 'g'},     {"play", 0, NULL, 'p'},       {"runs", 1, NULL, 'r'},
         {"rays-each", 1, NULL, 'k'}, {"integrator", 1, NULL, 't'}, {"ao-rays", 1, NULL, 'a'},
-        {NULL, 0, NULL, 0},
+        {"once", 0, NULL, '1'},      {NULL, 0, NULL, 0},
     };
     *bench =
         (struct bench_forms){.width = 512, .height = 512, .depth = 1, .rays_each = 1, .ao_rays = 8, .runs = 5};

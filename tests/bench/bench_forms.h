@@ -34,6 +34,7 @@ struct bench_forms {
     unsigned runs;
     bool waves[BENCH_WAVE_KINDS];
     bool plays; /* the model's first clip */
+    bool once;  /* frames without a warm-up: for what they show, not for their time */
     struct bench_form forms[BENCH_FORMS_MAX];
     unsigned form_count;
 };

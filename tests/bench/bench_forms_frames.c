@@ -14,7 +14,7 @@
 
 #define STEP_S 0.1 /* of the clip, from run to run */
 /* The first compiles and builds; in the second it is seen what moves, and what stands still is built once more. */
-#define WARM_UPS 2
+#define WARM_UPS 2u
 
 static const enum stage_id shown[] = {STAGE_UPLOAD, STAGE_PRIMARY, STAGE_TRACE, STAGE_SHADE, STAGE_RESOLVE};
 enum { SHOWN = sizeof shown / sizeof shown[0] };
@@ -60,6 +60,11 @@ static bool render(struct frames *frames, const struct bench_form *form, const s
     return progress == FRAME_DONE;
 }
 
+static unsigned warm_ups(const struct frames *frames)
+{
+    return frames->bench->once ? 0 : WARM_UPS;
+}
+
 static bool run_once(struct frames *frames, unsigned i, unsigned run, struct error *error)
 {
     struct bench_forms *bench = frames->bench;
@@ -75,7 +80,7 @@ static bool run_once(struct frames *frames, unsigned i, unsigned run, struct err
         return false;
     frame_result_finish(&frames->last[i]);
     frames->last[i] = result;
-    if (run < WARM_UPS)
+    if (run < warm_ups(frames))
         return true;
     bench_add(&frames->whole[i], frame_ns);
     bench_add(&frames->build[i], stage_times_sum_ns(&result.times, STAGE_BUILD, STAGE_CPU));
@@ -84,12 +89,27 @@ static bool run_once(struct frames *frames, unsigned i, unsigned run, struct err
     return true;
 }
 
+/* Forms may differ in what is asked of one tracer. */
+static unsigned tracers_of(const struct bench_forms *bench)
+{
+    unsigned count = 0;
+    for (unsigned i = 0; i < bench->form_count; i++) {
+        const struct bench_form *form = &bench->forms[i];
+        bool is_new = true;
+        for (unsigned k = 0; k < i; k++)
+            is_new = is_new && !(bench->forms[k].tracer == form->tracer && bench->forms[k].rival == form->rival &&
+                                 tracer_options_same(&bench->forms[k].options, &form->options));
+        count += is_new;
+    }
+    return count;
+}
+
 /* The forms take turns where their tracers are all kept between frames. Where the scene plays, who comes first
  * would pay for what all of a round are shown. */
 static bool run_all(struct frames *frames, struct error *error)
 {
-    const unsigned forms = frames->bench->form_count, runs = WARM_UPS + frames->bench->runs;
-    const bool turns = forms <= TRACERS_KEPT && !frames->bench->plays;
+    const unsigned forms = frames->bench->form_count, runs = warm_ups(frames) + frames->bench->runs;
+    const bool turns = tracers_of(frames->bench) <= TRACERS_KEPT && !frames->bench->plays;
     for (unsigned k = 0; k < forms * runs; k++) {
         const unsigned i = turns ? k % forms : k / runs, run = turns ? k / forms : k % runs;
         if (!run_once(frames, i, run, error))
@@ -133,7 +153,7 @@ static bool render_truth(struct frames *frames, struct frame_result *truth, stru
     const struct bench_form reference = {.tracer = BENCH_TRACER_REFERENCE};
     struct scene_motion motion = {0};
     const bool plays = frames->bench->plays;
-    const bool done = (!plays || pose(frames, WARM_UPS + frames->bench->runs - 1, &motion, error)) &&
+    const bool done = (!plays || pose(frames, warm_ups(frames) + frames->bench->runs - 1, &motion, error)) &&
                       render(frames, &reference, plays ? &motion : NULL, truth, error);
     scene_motion_finish(&motion);
     return done;

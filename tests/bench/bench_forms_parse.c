@@ -2,6 +2,7 @@
 /* Forms as they are given on the command line. */
 #include "tests/bench/bench_forms.h"
 #include "tests/bench/bench_options.h"
+#include "tests/bench/plain_pass.h"
 #include "tests/bench/svo.h"
 
 #include <stdlib.h>
@@ -70,8 +71,10 @@ static bool set_tracer(struct bench_form *form, const char *name)
     static const struct {
         const char *name;
         const struct tracer_impl *impl;
-    } rivals[] = {
-        {"svo-cells", &svo_cells_impl}, {"svo-planes", &svo_planes_impl}, {"svo-tiles", &svo_tiles_impl}};
+    } rivals[] = {{"svo-cells", &svo_cells_impl},
+                  {"svo-planes", &svo_planes_impl},
+                  {"svo-tiles", &svo_tiles_impl},
+                  {"plain", &plain_pass_impl}};
     for (size_t i = 0; i < sizeof rivals / sizeof *rivals; i++) {
         if (strcmp(name, rivals[i].name) == 0) {
             form->tracer = BENCH_TRACER_RIVAL;

@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* Builds: {"name", "cubes", "bytes", "build_ns": [..]}.
+/* Builds: {"name", "cubes", "bytes", "build_ns": [..]}; of octrees also "octree": what the last build counted.
  * Waves: the same, and "waves": [{"kind", "rays", "hits_ns": [..], "walk_ns": [..]}]: rays to hits on the device,
  * surfaces included, and the walk alone (of any-hit waves there is none). Closest-hit waves beside the reference
  * also have "agree" (share of the rays that hit with both or miss with both), "only_form", "only_reference", and
- * of rays that hit with both the difference of distances: "error_median", "error_p99", in metres; of ldc also what
- * a ray looked at in the mean: "nodes", "texels" (or cells) and "samples". Rays begin where the reference's camera
- * rays hit. */
+ * of rays that hit with both the difference of distances: "error_median", "error_p99", in metres; of ldc and
+ * abuffer also what a ray looked at in the mean: "nodes" (abuffer: blocks of voxels), "texels" (or cells) and
+ * "samples". Rays begin where the reference's camera rays hit. */
 #include "tests/bench/bench_forms.h"
 
 #include "base/clock.h"
+#include "tests/bench/plain_pass.h"
+#include "tests/bench/svo.h"
 
 #include <epoxy/gl.h>
 
@@ -53,9 +55,18 @@ static bool build(struct bench_forms *bench, struct bench_form *form, uint64_t *
 
 static json_t *describe(const struct bench_form *form, const struct bench_runs *builds)
 {
-    return json_pack("{s:s, s:o, s:I, s:o}", "name", form->name, "cubes",
-                     bench_cubes_json(form->made->stats.cubes), "bytes",
-                     (json_int_t)form->made->stats.device_bytes, "build_ns", bench_times_json(builds));
+    json_t *object =
+        json_pack("{s:s, s:o, s:I, s:o}", "name", form->name, "cubes", bench_cubes_json(form->made->stats.cubes),
+                  "bytes", (json_int_t)form->made->stats.device_bytes, "build_ns", bench_times_json(builds));
+    if (form->rival && form->rival != &plain_pass_impl) {
+        const struct svo_build_facts facts = svo_facts(form->made);
+        json_object_set_new(object, "octree",
+                            json_pack("{s:I, s:I, s:I, s:f, s:I, s:I}", "fragments", (json_int_t)facts.fragments,
+                                      "records", (json_int_t)facts.records, "leaves", (json_int_t)facts.leaves,
+                                      "cell_metres", (double)facts.cell_world, "voxelise_ns",
+                                      (json_int_t)facts.voxelise_ns, "tree_ns", (json_int_t)facts.tree_ns));
+    }
+    return object;
 }
 
 /* The first build of each compiles, too. */
@@ -117,16 +128,18 @@ static void compare(json_t *object, const struct hit *truth, const struct hit *h
     free(errors);
 }
 
-/* What the walk looks at, in the mean of the wave's rays. Crossings are no answers then (shaders/ldc/cube.glsl).
+/* What the walk looks at, in the mean of the wave's rays. Crossings are no answers then (shaders/ldc/cube.glsl,
+ * shaders/abuffer/column.glsl).
  */
 static bool count_steps(struct bench_contest *contest, struct bench_form *form, const struct bench_wave *wave,
                         struct hit *counts, json_t *object, struct error *error)
 {
     static const char *const names[3] = {"nodes", "texels", "samples"};
     double sums[3] = {0};
-    form->made->options.ldc_count_steps = 1;
+    struct tracer_options *options = &form->made->options;
+    options->ldc_count_steps = options->abuffer_count_steps = 1;
     const bool done = bench_contest_crossings(contest, form->made, wave, counts, error);
-    form->made->options.ldc_count_steps = 0;
+    options->ldc_count_steps = options->abuffer_count_steps = 0;
     for (uint32_t i = 0; done && i < wave->ray_count; i++) {
         sums[0] += (double)counts[i].distance;
         sums[1] += (double)counts[i].instance;
@@ -144,20 +157,21 @@ struct waves {
     struct bench_contest contest;
     struct bench_form reference; /* nothing made: this build has none */
     struct ray *camera_rays;
-    struct hit *camera_hits, *truth, *hits; /* a pixel each */
+    struct hit *camera_hits, *truth, *hits; /* a pixel each, and a ray each */
     json_t *lists[BENCH_FORMS_MAX];
 };
 
 static bool begin(struct waves *waves, struct bench_forms *bench, struct error *error)
 {
     const uint32_t pixels = bench->width * bench->height;
+    const size_t most = (size_t)pixels * bench->rays_each;
     *waves = (struct waves){.bench = bench,
                             .contest = {.device = bench->device, .scene = &bench->scene, .runs = bench->runs},
                             .reference = {.name = "reference", .tracer = BENCH_TRACER_REFERENCE},
                             .camera_rays = malloc(pixels * sizeof *waves->camera_rays),
                             .camera_hits = malloc(pixels * sizeof *waves->camera_hits),
-                            .truth = malloc(pixels * sizeof *waves->truth),
-                            .hits = malloc(pixels * sizeof *waves->hits)};
+                            .truth = malloc(most * sizeof *waves->truth),
+                            .hits = malloc(most * sizeof *waves->hits)};
     if (!waves->camera_rays || !waves->camera_hits || !waves->truth || !waves->hits)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture's rays");
     uint64_t time_ns;
@@ -182,7 +196,7 @@ static bool examine(struct waves *waves, struct bench_form *form, const struct b
     if (!bench_contest_hits(&waves->contest, form->made, wave, waves->hits, error))
         return false;
     compare(object, waves->truth, waves->hits, wave->ray_count);
-    return form->tracer != BENCH_TRACER_LDC ||
+    return (form->tracer != BENCH_TRACER_LDC && form->tracer != BENCH_TRACER_ABUFFER) ||
            count_steps(&waves->contest, form, wave, waves->hits, object, error);
 }
 
@@ -214,15 +228,16 @@ static bool run_wave(struct waves *waves, enum bench_wave_kind kind, struct erro
 {
     const struct bench_forms *bench = waves->bench;
     const uint32_t pixels = bench->width * bench->height;
-    struct ray *rays = malloc(pixels * sizeof *rays);
+    const size_t most = (size_t)pixels * (kind == BENCH_PRIMARY || kind == BENCH_SHUFFLED ? 1 : bench->rays_each);
+    struct ray *rays = malloc(most * sizeof *rays);
     struct bench_wave wave = {.kind = kind, .rays = rays, .ray_count = pixels};
     if (!rays)
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for rays");
     if (kind == BENCH_PRIMARY)
         memcpy(rays, waves->camera_rays, pixels * sizeof *rays);
     else
-        wave.ray_count =
-            bench_secondary_rays(rays, kind, waves->camera_rays, waves->camera_hits, pixels, 1, &bench->scene);
+        wave.ray_count = bench_secondary_rays(rays, kind, waves->camera_rays, waves->camera_hits, pixels,
+                                              bench->rays_each, &bench->scene);
     const bool done = wave.ray_count == 0 || measure(waves, &wave, error);
     free(rays);
     return done;

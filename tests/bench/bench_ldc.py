@@ -12,8 +12,8 @@ beside `bvh` and `reference`, and in their variants. Its JSON:
 
 A result is what bench_forms prints (its head says what), with "title" added.
 """
-from bench_animated import run_json
-from bench_common import figure, paired_ratio, shared
+from bench_common import figure, paired_ratio
+from bench_forms import call, form_of, models, once, ratio, wave_of, wave_size
 from bench_reach import row
 
 RESOLUTIONS = (512, 1024, 2048)
@@ -52,16 +52,8 @@ def ldc(resolution=USUAL, **options):
     return ["--form", "ldc:" + ",".join(f"{key}={value}" for key, value in {"resolution": resolution, **options}.items())]
 
 
-def call(bench, part, title, usual_runs, *arguments):
-    return {"title": title, **run_json(bench, "bench_forms", part, *arguments, "--runs", bench.times(usual_runs))}
-
-
 def resolutions(bench):
     return tuple(n // 16 for n in RESOLUTIONS) if bench.tiny else RESOLUTIONS
-
-
-def wave_size(bench):
-    return "64x64" if bench.tiny else "512x512"
 
 
 def forms_of(bench, names=RESOLUTIONS):
@@ -90,18 +82,6 @@ def measure_table1(bench):
         builds = None if options else call(bench, "builds", name, 7, *model, *forms)
         rows.append({"name": name, "instead": instead, "frames": frames, "builds": builds})
     return rows
-
-
-def models(bench, names, left_out):
-    """(title, arguments) of what is there; something generated where nothing is."""
-    if bench.tiny:
-        yield "teapot (bundled)", ["--model", bench.scenes / "teapot.glb"]
-        return
-    found = list(shared(bench, [(title, name, []) for title, name in names], left_out))
-    for title, path, _ in found:
-        yield title, ["--model", path]
-    if not found:
-        yield "teapot (bundled)", ["--model", bench.scenes / "teapot.glb"]
 
 
 def measure_scenes(bench, left_out):
@@ -189,33 +169,9 @@ def measure(bench):
 # ---- reading ----------------------------------------------------------------------------------------
 
 
-def form_of(result, resolution):
-    """The form of that many cells, or by name; where a tiny run has others, the one in their place."""
-    names = [form["name"] for form in result["forms"]]
-    name = resolution if isinstance(resolution, str) else f"ldc:resolution={resolution}"
-    return result["forms"][names.index(name)] if name in names else None
-
-
 def at(result, usual):
     """Likewise of one of RESOLUTIONS, also in a tiny run."""
     return form_of(result, usual) or form_of(result, usual // 16)
-
-
-def wave_of(form, kind):
-    return next(wave for wave in form["waves"] if wave["kind"] == kind)
-
-
-def ratio(form, other, kind, key="hits_ns"):
-    """How many times as long the form takes."""
-    return paired_ratio(wave_of(form, kind)[key], wave_of(other, kind)[key])
-
-
-def milliseconds(runs_ns):
-    return figure([ns / 1e6 for ns in runs_ns])
-
-
-def once(value):
-    return {"median": value, "deviation": 0, "least": value, "greatest": value, "runs": 1}
 
 
 def error_cells(form, wave, which="error_median"):

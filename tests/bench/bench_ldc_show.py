@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The tables of the part `ldc` of the benchmark."""
 from bench_common import figure, paired_ratio, significant, table, with_spread
-from bench_ldc import (ACCURACY_WAVES, PAPER, PICTURES, USUAL, after_build_ms, at, error_cells, form_of, milliseconds, ratio,
-                       same_samples, wave_of)
+from bench_forms import form_of, milliseconds, ratio, wave_of
+from bench_ldc import ACCURACY_WAVES, PAPER, PICTURES, USUAL, after_build_ms, at, error_cells, same_samples
 from bench_reach import show as show_wanted
 
 LOOKED_AT = ("nodes", "texels", "samples")  # cells in place of texels, where nodes are of cells

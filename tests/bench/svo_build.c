@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "gpu/program.h"
 #include "tests/bench/svo/svo.h"
+#include "trace/axes_box.h"
 #include "trace/ldc_store.h"
 
 #include <epoxy/gl.h>
@@ -14,11 +15,7 @@
 
 #define RECORD_BYTES 16u
 #define SUMS_BYTES 16u
-#define MARGIN_CELLS 0.5
 #define FRAGMENTS_FIRST (1u << 20)
-/* Of a scene so far from its origin that cells are no longer told apart. */
-#define CELL_RELATIVE_MIN 1e-6
-#define CELL_MIN 1e-30
 
 void svo_tree_init(struct svo_tree *tree, struct gpu_device *device, uint32_t resolution, enum svo_kind kind)
 {
@@ -55,31 +52,26 @@ uint64_t svo_tree_bytes(const struct svo_tree *tree)
 
 /* ---- the cube ---- */
 
-static void place(struct svo_tree *tree, const struct scene_gpu *scene)
+/* The one that A-buffers of as many texels have: leaves' cells are their texels. */
+static bool place(struct svo_tree *tree, const struct scene_gpu *scene, const uint32_t *instances, uint32_t count,
+                  struct error *error)
 {
-    double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
-    double longest = 0, farthest = 0;
-    for (uint32_t i = 0; i < scene->instance_count; i++) {
-        float own_lower[3], own_upper[3];
-        scene_gpu_instance_bounds(scene, i, own_lower, own_upper);
-        for (int k = 0; k < 3; k++) {
-            lower[k] = fmin(lower[k], (double)own_lower[k]);
-            upper[k] = fmax(upper[k], (double)own_upper[k]);
+    struct axes_box box;
+    if (!axes_box_place(&box, scene, instances, count, tree->resolution, error))
+        return false;
+    tree->cell_world = box.cell_world;
+    memcpy(tree->lower_world, box.lower_world, sizeof tree->lower_world);
+    for (int k = 0; k < 3; k++) {
+        float upper_world = box.lower_world[k], lower[3], upper[3];
+        for (uint32_t i = 0; i < count; i++) {
+            scene_gpu_instance_bounds(scene, instances[i], lower, upper);
+            upper_world = fmaxf(upper_world, upper[k]);
         }
-    }
-    for (int k = 0; k < 3; k++) {
-        longest = fmax(longest, upper[k] - lower[k]);
-        farthest = fmax(farthest, fmax(fabs(lower[k]), fabs(upper[k])));
-    }
-    const double cell =
-        fmax(longest / (tree->resolution - 2 * MARGIN_CELLS), fmax(CELL_RELATIVE_MIN * farthest, CELL_MIN));
-    tree->cell_world = (float)cell;
-    for (int k = 0; k < 3; k++) {
-        tree->lower_world[k] = (float)(lower[k] - MARGIN_CELLS * cell);
         tree->lower_cells[k] = 0;
         tree->upper_cells[k] =
-            (float)fmin(ceil((upper[k] - lower[k]) / cell + 2 * MARGIN_CELLS), tree->resolution);
+            fminf(ceilf((upper_world - box.lower_world[k]) / box.cell_world + 1), (float)tree->resolution);
     }
+    return true;
 }
 
 /* ---- the list ---- */
@@ -318,10 +310,9 @@ bool svo_tree_build(struct svo_tree *tree, struct scene_gpu *scene, struct error
             instances[count++] = i;
     scene_gpu_bind(scene);
     bool done = true;
-    if (count > 0) {
-        place(tree, scene);
-        done = axes_draw_prepare(&tree->draw, scene, instances, count, error) && build(tree, scene, error);
-    }
+    if (count > 0)
+        done = place(tree, scene, instances, count, error) &&
+               axes_draw_prepare(&tree->draw, scene, instances, count, error) && build(tree, scene, error);
     tree->facts.cell_world = tree->cell_world;
     free(instances);
     return done;

@@ -13,6 +13,7 @@ from farlight_test import BIN, ROOT, TIMEOUT_S
 
 BENCH = ROOT / "tests" / "bench"
 sys.path.insert(0, str(BENCH))
+import bench_abuffer  # noqa: E402  pylint: disable=wrong-import-position
 import bench_common  # noqa: E402  pylint: disable=wrong-import-position
 import bench_frames  # noqa: E402  pylint: disable=wrong-import-position
 import bench_ldc  # noqa: E402  pylint: disable=wrong-import-position
@@ -22,7 +23,7 @@ import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of bench_tracers
 PARTS = ("frames", "distributed", "tracers", "family", "pixels", "rays", "parallel", "instances",
-         "refit", "flake", "ldc", "reach")
+         "refit", "flake", "ldc", "abuffer", "reach")
 
 
 class Figures(unittest.TestCase):
@@ -137,6 +138,31 @@ class Benchmark(unittest.TestCase):
         for depth, result in sheets.items():
             self.assertTrue(bench_ldc.same_samples(result))
             self.assertEqual([f["cubes"][0]["layers_needed"] for f in result["forms"]], [depth, depth])
+        text = (self.out / "bench.txt").read_text()
+        for row in data["wanted"]:
+            self.assertIn(row["line"], text)
+
+    def test_a_buffers_have_the_papers_tables_and_are_held_against_octrees(self):
+        data = self.document["parts"]["abuffer"]
+        self.assertEqual([r["how"] for r in data["searches"]], ["mirrors", "glass", "ao"])
+        for result in data["searches"]:
+            forms = bench_abuffer.by_search(result["frames"])
+            self.assertEqual(list(forms), ["dda", "linear3", "linear1", "bvh"])
+            self.assertIsNone(forms["bvh"]["psnr_db"])  # exact, as the reference is
+            self.assertGreater(bench_abuffer.psnr(forms["dda"]), 15)  # 64 texels make a coarse picture, but that one
+        still = bench_abuffer.by_search(data["searches"][0]["waves"])["dda"]
+        self.assertEqual([w["kind"] for w in still["waves"]], ["reflection", "refraction", "shadow"])
+        self.assertGreater(still["waves"][0]["nodes"], 0)
+        rays = [form["shadow_rays"] for form in data["rays"]["forms"]]
+        self.assertEqual(rays[1], 2 * rays[0])
+        for row in data["table1"]:
+            for kind in ("abuffer", *bench_abuffer.OCTREES):
+                cost = bench_abuffer.costs(row, kind)
+                self.assertEqual(cost["total"][0], sum(cost[what][0] for what in ("construction", "tracing", "others")))
+            leaves = {form["name"].partition(":")[0]: form["octree"]["leaves"] for form in row["builds"]["forms"]
+                      if "octree" in form}
+            self.assertEqual(set(leaves), set(bench_abuffer.OCTREES))
+            self.assertLess(leaves["svo-cells"], leaves["svo-tiles"])  # whose tiles have empty ones
         text = (self.out / "bench.txt").read_text()
         for row in data["wanted"]:
             self.assertIn(row["line"], text)

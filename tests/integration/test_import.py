@@ -746,6 +746,23 @@ class Written(unittest.TestCase):
         self.assertAlmostEqual(material["transmission"], 0.9, 6)
         self.assertAlmostEqual(material["ior"], 1.33, 6)
 
+    def test_gltf_anisotropy(self):
+        def materials(*brushed):
+            result = self.run_gltf({
+                "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "extensionsRequired": ["KHR_materials_anisotropy"],
+                "images": [{"uri": "nowhere.png"}], "textures": [{"source": 0}],
+                "materials": [{"extensions": {"KHR_materials_anisotropy": one}} for one in brushed],
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": i} for i in range(len(brushed))]}]})
+            return [m["anisotropy"] for m in result.of(SET_MATERIAL)], result
+        got, result = materials({"anisotropyStrength": 0.5, "anisotropyRotation": -1.5}, {}, {"anisotropyRotation": 2})
+        self.assertEqual(got, [[0.5, -1.5], [0, 0], [0, 2]])
+        self.assertEqual(result.notes, [])
+        got, result = materials({"anisotropyStrength": 3, "anisotropyRotation": "east", "anisotropyTexture": {"index": 0}})
+        self.assertEqual(got, [[1, 0]])
+        self.assertIn("anisotropyStrength", result.text())
+        self.assertIn("texture of anisotropy is not shown", result.text())
+        self.assertNotIn("nowhere.png", result.text(), "what is not shown is not read either")
+
     def test_gltf_missing_image_is_marked(self):
         result = self.run_gltf({
             "nodes": [{"mesh": 0}], "images": [{"uri": "nowhere.png"}], "textures": [{"source": 0}],
@@ -794,6 +811,7 @@ class Written(unittest.TestCase):
     def test_obj_faces_and_materials(self):
         with open(os.path.join(self.folder.name, "m.mtl"), "w", encoding="utf-8") as file:
             file.write("newmtl red\nKd 1 0 0\nNs 10\nd 0.5\n\nnewmtl mirror\nKd 0 0 0\nKs 0.9 0.9 0.9\nNs 1000\nillum 3\n"
+                       "aniso 0.5\nanisor 0.25\n"
                        "newmtl glass\nKd 0 0 0\nd 0.1\nNi 1.5\nillum 7\n")
         result = self.run_text("model.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0.25\n"
                                "usemtl red\nf 1/1 2/1 3/1 4/1\nusemtl mirror\nf -4 -3 -2\nusemtl glass\nf 1 2 4\n")
@@ -803,6 +821,9 @@ class Written(unittest.TestCase):
         self.assertEqual((red["base"], red["alpha_mode"]), ((1, 0, 0, 0.5), 2))
         self.assertAlmostEqual(red["roughness"], (2 / 12) ** 0.5, 5)
         self.assertEqual((mirror["metallic"], mirror["roughness"]), (1, 0))
+        self.assertEqual(mirror["anisotropy"][0], 0.5)
+        self.assertAlmostEqual(mirror["anisotropy"][1], 1.5707963, 5, "a quarter of a turn")
+        self.assertEqual(red["anisotropy"], [0, 0])
         self.assertAlmostEqual(glass["transmission"], 0.9, 6)
         self.assertEqual(glass["base"][:3], (1, 1, 1))
         self.assertEqual(self.floats(result, mesh, 4)[1], 0.75, "v runs downwards here")

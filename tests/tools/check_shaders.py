@@ -16,7 +16,8 @@ import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 
-ROOT = pathlib.Path("shaders")
+# Of the daemon, and of programs that measure: a name is looked for in both, as those programs have both built in.
+ROOTS = (pathlib.Path("shaders"), pathlib.Path("tests/bench"))
 # Program -> its stages, and the defines of which it has one combination always.
 TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "RAYS_TOGETHER": "1"}] + [
     {"TRAVERSE": '"bvh/traverse.glsl"', "TRACER_BVH": "1", "RAYS_TOGETHER": together, **bounds}
@@ -28,7 +29,9 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "RAYS_TOGE
         ("1", "4", "1", "0", {"LDC_CELLS": "1"}), ("2", "4", "4", "0", {"LDC_CELLS": "1"}),
         ("2", "1", "4", "2", {}), ("1", "4", "1", "3", {"LDC_BLOCKS": "1"}))] + [
     {"TRAVERSE": '"abuffer/traverse.glsl"', "TRACER_ABUFFER": "1", "RAYS_TOGETHER": "1", **search}
-    for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"})]
+    for search in ({}, {"ABUFFER_STEPS": "3"}, {"ABUFFER_STEPS": "1"})] + [
+    {"TRAVERSE": f'"svo/{walk}.glsl"', "TRACER_SVO": "1", "RAYS_TOGETHER": "1", **tree}
+    for walk, tree in (("traverse", {"SVO_TOP_SHIFT": "8"}), ("tile_traverse", {"SVO_LEVELS": "10"}))]
 CHOICES = {
     "trace.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
     "bvh/coherence.comp": [[{"RAYS_TOGETHER": "8"}]],
@@ -42,12 +45,14 @@ CHOICES = {
                        [{"BUILD_PASS": number} for number in "012"]],
     "abuffer/build.frag": [[{"PRIMITIVE_KIND": "0", "ALL_IMAGES": "1"},
                             {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1", "ALL_IMAGES": "1"}]],
+    "svo/voxelise.frag": [[{"PRIMITIVE_KIND": "0"}, {"PRIMITIVE_KIND": "1", "HAS_SPHERES": "1"}]],
 }
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION")}
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
           "ldc/build.frag": ["axes/draw.vert", "axes/draw.geom", "ldc/build.frag"],
-          "abuffer/build.frag": ["axes/draw.vert", "axes/draw.geom", "abuffer/build.frag"]}
+          "abuffer/build.frag": ["axes/draw.vert", "axes/draw.geom", "abuffer/build.frag"],
+          "svo/voxelise.frag": ["axes/draw.vert", "axes/draw.geom", "svo/voxelise.frag"]}
 # Storage blocks of a stage; server/gpu/device.c asks a driver for as many.
 STORAGE_BLOCKS_MAX = {".comp": 16, ".vert": 4, ".geom": 0, ".frag": 8}
 
@@ -59,6 +64,10 @@ DEFINED = re.compile(r"\bdefined[ \t]*\(?[ \t]*(\w+)")
 STORAGE_BLOCK = re.compile(r"\bbuffer\s+\w+\s*\{")
 
 
+def file_of(path):
+    return next(root / path for root in ROOTS if (root / path).is_file())
+
+
 def expand(path, defines, files):
     """The lines of a file with everything that it includes; `files` grows by the files' names."""
     if path in files:
@@ -66,7 +75,7 @@ def expand(path, defines, files):
     files.append(path)
     number = files.index(path)
     lines = [f"#line 1 {number}"]
-    for i, line in enumerate((ROOT / path).read_text().splitlines(), 1):
+    for i, line in enumerate(file_of(path).read_text().splitlines(), 1):
         found = DIRECTIVE.match(line)
         if not found:
             lines.append(line)
@@ -148,9 +157,9 @@ def complaints_of(variant):
 
 
 def main():
-    found = sorted(str(path.relative_to(ROOT)) for path in ROOT.rglob("*.comp"))
     stages = {stage for program, stages in STAGES.items() for stage in stages if stage != program}
-    found += sorted(str(path.relative_to(ROOT)) for suffix in ("vert", "frag") for path in ROOT.rglob("*." + suffix))
+    found = sorted(str(path.relative_to(root)) for suffix in ("comp", "vert", "frag") for root in ROOTS
+                   for path in root.rglob("*." + suffix))
     found = [program for program in found if program not in stages]
     all_variants = [variant for program in found for variant in variants(program)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:

@@ -60,5 +60,14 @@ echo "--- $out/lens.png, the clip at 0.7 s through a wide open lens, in focus on
     --samples 16 --aperture 0.3 --focus 7.4 --timings -o "$out/lens.png"
 echo "--- $out/ldc.png, the first scene by layered depth cubes beside an exact tracer, and where they differ"
 "$bin/farlight" compare "$scene" --environment "$sky" --server "$server" --size 480x270 --tracers ldc,bvh -o "$out/ldc.png"
+echo "--- $out/abuffer.png, ambient occlusion in a box by voxels and A-buffers beside an exact tracer, and where they differ"
+"$bin/farlight" compare "$private/scenes/cornell.glb" --server "$server" --size 320x240 --integrator ao --samples 1 \
+    --tracers abuffer,bvh -o "$out/abuffer.png"
+echo "--- $out/path.png, the first scene by path tracing, refined in passes of 4 samples"
+"$bin/farlight" render "$scene" --environment "$sky" --server "$server" --size 400x225 --integrator path --samples 16 \
+    --progressive=4 -o "$out/path.png"
+echo "--- $out/layers.exr, the picture with albedo, normals, depth and numbers of objects as channels of one file"
+"$bin/farlight" render "$scene" --environment "$sky" --server "$server" --size 480x270 \
+    --layers beauty,albedo,normal,depth,id -o "$out/layers.exr"
 echo "--- the daemon, afterwards"
 "$bin/farlight" stats --server "$server"

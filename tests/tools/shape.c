@@ -119,6 +119,20 @@ static void join_grid(struct shape *shape, uint32_t first, uint32_t rows, uint32
     }
 }
 
+/* Closes a grid's first or last row, of vertices from `first` on, with a flat disc. */
+static void close_end(struct shape *shape, uint32_t first, uint32_t columns, const float centre[3],
+                      const float normal[3], bool is_last)
+{
+    const uint32_t middle = add_vertex(shape, centre, normal);
+    for (uint32_t i = 0; i <= columns && !shape->out_of_memory; i++) {
+        float position[3];
+        memcpy(position, shape->positions + 3 * (size_t)(first + i), sizeof position);
+        add_vertex(shape, position, normal);
+    }
+    for (uint32_t i = 1; i <= columns; i++)
+        add_triangle(shape, middle, is_last ? middle + i + 1 : middle + i, is_last ? middle + i : middle + i + 1);
+}
+
 void shape_lathe(struct shape *shape, const float (*profile)[2], uint32_t profile_count, uint32_t segments)
 {
     const uint32_t first = shape->vertex_count;
@@ -136,6 +150,12 @@ void shape_lathe(struct shape *shape, const float (*profile)[2], uint32_t profil
         }
     }
     join_grid(shape, first, profile_count, segments);
+    const float *bottom = profile[0], *top = profile[profile_count - 1];
+    if (bottom[0] > 0)
+        close_end(shape, first, segments, (const float[3]){0, bottom[1], 0}, (const float[3]){0, -1, 0}, false);
+    if (top[0] > 0)
+        close_end(shape, first + (profile_count - 1) * (segments + 1), segments, (const float[3]){0, top[1], 0},
+                  (const float[3]){0, 1, 0}, true);
 }
 
 void shape_sphere(struct shape *shape, const float centre[3], float radius, uint32_t segments)
@@ -180,6 +200,14 @@ void shape_tube(struct shape *shape, const float (*path)[3], const float *radii,
         }
     }
     join_grid(shape, first, path_count, segments);
+    const uint32_t last = path_count - 1;
+    float backwards[3], forwards[3];
+    subtract(backwards, path[0], path[1]);
+    subtract(forwards, path[last], path[last - 1]);
+    normalise(backwards);
+    normalise(forwards);
+    close_end(shape, first, segments, path[0], backwards, false);
+    close_end(shape, first + last * (segments + 1), segments, path[last], forwards, true);
 }
 
 void shape_teapot(struct shape *shape, uint32_t segments)

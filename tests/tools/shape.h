@@ -21,9 +21,9 @@ void shape_quad(struct shape *shape, const float a[3], const float b[3], const f
 /* An axis-aligned box, turned by `turn` radians about +y through its centre. */
 void shape_box(struct shape *shape, const float centre[3], const float half_size[3], float turn);
 void shape_sphere(struct shape *shape, const float centre[3], float radius, uint32_t segments);
-/* Surface of revolution about +y: `profile` holds radius and height pairs from the bottom up. */
+/* Body of revolution about +y: `profile` holds radius and height pairs from the bottom up. Flat at its ends. */
 void shape_lathe(struct shape *shape, const float (*profile)[2], uint32_t profile_count, uint32_t segments);
-/* A tube along a path of centres with a radius each. */
+/* A tube along a path of two and more centres with a radius each. Flat at its ends. */
 void shape_tube(struct shape *shape, const float (*path)[3], const float *radii, uint32_t path_count,
                 uint32_t segments);
 /* On its foot at the origin, its spout towards +x, about 1.2 high and 2.8 long. */

@@ -22,5 +22,6 @@ void main()
     float count = float(sum.w & (SVO_SUM_COUNT - 1)), distance_ = float(sum.w >> 12) / SVO_DISTANCE_UNIT;
     vec3 normal = vec3(sum.xyz) / SVO_NORMAL_UNIT;
     float long_ = length(normal);
-    imageStore(planes, k, uvec4(long_ < AGREE_LEAST * count ? SVO_NO_PLANE : pack_plane(normal / long_, distance_ / count)));
+    uint plane = long_ < AGREE_LEAST * count ? SVO_NO_PLANE : pack_plane(normal / long_, distance_ / count);
+    imageStore(planes, k, uvec4(plane));
 }

@@ -21,15 +21,15 @@
  *              average distance of that along the normal from the middle of the cell, SVO_PLANE_UNIT cells for 1.
  *              SVO_NO_PLANE: what is in it faces all ways
  *
- * Tiles: the tree as Crassin and Green have it, for comparison: nodes with pointers to tiles of eight children, found anew
- * from the root by each fragment at each level and by each ray in each step, and normals averaged leaf by leaf.
+ * Tiles: the tree as Crassin and Green have it, for comparison: nodes with pointers to tiles of eight children, found
+ * anew from the root by each fragment at each level and by each ray in each step, and normals averaged leaf by leaf.
  *   records    R32UI, one a node: bits 0..30 the first of its children, 0: none; SVO_HOLDS. Nodes of the last level are
  *              leaves, whether they hold something or not
  *   planes     R32UI, one a leaf: average normal, unorm 3 x 8 bits, 0.5 for 0, and above them how many they are
  *
  * While it is built:
- *   fragments  RG32UI: bits 0..9, 10..19, 20..29 x, y, z; id. With planes or tiles RGBA32UI: z the geometric normal, 2 x 16 bit
- *              octahedral snorm, w distance along it from the middle of the cell (float, cells)
+ *   fragments  RG32UI: bits 0..9, 10..19, 20..29 x, y, z; id. With planes or tiles RGBA32UI: z the geometric normal,
+ *              2 x 16 bit octahedral snorm, w distance along it from the middle of the cell (float, cells)
  *   current    R32UI, one a fragment: the record that it has come to
  *   sums       R32I, four a leaf: normals, SVO_NORMAL_UNIT for 1, then distances, SVO_DISTANCE_UNIT for a cell, times
  *              SVO_SUM_COUNT, plus their number */

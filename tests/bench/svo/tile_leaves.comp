@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From fragments to leaves: who is in each, and the running average of its normals, which goes round until nobody else has
-// changed it meanwhile (Crassin and Green, listing 22.2).
+// From fragments to leaves: who is in each, and the running average of its normals, which goes round until nobody else
+// has changed it meanwhile (Crassin and Green).
 #include "common/dispatch.glsl"
 #include "common/math.glsl"
 #include "svo/tiles.glsl"

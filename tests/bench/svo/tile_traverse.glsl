@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The walk through a tree of tiles (svo/svo.h): from the root to the leaf or empty node that the ray is in, then from there
-// to where the ray leaves it, and from the root again. Crassin et al. GigaVoxels. 2009.
+// The walk through a tree of tiles (svo/svo.h): from the root to the leaf or empty node that the ray is in, then from
+// there to where the ray leaves it, and from the root again. Crassin et al. GigaVoxels. 2009.
 //
 // Define: SVO_LEVELS
 #include "common/candidate.glsl"
@@ -47,10 +47,11 @@ int first_leaf_of(trace_ray r, out float distance_)
         vec3 at = (vec3(corner) - origin) * inverse;
         float leaves = least_of(at);
         if (word == 0u) {
-            ivec3 own = (cell >> shift) << shift, inside = clamp(ivec3(origin + leaves * direction), own, own + (1 << shift) - 1);
-            inside = mix(inside, corner - 1 + upward, lessThanEqual(at, vec3(leaves)));
-            t = any(lessThan(inside, ivec3(0))) || any(greaterThanEqual(inside, ivec3(1 << SVO_LEVELS))) ? end : leaves;
-            cell = inside;
+            ivec3 own = (cell >> shift) << shift;
+            cell = clamp(ivec3(origin + leaves * direction), own, own + (1 << shift) - 1);
+            cell = mix(cell, corner - 1 + upward, lessThanEqual(at, vec3(leaves)));
+            bool is_out = any(lessThan(cell, ivec3(0))) || any(greaterThanEqual(cell, ivec3(1 << SVO_LEVELS)));
+            t = is_out ? end : leaves;
             node = 0;
             shift = SVO_LEVELS;
         } else if (shift == 0) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The walk through a sparse voxel octree (svo/svo.h), front to back down to the leaves. Laine, Karras. Efficient Sparse
-// Voxel Octrees. 2010: the ray's cell as whole numbers whose highest differing bit says how far to climb, and a stack of
-// the nodes above, which are so few here that they are variables.
+// Voxel Octrees. 2010: the ray's cell as whole numbers whose highest differing bit says how far to climb, and a stack
+// of the nodes above, which are so few here that they are variables.
 //
 // All directions are made to run upwards: where a component runs down, cells are counted from the other side.
 //

@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to frame_renderer.c, frame_begin.c and frame.c: what a renderer holds, and where its frame is. */
+#ifndef FARLIGHT_RENDER_FRAME_STATE_H
+#define FARLIGHT_RENDER_FRAME_STATE_H
+
+#include "render/comparison.h"
+#include "render/context.h"
+#include "render/frame.h"
+#include "render/integrator.h"
+#include "render/layers.h"
+#include "render/picture.h"
+#include "render/primary.h"
+#include "render/slices.h"
+#include "render/tracer_set.h"
+
+enum frame_phase {
+    PHASE_IDLE,
+    PHASE_SAMPLE,
+    PHASE_RASTER,
+    PHASE_SLICE,
+    PHASE_LAYERS,
+    PHASE_SHADE,
+    PHASE_TRACE,
+    PHASE_RESOLVE
+};
+
+struct frame_renderer {
+    struct gpu_device *device;
+    struct scene_gpu scene;
+    struct tracer_set tracers;
+    struct integrator *integrator;
+    struct render_context context;
+    struct primary primary;
+    struct picture picture;
+    struct layers layers;
+    struct comparison *comparison; /* NULL: no frame has asked for one */
+    const struct tracer_impl *stand_in;
+    unsigned stand_in_number;
+    uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */
+    /* the frame in hand */
+    enum frame_phase phase;
+    bool rasterise;
+    uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
+    uint32_t sample;         /* samples of this frame that are done */
+    uint32_t plane, band;    /* of the picture that is handed out next */
+    struct slices slices;
+    /* the last frame that was finished, whose sum the picture holds */
+    struct frame_request kept_request;
+    uint32_t kept_samples;      /* 0: there is none */
+    struct frame_result result; /* counts, until the last step hands it out */
+};
+
+/* frame_renderer.c. There is none afterwards. */
+void frame_drop_integrator(struct frame_renderer *renderer);
+/* frame_begin.c. Room for slices of slices.slice_rays and waves of context.wave_capacity rays. */
+bool frame_reserve_waves(struct frame_renderer *renderer, struct error *error);
+
+#endif

@@ -1,0 +1,156 @@
+/* SPDX-License-Identifier: MIT */
+/* Calls the functions of shaders/common/bsdf.glsl on the device, for any material: a test of them is a test of
+ * what the integrator uses, not of a copy. The normal is +z, the grain runs along x. */
+#ifndef FARLIGHT_TESTS_BSDF_PROBE_H
+#define FARLIGHT_TESTS_BSDF_PROBE_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "gpu/buffer.h"
+#include "gpu/device.h"
+#include "gpu/program.h"
+#include "gpu/program_source.h"
+#include "shared/bindings.h"
+
+#include <epoxy/gl.h>
+#include <string.h>
+
+/* As the shader has it: three vec4. */
+struct bsdf_case {
+    float roughness, metallic, transmission, ior;
+    float view[3], base;                 /* unit, towards the eye; base colour, grey */
+    float inside, anisotropy, unused[2]; /* inside 1: seen from behind, as glass is */
+};
+_Static_assert(sizeof(struct bsdf_case) == 48, "the shader reads three vec4 a case");
+
+/* What is asked: a direction to evaluate, or three numbers to choose by. */
+struct bsdf_question {
+    float v[4]; /* direction; or u, u, choice */
+};
+
+struct bsdf_answer {
+    float direction[3], lobe; /* as given; or chosen, BSDF_* */
+    float weight, probability, sent,
+        of; /* weight of what was chosen; bsdf_evaluate() of the direction and its
+               probability; `of`: brdf() of common/scattering.glsl, times the cosine */
+};
+
+struct bsdf_probe {
+    struct gpu_device *device;
+    struct gpu_program program;
+    struct gpu_buffer questions, answers;
+};
+
+static const char bsdf_probe_text[] =
+    "#include \"shared/bindings.h\"\n"
+    "#define GROUP_SIZE 1024\n" /* software GL allocates for each group, which is slow below a sanitizer */
+    "#include \"common/dispatch.glsl\"\n"
+    "#include \"common/bsdf.glsl\"\n"
+    "uniform uint question_count, chooses;\n"
+    "uniform vec4 material_, view_base, more;\n"
+    "layout(std430, binding = BIND_PASS_1) readonly buffer question_block { vec4 questions[]; };\n"
+    "layout(std430, binding = BIND_PASS_2) writeonly buffer answer_block { vec4 answers[]; };\n"
+    "void main()\n"
+    "{\n"
+    "    uint i = item_index();\n"
+    "    if (i >= question_count)\n"
+    "        return;\n"
+    "    surface s;\n"
+    "    s.position = s.emission = vec3(0.0);\n"
+    "    s.geometric = s.normal = vec3(0.0, 0.0, 1.0);\n"
+    "    s.base = vec3(view_base.w);\n"
+    "    s.alpha = s.occlusion = 1.0;\n"
+    "    s.unlit = false;\n"
+    "    s.roughness = material_.x;\n"
+    "    s.metallic = material_.y;\n"
+    "    s.transmission = material_.z;\n"
+    "    s.ior = material_.w;\n"
+    "    s.inside = more.x > 0.0;\n"
+    "    vec3 view = view_base.xyz;\n"
+    "    split parts = split_light(s, view.z);\n"
+    "    bsdf b = bsdf_of(s, parts, view, view.z, vec3(1.0, 0.0, 0.0), more.y);\n"
+    "    vec4 asked = questions[i];\n"
+    "    bsdf_choice chosen = bsdf_choice(asked.xyz, vec3(0.0), 0.0, BSDF_SCATTERED);\n"
+    "    float choice = asked.z, probability;\n"
+    "    if (chooses != 0u)\n"
+    "        chosen = bsdf_choose(b, s, choice, asked.xy);\n"
+    "    vec3 sent = bsdf_evaluate(b, s, chosen.direction, probability);\n"
+    "    float other = brdf(s, parts, view, view.z, chosen.direction).g * chosen.direction.z;\n"
+    "    if (chooses != 0u)\n"
+    "        probability = chosen.probability;\n"
+    "    answers[2u * i] = vec4(chosen.direction, float(chosen.lobe));\n"
+    "    answers[2u * i + 1u] = vec4(chosen.weight.g, probability, sent.g, other);\n"
+    "}\n";
+
+static inline bool bsdf_probe_lookup(const char *path, size_t length, const char **kept, const char **begin,
+                                     const char **end)
+{
+    static const char own[] = "bsdf_probe.comp";
+    if (length != strlen(own) || memcmp(path, own, length) != 0)
+        return gpu_source_lookup_embedded(path, length, kept, begin, end);
+    *kept = own;
+    *begin = bsdf_probe_text;
+    *end = bsdf_probe_text + strlen(bsdf_probe_text);
+    return true;
+}
+
+static inline void bsdf_probe_init(struct bsdf_probe *probe, struct gpu_device *device, bool ward)
+{
+    struct error error = {0};
+    struct gpu_source_text text = {0};
+    const struct gpu_define defines[] = {{"HAS_ANISOTROPY", "1"}, {ward ? "WARD" : NULL, "1"}, {NULL, NULL}};
+    *probe = (struct bsdf_probe){.device = device};
+    if (!gpu_source_expand(&text, bsdf_probe_lookup, "bsdf_probe.comp", defines, &error))
+        fail_msg("%s", error.text);
+    const GLchar *source = text.text;
+    probe->program = (struct gpu_program){glCreateShaderProgramv(GL_COMPUTE_SHADER, 1, &source), 1024};
+    GLint linked = GL_FALSE;
+    glGetProgramiv(probe->program.name, GL_LINK_STATUS, &linked);
+    if (!linked) {
+        char log[2048] = "", named[4096] = "";
+        glGetProgramInfoLog(probe->program.name, sizeof(log), NULL, log);
+        gpu_source_name_files(&text, log, named, sizeof(named));
+        fail_msg("%s", named);
+    }
+    gpu_source_finish(&text);
+}
+
+static inline void bsdf_probe_finish(struct bsdf_probe *probe)
+{
+    gpu_buffer_finish(probe->device, &probe->questions);
+    gpu_buffer_finish(probe->device, &probe->answers);
+    glDeleteProgram(probe->program.name);
+}
+
+static inline void bsdf_probe_ask(struct bsdf_probe *probe, const struct bsdf_question *questions, size_t count)
+{
+    struct error error = {0};
+    assert_true(
+        gpu_buffer_upload(probe->device, &probe->questions, questions, count * sizeof(*questions), &error));
+    assert_true(gpu_buffer_reserve(probe->device, &probe->answers, count * sizeof(struct bsdf_answer), &error));
+}
+
+/* Answers to the questions that were asked last; `chooses`: they are numbers to choose by. */
+static inline void bsdf_probe_run(struct bsdf_probe *probe, const struct bsdf_case *c, bool chooses, size_t count,
+                                  struct bsdf_answer *answers)
+{
+    struct error error = {0};
+    glUseProgram(probe->program.name);
+    gpu_uniform_uint(&probe->program, "question_count", (uint32_t)count);
+    gpu_uniform_uint(&probe->program, "chooses", chooses);
+    gpu_uniform_vec(&probe->program, "material_", 4, &c->roughness);
+    gpu_uniform_vec(&probe->program, "view_base", 4, c->view);
+    gpu_uniform_vec(&probe->program, "more", 4, &c->inside);
+    gpu_buffer_bind_storage(&probe->questions, BIND_PASS_1);
+    gpu_buffer_bind_storage(&probe->answers, BIND_PASS_2);
+    gpu_dispatch(probe->device, &probe->program, count);
+    gpu_buffer_read(probe->device, &probe->answers, 0, answers, count * sizeof(*answers));
+    if (!gpu_check(probe->device, "bsdf probe", &error))
+        fail_msg("%s", error.text);
+}
+
+#endif

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: MIT */
+/* What the tests of the integrator `path` share: its default request, and means with their standard errors. */
+#ifndef FARLIGHT_TESTS_PATH_FIXTURE_H
+#define FARLIGHT_TESTS_PATH_FIXTURE_H
+
+#include "render_fixture.h"
+
+#define TRACER_BVH 0
+#define TRACER_REFERENCE 2
+#define TRACER_LDC 3
+#define PI 3.14159265358979323846
+#define COUNT(array) (sizeof(array) / sizeof((array)[0]))
+
+enum { EDGE = 32, PIXELS = EDGE * EDGE };
+
+static inline void path_begin(struct fixture *fixture, unsigned tracer, uint32_t depth)
+{
+    fixture_clear((void **)&fixture);
+    fixture->request.width = fixture->request.height = EDGE;
+    fixture->request.integrator = INTEGRATOR_PATH;
+    fixture->request.filter = FILTER_BOX;
+    fixture->request.tracer = tracer;
+    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.depth = depth;
+}
+
+struct mean {
+    double value, error; /* standard error */
+};
+
+/* Of numbers that are independent of each other. */
+static inline struct mean mean_of(const double *values, size_t count)
+{
+    double sum = 0.0, squares = 0.0;
+    for (size_t i = 0; i < count; i++)
+        sum += values[i];
+    for (size_t i = 0; i < count; i++)
+        squares += (values[i] - sum / (double)count) * (values[i] - sum / (double)count);
+    return (struct mean){sum / (double)count, sqrt(squares / (double)count / (double)(count - 1))};
+}
+
+/* Green of all pixels; pixels have numbers of their own, and what they show is alike where this is asked for. */
+static inline struct mean mean_of_picture(const struct frame_result *result)
+{
+    double values[PIXELS];
+    for (uint32_t i = 0; i < PIXELS; i++)
+        values[i] = (double)fixture_pixel(result, i % EDGE, i / EDGE)[1];
+    return mean_of(values, PIXELS);
+}
+
+/* Of something that a picture says, over seeds. */
+enum { SEEDS = 16 };
+typedef double measure(const struct frame_result *result);
+static inline struct mean mean_of_seeds(struct fixture *fixture, measure *of)
+{
+    double values[SEEDS];
+    for (uint64_t seed = 0; seed < SEEDS; seed++) {
+        fixture->request.seed = seed;
+        struct frame_result result = fixture_render(fixture);
+        values[seed] = of(&result);
+        frame_result_finish(&result);
+    }
+    return mean_of(values, SEEDS);
+}
+
+/* Student's t with 15 degrees of freedom is beyond 5 once in 6000 cases; `other`: what else it may be off. */
+#define assert_mean(mean_, expected, other)                                                                       \
+    do {                                                                                                          \
+        struct mean got = (mean_);                                                                                \
+        double wanted = (expected);                                                                               \
+        if (!(fabs(got.value - wanted) <= 5.0 * got.error + (other)))                                             \
+            fail_msg("%s is %.6g with a standard error of %.1e, expected %.6g", #mean_, got.value, got.error,     \
+                     wanted);                                                                                     \
+    } while (0)
+
+#endif

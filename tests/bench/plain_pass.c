@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: MIT */
+#include "tests/bench/plain_pass.h"
+
+#include "gpu/texture.h"
+#include "trace/axes_box.h"
+#include "trace/axes_draw.h"
+
+#include <epoxy/gl.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+#define RESOLUTION_DEFAULT 1024
+
+struct plain_pass {
+    struct tracer base;
+    struct axes_draw draw;
+    struct gpu_texture depth;
+    struct gpu_framebuffer framebuffer;
+    uint32_t resolution;
+};
+
+static void plain_destroy(struct tracer *tracer)
+{
+    struct plain_pass *pass = (struct plain_pass *)tracer;
+    gpu_framebuffer_finish(pass->draw.device, &pass->framebuffer);
+    gpu_texture_finish(pass->draw.device, &pass->depth);
+    axes_draw_finish(&pass->draw);
+    free(pass);
+}
+
+static struct tracer *plain_create(struct gpu_device *device, const struct tracer_options *options,
+                                   struct error *error)
+{
+    struct plain_pass *pass = calloc(1, sizeof *pass);
+    if (!pass) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a pass");
+        return NULL;
+    }
+    pass->resolution = options->abuffer_resolution ? options->abuffer_resolution : RESOLUTION_DEFAULT;
+    axes_draw_init(&pass->draw, device);
+    if (gpu_texture_reserve_array(device, &pass->depth, GL_DEPTH_COMPONENT32F, pass->resolution, pass->resolution,
+                                  3, error) &&
+        gpu_framebuffer_create(device, &pass->framebuffer, NULL, 0, &pass->depth, error))
+        return &pass->base;
+    plain_destroy(&pass->base);
+    return NULL;
+}
+
+static bool draw(struct plain_pass *pass, struct scene_gpu *scene, const uint32_t *instances, uint32_t count,
+                 struct error *error)
+{
+    static const float farthest = 1;
+    struct axes_box box;
+    if (!axes_box_place(&box, scene, instances, count, pass->resolution, error) ||
+        !axes_draw_prepare(&pass->draw, scene, instances, count, error))
+        return false;
+    struct axes_pass axes = {.cell_world = box.cell_world, .resolution = pass->resolution, .overlap = 1};
+    memcpy(axes.lower_world, box.lower_world, sizeof axes.lower_world);
+    scene_gpu_bind(scene);
+    glDepthMask(GL_TRUE);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_LESS);
+    glClearNamedFramebufferfv(pass->framebuffer.name, GL_DEPTH, 0, &farthest);
+    glBindFramebuffer(GL_FRAMEBUFFER, pass->framebuffer.name);
+    const bool drawn = axes_draw(&pass->draw, scene, &axes, error);
+    glDisable(GL_DEPTH_TEST);
+    return drawn;
+}
+
+static bool plain_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
+                         struct stage_times *times, struct error *error)
+{
+    (void)changes, (void)times;
+    uint32_t *instances = malloc((scene->instance_count + 1u) * sizeof *instances), count = 0;
+    if (!instances)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u instances", scene->instance_count);
+    for (uint32_t i = 0; i < scene->instance_count; i++)
+        if (scene->geometries[scene->instances[i].geometry].device.primitive_count > 0)
+            instances[count++] = i;
+    const bool done = count == 0 || draw((struct plain_pass *)tracer, scene, instances, count, error);
+    glFinish();
+    free(instances);
+    return done;
+}
+
+static bool plain_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,
+                        struct error *error)
+{
+    (void)tracer, (void)scene, (void)wave;
+    return error_set(error, ERROR_UNSUPPORTED, "--form", "a plain pass can be built only");
+}
+
+const struct tracer_impl plain_pass_impl = {
+    .name = "plain",
+    .depends_on = TRACER_NEEDS_SCENE,
+    .create = plain_create,
+    .destroy = plain_destroy,
+    .update = plain_update,
+    .trace = plain_trace,
+};

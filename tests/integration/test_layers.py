@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""Layers of an EXR file: which channels there are, that their numbers fit each other and the picture, and what is
+refused."""
+import math
+
+import farlight_test
+from farlight_test import Case, Daemon, bundled_scenes, exr_attributes, exr_channels, farlight, frames_of, read_exr
+
+EYE, LOOK_AT = (0.3, 1.1, 3.1), (0.0, 0.9, 0.0)
+VIEW = ["--size", "48x40", "--eye", ",".join(map(str, EYE)), "--look-at", ",".join(map(str, LOOK_AT)), "--fov", "50"]
+ALL = "beauty,albedo,normal,depth,position,ao,id"
+UINT, HALF, FLOAT = 0, 1, 2
+CHANNELS = {
+    "beauty": {"R": HALF, "G": HALF, "B": HALF, "A": HALF},
+    "albedo": {"albedo.R": HALF, "albedo.G": HALF, "albedo.B": HALF},
+    "normal": {"normal.X": HALF, "normal.Y": HALF, "normal.Z": HALF},
+    "depth": {"Z": FLOAT},
+    "position": {"position.X": FLOAT, "position.Y": FLOAT, "position.Z": FLOAT},
+    "ao": {"ao.Y": HALF},
+    "id": {"id.node": UINT, "id.material": UINT},
+}
+
+
+class Layers(Case):
+    def render(self, *options, name="x.exr", scene="cornell.glb", status=0):
+        path = self.folder / name
+        return path, self.expect(farlight("render", bundled_scenes() / scene, "-o", path, *VIEW, "--timings=json", *options),
+                                 status)
+
+    def read(self, *options, **more):
+        return read_exr(self.render(*options, **more)[0])[2]
+
+    def test_channels_are_those_of_the_layers_named(self):
+        for layers in ("beauty", "depth", "beauty,depth", "id,albedo", "normal,position,ao", ALL):
+            with self.subTest(layers=layers):
+                path, _ = self.render("--layers", layers)
+                wanted = {}
+                for layer in layers.split(","):
+                    wanted.update(CHANNELS[layer])
+                self.assertEqual(exr_channels(path), wanted)
+                self.assertEqual(exr_attributes(path).get("farlight/layers", b"").decode().strip("\0"),
+                                 ",".join(name for name in CHANNELS if name in layers.split(",")) if layers != "beauty" else "")
+
+    def test_float_makes_floats_of_all_but_numbers_of_objects(self):
+        channels = exr_channels(self.render("--layers", ALL, "--float")[0])
+        self.assertEqual({name: kind for name, kind in channels.items() if kind != FLOAT}, CHANNELS["id"])
+
+    def test_the_picture_is_the_one_without_layers(self):
+        for options in ((), ("--float",), ("--samples", "3", "--exposure", "1")):
+            with self.subTest(options=options):
+                plain, layered = self.read(*options), self.read(*options, "--layers", ALL)
+                self.assertEqual({name: layered[name] for name in "RGBA"}, plain)
+
+    def test_places_depths_and_normals_fit_each_other_and_the_camera(self):
+        """One sample, which lies in the middle of its pixel."""
+        got = self.read("--layers", "beauty,normal,depth,position,id", "--float", "--primary", "trace")
+        way = [b - a for a, b in zip(EYE, LOOK_AT)]
+        length = math.hypot(*way)
+        forward = [w / length for w in way]
+        right = [-forward[2], 0, forward[0]]
+        scale = 1 / math.hypot(*right)
+        right = [scale * r for r in right]
+        up = [right[1] * forward[2] - right[2] * forward[1], right[2] * forward[0] - right[0] * forward[2],
+              right[0] * forward[1] - right[1] * forward[0]]
+        seen = 0
+        for i, depth in enumerate(got["Z"]):
+            place = [got[f"position.{axis}"][i] for axis in "XYZ"]
+            normal = [got[f"normal.{axis}"][i] for axis in "XYZ"]
+            if got["id.node"][i] == 0:
+                self.assertEqual([depth, *place, *normal], [0] * 7, "nothing is there")
+                continue
+            seen += 1
+            ray = [p - e for p, e in zip(place, EYE)]
+            # Single floats of a few metres: 1e-6 of them, times the few operations on the way.
+            self.assertAlmostEqual(sum(r * f for r, f in zip(ray, forward)), depth, delta=2e-5)
+            self.assertAlmostEqual(math.hypot(*normal), 1, delta=1e-4)
+            self.assertLess(sum(r * n for r, n in zip(ray, normal)), 1e-3, "towards the eye")
+            half = math.tan(math.radians(25))
+            x = 24 + 20 * sum(r * a for r, a in zip(ray, right)) / depth / half
+            y = 20 - 20 * sum(r * a for r, a in zip(ray, up)) / depth / half
+            self.assertAlmostEqual(x, i % 48 + 0.5, delta=0.01)
+            self.assertAlmostEqual(y, i // 48 + 0.5, delta=0.01)
+        self.assertGreater(seen, 48 * 40 / 2)
+
+    def test_numbers_tell_objects_apart(self):
+        got = self.read("--layers", "albedo,id", "--float")
+        colours = {}
+        for i, number in enumerate(got["id.material"]):
+            colours.setdefault(number, set()).add(tuple(round(got[f"albedo.{c}"][i], 4) for c in "RGB"))
+        self.assertGreater(len(colours), 3, "walls of several colours, and what stands in the box")
+        for number, seen in colours.items():
+            self.assertEqual(len(seen), 1, f"material {number} has one colour: the box has no textures")
+
+    def test_ambient_occlusion_is_a_share_and_follows_its_options(self):
+        got = {distance: self.read("--layers", "ao", "--ao-distance", distance, "--samples", "4")["ao.Y"]
+               for distance in ("0.01", "10")}
+        for values in got.values():
+            self.assertTrue(all(0 <= value <= 1 for value in values))
+        means = {distance: sum(values) / len(values) for distance, values in got.items()}
+        self.assertGreater(means["0.01"], means["10"] + 0.2, "in a closed room everything is occluded from afar")
+
+    def test_passes_add_up_to_the_same_layers(self):
+        options = ["--layers", ALL, "--samples", "4", "--float"]
+        self.assertEqual(self.read(*options, "--progressive=4"), self.read(*options, "--progressive=1"))
+
+    def test_layers_travel_compressed_too(self):
+        digests = set()
+        for encoding in ("raw", "zstd"):
+            frame, = frames_of(self.render("--layers", ALL, "--encoding", encoding)[1])
+            self.assertEqual((frame["encoding"], frame["pixels_bytes"]), (encoding, 48 * 40 * 16 * 7))
+            self.assertEqual(frame["wire_bytes"] < frame["pixels_bytes"], encoding == "zstd")
+            digests.add(frame["digest"])
+        self.assertEqual(len(digests), 1)
+        with Daemon(listen="tcp:127.0.0.1:0") as daemon:
+            address = daemon.ready[0].split()[1]
+            frame, = frames_of(self.render("--layers", ALL, "--server", address)[1])
+            self.assertEqual((frame["encoding"], {frame["digest"]}), ("zstd", digests))
+
+    def test_an_animation_has_them_in_every_frame(self):
+        self.expect(farlight("animate", bundled_scenes() / "teapot.glb", "--orbit", "--frames", "1-3", "--size", "32x24", "-o",
+                             self.folder / "%d.exr", "--layers", "beauty,depth"), 0)
+        depths = [read_exr(self.folder / f"{n}.exr")[2]["Z"] for n in (1, 2, 3)]
+        self.assertNotEqual(depths[0], depths[1])
+        self.assertNotEqual(depths[1], depths[2])
+
+    def test_the_picture_of_such_a_file_is_compared(self):
+        plain, layered = self.render(name="plain.exr")[0], self.render("--layers", ALL, name="layered.exr")[0]
+        self.assertIn("R,G,B,A", self.expect(farlight("compare", plain, layered, "--fail-above", "0"), 0).stdout)
+
+    def test_what_cannot_have_layers_is_refused_before_a_model_is_read(self):
+        missing = self.folder / "no such model.glb"
+        for output, options, says in (
+                ("x.png", [], "write an .exr file, or leave out --layers"), ("x.hdr", [], "write an .exr file"),
+                ("x.jpg", [], "write an .exr file"), ("x.exr", ["--encoding", "jpeg"], "raw or zstd"),
+                ("x.exr", ["--size", "8192x8192"], "some of them at a time"),
+                ("x.exr", ["--layers", "beauty,z"], "known: beauty, albedo, normal, depth, position, ao, id"),
+                ("x.exr", ["--layers", ""], "known: beauty")):
+            with self.subTest(output=output, options=options):
+                result = self.expect(farlight("render", missing, "-o", self.folder / output, "--layers", ALL, *options), 2)
+                self.assertIn(says, result.stderr)
+        result = self.expect(farlight("animate", missing, "--frames", "1-2", "-o", self.folder / "x.mp4", "--layers", ALL), 2)
+        self.assertIn("mp4 files do not have the layers of --layers", result.stderr)
+        self.assertEqual(self.leftovers(), [])
+
+
+if __name__ == "__main__":
+    farlight_test.unittest.main()

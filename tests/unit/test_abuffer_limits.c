@@ -1,0 +1,315 @@
+/* SPDX-License-Identifier: MIT */
+/* A-buffers with many samples behind each other, with more than there was room for, with none; what is told where
+ * they do not fit; what a build costs that has been done before. */
+#include "abuffer_fixture.h"
+#include "abuffer_scenes.h"
+#include "stack_scene.h"
+
+#include "gpu/registry.h"
+#include "shared/abuffer_build.h"
+
+#define RESOLUTION 32u
+#define VOXELS 16u
+
+static void build_and_read(struct fixture *fixture, struct contents *contents, uint32_t resolution)
+{
+    build(fixture, resolution, VOXELS);
+    contents_read(contents, &fixture->store);
+    expect_consistent(contents);
+}
+
+/* In whatever order they come: few, that are sorted as they are taken; more; many, for which there is a pass of
+ * its own; and more than a device's loops may go over. */
+static void many_layers_are_sorted(void **state)
+{
+    (void)state;
+    static const uint32_t counts[] = {3, 4, 5, 7, 8, 9, 33, 251, ABUFFER_LIST_MAX, ABUFFER_LIST_MAX + 1, 3001};
+    for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++)
+        for (int order = FRONT_TO_BACK; order <= SHUFFLED; order++) {
+            struct fixture fixture;
+            struct contents contents;
+            fixture_init(&fixture, stack_scene(counts[i], (enum stack_order)order, false));
+            build_and_read(&fixture, &contents, RESOLUTION);
+            assert_int_equal(contents.store.depth_max, counts[i]);
+            /* Along z, all of them in all texels but those of the margin; along the others at least nothing more
+             * than that. */
+            assert_in_range(contents.store.sample_count, counts[i] * (RESOLUTION - 1) * (RESOLUTION - 1),
+                            3 * counts[i] * RESOLUTION * RESOLUTION);
+            for (uint32_t texel = 2 * RESOLUTION * RESOLUTION; texel < 3 * RESOLUTION * RESOLUTION; texel++)
+                assert_true(contents.texels[texel][1] == 0 || contents.texels[texel][1] == counts[i]);
+            contents_free(&contents);
+            fixture_finish(&fixture);
+        }
+}
+
+/* One body in another, a thousand times: 63 is the greatest number that a sample tells. */
+static void windings_beyond_what_is_told_stay_there(void **state)
+{
+    (void)state;
+    struct test_edits edits = {.scene = test_scene_create()};
+    struct fixture fixture;
+    struct contents contents;
+    const uint32_t bodies = 1000;
+    add_box_mesh(&edits, 1);
+    for (uint32_t i = 0; i < bodies; i++) {
+        float m[12], size = 1 - 0.5f * (float)i / (float)bodies;
+        test_transform(m, size, size, size, 0, 0, 0, 0, 0);
+        test_node(&edits, i + 1, 0, NODE_MESH, 1, m);
+    }
+    test_commit(&edits);
+    fixture_init(&fixture, edits.scene);
+    build_and_read(&fixture, &contents, RESOLUTION);
+    assert_int_equal(contents.store.depth_max, 2 * bodies);
+    for (uint32_t i = 0; i < texel_count_of(&contents); i++)
+        for (uint32_t k = 0; k < contents.texels[i][1]; k++) {
+            int inside = (int)(k < contents.texels[i][1] / 2 ? k + 1 : contents.texels[i][1] - 1 - k);
+            int told = ABUFFER_WINDING_ZERO - 1;
+            assert_int_equal(winding_of(&contents, contents.texels[i][0] + k), inside < told ? inside : told);
+        }
+    contents_free(&contents);
+    fixture_finish(&fixture);
+}
+
+/* Of several samples at one place the first is that of the first instance, and of this that of the first
+ * primitive. */
+static void coincident_surfaces_keep_their_order(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents contents;
+    uint32_t pairs = 0;
+    fixture_init(&fixture, stack_scene(20, SHUFFLED, true));
+    build_and_read(&fixture, &contents, RESOLUTION); /* which holds them to their order */
+    for (uint32_t i = 0; i < texel_count_of(&contents); i++)
+        for (uint32_t k = 1; k < contents.texels[i][1]; k++) {
+            uint32_t sample = contents.texels[i][0] + k;
+            pairs += depth_of(&contents, sample) == depth_of(&contents, sample - 1);
+        }
+    assert_in_range(pairs, 20 * (RESOLUTION - 1) * (RESOLUTION - 1), UINT32_MAX);
+    contents_free(&contents);
+    fixture_finish(&fixture);
+}
+
+/* ---- room ---- */
+
+/* Nothing is lost where the lists did not fit at first, and what was drawn for nothing leaves no trace. */
+static void lists_that_do_not_fit_are_made_anew(void **state)
+{
+    (void)state;
+    struct scene *(*const scenes[])(void) = {scene_of_bodies_and_others, test_scene_spheres,
+                                             test_scene_translucent};
+    for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++) {
+        struct fixture fixture;
+        struct contents roomy, grown, again;
+        fixture_init(&fixture, scenes[i]());
+        abuffer_builder_start_with(fixture.builder, 1u << 20);
+        build_and_read(&fixture, &roomy, 3 * RESOLUTION);
+        assert_int_equal(abuffer_builder_passes(fixture.builder), 1);
+        assert_in_range(roomy.store.sample_count, 1000, 1u << 20);
+        for (uint32_t first = 1; first < roomy.store.sample_count; first = 7 * first + 1) {
+            abuffer_builder_start_with(fixture.builder, first);
+            build_and_read(&fixture, &grown, 3 * RESOLUTION);
+            assert_int_equal(abuffer_builder_passes(fixture.builder), 2);
+            expect_same(&roomy, &grown);
+            contents_free(&grown);
+        }
+        /* Once there is room there stays room. */
+        build_and_read(&fixture, &again, 3 * RESOLUTION);
+        assert_int_equal(abuffer_builder_passes(fixture.builder), 1);
+        expect_same(&roomy, &again);
+        contents_free(&roomy);
+        contents_free(&again);
+        fixture_finish(&fixture);
+    }
+}
+
+static void expect_refused(struct fixture *fixture, enum error_kind kind, const char *field)
+{
+    struct error error = {0};
+    assert_false(try_build(fixture, &error));
+    assert_int_equal(error.kind, kind);
+    if (field)
+        assert_string_equal(error.field, field);
+    if (kind == ERROR_LIMIT && strcmp(error.field, "abuffer") == 0)
+        assert_non_null(strstr(error.remedy, "memory.abuffer"));
+    assert_int_equal(fixture->store.resolution, 0);
+    assert_int_equal(fixture->store.sample_count, 0);
+    assert_int_equal(abuffer_store_bytes(&fixture->store), 0);
+}
+
+/* Lists and samples: 28 bytes a sample, 16 a texel. */
+static void more_than_is_allowed_is_refused_with_what_it_needs(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents all, some;
+    fixture_init(&fixture, stack_scene(200, SHUFFLED, false));
+    build_and_read(&fixture, &all, 2 * RESOLUTION);
+    uint64_t bytes = 28 * all.store.sample_count + 16 * texel_count_of(&all);
+    uint32_t needed = (uint32_t)((bytes + (1 << 20) - 1) >> 20);
+    assert_in_range(needed, 10, 100);
+    fixture.options.abuffer_mebibytes_max = needed;
+    abuffer_builder_start_with(fixture.builder, 1000);
+    build_and_read(&fixture, &some, 2 * RESOLUTION);
+    expect_same(&all, &some);
+    assert_in_range(some.store.sample_count * 28, 1, (uint64_t)needed << 20);
+    contents_free(&some);
+    for (uint32_t allowed = needed - 1; allowed > 0; allowed /= 2) {
+        struct error error = {0};
+        char expected[64];
+        fixture.options.abuffer_mebibytes_max = allowed;
+        place(&fixture, 2 * RESOLUTION, VOXELS);
+        expect_refused(&fixture, ERROR_LIMIT, "abuffer");
+        place(&fixture, 2 * RESOLUTION, VOXELS);
+        assert_false(try_build(&fixture, &error));
+        snprintf(expected, sizeof(expected), "need %u MiB; %u MiB", needed, allowed);
+        assert_non_null(strstr(error.text, expected));
+    }
+    /* It is no harm to the next one. */
+    fixture.options.abuffer_mebibytes_max = 0;
+    build_and_read(&fixture, &some, 2 * RESOLUTION);
+    expect_same(&all, &some);
+    contents_free(&all);
+    contents_free(&some);
+    fixture_finish(&fixture);
+}
+
+/* Of a high resolution the texels are most of it, and are refused before there is memory for any. */
+static void texels_alone_may_be_more_than_is_allowed(void **state)
+{
+    (void)state;
+    const uint32_t resolution = 512; /* 12 MiB */
+    struct fixture fixture;
+    fixture_init(&fixture, stack_scene(1, FRONT_TO_BACK, false));
+    fixture.options.abuffer_mebibytes_max = 11;
+    place(&fixture, resolution, VOXELS);
+    uint64_t before = device->memory_used_bytes;
+    expect_refused(&fixture, ERROR_LIMIT, "abuffer");
+    assert_in_range(device->memory_used_bytes, before, before + ((uint64_t)1 << 20)); /* the list of instances */
+    fixture.options.abuffer_mebibytes_max = 64;
+    build(&fixture, resolution, VOXELS);
+    assert_in_range(fixture.store.sample_count, (resolution - 1) * (resolution - 1), UINT32_MAX);
+    fixture_finish(&fixture);
+}
+
+/* Each device has a size beyond which it reads nothing of a buffer, and only so much memory. */
+static void what_a_device_cannot_hold_is_refused(void **state)
+{
+    (void)state;
+    const uint64_t texels_max = device->facts.texture_buffer_texels_max, limit = device->memory_limit_bytes;
+    struct fixture fixture;
+    fixture_init(&fixture, stack_scene(100, SHUFFLED, false));
+    device->facts.texture_buffer_texels_max = 4 * VOXELS * VOXELS * VOXELS;
+    place(&fixture, RESOLUTION, VOXELS); /* images of 3072 texels, 102,400 samples in the third */
+    expect_refused(&fixture, ERROR_LIMIT, "abuffer");
+    place(&fixture, 96, VOXELS);
+    expect_refused(&fixture, ERROR_LIMIT, "options.abuffer_resolution");
+    place(&fixture, RESOLUTION, 2 * VOXELS);
+    expect_refused(&fixture, ERROR_LIMIT, "options.abuffer_voxels");
+    device->facts.texture_buffer_texels_max = texels_max;
+    device->memory_limit_bytes = device->memory_used_bytes + ((uint64_t)2 << 20);
+    place(&fixture, RESOLUTION, VOXELS);
+    expect_refused(&fixture, ERROR_OUT_OF_MEMORY, NULL);
+    device->memory_limit_bytes = limit;
+    build(&fixture, RESOLUTION, VOXELS);
+    assert_int_equal(fixture.store.depth_max, 100);
+    fixture_finish(&fixture);
+}
+
+/* ---- little ---- */
+
+static void a_scene_may_hold_nothing(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents contents;
+    fixture_init(&fixture, test_scene_create());
+    place(&fixture, RESOLUTION, VOXELS);
+    struct error error = {0};
+    expect_ok(try_build(&fixture, &error), &error);
+    assert_int_equal(fixture.store.resolution, 0);
+    assert_int_equal(fixture.store.sample_count, 0);
+    fixture_finish(&fixture);
+    /* Nor does anything come in that lies beside the cube. */
+    fixture_init(&fixture, test_scene_soup());
+    place(&fixture, RESOLUTION, VOXELS);
+    fixture.store.lower_world[2] += 100;
+    expect_ok(try_build(&fixture, &error), &error);
+    contents_read(&contents, &fixture.store);
+    expect_consistent(&contents);
+    assert_int_equal(contents.store.sample_count, 0);
+    for (uint32_t i = 0; i < VOXELS * VOXELS * VOXELS; i++)
+        assert_int_equal(contents.sums[i][3], 0);
+    contents_free(&contents);
+    fixture_finish(&fixture);
+}
+
+/* Squares on the very sides of a cube: rounding does not take them out of it. */
+static void what_lies_on_a_side_is_there(void **state)
+{
+    (void)state;
+    struct test_edits edits = {.scene = test_scene_create()};
+    struct fixture fixture;
+    struct contents contents;
+    add_box_mesh(&edits, 1);
+    test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
+    test_commit(&edits);
+    fixture_init(&fixture, edits.scene);
+    place(&fixture, 30, VOXELS);
+    fixture.store.cell_world = 2.0f / 30;
+    for (int k = 0; k < 3; k++)
+        fixture.store.lower_world[k] = -1;
+    struct error error = {0};
+    expect_ok(try_build(&fixture, &error), &error);
+    contents_read(&contents, &fixture.store);
+    expect_consistent(&contents);
+    assert_int_equal(contents.store.sample_count, 3 * 2 * 30 * 30);
+    assert_int_equal(contents.store.depth_max, 2);
+    contents_free(&contents);
+    fixture_finish(&fixture);
+}
+
+/* What moves is built with every frame. */
+static void a_build_again_allocates_nothing(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    uint64_t before = device->memory_used_bytes;
+    size_t buffers_before = gpu_registry_count(device->registry, GPU_BUFFER);
+    size_t arrays_before = gpu_registry_count(device->registry, GPU_VERTEX_ARRAY);
+    fixture_init(&fixture, test_scene_spheres());
+    for (int i = 0; i < 3; i++)
+        build(&fixture, RESOLUTION, VOXELS);
+    uint64_t used = device->memory_used_bytes;
+    uint64_t own = abuffer_builder_bytes(fixture.builder) + abuffer_store_bytes(&fixture.store);
+    size_t buffers = gpu_registry_count(device->registry, GPU_BUFFER);
+    for (int i = 0; i < 5; i++) {
+        build(&fixture, RESOLUTION, VOXELS);
+        assert_int_equal(device->memory_used_bytes, used);
+        assert_int_equal(gpu_registry_count(device->registry, GPU_BUFFER), buffers);
+    }
+    /* All that it takes is told. */
+    assert_int_equal(used - before - scene_gpu_device_bytes(&fixture.gpu), own);
+    fixture_finish(&fixture);
+    assert_int_equal(device->memory_used_bytes, before);
+    assert_int_equal(gpu_registry_count(device->registry, GPU_BUFFER), buffers_before);
+    assert_int_equal(gpu_registry_count(device->registry, GPU_FRAMEBUFFER), 0);
+    assert_int_equal(gpu_registry_count(device->registry, GPU_VERTEX_ARRAY), arrays_before);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(many_layers_are_sorted),
+        cmocka_unit_test(windings_beyond_what_is_told_stay_there),
+        cmocka_unit_test(coincident_surfaces_keep_their_order),
+        cmocka_unit_test(lists_that_do_not_fit_are_made_anew),
+        cmocka_unit_test(more_than_is_allowed_is_refused_with_what_it_needs),
+        cmocka_unit_test(texels_alone_may_be_more_than_is_allowed),
+        cmocka_unit_test(what_a_device_cannot_hold_is_refused),
+        cmocka_unit_test(a_scene_may_hold_nothing),
+        cmocka_unit_test(what_lies_on_a_side_is_there),
+        cmocka_unit_test(a_build_again_allocates_nothing),
+    };
+    return cmocka_run_group_tests(tests, open_device, close_device);
+}
