@@ -133,7 +133,9 @@ static void add_room(struct abuffer_samples *s)
 
 /* Where an edge passes a texel a sample's plane goes on beyond it, by up to half a texel: of the searches that
  * look at all texels a few rays in a thousand see that. Steps miss what is passed twice between two of them, which
- * is at edges and rims, by the length of a step: a voxel is 15 cells wide here, and shapes are some 100. */
+ * is at edges and rims, by the length of a step: a voxel is 15 cells wide here, and shapes are some 100. And where
+ * walls meet that no one image shows, they look in one of the images: some fifteen of a thousand rays pass the
+ * walls of the room there. */
 static void rays_meet_shapes_where_they_are(void **state)
 {
     (void)state;
