@@ -129,12 +129,13 @@ static bool build(struct abuffer_task *task, struct error *error)
 bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
                    const struct tracer_options *options, struct error *error)
 {
+    const uint32_t tiles_along = ABUFFER_TILES_ALONG(store->resolution);
     struct abuffer_task task = {
         .builder = builder,
         .store = store,
         .scene = scene,
         .options = options,
-        .texel_count = 3 * store->resolution * store->resolution,
+        .texel_count = 3 * tiles_along * tiles_along * ABUFFER_TILE_TEXELS,
     };
     store->sample_count = 0;
     store->depth_max = 0;

@@ -127,11 +127,9 @@ static bool list_occupied(struct abuffer_task *task, struct error *error)
     gpu_buffer_bind_texels(device, &builder->heads, UNIT_ABUFFER_HEADS, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->occupied, IMAGE_ABUFFER_OCCUPIED, GL_R32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_ABUFFER_BUILD_COUNTS);
-    uint64_t along = task->store->resolution;
-    gpu_uniform_uint(program, "texels_along", task->store->resolution);
-    gpu_dispatch(device, program,
-                 3 * ((along + ABUFFER_TILE_U - 1) / ABUFFER_TILE_U) *
-                     ((along + ABUFFER_TILE_V - 1) / ABUFFER_TILE_V));
+    uint32_t items = task->texel_count / ABUFFER_OCCUPIED_TEXELS;
+    gpu_uniform_uint(program, "item_count", items);
+    gpu_dispatch(device, program, items);
     abuffer_read_counts(task);
     return true;
 }

@@ -17,6 +17,12 @@ layout(binding = IMAGE_ABUFFER_NODES, rgba32ui) writeonly uniform uimageBuffer n
 layout(binding = IMAGE_ABUFFER_SUMS, r32i) uniform iimageBuffer sums;
 layout(std430, binding = BIND_ABUFFER_BUILD_COUNTS) buffer build_block { abuffer_build_counts build; };
 
+uint texel_in_tiles()
+{
+    uvec2 place = uvec2(gl_FragCoord.xy);
+    return ABUFFER_TEXEL(ABUFFER_TILES_ALONG(texels_along), uint(gl_Layer), place.x, place.y);
+}
+
 // Whether there was room. Without, this one is only counted, as all is drawn once more.
 bool link(float depth_cells, uint bits)
 {
@@ -26,7 +32,7 @@ bool link(float depth_cells, uint bits)
             atomicAdd(build.wraps, 1u);
         return false;
     }
-    uint before = imageAtomicExchange(heads, int(texel_number()), node + 1u);
+    uint before = imageAtomicExchange(heads, int(texel_in_tiles()), node + 1u);
     imageStore(nodes, int(node), uvec4(before, floatBitsToUint(depth_cells), bits, primitive.x));
     return true;
 }

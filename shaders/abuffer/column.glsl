@@ -35,7 +35,9 @@ struct column {
 column column_at(int axis, ivec2 texel)
 {
     ABUFFER_COUNT(y);
-    uvec2 words = texelFetch(abuffer_texels, (axis * abuffer_resolution + texel.y) * abuffer_resolution + texel.x).xy;
+    uint tiles_along = ABUFFER_TILES_ALONG(uint(abuffer_resolution));
+    uvec2 place = uvec2(texel);
+    uvec2 words = texelFetch(abuffer_texels, int(ABUFFER_TEXEL(tiles_along, uint(axis), place.x, place.y))).xy;
     return column(int(words.x), int(words.x + words.y));
 }
 

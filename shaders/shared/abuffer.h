@@ -11,7 +11,7 @@
  *
  * Over the same cube lies a grid of V x V x V voxels, V a power of two, each N / V cells wide.
  *
- *   texels      RG32UI, one a texel, image after image, row (v) after row: first sample, number of samples
+ *   texels      RG32UI, one a texel, image after image, each in tiles (ABUFFER_TEXEL): first sample, number of samples
  *   samples     RG32UI, one a sample; those of a texel lie together and ascend in depth, of equal depths in the order of
  *               instances and primitives
  *                 x  depth (float, cells)
@@ -39,6 +39,16 @@
 #define FARLIGHT_SHARED_ABUFFER_H
 #include "shared/axes.h"
 #include "shared/types.h"
+
+/* Images lie in tiles of 8 x 8 texels, row after row, the last ones of a row and of an image padded by empty texels. In
+ * a tile 4 x 8 texels lie before the other 4 x 8, and 4 x 2 fill a line of most caches: whichever way a ray goes it finds
+ * what it reads next near what it has read. */
+#define ABUFFER_TILE_TEXELS 64u
+#define ABUFFER_TILES_ALONG(resolution) (((resolution) + 7u) >> 3)
+/* The number of texel (u, v) of image `axis`; all are uint. */
+#define ABUFFER_TEXEL(tiles_along, axis, u, v)                                                                    \
+    ((((axis) * (tiles_along) + ((v) >> 3)) * (tiles_along) + ((u) >> 3)) << 6 | ((u)&4u) << 3 | ((v)&7u) << 2 |  \
+     ((u)&3u))
 
 #define ABUFFER_NORMAL_UNIT 127
 /* Times 2 to the axis: some sample leans to it as much as to any, or almost (AXES_OVERLAP). */

@@ -76,7 +76,7 @@ static inline void build(struct fixture *fixture, uint32_t resolution, uint32_t 
 /* A structure, read back. */
 struct contents {
     struct abuffer_store store; /* as it was then */
-    uint32_t (*texels)[2];      /* first, count */
+    uint32_t (*texels)[2];      /* first, count; image after image, row after row */
     uint32_t (*samples)[2];
     uint32_t *ids;
     uint32_t (*drawn)[4];
@@ -91,11 +91,30 @@ static inline void *read_all(const struct gpu_buffer *buffer, size_t bytes)
     return data;
 }
 
+/* From tiles to rows. What pads tiles is empty. */
+static inline void *read_texels(const struct abuffer_store *store)
+{
+    const uint32_t n = store->resolution, tiles = ABUFFER_TILES_ALONG(n);
+    uint32_t(*tiled)[2] = read_all(&store->texels, (size_t)3 * tiles * tiles * ABUFFER_TILE_TEXELS * 8);
+    uint32_t(*texels)[2] = malloc((size_t)3 * n * n * 8);
+    for (uint32_t axis = 0; axis < 3; axis++)
+        for (uint32_t v = 0; v < 8 * tiles; v++)
+            for (uint32_t u = 0; u < 8 * tiles; u++) {
+                const uint32_t *words = tiled[ABUFFER_TEXEL(tiles, axis, u, v)];
+                if (u < n && v < n)
+                    memcpy(texels[(axis * n + v) * n + u], words, 8);
+                else
+                    assert_int_equal(words[1], 0);
+            }
+    free(tiled);
+    return texels;
+}
+
 static inline void contents_read(struct contents *contents, const struct abuffer_store *store)
 {
-    size_t texels = (size_t)3 * store->resolution * store->resolution, along = store->voxels_along;
+    size_t along = store->voxels_along;
     contents->store = *store;
-    contents->texels = read_all(&store->texels, texels * 8);
+    contents->texels = read_texels(store);
     contents->samples = read_all(&store->samples, store->sample_count * 8);
     contents->ids = read_all(&store->ids, store->sample_count * 4);
     contents->drawn = read_all(&store->drawn, store->drawn_count * 16);

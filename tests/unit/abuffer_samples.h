@@ -18,7 +18,7 @@
 #define ABUFFER_SLACK 0.05
 
 struct abuffer_sample {
-    uint32_t texel; /* of all three images */
+    uint32_t texel; /* of all three images, row after row */
     float depth;    /* cells */
     float normal[3];
     uint32_t id; /* triangle */
@@ -195,7 +195,8 @@ static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[
 static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_store *store, float cell_world,
                                   struct error *error)
 {
-    const size_t texel_count = 3 * (size_t)s->resolution * s->resolution;
+    const uint32_t n = s->resolution, tiles = ABUFFER_TILES_ALONG(n);
+    const size_t texel_count = 3 * (size_t)tiles * tiles * ABUFFER_TILE_TEXELS;
     const size_t voxel_count = (size_t)s->voxels_along * s->voxels_along * s->voxels_along;
     uint32_t(*texels)[2] = calloc(texel_count, sizeof *texels);
     uint32_t(*samples)[2] = calloc(s->count + 1, sizeof *samples), *ids = calloc(s->count + 1, sizeof *ids);
@@ -209,8 +210,9 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
     store->drawn_count = 1;
     if (s->count > 1)
         qsort(s->list, s->count, sizeof *s->list, abuffer_by_texel);
-    for (size_t t = 0, i = 0; t < texel_count; t++) {
-        const size_t first = i, axis = t / ((size_t)s->resolution * s->resolution);
+    for (size_t t = 0, i = 0; t < 3 * (size_t)n * n; t++) {
+        const size_t first = i, axis = t / ((size_t)n * n);
+        uint32_t *words = texels[ABUFFER_TEXEL(tiles, (uint32_t)axis, (uint32_t)(t % n), (uint32_t)(t / n % n))];
         int winding = 0;
         for (; i < s->count && s->list[i].texel == t; i++) {
             const struct abuffer_sample *at = &s->list[i];
@@ -222,10 +224,10 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
             ids[i] = s->all_of_one ? 0 : at->id;
             abuffer_sum(s, sums, at);
         }
-        texels[t][0] = (uint32_t)first;
-        texels[t][1] = (uint32_t)(i - first);
-        if (texels[t][1] > store->depth_max)
-            store->depth_max = texels[t][1];
+        words[0] = (uint32_t)first;
+        words[1] = (uint32_t)(i - first);
+        if (words[1] > store->depth_max)
+            store->depth_max = words[1];
     }
     bool ok = gpu_buffer_upload(store->device, &store->texels, texels, texel_count * sizeof *texels, error) &&
               gpu_buffer_upload(store->device, &store->samples, samples, s->count * sizeof *samples, error) &&
