@@ -278,7 +278,7 @@ static uint16_t half_from(float value) /* of a normal number that a half holds e
 {
     uint32_t bits;
     memcpy(&bits, &value, sizeof(bits));
-    return (uint16_t)((bits >> 23) - 112u) << 10 | (uint16_t)(bits >> 13 & 0x3ffu);
+    return (uint16_t)(((bits >> 23) - 112u) << 10 | (bits >> 13 & 0x3ffu));
 }
 
 /* All of one grey, but for one texel. The floor's normal, +z, is the middle of the edges of the image's columns.
