@@ -87,9 +87,12 @@ struct frame_request {
  *                   exposure
  *   alpha           1 where there is a surface (what blended surfaces leave open goes on to what lies behind) and
  *                   where the environment is seen; 0 where there is neither
- * A scene with no light and a black environment is lit by the default of shaders/shared/sky.h. The same request on
- * the same revision and device gives the same bytes. Cut into other slices a frame may differ in rays within
- * rounding of an edge: how many rays `bvh` walks together follows the coherence of the slice's wave. */
+ * What integrators do with `depth`: whitted, distributed and path bounce so often after the first hit (path: and
+ * ask for light at the last hit too); raycast and ao do not bounce, and going straight on through layers is no
+ * bounce. What `ao` shows is how open a first hit is, 1 where nothing is hit; all else show radiance. A scene with
+ * no light and a black environment is lit by the default of shaders/shared/sky.h. The same request on the same
+ * revision and device gives the same bytes. Cut into other slices a frame may differ in rays within rounding of an
+ * edge: how many rays `bvh` walks together follows the coherence of the slice's wave. */
 struct frame_result {
     uint8_t *pixels; /* owned; free(). Layer after layer, each of width x height pixels */
     uint32_t layers; /* bits, at least one */

@@ -11,6 +11,9 @@
 
 #ifdef ABUFFER_STEPS
 
+// Cells from a ray's origin within which it is looked for more closely what it meets.
+const float NEAR_ORIGIN = 4.0;
+
 const int BISECTIONS_MAX = 8;
 // From column to column towards where a plane is crossed: a curved surface is met after two or three.
 const int FOLLOWS_MAX = 4;
@@ -71,8 +74,10 @@ int winding_at_origin(voxel_walk w, uint what)
             return goes_along ? winding_at(axis, p + OWN_WAY * d) : own_winding;
     }
     int axis = image_of(what, w.ray.d);
-    return winding_at(axis, place_in_image(w, axis, w.s_least));
+    return winding_at(axis, place_in_image(w, axis, w.s_least + OWN_WAY));
 }
+
+#ifndef ANYTHING_ENDS
 
 // Where the ray crosses a surface near s, by the plane of a sample there, then by that of a sample where it crosses this
 // one, and so on until the crossing is in the sample's own texel.
@@ -112,8 +117,6 @@ bool follow(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis
     }
     return false;
 }
-
-#ifndef ANYTHING_ENDS
 
 int nearest_sample(int axis, vec3 p)
 {
@@ -159,57 +162,93 @@ void search_body(trace_ray r, inout voxel_walk w, inout abuffer_found found, fou
 {
     int axis = image_of(here.what, w.ray.d);
     float end = here.s_out < w.s_limit ? here.s_out : w.s_limit;
-    float lo = here.s_in, step_ = (end - lo) * (1.0 / float(ABUFFER_STEPS));
+    float lo = here.s_in, hi = lo, step_ = (end - lo) * (1.0 / float(ABUFFER_STEPS));
     if (!state.is_known) {
         state.is_known = true;
         state.winding = here.s_in <= w.s_least ? winding_at_origin(w, here.what)
                                                : winding_at(axis, place_in_image(w, axis, here.s_in));
     }
-    for (int k = 1; k <= ABUFFER_STEPS; k++) {
-        float hi = here.s_in + float(k) * step_;
-        if (hi > w.s_least + OWN_WAY) {
-            int winding = winding_at(axis, place_in_image(w, axis, hi));
-            if (winding != state.winding) {
-#ifdef ANYTHING_ENDS
-                offer_at(r, w, found, 0, hi, 1.0);
-                return;
-#else
-                refine(r, w, found, axis, lo, hi, state.winding);
-                state.winding = winding;
-                if (w.s_limit < hi)
-                    return;
-#endif
-            }
+    int k = 1;
+    while (k <= ABUFFER_STEPS && lo < w.s_limit) {
+        int winding = state.winding;
+        // Rays of a SIMD group step together, and then those of them together refine that have to.
+        for (; k <= ABUFFER_STEPS && winding == state.winding; k++) {
+            lo = hi;
+            hi = here.s_in + float(k) * step_;
+            if (hi > w.s_least + OWN_WAY)
+                winding = winding_at(axis, place_in_image(w, axis, hi));
         }
+        if (winding == state.winding)
+            return;
+#ifdef ANYTHING_ENDS
+        offer_at(r, w, found, 0, hi, 1.0);
+        return;
+#else
+        refine(r, w, found, axis, lo, hi, state.winding);
+        state.winding = winding;
         lo = hi;
+#endif
     }
 }
 
+// All images that a voxel names only near where the ray begins: along what stands on a surface light would leak. Farther on
+// the one that the ray runs along most, which shows most of what it meets.
+uint images_from(voxel_walk w, uint what, float s)
+{
+    return s <= w.s_least + NEAR_ORIGIN ? what & ABUFFER_VOXEL_IMAGES : 1u << image_of(what, w.ray.d);
+}
+
+// Of an image's column at each step's end, what is crossed first of its samples' planes; it is followed from column to
+// column until the crossing is in the sample's own texel. In one loop, a column a round: rays of a SIMD group that step
+// and others that follow do so together.
 void search_open(trace_ray r, inout voxel_walk w, inout abuffer_found found, found_voxel here)
 {
     float end = here.s_out < w.s_limit ? here.s_out : w.s_limit;
-    float lo = here.s_in, step_ = (end - lo) * (1.0 / float(ABUFFER_STEPS));
-    for (int k = 1; k <= ABUFFER_STEPS && lo < w.s_limit; k++) {
-        float hi = here.s_in + float(k) * step_;
-        {
-            int axis = image_of(here.what, w.ray.d);
-            vec3 o = in_image(w.ray.o, axis), d = in_image(w.ray.d, axis), p = o + hi * d;
-            ivec2 texel = texel_of(p.xy);
-            float reach = 2.0 * (hi - lo) + SPAN, nearest = w.s_limit;
-            column c = column_at(axis, texel);
-            for (int i = sample_from(c, p.z - reach); i < c.end; i++) {
-                uvec2 words = words_at(i);
-                if (depth_of(words) > p.z + reach)
-                    break;
-                column_sample q = sample_of(words, axis);
-                float s, side;
-                if (cross_plane(o, d, w.s_least, texel, q, s, side) && s > lo - 4.0 && s < hi + 4.0 && s < nearest)
-                    nearest = s;
+    float step_ = (end - here.s_in) * (1.0 / float(ABUFFER_STEPS)), lo = here.s_in, hi = lo + step_, s = hi;
+    uint images = images_from(w, here.what, lo);
+    int k = 1, follows = 0;
+    while (k <= ABUFFER_STEPS && lo < w.s_limit) {
+        int axis = findLSB(images);
+        vec3 o = in_image(w.ray.o, axis), d = in_image(w.ray.d, axis), p = o + s * d;
+        ivec2 texel = texel_of(p.xy);
+        float reach = follows > 0 ? FOLLOW_REACH : 2.0 * (hi - lo) + SPAN;
+        float crossing = 1e30, crossing_side = 0.0, least_ = 1e30;
+        bool is_near = lo <= w.s_least + NEAR_ORIGIN;
+        int crossed = 0;
+        column c = column_at(axis, texel);
+        for (int i = sample_from(c, p.z - reach); i < c.end; i++) {
+            uvec2 words = words_at(i);
+            if (depth_of(words) > p.z + reach)
+                break;
+            float s_plane, side;
+            column_sample q = sample_of(words, axis);
+            bool crosses = cross_plane(o, d, w.s_least, texel, q, s_plane, side) && (!is_near || leans(q));
+            float away = follows > 0 ? abs(s_plane - s) : s_plane;
+            if (crosses && away < least_ && s_plane > lo - FOLLOW_REACH && s_plane < hi + FOLLOW_REACH) {
+                least_ = away;
+                crossing = s_plane;
+                crossing_side = side;
+                crossed = i;
             }
-            if (nearest < w.s_limit)
-                follow(r, w, found, axis, false, nearest, lo, hi);
         }
-        lo = hi;
+        vec2 from_middle = abs(o.xy + crossing * d.xy - vec2(texel) - 0.5);
+        bool is_there = from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK && crossing < w.s_limit;
+        if (is_there)
+            offer_at(r, w, found, crossed, crossing, crossing_side);
+        if (!is_there && crossing < w.s_limit && follows < FOLLOWS_MAX) {
+            s = crossing;
+            follows++;
+        } else {
+            follows = 0;
+            images &= images - 1u;
+            if (images == 0u) {
+                k++;
+                lo = hi;
+                hi = here.s_in + float(k) * step_;
+                images = images_from(w, here.what, lo);
+            }
+            s = hi;
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* clang-format off */
-/* Voxels and A-buffers on the device: what the build (abuffer/build.*, abuffer/resolve.comp, abuffer/voxels.comp)
+/* Voxels and A-buffers on the device: what the build (abuffer/build.frag, abuffer/resolve.comp, abuffer/voxels.comp)
  * writes and the walk reads. Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014.
  *
  * The structure is a cube of N x N x N cells of one size over a box of the world. It has three A-buffers, one an axis:

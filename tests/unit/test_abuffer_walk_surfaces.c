@@ -119,8 +119,8 @@ static void what_stands_on_a_floor_is_met_from_a_cell_on(void **state)
                     first = i;
                 }
             }
-            /* Beside an edge a step may end in the next texel, which its plane does not reach. */
-            if (wrong > (f == DDA ? 0 : RAY_COUNT / 1000))
+            /* Where no one image shows floor and box, steps look in one, but for the first few cells. */
+            if (wrong > (f == DDA ? 0 : RAY_COUNT / 100))
                 fail_msg("%s, body %d: %u rays are wrong; one, %g from the wall, meets something at %g",
                          forms[f].name, body, wrong, wall - (double)rays[first].origin_t_min[0],
                          (double)hits[first].distance);
