@@ -87,7 +87,7 @@ bool abuffer_trace(struct abuffer_store *store, struct scene_gpu *scene, const s
     gpu_uniform_int(program, "abuffer_drawn_count", (int32_t)store->drawn_count);
     gpu_uniform_vec(program, "abuffer_place", 4, place);
     gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RG32UI);
-    gpu_buffer_bind_texels(store->device, &store->samples, UNIT_TRACER_1, GL_RG32UI);
+    gpu_buffer_bind_texels(store->device, &store->samples, UNIT_TRACER_1, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &store->voxels, UNIT_TRACER_2, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &store->ids, UNIT_TRACER_3, GL_R32UI);
     gpu_buffer_bind_texels(store->device, &store->drawn, UNIT_TRACER_4, GL_RGBA32UI);

@@ -18,7 +18,7 @@ uvec3 abuffer_counts = uvec3(0u);
 #endif
 
 layout(binding = UNIT_TRACER_0) uniform usamplerBuffer abuffer_texels;
-layout(binding = UNIT_TRACER_1) uniform usamplerBuffer abuffer_samples;
+layout(binding = UNIT_TRACER_1) uniform usamplerBuffer abuffer_samples; // two a texel
 
 uniform int abuffer_resolution;
 
@@ -57,7 +57,8 @@ struct column_sample {
 uvec2 words_at(int index)
 {
     ABUFFER_COUNT(z);
-    return texelFetch(abuffer_samples, index).xy;
+    uvec4 two = texelFetch(abuffer_samples, index >> 1);
+    return (index & 1) == 0 ? two.xy : two.zw;
 }
 
 float depth_of(uvec2 words)
@@ -87,19 +88,37 @@ float plane_depth(column_sample s, vec2 from_middle)
     return s.depth + (shift < SPAN ? shift > -SPAN ? shift : -SPAN : SPAN);
 }
 
-// From which of a column's samples on to look for those that are not before a depth. A few before it are as soon passed
-// as found.
+// A column's samples from a depth on, one after the other.
+struct column_scan {
+    int next, end;
+    int bound; // the first is not behind this one
+};
+
+// Bisection leaves so many before the first: they are as soon passed as found.
 const int PASSED = 4;
 
-int sample_from(column c, float depth)
+column_scan scan_of(column c)
 {
-    while (c.end - c.first > PASSED) {
-        int middle = (c.first + c.end) >> 1;
-        bool is_before = depth_of(words_at(middle)) < depth;
-        c.first = is_before ? middle + 1 : c.first;
-        c.end = is_before ? c.end : middle;
-    }
-    return c.first;
+    return column_scan(c.first, c.end, c.end);
+}
+
+// One round of a loop that goes on while next < end: whether it came to a sample, which `words` are those of. Bisection is
+// rounds of the same loop, so that columns which need none do not wait for code that they skip.
+bool scan(inout column_scan c, float least_, out int index, out uvec2 words)
+{
+    ABUFFER_COUNT(z);
+    bool is_far = c.bound - c.next > PASSED;
+    int at = is_far ? (c.next + c.bound) >> 1 : c.next;
+    uvec4 two = texelFetch(abuffer_samples, at >> 1);
+    bool is_even = (at & 1) == 0;
+    bool is_before = uintBitsToFloat(is_even ? two.x : two.z) < least_;
+    bool is_first = is_even && !is_before;
+    index = is_first ? at : at | 1;
+    words = is_first ? two.xy : two.zw;
+    int passed = is_first ? at + 1 : (at | 1) + 1;
+    c.next = is_far ? is_before ? at + 1 : c.next : passed;
+    c.bound = is_far && !is_before ? at : c.bound;
+    return !is_far && index < c.end && depth_of(words) >= least_;
 }
 
 // Of how many bodies a point of the image is inside.
@@ -107,19 +126,19 @@ int winding_at(int axis, vec3 p)
 {
     ivec2 texel = texel_of(p.xy);
     vec2 from_middle = p.xy - vec2(texel) - 0.5;
-    column c = column_at(axis, texel);
+    column_scan c = scan_of(column_at(axis, texel));
     int winding = 0; // behind all samples
-    bool is_first = true;
-    for (int i = sample_from(c, p.z - SPAN); i < c.end; i++) {
-        uvec2 words = words_at(i);
-        if (depth_of(words) < p.z - SPAN)
-            continue;
-        column_sample s = sample_of(words, axis);
-        winding = is_first ? s.behind - s.step_ : winding;
-        is_first = false;
-        if (s.depth > p.z + SPAN)
-            break;
-        winding += plane_depth(s, from_middle) < p.z ? s.step_ : 0;
-    }
+    bool is_first = true, is_behind = false;
+    do {
+        int i;
+        uvec2 words;
+        if (scan(c, p.z - SPAN, i, words)) {
+            column_sample s = sample_of(words, axis);
+            winding = is_first ? s.behind - s.step_ : winding;
+            is_first = false;
+            is_behind = s.depth > p.z + SPAN;
+            winding += !is_behind && plane_depth(s, from_middle) < p.z ? s.step_ : 0;
+        }
+    } while (c.next < c.end && !is_behind);
     return winding;
 }

@@ -3,6 +3,7 @@
 //
 // Defines: those of trace.comp.
 #include "shared/hit.h"
+#include "common/crossed.glsl"
 #include "abuffer/sample_primitive.glsl"
 #include "abuffer/walk.glsl"
 
@@ -12,10 +13,7 @@ struct abuffer_found {
 #ifdef ANY_HIT
     vec3 taken;
 #ifdef HAS_TRANSLUCENT
-    // The last crossings of translucent surfaces, to tell one that two samples have from two: distances, greater than 0
-    // where the ray came from behind, and materials.
-    vec4 crossed;
-    uvec4 materials;
+    crossed_surfaces crossed;
 #endif
 #else
     int sample_index; // -1: none
@@ -35,17 +33,8 @@ void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, floa
 #ifdef HAS_TRANSLUCENT
     candidate c = candidate_of_sample(sample_index, distance_);
     c.barycentrics = nearest_barycentrics(c, r.origin, r.direction);
-    uint material_index = material_index_of(c);
-    // Samples of one surface overlap by the slack, and where images meet by up to a cell.
-    float signed_ = side > 0.0 ? distance_ : -distance_;
-    bvec4 same = lessThan(abs(found.crossed - signed_), vec4(near));
-    same = bvec4(uvec4(same) * uvec4(equal(found.materials, uvec4(material_index))));
-    vec3 through = transmittance_of(c, r.origin, r.direction, 0.0);
-    if (any(same) && through != vec3(0.0))
-        return;
-    found.crossed = vec4(signed_, found.crossed.xyz);
-    found.materials = uvec4(material_index, found.materials.xyz);
-    found.taken = min(found.taken + taken_by(through), vec3(TAKEN_ALL));
+    cross_surface(found.crossed, found.taken, material_index_of(c), distance_, side, near,
+                  transmittance_of(c, r.origin, r.direction, 0.0));
     if (least(found.taken) >= TAKEN_BLACK)
         found.end = -1.0;
 #else
@@ -57,7 +46,7 @@ void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, floa
 abuffer_found found_of(trace_ray r, vec3 taken)
 {
 #ifdef HAS_TRANSLUCENT
-    return abuffer_found(r.t_max, taken, vec4(1e30), uvec4(HIT_NO_PRIMITIVE));
+    return abuffer_found(r.t_max, taken, crossed_nothing());
 #else
     return abuffer_found(r.t_max, taken);
 #endif

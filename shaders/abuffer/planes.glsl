@@ -40,38 +40,36 @@ bool search_image(trace_ray r, inout voxel_walk w, inout abuffer_found found, in
     vec2 inverse = 1.0 / d.xy;
     vec2 border = (vec2(texel + forward) - o.xy) * inverse;
     float s = s_in;
-    bool any_crossed = false;
-    for (;;) {
+    bool any_crossed = false, goes_on;
+    do {
         bool along_u = border.x < border.y;
         float s_next = along_u ? border.x : border.y;
         float s_here = s_next < s_out ? s_next : s_out;
         float z_in = o.z + s * d.z, z_out = o.z + s_here * d.z;
         float least_ = (z_in < z_out ? z_in : z_out) - SPAN, greatest_ = (z_in < z_out ? z_out : z_in) + SPAN;
-        column c = column_at(axis, texel);
-        for (int i = sample_from(c, least_); i < c.end; i++) {
-            uvec2 words = words_at(i);
-            if (depth_of(words) > greatest_)
-                break;
-            if (depth_of(words) < least_)
-                continue;
+        column_scan c = scan_of(column_at(axis, texel));
+        bool is_behind = false;
+        do {
+            int i;
+            uvec2 words;
+            bool is_one = scan(c, least_, i, words);
+            is_behind = is_one && depth_of(words) > greatest_;
             column_sample p = sample_of(words, axis);
             float s_plane, side;
             bool crosses = cross_plane(o, d, w.s_least, texel, p, s_plane, side);
             vec2 from_middle = abs(o.xy + s_plane * d.xy - vec2(texel) - 0.5);
-            if (crosses && from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK && s_plane < w.s_limit &&
-                (!only_leaning || leans(p))) {
+            if (is_one && !is_behind && crosses && from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK &&
+                s_plane < w.s_limit && (!only_leaning || leans(p))) {
                 offer_at(r, w, found, i, s_plane, side);
                 any_crossed = true;
             }
-        }
-        if (!(s_next < s_out && s_next < w.s_limit))
-            break;
+        } while (c.next < c.end && !is_behind);
+        goes_on = s_next < s_out && s_next < w.s_limit;
         s = s_next;
         texel += along_u ? ivec2(2 * forward.x - 1, 0) : ivec2(0, 2 * forward.y - 1);
-        if (any(notEqual(texel, texel_of(vec2(texel)))))
-            break;
+        goes_on = goes_on && all(lessThan(uvec2(texel), uvec2(abuffer_resolution)));
         border = (vec2(texel + forward) - o.xy) * inverse;
-    }
+    } while (goes_on);
     return any_crossed;
 }
 
@@ -80,7 +78,9 @@ void search_planes(trace_ray r, inout voxel_walk w, inout abuffer_found found, f
 {
     uint images = here.what & ABUFFER_VOXEL_IMAGES;
     bool only_leaning = bitCount(images) > 1;
-    for (; images != 0u; images &= images - 1u)
+    do {
         search_image(r, w, found, findLSB(images), only_leaning, here.s_in,
                      here.s_out < w.s_limit ? here.s_out : w.s_limit);
+        images &= images - 1u;
+    } while (images != 0u);
 }

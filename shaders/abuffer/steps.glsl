@@ -11,18 +11,29 @@
 
 #ifdef ABUFFER_STEPS
 
-// Cells from a ray's origin within which it is looked for more closely what it meets.
-const float NEAR_ORIGIN = 4.0;
-
 const int BISECTIONS_MAX = 8;
 // From column to column towards where a plane is crossed: a curved surface is met after two or three.
 const int FOLLOWS_MAX = 4;
-const float FOLLOW_REACH = 4.0; // cells of depth in which a column's samples are of the surface that is followed
+const float FOLLOW_REACH = 8.0; // cells of depth in which a column's samples are of the surface that is followed
+const float FOLLOW_ALONG = 4.0; // beyond a step, of an open surface
+// Cells from a ray's origin within which it is looked for more closely what it meets.
+const float NEAR_ORIGIN = 4.0;
 
-// Of how many bodies the ray is inside, where it was last looked.
-struct ray_state {
+// Where a ray is among the steps of a voxel.
+struct step_walk {
+    found_voxel here; // `what` 0: past it
+    float size;       // of its steps
+    int next;         // step of the voxel; 0: what is known at its begin
+    uint images;      // in which it looks yet at this step; 0: not yet at it
+    // Of how many bodies the ray is inside, where it was last looked.
     int winding;
     bool is_known;
+    // Of the step that was looked at last.
+    int axis;
+    float lo, hi;
+    float s; // about where something is passed
+    bool by_winding, only_leaning;
+    int winding_lo;
 };
 
 // In the image that the voxel names; of several in that which the ray runs along most: there it crosses fewest texels, and
@@ -46,77 +57,84 @@ const float OWN_ALONG = 0.15;
 
 int winding_at_origin(voxel_walk w, uint what)
 {
-    for (uint images = what & ABUFFER_VOXEL_IMAGES; images != 0u; images &= images - 1u) {
-        int axis = findLSB(images);
+    float nearest = OWN_BEHIND;
+    int own_winding = 0;
+    bool is_own = false, goes_along = false;
+    int axis;
+    uint images = what & ABUFFER_VOXEL_IMAGES;
+    do {
+        axis = findLSB(images);
         vec3 p = place_in_image(w, axis, w.s_least), d = in_image(w.ray.d, axis);
         ivec2 texel = texel_of(p.xy);
-        column c = column_at(axis, texel);
-        float nearest = OWN_BEHIND;
-        int own_winding = 0;
-        bool is_own = false, goes_along = false;
-        for (int i = sample_from(c, p.z - SPAN); i < c.end; i++) {
-            uvec2 words = words_at(i);
-            if (depth_of(words) > p.z + SPAN)
-                break;
-            if (depth_of(words) < p.z - SPAN)
-                continue;
+        column_scan c = scan_of(column_at(axis, texel));
+        bool is_behind = false;
+        do {
+            int i;
+            uvec2 words;
+            bool is_one = scan(c, p.z - SPAN, i, words);
+            is_behind = is_one && depth_of(words) > p.z + SPAN;
             column_sample q = sample_of(words, axis);
             float inverse = inversesqrt(dot(q.normal, q.normal)), side = dot(q.normal, d) * inverse;
             float distance_ = abs(dot(q.normal, p - vec3(vec2(texel) + 0.5, q.depth))) * inverse;
-            if (q.step_ != 0 && distance_ < nearest) {
+            if (is_one && !is_behind && q.step_ != 0 && distance_ < nearest) {
                 nearest = distance_;
                 is_own = true;
                 goes_along = abs(side) < OWN_ALONG;
                 own_winding = (side > 0.0) == (q.normal.z > 0.0) ? q.behind : q.behind - q.step_;
             }
-        }
-        if (is_own)
-            return goes_along ? winding_at(axis, p + OWN_WAY * d) : own_winding;
-    }
-    int axis = image_of(what, w.ray.d);
-    return winding_at(axis, place_in_image(w, axis, w.s_least + OWN_WAY));
+        } while (c.next < c.end && !is_behind);
+        images &= images - 1u;
+    } while (images != 0u && !is_own);
+    axis = is_own ? axis : image_of(what, w.ray.d);
+    int there = winding_at(axis, place_in_image(w, axis, w.s_least + OWN_WAY));
+    return is_own && !goes_along ? own_winding : there;
 }
-
-#ifndef ANYTHING_ENDS
 
 // Where the ray crosses a surface near s, by the plane of a sample there, then by that of a sample where it crosses this
 // one, and so on until the crossing is in the sample's own texel.
-bool follow(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis, bool only_leaning, float s, float lo,
-            float hi)
+bool follow(trace_ray r, inout voxel_walk w, inout abuffer_found found, step_walk t)
 {
+    int axis = t.axis;
+    float beyond = t.by_winding ? 1.0 : FOLLOW_ALONG, lo = t.lo - beyond, hi = t.hi + beyond, s = t.s;
     vec3 o = in_image(w.ray.o, axis), d = in_image(w.ray.d, axis);
-    for (int k = 0; k < FOLLOWS_MAX; k++) {
+    bool is_there, goes_on;
+    int k = 0, nearest_sample;
+    float nearest_side;
+    do {
         vec3 p = o + s * d;
         ivec2 texel = texel_of(p.xy);
-        column c = column_at(axis, texel);
-        float nearest = 1e30, nearest_side = 0.0;
-        int nearest_sample = 0;
-        for (int i = sample_from(c, p.z - FOLLOW_REACH); i < c.end; i++) {
-            uvec2 words = words_at(i);
-            if (depth_of(words) > p.z + FOLLOW_REACH)
-                break;
-            column_sample q = sample_of(words, axis);
+        column_scan c = scan_of(column_at(axis, texel));
+        float nearest = 1e30;
+        nearest_side = 0.0;
+        nearest_sample = 0;
+        bool is_behind = false;
+        do {
+            int i;
+            uvec2 words;
+            bool is_one = scan(c, p.z - FOLLOW_REACH, i, words);
+            is_behind = is_one && depth_of(words) > p.z + FOLLOW_REACH;
             float s_plane, side;
-            if (cross_plane(o, d, w.s_least, texel, q, s_plane, side) && abs(s_plane - s) < abs(nearest - s) &&
-                (!only_leaning || leans(q))) {
+            column_sample q = sample_of(words, axis);
+            bool crosses = cross_plane(o, d, w.s_least, texel, q, s_plane, side) && (!t.only_leaning || leans(q));
+            crosses = crosses && (t.by_winding || (s_plane > lo && s_plane < hi));
+            if (is_one && !is_behind && crosses && abs(s_plane - s) < abs(nearest - s)) {
                 nearest = s_plane;
                 nearest_side = side;
                 nearest_sample = i;
             }
-        }
+        } while (c.next < c.end && !is_behind);
         vec2 from_middle = abs(o.xy + nearest * d.xy - vec2(texel) - 0.5);
-        if (from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK) {
-            if (!(nearest < w.s_limit))
-                return false;
-            offer_at(r, w, found, nearest_sample, nearest, nearest_side);
-            return true;
-        }
-        if (!(nearest > lo - 1.0 && nearest < hi + 1.0))
-            return false;
+        is_there = from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK;
+        goes_on = !is_there && nearest > lo && nearest < hi;
         s = nearest;
-    }
-    return false;
+    } while (goes_on && ++k < FOLLOWS_MAX);
+    is_there = is_there && s < w.s_limit;
+    if (is_there)
+        offer_at(r, w, found, nearest_sample, s, nearest_side);
+    return is_there;
 }
+
+#ifndef ANYTHING_ENDS
 
 int nearest_sample(int axis, vec3 p)
 {
@@ -131,25 +149,27 @@ int nearest_sample(int axis, vec3 p)
     return nearest;
 }
 
-// A surface is passed between lo and hi.
-void refine(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis, float lo, float hi, int winding_lo)
+// The winding is another between lo and hi, but no plane is crossed near hi.
+void search_passage(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis, float lo, float hi,
+                    int winding_lo)
 {
-    if (follow(r, w, found, axis, false, hi, lo, hi))
-        return;
-    for (int i = 0; i < BISECTIONS_MAX && hi - lo > 1.0; i++) {
+    int i = 0;
+    do {
         float middle = 0.5 * (lo + hi);
         bool is_before = winding_at(axis, place_in_image(w, axis, middle)) == winding_lo;
-        lo = is_before ? middle : lo;
-        hi = is_before ? hi : middle;
-    }
+        bool is_far = hi - lo > 1.0;
+        lo = is_far && is_before ? middle : lo;
+        hi = !is_far || is_before ? hi : middle;
+    } while (++i < BISECTIONS_MAX && hi - lo > 1.0);
     // Where it was passed at a texel's border and no plane was crossed, it is steep here and another image shows it.
     bool crossed = false;
-    for (int other = 0; other < 3 && !crossed; other++) {
+    int other = 0;
+    do {
         int image = axis + other < 3 ? axis + other : axis + other - 3;
         crossed = search_image(r, w, found, image, other > 0, max(lo - 0.5, w.s_least), hi + 0.5);
-    }
+    } while (++other < 3 && !crossed);
     if (!crossed && hi > w.s_least + OWN_WAY + 1.0 && hi < w.s_limit) {
-        int i = nearest_sample(axis, place_in_image(w, axis, hi));
+        i = nearest_sample(axis, place_in_image(w, axis, hi));
         i = i < 0 ? nearest_sample(axis, place_in_image(w, axis, lo)) : i;
         if (i >= 0)
             offer_at(r, w, found, i, hi, dot(sample_of(words_at(i), axis).normal, in_image(w.ray.d, axis)));
@@ -158,108 +178,118 @@ void refine(trace_ray r, inout voxel_walk w, inout abuffer_found found, int axis
 
 #endif
 
-void search_body(trace_ray r, inout voxel_walk w, inout abuffer_found found, found_voxel here, inout ray_state state)
+// The next step of the voxel. Whether something may be passed there.
+//
+// In a body the samples of the column at its end say how many bodies it is in; of an open surface the plane of one of them
+// may be crossed within the step or not far from it.
+bool look(inout voxel_walk w, inout step_walk t)
 {
-    int axis = image_of(here.what, w.ray.d);
-    float end = here.s_out < w.s_limit ? here.s_out : w.s_limit;
-    float lo = here.s_in, hi = lo, step_ = (end - lo) * (1.0 / float(ABUFFER_STEPS));
-    if (!state.is_known) {
-        state.is_known = true;
-        state.winding = here.s_in <= w.s_least ? winding_at_origin(w, here.what)
-                                               : winding_at(axis, place_in_image(w, axis, here.s_in));
-    }
-    int k = 1;
-    while (k <= ABUFFER_STEPS && lo < w.s_limit) {
-        int winding = state.winding;
-        // Rays of a SIMD group step together, and then those of them together refine that have to.
-        for (; k <= ABUFFER_STEPS && winding == state.winding; k++) {
-            lo = hi;
-            hi = here.s_in + float(k) * step_;
-            if (hi > w.s_least + OWN_WAY)
-                winding = winding_at(axis, place_in_image(w, axis, hi));
+    bool is_body = (t.here.what & ABUFFER_VOXEL_BODY) != 0u;
+    t.lo = t.here.s_in + float(t.next - 1) * t.size;
+    t.hi = t.here.s_in + float(t.next) * t.size;
+    // All images that a voxel names only near where the ray begins: along what stands on a surface light would leak.
+    // Farther on the one that the ray runs along most, which shows most of what it meets.
+    t.only_leaning = !is_body && t.lo <= w.s_least + NEAR_ORIGIN;
+    if (t.images == 0u)
+        t.images = t.only_leaning ? t.here.what & ABUFFER_VOXEL_IMAGES : 1u << image_of(t.here.what, w.ray.d);
+    t.axis = findLSB(t.images);
+    vec3 o = in_image(w.ray.o, t.axis), d = in_image(w.ray.d, t.axis), p = o + t.hi * d;
+    ivec2 texel = texel_of(p.xy);
+    vec2 from_middle = p.xy - vec2(texel) - 0.5;
+    float reach = is_body ? SPAN : 2.0 * (t.hi - t.lo) + SPAN;
+    int winding = 0; // behind all samples
+    float nearest = w.s_limit;
+    bool is_first = true, is_behind = false;
+    column_scan c = scan_of(column_at(t.axis, texel));
+    do {
+        int i;
+        uvec2 words;
+        if (scan(c, p.z - reach, i, words)) {
+            is_behind = depth_of(words) > p.z + reach;
+            column_sample q = sample_of(words, t.axis);
+            winding = is_first ? q.behind - q.step_ : winding;
+            winding += !is_behind && plane_depth(q, from_middle) < p.z ? q.step_ : 0;
+            is_first = false;
+            float s, side;
+            bool crosses = cross_plane(o, d, w.s_least, texel, q, s, side) && (!t.only_leaning || leans(q));
+            bool is_here = s > t.lo - FOLLOW_ALONG && s < t.hi + FOLLOW_ALONG && s < nearest;
+            nearest = !is_behind && crosses && is_here ? s : nearest;
         }
-        if (winding == state.winding)
-            return;
+    } while (c.next < c.end && !is_behind);
+    bool is_past_own = t.hi > w.s_least + OWN_WAY;
+    bool differs = t.next > 0 && is_past_own && winding != t.winding;
+    t.by_winding = is_body;
+    t.winding_lo = t.winding;
+    t.winding = is_body && (t.next == 0 || is_past_own) ? winding : t.winding;
+    t.is_known = is_body;
+    t.s = is_body ? t.hi : nearest;
+    // Past the voxel, or on.
+    t.images &= t.images - 1u;
+    t.next += t.images == 0u ? 1 : 0;
+    t.here.what = t.next <= ABUFFER_STEPS ? t.here.what : 0u;
+    return is_body ? differs : nearest < w.s_limit;
+}
+
+// What a step said may be passed.
+void pass(trace_ray r, inout voxel_walk w, inout abuffer_found found, inout step_walk t)
+{
 #ifdef ANYTHING_ENDS
-        offer_at(r, w, found, 0, hi, 1.0);
-        return;
+    if (t.by_winding)
+        offer_at(r, w, found, 0, t.hi, 1.0);
+    else
+        follow(r, w, found, t);
 #else
-        refine(r, w, found, axis, lo, hi, state.winding);
-        state.winding = winding;
-        lo = hi;
+    if (!follow(r, w, found, t) && t.by_winding)
+        search_passage(r, w, found, t.axis, t.lo, t.hi, t.winding_lo);
 #endif
-    }
+    // Another image may show something nearer.
+    t.here.what = w.s_limit < t.lo || (t.by_winding && w.s_limit < t.hi) ? 0u : t.here.what;
 }
 
-// All images that a voxel names only near where the ray begins: along what stands on a surface light would leak. Farther on
-// the one that the ray runs along most, which shows most of what it meets.
-uint images_from(voxel_walk w, uint what, float s)
+// Up to the next voxel that holds something, at most one step.
+void step_to_voxel(inout voxel_walk w, inout step_walk t)
 {
-    return s <= w.s_least + NEAR_ORIGIN ? what & ABUFFER_VOXEL_IMAGES : 1u << image_of(what, w.ray.d);
+    step_on(w, t.here);
+    float end = t.here.s_out < w.s_limit ? t.here.s_out : w.s_limit;
+    t.size = (end - t.here.s_in) * (1.0 / float(ABUFFER_STEPS));
+    bool is_body = (t.here.what & ABUFFER_VOXEL_BODY) != 0u;
+    t.next = is_body && !t.is_known ? 0 : 1;
+    t.images = 0u;
 }
 
-// Of an image's column at each step's end, what is crossed first of its samples' planes; it is followed from column to
-// column until the crossing is in the sample's own texel. In one loop, a column a round: rays of a SIMD group that step
-// and others that follow do so together.
-void search_open(trace_ray r, inout voxel_walk w, inout abuffer_found found, found_voxel here)
+void walk_steps(trace_ray r, inout voxel_walk w, inout abuffer_found found)
 {
-    float end = here.s_out < w.s_limit ? here.s_out : w.s_limit;
-    float step_ = (end - here.s_in) * (1.0 / float(ABUFFER_STEPS)), lo = here.s_in, hi = lo + step_, s = hi;
-    uint images = images_from(w, here.what, lo);
-    int k = 1, follows = 0;
-    while (k <= ABUFFER_STEPS && lo < w.s_limit) {
-        int axis = findLSB(images);
-        vec3 o = in_image(w.ray.o, axis), d = in_image(w.ray.d, axis), p = o + s * d;
-        ivec2 texel = texel_of(p.xy);
-        float reach = follows > 0 ? FOLLOW_REACH : 2.0 * (hi - lo) + SPAN;
-        float crossing = 1e30, crossing_side = 0.0, least_ = 1e30;
-        bool is_near = lo <= w.s_least + NEAR_ORIGIN;
-        int crossed = 0;
-        column c = column_at(axis, texel);
-        for (int i = sample_from(c, p.z - reach); i < c.end; i++) {
-            uvec2 words = words_at(i);
-            if (depth_of(words) > p.z + reach)
-                break;
-            float s_plane, side;
-            column_sample q = sample_of(words, axis);
-            bool crosses = cross_plane(o, d, w.s_least, texel, q, s_plane, side) && (!is_near || leans(q));
-            float away = follows > 0 ? abs(s_plane - s) : s_plane;
-            if (crosses && away < least_ && s_plane > lo - FOLLOW_REACH && s_plane < hi + FOLLOW_REACH) {
-                least_ = away;
-                crossing = s_plane;
-                crossing_side = side;
-                crossed = i;
-            }
-        }
-        vec2 from_middle = abs(o.xy + crossing * d.xy - vec2(texel) - 0.5);
-        bool is_there = from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK && crossing < w.s_limit;
-        if (is_there)
-            offer_at(r, w, found, crossed, crossing, crossing_side);
-        if (!is_there && crossing < w.s_limit && follows < FOLLOWS_MAX) {
-            s = crossing;
-            follows++;
-        } else {
-            follows = 0;
-            images &= images - 1u;
-            if (images == 0u) {
-                k++;
-                lo = hi;
-                hi = here.s_in + float(k) * step_;
-                images = images_from(w, here.what, lo);
-            }
-            s = hi;
+    step_walk t;
+    t.here = found_voxel(0u, 0.0, 0.0);
+    t.next = 0;
+    t.size = 0.0;
+    t.images = 0u;
+    // All is outside of what is beyond the voxels.
+    t.winding = 0;
+    t.is_known = w.s > w.s_least;
+    if (!t.is_known && w.s < w.s_end) {
+        do {
+            step_to_voxel(w, t);
+        } while (t.here.what == 0u && w.s <= w.s_least && w.s < w.s_end);
+        if ((t.here.what & ABUFFER_VOXEL_BODY) != 0u && t.here.s_in <= w.s_least) {
+            t.winding = winding_at_origin(w, t.here.what);
+            t.is_known = true;
+            t.next = 1;
         }
     }
-}
-
-void search_steps(trace_ray r, inout voxel_walk w, inout abuffer_found found, found_voxel here, inout ray_state state)
-{
-    if ((here.what & ABUFFER_VOXEL_BODY) != 0u) {
-        search_body(r, w, found, here, state);
-    } else {
-        search_open(r, w, found, here);
-        state.is_known = false;
-    }
+    // Software GL runs all of a loop's body in every round, whatever of it is needed. So what is rarely so, that something
+    // is passed, is out of the loop of what each step needs.
+    do {
+        bool passes = false;
+        do {
+            if (t.here.what == 0u && w.s < w.s_end)
+                step_to_voxel(w, t);
+            if (t.here.what != 0u)
+                passes = look(w, t);
+        } while (!passes && (t.here.what != 0u || w.s < w.s_end));
+        if (passes)
+            pass(r, w, found, t);
+    } while (t.here.what != 0u || w.s < w.s_end);
 }
 
 #endif

@@ -14,19 +14,14 @@ void walk_ray(trace_ray r, inout abuffer_found found)
     voxel_walk w;
     begin_walk(r, found.end, w);
 #ifdef ABUFFER_STEPS
-    // All is outside of what is beyond the voxels.
-    ray_state state = ray_state(0, w.s > w.s_least);
-#endif
+    walk_steps(r, w, found);
+#else
     while (w.s < w.s_end) {
         found_voxel here = next_voxel(w);
-        if (here.what != 0u) {
-#ifdef ABUFFER_STEPS
-            search_steps(r, w, found, here, state);
-#else
+        if (here.what != 0u)
             search_planes(r, w, found, here);
-#endif
-        }
     }
+#endif
 #endif
 }
 

@@ -115,12 +115,12 @@ void step_on(inout voxel_walk w, inout found_voxel found)
     w.s = any(greaterThanEqual(next, ivec3(abuffer_grid << 2))) ? 1e30 : w.s;
 }
 
-// Up to two steps towards the next voxel that holds something. In a SIMD group all wait for the one that has most to do.
+// To the next voxel that holds something, if one does.
 found_voxel next_voxel(inout voxel_walk w)
 {
     found_voxel found = found_voxel(0u, 0.0, 0.0);
-    step_on(w, found);
-    if (w.s < w.s_end && found.what == 0u)
+    do {
         step_on(w, found);
+    } while (w.s < w.s_end && found.what == 0u);
     return found;
 }

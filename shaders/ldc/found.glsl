@@ -3,6 +3,7 @@
 //
 // Defines: those of trace.comp.
 #include "shared/hit.h"
+#include "common/crossed.glsl"
 #include "common/sampled.glsl"
 #include "ldc/cube.glsl"
 
@@ -12,10 +13,7 @@ struct ldc_found {
 #ifdef ANY_HIT
     vec3 taken;
 #ifdef HAS_TRANSLUCENT
-    // The last crossings of translucent surfaces, to tell one that two samples have from two: distances, greater than 0
-    // where the ray came from behind, and materials.
-    vec4 crossed;
-    uvec4 materials;
+    crossed_surfaces crossed;
 #endif
 #else
     uint sample_index; // HIT_NO_PRIMITIVE: none
@@ -46,17 +44,8 @@ void offer_sample(inout ldc_found found, uint sample_index, float distance_, flo
 {
 #ifdef HAS_TRANSLUCENT
     uvec4 words = texelFetch(ldc_surface, int(sample_index));
-    uint material_index = sample_material(words);
-    // Samples of one surface overlap by the slack, and where images meet by up to a cell.
-    float signed_ = side > 0.0 ? distance_ : -distance_;
-    bvec4 same = lessThan(abs(found.crossed - signed_), vec4(near));
-    same = bvec4(uvec4(same) * uvec4(equal(found.materials, uvec4(material_index))));
-    vec3 through = transmittance_of_sample(words);
-    if (any(same) && through != vec3(0.0))
-        return;
-    found.crossed = vec4(signed_, found.crossed.xyz);
-    found.materials = uvec4(material_index, found.materials.xyz);
-    found.taken = min(found.taken + taken_by(through), vec3(TAKEN_ALL));
+    cross_surface(found.crossed, found.taken, sample_material(words), distance_, side, near,
+                  transmittance_of_sample(words));
     if (least(found.taken) >= TAKEN_BLACK)
         found.end = -1.0;
 #else
@@ -68,7 +57,7 @@ void offer_sample(inout ldc_found found, uint sample_index, float distance_, flo
 ldc_found ldc_found_of(trace_ray r, vec3 taken)
 {
 #ifdef HAS_TRANSLUCENT
-    return ldc_found(r.t_max, taken, vec4(1e30), uvec4(HIT_NO_PRIMITIVE));
+    return ldc_found(r.t_max, taken, crossed_nothing());
 #else
     return ldc_found(r.t_max, taken);
 #endif

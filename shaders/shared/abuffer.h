@@ -14,6 +14,7 @@
  *   texels      RG32UI, one a texel, image after image, each in tiles (ABUFFER_TEXEL): first sample, number of samples
  *   samples     RG32UI, one a sample; those of a texel lie together and ascend in depth, of equal depths in the order of
  *               instances and primitives
+ *               for an even number there is room, as the walk reads two a texel, RGBA32UI
  *                 x  depth (float, cells)
  *                 y  bits 0..11, 12..23 geometric normal, octahedral snorm, world space, to the outside (winding);
  *                    24..30 winding behind it: of how many bodies a point between it and the next sample is inside, plus

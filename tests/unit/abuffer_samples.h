@@ -230,7 +230,8 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
             store->depth_max = words[1];
     }
     bool ok = gpu_buffer_upload(store->device, &store->texels, texels, texel_count * sizeof *texels, error) &&
-              gpu_buffer_upload(store->device, &store->samples, samples, s->count * sizeof *samples, error) &&
+              gpu_buffer_upload(store->device, &store->samples, samples,
+                                (s->count + s->count % 2) * sizeof *samples, error) &&
               gpu_buffer_upload(store->device, &store->ids, ids, s->count * sizeof *ids, error) &&
               gpu_buffer_upload(store->device, &store->drawn, drawn, sizeof drawn, error) &&
               gpu_buffer_upload(store->device, &store->sums, sums, voxel_count * sizeof *sums, error);
