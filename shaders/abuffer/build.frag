@@ -66,18 +66,17 @@ void mark(float least_cells, float greatest_cells, int bits)
     ivec3 far = ivec3(int(voxels_along) - 1), step_ = strides();
     first = clamp(first, ivec3(0), far);
     last = clamp(last, ivec3(0), far);
-    int at = first.x * step_.x + first.y * step_.y + first.z * step_.z + 3;
-    mark_voxel(at, bits);
-    ivec3 more = last - first;
-    if (more.y == 0 && more.z == 0 && more.x <= 1) {
-        if (more.x == 1)
-            mark_voxel(at + step_.x, bits);
-        return;
+    // One after the other, in one loop: software GL goes once through every loop and branch, taken or not.
+    ivec3 voxel = first;
+    bool more = true;
+    while (more) {
+        mark_voxel(voxel.x * step_.x + voxel.y * step_.y + voxel.z * step_.z + 3, bits);
+        bool ends_d = voxel.x >= last.x, ends_u = ends_d && voxel.y >= last.y;
+        more = !(ends_u && voxel.z >= last.z);
+        voxel.z += int(ends_u);
+        voxel.y = ends_u ? first.y : voxel.y + int(ends_d);
+        voxel.x = ends_d ? first.x : voxel.x + 1;
     }
-    for (int v = 0; v <= more.z; v++)
-        for (int u = 0; u <= more.y; u++)
-            for (int d = 0; d <= more.x; d++)
-                mark_voxel(at + d * step_.x + u * step_.y + v * step_.z, bits);
 }
 
 // A unit normal's components along depth, u and v, to the voxel that the texel's middle is in at this depth.
