@@ -13,8 +13,10 @@
 
 /* Rays of a slice. Software GL has no latency to hide, and its caches are the CPU's; a GPU wants enough rays to
  * fill itself. Waves have room for twice as many: mirrors and glass rarely fill a slice. A step traces no more
- * than that: on software GL, where incoherent rays take about half a microsecond each, a few milliseconds. */
+ * than that: on software GL, where incoherent rays take about half a microsecond each, with some tracers several,
+ * a few milliseconds. */
 #define SLICE_RAYS_SOFTWARE (1u << 14)
+#define SLICE_RAYS_SLOW (1u << 12)
 #define SLICE_RAYS_HARDWARE (1u << 18)
 #define WAVE_PER_SLICE 2
 /* Textures of a picture that goes on and on are taken as if it had so many samples. */
@@ -113,6 +115,15 @@ bool frame_reserve_waves(struct frame_renderer *renderer, struct error *error)
            renderer->integrator->impl->reserve(renderer->integrator, context, error);
 }
 
+static uint32_t slice_rays(const struct frame_renderer *renderer)
+{
+    if (renderer->wanted_slice_pixels)
+        return renderer->wanted_slice_pixels;
+    if (!renderer->device->facts.software)
+        return SLICE_RAYS_HARDWARE;
+    return renderer->context.tracer->impl->slow_on_software ? SLICE_RAYS_SLOW : SLICE_RAYS_SOFTWARE;
+}
+
 static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->context;
@@ -130,9 +141,7 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     /* A picture too large for the visibility buffer is traced from the first ray: the same hits, another way. */
     renderer->rasterise = flat && request->primary == PRIMARY_RASTER && !request->compare &&
                           primary_reserve(&renderer->primary, context, NULL);
-    uint32_t rays = renderer->device->facts.software ? SLICE_RAYS_SOFTWARE : SLICE_RAYS_HARDWARE;
-    if (renderer->wanted_slice_pixels)
-        rays = renderer->wanted_slice_pixels;
+    uint32_t rays = slice_rays(renderer);
     uint64_t all = picture_slot_count(&renderer->picture);
     all *= renderer->rasterise ? 1 : SLICES_SAMPLES_TOGETHER;
     renderer->slices.slice_rays = rays < all ? rays : (uint32_t)all;

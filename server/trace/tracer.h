@@ -98,6 +98,7 @@ struct tracer_impl {
     /* The structure knows the scene as the shutter opens: rays of a scene in which something moves meanwhile must
      * have no times. */
     bool still;
+    bool slow_on_software; /* a ray takes microseconds there: few are traced in one step of a frame */
     struct tracer *(*create)(struct gpu_device *device, const struct tracer_options *options, struct error *error);
     void (*destroy)(struct tracer *tracer);
     /* Brings the structure to the scene; `changes` is what changed since the last update of this tracer.

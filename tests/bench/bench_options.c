@@ -24,7 +24,8 @@ const char bench_usage[] =
     "  --size WxH            multiples of 8; default 512x512\n"
     "  --eye X,Y,Z --look-at X,Y,Z [--up X,Y,Z] [--fov DEGREES]   else the model's first camera, or one that sees "
     "all\n"
-    "  --waves LIST          of primary,reflection,shadow,refraction,occlusion,bounce,shuffled; default: all\n"
+    "  --waves LIST          of primary,reflection,shadow,refraction,occlusion,bounce,shuffled; default: all but\n"
+    "                        refraction\n"
     "  --rays-per-pixel N    of every wave but primary and shuffled; default 1\n"
     "  --tracers LIST        default: all but naive\n"
     "  --runs N              after one warm-up; default 5, at most 64\n"
@@ -131,6 +132,7 @@ bool bench_parse(int argc, char **argv, struct bench_options *options, struct gp
     options->scene.up[1] = 1;
     options->scene.fov_y = 0.7f;
     memset(options->waves, true, sizeof options->waves);
+    options->waves[BENCH_REFRACTION] = false; /* rays into what is no glass */
     for (int option; (option = getopt_long(argc, argv, "", names, NULL)) != -1;) {
         if (option == '?')
             return false;
