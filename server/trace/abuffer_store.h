@@ -24,7 +24,7 @@ struct abuffer_store {
 
 void abuffer_store_init(struct abuffer_store *store, struct gpu_device *device);
 void abuffer_store_finish(struct abuffer_store *store);        /* leaves it empty */
-bool abuffer_has_subvoxels(const struct abuffer_store *store); /* or one texel in place of all */
+bool abuffer_has_subvoxels(const struct abuffer_store *store); /* or the same ones for all voxels */
 uint64_t abuffer_store_bytes(const struct abuffer_store *store);
 
 #endif

@@ -16,7 +16,7 @@ uniform bool has_subvoxels;
 layout(binding = IMAGE_ABUFFER_HEADS, r32ui) uniform uimageBuffer heads;
 layout(binding = IMAGE_ABUFFER_NODES, rgba32ui) writeonly uniform uimageBuffer nodes;
 layout(binding = IMAGE_ABUFFER_SUMS, r32i) uniform iimageBuffer sums;
-layout(binding = IMAGE_ABUFFER_SUBVOXELS, r32ui) uniform uimageBuffer subvoxels; // two a voxel
+layout(binding = IMAGE_ABUFFER_SUBVOXELS, r32ui) uniform uimageBuffer subvoxels; // six a voxel
 layout(std430, binding = BIND_ABUFFER_BUILD_COUNTS) buffer build_block { abuffer_build_counts build; };
 
 // Whether there was room. Without, this one is only counted, as all is drawn once more.
@@ -64,7 +64,8 @@ uint subvoxels_between(ivec3 first, ivec3 last, ivec3 half_)
 
 // The patch of a surface that is seen through a texel, and reaches from one depth to the other: mostly in one half of a
 // voxel, or in two. A load is cheaper than an atomic, and mostly the bits are there.
-void mark(float least_cells, float greatest_cells, int bits)
+// `looks_along`: the axis that its normal leans to most.
+void mark(float least_cells, float greatest_cells, int bits, int looks_along)
 {
     float subvoxels_per_cell = 4.0 * voxels_per_cell;
     int along = int(voxels_along);
@@ -78,7 +79,7 @@ void mark(float least_cells, float greatest_cells, int bits)
         uint inner = has_subvoxels ? subvoxels_between(first, last, half_) : 0u;
         if ((imageLoad(sums, 4 * voxel + 3).x & bits) != bits)
             imageAtomicOr(sums, 4 * voxel + 3, bits);
-        int word = has_subvoxels ? 2 * voxel + (half_.z & 1) : 0;
+        int word = has_subvoxels ? 6 * voxel + 2 * looks_along + (half_.z & 1) : 0;
         if ((imageLoad(subvoxels, word).x & inner) != inner)
             imageAtomicOr(subvoxels, word, inner);
         half_.x++;
@@ -112,6 +113,13 @@ int sum_bits(uint face, bool closed, bool leaves)
 }
 
 #if PRIMITIVE_KIND == 0
+int axis_of_plane()
+{
+    vec2 slope = abs(plane.xy);
+    int on = slope.x <= 1.0 && slope.y <= 1.0 ? 0 : slope.x >= slope.y ? 1 : 2, axis = gl_Layer + on;
+    return axis < 3 ? axis : axis - 3;
+}
+
 void main()
 {
     if (is_triangle_cut_out())
@@ -130,7 +138,7 @@ void main()
         most_cells = min(most_cells, depths.z);
     }
     if ((face & FACE_LEANS << gl_Layer) != 0u)
-        mark(least_cells, most_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves));
+        mark(least_cells, most_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves), axis_of_plane());
     if ((face & FACE_MOST) != 0u) {
         vec3 normal = vec3(1.0, -plane.xy) * inversesqrt(1.0 + dot(plane.xy, plane.xy));
         add_normal(depth_cells, leaves ? normal : -normal);
@@ -173,7 +181,7 @@ void main()
                                    (side == 1 ? ABUFFER_NODE_LEAVES : 0u)))
             continue;
         if ((face & FACE_LEANS << axis) != 0u)
-            mark(least_cells, most_cells, sum_bits(face, closed, side == 1));
+            mark(least_cells, most_cells, sum_bits(face, closed, side == 1), axis_of(abs(normal)));
         if (axis_of(abs(normal)) == axis)
             add_normal(depth_cells, vec3(normal[axis], normal[u], normal[v]));
     }

@@ -8,7 +8,7 @@ layout(binding = UNIT_TRACER_5) uniform usamplerBuffer abuffer_subvoxels;
 
 uniform vec4 abuffer_place; // lower corner, world; size of a cell
 uniform int abuffer_grid;   // blocks along a side
-uniform int abuffer_subvoxel_stride; // 0: all voxels have the same texel
+uniform bool abuffer_has_subvoxels;
 
 struct voxel_walk {
     cell_ray ray;
@@ -62,7 +62,7 @@ int subvoxels_at(uvec3 voxel)
 {
     ivec3 p = ivec3(voxel);
     int along = abuffer_grid << 2;
-    return abuffer_subvoxel_stride * ((p.z * along + p.y) * along + p.x);
+    return abuffer_has_subvoxels ? 3 * ((p.z * along + p.y) * along + p.x) : 0;
 }
 
 // What is known of one that holds something. `b`: its place in the block.
@@ -100,17 +100,20 @@ void step_on(inout voxel_walk w, inout found_voxel found)
     bool is_set = ((b.z < 2u ? words.x : words.y) >> bit & 1u) != 0u;
 #ifdef ABUFFER_STEPS
     uvec2 inner = uvec2(0xffffffffu);
+    bool is_whole = is_set;
 #else
-    uvec2 inner = texelFetch(abuffer_subvoxels, subvoxels_at(voxel)).xy;
+    int inside = subvoxels_at(voxel);
+    uvec2 in_x = texelFetch(abuffer_subvoxels, inside).xy, in_y = texelFetch(abuffer_subvoxels, inside + 1).xy;
+    uvec2 in_z = texelFetch(abuffer_subvoxels, inside + 2).xy, inner = in_x | in_y | in_z;
+    bool is_whole = is_set && !abuffer_has_subvoxels;
 #endif
     // The next of 64 voxels, or of a voxel's 64 subvoxels.
     uvec2 bits = is_set ? inner : words.xy;
     uvec3 p = is_set ? subvoxel & 3u : b;
     bit = p.x | p.y << 2 | (p.z & 1u) << 4;
-    bool is_full = (bits.x & bits.y) == 0xffffffffu;
     bool is_found = ((p.z < 2u ? bits.x : bits.y) >> bit & 1u) != 0u;
     uvec2 all_ahead = bits & cells_ahead(p, down, 4u), near_ahead = bits & cells_ahead(p, down, 2u);
-    int many = (all_ahead.x | all_ahead.y) == 0u || is_full ? 4 : (near_ahead.x | near_ahead.y) == 0u ? 2 : 1;
+    int many = (all_ahead.x | all_ahead.y) == 0u || is_whole ? 4 : (near_ahead.x | near_ahead.y) == 0u ? 2 : 1;
     int empty = int(words.z >> w.octant_shift & 15u);
     bool is_empty = (words.x | words.y) == 0u;
     int shift = is_set ? 0 : is_empty ? 4 : 2;
@@ -123,6 +126,13 @@ void step_on(inout voxel_walk w, inout found_voxel found)
     s_out = s_out > w.s ? s_out : w.s;
     if (is_found)
         found = found_voxel(what_of(block, b), w.s, s_out);
+#ifndef ABUFFER_STEPS
+    // Where one image does not show all of a voxel, in those that show best what is in the subvoxel.
+    uvec3 shown = (p.z < 2u ? uvec3(in_x.x, in_y.x, in_z.x) : uvec3(in_x.y, in_y.y, in_z.y)) >> bit & 1u;
+    uint best = shown.x | shown.y << 1 | shown.z << 2;
+    if (is_found && bitCount(found.what & ABUFFER_VOXEL_IMAGES) > 1)
+        found.what &= best | ABUFFER_VOXEL_BODY;
+#endif
     ivec3 next = clamp(ivec3(w.o + s_out * w.d), w.subvoxel, border - 1);
     // In whole numbers, so that each step goes on.
     next = mix(next, border, lessThanEqual(exits, vec3(s_out)));

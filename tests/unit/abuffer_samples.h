@@ -143,7 +143,7 @@ static inline uint32_t abuffer_pack_normal(const float n[3])
     return ((uint32_t)lrintf(p[0] * 2047) & 0xfff) | ((uint32_t)lrintf(p[1] * 2047) & 0xfff) << 12;
 }
 
-static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[4], uint32_t (*subvoxels)[2],
+static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[4], uint32_t (*subvoxels)[3][2],
                                const struct abuffer_sample *at)
 {
     const uint32_t n = s->resolution, axis = at->texel / (n * n), iu = (axis + 1) % 3, iv = (axis + 2) % 3;
@@ -185,7 +185,7 @@ static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[
     for (int z = inner_first[2]; z <= inner_last[2]; z++)
         for (int y = inner_first[1]; y <= inner_last[1]; y++)
             for (int x = inner_first[0]; x <= inner_last[0]; x++)
-                subvoxels[(z / 4 * along + y / 4) * along + x / 4][z / 2 % 2] |=
+                subvoxels[(z / 4 * along + y / 4) * along + x / 4][most_axis][z / 2 % 2] |=
                     1u << (x % 4 + 4 * (y % 4) + 16 * (z % 2));
     for (int z = first[2]; z <= last[2]; z++)
         for (int y = first[1]; y <= last[1]; y++)
@@ -207,7 +207,7 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
     uint32_t(*texels)[2] = calloc(texel_count, sizeof *texels);
     uint32_t(*samples)[2] = calloc(s->count + 1, sizeof *samples), *ids = calloc(s->count + 1, sizeof *ids);
     int32_t(*sums)[4] = calloc(voxel_count, sizeof *sums);
-    uint32_t(*subvoxels)[2] = calloc(voxel_count, sizeof *subvoxels);
+    uint32_t(*subvoxels)[3][2] = calloc(voxel_count, sizeof *subvoxels);
     const uint32_t drawn[4] = {0};
     store->cell_world = cell_world;
     store->resolution = s->resolution;
@@ -237,7 +237,7 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
     }
     const bool has_subvoxels = abuffer_has_subvoxels(store);
     if (!has_subvoxels)
-        subvoxels[0][0] = subvoxels[0][1] = UINT32_MAX;
+        memset(subvoxels, 0xff, sizeof *subvoxels);
     bool ok = gpu_buffer_upload(store->device, &store->texels, texels, texel_count * sizeof *texels, error) &&
               gpu_buffer_upload(store->device, &store->samples, samples,
                                 (s->count + s->count % 2) * sizeof *samples, error) &&

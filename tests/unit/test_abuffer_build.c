@@ -204,7 +204,9 @@ static void expect_subvoxels(const struct contents *contents, bool has_spheres)
         uint32_t x = i % along, y = i / along % along, z = i / along / along;
         uint32_t voxel = (z / 4 * (along / 4) + y / 4) * (along / 4) + x / 4,
                  bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
-        bool is_set = (contents->subvoxels[voxel][bit / 32] >> bit % 32 & 1) != 0;
+        bool is_set = false;
+        for (int axis = 0; axis < 3; axis++)
+            is_set |= (contents->subvoxels[voxel][axis][bit / 32] >> bit % 32 & 1) != 0;
         assert_true(is_set || certain[i] == 0);
         assert_true(!is_set || possible[i] != 0);
         set += is_set;
