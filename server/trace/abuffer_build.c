@@ -93,12 +93,14 @@ static bool reserve(struct abuffer_task *task, struct error *error)
     if (4 * voxels > device->facts.texture_buffer_texels_max)
         return error_set(error, ERROR_LIMIT, "options.abuffer_voxels",
                          "%llu voxels are more than the device takes", (unsigned long long)voxels);
+    size_t subvoxels = abuffer_has_subvoxels(store) ? (size_t)voxels : 1;
     size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
     return abuffer_texels_allowed(task, error) &&
            gpu_buffer_reserve(device, &builder->heads, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->build, sizeof(task->counts), error) &&
            gpu_buffer_reserve(device, &store->sums, (size_t)voxels * ABUFFER_SUM_BYTES, error) &&
+           gpu_buffer_reserve(device, &store->subvoxels, subvoxels * ABUFFER_SUBVOXELS_BYTES, error) &&
            gpu_buffer_reserve(device, &store->texels, (size_t)task->texel_count * ABUFFER_TEXEL_BYTES, error);
 }
 

@@ -84,6 +84,7 @@ static void set_lists(const void *context, const struct gpu_program *program)
     const struct abuffer_task *task = context;
     gpu_uniform_uint(program, "nodes_max", task->builder->nodes_max);
     gpu_uniform_uint(program, "voxels_along", task->store->voxels_along);
+    gpu_uniform_int(program, "has_subvoxels", abuffer_has_subvoxels(task->store));
     gpu_uniform_float(program, "voxels_per_cell",
                       (float)task->store->voxels_along / (float)task->store->resolution);
 }
@@ -106,9 +107,11 @@ static bool draw(struct abuffer_task *task, struct error *error)
     gpu_buffer_clear(device, &builder->heads, 0);
     gpu_buffer_clear(device, &builder->build, 0);
     gpu_buffer_clear(device, &task->store->sums, 0);
+    gpu_buffer_clear(device, &task->store->subvoxels, abuffer_has_subvoxels(store) ? 0 : UINT32_MAX);
     gpu_buffer_bind_image(device, &builder->heads, IMAGE_ABUFFER_HEADS, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->nodes, IMAGE_ABUFFER_NODES, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &task->store->sums, IMAGE_ABUFFER_SUMS, GL_R32I);
+    gpu_buffer_bind_image(device, &task->store->subvoxels, IMAGE_ABUFFER_SUBVOXELS, GL_R32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_ABUFFER_BUILD_COUNTS);
     builder->passes++;
     return axes_draw_bind_plain(&builder->draw, store->resolution, error) &&

@@ -34,6 +34,7 @@ struct abuffer_task {
 #define ABUFFER_ID_BYTES 4
 #define ABUFFER_NODE_BYTES 16
 #define ABUFFER_SUM_BYTES 16
+#define ABUFFER_SUBVOXELS_BYTES 24 /* a voxel */
 
 /* abuffer_build_lists.c. Draws the scene into `heads`, `nodes` and the store's sums, and lists the texels that
  * have any. */

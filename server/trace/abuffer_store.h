@@ -6,6 +6,7 @@
 
 #include "gpu/buffer.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 struct abuffer_store {
@@ -17,12 +18,13 @@ struct abuffer_store {
     uint64_t sample_count;
     uint32_t depth_max; /* samples of the texel that has most */
     uint32_t drawn_count;
-    struct gpu_buffer texels, samples, ids, drawn, voxels;
+    struct gpu_buffer texels, samples, ids, drawn, voxels, subvoxels;
     struct gpu_buffer sums; /* of the last build */
 };
 
 void abuffer_store_init(struct abuffer_store *store, struct gpu_device *device);
-void abuffer_store_finish(struct abuffer_store *store); /* leaves it empty */
+void abuffer_store_finish(struct abuffer_store *store);        /* leaves it empty */
+bool abuffer_has_subvoxels(const struct abuffer_store *store); /* or the same ones for all voxels */
 uint64_t abuffer_store_bytes(const struct abuffer_store *store);
 
 #endif

@@ -84,6 +84,7 @@ bool abuffer_trace(struct abuffer_store *store, struct scene_gpu *scene, const s
                             store->cell_world};
     gpu_uniform_int(program, "abuffer_resolution", (int32_t)store->resolution);
     gpu_uniform_int(program, "abuffer_grid", (int32_t)(store->voxels_along / BLOCK_VOXELS));
+    gpu_uniform_int(program, "abuffer_has_subvoxels", abuffer_has_subvoxels(store));
     gpu_uniform_int(program, "abuffer_drawn_count", (int32_t)store->drawn_count);
     gpu_uniform_vec(program, "abuffer_place", 4, place);
     gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RG32UI);
@@ -91,6 +92,7 @@ bool abuffer_trace(struct abuffer_store *store, struct scene_gpu *scene, const s
     gpu_buffer_bind_texels(store->device, &store->voxels, UNIT_TRACER_2, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &store->ids, UNIT_TRACER_3, GL_R32UI);
     gpu_buffer_bind_texels(store->device, &store->drawn, UNIT_TRACER_4, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->subvoxels, UNIT_TRACER_5, GL_RG32UI);
     /* Crossings of samples are no matter of trace_surfaces(). */
     struct wave walk = *wave;
     walk.crossings_only = true;

@@ -11,10 +11,12 @@
 uniform uint nodes_max;         // that there is room for
 uniform uint voxels_along;      // a side of the grid
 uniform float voxels_per_cell;
+uniform bool has_subvoxels;
 
 layout(binding = IMAGE_ABUFFER_HEADS, r32ui) uniform uimageBuffer heads;
 layout(binding = IMAGE_ABUFFER_NODES, rgba32ui) writeonly uniform uimageBuffer nodes;
 layout(binding = IMAGE_ABUFFER_SUMS, r32i) uniform iimageBuffer sums;
+layout(binding = IMAGE_ABUFFER_SUBVOXELS, r32ui) uniform uimageBuffer subvoxels; // six a voxel
 layout(std430, binding = BIND_ABUFFER_BUILD_COUNTS) buffer build_block { abuffer_build_counts build; };
 
 uint texel_in_tiles()
@@ -46,37 +48,50 @@ ivec3 strides()
 }
 
 // Nothing of a patch is lost to rounding; and one that ends where a voxel does, does not touch the next one. Sides of
-// voxels lie at least 1 / 256 of a cell from those of texels, if they do not coincide.
+// voxels and subvoxels lie at least 1 / 512 of a cell from those of texels, if they do not coincide.
 const float DEPTH_MARGIN_CELLS = 1.0 / 64.0;
 const float HALF_TEXEL = 0.5 - 1.0 / 1024.0;
 
-// A load is cheaper than an atomic, and mostly the bits are there.
-void mark_voxel(int at, int bits)
+// Depth, u and v to x, y and z.
+ivec3 turned(ivec3 duv)
 {
-    if ((imageLoad(sums, at).x & bits) != bits)
-        imageAtomicOr(sums, at, bits);
+    return gl_Layer == 0 ? duv : gl_Layer == 1 ? duv.zxy : duv.yzx;
 }
 
-// The patch of a surface that is seen through a texel, and reaches from one depth to the other: mostly in one voxel, or
-// in two behind each other.
-void mark(float least_cells, float greatest_cells, int bits)
+// Of the subvoxels from the first to the last those that are in one half of a voxel, as bits of a word; `half_`: of the
+// grid, so many along z as there are pairs of subvoxels.
+uint subvoxels_between(ivec3 first, ivec3 last, ivec3 half_)
 {
-    ivec3 first = ivec3(vec3(least_cells - DEPTH_MARGIN_CELLS, gl_FragCoord.xy - HALF_TEXEL) * voxels_per_cell);
-    ivec3 last = ivec3(vec3(greatest_cells + DEPTH_MARGIN_CELLS, gl_FragCoord.xy + HALF_TEXEL) * voxels_per_cell);
-    ivec3 far = ivec3(int(voxels_along) - 1), step_ = strides();
-    first = clamp(first, ivec3(0), far);
-    last = clamp(last, ivec3(0), far);
-    // One after the other, in one loop: software GL goes once through every loop and branch, taken or not.
-    ivec3 voxel = first;
-    bool more = true;
-    while (more) {
-        mark_voxel(voxel.x * step_.x + voxel.y * step_.y + voxel.z * step_.z + 3, bits);
-        bool ends_d = voxel.x >= last.x, ends_u = ends_d && voxel.y >= last.y;
-        more = !(ends_u && voxel.z >= last.z);
-        voxel.z += int(ends_u);
-        voxel.y = ends_u ? first.y : voxel.y + int(ends_d);
-        voxel.x = ends_d ? first.x : voxel.x + 1;
-    }
+    ivec3 lower = half_ * ivec3(4, 4, 2);
+    uvec3 from = uvec3(max(first - lower, ivec3(0))), to = uvec3(min(last - lower, ivec3(3, 3, 1)));
+    uint x = (2u << to.x) - (1u << from.x), y = (16u << 4u * to.y) - (1u << 4u * from.y);
+    return (x * 0x1111u & y) * (from.z == to.z ? 1u << 16u * from.z : 0x10001u);
+}
+
+// The patch of a surface that is seen through a texel, and reaches from one depth to the other: mostly in one half of a
+// voxel, or in two. A load is cheaper than an atomic, and mostly the bits are there.
+// `looks_along`: the axis that its normal leans to most.
+void mark(float least_cells, float greatest_cells, int bits, int looks_along)
+{
+    float subvoxels_per_cell = 4.0 * voxels_per_cell;
+    int along = int(voxels_along);
+    ivec3 first = ivec3(vec3(least_cells - DEPTH_MARGIN_CELLS, gl_FragCoord.xy - HALF_TEXEL) * subvoxels_per_cell);
+    ivec3 last = ivec3(vec3(greatest_cells + DEPTH_MARGIN_CELLS, gl_FragCoord.xy + HALF_TEXEL) * subvoxels_per_cell);
+    first = turned(clamp(first, ivec3(0), ivec3(4 * along - 1)));
+    last = turned(clamp(last, ivec3(0), ivec3(4 * along - 1)));
+    ivec3 half_first = first >> ivec3(2, 2, 1), half_last = last >> ivec3(2, 2, 1), half_ = half_first;
+    do {
+        int voxel = ((half_.z >> 1) * along + half_.y) * along + half_.x;
+        uint inner = has_subvoxels ? subvoxels_between(first, last, half_) : 0u;
+        if ((imageLoad(sums, 4 * voxel + 3).x & bits) != bits)
+            imageAtomicOr(sums, 4 * voxel + 3, bits);
+        int word = has_subvoxels ? 6 * voxel + 2 * looks_along + (half_.z & 1) : 0;
+        if ((imageLoad(subvoxels, word).x & inner) != inner)
+            imageAtomicOr(subvoxels, word, inner);
+        half_.x++;
+        half_.yx = half_.x > half_last.x ? ivec2(half_.y + 1, half_first.x) : half_.yx;
+        half_.zy = half_.y > half_last.y ? ivec2(half_.z + 1, half_first.y) : half_.zy;
+    } while (half_.z <= half_last.z);
 }
 
 // A unit normal's components along depth, u and v, to the voxel that the texel's middle is in at this depth.
@@ -104,6 +119,13 @@ int sum_bits(uint face, bool closed, bool leaves)
 }
 
 #if PRIMITIVE_KIND == 0
+int axis_of_plane()
+{
+    vec2 slope = abs(plane.xy);
+    int on = slope.x <= 1.0 && slope.y <= 1.0 ? 0 : slope.x >= slope.y ? 1 : 2, axis = gl_Layer + on;
+    return axis < 3 ? axis : axis - 3;
+}
+
 void main()
 {
     if (is_triangle_cut_out())
@@ -122,7 +144,7 @@ void main()
         most_cells = min(most_cells, depths.z);
     }
     if ((face & FACE_LEANS << gl_Layer) != 0u)
-        mark(least_cells, most_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves));
+        mark(least_cells, most_cells, sum_bits(face, (face & FACE_CLOSED) != 0u, leaves), axis_of_plane());
     if ((face & FACE_MOST) != 0u) {
         vec3 normal = vec3(1.0, -plane.xy) * inversesqrt(1.0 + dot(plane.xy, plane.xy));
         add_normal(depth_cells, leaves ? normal : -normal);
@@ -165,7 +187,7 @@ void main()
                                    (side == 1 ? ABUFFER_NODE_LEAVES : 0u)))
             continue;
         if ((face & FACE_LEANS << axis) != 0u)
-            mark(least_cells, most_cells, sum_bits(face, closed, side == 1));
+            mark(least_cells, most_cells, sum_bits(face, closed, side == 1), axis_of(abs(normal)));
         if (axis_of(abs(normal)) == axis)
             add_normal(depth_cells, vec3(normal[axis], normal[u], normal[v]));
     }

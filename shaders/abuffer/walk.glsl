@@ -1,25 +1,28 @@
 // SPDX-License-Identifier: MIT
 // The walk through the voxels, from one that holds something to the next: a block of 4 x 4 x 4 tells which of its own do,
-// and how far it is empty around it where none does.
+// and how far it is empty around it where none does; and a voxel, in which of its 4 x 4 x 4 subvoxels something is.
 #include "abuffer/column.glsl"
 
 layout(binding = UNIT_TRACER_2) uniform usamplerBuffer abuffer_voxels;
+layout(binding = UNIT_TRACER_5) uniform usamplerBuffer abuffer_subvoxels;
 
 uniform vec4 abuffer_place; // lower corner, world; size of a cell
 uniform int abuffer_grid;   // blocks along a side
+uniform bool abuffer_has_subvoxels;
 
 struct voxel_walk {
     cell_ray ray;
-    // Axes along which the ray runs down are turned round, so that to the walk it runs up all of them. In voxels.
+    // Axes along which the ray runs down are turned round, so that to the walk it runs up all of them. In
+    // subvoxels.
     vec3 o, d, inverse;
     ivec3 flip; // -1: turned
-    ivec3 voxel;
+    ivec3 subvoxel;
     int octant_shift;
     float s, s_end;
     float s_least, s_limit; // between which a crossing counts
 };
 
-// A voxel to be searched, and where the ray is in it.
+// A voxel to be searched, and a part of the ray in it.
 struct found_voxel {
     uint what; // ABUFFER_VOXEL_*; 0: there is none
     float s_in, s_out;
@@ -27,7 +30,7 @@ struct found_voxel {
 
 void begin_walk(trace_ray r, float end, out voxel_walk w)
 {
-    float along = float(abuffer_grid << 2), voxels_a_cell = along / float(abuffer_resolution);
+    float along = float(abuffer_grid << 4), subvoxels_a_cell = along / float(abuffer_resolution);
     w.ray = cell_ray_of(r, abuffer_place, float(abuffer_resolution));
     // Its origin is where it begins, unless that is far away.
     float s_begin = w.ray.begin > 0.0 ? 0.0 : r.t_min * w.ray.scale;
@@ -36,9 +39,9 @@ void begin_walk(trace_ray r, float end, out voxel_walk w)
     bvec3 down = lessThan(w.ray.d, vec3(0.0));
     w.flip = -ivec3(down);
     w.octant_shift = 4 * (int(down.x) + 2 * int(down.y) + 4 * int(down.z));
-    vec3 o = w.ray.o * voxels_a_cell;
+    vec3 o = w.ray.o * subvoxels_a_cell;
     w.o = mix(o, along - o, down);
-    w.d = abs(w.ray.d) * voxels_a_cell;
+    w.d = abs(w.ray.d) * subvoxels_a_cell;
     w.inverse = 1.0 / w.d;
     w.s_least = r.t_min * w.ray.scale - w.ray.begin;
     w.s_limit = min(end * w.ray.scale, 1e30) - w.ray.begin;
@@ -46,19 +49,20 @@ void begin_walk(trace_ray r, float end, out voxel_walk w)
     w.s_end = w.s_limit;
     clip(w.s, w.s_end, w.o, w.inverse, vec3(0.0), vec3(along));
     w.s_end = w.ray.scale > 0.0 ? w.s_end : -1e30;
-    w.voxel = clamp(ivec3(w.o + w.s * w.d), ivec3(0), ivec3(int(along) - 1));
-}
-
-// Not turned.
-uvec3 voxel_of(voxel_walk w, ivec3 voxel)
-{
-    return uvec3((voxel ^ w.flip) + (w.flip & (abuffer_grid << 2)));
+    w.subvoxel = clamp(ivec3(w.o + w.s * w.d), ivec3(0), ivec3(int(along) - 1));
 }
 
 int block_at(uvec3 voxel)
 {
     ivec3 b = ivec3(voxel >> 2u);
     return ABUFFER_BLOCK_TEXELS * ((b.z * abuffer_grid + b.y) * abuffer_grid + b.x);
+}
+
+int subvoxels_at(uvec3 voxel)
+{
+    ivec3 p = ivec3(voxel);
+    int along = abuffer_grid << 2;
+    return abuffer_has_subvoxels ? 3 * ((p.z * along + p.y) * along + p.x) : 0;
 }
 
 // What is known of one that holds something. `b`: its place in the block.
@@ -70,9 +74,9 @@ uint what_of(int block, uvec3 b)
     return ((i & 8u) == 0u ? two.x : two.y) >> 4u * (i & 7u) & 15u;
 }
 
-// Of the 64 voxels of a block those that lie in a cube of so many along each side, 2 or 4, which begins with voxel b and
-// reaches the way the ray runs.
-uvec2 voxels_ahead(uvec3 b, bvec3 down, uint size)
+// Of 64 cells, a block's voxels or a voxel's subvoxels, those that lie in a cube of so many along each side, 2 or 4, which
+// begins with cell b and reaches the way the ray runs.
+uvec2 cells_ahead(uvec3 b, bvec3 down, uint size)
 {
     uint many = (1u << size) - 1u, back = size - 1u;
     uint x = down.x ? many << b.x >> back : many << b.x & 15u;
@@ -83,39 +87,62 @@ uvec2 voxels_ahead(uvec3 b, bvec3 down, uint size)
     return slice * uvec2((z & 1u) | (z & 2u) << 15, (z >> 2 & 1u) | (z & 8u) << 13);
 }
 
-// Past a voxel that holds something, which is `found`, or as far as nothing does.
+// Past a subvoxel that holds something, which is `found`, or as far as nothing does.
 void step_on(inout voxel_walk w, inout found_voxel found)
 {
     ABUFFER_COUNT(x);
     bvec3 down = notEqual(w.flip, ivec3(0));
-    uvec3 voxel = voxel_of(w, w.voxel), b = voxel & 3u;
+    uvec3 subvoxel = uvec3((w.subvoxel ^ w.flip) + (w.flip & (abuffer_grid << 4))), voxel = subvoxel >> 2u;
     int block = block_at(voxel);
     uvec4 words = texelFetch(abuffer_voxels, block);
+    uvec3 b = voxel & 3u;
     uint bit = b.x | b.y << 2 | (b.z & 1u) << 4; // of 32
     bool is_set = ((b.z < 2u ? words.x : words.y) >> bit & 1u) != 0u;
-    uvec2 all_voxels = words.xy & voxels_ahead(b, down, 4u), near_voxels = words.xy & voxels_ahead(b, down, 2u);
+#ifdef ABUFFER_STEPS
+    uvec2 inner = uvec2(0xffffffffu);
+    bool is_whole = is_set;
+#else
+    int inside = subvoxels_at(voxel);
+    uvec2 in_x = texelFetch(abuffer_subvoxels, inside).xy, in_y = texelFetch(abuffer_subvoxels, inside + 1).xy;
+    uvec2 in_z = texelFetch(abuffer_subvoxels, inside + 2).xy, inner = in_x | in_y | in_z;
+    bool is_whole = is_set && !abuffer_has_subvoxels;
+#endif
+    // The next of 64 voxels, or of a voxel's 64 subvoxels.
+    uvec2 bits = is_set ? inner : words.xy;
+    uvec3 p = is_set ? subvoxel & 3u : b;
+    bit = p.x | p.y << 2 | (p.z & 1u) << 4;
+    bool is_found = ((p.z < 2u ? bits.x : bits.y) >> bit & 1u) != 0u;
+    uvec2 all_ahead = bits & cells_ahead(p, down, 4u), near_ahead = bits & cells_ahead(p, down, 2u);
+    int many = (all_ahead.x | all_ahead.y) == 0u || is_whole ? 4 : (near_ahead.x | near_ahead.y) == 0u ? 2 : 1;
     int empty = int(words.z >> w.octant_shift & 15u);
     bool is_empty = (words.x | words.y) == 0u;
-    int many = (all_voxels.x | all_voxels.y) == 0u ? 4 : (near_voxels.x | near_voxels.y) == 0u ? 2 : 1;
-    ivec3 first = w.voxel >> 2;
-    ivec3 block_end = (first + (is_empty && empty > 1 ? empty : 1)) << 2;
-    ivec3 border = is_empty ? block_end : min(w.voxel + many, block_end);
+    int shift = is_set ? 0 : is_empty ? 4 : 2;
+    ivec3 first = w.subvoxel >> shift;
+    ivec3 border = is_empty ? first + (empty > 1 ? empty : 1) : min(first + many, (first | 3) + 1);
+    border <<= shift;
     vec3 exits = (vec3(border) - w.o) * w.inverse;
     float s_out = exits.x < exits.y ? exits.x : exits.y;
     s_out = exits.z < s_out ? exits.z : s_out;
     s_out = s_out > w.s ? s_out : w.s;
-    if (is_set)
+    if (is_found)
         found = found_voxel(what_of(block, b), w.s, s_out);
-    ivec3 next = clamp(ivec3(w.o + s_out * w.d), w.voxel, border - 1);
+#ifndef ABUFFER_STEPS
+    // Where one image does not show all of a voxel, in those that show best what is in the subvoxel.
+    uvec3 shown = (p.z < 2u ? uvec3(in_x.x, in_y.x, in_z.x) : uvec3(in_x.y, in_y.y, in_z.y)) >> bit & 1u;
+    uint best = shown.x | shown.y << 1 | shown.z << 2;
+    if (is_found && bitCount(found.what & ABUFFER_VOXEL_IMAGES) > 1)
+        found.what &= best | ABUFFER_VOXEL_BODY;
+#endif
+    ivec3 next = clamp(ivec3(w.o + s_out * w.d), w.subvoxel, border - 1);
     // In whole numbers, so that each step goes on.
     next = mix(next, border, lessThanEqual(exits, vec3(s_out)));
-    w.voxel = next;
+    w.subvoxel = next;
     w.s = s_out;
-    // Voxels only go up, so whatever is rounded the walk ends.
-    w.s = any(greaterThanEqual(next, ivec3(abuffer_grid << 2))) ? 1e30 : w.s;
+    // Subvoxels only go up, so whatever is rounded the walk ends.
+    w.s = any(greaterThanEqual(next, ivec3(abuffer_grid << 4))) ? 1e30 : w.s;
 }
 
-// To the next voxel that holds something, if one does.
+// To the next subvoxel that holds something, if one does.
 found_voxel next_voxel(inout voxel_walk w)
 {
     found_voxel found = found_voxel(0u, 0.0, 0.0);

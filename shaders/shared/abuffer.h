@@ -29,6 +29,10 @@
  *                          empty
  *                    w     unused
  *                 1, 2  4 bits a voxel, ABUFFER_VOXEL_*: voxel i in texel 1 + i / 32, component i / 8 % 4, bits 4 (i % 8)
+ *   subvoxels   RG32UI, three a voxel, x fastest: in which of 4 x 4 x 4 parts of it the squares of samples' planes are that
+ *               texels show, of samples in the images that they lean to; one texel for those that look along x most, one
+ *               for y, one for z: bit x + 4 y + 16 z. Where subvoxels would be smaller than texels, or V is more than
+ *               ABUFFER_SUBVOXELS_VOXELS_MAX, three for all voxels, all bits set
  *
  * While it is built, in R32I texels (image atomics), four a voxel, x fastest:
  *   sums        0..2  sum of the geometric normals of the samples in it, ABUFFER_NORMAL_UNIT for 1: their direction is
@@ -62,6 +66,7 @@
 #define ABUFFER_STEEP FACE_STEEP_BELOW /* component of a unit normal along the axis below which it is */
 
 #define ABUFFER_BLOCK_TEXELS 3
+#define ABUFFER_SUBVOXELS_VOXELS_MAX 128 /* 48 MiB of them */
 /* In which images the walk looks, bits 0..2; it does by winding where ABUFFER_VOXEL_BODY is set, and by the
  * samples' planes alone where it is not. A voxel of bodies whose samples can all be seen in the image that the
  * average normal leans to most (none is steep there) is looked for in that one, by winding. Where samples look both

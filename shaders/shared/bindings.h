@@ -46,6 +46,7 @@
 #define IMAGE_ABUFFER_HEADS 0 /* abuffer/build.frag, and the passes behind it: shared/abuffer_build.h */
 #define IMAGE_ABUFFER_NODES 1
 #define IMAGE_ABUFFER_SUMS 2
+#define IMAGE_ABUFFER_SUBVOXELS 3
 #define IMAGE_ABUFFER_OCCUPIED 0
 #define IMAGE_ABUFFER_TEXELS 0
 #define IMAGE_ABUFFER_SAMPLES 1

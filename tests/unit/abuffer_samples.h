@@ -143,13 +143,13 @@ static inline uint32_t abuffer_pack_normal(const float n[3])
     return ((uint32_t)lrintf(p[0] * 2047) & 0xfff) | ((uint32_t)lrintf(p[1] * 2047) & 0xfff) << 12;
 }
 
-static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[4],
+static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[4], uint32_t (*subvoxels)[3][2],
                                const struct abuffer_sample *at)
 {
     const uint32_t n = s->resolution, axis = at->texel / (n * n), iu = (axis + 1) % 3, iv = (axis + 2) % 3;
     const float voxel = (float)n / (float)s->voxels_along;
     float size[3], most = 0, low[3], high[3], middle[3];
-    int first[3], last[3], own[3];
+    int first[3], last[3], own[3], inner_first[3], inner_last[3];
     uint32_t most_axis = 0;
     for (uint32_t k = 0; k < 3; k++) {
         size[k] = fabsf(at->normal[k]);
@@ -171,6 +171,8 @@ static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[
         const float end = (float)(s->voxels_along - 1);
         first[k] = (int)fminf(fmaxf(low[k] / voxel, 0), end);
         last[k] = (int)fminf(fmaxf(high[k] / voxel, 0), end);
+        inner_first[k] = (int)fminf(fmaxf(4 * low[k] / voxel, 0), 4 * end + 3);
+        inner_last[k] = (int)fminf(fmaxf(4 * high[k] / voxel, 0), 4 * end + 3);
         own[k] = (int)fminf(fmaxf(middle[k] / voxel, 0), end);
     }
     uint32_t bits = at->is_body ? 0 : ABUFFER_SUM_OPEN;
@@ -180,6 +182,11 @@ static inline void abuffer_sum(const struct abuffer_samples *s, int32_t (*sums)[
         bits |= size[k] < ABUFFER_STEEP ? ABUFFER_SUM_STEEP << k : 0;
     }
     const int along = (int)s->voxels_along;
+    for (int z = inner_first[2]; z <= inner_last[2]; z++)
+        for (int y = inner_first[1]; y <= inner_last[1]; y++)
+            for (int x = inner_first[0]; x <= inner_last[0]; x++)
+                subvoxels[(z / 4 * along + y / 4) * along + x / 4][most_axis][z / 2 % 2] |=
+                    1u << (x % 4 + 4 * (y % 4) + 16 * (z % 2));
     for (int z = first[2]; z <= last[2]; z++)
         for (int y = first[1]; y <= last[1]; y++)
             for (int x = first[0]; x <= last[0]; x++) {
@@ -201,6 +208,7 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
     uint32_t(*texels)[2] = calloc(texel_count, sizeof *texels);
     uint32_t(*samples)[2] = calloc(s->count + 1, sizeof *samples), *ids = calloc(s->count + 1, sizeof *ids);
     int32_t(*sums)[4] = calloc(voxel_count, sizeof *sums);
+    uint32_t(*subvoxels)[3][2] = calloc(voxel_count, sizeof *subvoxels);
     const uint32_t drawn[4] = {0};
     store->cell_world = cell_world;
     store->resolution = s->resolution;
@@ -222,23 +230,29 @@ static inline bool abuffer_upload(struct abuffer_samples *s, struct abuffer_stor
                             (uint32_t)(winding + ABUFFER_WINDING_ZERO) << ABUFFER_WINDING_SHIFT |
                             (at->is_body ? ABUFFER_SAMPLE_BODY : 0);
             ids[i] = s->all_of_one ? 0 : at->id;
-            abuffer_sum(s, sums, at);
+            abuffer_sum(s, sums, subvoxels, at);
         }
         words[0] = (uint32_t)first;
         words[1] = (uint32_t)(i - first);
         if (words[1] > store->depth_max)
             store->depth_max = words[1];
     }
+    const bool has_subvoxels = abuffer_has_subvoxels(store);
+    if (!has_subvoxels)
+        memset(subvoxels, 0xff, sizeof *subvoxels);
     bool ok = gpu_buffer_upload(store->device, &store->texels, texels, texel_count * sizeof *texels, error) &&
               gpu_buffer_upload(store->device, &store->samples, samples,
                                 (s->count + s->count % 2) * sizeof *samples, error) &&
               gpu_buffer_upload(store->device, &store->ids, ids, s->count * sizeof *ids, error) &&
               gpu_buffer_upload(store->device, &store->drawn, drawn, sizeof drawn, error) &&
+              gpu_buffer_upload(store->device, &store->subvoxels, subvoxels,
+                                (has_subvoxels ? voxel_count : 1) * sizeof *subvoxels, error) &&
               gpu_buffer_upload(store->device, &store->sums, sums, voxel_count * sizeof *sums, error);
     free(texels);
     free(samples);
     free(ids);
     free(sums);
+    free(subvoxels);
     return ok;
 }
 

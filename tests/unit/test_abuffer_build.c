@@ -136,11 +136,11 @@ static int bits_of(const struct patch *patch, bool certain)
     return bits;
 }
 
-/* Adds the bits to the voxels that the patch touches, grown by `margin` cells. */
-static void spread(int *marks, const struct contents *contents, const struct patch *patch, int bits, double half,
-                   double half_depth)
+/* Adds the bits to the cells, so many along a side, voxels or subvoxels, that the patch touches. */
+static void spread(int *marks, int along, const struct contents *contents, const struct patch *patch, int bits,
+                   double half, double half_depth)
 {
-    int along = (int)contents->store.voxels_along, first[3], last[3];
+    int first[3], last[3];
     double scale = along / (double)contents->store.resolution;
     for (int k = 0; k < 3; k++) {
         double reach = k == patch->axis ? half_depth : half;
@@ -160,22 +160,28 @@ static bool leans(const struct patch *patch, double slack)
     return fabs(n[patch->axis]) >= (double)AXES_OVERLAP * most + slack;
 }
 
-/* Each voxel has all bits of the patches that touch it, and no others. Of a curved sphere the reach is larger than
- * that of the plane. */
-static void expect_marks(const struct contents *contents, bool has_spheres)
+/* Of voxels, or subvoxels, so many along a side: what they have to know of the patches that touch them, and what
+ * they may. Of a curved sphere the reach is larger than that of the plane. */
+static void spread_all(int *certain, int *possible, int along, const struct contents *contents, bool has_spheres)
 {
-    uint32_t along = contents->store.voxels_along, voxels = along * along * along, set = 0;
-    int *certain = calloc(voxels, sizeof(int)), *possible = calloc(voxels, sizeof(int));
     for (uint32_t i = 0; i < texel_count_of(contents); i++)
         for (uint32_t k = 0; k < contents->texels[i][1]; k++) {
             struct patch patch = patch_of(contents, i, contents->texels[i][0] + k);
             if (!leans(&patch, -NORMAL_SLACK))
                 continue;
             if (leans(&patch, NORMAL_SLACK))
-                spread(certain, contents, &patch, bits_of(&patch, true), 0.499, patch.half_depth - 0.01);
+                spread(certain, along, contents, &patch, bits_of(&patch, true), 0.499, patch.half_depth - 0.01);
             double most = has_spheres ? 2 * patch.half_depth + 1 : patch.half_depth;
-            spread(possible, contents, &patch, bits_of(&patch, false), 0.501, most * 1.02 + 0.03);
+            spread(possible, along, contents, &patch, bits_of(&patch, false), 0.501, most * 1.02 + 0.03);
         }
+}
+
+/* Each voxel has all bits of the patches that touch it, and no others. */
+static void expect_marks(const struct contents *contents, bool has_spheres)
+{
+    uint32_t along = contents->store.voxels_along, voxels = along * along * along, set = 0;
+    int *certain = calloc(voxels, sizeof(int)), *possible = calloc(voxels, sizeof(int));
+    spread_all(certain, possible, (int)along, contents, has_spheres);
     for (uint32_t i = 0; i < voxels; i++) {
         int bits = contents->sums[i][3];
         assert_int_equal(certain[i] & ~bits, 0);
@@ -183,6 +189,29 @@ static void expect_marks(const struct contents *contents, bool has_spheres)
         set += bits != 0;
     }
     assert_in_range(set, 1, voxels);
+    free(certain);
+    free(possible);
+}
+
+/* As is each subvoxel marked that a patch touches, and no other. */
+static void expect_subvoxels(const struct contents *contents, bool has_spheres)
+{
+    uint32_t along = 4 * contents->store.voxels_along, count = along * along * along, set = 0;
+    int *certain = calloc(count, sizeof(int)), *possible = calloc(count, sizeof(int));
+    assert_true(abuffer_has_subvoxels(&contents->store));
+    spread_all(certain, possible, (int)along, contents, has_spheres);
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t x = i % along, y = i / along % along, z = i / along / along;
+        uint32_t voxel = (z / 4 * (along / 4) + y / 4) * (along / 4) + x / 4,
+                 bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
+        bool is_set = false;
+        for (int axis = 0; axis < 3; axis++)
+            is_set |= (contents->subvoxels[voxel][axis][bit / 32] >> bit % 32 & 1) != 0;
+        assert_true(is_set || certain[i] == 0);
+        assert_true(!is_set || possible[i] != 0);
+        set += is_set;
+    }
+    assert_in_range(set, 1, count);
     free(certain);
     free(possible);
 }
@@ -249,6 +278,7 @@ static void expect_scene_like_oracle(struct scene *scene,
     if (balanced)
         expect_balance(&contents);
     expect_marks(&contents, fixture.gpu.has_spheres);
+    expect_subvoxels(&contents, fixture.gpu.has_spheres);
     expect_sums(&contents);
     contents_free(&contents);
     fixture_finish(&fixture);
