@@ -25,7 +25,7 @@ struct abuffer_task {
     struct abuffer_store *store;
     struct scene_gpu *scene;
     const struct tracer_options *options;
-    uint32_t texel_count; /* with what pads tiles */
+    uint32_t texel_count;               /* with what pads tiles */
     struct abuffer_build_counts counts; /* as last read back */
 };
 

@@ -45,9 +45,9 @@
 #include "shared/axes.h"
 #include "shared/types.h"
 
-/* Images lie in tiles of 8 x 8 texels, row after row, the last ones of a row and of an image padded by empty texels. In
- * a tile 4 x 8 texels lie before the other 4 x 8, and 4 x 2 fill a line of most caches: whichever way a ray goes it finds
- * what it reads next near what it has read. */
+/* Images lie in tiles of 8 x 8 texels, row after row, the last ones of a row and of an image padded by empty
+ * texels. In a tile 4 x 8 texels lie before the other 4 x 8, and 4 x 2 fill a line of most caches: whichever way a
+ * ray goes it finds what it reads next near what it has read. */
 #define ABUFFER_TILE_TEXELS 64u
 #define ABUFFER_TILES_ALONG(resolution) (((resolution) + 7u) >> 3)
 /* The number of texel (u, v) of image `axis`; all are uint. */
@@ -69,8 +69,9 @@
 #define ABUFFER_SUBVOXELS_VOXELS_MAX 128 /* 48 MiB of them */
 /* In which images the walk looks, bits 0..2; it does by winding where ABUFFER_VOXEL_BODY is set, and by the
  * samples' planes alone where it is not. A voxel of bodies whose samples can all be seen in the image that the
- * average normal leans to most (none is steep there) is looked for in that one, by winding. Where samples look both
- * ways along an axis winding is no help: a ray may pass both sides of a body between two places that it is asked of. */
+ * average normal leans to most (none is steep there) is looked for in that one, by winding. Where samples look
+ * both ways along an axis winding is no help: a ray may pass both sides of a body between two places that it is
+ * asked of. */
 #define ABUFFER_VOXEL_IMAGES 7u
 #define ABUFFER_VOXEL_BODY 8u
 

@@ -29,8 +29,8 @@ struct abuffer_build_counts {
 };
 SHARED_SIZE(abuffer_build_counts, 48)
 
-/* Texels that one invocation looks at to see what is occupied, at most 32: drivers rasterise in small squares, too, so
- * nodes of these lie near each other. */
+/* Texels that one invocation looks at to see what is occupied, at most 32: drivers rasterise in small squares,
+ * too, so nodes of these lie near each other. */
 #define ABUFFER_OCCUPIED_TEXELS 32u
 /* Lists that resolve.comp sorts as it takes them: most have no more than four. */
 #define ABUFFER_FOUR 4u

@@ -5,8 +5,8 @@
  * image a looks along axis a (0 x, 1 y, 2 z) towards greater values; a texel's u runs along axis (a + 1) % 3 and
  * its v along axis (a + 2) % 3. Places are in cells from the cube's lower corner: p_cell = (p_world - lower) /
  * cell; texel (u, v) covers [u, u + 1) x [v, v + 1) and was sampled at its middle. A triangle is in the image of
- * the axis that its normal leans to most, and of no other but where it leans to that almost as much (AXES_OVERLAP),
- * so a sample's depth changes by at most 1 / AXES_OVERLAP cells for each cell of u or of v.
+ * the axis that its normal leans to most, and of no other but where it leans to that almost as much
+ * (AXES_OVERLAP), so a sample's depth changes by at most 1 / AXES_OVERLAP cells for each cell of u or of v.
  *
  * The paper has each triangle in one image. Where a surface goes over from one image to another there are texels
  * then whose middle the last triangle of the one does not reach, nor does the first of the other: cracks of up to
