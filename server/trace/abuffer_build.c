@@ -37,8 +37,6 @@ void abuffer_builder_destroy(struct abuffer_builder *builder)
     list_buffers(builder, buffers);
     for (int i = 0; i < BUFFER_COUNT; i++)
         gpu_buffer_finish(builder->device, buffers[i]);
-    gpu_framebuffer_finish(builder->device, &builder->plain);
-    gpu_texture_finish(builder->device, &builder->plain_depth);
     axes_draw_finish(&builder->draw);
     free(builder);
 }
@@ -47,8 +45,7 @@ uint64_t abuffer_builder_bytes(const struct abuffer_builder *builder)
 {
     struct gpu_buffer *buffers[BUFFER_COUNT];
     struct abuffer_builder copy = *builder;
-    uint64_t bytes = builder->plain_depth.size_bytes + builder->draw.drawn.capacity_bytes +
-                     builder->draw.commands.capacity_bytes;
+    uint64_t bytes = builder->draw.drawn.capacity_bytes + builder->draw.commands.capacity_bytes;
     list_buffers(&copy, buffers);
     for (int i = 0; i < BUFFER_COUNT; i++)
         bytes += buffers[i]->capacity_bytes;
@@ -72,7 +69,8 @@ void abuffer_read_counts(struct abuffer_task *task)
     gpu_buffer_read(task->builder->device, &task->builder->build, 0, &task->counts, sizeof(task->counts));
 }
 
-bool abuffer_list_instances(struct abuffer_builder *builder, const struct scene_gpu *scene, struct error *error)
+/* Of the whole scene, for the draws that follow. */
+static bool list_instances(struct abuffer_builder *builder, const struct scene_gpu *scene, struct error *error)
 {
     uint32_t *instances = NULL, count = 0;
     bool listed = axes_list_instances(scene, &instances, &count, error) &&
@@ -118,7 +116,7 @@ static bool copy_drawn(struct abuffer_task *task, struct error *error)
 
 static bool build(struct abuffer_task *task, struct error *error)
 {
-    if (!abuffer_list_instances(task->builder, task->scene, error))
+    if (!list_instances(task->builder, task->scene, error))
         return false;
     if (task->builder->draw.drawn_count == 0) {
         abuffer_store_finish(task->store);

@@ -28,9 +28,4 @@ uint32_t abuffer_builder_passes(const struct abuffer_builder *builder);
 bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
                    const struct tracer_options *options, struct error *error);
 
-/* For the benchmark, what a build is measured by: the same primitives through the same stages into the depths of
- * three images, and nothing else. The store says where; it is not written to. Queues the work. */
-bool abuffer_build_plain(struct abuffer_builder *builder, const struct abuffer_store *store,
-                         struct scene_gpu *scene, struct error *error);
-
 #endif

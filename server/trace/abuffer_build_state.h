@@ -14,9 +14,6 @@ struct abuffer_builder {
     uint32_t nodes_max;                                            /* for which there is room in `nodes` */
     uint32_t nodes_first; /* so many at first; 0: chosen from the number of texels */
     uint32_t passes;      /* over the scene, of the last build */
-    /* abuffer_build_plain() */
-    struct gpu_texture plain_depth;
-    struct gpu_framebuffer plain;
 };
 
 /* One call of abuffer_build(). */
@@ -46,8 +43,6 @@ bool abuffer_runs(struct abuffer_task *task, struct error *error);
 /* abuffer_build_deep.c. Those of texels that have more than the device's passes sort. */
 bool abuffer_runs_deep(struct abuffer_task *task, struct error *error);
 
-/* abuffer_build.c. Of the whole scene, for the draws that follow. */
-bool abuffer_list_instances(struct abuffer_builder *builder, const struct scene_gpu *scene, struct error *error);
 /* abuffer_build.c. Reads task->counts back. */
 void abuffer_read_counts(struct abuffer_task *task);
 

@@ -50,12 +50,18 @@ static struct tracer *plain_create(struct gpu_device *device, const struct trace
 static bool draw(struct plain_pass *pass, struct scene_gpu *scene, const uint32_t *instances, uint32_t count,
                  struct error *error)
 {
+    static const struct gpu_define all_images[] = {{"ALL_IMAGES", "1"}, {0}};
     static const float farthest = 1;
     struct axes_box box;
     if (!axes_box_place(&box, scene, instances, count, pass->resolution, error) ||
         !axes_draw_prepare(&pass->draw, scene, instances, count, error))
         return false;
-    struct axes_pass axes = {.cell_world = box.cell_world, .resolution = pass->resolution, .overlap = 1};
+    struct axes_pass axes = {
+        .defines = all_images,
+        .cutouts_ignored = true,
+        .cell_world = box.cell_world,
+        .resolution = pass->resolution,
+    };
     memcpy(axes.lower_world, box.lower_world, sizeof axes.lower_world);
     scene_gpu_bind(scene);
     glDepthMask(GL_TRUE);
@@ -72,13 +78,9 @@ static bool plain_update(struct tracer *tracer, struct scene_gpu *scene, const s
                          struct stage_times *times, struct error *error)
 {
     (void)changes, (void)times;
-    uint32_t *instances = malloc((scene->instance_count + 1u) * sizeof *instances), count = 0;
-    if (!instances)
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u instances", scene->instance_count);
-    for (uint32_t i = 0; i < scene->instance_count; i++)
-        if (scene->geometries[scene->instances[i].geometry].device.primitive_count > 0)
-            instances[count++] = i;
-    const bool done = count == 0 || draw((struct plain_pass *)tracer, scene, instances, count, error);
+    uint32_t *instances = NULL, count = 0;
+    const bool done = axes_list_instances(scene, &instances, &count, error) &&
+                      (count == 0 || draw((struct plain_pass *)tracer, scene, instances, count, error));
     glFinish();
     free(instances);
     return done;
