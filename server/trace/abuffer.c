@@ -31,8 +31,7 @@ struct abuffer {
 
 /* ---- options ---- */
 
-/* The power of two that is nearest to sqrt(3 N), within bounds. Paper, section 4: a ray passes about as many
- * voxels as it then passes texels. */
+/* The power of two that is nearest to sqrt(3 N), within bounds: what its authors found best. Paper, section 5. */
 static uint32_t voxels_for(uint32_t resolution)
 {
     uint32_t voxels = VOXELS_MIN;

@@ -12,9 +12,8 @@
 
 #include "gpu/buffer.h"
 #include "gpu/device.h"
-#include "gpu/program.h"
-#include "gpu/program_source.h"
 #include "shared/bindings.h"
+#include "tests/accuracy/shader_probe.h"
 
 #include <epoxy/gl.h>
 #include <string.h>
@@ -86,37 +85,10 @@ static const char bsdf_probe_text[] =
     "    answers[2u * i + 1u] = vec4(chosen.weight.g, probability, sent.g, other);\n"
     "}\n";
 
-static inline bool bsdf_probe_lookup(const char *path, size_t length, const char **kept, const char **begin,
-                                     const char **end)
-{
-    static const char own[] = "bsdf_probe.comp";
-    if (length != strlen(own) || memcmp(path, own, length) != 0)
-        return gpu_source_lookup_embedded(path, length, kept, begin, end);
-    *kept = own;
-    *begin = bsdf_probe_text;
-    *end = bsdf_probe_text + strlen(bsdf_probe_text);
-    return true;
-}
-
 static inline void bsdf_probe_init(struct bsdf_probe *probe, struct gpu_device *device, bool ward)
 {
-    struct error error = {0};
-    struct gpu_source_text text = {0};
     const struct gpu_define defines[] = {{"HAS_ANISOTROPY", "1"}, {ward ? "WARD" : NULL, "1"}, {NULL, NULL}};
-    *probe = (struct bsdf_probe){.device = device};
-    if (!gpu_source_expand(&text, bsdf_probe_lookup, "bsdf_probe.comp", defines, &error))
-        fail_msg("%s", error.text);
-    const GLchar *source = text.text;
-    probe->program = (struct gpu_program){glCreateShaderProgramv(GL_COMPUTE_SHADER, 1, &source), 1024};
-    GLint linked = GL_FALSE;
-    glGetProgramiv(probe->program.name, GL_LINK_STATUS, &linked);
-    if (!linked) {
-        char log[2048] = "", named[4096] = "";
-        glGetProgramInfoLog(probe->program.name, sizeof(log), NULL, log);
-        gpu_source_name_files(&text, log, named, sizeof(named));
-        fail_msg("%s", named);
-    }
-    gpu_source_finish(&text);
+    *probe = (struct bsdf_probe){.device = device, .program = shader_probe_compile(bsdf_probe_text, defines)};
 }
 
 static inline void bsdf_probe_finish(struct bsdf_probe *probe)

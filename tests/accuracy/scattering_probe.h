@@ -12,9 +12,8 @@
 
 #include "gpu/buffer.h"
 #include "gpu/device.h"
-#include "gpu/program.h"
-#include "gpu/program_source.h"
 #include "shared/bindings.h"
+#include "tests/accuracy/shader_probe.h"
 
 #include <epoxy/gl.h>
 #include <stdlib.h>
@@ -77,36 +76,9 @@ static const char probe_text[] =
     "        splits[k] = vec4(parts.mirror.g, parts.scattered.g, parts.refracted.g, parts.mirror_ray);\n"
     "}\n";
 
-static inline bool probe_lookup(const char *path, size_t length, const char **kept, const char **begin,
-                                const char **end)
-{
-    static const char own[] = "probe.comp";
-    if (length != strlen(own) || memcmp(path, own, length) != 0)
-        return gpu_source_lookup_embedded(path, length, kept, begin, end);
-    *kept = own;
-    *begin = probe_text;
-    *end = probe_text + strlen(probe_text);
-    return true;
-}
-
 static inline void probe_init(struct probe *probe, struct gpu_device *device)
 {
-    struct error error = {0};
-    struct gpu_source_text text = {0};
-    *probe = (struct probe){.device = device};
-    if (!gpu_source_expand(&text, probe_lookup, "probe.comp", NULL, &error))
-        fail_msg("%s", error.text);
-    const GLchar *source = text.text;
-    probe->program = (struct gpu_program){glCreateShaderProgramv(GL_COMPUTE_SHADER, 1, &source), 1024};
-    GLint linked = GL_FALSE;
-    glGetProgramiv(probe->program.name, GL_LINK_STATUS, &linked);
-    if (!linked) {
-        char log[2048] = "", named[4096] = "";
-        glGetProgramInfoLog(probe->program.name, sizeof(log), NULL, log);
-        gpu_source_name_files(&text, log, named, sizeof(named));
-        fail_msg("%s", named);
-    }
-    gpu_source_finish(&text);
+    *probe = (struct probe){.device = device, .program = shader_probe_compile(probe_text, NULL)};
 }
 
 static inline void probe_finish(struct probe *probe)
