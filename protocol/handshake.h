@@ -36,6 +36,10 @@ extern "C" {
 #define HANDSHAKE_NONCE_BYTES 16u
 #define HANDSHAKE_TOKEN_BYTES 16u
 
+/* Bits of `capabilities`. */
+#define HANDSHAKE_CAN_H264 (UINT64_C(1) << 0)      /* client: decodes it; daemon: encodes it */
+#define HANDSHAKE_CAN_READ_ONLY (UINT64_C(1) << 1) /* reply: this client may only look: it edits nothing */
+
 struct handshake_hello {
     uint16_t version_min;
     uint16_t version_max;

@@ -77,7 +77,11 @@ struct fl_connect_options {
     /* "unix:PATH", "tcp:HOST:PORT" or "ssh:HOST[:SOCKET]"; NULL: a private daemon over a socketpair, which
      * ends with the connection. ssh runs `farlight bridge unix:SOCKET` on HOST and speaks through it. */
     const char *server;
-    const char *name;    /* how the client calls itself in the daemon's statistics; NULL: "libfarlight" */
+    const char *name; /* how the client calls itself in the daemon's statistics; NULL: "libfarlight" */
+    /* File of the 32 random bytes that the daemon has as well, mode 0600: the link is sealed with it. For TCP
+     * beyond loopback; NULL: nothing is sealed. */
+    const char *key_file;
+    bool can_h264;       /* frames of views may come in H.264, for the caller to decode */
     int interrupt_fd;    /* > 0: calls give up with FL_ERROR_INTERRUPTED when it becomes readable */
     unsigned timeout_ms; /* to connect, start and shake hands; 0: 30 s */
     const char *const *daemon_arguments; /* for a private daemon, NULL-terminated; NULL: none */
@@ -95,6 +99,8 @@ FL_API bool fl_connection_is_local(const struct fl_connection *connection);
 FL_API const char *fl_connection_address(const struct fl_connection *connection);
 
 FL_API bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error);
+/* The daemon lets this client look, but edit nothing. */
+FL_API bool fl_connection_is_read_only(const struct fl_connection *connection);
 /* *reply is valid until the next call on the connection. */
 FL_API bool fl_stats(struct fl_connection *connection, const struct message_stats_reply **reply,
                      struct fl_error *error);
@@ -137,8 +143,10 @@ struct fl_load_options {
     void (*note)(void *user, const struct fl_note *note);
     void (*progress)(void *user, uint64_t done_bytes, uint64_t total_bytes, const char *what);
     void *user;
-    struct fl_import *started; /* by fl_import_start; the load takes it over, also when it fails. `model`,
-                                  `environment` and `timeout_ms` are those given at its start */
+    enum protocol_sharing sharing; /* who else can come to the scene .. */
+    const char *scene_name;        /* .. and by what name; NULL: the model's file name */
+    struct fl_import *started;     /* by fl_import_start; the load takes it over, also when it fails. `model`,
+                                      `environment` and `timeout_ms` are those given at its start */
 };
 
 /* The options' strings must live until the load. An importer that is not loaded is to be destroyed. */
@@ -148,7 +156,29 @@ FL_API void fl_import_destroy(struct fl_import *started);
 /* Runs the importer and hands its edits to the daemon. */
 FL_API struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl_load_options *options,
                                       struct fl_error *error);
-FL_API void fl_scene_destroy(struct fl_scene *scene); /* closes it on the daemon, too */
+FL_API void fl_scene_destroy(struct fl_scene *scene); /* lets go of it on the daemon, too */
+
+/* Comes to a scene that is there; what it holds (cameras, clips) is asked for at once and known as of a loaded
+ * one. Objects that are known by name only from an import (materials, lights) are not. */
+FL_API struct fl_scene *fl_scene_attach(struct fl_connection *connection, const char *name,
+                                        struct fl_error *error);
+/* The scenes that may be attached to. *list is malloc'ed, for free(). */
+struct fl_scene_entry {
+    char name[129];
+    uint64_t revision, triangles;
+    uint32_t clients;
+    enum protocol_sharing sharing;
+};
+FL_API bool fl_scene_list(struct fl_connection *connection, struct fl_scene_entry **list, size_t *count,
+                          struct fl_error *error);
+struct fl_scene_bounds {
+    bool empty; /* nothing is visible */
+    float lower_world[3], upper_world[3];
+    uint64_t revision, triangles, spheres;
+};
+FL_API bool fl_scene_get_bounds(struct fl_scene *scene, struct fl_scene_bounds *bounds, struct fl_error *error);
+/* The greatest revision that the daemon has told of: by an edit of one's own, or by another client's. */
+FL_API uint64_t fl_scene_revision(const struct fl_scene *scene);
 FL_API const struct fl_import_stats *fl_scene_import_stats(const struct fl_scene *scene);
 FL_API size_t fl_scene_camera_count(const struct fl_scene *scene);
 FL_API const struct fl_camera_info *fl_scene_camera(const struct fl_scene *scene, size_t index);
@@ -310,8 +340,20 @@ struct fl_frame {
     struct record_wave_comparison *wave_comparisons; /* ascending by wave and kind of ray; see messages.def */
     size_t cube_count;                               /* 0: the tracer does not sample the scene */
     struct record_layered_cube cubes[PROTOCOL_CUBE_PART_COUNT]; /* static before dynamic; see messages.def */
-    size_t pixels_bytes;                                        /* layers times width * height * 4, 8 or 16 */
-    uint8_t *pixels;                                            /* rows from the top, without gaps, in `format` */
+    /* Of a view. Times of the daemon's clock are as fl_ping's answer has it; `command_sent_ns`,
+     * `begun_ns` and `whole_ns` are of this process' monotonic clock. */
+    uint64_t command; /* the last one that it shows; 0: none yet, and the times of it are 0 */
+    uint64_t command_received_ns, command_applied_ns, rendered_ns; /* the daemon's clock */
+    uint64_t command_sent_ns;                                      /* when fl_view_look was called for it */
+    uint64_t begun_ns, whole_ns;                                   /* first byte, and decoded */
+    bool moving, key_frame;
+    unsigned frame_quality; /* as encoded; 0: lossless */
+    uint8_t *encoded;       /* H.264 access unit; NULL: pixels are decoded */
+    size_t encoded_bytes;
+    float *depth;        /* width * height, metres along the view; 0 where nothing is; NULL: none */
+    uint8_t *normals;    /* width * height * 4; see messages.def; NULL: none */
+    size_t pixels_bytes; /* layers times width * height * 4, 8 or 16 */
+    uint8_t *pixels;     /* rows from the top, without gaps, in `format` */
 };
 
 /* One job at a time per connection. */
@@ -323,6 +365,50 @@ FL_API void fl_frame_destroy(struct fl_frame *frame);
 /* Ends the job early and waits until the daemon confirms it; what was sent meanwhile is dropped. */
 FL_API bool fl_render_cancel(struct fl_job *job, struct fl_error *error);
 FL_API void fl_render_destroy(struct fl_job *job); /* cancels what still runs */
+
+/* ---- views: pictures that follow a camera ---------------------------------------------------------- */
+
+/* One per connection, beside at most one job of fl_render_start. Its frames come when there is something to show;
+ * between calls they wait in the socket. */
+struct fl_view;
+
+enum fl_attachment { FL_ATTACH_DEPTH = 1, FL_ATTACH_NORMALS = 2 }; /* bits */
+
+struct fl_view_options {
+    /* What it shows. Of the fields that only a range of frames has, none is used; `frames_per_second` is the most
+     * that is wanted, 0: 60; `samples` what a picture gets at most while nothing moves, 0: 64; format rgba8;
+     * `encoding` is that of motion. `frames_in_flight` 0: 4. */
+    struct fl_job_options job;
+    enum protocol_encoding still_encoding;
+    unsigned pass_samples; /* that a frame adds while nothing moves; 0: 1 */
+    unsigned weight;       /* beside other clients, 1 to 16; 0: the daemon's default */
+    bool adapt;            /* quality and size follow the link while it moves */
+    unsigned attachments;  /* enum fl_attachment bits */
+};
+
+struct fl_view_camera {
+    float eye_world[3], look_at_world[3], up_world[3];
+    float fov_y;
+    float time_s;
+    bool moving; /* more will follow soon */
+};
+
+FL_API struct fl_view *fl_view_start(struct fl_scene *scene, const struct fl_view_options *options,
+                                     struct fl_error *error);
+/* From now on it shows something else (size, tracer, integrator, exposure ..); camera and frame numbers go on. */
+FL_API bool fl_view_change(struct fl_view *view, const struct fl_view_options *options, struct fl_error *error);
+/* Sends it and returns; *command (may be NULL) is the number by which frames name it. */
+FL_API bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uint64_t *command,
+                         struct fl_error *error);
+/* The next frame that has come whole; waits at most timeout_ms for it, 0: not at all. NULL with error->code
+ * FL_ERROR_NONE: none so far. The caller destroys it. A frame in H.264 comes undecoded: `encoded` instead of
+ * `pixels`. */
+FL_API struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct fl_error *error);
+/* The caller could not decode a frame: the next one shall stand alone. */
+FL_API bool fl_view_want_key_frame(struct fl_view *view, struct fl_error *error);
+FL_API void fl_view_destroy(struct fl_view *view);
+/* For a poll of one's own: readable when something may have come. It stays the connection's. */
+FL_API int fl_connection_fd(const struct fl_connection *connection);
 
 /* Rays of which both tracers said the same, as a share of those that are on no edge; 1 without rays. What shading
  * makes of it does not matter. */

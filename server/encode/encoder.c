@@ -12,7 +12,7 @@ static const struct encoder_impl *const impls[ENCODING_COUNT] = {
 
 static bool is_known(enum encoding encoding)
 {
-    return (unsigned)encoding < ENCODING_COUNT;
+    return (unsigned)encoding < ENCODING_COUNT && impls[encoding];
 }
 
 bool encoder_supports(enum encoding encoding, uint32_t bytes_per_pixel)
