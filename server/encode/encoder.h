@@ -9,7 +9,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum encoding { ENCODING_RAW, ENCODING_ZSTD, ENCODING_JPEG, ENCODING_H264, ENCODING_PREDICTED, ENCODING_COUNT }; /* protocol's numbers */
+enum encoding {
+    ENCODING_RAW,
+    ENCODING_ZSTD,
+    ENCODING_JPEG,
+    ENCODING_H264,
+    ENCODING_PREDICTED,
+    ENCODING_COUNT
+}; /* protocol's numbers */
 
 struct picture {
     uint32_t width, height;
