@@ -97,7 +97,7 @@ static void run(struct engine *engine)
         if (job)
             job_step(engine, job);
         else
-            take_commands(engine, queue_pop(engine->commands, UINT64_MAX));
+            take_commands(engine, queue_pop(engine->commands, jobs_idle_ns(engine)));
     }
 }
 

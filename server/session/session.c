@@ -79,7 +79,7 @@ void session_submit(struct session *session, struct request *request, struct eng
     else if (request->kind == REQUEST_SCENE_CLOSE)
         hashmap_put(&session->scenes, request->scene, (void *)(uintptr_t)SCENE_OPEN); /* replaces */
     if (request->kind == REQUEST_JOB && request->object)
-        job_failed(session, request->object, &error);
+        job_failed(session, request, &error);
     else
         request_answer_error(session, request, &error);
 }
@@ -104,7 +104,7 @@ static void on_done(struct session *session, struct request *request, const stru
         request_answer_ok(session, request, 0);
         return;
     case REQUEST_JOB:
-        job_done(session, request->object);
+        job_done(session, request);
         return;
     case REQUEST_COMMIT:
     case REQUEST_CANCEL:
@@ -124,7 +124,7 @@ static void on_failed(struct session *session, struct request *request, const st
     error_set(&error, ERROR_INTERNAL, NULL, "the engine gave no reason");
     switch (request->kind) {
     case REQUEST_JOB:
-        job_failed(session, request->object, &error);
+        job_failed(session, request, &error);
         return;
     case REQUEST_CANCEL:
         request_answer_ok(session, request, 0); /* the job had just ended */
