@@ -20,8 +20,10 @@
 
 /* ---- a renderer that renders nothing ------------------------------------------------------------ */
 
-/* Steps that a frame takes are its samples; a frame of depth 7 goes on until the gate is opened. */
+/* Steps that a frame takes are its samples. A frame of depth 7 goes on until the gate is opened, to all or to its
+ * seed; one of depth 8 changes what the frames of a scene share. */
 #define GATED_DEPTH 7
+#define CHANGING_DEPTH 8
 #define STEPS_MAX 4096
 
 /* Bytes on the device that it says it has. */
@@ -30,7 +32,7 @@
 
 struct frame_scene {
     uint64_t revision;      /* that was shown last */
-    bool moved;             /* with something in motion */
+    bool moved;             /* with something in motion, or else changed */
     uint32_t frames, users; /* in progress; renderers */
 };
 
@@ -46,12 +48,14 @@ struct frame_renderer {
 
 static struct {
     atomic_bool gate_open;
-    atomic_int devices_made, devices, scenes, renderers, frames_begun, frames_done, frames_abandoned;
+    atomic_uint gate_seed;
+    atomic_int devices_made, devices, scenes, renderers_made, renderers, frames_begun, frames_done,
+        frames_abandoned;
     atomic_int fail_steps;      /* the next steps that fail */
     atomic_int fail_kind;       /* enum error_kind */
     atomic_int fail_from_frame; /* frames from this number on fail; 0: none */
     atomic_bool no_device;
-    atomic_int in_progress, most_in_progress; /* frames, of all scenes */
+    atomic_int in_progress; /* frames, of all scenes */
     atomic_int step_count;
     uint64_t step_seeds[STEPS_MAX]; /* whose step it was: the request's seed */
 } fake;
@@ -109,6 +113,7 @@ static inline struct frame_renderer *fake_renderer_create(struct frame_scene *sh
     (void)error;
     assert_non_null(shared);
     shared->users++;
+    atomic_fetch_add(&fake.renderers_made, 1);
     atomic_fetch_add(&fake.renderers, 1);
     struct frame_renderer *renderer = calloc(1, sizeof *renderer);
     assert_non_null(renderer);
@@ -165,8 +170,8 @@ static inline bool fake_may_begin(const struct frame_renderer *renderer, const s
                                   const struct scene_motion *motion, const struct frame_request *request)
 {
     const struct frame_scene *shared = renderer->shared;
-    (void)request;
-    return !shared->frames || (!motion && !shared->moved && shared->revision == scene->revision);
+    bool moves = motion || request->depth == CHANGING_DEPTH;
+    return !shared->frames || (!moves && !shared->moved && shared->revision == scene->revision);
 }
 
 static inline bool fake_begin(struct frame_renderer *renderer, const struct scene *scene,
@@ -178,11 +183,9 @@ static inline bool fake_begin(struct frame_renderer *renderer, const struct scen
     if (!fake_may_begin(renderer, scene, motion, request))
         return error_set(error, ERROR_INTERNAL, "fake", "a frame that may not begin");
     renderer->shared->revision = scene->revision;
-    renderer->shared->moved = motion;
+    renderer->shared->moved = motion || request->depth == CHANGING_DEPTH;
     renderer->shared->frames++;
-    int in_progress = atomic_fetch_add(&fake.in_progress, 1) + 1;
-    if (in_progress > atomic_load(&fake.most_in_progress))
-        atomic_store(&fake.most_in_progress, in_progress);
+    atomic_fetch_add(&fake.in_progress, 1);
     renderer->motion_digest = fake_motion_digest(motion);
     renderer->pose_count = motion ? motion->pose_count : 0;
     renderer->busy = true;
@@ -206,7 +209,9 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         error_set(error, (enum error_kind)atomic_load(&fake.fail_kind), "fake", "as the test wants");
         return FRAME_FAILED;
     }
-    if (renderer->request.depth == GATED_DEPTH && !atomic_load(&fake.gate_open)) {
+    bool is_gated =
+        renderer->request.depth == GATED_DEPTH && renderer->request.seed != atomic_load(&fake.gate_seed);
+    if (is_gated && !atomic_load(&fake.gate_open)) {
         usleep(500);
         return FRAME_MORE;
     }
@@ -260,11 +265,12 @@ static const struct engine_backend fake_backend = {
 static inline struct engine *start(struct engine_options options)
 {
     atomic_store(&fake.gate_open, false);
+    atomic_store(&fake.gate_seed, 0);
     atomic_store(&fake.fail_steps, 0);
     atomic_store(&fake.fail_from_frame, 0);
     atomic_store(&fake.no_device, false);
     atomic_store(&fake.step_count, 0);
-    atomic_store(&fake.most_in_progress, 0);
+    atomic_store(&fake.renderers_made, 0);
     atomic_store(&fake.devices_made, 0);
     atomic_store(&fake.frames_begun, 0);
     atomic_store(&fake.frames_done, 0);
