@@ -56,6 +56,7 @@ struct engine_scene {
 struct view {
     uint64_t credit, made; /* frames that may be begun, and that were made */
     uint64_t due_ns;       /* no frame is begun before */
+    uint64_t render_ns, rendered_ns; /* of its last frame: how long it took, and until when; 0: there is none */
     /* Of its last frame; `shown`: there is one. */
     bool shown;
     uint64_t shown_command, shown_revision;
