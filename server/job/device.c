@@ -20,23 +20,8 @@ bool engine_open_device(struct engine *engine, struct error *error)
     return true;
 }
 
-/* Calls a function for every scene of every client. */
-static void for_each_scene(struct engine *engine, void (*visit)(struct engine_scene *scene, void *context),
-                           void *context)
+static void drop_renderer(const struct engine *engine, struct engine_scene *scene)
 {
-    size_t client_cursor = 0;
-    void *client;
-    while (hashmap_next(&engine->clients, &client_cursor, NULL, &client)) {
-        size_t scene_cursor = 0;
-        void *scene;
-        while (hashmap_next(&((struct engine_client *)client)->scenes, &scene_cursor, NULL, &scene))
-            visit(scene, context);
-    }
-}
-
-static void drop_renderer(struct engine_scene *scene, void *context)
-{
-    const struct engine *engine = context;
     engine->backend->renderer_destroy(scene->renderer);
     scene->renderer = NULL;
     scene->frame_of = NULL;
@@ -47,7 +32,8 @@ void engine_drop_device(struct engine *engine)
     /* Frames in progress are taken up again from their beginning. */
     for (size_t i = 0; i < engine->job_count; i++)
         engine->jobs[i]->rendering = false;
-    for_each_scene(engine, drop_renderer, engine);
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        drop_renderer(engine, scene);
     engine->backend->device_destroy(engine->device);
     engine->device = NULL;
 }
@@ -77,26 +63,16 @@ bool engine_need_device(struct engine *engine, struct error *error)
     return false;
 }
 
-struct eviction {
-    struct engine *engine;
-    const struct engine_scene *keep;
-    bool found;
-};
-
-static void evict(struct engine_scene *scene, void *context)
-{
-    struct eviction *eviction = context;
-    if (scene == eviction->keep || scene->frame_of || !scene->renderer)
-        return;
-    drop_renderer(scene, eviction->engine);
-    eviction->found = true;
-}
-
 bool engine_evict_idle(struct engine *engine, const struct engine_scene *keep)
 {
-    struct eviction eviction = {.engine = engine, .keep = keep};
-    for_each_scene(engine, evict, &eviction);
-    return eviction.found;
+    bool found = false;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        if (scene == keep || scene->frame_of || !scene->renderer)
+            continue;
+        drop_renderer(engine, scene);
+        found = true;
+    }
+    return found;
 }
 
 uint64_t engine_device_bytes(const struct engine *engine)

@@ -30,9 +30,10 @@ static void describe_scene(const struct engine *engine, struct engine_scene *fro
 {
     const struct scene *scene = from->scene;
     count_contents(from);
+    const struct engine_reference *first = from->references;
     *stat = (struct engine_scene_stat){
-        .client = from->client->client,
-        .scene = from->id,
+        .client = first ? first->client->client : 0,
+        .scene = first ? first->id : 0,
         .revision = scene->revision,
         .host_bytes = scene->host_bytes,
         .device_bytes = from->renderer ? engine->backend->device_bytes(from->renderer) : 0,
@@ -46,24 +47,17 @@ static void describe_scene(const struct engine *engine, struct engine_scene *fro
 
 static bool describe_scenes(const struct engine *engine, struct engine_stats *stats)
 {
-    size_t count = 0, cursor = 0;
-    void *value;
-    while (hashmap_next(&engine->clients, &cursor, NULL, &value))
-        count += ((const struct engine_client *)value)->scenes.count;
+    size_t count = 0;
+    for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        count++;
     if (!count)
         return true;
     stats->scenes = calloc(count, sizeof *stats->scenes);
     if (!stats->scenes)
         return false;
-    cursor = 0;
-    while (hashmap_next(&engine->clients, &cursor, NULL, &value)) {
-        const struct engine_client *client = value;
-        size_t scene_cursor = 0;
-        void *scene;
-        while (hashmap_next(&client->scenes, &scene_cursor, NULL, &scene)) {
-            describe_scene(engine, scene, &stats->scenes[stats->scene_count]);
-            stats->host_bytes += stats->scenes[stats->scene_count++].host_bytes;
-        }
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        describe_scene(engine, scene, &stats->scenes[stats->scene_count]);
+        stats->host_bytes += stats->scenes[stats->scene_count++].host_bytes;
     }
     return true;
 }
