@@ -47,11 +47,17 @@ static bool commit_within_limits(struct engine *engine, struct scene *scene, str
     return applied;
 }
 
-static void commit(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
+static void commit(struct engine *engine, const struct engine_reference *reference, struct engine_command *command)
 {
+    struct engine_scene *scene = reference->scene;
     struct error error = {0};
     uint64_t start_ns = clock_now_ns();
     bool applied = commit_within_limits(engine, scene->scene, command, &error);
+    if (!applied && error.kind == ERROR_LIMIT && engine_trim_scenes(engine)) {
+        /* Scenes that nobody holds give way. */
+        error = (struct error){0};
+        applied = commit_within_limits(engine, scene->scene, command, &error);
+    }
     if (!applied) {
         fail(engine, command, &error);
         return;
@@ -60,6 +66,7 @@ static void commit(struct engine *engine, struct engine_scene *scene, struct eng
         scene->apply_start_ns = start_ns;
     scene->apply_ns += clock_now_ns() - start_ns;
     done(engine, command, scene->scene->revision);
+    engine_scene_changed(engine, reference);
 }
 
 static void start(struct engine *engine, struct engine_reference *reference, struct engine_command *command)
@@ -135,9 +142,10 @@ static bool scene_close(struct engine *engine, struct engine_reference *referenc
 
 static const char *scene_field(enum engine_command_kind kind)
 {
-    return kind == ENGINE_JOB_START     ? "render.scene"
-           : kind == ENGINE_SCENE_CLOSE ? "scene_close.scene"
-                                        : "edit_begin.scene";
+    return kind == ENGINE_JOB_START        ? "render.scene"
+           : kind == ENGINE_SCENE_CLOSE    ? "scene_close.scene"
+           : kind == ENGINE_SCENE_DESCRIBE ? "scene_describe.scene"
+                                           : "edit_begin.scene";
 }
 
 /* For commands that name a scene. */
@@ -159,7 +167,9 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
         wait_for_frame(engine, scene, command);
         return;
     } else if (command->kind == ENGINE_COMMIT) {
-        commit(engine, scene, command);
+        commit(engine, reference, command);
+    } else if (command->kind == ENGINE_SCENE_DESCRIBE) {
+        engine_scene_describe(engine, scene, command);
     } else {
         start(engine, reference, command);
     }
@@ -257,6 +267,7 @@ void engine_handle(struct engine *engine, struct engine_command *command)
 {
     switch (command->kind) {
     case ENGINE_SCENE_CLOSE:
+    case ENGINE_SCENE_DESCRIBE:
     case ENGINE_COMMIT:
     case ENGINE_JOB_START:
         handle_of_scene(engine, command);
@@ -264,6 +275,15 @@ void engine_handle(struct engine *engine, struct engine_command *command)
         return;
     case ENGINE_SCENE_OPEN:
         engine_scene_open(engine, command);
+        break;
+    case ENGINE_SCENE_ATTACH:
+        engine_scene_attach(engine, command);
+        break;
+    case ENGINE_SCENE_LIST:
+        engine_scene_list(engine, command);
+        break;
+    case ENGINE_SCENES_TRIM:
+        engine_trim_scenes(engine);
         break;
     case ENGINE_JOB_CREDIT:
         job_credit(engine, command);

@@ -101,12 +101,12 @@ static void run(struct engine *engine)
         atomic_store(&engine->nudged, false);
         take_commands(engine, queue_try_pop(engine->commands));
         jobs_reap(engine);
-        engine_reap_scenes(engine);
+        uint64_t wait_ns = engine_reap_scenes(engine);
         struct job *job = next_job(engine);
         if (job)
             job_step(engine, job);
         else
-            take_commands(engine, queue_pop(engine->commands, UINT64_MAX));
+            take_commands(engine, queue_pop(engine->commands, wait_ns));
     }
 }
 
@@ -134,7 +134,7 @@ static void *run_thread(void *context)
         engine_forget_client(engine, client);
         cursor = 0; /* the map has changed */
     }
-    engine_reap_scenes(engine);
+    engine_trim_scenes(engine);
     engine_drop_device(engine);
     return NULL;
 }
@@ -192,6 +192,8 @@ struct engine *engine_create(const struct engine_options *options, struct error 
         engine->options.queue_capacity = QUEUE_CAPACITY_DEFAULT;
     if (!engine->options.frames_in_flight)
         engine->options.frames_in_flight = FRAMES_IN_FLIGHT_DEFAULT;
+    if (!engine->options.lingering_scenes)
+        engine->options.lingering_scenes = ENGINE_LINGERING_SCENES;
     if (!engine->options.frame_window_bytes)
         engine->options.frame_window_bytes = ENGINE_FRAME_WINDOW_BYTES;
     pthread_mutex_init(&engine->start_lock, NULL);

@@ -35,7 +35,10 @@ struct engine_reference {
 
 struct engine_scene {
     struct engine_scene *next;           /* of the engine's, in the order of their opening */
-    struct engine_reference *references; /* NULL: nobody holds it, and it ends */
+    struct engine_reference *references; /* NULL: nobody holds it; it ends, or lingers for a while */
+    uint64_t left_ns;                    /* since when nobody does */
+    enum engine_sharing sharing;
+    uint64_t principal; /* who opened it */
     struct scene *scene;
     struct frame_renderer *renderer; /* NULL until the first frame, and after the device was lost */
     struct job *frame_of;            /* whose frame is in progress; NULL: none */
@@ -46,6 +49,7 @@ struct engine_scene {
     /* For stats, as of that revision: a large scene is not gone through each time that somebody asks. */
     uint64_t counted_revision, triangles, spheres;
     uint32_t instances;
+    struct engine_scene_description *description; /* as of its revision; NULL: nobody has asked */
 };
 
 struct job {
@@ -114,6 +118,7 @@ struct engine_command *engine_take_waiting(struct engine_scene *scene, const str
 
 /* scenes.c: scenes and who holds them. Each answers its command, and leaves it to the caller. */
 void engine_scene_open(struct engine *engine, const struct engine_command *command);
+void engine_scene_attach(struct engine *engine, const struct engine_command *command);
 void engine_scene_close(struct engine *engine, struct engine_reference *reference,
                         const struct engine_command *command);
 /* NULL: the client has no scene of that number. */
@@ -121,8 +126,21 @@ struct engine_reference *engine_find_reference(struct engine *engine, uint64_t c
 /* Ends the jobs that were started by a reference, with ERROR_CANCELLED; `why` NULL: nobody is told. */
 void engine_abort_jobs(struct engine *engine, const struct engine_reference *reference, const char *why);
 void engine_forget_client(struct engine *engine, struct engine_client *client);
-/* Lets go of scenes that nobody holds. Elsewhere none ends. */
-void engine_reap_scenes(struct engine *engine);
+/* Tells all who hold a scene, but for who changed it. */
+void engine_scene_changed(struct engine *engine, const struct engine_reference *by);
+/* Lets go of scenes that nobody holds, once they have lingered. The time until the next one ends, UINT64_MAX: none
+ * does. */
+uint64_t engine_reap_scenes(struct engine *engine);
+/* The same without lingering; false: there was none. */
+bool engine_trim_scenes(struct engine *engine);
+
+/* describe.c: what is in scenes, and which there are. */
+void engine_count_contents(struct engine_scene *scene);
+void engine_scene_list(struct engine *engine, const struct engine_command *command);
+void engine_scene_describe(struct engine *engine, struct engine_scene *scene,
+                           const struct engine_command *command);
+/* Whether who asks can come to it. */
+bool engine_scene_is_open_to(const struct engine_scene *scene, uint64_t principal);
 
 /* batch.c: jobs. */
 bool job_start(struct engine *engine, struct engine_reference *reference, struct engine_command *command,

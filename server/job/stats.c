@@ -4,32 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void count_contents(struct engine_scene *from)
-{
-    const struct scene *scene = from->scene;
-    if (from->counted_revision == scene->revision)
-        return;
-    from->counted_revision = scene->revision;
-    from->instances = 0;
-    from->triangles = from->spheres = 0;
-    size_t cursor = 0;
-    void *value;
-    while (hashmap_next(&scene->objects[SCENE_NODE], &cursor, NULL, &value)) {
-        enum scene_node_kind kind = ((const struct scene_node *)value)->kind;
-        from->instances += kind == NODE_MESH || kind == NODE_SPHERES;
-    }
-    cursor = 0;
-    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, NULL, &value))
-        from->triangles += ((const struct scene_mesh *)value)->triangle_count;
-    cursor = 0;
-    while (hashmap_next(&scene->objects[SCENE_SPHERES], &cursor, NULL, &value))
-        from->spheres += ((const struct scene_spheres *)value)->sphere_count;
-}
-
 static void describe_scene(const struct engine *engine, struct engine_scene *from, struct engine_scene_stat *stat)
 {
     const struct scene *scene = from->scene;
-    count_contents(from);
+    engine_count_contents(from);
     const struct engine_reference *first = from->references;
     *stat = (struct engine_scene_stat){
         .client = first ? first->client->client : 0,
