@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Commands that may wait for one scene's frame; more are answered with busy. */
+/* Commands that may wait for one scene's frames; more are answered with busy. */
 #define WAITING_MAX 256
 
 void engine_command_destroy(struct engine_command *command)
@@ -32,7 +32,7 @@ static void done(struct engine *engine, const struct engine_command *command, ui
     engine_post_done(engine, command->client, command->request, revision);
 }
 
-/* ---- what a frame in progress keeps waiting ----------------------------------------------------- */
+/* ---- what frames in progress keep waiting ------------------------------------------------------- */
 
 /* Blobs are limited where they are held, as scenes share them; tables here, all scenes together. */
 static bool commit_within_limits(struct engine *engine, struct scene *scene, struct engine_command *command,
@@ -87,12 +87,12 @@ static bool keep_waiting(struct engine_scene *scene, struct engine_command *comm
     return true;
 }
 
-static void wait_for_frame(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
+static void wait_for_frames(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
 {
     if (scene->waiting_count < WAITING_MAX && keep_waiting(scene, command))
         return;
     struct error error = {0};
-    error_set(&error, ERROR_BUSY, "", "%zu requests wait for the frame in progress already", scene->waiting_count);
+    error_set(&error, ERROR_BUSY, "", "%zu requests wait for frames in progress already", scene->waiting_count);
     fail(engine, command, &error);
     engine_command_destroy(command);
 }
@@ -163,8 +163,8 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
     if (command->kind == ENGINE_SCENE_CLOSE) {
         if (!scene_close(engine, reference, command))
             return;
-    } else if ((command->kind == ENGINE_COMMIT && scene->frame_of) || scene->waiting_count) {
-        wait_for_frame(engine, scene, command);
+    } else if ((command->kind == ENGINE_COMMIT && scene->frames) || scene->waiting_count) {
+        wait_for_frames(engine, scene, command);
         return;
     } else if (command->kind == ENGINE_COMMIT) {
         commit(engine, reference, command);
@@ -178,7 +178,7 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
 
 void engine_run_waiting(struct engine *engine, struct engine_scene *scene)
 {
-    if (scene->frame_of || !scene->waiting_count)
+    if (scene->frames || !scene->waiting_count)
         return;
     /* Nothing here begins a frame, so all of them can be carried out. */
     struct engine_command **waiting = scene->waiting;
@@ -192,7 +192,7 @@ void engine_run_waiting(struct engine *engine, struct engine_scene *scene)
 
 /* ---- jobs --------------------------------------------------------------------------------------- */
 
-/* Where a command of that request waits for a frame; false: none does. */
+/* Where a command of that request waits for frames; false: none does. */
 static bool find_waiting(struct engine *engine, const struct engine_command *by, struct engine_scene **found,
                          size_t *place)
 {

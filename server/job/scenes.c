@@ -48,9 +48,10 @@ static bool reference_add(struct engine *engine, struct engine_scene *scene, con
 }
 
 /* Its jobs have ended, nothing that came by it waits. */
-static void reference_remove(struct engine_reference *reference)
+static void reference_remove(struct engine *engine, struct engine_reference *reference)
 {
     struct engine_reference **place = &reference->scene->references;
+    scene_drop_idle(engine, reference->scene, &reference->client->client);
     while (*place != reference)
         place = &(*place)->next;
     *place = reference->next;
@@ -79,7 +80,7 @@ void engine_scene_close(struct engine *engine, struct engine_reference *referenc
         engine_post(engine, engine_cancelled(waiting->client, waiting->request, "its scene was closed"));
         engine_command_destroy(waiting);
     }
-    reference_remove(reference);
+    reference_remove(engine, reference);
     engine_post_done(engine, command->client, command->request, 0);
 }
 
@@ -94,7 +95,7 @@ void engine_forget_client(struct engine *engine, struct engine_client *client)
         engine_abort_jobs(engine, reference, NULL);
         while ((waiting = engine_take_waiting(scene, reference)))
             engine_command_destroy(waiting);
-        reference_remove(reference);
+        reference_remove(engine, reference);
         engine_run_waiting(engine, scene); /* its frame may have been in progress */
         cursor = 0;                        /* the map has changed */
     }
@@ -108,10 +109,11 @@ void engine_forget_client(struct engine *engine, struct engine_client *client)
 /* Jobs have ended, nothing waits, it is out of the list. */
 static void scene_free(struct engine *engine, struct engine_scene *scene)
 {
-    engine->backend->renderer_destroy(scene->renderer);
+    scene_drop_shared(engine, scene);
     engine->table_bytes -= scene->scene->table_bytes;
     scene_destroy(scene->scene);
     free(scene->description);
+    free(scene->idle);
     free(scene->waiting);
     free(scene);
 }

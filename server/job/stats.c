@@ -14,7 +14,7 @@ static void describe_scene(const struct engine *engine, struct engine_scene *fro
         .scene = first ? first->id : 0,
         .revision = scene->revision,
         .host_bytes = scene->host_bytes,
-        .device_bytes = from->renderer ? engine->backend->device_bytes(from->renderer) : 0,
+        .device_bytes = scene_device_bytes(engine, from),
         .nodes = (uint32_t)scene->objects[SCENE_NODE].count,
         .instances = from->instances,
         .triangles = from->triangles,
