@@ -108,15 +108,18 @@ static void abandon_frame(struct engine *engine, struct job *job)
 {
     if (!job->rendering)
         return;
-    engine->backend->abandon(job->scene->renderer);
+    engine->backend->abandon(job->renderer);
     job->rendering = false;
-    job->scene->frame_of = NULL;
+    job->scene->frames--;
 }
 
 /* The output may outlive the job, with frames that are still encoded or not taken. */
 static void job_remove(struct engine *engine, struct job *job)
 {
     abandon_frame(engine, job);
+    if (job->scene->put_off == job)
+        job->scene->put_off = NULL;
+    job_leave_renderer(engine, job);
     size_t i = 0;
     while (engine->jobs[i] != job)
         i++;
@@ -164,13 +167,29 @@ static void job_finish(struct job *job, const struct error *error)
 
 /* ---- frames ------------------------------------------------------------------------------------- */
 
+/* Whether there is a frame to begin, and a place for it. */
+static bool wants_frame(const struct job *job)
+{
+    return !job_output_is_closed(job->output) && !job->rendering && job->next_frame <= job->spec.last_frame &&
+           job_output_has_room(job->output);
+}
+
+/* What waits for the frames in progress to end is not kept waiting by new ones. */
+static bool may_begin(const struct job *job)
+{
+    const struct engine_scene *scene = job->scene;
+    if (scene->waiting_count)
+        return false;
+    if (scene->put_off == job)
+        return !scene->frames;
+    return !scene->put_off || !wants_frame(scene->put_off);
+}
+
 bool job_is_ready(const struct job *job)
 {
-    if (job_output_is_closed(job->output))
-        return false;
     if (job->rendering)
-        return true;
-    return job->next_frame <= job->spec.last_frame && !job->scene->frame_of && job_output_has_room(job->output);
+        return !job_output_is_closed(job->output);
+    return wants_frame(job) && may_begin(job);
 }
 
 /* Whether the frame is worth another try; if not, the job has failed. */
@@ -183,28 +202,36 @@ static void frame_failed(struct engine *engine, struct job *job, const struct er
         struct error rebuild_error = {0};
         if (!engine_need_device(engine, &rebuild_error))
             job_finish(job, &rebuild_error);
-        /* No frame is in progress any more, in no scene. */
+        /* No frame is in progress any more, in any scene. */
         for (size_t i = 0; i < engine->job_count; i++)
             engine_run_waiting(engine, engine->jobs[i]->scene);
         return;
     }
-    if (error->kind == ERROR_OUT_OF_MEMORY && !job->evicted && engine_evict_idle(engine, job->scene)) {
+    if (error->kind == ERROR_OUT_OF_MEMORY && !job->evicted && engine_evict_idle(engine, job)) {
         job->evicted = true;
-        log_write(LOG_INFO, "engine", "idle scenes gave up their device memory for another");
+        log_write(LOG_INFO, "engine", "what was idle gave up its device memory for a frame");
         return;
     }
     job_finish(job, error);
 }
 
+/* Or puts it off. */
 static bool frame_begin_shot(struct engine *engine, struct job *job, const struct shot *shot, struct error *error)
 {
     struct engine_scene *scene = job->scene;
     const struct scene_motion *motion = shot->motion.pose_count ? &shot->motion : NULL;
-    if (!engine_need_device(engine, error))
+    if (!engine_need_device(engine, error) || !job_need_renderer(engine, job, error))
         return false;
-    if (!scene->renderer)
-        scene->renderer = engine->backend->renderer_create(engine->device, error);
-    return scene->renderer && engine->backend->begin(scene->renderer, scene->scene, motion, &shot->request, error);
+    if (!engine->backend->may_begin(job->renderer, scene->scene, motion, &shot->request)) {
+        scene->put_off = job;
+        return true;
+    }
+    scene->put_off = NULL;
+    if (!engine->backend->begin(job->renderer, scene->scene, motion, &shot->request, error))
+        return false;
+    job->rendering = true;
+    scene->frames++;
+    return true;
 }
 
 static bool frame_take_up(struct engine *engine, struct job *job, struct error *error)
@@ -217,13 +244,9 @@ static bool frame_take_up(struct engine *engine, struct job *job, struct error *
     job->frame = shot.request;
     job->time_s = shot.time_s;
     job->shutter_s = shot.shutter_s;
-    bool begun = frame_begin_shot(engine, job, &shot, error);
+    bool good = frame_begin_shot(engine, job, &shot, error);
     shot_finish(&shot);
-    if (!begun)
-        return false;
-    job->rendering = true;
-    scene->frame_of = job;
-    return true;
+    return good;
 }
 
 static void account(struct engine *engine, struct job *job, struct frame_result *result)
@@ -243,7 +266,7 @@ static void frame_done(struct engine *engine, struct job *job, struct engine_fra
 {
     job->rendering = false;
     job->evicted = false;
-    job->scene->frame_of = NULL;
+    job->scene->frames--;
     account(engine, job, &frame->result);
     frame->frame = (uint32_t)job->next_frame;
     frame->request = job->frame;
@@ -274,7 +297,7 @@ static void frame_go_on(struct engine *engine, struct job *job)
         frame_failed(engine, job, &error);
         return;
     }
-    enum frame_progress progress = engine->backend->step(job->scene->renderer, &frame->result, &error);
+    enum frame_progress progress = engine->backend->step(job->renderer, &frame->result, &error);
     if (progress == FRAME_DONE) {
         frame_done(engine, job, frame);
         return;

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Commands that may wait for one scene's frame; more are answered with busy. */
+/* Commands that may wait for one scene's frames; more are answered with busy. */
 #define WAITING_MAX 256
 
 void engine_command_destroy(struct engine_command *command)
@@ -100,9 +100,10 @@ static void abort_jobs(struct engine *engine, const struct engine_scene *scene, 
 static void scene_free(struct engine *engine, struct engine_scene *scene)
 {
     hashmap_remove(&scene->client->scenes, scene->id);
-    engine->backend->renderer_destroy(scene->renderer);
+    scene_drop_shared(engine, scene);
     engine->table_bytes -= scene->scene->table_bytes;
     scene_destroy(scene->scene);
+    free(scene->idle);
     free(scene->waiting);
     free(scene);
 }
@@ -143,7 +144,7 @@ static void client_gone(struct engine *engine, struct engine_command *command)
     engine_post(engine, event_create(ENGINE_CLIENT_FORGOTTEN, command->client, command->request));
 }
 
-/* ---- what a frame in progress keeps waiting ----------------------------------------------------- */
+/* ---- what frames in progress keep waiting ------------------------------------------------------- */
 
 /* Blobs are limited where they are held, as scenes share them; tables here, all scenes together. */
 static bool commit_within_limits(struct engine *engine, struct scene *scene, struct engine_command *command,
@@ -180,7 +181,7 @@ static void start(struct engine *engine, struct engine_scene *scene, struct engi
         fail(engine, command, &error);
 }
 
-static void wait_for_frame(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
+static void wait_for_frames(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
 {
     struct engine_command **waiting = NULL;
     if (scene->waiting_count < WAITING_MAX)
@@ -191,7 +192,7 @@ static void wait_for_frame(struct engine *engine, struct engine_scene *scene, st
         return;
     }
     struct error error = {0};
-    error_set(&error, ERROR_BUSY, "", "%zu requests wait for the frame in progress already", scene->waiting_count);
+    error_set(&error, ERROR_BUSY, "", "%zu requests wait for frames in progress already", scene->waiting_count);
     fail(engine, command, &error);
     engine_command_destroy(command);
 }
@@ -209,8 +210,8 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
         fail(engine, command, &error);
     } else if (command->kind == ENGINE_SCENE_CLOSE) {
         scene_close(engine, scene, command);
-    } else if ((command->kind == ENGINE_COMMIT && scene->frame_of) || scene->waiting_count) {
-        wait_for_frame(engine, scene, command);
+    } else if ((command->kind == ENGINE_COMMIT && scene->frames) || scene->waiting_count) {
+        wait_for_frames(engine, scene, command);
         return;
     } else if (command->kind == ENGINE_COMMIT) {
         commit(engine, scene, command);
@@ -222,7 +223,7 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
 
 void engine_run_waiting(struct engine *engine, struct engine_scene *scene)
 {
-    if (scene->frame_of || !scene->waiting_count)
+    if (scene->frames || !scene->waiting_count)
         return;
     /* Nothing here begins a frame, so all of them can be carried out. */
     struct engine_command **waiting = scene->waiting;
@@ -236,7 +237,7 @@ void engine_run_waiting(struct engine *engine, struct engine_scene *scene)
 
 /* ---- jobs --------------------------------------------------------------------------------------- */
 
-/* A command of that request that waits for a frame; NULL: there is none. `taken`: takes it out. */
+/* A command of that request that waits for frames; NULL: there is none. `taken`: takes it out. */
 static struct engine_command *find_waiting(struct engine *engine, uint64_t client_number, uint32_t request,
                                            bool take)
 {

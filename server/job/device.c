@@ -5,6 +5,8 @@
 #include "base/clock.h"
 #include "base/log.h"
 
+#include <stdlib.h>
+
 /* Share of the device's memory that is used if nothing is configured. */
 #define DEVICE_SHARE_PERCENT 70
 
@@ -34,12 +36,97 @@ static void for_each_scene(struct engine *engine, void (*visit)(struct engine_sc
     }
 }
 
-static void drop_renderer(struct engine_scene *scene, void *context)
+/* ---- what scenes and jobs keep ------------------------------------------------------------------ */
+
+static struct engine_idle *find_idle(const struct engine_scene *scene, uint64_t client)
 {
-    const struct engine *engine = context;
-    engine->backend->renderer_destroy(scene->renderer);
-    scene->renderer = NULL;
-    scene->frame_of = NULL;
+    for (size_t i = 0; i < scene->idle_count; i++)
+        if (scene->idle[i].client == client)
+            return &scene->idle[i];
+    return NULL;
+}
+
+bool scene_drop_idle(struct engine *engine, struct engine_scene *scene, const uint64_t *client)
+{
+    size_t left = 0, count = scene->idle_count;
+    for (size_t i = 0; i < count; i++) {
+        if (client && scene->idle[i].client != *client)
+            scene->idle[left++] = scene->idle[i];
+        else
+            engine->backend->renderer_destroy(scene->idle[i].renderer);
+    }
+    scene->idle_count = left;
+    return left < count;
+}
+
+static bool drop_renderer(struct engine *engine, struct job *job)
+{
+    if (!job->renderer)
+        return false;
+    engine->backend->renderer_destroy(job->renderer);
+    job->renderer = NULL;
+    return true;
+}
+
+void scene_drop_shared(struct engine *engine, struct engine_scene *scene)
+{
+    for (size_t i = 0; i < engine->job_count; i++)
+        if (engine->jobs[i]->scene == scene)
+            drop_renderer(engine, engine->jobs[i]);
+    scene_drop_idle(engine, scene, NULL);
+    engine->backend->scene_destroy(scene->shared);
+    scene->shared = NULL;
+}
+
+bool job_need_renderer(struct engine *engine, struct job *job, struct error *error)
+{
+    struct engine_scene *scene = job->scene;
+    if (!scene->shared && !(scene->shared = engine->backend->scene_create(engine->device, error)))
+        return false;
+    struct engine_idle *idle = job->renderer ? NULL : find_idle(scene, job->client);
+    if (idle) {
+        job->renderer = idle->renderer;
+        *idle = scene->idle[--scene->idle_count];
+    }
+    if (!job->renderer)
+        job->renderer = engine->backend->renderer_create(scene->shared, error);
+    return job->renderer;
+}
+
+void job_leave_renderer(struct engine *engine, struct job *job)
+{
+    struct engine_scene *scene = job->scene;
+    if (!job->renderer)
+        return;
+    scene_drop_idle(engine, scene, &job->client);
+    struct engine_idle *idle = realloc(scene->idle, (scene->idle_count + 1) * sizeof *idle);
+    if (!idle) {
+        drop_renderer(engine, job);
+        return;
+    }
+    scene->idle = idle;
+    idle[scene->idle_count++] = (struct engine_idle){job->client, job->renderer};
+    job->renderer = NULL;
+}
+
+uint64_t scene_device_bytes(const struct engine *engine, const struct engine_scene *scene)
+{
+    uint64_t bytes = scene->shared ? engine->backend->scene_bytes(scene->shared) : 0;
+    for (size_t i = 0; i < engine->job_count; i++)
+        if (engine->jobs[i]->scene == scene && engine->jobs[i]->renderer)
+            bytes += engine->backend->renderer_bytes(engine->jobs[i]->renderer);
+    for (size_t i = 0; i < scene->idle_count; i++)
+        bytes += engine->backend->renderer_bytes(scene->idle[i].renderer);
+    return bytes;
+}
+
+/* ---- loss and need ------------------------------------------------------------------------------ */
+
+static void lose_scene(struct engine_scene *scene, void *context)
+{
+    scene_drop_shared(context, scene);
+    scene->frames = 0;
+    scene->put_off = NULL;
 }
 
 void engine_drop_device(struct engine *engine)
@@ -47,7 +134,7 @@ void engine_drop_device(struct engine *engine)
     /* Frames in progress are taken up again from their beginning. */
     for (size_t i = 0; i < engine->job_count; i++)
         engine->jobs[i]->rendering = false;
-    for_each_scene(engine, drop_renderer, engine);
+    for_each_scene(engine, lose_scene, engine);
     engine->backend->device_destroy(engine->device);
     engine->device = NULL;
 }
@@ -79,22 +166,28 @@ bool engine_need_device(struct engine *engine, struct error *error)
 
 struct eviction {
     struct engine *engine;
-    const struct engine_scene *keep;
+    const struct job *keep;
     bool found;
 };
 
 static void evict(struct engine_scene *scene, void *context)
 {
     struct eviction *eviction = context;
-    if (scene == eviction->keep || scene->frame_of || !scene->renderer)
+    eviction->found |= scene_drop_idle(eviction->engine, scene, NULL);
+    if (scene == eviction->keep->scene || scene->frames || !scene->shared)
         return;
-    drop_renderer(scene, eviction->engine);
+    scene_drop_shared(eviction->engine, scene);
     eviction->found = true;
 }
 
-bool engine_evict_idle(struct engine *engine, const struct engine_scene *keep)
+bool engine_evict_idle(struct engine *engine, const struct job *keep)
 {
     struct eviction eviction = {.engine = engine, .keep = keep};
+    for (size_t i = 0; i < engine->job_count; i++) {
+        struct job *job = engine->jobs[i];
+        if (job != keep && !job->rendering)
+            eviction.found |= drop_renderer(engine, job);
+    }
     for_each_scene(engine, evict, &eviction);
     return eviction.found;
 }

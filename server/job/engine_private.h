@@ -25,13 +25,23 @@ struct engine_client {
     uint64_t served;       /* number of the slice that it had last */
 };
 
+/* What a client's last job on a scene left: its next one goes on from the samples that it holds. */
+struct engine_idle {
+    uint64_t client;
+    struct frame_renderer *renderer; /* owned */
+};
+
 struct engine_scene {
     struct engine_client *client;
     uint32_t id;
     struct scene *scene;
-    struct frame_renderer *renderer; /* NULL until the first frame, and after the device was lost */
-    struct job *frame_of;            /* whose frame is in progress; NULL: none */
-    struct engine_command **waiting; /* owned: commands for after that frame, in order */
+    struct frame_scene *shared; /* NULL until the first frame, and after the device was lost */
+    uint32_t frames;            /* in progress, of all jobs */
+    /* Its frame may not begin beside those, and no other begins before it; NULL: there is none. */
+    struct job *put_off;
+    struct engine_idle *idle; /* owned; at most one for each client */
+    size_t idle_count;
+    struct engine_command **waiting; /* owned: commands for when no frame is in progress, in order */
     size_t waiting_count;
     uint64_t apply_start_ns, apply_ns; /* of the commits since the last frame */
     uint64_t used;                     /* number of the slice that used it last */
@@ -45,6 +55,7 @@ struct job {
     uint32_t request;
     struct engine_job spec; /* its keys are owned */
     struct engine_scene *scene;
+    struct frame_renderer *renderer; /* owned; NULL until the first frame, and after the device was lost */
     struct job_output *output;
     uint64_t next_frame; /* number in the range; beyond its end: all rendered */
     uint64_t served;
@@ -92,9 +103,9 @@ void engine_post_done(struct engine *engine, uint64_t client, uint32_t request, 
 void engine_post_failed(struct engine *engine, uint64_t client, uint32_t request, const struct error *error);
 void engine_nudge(struct engine *engine); /* any thread: there may be something to do */
 
-/* commands.c: carries a command out, or keeps it until its scene's frame is done. Takes it over. */
+/* commands.c: carries a command out, or keeps it until its scene's frames are done. Takes it over. */
 void engine_handle(struct engine *engine, struct engine_command *command);
-/* Carries out what waited for a scene, as far as no frame is in progress. */
+/* Carries out what waited for a scene, if no frame of it is in progress. */
 void engine_run_waiting(struct engine *engine, struct engine_scene *scene);
 void engine_forget_client(struct engine *engine, struct engine_client *client);
 
@@ -117,9 +128,18 @@ bool engine_open_device(struct engine *engine, struct error *error);
 bool engine_need_device(struct engine *engine, struct error *error);
 /* Lets go of everything on the device and of the device. */
 void engine_drop_device(struct engine *engine);
-/* Lets go of what scenes without a frame in progress keep on the device, but for `keep`. False: nothing was there.
- */
-bool engine_evict_idle(struct engine *engine, const struct engine_scene *keep);
+/* Lets go of what is kept on the device and no frame in progress needs, nor the next one of `keep`. False: nothing
+ * was there. */
+bool engine_evict_idle(struct engine *engine, const struct job *keep);
+/* A renderer for a job that has none: what the client's last one left, or a new one. */
+bool job_need_renderer(struct engine *engine, struct job *job, struct error *error);
+/* Leaves it to the client's next job on the scene. */
+void job_leave_renderer(struct engine *engine, struct job *job);
+/* What that client's jobs left, or (`client` NULL) all. False: nothing was there. */
+bool scene_drop_idle(struct engine *engine, struct engine_scene *scene, const uint64_t *client);
+/* Everything of it on the device; its jobs have ended, or no frame is in progress. */
+void scene_drop_shared(struct engine *engine, struct engine_scene *scene);
+uint64_t scene_device_bytes(const struct engine *engine, const struct engine_scene *scene);
 uint64_t engine_device_bytes(const struct engine *engine);
 
 /* stats.c */

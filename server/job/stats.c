@@ -35,7 +35,7 @@ static void describe_scene(const struct engine *engine, struct engine_scene *fro
         .scene = from->id,
         .revision = scene->revision,
         .host_bytes = scene->host_bytes,
-        .device_bytes = from->renderer ? engine->backend->device_bytes(from->renderer) : 0,
+        .device_bytes = scene_device_bytes(engine, from),
         .nodes = (uint32_t)scene->objects[SCENE_NODE].count,
         .instances = from->instances,
         .triangles = from->triangles,

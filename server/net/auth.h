@@ -10,9 +10,10 @@
 #include <stdint.h>
 
 struct auth_identity {
-    bool known;    /* the peer's user is known: it shares blobs with its other connections */
-    uint32_t user; /* its user number, if known */
-    char name[40]; /* for people: "user 1000", "tcp:127.0.0.1:40312" */
+    bool known;     /* the peer's user is known: it shares blobs with its other connections */
+    uint32_t user;  /* its user number, if known */
+    bool read_only; /* it may look, but change nothing */
+    char name[40];  /* for people: "user 1000", "tcp:127.0.0.1:40312" */
 };
 
 /* False with ERROR_DENIED: the peer may not come in. `insecure` as for listener_open(). */

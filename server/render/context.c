@@ -151,5 +151,4 @@ void context_finish(struct render_context *context)
     gpu_buffer_finish(device, &context->wave_state);
     gpu_buffer_finish(device, &context->slice_sums);
     gpu_buffer_finish(device, &context->uniform_buffer);
-    environment_finish(&context->environment, device);
 }

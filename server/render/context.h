@@ -21,14 +21,14 @@ struct slice {
 
 struct render_context {
     struct gpu_device *device;
-    struct scene_gpu *scene;
+    struct scene_gpu *scene; /* shared with other frames, as are the next two */
+    struct environment *environment;
     struct tracer *tracer;
     struct comparison *comparison; /* of the frame in hand; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;
     struct stage_times times;
     struct stage_times collected; /* only inside context_collect */
-    struct environment environment;
     struct scene_features features;
     struct frame_uniforms uniforms;
     struct gpu_buffer uniform_buffer;

@@ -17,7 +17,7 @@ void frame_abandon(struct frame_renderer *renderer)
         gpu_timer_collect(renderer->context.timer, NULL);
     renderer->context.span_count = 0;
     picture_drop_pixels(&renderer->picture);
-    renderer->phase = PHASE_IDLE;
+    frame_end(renderer);
 }
 
 /* Where all pixels have the sample in hand, if each does not have a place of its own. */
@@ -193,7 +193,8 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     result->times = context->times;
     renderer->kept_request = *request;
     renderer->kept_samples = result->samples;
-    renderer->phase = PHASE_IDLE;
+    renderer->kept_showing = renderer->shared->showing;
+    frame_end(renderer);
     return true;
 }
 

@@ -110,23 +110,37 @@ struct frame_result {
 };
 void frame_result_finish(struct frame_result *result);
 
-/* What a scene keeps on the device between frames: its copy, and each tracer that was asked for. */
+/* What a scene has on the device, whoever looks at it: its copy, its light, and each tracer that was asked for. */
+struct frame_scene;
+
+struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *error);
+void frame_scene_destroy(struct frame_scene *shared); /* after its renderers; accepts NULL */
+uint64_t frame_scene_device_bytes(const struct frame_scene *shared);
+
+/* What one who looks has: the waves and the picture of one frame at a time, and the samples of the last one. */
 struct frame_renderer;
 
-struct frame_renderer *frame_renderer_create(struct gpu_device *device, struct error *error);
+/* `shared` stays the caller's and outlives the renderer. */
+struct frame_renderer *frame_renderer_create(struct frame_scene *shared, struct error *error);
 void frame_renderer_destroy(struct frame_renderer *renderer); /* accepts NULL */
 
+/* Renderers of one scene may have frames in progress at the same time, each stepped as one likes. A frame that
+ * would change what they share (another revision, something that moves, a tracer in use that is not up to date)
+ * may only begin while no other is in progress. False: it has to wait for that. */
+bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *scene,
+                     const struct scene_motion *motion, const struct frame_request *request);
 /* A frame in slices, so that others get their turn and a cancel is served: begin, then step until it is done
  * (or abandon). Between the two the scene must not be edited. A step takes a few milliseconds where the
  * device allows. `result` is filled by the last step. `motion`: where things are while the shutter is open; NULL:
- * as they were committed. It is not needed after frame_begin. */
+ * as they were committed. It is not needed after frame_begin. A frame that may not begin is refused,
+ * ERROR_INTERNAL. */
 bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
                  const struct frame_request *request, struct error *error);
 enum frame_progress { FRAME_FAILED, FRAME_MORE, FRAME_DONE };
 enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_result *result, struct error *error);
 void frame_abandon(struct frame_renderer *renderer);
 
-uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer);
+uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer); /* without what is shared */
 /* How many pixels a slice has and how many rays a wave may have; 0: chosen for the device. A wave that becomes
  * larger than that splits its slice, which costs time and never changes the picture. From the next frame on. */
 void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice_pixels, uint32_t wave_rays);

@@ -43,26 +43,56 @@ static bool may_go_on(const struct frame_renderer *renderer, const struct frame_
            frame_request_adds_to(&renderer->kept_request, request);
 }
 
+static bool is_alone(const struct frame_renderer *renderer)
+{
+    return renderer->shared->frames == (renderer->phase != PHASE_IDLE);
+}
+
+bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *scene,
+                     const struct scene_motion *motion, const struct frame_request *request)
+{
+    struct error refused = {0}; /* by frame_begin, before it changes anything */
+    const struct tracer_impl *const impls[] = {
+        find_tracer(renderer, request->tracer, "tracer", &refused),
+        request->compare ? find_tracer(renderer, request->compare_with, "compare_with", &refused) : NULL,
+    };
+    size_t count = request->compare ? 2 : 1;
+    if (is_alone(renderer) || refused.kind != ERROR_NONE)
+        return true;
+    return scene_gpu_is_current(&renderer->shared->copy, scene, motion) &&
+           tracer_set_are_free(&renderer->shared->tracers, impls, count, &request->tracer_options);
+}
+
+/* An update that failed leaves no revision. */
+static void note_showing(struct frame_scene *shared, uint64_t revision_before, const struct scene_changes *changes)
+{
+    if (shared->copy.revision != revision_before || changes->geometry || changes->deformed || changes->instances ||
+        changes->shading || changes->lights)
+        shared->showing++;
+}
+
 static bool update_scene(struct frame_renderer *renderer, const struct scene *scene,
                          const struct scene_motion *motion, struct error *error)
 {
     struct render_context *context = &renderer->context;
     const struct frame_request *request = &context->request;
+    struct frame_scene *shared = renderer->shared;
     struct scene_changes changes = {0};
-    uint64_t revision_before = renderer->scene.revision;
-    bool updated = scene_gpu_update(&renderer->scene, scene, motion, &changes, &context->times, error);
-    tracer_set_note(&renderer->tracers, updated ? &changes : NULL);
+    uint64_t revision_before = shared->copy.revision;
+    bool updated = scene_gpu_update(&shared->copy, scene, motion, &changes, &context->times, error);
+    tracer_set_note(&shared->tracers, updated ? &changes : NULL);
+    note_showing(shared, revision_before, &changes);
     if (!updated)
         return false;
-    if (renderer->scene.revision != revision_before || changes.geometry || changes.deformed || changes.instances ||
-        changes.shading || changes.lights)
+    /* What others moved and put back may be in other parts of a tracer's structure, which are not added up. */
+    if (renderer->kept_showing != shared->showing)
         renderer->samples_before = 0;
     renderer->result.uploaded_bytes = changes.uploaded_bytes;
     const struct tracer_impl *impl = find_tracer(renderer, request->tracer, "tracer", error);
-    context->tracer = tracer_check_motion(impl, &renderer->scene, error)
-                          ? tracer_set_get(&renderer->tracers, &renderer->scene, impl, &request->tracer_options,
-                                           &context->times, error)
-                          : NULL;
+    if (!tracer_check_motion(impl, &shared->copy, error))
+        return false;
+    renderer->tracer = context->tracer =
+        tracer_set_take(&shared->tracers, &shared->copy, impl, &request->tracer_options, &context->times, error);
     if (!context->tracer)
         return false;
     renderer->result.uploaded_bytes += context->tracer->stats.uploaded_bytes;
@@ -70,15 +100,27 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     memcpy(renderer->result.cubes, context->tracer->stats.cubes, sizeof(renderer->result.cubes));
     context->features = scene_features_of(scene);
     uint64_t start_ns = clock_now_ns();
-    updated = environment_update(&context->environment, renderer->device, scene, &renderer->scene, error);
+    updated = environment_update(context->environment, renderer->device, scene, &renderer->shared->copy, error);
     stage_times_add(&context->times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return updated;
+}
+
+void frame_end(struct frame_renderer *renderer)
+{
+    struct tracer_set *tracers = &renderer->shared->tracers;
+    tracer_set_give(tracers, renderer->tracer);
+    tracer_set_give(tracers, renderer->second);
+    renderer->tracer = renderer->second = NULL;
+    if (renderer->phase != PHASE_IDLE)
+        renderer->shared->frames--;
+    renderer->phase = PHASE_IDLE;
 }
 
 /* The second tracer's structure is no part of what the frame's own tracer cost. */
 static bool begin_comparison(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->context;
+    struct frame_scene *shared = renderer->shared;
     const struct frame_request *request = &context->request;
     context->comparison = NULL;
     if (!request->compare) {
@@ -88,15 +130,16 @@ static bool begin_comparison(struct frame_renderer *renderer, struct error *erro
     }
     uint64_t start_ns = clock_now_ns();
     const struct tracer_impl *impl = find_tracer(renderer, request->compare_with, "compare_with", error);
-    if (!tracer_check_motion(impl, &renderer->scene, error))
+    if (!tracer_check_motion(impl, &shared->copy, error))
         return false;
-    struct tracer *second =
-        tracer_set_get(&renderer->tracers, &renderer->scene, impl, &request->tracer_options, NULL, error);
+    renderer->second =
+        tracer_set_take(&shared->tracers, &shared->copy, impl, &request->tracer_options, NULL, error);
     if (!renderer->comparison)
         renderer->comparison = comparison_create(renderer->device, error);
-    if (!second || !renderer->comparison)
+    if (!renderer->second || !renderer->comparison)
         return false;
-    comparison_begin(renderer->comparison, &renderer->scene, context->tracer, second, request->compare_far_share);
+    comparison_begin(renderer->comparison, &shared->copy, context->tracer, renderer->second,
+                     request->compare_far_share);
     context->comparison = renderer->comparison;
     stage_times_add(&context->times, STAGE_COMPARE, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return true;
@@ -137,7 +180,7 @@ static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
     if (!picture_begin(&renderer->picture, context, renderer->samples_before, error))
         return false;
     const struct frame_request *request = &context->request;
-    bool flat = !(request->aperture > 0.0f) && !renderer->scene.has_motion;
+    bool flat = !(request->aperture > 0.0f) && !renderer->shared->copy.has_motion;
     /* A picture too large for the visibility buffer is traced from the first ray: the same hits, another way. */
     renderer->rasterise = flat && request->primary == PRIMARY_RASTER && !request->compare &&
                           primary_reserve(&renderer->primary, context, NULL);
@@ -164,11 +207,10 @@ static void fill_filter(struct render_context *context)
     context->has_filter = true;
 }
 
-bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
-                 const struct frame_request *request, struct error *error)
+static bool begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
+                  const struct frame_request *request, struct error *error)
 {
     struct render_context *context = &renderer->context;
-    frame_abandon(renderer);
     if (!check_request(renderer, request, error))
         return false;
     context->request = *request;
@@ -178,8 +220,8 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
     stage_times_begin(&context->times);
     if (!update_scene(renderer, scene, motion, error) || !begin_comparison(renderer, error))
         return false;
-    camera_fill_uniforms(&context->uniforms, request, &renderer->scene);
-    environment_fill_uniforms(&context->environment, &context->uniforms, &renderer->scene);
+    camera_fill_uniforms(&context->uniforms, request, &renderer->shared->copy);
+    environment_fill_uniforms(context->environment, &context->uniforms, &renderer->shared->copy);
     context->uniforms.depth = request->depth;
     context->uniforms.jitter_pixel[3] =
         1.0f / sqrtf(request->accumulate ? SAMPLES_GOING_ON : (float)request->samples);
@@ -188,8 +230,22 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
     if (!reserve_frame(renderer, error) || !gpu_check(renderer->device, "beginning a frame", error))
         return false;
-    renderer->result.revision = renderer->scene.revision;
+    renderer->result.revision = renderer->shared->copy.revision;
     renderer->sample = renderer->plane = renderer->band = 0;
+    return true;
+}
+
+bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
+                 const struct frame_request *request, struct error *error)
+{
+    frame_abandon(renderer);
+    if (!frame_may_begin(renderer, scene, motion, request))
+        return error_set(error, ERROR_INTERNAL, NULL, "a frame that may not begin beside others");
+    if (!begin(renderer, scene, motion, request, error)) {
+        frame_end(renderer);
+        return false;
+    }
     renderer->phase = PHASE_SAMPLE;
+    renderer->shared->frames++;
     return true;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to frame_renderer.c, frame_begin.c and frame.c: what a renderer holds, and where its frame is. */
+/* Private to frame_renderer.c, frame_begin.c and frame.c: what renderers of a scene share, what each holds, and
+ * where its frame is. */
 #ifndef FARLIGHT_RENDER_FRAME_STATE_H
 #define FARLIGHT_RENDER_FRAME_STATE_H
 
@@ -24,10 +25,18 @@ enum frame_phase {
     PHASE_RESOLVE
 };
 
+struct frame_scene {
+    struct gpu_device *device;
+    struct scene_gpu copy;
+    struct tracer_set tracers;
+    struct environment environment;
+    uint64_t showing; /* counts up when the copy is of something else: a revision, poses */
+    uint32_t frames;  /* in progress, of all renderers */
+};
+
 struct frame_renderer {
     struct gpu_device *device;
-    struct scene_gpu scene;
-    struct tracer_set tracers;
+    struct frame_scene *shared;
     struct integrator *integrator;
     struct render_context context;
     struct primary primary;
@@ -39,6 +48,7 @@ struct frame_renderer {
     uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */
     /* the frame in hand */
     enum frame_phase phase;
+    struct tracer *tracer, *second; /* held; NULL: none */
     bool rasterise;
     uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
     uint32_t sample;         /* samples of this frame that are done */
@@ -46,12 +56,15 @@ struct frame_renderer {
     struct slices slices;
     /* the last frame that was finished, whose sum the picture holds */
     struct frame_request kept_request;
-    uint32_t kept_samples;      /* 0: there is none */
+    uint32_t kept_samples; /* 0: there is none */
+    uint64_t kept_showing;
     struct frame_result result; /* counts, until the last step hands it out */
 };
 
 /* frame_renderer.c. There is none afterwards. */
 void frame_drop_integrator(struct frame_renderer *renderer);
+/* frame_begin.c. Lets go of what the frame in hand holds of what is shared. */
+void frame_end(struct frame_renderer *renderer);
 /* frame_begin.c. Room for slices of slices.slice_rays and waves of context.wave_capacity rays. */
 bool frame_reserve_waves(struct frame_renderer *renderer, struct error *error);
 

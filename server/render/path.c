@@ -21,7 +21,7 @@ static bool asks_lights(const struct render_context *context)
 
 static bool asks_environment(const struct render_context *context)
 {
-    return context->environment.kind != ENVIRONMENT_NONE;
+    return context->environment->kind != ENVIRONMENT_NONE;
 }
 
 static uint32_t shadow_rays_a_hit(const struct render_context *context)
@@ -37,7 +37,7 @@ static bool shade(struct wave_passes *passes, struct render_context *context, ui
     size_t n = 0;
     (void)first; /* 0: there is room for all shadow rays at once */
     (void)count;
-    if (context->environment.kind == ENVIRONMENT_IMAGE)
+    if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (choice->rows > 0)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
@@ -92,7 +92,7 @@ static void destroy(struct integrator *integrator)
 static bool reserve(struct integrator *integrator, struct render_context *context, struct error *error)
 {
     return environment_choice_update(&((struct path_tracing *)integrator)->choice, context->device,
-                                     &context->environment, &context->scene->scene->environment, error) &&
+                                     context->environment, &context->scene->scene->environment, error) &&
            wave_passes_reserve(integrator, context, error);
 }
 

@@ -25,12 +25,41 @@ static void empty_slot(struct tracer_slot *slot)
     *slot = (struct tracer_slot){0};
 }
 
+static bool holds(const struct tracer_slot *slot, const struct tracer_impl *impl,
+                  const struct tracer_options *options)
+{
+    return slot->tracer && slot->impl == impl && tracer_options_same(&slot->options, options);
+}
+
+static bool is_up_to_date(const struct tracer_slot *slot)
+{
+    const struct scene_changes *pending = &slot->pending;
+    return slot->tracer->updated && !pending->geometry && !pending->deformed && !pending->instances &&
+           !pending->shading && !pending->surfaces && !pending->lights;
+}
+
+bool tracer_set_are_free(const struct tracer_set *set, const struct tracer_impl *const impls[], size_t count,
+                         const struct tracer_options *options)
+{
+    size_t missing = count, room = 0;
+    for (int i = 0; i < TRACERS_KEPT; i++) {
+        const struct tracer_slot *slot = &set->slots[i];
+        bool wanted = false;
+        for (size_t k = 0; k < count; k++)
+            wanted = wanted || holds(slot, impls[k], options);
+        if (wanted && slot->users && !is_up_to_date(slot))
+            return false;
+        missing -= wanted;
+        room += !wanted && !slot->users;
+    }
+    return missing <= room;
+}
+
 static struct tracer_slot *find_slot(struct tracer_set *set, const struct tracer_impl *impl,
                                      const struct tracer_options *options)
 {
     for (int i = 0; i < TRACERS_KEPT; i++)
-        if (set->slots[i].tracer && set->slots[i].impl == impl &&
-            tracer_options_same(&set->slots[i].options, options))
+        if (holds(&set->slots[i], impl, options))
             return &set->slots[i];
     return NULL;
 }
@@ -39,9 +68,9 @@ static struct tracer_slot *make_slot(struct tracer_set *set, struct gpu_device *
                                      const struct tracer_impl *impl, const struct tracer_options *options,
                                      struct error *error)
 {
-    struct tracer_slot *oldest = &set->slots[0];
-    for (int i = 1; i < TRACERS_KEPT; i++)
-        if (set->slots[i].last_use < oldest->last_use)
+    struct tracer_slot *oldest = NULL;
+    for (int i = 0; i < TRACERS_KEPT; i++)
+        if (!set->slots[i].users && (!oldest || set->slots[i].last_use < oldest->last_use))
             oldest = &set->slots[i];
     empty_slot(oldest);
     oldest->tracer = tracer_create(impl, device, options, error);
@@ -52,9 +81,15 @@ static struct tracer_slot *make_slot(struct tracer_set *set, struct gpu_device *
     return oldest;
 }
 
-struct tracer *tracer_set_get(struct tracer_set *set, struct scene_gpu *scene, const struct tracer_impl *impl,
-                              const struct tracer_options *options, struct stage_times *times, struct error *error)
+struct tracer *tracer_set_take(struct tracer_set *set, struct scene_gpu *scene, const struct tracer_impl *impl,
+                               const struct tracer_options *options, struct stage_times *times,
+                               struct error *error)
 {
+    if (!tracer_set_are_free(set, &impl, 1, options)) {
+        error_set(error, ERROR_INTERNAL, NULL, "%s cannot be brought to the scene beside other frames",
+                  impl->name);
+        return NULL;
+    }
     struct tracer_slot *slot = find_slot(set, impl, options);
     if (!slot)
         slot = make_slot(set, scene->device, impl, options, error);
@@ -64,7 +99,15 @@ struct tracer *tracer_set_get(struct tracer_set *set, struct scene_gpu *scene, c
     if (!tracer_update(slot->tracer, scene, &slot->pending, times, error))
         return NULL;
     slot->pending = (struct scene_changes){0};
+    slot->users++;
     return slot->tracer;
+}
+
+void tracer_set_give(struct tracer_set *set, const struct tracer *tracer)
+{
+    for (int i = 0; tracer && i < TRACERS_KEPT; i++)
+        if (set->slots[i].tracer == tracer)
+            set->slots[i].users--;
 }
 
 uint64_t tracer_set_device_bytes(const struct tracer_set *set)

@@ -5,7 +5,7 @@
 
 #include "trace/tracer.h"
 
-#define TRACERS_KEPT 4 /* the one that was used longest ago makes room */
+#define TRACERS_KEPT 4 /* of those that no frame uses the one that was used longest ago makes room */
 
 struct tracer_set {
     struct tracer_slot {
@@ -14,16 +14,22 @@ struct tracer_set {
         struct tracer_options options;
         struct scene_changes pending; /* since its last update */
         uint64_t last_use;
+        uint32_t users; /* frames in progress */
     } slots[TRACERS_KEPT];
     uint64_t use_count;
 };
 
 /* The scene's copy has changed, or (NULL) must be taken to be new. */
 void tracer_set_note(struct tracer_set *set, const struct scene_changes *changes);
-/* The tracer of that sort and options, made if need be and brought to the scene. */
-struct tracer *tracer_set_get(struct tracer_set *set, struct scene_gpu *scene, const struct tracer_impl *impl,
-                              const struct tracer_options *options, struct stage_times *times,
-                              struct error *error);
+/* Whether tracers of these sorts can all be taken now, which leaves those alone that are taken already. */
+bool tracer_set_are_free(const struct tracer_set *set, const struct tracer_impl *const impls[], size_t count,
+                         const struct tracer_options *options);
+/* The tracer of that sort and options, made if need be and brought to the scene. It stays as it is until it is
+ * given back as often as it was taken. */
+struct tracer *tracer_set_take(struct tracer_set *set, struct scene_gpu *scene, const struct tracer_impl *impl,
+                               const struct tracer_options *options, struct stage_times *times,
+                               struct error *error);
+void tracer_set_give(struct tracer_set *set, const struct tracer *tracer); /* accepts NULL */
 uint64_t tracer_set_device_bytes(const struct tracer_set *set);
 void tracer_set_finish(struct tracer_set *set);
 

@@ -88,7 +88,7 @@ static const struct gpu_program *use(struct render_context *context, const char 
 static void bind_shading(struct wave_passes *passes, struct render_context *context)
 {
     context_bind_hits(context);
-    gpu_buffer_bind_texels(context->device, environment_lights(&context->environment, context->scene),
+    gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
                            UNIT_SHADE_LIGHTS, GL_RGBA32F);
     gpu_buffer_bind_storage(&passes->radiance, BIND_RADIANCE);
     gpu_buffer_bind_storage(&passes->children, BIND_CHILDREN);
@@ -147,14 +147,14 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
     size_t n = 0;
     if (context->hit_count == context->ray_count)
         return true;
-    if (context->environment.kind == ENVIRONMENT_IMAGE)
+    if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
     if (passes->kind->left_scene)
         defines[n++] = (struct gpu_define){passes->kind->left_scene, "1"};
     if (passes->kind->left_scene && context->features.area_lights)
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     context_bind(context);
-    gpu_buffer_bind_texels(context->device, environment_lights(&context->environment, context->scene),
+    gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
                            UNIT_SHADE_LIGHTS, GL_RGBA32F);
     const struct gpu_program *program = use(context, "render/left_scene.comp", defines, error);
     if (!program)

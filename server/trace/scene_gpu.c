@@ -139,6 +139,13 @@ static bool update_parts(struct scene_gpu *gpu, const struct scene *scene, const
     return gpu_check(gpu->device, "scene upload", error);
 }
 
+bool scene_gpu_is_current(const struct scene_gpu *gpu, const struct scene *scene,
+                          const struct scene_motion *motion)
+{
+    return gpu->state && gpu->state->any_update && gpu->revision == scene->revision &&
+           (posed_parts(motion) | gpu->state->posed_parts) == 0;
+}
+
 bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error)
 {
@@ -151,9 +158,9 @@ bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const st
     gpu->motion = motion;
     if (!gpu->state && !(gpu->state = calloc(1, sizeof(*gpu->state))))
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the device's copy of a scene");
-    unsigned posed = parts | gpu->state->posed_parts;
-    if (gpu->state->any_update && gpu->revision == scene->revision && posed == 0)
+    if (scene_gpu_is_current(gpu, scene, motion))
         return true;
+    unsigned posed = parts | gpu->state->posed_parts;
     gpu_push_group(gpu->device, "scene upload");
     bool ok = update_parts(gpu, scene, motion, posed, changes, error);
     gpu_pop_group(gpu->device);

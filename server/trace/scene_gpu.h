@@ -86,6 +86,9 @@ void scene_gpu_finish(struct scene_gpu *gpu);
  * empty and will be made anew by the next update. */
 bool scene_gpu_update(struct scene_gpu *gpu, const struct scene *scene, const struct scene_motion *motion,
                       struct scene_changes *changes, struct stage_times *times, struct error *error);
+/* Whether an update would change nothing. */
+bool scene_gpu_is_current(const struct scene_gpu *gpu, const struct scene *scene,
+                          const struct scene_motion *motion);
 /* Where an instance is in each pose, one if it stands still: world_from_object, borrowed from the copy. */
 const float (*scene_gpu_poses(const struct scene_gpu *gpu, const struct instance *instance,
                               uint32_t *pose_count))[12];

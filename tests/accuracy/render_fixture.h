@@ -25,6 +25,7 @@
 /* Objects get the numbers 1, 2, .. in the order in which they are added. */
 struct fixture {
     struct gpu_device *device;
+    struct frame_scene *shared;
     struct frame_renderer *renderer;
     struct scene *scene;
     struct scene_edit edits[FIXTURE_EDITS_MAX];
@@ -66,8 +67,6 @@ static inline int fixture_setup(void **state)
         print_message("no device: %s\n", error.text);
         return -1;
     }
-    fixture->renderer = frame_renderer_create(fixture->device, &error);
-    assert_non_null(fixture->renderer);
     *state = fixture;
     return 0;
 }
@@ -77,6 +76,7 @@ static inline int fixture_teardown(void **state)
     struct fixture *fixture = *state;
     scene_destroy(fixture->scene);
     frame_renderer_destroy(fixture->renderer);
+    frame_scene_destroy(fixture->shared);
     gpu_device_destroy(fixture->device);
     free(fixture);
     return 0;
@@ -89,7 +89,10 @@ static inline int fixture_clear(void **state)
     struct error error = {0};
     scene_destroy(fixture->scene);
     frame_renderer_destroy(fixture->renderer); /* what it keeps belongs to one scene */
-    fixture->renderer = frame_renderer_create(fixture->device, &error);
+    frame_scene_destroy(fixture->shared);
+    fixture->shared = frame_scene_create(fixture->device, &error);
+    assert_non_null(fixture->shared);
+    fixture->renderer = frame_renderer_create(fixture->shared, &error);
     fixture->scene = scene_create("test", &(struct scene_limits){.host_bytes = 1u << 30});
     assert_non_null(fixture->renderer);
     assert_non_null(fixture->scene);

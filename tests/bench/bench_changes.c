@@ -92,7 +92,9 @@ static json_t *bench_instances(struct gpu_device *device, uint32_t count, uint32
 {
     struct error error = {0};
     struct test_edits edits = {.scene = test_scene_create()};
-    struct frame_renderer *renderer = frame_renderer_create(device, &error);
+    struct frame_scene *shared = frame_scene_create(device, &error);
+    require(shared != NULL, &error);
+    struct frame_renderer *renderer = frame_renderer_create(shared, &error);
     require(renderer != NULL, &error);
     add_sphere(&edits, 1, 16);
     test_commit(&edits);
@@ -125,6 +127,7 @@ static json_t *bench_instances(struct gpu_device *device, uint32_t count, uint32
         bench_add(&together, apply_ns + upload_ns + build_ns);
     }
     frame_renderer_destroy(renderer);
+    frame_scene_destroy(shared);
     scene_destroy(edits.scene);
     return json_pack("{s:i, s:i, s:i, s:I, s:o, s:o, s:o, s:o, s:o}", "instances", (int)count, "width", 640,
                      "height", 480, "uploaded_bytes", (json_int_t)bytes, "apply_ms", figure_json(&apply),

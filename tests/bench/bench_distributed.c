@@ -38,6 +38,7 @@ enum { FORM_COUNT = sizeof(forms) / sizeof(forms[0]), FORM_WHOLE = 4 };
 
 struct bench {
     struct gpu_device *device;
+    struct frame_scene *shared;
     struct frame_renderer *renderer;
     struct scene *scene;
     struct scene_motion motion;
@@ -175,7 +176,8 @@ int main(int argc, char **argv)
         return 2;
     }
     bench.device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);
-    bench.renderer = bench.device ? frame_renderer_create(bench.device, &error) : NULL;
+    bench.shared = bench.device ? frame_scene_create(bench.device, &error) : NULL;
+    bench.renderer = bench.shared ? frame_renderer_create(bench.shared, &error) : NULL;
     bench.scene = paper_scene_create();
     bool ok = bench.renderer && bench.scene && paper_scene_motion(&bench.motion) && measure(&bench, &error) &&
               print(&bench);
@@ -186,6 +188,7 @@ int main(int argc, char **argv)
     paper_scene_motion_finish(&bench.motion);
     scene_destroy(bench.scene);
     frame_renderer_destroy(bench.renderer);
+    frame_scene_destroy(bench.shared);
     if (bench.device)
         gpu_device_destroy(bench.device);
     return ok ? 0 : 1;

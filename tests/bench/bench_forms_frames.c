@@ -21,6 +21,7 @@ enum { SHOWN = sizeof shown / sizeof shown[0] };
 
 struct frames {
     struct bench_forms *bench;
+    struct frame_scene *shared;
     struct frame_renderer *renderer;
     struct frame_result last[BENCH_FORMS_MAX];
     struct bench_runs whole[BENCH_FORMS_MAX], build[BENCH_FORMS_MAX], stages[BENCH_FORMS_MAX][SHOWN];
@@ -167,7 +168,8 @@ json_t *bench_forms_frames(struct bench_forms *bench, struct error *error)
         return NULL;
     }
     frames->bench = bench;
-    frames->renderer = frame_renderer_create(bench->device, error);
+    frames->shared = frame_scene_create(bench->device, error);
+    frames->renderer = frames->shared ? frame_renderer_create(frames->shared, error) : NULL;
     bool done = frames->renderer != NULL;
     struct frame_result truth = {0};
     done = done && run_all(frames, error) && render_truth(frames, &truth, error);
@@ -179,6 +181,7 @@ json_t *bench_forms_frames(struct bench_forms *bench, struct error *error)
     }
     frame_result_finish(&truth);
     frame_renderer_destroy(frames->renderer);
+    frame_scene_destroy(frames->shared);
     free(frames);
     return list;
 }

@@ -20,11 +20,24 @@
 
 /* ---- a renderer that renders nothing ------------------------------------------------------------ */
 
-/* Steps that a frame takes are its samples; a frame of depth 7 goes on until the gate is opened. */
+/* Steps that a frame takes are its samples. A frame of depth 7 goes on until the gate is opened, to all or to its
+ * seed; one of depth 8 changes what the frames of a scene share. */
 #define GATED_DEPTH 7
+#define CHANGING_DEPTH 8
 #define STEPS_MAX 4096
 
+/* Bytes on the device that it says it has. */
+#define FAKE_SCENE_BYTES 70
+#define FAKE_RENDERER_BYTES 7
+
+struct frame_scene {
+    uint64_t revision;      /* that was shown last */
+    bool moved;             /* with something in motion, or else changed */
+    uint32_t frames, users; /* in progress; renderers */
+};
+
 struct frame_renderer {
+    struct frame_scene *shared;
     const struct scene *scene;
     struct frame_request request;
     uint64_t motion_digest;
@@ -35,11 +48,14 @@ struct frame_renderer {
 
 static struct {
     atomic_bool gate_open;
-    atomic_int devices_made, devices, renderers, frames_begun, frames_done, frames_abandoned;
+    atomic_uint gate_seed;
+    atomic_int devices_made, devices, scenes, renderers_made, renderers, frames_begun, frames_done,
+        frames_abandoned;
     atomic_int fail_steps;      /* the next steps that fail */
     atomic_int fail_kind;       /* enum error_kind */
     atomic_int fail_from_frame; /* frames from this number on fail; 0: none */
     atomic_bool no_device;
+    atomic_int in_progress; /* frames, of all scenes */
     atomic_int step_count;
     uint64_t step_seeds[STEPS_MAX]; /* whose step it was: the request's seed */
 } fake;
@@ -67,19 +83,67 @@ static inline void fake_device_destroy(struct gpu_device *device)
     free(device);
 }
 
-static inline struct frame_renderer *fake_renderer_create(struct gpu_device *device, struct error *error)
+static inline struct frame_scene *fake_scene_create(struct gpu_device *device, struct error *error)
 {
     (void)error;
     assert_non_null(device);
+    atomic_fetch_add(&fake.scenes, 1);
+    struct frame_scene *shared = calloc(1, sizeof *shared);
+    assert_non_null(shared);
+    return shared;
+}
+
+static inline void fake_scene_destroy(struct frame_scene *shared)
+{
+    if (!shared)
+        return;
+    assert_int_equal(shared->users, 0);
+    atomic_fetch_sub(&fake.scenes, 1);
+    free(shared);
+}
+
+static inline uint64_t fake_scene_bytes(const struct frame_scene *shared)
+{
+    (void)shared;
+    return FAKE_SCENE_BYTES;
+}
+
+static inline struct frame_renderer *fake_renderer_create(struct frame_scene *shared, struct error *error)
+{
+    (void)error;
+    assert_non_null(shared);
+    shared->users++;
+    atomic_fetch_add(&fake.renderers_made, 1);
     atomic_fetch_add(&fake.renderers, 1);
-    return calloc(1, sizeof(struct frame_renderer));
+    struct frame_renderer *renderer = calloc(1, sizeof *renderer);
+    assert_non_null(renderer);
+    renderer->shared = shared;
+    return renderer;
+}
+
+static inline void fake_end_frame(struct frame_renderer *renderer)
+{
+    if (!renderer->busy)
+        return;
+    renderer->busy = false;
+    renderer->shared->frames--;
+    atomic_fetch_sub(&fake.in_progress, 1);
 }
 
 static inline void fake_renderer_destroy(struct frame_renderer *renderer)
 {
-    if (renderer)
-        atomic_fetch_sub(&fake.renderers, 1);
+    if (!renderer)
+        return;
+    fake_end_frame(renderer);
+    renderer->shared->users--;
+    atomic_fetch_sub(&fake.renderers, 1);
     free(renderer);
+}
+
+static inline uint64_t fake_renderer_bytes(const struct frame_renderer *renderer)
+{
+    (void)renderer;
+    return FAKE_RENDERER_BYTES;
 }
 
 /* Of everything that a motion says; 0: none. The result's `splits` has it, and `structure_bytes` the poses. */
@@ -102,12 +166,26 @@ static inline uint64_t fake_motion_digest(const struct scene_motion *motion)
     return digest;
 }
 
+static inline bool fake_may_begin(const struct frame_renderer *renderer, const struct scene *scene,
+                                  const struct scene_motion *motion, const struct frame_request *request)
+{
+    const struct frame_scene *shared = renderer->shared;
+    bool moves = motion || request->depth == CHANGING_DEPTH;
+    return !shared->frames || (!moves && !shared->moved && shared->revision == scene->revision);
+}
+
 static inline bool fake_begin(struct frame_renderer *renderer, const struct scene *scene,
                               const struct scene_motion *motion, const struct frame_request *request,
                               struct error *error)
 {
     if (renderer->busy)
         return error_set(error, ERROR_INTERNAL, "fake", "a frame is in progress already");
+    if (!fake_may_begin(renderer, scene, motion, request))
+        return error_set(error, ERROR_INTERNAL, "fake", "a frame that may not begin");
+    renderer->shared->revision = scene->revision;
+    renderer->shared->moved = motion || request->depth == CHANGING_DEPTH;
+    renderer->shared->frames++;
+    atomic_fetch_add(&fake.in_progress, 1);
     renderer->motion_digest = fake_motion_digest(motion);
     renderer->pose_count = motion ? motion->pose_count : 0;
     renderer->busy = true;
@@ -131,7 +209,9 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         error_set(error, (enum error_kind)atomic_load(&fake.fail_kind), "fake", "as the test wants");
         return FRAME_FAILED;
     }
-    if (renderer->request.depth == GATED_DEPTH && !atomic_load(&fake.gate_open)) {
+    bool is_gated =
+        renderer->request.depth == GATED_DEPTH && renderer->request.seed != atomic_load(&fake.gate_seed);
+    if (is_gated && !atomic_load(&fake.gate_open)) {
         usleep(500);
         return FRAME_MORE;
     }
@@ -155,31 +235,29 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
     result->pixels = malloc(result->size_bytes);
     assert_non_null(result->pixels);
     memset(result->pixels, atomic_fetch_add(&fake.frames_done, 1), result->size_bytes);
-    renderer->busy = false;
+    fake_end_frame(renderer);
     return FRAME_DONE;
 }
 
 static inline void fake_abandon(struct frame_renderer *renderer)
 {
-    renderer->busy = false;
+    fake_end_frame(renderer);
     atomic_fetch_add(&fake.frames_abandoned, 1);
-}
-
-static inline uint64_t fake_device_bytes(const struct frame_renderer *renderer)
-{
-    (void)renderer;
-    return 77;
 }
 
 static const struct engine_backend fake_backend = {
     .device_create = fake_device_create,
     .device_destroy = fake_device_destroy,
+    .scene_create = fake_scene_create,
+    .scene_destroy = fake_scene_destroy,
+    .scene_bytes = fake_scene_bytes,
     .renderer_create = fake_renderer_create,
     .renderer_destroy = fake_renderer_destroy,
+    .renderer_bytes = fake_renderer_bytes,
+    .may_begin = fake_may_begin,
     .begin = fake_begin,
     .step = fake_step,
     .abandon = fake_abandon,
-    .device_bytes = fake_device_bytes,
 };
 
 /* ---- talking to the engine ---------------------------------------------------------------------- */
@@ -187,10 +265,12 @@ static const struct engine_backend fake_backend = {
 static inline struct engine *start(struct engine_options options)
 {
     atomic_store(&fake.gate_open, false);
+    atomic_store(&fake.gate_seed, 0);
     atomic_store(&fake.fail_steps, 0);
     atomic_store(&fake.fail_from_frame, 0);
     atomic_store(&fake.no_device, false);
     atomic_store(&fake.step_count, 0);
+    atomic_store(&fake.renderers_made, 0);
     atomic_store(&fake.devices_made, 0);
     atomic_store(&fake.frames_begun, 0);
     atomic_store(&fake.frames_done, 0);
@@ -207,7 +287,9 @@ static inline void stop(struct engine *engine)
 {
     engine_destroy(engine);
     assert_int_equal(atomic_load(&fake.devices), 0);
+    assert_int_equal(atomic_load(&fake.scenes), 0);
     assert_int_equal(atomic_load(&fake.renderers), 0);
+    assert_int_equal(atomic_load(&fake.in_progress), 0);
 }
 
 static inline struct engine_command *command(enum engine_command_kind kind, uint64_t client, uint32_t request)

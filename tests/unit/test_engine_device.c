@@ -239,11 +239,110 @@ static void jobs_switch_tracers_on_one_scene_while_both_run(void **state)
     engine_event_destroy(event);
 }
 
+/* ---- several views of one scene ----------------------------------------------------------------- */
+
+#define VIEWS 4
+#define BATCH_VIEW 3 /* another tracer, and a camera that moves */
+
+/* A view that refines one picture, frame by frame. */
+static void submit_view(uint64_t client, uint32_t request, uint32_t view)
+{
+    struct camera_key *key = malloc(sizeof *key);
+    assert_non_null(key);
+    *key = (struct camera_key){.eye_world = {2.0f - (float)view, 1.5f, 3.0f},
+                               .look_at_world = {0, 0.3f, 0},
+                               .up_world = {0, 1, 0},
+                               .fov_y = 0.7f};
+    struct engine_job job = {
+        .last_frame = FRAMES - 1,
+        .frame_step = 1,
+        .frames_per_second = 1,
+        .frame =
+            {.width = 160 + 50 * view, .height = 200, .samples = 2, .depth = 3, .seed = view, .accumulate = true},
+        .encoding = ENCODING_ZSTD,
+        .quality = 1,
+        .path = CAMERA_KEYS,
+        .keys = key,
+        .key_count = 1,
+        .credit = FRAMES,
+    };
+    job.frame.integrator = view == 1 ? INTEGRATOR_PATH : view == 2 ? INTEGRATOR_AO : INTEGRATOR_WHITTED;
+    if (view == BATCH_VIEW) {
+        job.frame.tracer = TRACER_LDC;
+        job.frame.tracer_options.ldc_resolution = 64;
+        job.path = CAMERA_ORBIT;
+        job.orbit_turn = job.orbit_seconds = 1;
+    }
+    submit((struct engine_command){
+        .kind = ENGINE_JOB_START, .client = client, .request = request, .scene = 1, .job = job});
+}
+
+struct view_frame {
+    uint64_t digest, begin_ns, end_ns;
+    uint32_t samples;
+};
+
+static void collect_views(struct view_frame frames[VIEWS][FRAMES], uint32_t first, uint32_t jobs)
+{
+    unsigned next[VIEWS] = {0};
+    while (jobs) {
+        struct engine_event *event = next_event();
+        uint32_t view = event->request - first;
+        assert_in_range(view, 0, VIEWS - 1);
+        jobs -= event->kind == ENGINE_DONE;
+        if (event->kind == ENGINE_FRAME) {
+            const struct frame_result *result = &event->frame->result;
+            uint64_t frame_ns = stage_times_sum_ns(&result->times, STAGE_FRAME, STAGE_CPU);
+            frames[view][next[view]++] = (struct view_frame){event->frame->digest, result->times.origin_ns,
+                                                             result->times.origin_ns + frame_ns, result->samples};
+        }
+        engine_event_destroy(event);
+    }
+}
+
+static bool are_together(const struct view_frame frames[VIEWS][FRAMES], int a, int b)
+{
+    for (int i = 0; i < FRAMES; i++)
+        for (int k = 0; k < FRAMES; k++)
+            if (frames[a][i].begin_ns < frames[b][k].end_ns && frames[b][k].begin_ns < frames[a][i].end_ns)
+                return true;
+    return false;
+}
+
+static void views_of_one_scene_at_once_show_what_each_shows_alone(void **state)
+{
+    (void)state;
+    if (!engine)
+        skip();
+    struct view_frame alone[VIEWS][FRAMES], together[VIEWS][FRAMES];
+    make_scene(4, 0.6f);
+    for (uint32_t view = 0; view < VIEWS; view++) {
+        submit_view(4, 3 + view, view);
+        collect_views(alone, 3, 1);
+    }
+    for (uint32_t view = 0; view < VIEWS; view++)
+        submit_view(4, 3 + VIEWS + view, view);
+    collect_views(together, 3 + VIEWS, VIEWS);
+    for (int view = 0; view < VIEWS; view++) {
+        for (uint32_t i = 0; i < FRAMES; i++) {
+            assert_true(alone[view][i].digest == together[view][i].digest);
+            assert_int_equal(together[view][i].samples, view == BATCH_VIEW ? 2 : 2 * (i + 1));
+        }
+        if (view > 0)
+            assert_true(are_together(together, 0, view));
+    }
+    submit((struct engine_command){.kind = ENGINE_CLIENT_GONE, .client = 4});
+    struct engine_event *event = next_event();
+    assert_int_equal(event->kind, ENGINE_CLIENT_FORGOTTEN);
+    engine_event_destroy(event);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(clients_that_take_turns_get_the_frames_they_would_get_alone),
         cmocka_unit_test(jobs_switch_tracers_on_one_scene_while_both_run),
+        cmocka_unit_test(views_of_one_scene_at_once_show_what_each_shows_alone),
     };
     return cmocka_run_group_tests(tests, start, stop);
 }

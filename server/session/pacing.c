@@ -1,0 +1,224 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/pacing.h"
+
+#include <math.h>
+#include <string.h>
+
+#define WINDOW_NS UINT64_C(10000000000)
+/* How much of what was learned about the link stays with each frame: eight frames count most. */
+#define CARRIED_FADES 0.875
+/* A local socket takes no time that could be measured; this keeps the rate finite. */
+#define CARRIED_LEAST_NS 1000.0
+/* The part of the link that frames are made to fit: what is left drains queues of others, and our own. */
+#define LINK_SHARE 0.9
+#define LEARN_SHARE 0.25
+/* So often in a row the next better step must fit, with this room to spare. */
+#define BETTER_TIMES 8
+#define BETTER_ROOM 1.25
+
+static const unsigned scales_eighths[] = {8, 6, 4, 3, 2};
+#define SCALES (sizeof scales_eighths / sizeof scales_eighths[0])
+
+void pacing_init(struct pacing *pacing, uint64_t frame_ns)
+{
+    *pacing = (struct pacing){.frame_ns = frame_ns, .scale_eighths = PACING_SCALE_FULL};
+}
+
+/* ---- the link ---------------------------------------------------------------------------------------- */
+
+uint64_t pacing_bytes_per_second(const struct pacing *pacing)
+{
+    return pacing->carried_ns > 0.0 ? (uint64_t)(pacing->carried_bytes / pacing->carried_ns * 1e9) : 0;
+}
+
+uint64_t pacing_round_trip_ns(const struct pacing *pacing)
+{
+    uint64_t before_ns = pacing->round_trip_before_ns, now_ns = pacing->round_trip_ns;
+    return !now_ns || (before_ns && before_ns < now_ns) ? before_ns : now_ns;
+}
+
+/* What the link drains in one frame time and the least round trip. */
+static double room_bytes(const struct pacing *pacing)
+{
+    return pacing->carried_bytes / pacing->carried_ns *
+           ((double)pacing->frame_ns + (double)pacing_round_trip_ns(pacing));
+}
+
+bool pacing_may_send(const struct pacing *pacing)
+{
+    if (!pacing->in_flight_count)
+        return true;
+    if (!(pacing->carried_ns > 0.0) || pacing->in_flight_count == PACING_IN_FLIGHT_MAX)
+        return false;
+    return (double)(pacing->in_flight_bytes + pacing->last_bytes) <= room_bytes(pacing);
+}
+
+void pacing_sent(struct pacing *pacing, uint32_t frame, uint64_t bytes, uint64_t now_ns)
+{
+    if (pacing->in_flight_count == PACING_IN_FLIGHT_MAX)
+        return;
+    pacing->in_flight[pacing->in_flight_count++] =
+        (struct pacing_frame){.frame = frame, .bytes = bytes, .sent_ns = now_ns};
+    pacing->in_flight_bytes += bytes;
+    pacing->last_bytes = bytes;
+}
+
+static void learn_round_trip(struct pacing *pacing, uint64_t taken_ns, uint64_t now_ns)
+{
+    if (now_ns - pacing->window_begun_ns >= WINDOW_NS) {
+        pacing->round_trip_before_ns = pacing->round_trip_ns;
+        pacing->round_trip_ns = 0;
+        pacing->window_begun_ns = now_ns;
+    }
+    taken_ns = taken_ns ? taken_ns : 1;
+    if (!pacing->round_trip_ns || taken_ns < pacing->round_trip_ns)
+        pacing->round_trip_ns = taken_ns;
+}
+
+/* The link worked on a frame from when its first bytes came until its last ones did; if it stood in line behind
+ * another, since that one had come at the latest. Of a client that does not tell of the first bytes the way counts
+ * too: the rate is too low then but where frames stand in line. */
+static void learn_rate(struct pacing *pacing, const struct pacing_frame *frame, uint64_t now_ns)
+{
+    uint64_t since_ns = frame->begun_ns ? frame->begun_ns : frame->sent_ns;
+    bool in_line = frame->sent_ns + pacing_round_trip_ns(pacing) < pacing->last_whole_ns;
+    if (in_line && (!frame->begun_ns || pacing->last_whole_ns < since_ns))
+        since_ns = pacing->last_whole_ns;
+    double taken_ns = now_ns > since_ns ? (double)(now_ns - since_ns) : 0.0;
+    pacing->carried_bytes = pacing->carried_bytes * CARRIED_FADES + (double)frame->bytes;
+    pacing->carried_ns = pacing->carried_ns * CARRIED_FADES + fmax(taken_ns, CARRIED_LEAST_NS);
+}
+
+static void remove_oldest(struct pacing *pacing, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        pacing->in_flight_bytes -= pacing->in_flight[i].bytes;
+    pacing->in_flight_count -= count;
+    memmove(pacing->in_flight, pacing->in_flight + count, pacing->in_flight_count * sizeof pacing->in_flight[0]);
+}
+
+void pacing_acknowledged(struct pacing *pacing, uint32_t frame, bool whole, uint64_t now_ns)
+{
+    size_t place = 0;
+    while (place < pacing->in_flight_count && pacing->in_flight[place].frame != frame)
+        place++;
+    if (place == pacing->in_flight_count)
+        return;
+    struct pacing_frame *acknowledged = &pacing->in_flight[place];
+    pacing->acknowledges = true;
+    if (!whole) {
+        if (!acknowledged->begun_ns)
+            learn_round_trip(pacing, now_ns - acknowledged->sent_ns, now_ns);
+        acknowledged->begun_ns = now_ns;
+        return;
+    }
+    if (!acknowledged->begun_ns)
+        learn_round_trip(pacing, now_ns - acknowledged->sent_ns, now_ns);
+    learn_rate(pacing, acknowledged, now_ns);
+    pacing->last_whole_ns = now_ns;
+    remove_oldest(pacing, place + 1); /* bytes come in order: those before it have come too */
+}
+
+void pacing_forget(struct pacing *pacing)
+{
+    if (!pacing->acknowledges)
+        remove_oldest(pacing, pacing->in_flight_count);
+}
+
+/* ---- size and quality -------------------------------------------------------------------------------- */
+
+/* Bytes of a JPEG beside those at PACING_QUALITY_REFERENCE: each step of 12 is a factor of about 1.35 (rendered
+ * pictures, libjpeg-turbo, 4:2:0). */
+static double bytes_of_quality(unsigned quality)
+{
+    return pow(1.35, ((double)quality - PACING_QUALITY_REFERENCE) / 12.0);
+}
+
+static double area_of(unsigned scale_eighths)
+{
+    double side = (double)scale_eighths / PACING_SCALE_FULL;
+    return side * side;
+}
+
+static void learn(double *known, double seen)
+{
+    *known = *known > 0.0 ? *known + LEARN_SHARE * (seen - *known) : seen;
+}
+
+void pacing_learn(struct pacing *pacing, unsigned scale_eighths, unsigned quality, uint64_t render_ns,
+                  uint64_t bytes)
+{
+    double area = area_of(scale_eighths);
+    learn(&pacing->render_ns_full, (double)render_ns / area);
+    if (quality)
+        learn(&pacing->bytes_full, (double)bytes / area / bytes_of_quality(quality));
+}
+
+static double bytes_of(const struct pacing *pacing, unsigned scale_eighths, unsigned quality)
+{
+    return pacing->bytes_full * area_of(scale_eighths) * bytes_of_quality(quality);
+}
+
+/* So that the rule for sending lets one go each frame time: those that were sent before it and are not
+ * acknowledged yet have to fit as well. */
+static double bytes_a_frame(const struct pacing *pacing)
+{
+    if (!(pacing->carried_ns > 0.0))
+        return INFINITY;
+    double of_link = LINK_SHARE * pacing->carried_bytes / pacing->carried_ns * (double)pacing->frame_ns;
+    double way_frames = (double)pacing_round_trip_ns(pacing) / (double)pacing->frame_ns;
+    double of_room = LINK_SHARE * room_bytes(pacing) / (floor(LINK_SHARE + way_frames) + 1.0);
+    return fmin(of_link, of_room);
+}
+
+/* The best that fits; `room`: how many times over. */
+static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned quality_wanted, double room)
+{
+    double bytes_max = bytes_a_frame(pacing) / room;
+    unsigned least = quality_wanted < PACING_QUALITY_LEAST ? quality_wanted : PACING_QUALITY_LEAST;
+    struct pacing_advice advice = {.scale_eighths = scales_eighths[SCALES - 1], .quality = least};
+    for (size_t i = 0; i < SCALES; i++) {
+        unsigned scale = scales_eighths[i];
+        bool rendered_in_time =
+            pacing->render_ns_full * area_of(scale) * room <= (double)pacing->frame_ns || i == SCALES - 1;
+        if (!rendered_in_time || (bytes_of(pacing, scale, least) > bytes_max && i < SCALES - 1))
+            continue;
+        advice.scale_eighths = scale;
+        advice.quality = quality_wanted;
+        while (advice.quality > least && bytes_of(pacing, scale, advice.quality) > bytes_max)
+            advice.quality--;
+        break;
+    }
+    return advice;
+}
+
+static bool is_better(const struct pacing_advice *a, unsigned scale_eighths, unsigned quality)
+{
+    return a->scale_eighths > scale_eighths || (a->scale_eighths == scale_eighths && a->quality > quality);
+}
+
+struct pacing_advice pacing_advise(struct pacing *pacing, unsigned quality_wanted)
+{
+    if (!pacing->quality)
+        pacing->quality = quality_wanted;
+    struct pacing_advice now = best_that_fits(pacing, quality_wanted, 1.0);
+    struct pacing_advice with_room = best_that_fits(pacing, quality_wanted, BETTER_ROOM);
+    if (!is_better(&now, pacing->scale_eighths, pacing->quality)) {
+        pacing->better_count = 0;
+    } else if (!is_better(&with_room, pacing->scale_eighths, pacing->quality)) {
+        pacing->better_count = 0;
+        now.scale_eighths = pacing->scale_eighths;
+        now.quality = pacing->quality;
+    } else if (++pacing->better_count < BETTER_TIMES) {
+        now.scale_eighths = pacing->scale_eighths;
+        now.quality = pacing->quality;
+    } else {
+        pacing->better_count = 0;
+        now = with_room;
+    }
+    pacing->scale_eighths = now.scale_eighths;
+    pacing->quality = now.quality;
+    double bytes = fmin(bytes_a_frame(pacing), 0x1p40);
+    now.bytes = (uint64_t)bytes;
+    return now;
+}
