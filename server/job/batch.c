@@ -77,10 +77,10 @@ static struct job *replaced_by(struct engine *engine, const struct engine_comman
     return NULL;
 }
 
-bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_command *command,
+bool job_start(struct engine *engine, struct engine_reference *reference, struct engine_command *command,
                struct error *error)
 {
-    if (!spec_check(&command->job, scene->scene, error))
+    if (!spec_check(&command->job, reference->scene->scene, error))
         return false;
     struct job *job = calloc(1, sizeof *job);
     struct job_output *output = job_output_create(&(struct job_output_options){
@@ -104,7 +104,8 @@ bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_
     command->job.keys = NULL;
     command->job.clips = NULL;
     command->job.wishes = NULL;
-    job->scene = scene;
+    job->reference = reference;
+    job->scene = reference->scene;
     job->output = output;
     job->next_frame = job->spec.first_frame;
     job->view.credit = job->spec.credit;
@@ -113,7 +114,7 @@ bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_
         struct engine_scene *scene_before = before->scene;
         view_follow(job, before);
         job_abort(engine, before, end_before);
-        if (scene_before != scene)
+        if (scene_before != job->scene)
             engine_run_waiting(engine, scene_before);
     }
     return true;
@@ -259,8 +260,8 @@ static void frame_failed(struct engine *engine, struct job *job, const struct er
         if (!engine_need_device(engine, &rebuild_error))
             job_finish(job, &rebuild_error);
         /* No frame is in progress any more, in any scene. */
-        for (size_t i = 0; i < engine->job_count; i++)
-            engine_run_waiting(engine, engine->jobs[i]->scene);
+        for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+            engine_run_waiting(engine, scene);
         return;
     }
     if (error->kind == ERROR_OUT_OF_MEMORY && !job->evicted && engine_evict_idle(engine, job)) {
@@ -374,7 +375,7 @@ static void frame_go_on(struct engine *engine, struct job *job)
 void job_step(struct engine *engine, struct job *job)
 {
     struct engine_scene *scene = job->scene;
-    job->served = scene->client->served = scene->used = ++engine->slices;
+    job->served = job->reference->client->served = scene->used = ++engine->slices;
     if (job->rendering && job->spec.kind == JOB_VIEW && view_is_stale(job))
         abandon_frame(engine, job);
     else if (job->rendering) {

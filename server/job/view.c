@@ -75,6 +75,17 @@ static uint32_t samples_of_next(const struct job *job)
     return wanted < job->spec.pass_samples ? wanted : job->spec.pass_samples;
 }
 
+/* Smaller while it moves, if that is what keeps up. */
+static void apply_effort(const struct job *job, struct frame_request *request)
+{
+    const struct view_wish *wish = &job->view.wish;
+    uint32_t scale = wish->effort.scale_eighths;
+    if (!job->spec.adapt || !wish->camera.moving || !scale || scale >= 8)
+        return;
+    request->width = request->width * scale >= 8 ? request->width * scale / 8 : 1;
+    request->height = request->height * scale >= 8 ? request->height * scale / 8 : 1;
+}
+
 bool view_take_up(struct job *job, struct shot *shot, struct error *error)
 {
     struct view *view = &job->view;
@@ -91,6 +102,7 @@ bool view_take_up(struct job *job, struct shot *shot, struct error *error)
     shot->request.seed = job->spec.frame.seed; /* the same picture of the same place */
     shot->request.accumulate = adds_up(job);
     shot->request.samples = samples_of_next(job);
+    apply_effort(job, &shot->request);
     return true;
 }
 
@@ -118,6 +130,12 @@ void view_done(struct job *job, struct engine_frame *frame)
     frame->moving = camera->moving;
     frame->wants_key = view->wish.key_frame;
     view->wish.key_frame = false;
+    if (camera->moving && job->spec.adapt) {
+        const struct view_effort *effort = &view->wish.effort;
+        frame->scale_eighths = effort->scale_eighths;
+        frame->quality = effort->quality ? effort->quality : frame->quality;
+        frame->wanted_bytes = effort->bytes;
+    }
     if (!camera->moving && job->spec.still_encoding != job->spec.encoding) {
         frame->encoding = job->spec.still_encoding;
         if (frame->encoding != ENCODING_JPEG)
