@@ -61,10 +61,10 @@ static uint32_t window_of(const struct engine *engine, const struct frame_reques
                                                        : engine->options.frames_in_flight;
 }
 
-bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_command *command,
+bool job_start(struct engine *engine, struct engine_reference *reference, struct engine_command *command,
                struct error *error)
 {
-    if (!spec_check(&command->job, scene->scene, error))
+    if (!spec_check(&command->job, reference->scene->scene, error))
         return false;
     struct job *job = calloc(1, sizeof *job);
     struct job_output *output = job_output_create(&(struct job_output_options){
@@ -84,7 +84,8 @@ bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_
     job->spec = command->job;
     command->job.keys = NULL;
     command->job.clips = NULL;
-    job->scene = scene;
+    job->reference = reference;
+    job->scene = reference->scene;
     job->output = output;
     job->next_frame = job->spec.first_frame;
     engine->jobs[engine->job_count++] = job;
@@ -203,8 +204,8 @@ static void frame_failed(struct engine *engine, struct job *job, const struct er
         if (!engine_need_device(engine, &rebuild_error))
             job_finish(job, &rebuild_error);
         /* No frame is in progress any more, in any scene. */
-        for (size_t i = 0; i < engine->job_count; i++)
-            engine_run_waiting(engine, engine->jobs[i]->scene);
+        for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+            engine_run_waiting(engine, scene);
         return;
     }
     if (error->kind == ERROR_OUT_OF_MEMORY && !job->evicted && engine_evict_idle(engine, job)) {
@@ -310,7 +311,7 @@ static void frame_go_on(struct engine *engine, struct job *job)
 void job_step(struct engine *engine, struct job *job)
 {
     struct engine_scene *scene = job->scene;
-    job->served = scene->client->served = scene->used = ++engine->slices;
+    job->served = job->reference->client->served = scene->used = ++engine->slices;
     if (job->rendering) {
         frame_go_on(engine, job);
     } else {

@@ -32,118 +32,6 @@ static void done(struct engine *engine, const struct engine_command *command, ui
     engine_post_done(engine, command->client, command->request, revision);
 }
 
-static struct engine_event *cancelled_event(uint64_t client, uint32_t request, const char *why)
-{
-    struct engine_event *event = event_create(ENGINE_FAILED, client, request);
-    if (event)
-        error_set(&event->error, ERROR_CANCELLED, "", "%s", why);
-    return event;
-}
-
-/* ---- clients and scenes ------------------------------------------------------------------------- */
-
-static struct engine_client *need_client(struct engine *engine, uint64_t number)
-{
-    struct engine_client *client = hashmap_get(&engine->clients, number);
-    if (client)
-        return client;
-    client = calloc(1, sizeof *client);
-    if (!client || !hashmap_put(&engine->clients, number, client)) {
-        free(client);
-        return NULL;
-    }
-    client->client = number;
-    return client;
-}
-
-static struct engine_scene *find_scene(struct engine *engine, uint64_t client_number, uint32_t id)
-{
-    struct engine_client *client = hashmap_get(&engine->clients, client_number);
-    return client ? hashmap_get(&client->scenes, id) : NULL;
-}
-
-static void scene_open(struct engine *engine, struct engine_command *command)
-{
-    struct error error = {0};
-    if (find_scene(engine, command->client, command->scene)) {
-        error_set(&error, ERROR_INVALID, "scene_open.scene", "scene %u is open already", command->scene);
-        fail(engine, command, &error);
-        return;
-    }
-    struct engine_client *client = need_client(engine, command->client);
-    struct engine_scene *scene = client ? calloc(1, sizeof *scene) : NULL;
-    if (scene)
-        scene->scene = scene_create(command->name, &engine->options.scene_limits);
-    if (!scene || !scene->scene || !hashmap_put(&client->scenes, command->scene, scene)) {
-        if (scene)
-            scene_destroy(scene->scene);
-        free(scene);
-        error_set(&error, ERROR_OUT_OF_MEMORY, "scene_open", "no memory for a scene");
-        fail(engine, command, &error);
-        return;
-    }
-    scene->client = client;
-    scene->id = command->scene;
-    done(engine, command, 0);
-}
-
-static void abort_jobs(struct engine *engine, const struct engine_scene *scene, const char *why)
-{
-    for (size_t i = engine->job_count; i-- > 0;) {
-        struct job *job = engine->jobs[i];
-        if (job->scene == scene)
-            job_abort(engine, job, why ? cancelled_event(job->client, job->request, why) : NULL);
-    }
-}
-
-/* Jobs have ended, nothing waits. */
-static void scene_free(struct engine *engine, struct engine_scene *scene)
-{
-    hashmap_remove(&scene->client->scenes, scene->id);
-    scene_drop_shared(engine, scene);
-    engine->table_bytes -= scene->scene->table_bytes;
-    scene_destroy(scene->scene);
-    free(scene->idle);
-    free(scene->waiting);
-    free(scene);
-}
-
-static void scene_close(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
-{
-    abort_jobs(engine, scene, "its scene was closed");
-    /* What came before is answered before. */
-    engine_run_waiting(engine, scene);
-    abort_jobs(engine, scene, "its scene was closed");
-    scene_free(engine, scene);
-    done(engine, command, 0);
-}
-
-void engine_forget_client(struct engine *engine, struct engine_client *client)
-{
-    size_t cursor = 0;
-    void *value;
-    while (hashmap_next(&client->scenes, &cursor, NULL, &value)) {
-        struct engine_scene *scene = value;
-        abort_jobs(engine, scene, NULL);
-        for (size_t i = 0; i < scene->waiting_count; i++)
-            engine_command_destroy(scene->waiting[i]);
-        scene->waiting_count = 0;
-        scene_free(engine, scene);
-        cursor = 0; /* the map has changed */
-    }
-    hashmap_remove(&engine->clients, client->client);
-    hashmap_finish(&client->scenes);
-    free(client);
-}
-
-static void client_gone(struct engine *engine, struct engine_command *command)
-{
-    struct engine_client *client = hashmap_get(&engine->clients, command->client);
-    if (client)
-        engine_forget_client(engine, client);
-    engine_post(engine, event_create(ENGINE_CLIENT_FORGOTTEN, command->client, command->request));
-}
-
 /* ---- what frames in progress keep waiting ------------------------------------------------------- */
 
 /* Blobs are limited where they are held, as scenes share them; tables here, all scenes together. */
@@ -159,11 +47,17 @@ static bool commit_within_limits(struct engine *engine, struct scene *scene, str
     return applied;
 }
 
-static void commit(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
+static void commit(struct engine *engine, const struct engine_reference *reference, struct engine_command *command)
 {
+    struct engine_scene *scene = reference->scene;
     struct error error = {0};
     uint64_t start_ns = clock_now_ns();
     bool applied = commit_within_limits(engine, scene->scene, command, &error);
+    if (!applied && error.kind == ERROR_LIMIT && engine_trim_scenes(engine)) {
+        /* Scenes that nobody holds give way. */
+        error = (struct error){0};
+        applied = commit_within_limits(engine, scene->scene, command, &error);
+    }
     if (!applied) {
         fail(engine, command, &error);
         return;
@@ -172,51 +66,112 @@ static void commit(struct engine *engine, struct engine_scene *scene, struct eng
         scene->apply_start_ns = start_ns;
     scene->apply_ns += clock_now_ns() - start_ns;
     done(engine, command, scene->scene->revision);
+    engine_scene_changed(engine, reference);
 }
 
-static void start(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
+static void start(struct engine *engine, struct engine_reference *reference, struct engine_command *command)
 {
     struct error error = {0};
-    if (!job_start(engine, scene, command, &error))
+    if (!job_start(engine, reference, command, &error))
         fail(engine, command, &error);
+}
+
+/* False: it stays the caller's. */
+static bool keep_waiting(struct engine_scene *scene, struct engine_command *command)
+{
+    struct engine_command **waiting = realloc(scene->waiting, (scene->waiting_count + 1) * sizeof *waiting);
+    if (!waiting)
+        return false;
+    scene->waiting = waiting;
+    waiting[scene->waiting_count++] = command;
+    return true;
 }
 
 static void wait_for_frames(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
 {
-    struct engine_command **waiting = NULL;
-    if (scene->waiting_count < WAITING_MAX)
-        waiting = realloc(scene->waiting, (scene->waiting_count + 1) * sizeof *waiting);
-    if (waiting) {
-        scene->waiting = waiting;
-        waiting[scene->waiting_count++] = command;
+    if (scene->waiting_count < WAITING_MAX && keep_waiting(scene, command))
         return;
-    }
     struct error error = {0};
     error_set(&error, ERROR_BUSY, "", "%zu requests wait for frames in progress already", scene->waiting_count);
     fail(engine, command, &error);
     engine_command_destroy(command);
 }
 
+static bool is_by(const struct engine_command *command, const struct engine_reference *reference)
+{
+    return command->client == reference->client->client && command->scene == reference->id;
+}
+
+static bool waits_by(const struct engine_scene *scene, const struct engine_reference *reference)
+{
+    for (size_t i = 0; i < scene->waiting_count; i++) {
+        if (is_by(scene->waiting[i], reference))
+            return true;
+    }
+    return false;
+}
+
+static struct engine_command *take_waiting(struct engine_scene *scene, size_t i)
+{
+    struct engine_command *command = scene->waiting[i];
+    memmove(&scene->waiting[i], &scene->waiting[i + 1], (--scene->waiting_count - i) * sizeof *scene->waiting);
+    return command;
+}
+
+struct engine_command *engine_take_waiting(struct engine_scene *scene, const struct engine_reference *reference)
+{
+    for (size_t i = 0; i < scene->waiting_count; i++) {
+        if (is_by(scene->waiting[i], reference))
+            return take_waiting(scene, i);
+    }
+    return NULL;
+}
+
+/* False: it has to wait for what came before it from this client, and that for another client's frame. */
+static bool scene_close(struct engine *engine, struct engine_reference *reference, struct engine_command *command)
+{
+    struct engine_scene *scene = reference->scene;
+    engine_abort_jobs(engine, reference, "its scene was closed");
+    /* What came before is answered before. */
+    engine_run_waiting(engine, scene);
+    if (waits_by(scene, reference) && keep_waiting(scene, command))
+        return false;
+    engine_scene_close(engine, reference, command);
+    return true;
+}
+
+static const char *scene_field(enum engine_command_kind kind)
+{
+    return kind == ENGINE_JOB_START        ? "render.scene"
+           : kind == ENGINE_SCENE_CLOSE    ? "scene_close.scene"
+           : kind == ENGINE_SCENE_DESCRIBE ? "scene_describe.scene"
+                                           : "edit_begin.scene";
+}
+
 /* For commands that name a scene. */
 static void handle_of_scene(struct engine *engine, struct engine_command *command)
 {
-    struct engine_scene *scene = find_scene(engine, command->client, command->scene);
-    if (!scene) {
+    struct engine_reference *reference = engine_find_reference(engine, command->client, command->scene);
+    if (!reference) {
         struct error error = {0};
-        const char *field = command->kind == ENGINE_JOB_START     ? "render.scene"
-                            : command->kind == ENGINE_SCENE_CLOSE ? "scene_close.scene"
-                                                                  : "edit_begin.scene";
-        error_set(&error, ERROR_UNKNOWN_ID, field, "there is no scene %u", command->scene);
+        error_set(&error, ERROR_UNKNOWN_ID, scene_field(command->kind), "there is no scene %u", command->scene);
         fail(engine, command, &error);
-    } else if (command->kind == ENGINE_SCENE_CLOSE) {
-        scene_close(engine, scene, command);
+        engine_command_destroy(command);
+        return;
+    }
+    struct engine_scene *scene = reference->scene;
+    if (command->kind == ENGINE_SCENE_CLOSE) {
+        if (!scene_close(engine, reference, command))
+            return;
     } else if ((command->kind == ENGINE_COMMIT && scene->frames) || scene->waiting_count) {
         wait_for_frames(engine, scene, command);
         return;
     } else if (command->kind == ENGINE_COMMIT) {
-        commit(engine, scene, command);
+        commit(engine, reference, command);
+    } else if (command->kind == ENGINE_SCENE_DESCRIBE) {
+        engine_scene_describe(engine, scene, command);
     } else {
-        start(engine, scene, command);
+        start(engine, reference, command);
     }
     engine_command_destroy(command);
 }
@@ -237,41 +192,36 @@ void engine_run_waiting(struct engine *engine, struct engine_scene *scene)
 
 /* ---- jobs --------------------------------------------------------------------------------------- */
 
-/* A command of that request that waits for frames; NULL: there is none. `taken`: takes it out. */
-static struct engine_command *find_waiting(struct engine *engine, uint64_t client_number, uint32_t request,
-                                           bool take)
+/* Where a command of that request waits for frames; false: none does. */
+static bool find_waiting(struct engine *engine, const struct engine_command *by, struct engine_scene **found,
+                         size_t *place)
 {
-    struct engine_client *client = hashmap_get(&engine->clients, client_number);
-    size_t cursor = 0;
-    void *value;
-    while (client && hashmap_next(&client->scenes, &cursor, NULL, &value)) {
-        struct engine_scene *scene = value;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
         for (size_t i = 0; i < scene->waiting_count; i++) {
-            struct engine_command *command = scene->waiting[i];
-            if (command->request != request)
+            const struct engine_command *command = scene->waiting[i];
+            if (command->client != by->client || command->request != by->target_request)
                 continue;
-            if (take)
-                memmove(&scene->waiting[i], &scene->waiting[i + 1],
-                        (--scene->waiting_count - i) * sizeof *scene->waiting);
-            return command;
+            *found = scene;
+            *place = i;
+            return true;
         }
     }
-    return NULL;
+    return false;
 }
 
 static void job_cancel(struct engine *engine, struct engine_command *command)
 {
     uint32_t target = command->target_request;
+    struct engine_scene *waits_for;
+    size_t place;
     struct job *job = job_find(engine, command->client, target);
     if (job) {
         struct engine_scene *scene = job->scene;
-        job_abort(engine, job, cancelled_event(command->client, target, "the client cancelled it"));
+        job_abort(engine, job, engine_cancelled(command->client, target, "the client cancelled it"));
         engine_run_waiting(engine, scene);
-    } else {
-        struct engine_command *waiting = find_waiting(engine, command->client, target, true);
-        if (waiting)
-            engine_post(engine, cancelled_event(command->client, target, "the client cancelled it"));
-        engine_command_destroy(waiting);
+    } else if (find_waiting(engine, command, &waits_for, &place)) {
+        engine_command_destroy(take_waiting(waits_for, place));
+        engine_post(engine, engine_cancelled(command->client, target, "the client cancelled it"));
     }
     done(engine, command, 0);
 }
@@ -283,9 +233,22 @@ static void job_credit(struct engine *engine, const struct engine_command *comma
         job_output_credit(job->output, command->credit);
         return;
     }
-    struct engine_command *waiting = find_waiting(engine, command->client, command->target_request, false);
-    if (waiting && command->credit > waiting->job.credit)
+    struct engine_scene *waits_for;
+    size_t place;
+    if (!find_waiting(engine, command, &waits_for, &place))
+        return;
+    struct engine_command *waiting = waits_for->waiting[place];
+    if (command->credit > waiting->job.credit)
         waiting->job.credit = command->credit;
+}
+
+static void client_gone(struct engine *engine, const struct engine_command *command)
+{
+    struct engine_client *client = hashmap_get(&engine->clients, command->client);
+    if (client)
+        engine_forget_client(engine, client);
+    engine_reap_scenes(engine);
+    engine_post(engine, event_create(ENGINE_CLIENT_FORGOTTEN, command->client, command->request));
 }
 
 static void report_stats(struct engine *engine, const struct engine_command *command)
@@ -304,12 +267,23 @@ void engine_handle(struct engine *engine, struct engine_command *command)
 {
     switch (command->kind) {
     case ENGINE_SCENE_CLOSE:
+    case ENGINE_SCENE_DESCRIBE:
     case ENGINE_COMMIT:
     case ENGINE_JOB_START:
         handle_of_scene(engine, command);
+        engine_reap_scenes(engine);
         return;
     case ENGINE_SCENE_OPEN:
-        scene_open(engine, command);
+        engine_scene_open(engine, command);
+        break;
+    case ENGINE_SCENE_ATTACH:
+        engine_scene_attach(engine, command);
+        break;
+    case ENGINE_SCENE_LIST:
+        engine_scene_list(engine, command);
+        break;
+    case ENGINE_SCENES_TRIM:
+        engine_trim_scenes(engine);
         break;
     case ENGINE_JOB_CREDIT:
         job_credit(engine, command);

@@ -22,20 +22,6 @@ bool engine_open_device(struct engine *engine, struct error *error)
     return true;
 }
 
-/* Calls a function for every scene of every client. */
-static void for_each_scene(struct engine *engine, void (*visit)(struct engine_scene *scene, void *context),
-                           void *context)
-{
-    size_t client_cursor = 0;
-    void *client;
-    while (hashmap_next(&engine->clients, &client_cursor, NULL, &client)) {
-        size_t scene_cursor = 0;
-        void *scene;
-        while (hashmap_next(&((struct engine_client *)client)->scenes, &scene_cursor, NULL, &scene))
-            visit(scene, context);
-    }
-}
-
 /* ---- what scenes and jobs keep ------------------------------------------------------------------ */
 
 static struct engine_idle *find_idle(const struct engine_scene *scene, uint64_t client)
@@ -122,9 +108,9 @@ uint64_t scene_device_bytes(const struct engine *engine, const struct engine_sce
 
 /* ---- loss and need ------------------------------------------------------------------------------ */
 
-static void lose_scene(struct engine_scene *scene, void *context)
+static void lose_scene(struct engine *engine, struct engine_scene *scene)
 {
-    scene_drop_shared(context, scene);
+    scene_drop_shared(engine, scene);
     scene->frames = 0;
     scene->put_off = NULL;
 }
@@ -134,7 +120,8 @@ void engine_drop_device(struct engine *engine)
     /* Frames in progress are taken up again from their beginning. */
     for (size_t i = 0; i < engine->job_count; i++)
         engine->jobs[i]->rendering = false;
-    for_each_scene(engine, lose_scene, engine);
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        lose_scene(engine, scene);
     engine->backend->device_destroy(engine->device);
     engine->device = NULL;
 }
@@ -164,32 +151,22 @@ bool engine_need_device(struct engine *engine, struct error *error)
     return false;
 }
 
-struct eviction {
-    struct engine *engine;
-    const struct job *keep;
-    bool found;
-};
-
-static void evict(struct engine_scene *scene, void *context)
-{
-    struct eviction *eviction = context;
-    eviction->found |= scene_drop_idle(eviction->engine, scene, NULL);
-    if (scene == eviction->keep->scene || scene->frames || !scene->shared)
-        return;
-    scene_drop_shared(eviction->engine, scene);
-    eviction->found = true;
-}
-
 bool engine_evict_idle(struct engine *engine, const struct job *keep)
 {
-    struct eviction eviction = {.engine = engine, .keep = keep};
+    bool found = false;
     for (size_t i = 0; i < engine->job_count; i++) {
         struct job *job = engine->jobs[i];
         if (job != keep && !job->rendering)
-            eviction.found |= drop_renderer(engine, job);
+            found |= drop_renderer(engine, job);
     }
-    for_each_scene(engine, evict, &eviction);
-    return eviction.found;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        found |= scene_drop_idle(engine, scene, NULL);
+        if (scene == keep->scene || scene->frames || !scene->shared)
+            continue;
+        scene_drop_shared(engine, scene);
+        found = true;
+    }
+    return found;
 }
 
 uint64_t engine_device_bytes(const struct engine *engine)

@@ -44,6 +44,14 @@ void engine_post_failed(struct engine *engine, uint64_t client, uint32_t request
     engine_post(engine, event);
 }
 
+struct engine_event *engine_cancelled(uint64_t client, uint32_t request, const char *why)
+{
+    struct engine_event *event = event_create(ENGINE_FAILED, client, request);
+    if (event)
+        error_set(&event->error, ERROR_CANCELLED, "", "%s", why);
+    return event;
+}
+
 void engine_nudge(struct engine *engine)
 {
     /* One in the queue is enough. If the queue is full, that alone keeps the thread awake. */
@@ -68,7 +76,7 @@ static struct job *next_job(struct engine *engine)
     for (size_t i = 0; i < count; i++) {
         const struct job *job = engine->jobs[i];
         entries[i] =
-            (struct schedule_entry){job->client, job->scene->client->served, job->served, job_is_ready(job)};
+            (struct schedule_entry){job->client, job->reference->client->served, job->served, job_is_ready(job)};
     }
     size_t picked = schedule_pick(entries, count);
     if (entries != few)
@@ -93,11 +101,12 @@ static void run(struct engine *engine)
         atomic_store(&engine->nudged, false);
         take_commands(engine, queue_try_pop(engine->commands));
         jobs_reap(engine);
+        uint64_t wait_ns = engine_reap_scenes(engine);
         struct job *job = next_job(engine);
         if (job)
             job_step(engine, job);
         else
-            take_commands(engine, queue_pop(engine->commands, UINT64_MAX));
+            take_commands(engine, queue_pop(engine->commands, wait_ns));
     }
 }
 
@@ -125,6 +134,7 @@ static void *run_thread(void *context)
         engine_forget_client(engine, client);
         cursor = 0; /* the map has changed */
     }
+    engine_trim_scenes(engine);
     engine_drop_device(engine);
     return NULL;
 }
@@ -182,6 +192,8 @@ struct engine *engine_create(const struct engine_options *options, struct error 
         engine->options.queue_capacity = QUEUE_CAPACITY_DEFAULT;
     if (!engine->options.frames_in_flight)
         engine->options.frames_in_flight = FRAMES_IN_FLIGHT_DEFAULT;
+    if (!engine->options.lingering_scenes)
+        engine->options.lingering_scenes = ENGINE_LINGERING_SCENES;
     if (!engine->options.frame_window_bytes)
         engine->options.frame_window_bytes = ENGINE_FRAME_WINDOW_BYTES;
     pthread_mutex_init(&engine->start_lock, NULL);

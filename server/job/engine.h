@@ -22,6 +22,7 @@
 struct engine;
 struct engine_backend;
 
+#define ENGINE_LINGERING_SCENES 16u                     /* default of lingering_scenes */
 #define ENGINE_FRAME_WINDOW_BYTES ((uint64_t)512 << 20) /* default of frame_window_bytes */
 
 struct engine_options {
@@ -30,10 +31,15 @@ struct engine_options {
     size_t queue_capacity;       /* commands and events; 0: 1024 */
     uint32_t frames_in_flight;   /* per job, rendered but not taken; 0: 3 */
     uint64_t frame_window_bytes; /* the same in bytes of pixels, if that is fewer, but at least one; 0: default */
-    struct scene_limits scene_limits;     /* host_bytes is also what the tables of all scenes may take together */
-    uint64_t device_bytes_limit;          /* 0: 70 % of what the device has, or no limit if it does not tell */
+    struct scene_limits scene_limits; /* host_bytes is also what the tables of all scenes may take together */
+    uint64_t scene_linger_ms;    /* how long a scene that others can come to stays when nobody holds it; 0: not */
+    uint32_t lingering_scenes;   /* that do so, at most: the one that was left first ends first; 0: default */
+    uint64_t device_bytes_limit; /* 0: 70 % of what the device has, or no limit if it does not tell */
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
 };
+
+/* Who can come to a scene beside the client that opened it; the protocol's numbers. */
+enum engine_sharing { SHARING_PRIVATE, SHARING_KEPT, SHARING_SHARED };
 
 /* Camera of a job over time, `time_s` and ten numbers that a spline goes through; enums have the protocol's
  * numbers. */
@@ -68,8 +74,12 @@ struct engine_job {
 
 enum engine_command_kind {
     ENGINE_SCENE_OPEN,
-    ENGINE_SCENE_CLOSE, /* its jobs fail with ERROR_CANCELLED just before the answer */
-    ENGINE_COMMIT,      /* waits for the frame of the scene that is in progress, what follows for that scene too */
+    ENGINE_SCENE_ATTACH, /* answered by ENGINE_DONE with its revision; ENGINE_SCENE_CHANGED may follow */
+    ENGINE_SCENE_CLOSE,  /* the jobs that the client has on it fail with ERROR_CANCELLED just before the answer */
+    ENGINE_SCENE_LIST,   /* answered by ENGINE_SCENES_LISTED */
+    ENGINE_SCENE_DESCRIBE, /* answered by ENGINE_SCENE_DESCRIBED */
+    ENGINE_SCENES_TRIM,    /* scenes that nobody holds end now; no answer */
+    ENGINE_COMMIT, /* waits for the frame of the scene that is in progress, what follows for that scene too */
     /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, before which come the frames that were
      * finished and have credit. */
     ENGINE_JOB_START,
@@ -85,7 +95,9 @@ struct engine_command {
     uint64_t client;
     uint32_t request;
     uint32_t scene;
-    char name[SCENE_NAME_MAX + 1]; /* scene_open */
+    char name[SCENE_NAME_MAX + 1]; /* scene_open, scene_attach */
+    enum engine_sharing sharing;   /* scene_open */
+    uint64_t principal;            /* scene_open, _attach, _list: who asks, as what is kept is told apart by it */
     struct scene_edit *edits;      /* commit; malloc'ed array */
     size_t edit_count;
     struct engine_job job;
@@ -112,7 +124,48 @@ struct engine_stats {
     } stages[STAGE_COUNT][2]; /* by stage and clock */
 };
 
-enum engine_event_kind { ENGINE_DONE, ENGINE_FAILED, ENGINE_FRAME, ENGINE_STATS_READY, ENGINE_CLIENT_FORGOTTEN };
+#define ENGINE_DESCRIPTION_MAX 256 /* cameras, and clips */
+
+struct engine_scene_entry {
+    uint64_t revision, triangles;
+    uint32_t clients;
+    enum engine_sharing sharing;
+    char name[SCENE_NAME_MAX + 1];
+};
+struct engine_scene_list {
+    size_t count;
+    struct engine_scene_entry scenes[]; /* by name */
+};
+struct engine_camera_entry {
+    uint32_t node;
+    char name[SCENE_NAME_MAX + 1];
+};
+struct engine_clip_entry {
+    uint32_t clip, channels;
+    float duration_s;
+    char name[SCENE_NAME_MAX + 1];
+};
+struct engine_scene_description {
+    uint64_t revision, triangles, spheres;
+    uint32_t nodes;
+    bool empty;
+    float lower_world[3], upper_world[3]; /* finite */
+    uint32_t camera_count, clip_count;    /* the first ones, ascending */
+    struct engine_camera_entry cameras[ENGINE_DESCRIPTION_MAX];
+    struct engine_clip_entry clips[ENGINE_DESCRIPTION_MAX];
+};
+
+enum engine_event_kind {
+    ENGINE_DONE,
+    ENGINE_FAILED,
+    ENGINE_FRAME,
+    ENGINE_STATS_READY,
+    ENGINE_SCENES_LISTED,
+    ENGINE_SCENE_DESCRIBED,
+    ENGINE_SCENE_CHANGED, /* by another client; `scene` is the client's number for it */
+    ENGINE_SCENE_ENDED,   /* one that nobody held: blobs may be unused now. Client 0 */
+    ENGINE_CLIENT_FORGOTTEN
+};
 
 struct engine_frame {
     uint32_t frame;               /* number in the job's range */
@@ -130,10 +183,13 @@ struct engine_event {
     enum engine_event_kind kind;
     uint64_t client;
     uint32_t request;
-    uint64_t revision;  /* done, for a commit */
+    uint64_t revision;  /* done, for a commit or an attach; scene_changed */
+    uint32_t scene;     /* scene_changed */
     struct error error; /* failed */
     struct engine_frame *frame;
     struct engine_stats *stats;
+    struct engine_scene_list *list;
+    struct engine_scene_description *description;
     struct job_output *output; /* private to job/ */
 };
 void engine_event_destroy(struct engine_event *event); /* accepts NULL */

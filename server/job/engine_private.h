@@ -21,8 +21,16 @@
 
 struct engine_client {
     uint64_t client;
-    struct hashmap scenes; /* struct engine_scene *, by the client's number */
-    uint64_t served;       /* number of the slice that it had last */
+    struct hashmap references; /* struct engine_reference *, by the client's number */
+    uint64_t served;           /* number of the slice that it had last */
+};
+
+/* A client's hold on a scene. */
+struct engine_reference {
+    struct engine_reference *next; /* on the same scene, in the order of their coming */
+    struct engine_client *client;
+    struct engine_scene *scene;
+    uint32_t id; /* the client's number for it */
 };
 
 /* What a client's last job on a scene left: its next one goes on from the samples that it holds. */
@@ -32,8 +40,11 @@ struct engine_idle {
 };
 
 struct engine_scene {
-    struct engine_client *client;
-    uint32_t id;
+    struct engine_scene *next;           /* of the engine's, in the order of their opening */
+    struct engine_reference *references; /* NULL: nobody holds it; it ends, or lingers for a while */
+    uint64_t left_ns;                    /* since when nobody does */
+    enum engine_sharing sharing;
+    uint64_t principal; /* who opened it */
     struct scene *scene;
     struct frame_scene *shared; /* NULL until the first frame, and after the device was lost */
     uint32_t frames;            /* in progress, of all jobs */
@@ -48,14 +59,16 @@ struct engine_scene {
     /* For stats, as of that revision: a large scene is not gone through each time that somebody asks. */
     uint64_t counted_revision, triangles, spheres;
     uint32_t instances;
+    struct engine_scene_description *description; /* as of its revision; NULL: nobody has asked */
 };
 
 struct job {
     uint64_t client;
     uint32_t request;
-    struct engine_job spec; /* its keys are owned */
-    struct engine_scene *scene;
-    struct frame_renderer *renderer; /* owned; NULL until the first frame, and after the device was lost */
+    struct engine_job spec;             /* its keys are owned */
+    struct engine_reference *reference; /* by which it was started; it ends before that does */
+    struct engine_scene *scene;         /* that of the reference */
+    struct frame_renderer *renderer;    /* owned; NULL until the first frame, and after the device was lost */
     struct job_output *output;
     uint64_t next_frame; /* number in the range; beyond its end: all rendered */
     uint64_t served;
@@ -89,8 +102,9 @@ struct engine {
     uint64_t device_bytes_limit;
     uint64_t rebuilds_ns[DEVICE_REBUILDS_MAX]; /* when it was made anew, a ring */
     unsigned rebuilds;
-    struct hashmap clients; /* struct engine_client *, by number */
-    struct job **jobs;      /* owned, in the order of their start */
+    struct hashmap clients;      /* struct engine_client *, by number */
+    struct engine_scene *scenes; /* owned */
+    struct job **jobs;           /* owned, in the order of their start */
     size_t job_count, job_capacity;
     uint64_t slices;
     uint64_t frames, rays;
@@ -103,14 +117,44 @@ void engine_post_done(struct engine *engine, uint64_t client, uint32_t request, 
 void engine_post_failed(struct engine *engine, uint64_t client, uint32_t request, const struct error *error);
 void engine_nudge(struct engine *engine); /* any thread: there may be something to do */
 
+/* The failure of what somebody ended; NULL: out of memory. */
+struct engine_event *engine_cancelled(uint64_t client, uint32_t request, const char *why);
+
 /* commands.c: carries a command out, or keeps it until its scene's frames are done. Takes it over. */
 void engine_handle(struct engine *engine, struct engine_command *command);
 /* Carries out what waited for a scene, if no frame of it is in progress. */
 void engine_run_waiting(struct engine *engine, struct engine_scene *scene);
+/* Of those that wait, the first that has come by the reference; NULL: none. Takes it out. */
+struct engine_command *engine_take_waiting(struct engine_scene *scene, const struct engine_reference *reference);
+
+/* scenes.c: scenes and who holds them. Each answers its command, and leaves it to the caller. */
+void engine_scene_open(struct engine *engine, const struct engine_command *command);
+void engine_scene_attach(struct engine *engine, const struct engine_command *command);
+void engine_scene_close(struct engine *engine, struct engine_reference *reference,
+                        const struct engine_command *command);
+/* NULL: the client has no scene of that number. */
+struct engine_reference *engine_find_reference(struct engine *engine, uint64_t client, uint32_t id);
+/* Ends the jobs that were started by a reference, with ERROR_CANCELLED; `why` NULL: nobody is told. */
+void engine_abort_jobs(struct engine *engine, const struct engine_reference *reference, const char *why);
 void engine_forget_client(struct engine *engine, struct engine_client *client);
+/* Tells all who hold a scene, but for who changed it. */
+void engine_scene_changed(struct engine *engine, const struct engine_reference *by);
+/* Lets go of scenes that nobody holds, once they have lingered. The time until the next one ends, UINT64_MAX: none
+ * does. */
+uint64_t engine_reap_scenes(struct engine *engine);
+/* The same without lingering; false: there was none. */
+bool engine_trim_scenes(struct engine *engine);
+
+/* describe.c: what is in scenes, and which there are. */
+void engine_count_contents(struct engine_scene *scene);
+void engine_scene_list(struct engine *engine, const struct engine_command *command);
+void engine_scene_describe(struct engine *engine, struct engine_scene *scene,
+                           const struct engine_command *command);
+/* Whether who asks can come to it. */
+bool engine_scene_is_open_to(const struct engine_scene *scene, uint64_t principal);
 
 /* batch.c: jobs. */
-bool job_start(struct engine *engine, struct engine_scene *scene, struct engine_command *command,
+bool job_start(struct engine *engine, struct engine_reference *reference, struct engine_command *command,
                struct error *error); /* takes the keys over on success */
 /* A job that is not answered yet; NULL: there is none. */
 struct job *job_find(struct engine *engine, uint64_t client, uint32_t request);

@@ -199,6 +199,8 @@ void engine_event_destroy(struct engine_event *event)
     if (event->stats)
         free(event->stats->scenes);
     free(event->stats);
+    free(event->list);
+    free(event->description);
     job_output_unref(event->output);
     free(event);
 }

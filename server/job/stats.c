@@ -4,35 +4,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void count_contents(struct engine_scene *from)
-{
-    const struct scene *scene = from->scene;
-    if (from->counted_revision == scene->revision)
-        return;
-    from->counted_revision = scene->revision;
-    from->instances = 0;
-    from->triangles = from->spheres = 0;
-    size_t cursor = 0;
-    void *value;
-    while (hashmap_next(&scene->objects[SCENE_NODE], &cursor, NULL, &value)) {
-        enum scene_node_kind kind = ((const struct scene_node *)value)->kind;
-        from->instances += kind == NODE_MESH || kind == NODE_SPHERES;
-    }
-    cursor = 0;
-    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, NULL, &value))
-        from->triangles += ((const struct scene_mesh *)value)->triangle_count;
-    cursor = 0;
-    while (hashmap_next(&scene->objects[SCENE_SPHERES], &cursor, NULL, &value))
-        from->spheres += ((const struct scene_spheres *)value)->sphere_count;
-}
-
 static void describe_scene(const struct engine *engine, struct engine_scene *from, struct engine_scene_stat *stat)
 {
     const struct scene *scene = from->scene;
-    count_contents(from);
+    engine_count_contents(from);
+    const struct engine_reference *first = from->references;
     *stat = (struct engine_scene_stat){
-        .client = from->client->client,
-        .scene = from->id,
+        .client = first ? first->client->client : 0,
+        .scene = first ? first->id : 0,
         .revision = scene->revision,
         .host_bytes = scene->host_bytes,
         .device_bytes = scene_device_bytes(engine, from),
@@ -46,24 +25,17 @@ static void describe_scene(const struct engine *engine, struct engine_scene *fro
 
 static bool describe_scenes(const struct engine *engine, struct engine_stats *stats)
 {
-    size_t count = 0, cursor = 0;
-    void *value;
-    while (hashmap_next(&engine->clients, &cursor, NULL, &value))
-        count += ((const struct engine_client *)value)->scenes.count;
+    size_t count = 0;
+    for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        count++;
     if (!count)
         return true;
     stats->scenes = calloc(count, sizeof *stats->scenes);
     if (!stats->scenes)
         return false;
-    cursor = 0;
-    while (hashmap_next(&engine->clients, &cursor, NULL, &value)) {
-        const struct engine_client *client = value;
-        size_t scene_cursor = 0;
-        void *scene;
-        while (hashmap_next(&client->scenes, &scene_cursor, NULL, &scene)) {
-            describe_scene(engine, scene, &stats->scenes[stats->scene_count]);
-            stats->host_bytes += stats->scenes[stats->scene_count++].host_bytes;
-        }
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        describe_scene(engine, scene, &stats->scenes[stats->scene_count]);
+        stats->host_bytes += stats->scenes[stats->scene_count++].host_bytes;
     }
     return true;
 }

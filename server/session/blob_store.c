@@ -10,6 +10,7 @@ struct entry {
     struct entry *older, *newer;
     struct entry *same_key; /* the map's keys are short: what shares one hangs in a chain */
     blob_principal principal;
+    bool forgotten; /* the principal will not come back: nobody finds it, it goes with its last use */
     struct blob *blob;
 };
 
@@ -135,17 +136,18 @@ static uint64_t cost_of(const struct entry *entry)
     return entry->blob->size_bytes + BLOB_STORE_OVERHEAD_BYTES;
 }
 
-/* Drops idle blobs, oldest first, until no more than that many bytes of them are left. */
+/* Drops idle blobs, those of who will not come back, and then oldest first, until no more than that many bytes of
+ * them are left. */
 static void trim_to(struct blob_store *store, uint64_t idle_limit_bytes)
 {
     uint64_t idle_bytes = 0;
     for (const struct entry *entry = store->oldest; entry; entry = entry->newer)
-        idle_bytes += is_idle(entry) ? cost_of(entry) : 0;
-    for (struct entry *entry = store->oldest, *newer; entry && idle_bytes > idle_limit_bytes; entry = newer) {
+        idle_bytes += is_idle(entry) && !entry->forgotten ? cost_of(entry) : 0;
+    for (struct entry *entry = store->oldest, *newer; entry; entry = newer) {
         newer = entry->newer;
-        if (!is_idle(entry))
+        if (!is_idle(entry) || (!entry->forgotten && idle_bytes <= idle_limit_bytes))
             continue;
-        idle_bytes -= cost_of(entry);
+        idle_bytes -= entry->forgotten ? 0 : cost_of(entry);
         remove_entry(store, entry);
     }
 }
@@ -187,11 +189,9 @@ void blob_store_release(struct blob_store *store, uint64_t size_bytes)
 
 void blob_store_forget(struct blob_store *store, blob_principal principal)
 {
-    for (struct entry *entry = store->oldest, *newer; entry; entry = newer) {
-        newer = entry->newer;
-        if (entry->principal == principal)
-            remove_entry(store, entry);
-    }
+    for (struct entry *entry = store->oldest; entry; entry = entry->newer)
+        entry->forgotten = entry->forgotten || entry->principal == principal;
+    blob_store_trim(store);
 }
 
 uint64_t blob_store_bytes(const struct blob_store *store)

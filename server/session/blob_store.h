@@ -34,8 +34,9 @@ bool blob_store_reserve(struct blob_store *store, uint64_t size_bytes, struct er
 void blob_store_release(struct blob_store *store, uint64_t size_bytes); /* it is added now, or will not come */
 
 void blob_store_trim(struct blob_store *store); /* to be called when uses may have ended */
-void blob_store_forget(struct blob_store *store, blob_principal principal); /* it will never come back */
-uint64_t blob_store_bytes(const struct blob_store *store);                  /* of content, held and reserved */
+/* It will never come back: what scenes still use of its is held, and counted, until they do not. */
+void blob_store_forget(struct blob_store *store, blob_principal principal);
+uint64_t blob_store_bytes(const struct blob_store *store); /* of content, held and reserved */
 size_t blob_store_count(const struct blob_store *store);
 
 #endif

@@ -4,10 +4,9 @@
 #include "base/clock.h"
 #include "session/edits.h"
 #include "session/jobs.h"
+#include "session/scenes.h"
 #include "session/session.h"
 #include "session/upload.h"
-
-#include <stdio.h>
 
 /* ---- connection -------------------------------------------------------------------------------------- */
 
@@ -62,49 +61,35 @@ static void on_scene_open(struct session *session, struct request *request, cons
                           const struct message *message)
 {
     (void)header;
-    const struct message_scene_open *open = &message->scene_open;
-    struct error error = {0};
-    uint32_t limit = session->hub->options.limits.scenes_per_client;
-    if (session_scene(session, open->scene))
-        error_set(&error, ERROR_INVALID, "scene_open.scene", "scene %u is there already", open->scene);
-    else if (session->scenes.count >= limit)
-        error_set(&error, ERROR_LIMIT, "scene_open", "%u scenes are open, the limit", limit);
-    else if (!hashmap_put(&session->scenes, open->scene, (void *)(uintptr_t)SCENE_OPENING))
-        error_set(&error, ERROR_OUT_OF_MEMORY, "scene_open", "no memory");
-    if (error.kind == ERROR_LIMIT)
-        error_remedy(&error, "close one, or raise limits.scenes in the daemon's configuration");
-    if (error.kind != ERROR_NONE) {
-        request_answer_error(session, request, &error);
-        return;
-    }
-    request->scene = open->scene;
-    struct engine_command *command = hub_command(ENGINE_SCENE_OPEN, session->number, request->id);
-    if (command) {
-        command->scene = open->scene;
-        snprintf(command->name, sizeof command->name, "%s", open->name);
-    }
-    session_submit(session, request, command);
+    scenes_open(session, request, &message->scene_open);
 }
 
 static void on_scene_close(struct session *session, struct request *request, const struct framing_header *header,
                            const struct message *message)
 {
     (void)header;
-    uint32_t scene = message->scene_close.scene;
-    enum session_scene_state state = session_scene(session, scene);
-    if (state != SCENE_OPENING && state != SCENE_OPEN) {
-        struct error error = {0};
-        error_set(&error, ERROR_UNKNOWN_ID, "scene_close.scene", "there is no scene %u", scene);
-        request_answer_error(session, request, &error);
-        return;
-    }
-    request->scene = scene;
-    struct engine_command *command = hub_command(ENGINE_SCENE_CLOSE, session->number, request->id);
-    if (command) {
-        command->scene = scene;
-        hashmap_put(&session->scenes, scene, (void *)(uintptr_t)SCENE_CLOSING); /* replaces: needs no memory */
-    }
-    session_submit(session, request, command);
+    scenes_close(session, request, &message->scene_close);
+}
+
+static void on_scene_attach(struct session *session, struct request *request, const struct framing_header *header,
+                            const struct message *message)
+{
+    (void)header;
+    scenes_attach(session, request, &message->scene_attach);
+}
+
+static void on_scene_list(struct session *session, struct request *request, const struct framing_header *header,
+                          const struct message *message)
+{
+    (void)header, (void)message;
+    scenes_list(session, request);
+}
+
+static void on_scene_describe(struct session *session, struct request *request,
+                              const struct framing_header *header, const struct message *message)
+{
+    (void)header;
+    scenes_describe(session, request, &message->scene_describe);
 }
 
 /* ---- blobs and edits --------------------------------------------------------------------------------- */
@@ -163,6 +148,9 @@ static const struct dispatch_row rows[] = {
     {MESSAGE_STATS, DISPATCH_STARTS, REQUEST_STATS, on_stats},
     {MESSAGE_SCENE_OPEN, DISPATCH_STARTS, REQUEST_SCENE_OPEN, on_scene_open},
     {MESSAGE_SCENE_CLOSE, DISPATCH_STARTS, REQUEST_SCENE_CLOSE, on_scene_close},
+    {MESSAGE_SCENE_ATTACH, DISPATCH_STARTS, REQUEST_SCENE_ATTACH, on_scene_attach},
+    {MESSAGE_SCENE_LIST, DISPATCH_STARTS, REQUEST_SCENE_LIST, on_scene_list},
+    {MESSAGE_SCENE_DESCRIBE, DISPATCH_STARTS, REQUEST_SCENE_DESCRIBE, on_scene_describe},
     {MESSAGE_BLOB_OFFER, DISPATCH_STARTS, REQUEST_OFFER, on_blob_offer},
     {MESSAGE_BLOB_DATA, DISPATCH_ANY, REQUEST_UPLOAD, on_blob_data},
     {MESSAGE_EDIT_BEGIN, DISPATCH_STARTS, REQUEST_TRANSACTION, on_edit_begin},

@@ -64,6 +64,13 @@ bool hub_submit(struct hub *hub, struct engine_command *command)
     return true;
 }
 
+void hub_trim(struct hub *hub)
+{
+    struct engine_command *command = hub_command(ENGINE_SCENES_TRIM, 0, 0);
+    if (command)
+        hub_submit(hub, command);
+}
+
 static void retry(void *context)
 {
     struct hub *hub = context;
@@ -92,7 +99,7 @@ static void on_engine(void *context, uint32_t epoll_events)
         if (!event)
             return;
         struct session *session = hashmap_get(&hub->sessions, event->client);
-        if (event->kind == ENGINE_CLIENT_FORGOTTEN)
+        if (event->kind == ENGINE_CLIENT_FORGOTTEN || event->kind == ENGINE_SCENE_ENDED)
             blob_store_trim(hub->blobs);
         else if (session)
             session_engine_event(session, event);

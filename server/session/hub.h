@@ -59,6 +59,8 @@ void hub_stop(struct hub *hub);
 /* Hands a command to the engine, now or as soon as it has room; takes it over in any case. False: out of
  * memory, the command is destroyed. */
 bool hub_submit(struct hub *hub, struct engine_command *command);
+/* Memory is short: scenes that nobody holds shall end, with what they use. */
+void hub_trim(struct hub *hub);
 /* The same for one of a session's requests: zeroed but for kind, client and request. NULL: out of memory. */
 struct engine_command *hub_command(enum engine_command_kind kind, uint64_t client, uint32_t request);
 

@@ -147,6 +147,9 @@ void request_cancel(struct session *session, struct request *cancel, uint32_t ta
         return;
     case REQUEST_SCENE_OPEN:
     case REQUEST_SCENE_CLOSE:
+    case REQUEST_SCENE_ATTACH:
+    case REQUEST_SCENE_LIST:
+    case REQUEST_SCENE_DESCRIBE:
     case REQUEST_OFFER:
     case REQUEST_COMMIT:
     case REQUEST_CANCEL:

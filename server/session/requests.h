@@ -15,6 +15,9 @@ struct session;
 enum request_kind {
     REQUEST_SCENE_OPEN,
     REQUEST_SCENE_CLOSE,
+    REQUEST_SCENE_ATTACH,
+    REQUEST_SCENE_LIST,
+    REQUEST_SCENE_DESCRIBE,
     REQUEST_OFFER,
     REQUEST_UPLOAD,      /* object: struct offer */
     REQUEST_TRANSACTION, /* object: struct transaction; the client still adds to it */
@@ -27,7 +30,7 @@ enum request_kind {
 struct request {
     uint32_t id;
     enum request_kind kind;
-    uint32_t scene; /* of scene open and close */
+    uint32_t scene; /* of scene open, attach and close */
     void *object;
     uint32_t cancelled_by; /* the cancel that is answered once this one is; 0: none */
     size_t edits;          /* of a commit: what the engine holds for it until the answer */

@@ -75,19 +75,11 @@ void session_submit(struct session *session, struct request *request, struct eng
     struct error error = {0};
     error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
     /* The engine knows nothing of it: all is as before. */
-    if (request->kind == REQUEST_SCENE_OPEN)
-        hashmap_remove(&session->scenes, request->scene);
-    else if (request->kind == REQUEST_SCENE_CLOSE)
-        hashmap_put(&session->scenes, request->scene, (void *)(uintptr_t)SCENE_OPEN); /* replaces */
+    scenes_failed(session, request, false);
     if (request->kind == REQUEST_JOB && request->object)
         job_failed(session, request->object, &error);
     else
         request_answer_error(session, request, &error);
-}
-
-enum session_scene_state session_scene(const struct session *session, uint32_t scene)
-{
-    return (enum session_scene_state)(uintptr_t)hashmap_get(&session->scenes, scene);
 }
 
 /* ---- the engine's answers ---------------------------------------------------------------------------- */
@@ -96,13 +88,11 @@ static void on_done(struct session *session, struct request *request, const stru
 {
     switch (request->kind) {
     case REQUEST_SCENE_OPEN:
-        if (session_scene(session, request->scene) == SCENE_OPENING)
-            hashmap_put(&session->scenes, request->scene, (void *)(uintptr_t)SCENE_OPEN);
-        request_answer_ok(session, request, 0);
+    case REQUEST_SCENE_ATTACH:
+        scenes_opened(session, request, event->revision);
         return;
     case REQUEST_SCENE_CLOSE:
-        hashmap_remove(&session->scenes, request->scene);
-        request_answer_ok(session, request, 0);
+        scenes_closed(session, request);
         return;
     case REQUEST_JOB:
         job_done(session, request->object);
@@ -115,6 +105,8 @@ static void on_done(struct session *session, struct request *request, const stru
     case REQUEST_UPLOAD:
     case REQUEST_TRANSACTION:
     case REQUEST_STATS:
+    case REQUEST_SCENE_LIST:
+    case REQUEST_SCENE_DESCRIBE:
         return; /* the engine knows nothing of these */
     }
 }
@@ -130,23 +122,23 @@ static void on_failed(struct session *session, struct request *request, const st
     case REQUEST_CANCEL:
         request_answer_ok(session, request, 0); /* the job had just ended */
         return;
-    case REQUEST_SCENE_OPEN:
-        if (session_scene(session, request->scene) == SCENE_OPENING)
-            hashmap_remove(&session->scenes, request->scene);
-        break;
-    case REQUEST_SCENE_CLOSE:
-        hashmap_remove(&session->scenes, request->scene);
-        break;
     default:
         break;
     }
+    scenes_failed(session, request, true);
     request_answer_error(session, request, &error);
 }
 
 void session_engine_event(struct session *session, struct engine_event *event)
 {
+    if (session->connection->state != CONNECTION_OPEN)
+        return;
+    if (event->kind == ENGINE_SCENE_CHANGED) {
+        scenes_changed(session, event->scene, event->revision);
+        return;
+    }
     struct request *request = request_find(session, event->request);
-    if (!request || session->connection->state != CONNECTION_OPEN)
+    if (!request)
         return;
     switch (event->kind) {
     case ENGINE_DONE:
@@ -165,6 +157,16 @@ void session_engine_event(struct session *session, struct engine_event *event)
         if (request->kind == REQUEST_STATS && event->stats)
             stats_answer(session, request, event->stats);
         return;
+    case ENGINE_SCENES_LISTED:
+        if (request->kind == REQUEST_SCENE_LIST && event->list)
+            scenes_listed(session, request, event->list);
+        return;
+    case ENGINE_SCENE_DESCRIBED:
+        if (request->kind == REQUEST_SCENE_DESCRIBE && event->description)
+            scenes_described(session, request, event->description);
+        return;
+    case ENGINE_SCENE_CHANGED:
+    case ENGINE_SCENE_ENDED:
     case ENGINE_CLIENT_FORGOTTEN:
         return;
     }
@@ -267,6 +269,7 @@ static void on_opened(void *context)
 
 static void on_room(void *context)
 {
+    scenes_tell_changes(context);
     frames_pump(context);
 }
 
@@ -306,7 +309,7 @@ static void on_closed(void *context)
     destroy_transactions(session);
     requests_finish(&session->requests);
     upload_finish(session);
-    hashmap_finish(&session->scenes);
+    scenes_finish(session);
     if (session->introduced) {
         struct engine_command *command = hub_command(ENGINE_CLIENT_GONE, session->number, 0);
         if (!command || !hub_submit(hub, command))

@@ -6,6 +6,7 @@
 #include "base/hashmap.h"
 #include "session/hub.h"
 #include "session/requests.h"
+#include "session/scenes.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -13,8 +14,6 @@
 struct job;
 
 #define SESSION_OFFERS_KEY_BYTES 16
-
-enum session_scene_state { SCENE_OPENING = 1, SCENE_OPEN, SCENE_CLOSING };
 
 /* Blobs that the client named; see upload.h. */
 struct session_blobs {
@@ -36,7 +35,8 @@ struct session {
     bool introduced; /* the hello is done: the engine may know it */
 
     struct requests requests;
-    struct hashmap scenes; /* enum session_scene_state in a pointer, by id */
+    struct hashmap scenes; /* struct session_scene *, by id; see scenes.h */
+    bool scenes_changed;   /* there may be changes to tell */
     struct session_blobs blobs;
     size_t transaction_edits;   /* in all transactions that are not answered */
     uint64_t transaction_bytes; /* of them: memory */
@@ -59,7 +59,4 @@ void session_send_error(struct session *session, uint32_t request, const struct 
 void session_fail(struct session *session, const struct error *error);
 /* Hands a request's command to the engine; NULL (out of memory) is answered as well. */
 void session_submit(struct session *session, struct request *request, struct engine_command *command);
-/* State of a scene, 0 if there is none. */
-enum session_scene_state session_scene(const struct session *session, uint32_t scene);
-
 #endif

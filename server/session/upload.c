@@ -295,6 +295,8 @@ void upload_data(struct session *session, const struct framing_header *header,
         request_answer_ok(session, request, 0);
         return;
     }
+    if (error.kind == ERROR_LIMIT)
+        hub_trim(session->hub);
     requests_bury(session, request->id);
     request_answer_error(session, request, &error);
 }

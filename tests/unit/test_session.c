@@ -141,7 +141,11 @@ static bool submit(void *context, struct engine_command *command, struct error *
         event(ENGINE_DONE, command, command->request);
         break;
     case ENGINE_SCENE_OPEN:
+    case ENGINE_SCENE_ATTACH:
     case ENGINE_SCENE_CLOSE:
+    case ENGINE_SCENE_LIST:
+    case ENGINE_SCENE_DESCRIBE:
+    case ENGINE_SCENES_TRIM:
         event(ENGINE_DONE, command, command->request);
         break;
     case ENGINE_JOB_START:

@@ -1,0 +1,285 @@
+/* SPDX-License-Identifier: MIT */
+/* Scenes and who holds them, on the thread that owns GL. */
+#include "job/engine_private.h"
+
+#include "base/clock.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- clients ------------------------------------------------------------------------------------ */
+
+static struct engine_client *need_client(struct engine *engine, uint64_t number)
+{
+    struct engine_client *client = hashmap_get(&engine->clients, number);
+    if (client)
+        return client;
+    client = calloc(1, sizeof *client);
+    if (!client || !hashmap_put(&engine->clients, number, client)) {
+        free(client);
+        return NULL;
+    }
+    client->client = number;
+    return client;
+}
+
+struct engine_reference *engine_find_reference(struct engine *engine, uint64_t client_number, uint32_t id)
+{
+    struct engine_client *client = hashmap_get(&engine->clients, client_number);
+    return client ? hashmap_get(&client->references, id) : NULL;
+}
+
+/* ---- references --------------------------------------------------------------------------------- */
+
+static bool reference_add(struct engine *engine, struct engine_scene *scene, const struct engine_command *command)
+{
+    struct engine_client *client = need_client(engine, command->client);
+    struct engine_reference *reference = client ? calloc(1, sizeof *reference) : NULL;
+    if (!reference || !hashmap_put(&client->references, command->scene, reference)) {
+        free(reference);
+        return false;
+    }
+    *reference = (struct engine_reference){.client = client, .scene = scene, .id = command->scene};
+    struct engine_reference **place = &scene->references;
+    while (*place)
+        place = &(*place)->next;
+    *place = reference;
+    return true;
+}
+
+/* Its jobs have ended, nothing that came by it waits. */
+static void reference_remove(struct engine *engine, struct engine_reference *reference)
+{
+    struct engine_reference **place = &reference->scene->references;
+    scene_drop_idle(engine, reference->scene, &reference->client->client);
+    while (*place != reference)
+        place = &(*place)->next;
+    *place = reference->next;
+    if (!reference->scene->references)
+        reference->scene->left_ns = clock_now_ns();
+    hashmap_remove(&reference->client->references, reference->id);
+    free(reference);
+}
+
+void engine_abort_jobs(struct engine *engine, const struct engine_reference *reference, const char *why)
+{
+    for (size_t i = engine->job_count; i-- > 0;) {
+        struct job *job = engine->jobs[i];
+        if (job->reference == reference)
+            job_abort(engine, job, why ? engine_cancelled(job->client, job->request, why) : NULL);
+    }
+}
+
+void engine_scene_close(struct engine *engine, struct engine_reference *reference,
+                        const struct engine_command *command)
+{
+    struct engine_command *waiting;
+    engine_abort_jobs(engine, reference, "its scene was closed");
+    /* Only where memory was short does anything wait still. */
+    while ((waiting = engine_take_waiting(reference->scene, reference))) {
+        engine_post(engine, engine_cancelled(waiting->client, waiting->request, "its scene was closed"));
+        engine_command_destroy(waiting);
+    }
+    reference_remove(engine, reference);
+    engine_post_done(engine, command->client, command->request, 0);
+}
+
+void engine_forget_client(struct engine *engine, struct engine_client *client)
+{
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&client->references, &cursor, NULL, &value)) {
+        struct engine_reference *reference = value;
+        struct engine_scene *scene = reference->scene;
+        struct engine_command *waiting;
+        engine_abort_jobs(engine, reference, NULL);
+        while ((waiting = engine_take_waiting(scene, reference)))
+            engine_command_destroy(waiting);
+        reference_remove(engine, reference);
+        engine_run_waiting(engine, scene); /* its frame may have been in progress */
+        cursor = 0;                        /* the map has changed */
+    }
+    hashmap_remove(&engine->clients, client->client);
+    hashmap_finish(&client->references);
+    free(client);
+}
+
+/* ---- scenes ------------------------------------------------------------------------------------- */
+
+/* Jobs have ended, nothing waits, it is out of the list. */
+static void scene_free(struct engine *engine, struct engine_scene *scene)
+{
+    scene_drop_shared(engine, scene);
+    engine->table_bytes -= scene->scene->table_bytes;
+    scene_destroy(scene->scene);
+    free(scene->description);
+    free(scene->idle);
+    free(scene->waiting);
+    free(scene);
+}
+
+/* One that nobody holds. */
+static void scene_end(struct engine *engine, struct engine_scene *scene)
+{
+    bool lingered = scene->sharing != SHARING_PRIVATE;
+    struct engine_scene **place = &engine->scenes;
+    while (*place != scene)
+        place = &(*place)->next;
+    *place = scene->next;
+    scene_free(engine, scene);
+    if (lingered)
+        engine_post(engine, event_create(ENGINE_SCENE_ENDED, 0, 0));
+}
+
+/* Until when one that nobody holds may stay; 0: no longer than now. One that holds nothing is not worth it. */
+static uint64_t lingers_until_ns(const struct engine *engine, const struct engine_scene *scene)
+{
+    if (scene->sharing == SHARING_PRIVATE || !scene->scene->revision || !engine->options.scene_linger_ms)
+        return 0;
+    return scene->left_ns + engine->options.scene_linger_ms * UINT64_C(1000000);
+}
+
+/* Ends those whose time has passed. Of the rest: how many, which was left first, and when the next one ends. */
+static size_t end_overdue(struct engine *engine, struct engine_scene **oldest, uint64_t *wait_ns)
+{
+    uint64_t now_ns = clock_now_ns();
+    size_t count = 0;
+    *oldest = NULL;
+    *wait_ns = UINT64_MAX;
+    for (struct engine_scene *scene = engine->scenes, *next; scene; scene = next) {
+        next = scene->next;
+        if (scene->references)
+            continue;
+        uint64_t until_ns = lingers_until_ns(engine, scene);
+        if (until_ns <= now_ns) {
+            scene_end(engine, scene);
+            continue;
+        }
+        count++;
+        *wait_ns = until_ns - now_ns < *wait_ns ? until_ns - now_ns : *wait_ns;
+        if (!*oldest || scene->left_ns < (*oldest)->left_ns)
+            *oldest = scene;
+    }
+    return count;
+}
+
+uint64_t engine_reap_scenes(struct engine *engine)
+{
+    struct engine_scene *oldest;
+    uint64_t wait_ns;
+    while (end_overdue(engine, &oldest, &wait_ns) > engine->options.lingering_scenes)
+        scene_end(engine, oldest);
+    return wait_ns;
+}
+
+bool engine_trim_scenes(struct engine *engine)
+{
+    bool found = false;
+    for (struct engine_scene *scene = engine->scenes, *next; scene; scene = next) {
+        next = scene->next;
+        if (scene->references)
+            continue;
+        scene_end(engine, scene);
+        found = true;
+    }
+    return found;
+}
+
+/* ---- coming to a scene -------------------------------------------------------------------------- */
+
+/* By that name, what is kept for who asks before what is shared by all; NULL: there is none. */
+static struct engine_scene *find_by_name(const struct engine *engine, const struct engine_command *command)
+{
+    struct engine_scene *found = NULL;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        if (engine_scene_is_open_to(scene, command->principal) && strcmp(scene->scene->name, command->name) == 0 &&
+            (!found || scene->sharing == SHARING_KEPT))
+            found = scene;
+    }
+    return found;
+}
+
+/* One's own scene that nobody holds any more gives its name to a new one. */
+static bool name_is_free(struct engine *engine, const struct engine_command *command, struct error *error)
+{
+    if (command->sharing == SHARING_PRIVATE)
+        return true;
+    if (!command->name[0])
+        return error_set(error, ERROR_INVALID, "scene_open.name", "a scene that others can come to needs a name");
+    struct engine_scene *other = find_by_name(engine, command);
+    if (other && !other->references && other->principal == command->principal) {
+        scene_end(engine, other);
+        other = find_by_name(engine, command);
+    }
+    if (!other)
+        return true;
+    error_set(error, ERROR_INVALID, "scene_open.name", "there is a scene \"%s\" already", command->name);
+    return error_remedy(error, "attach to it, or choose another name");
+}
+
+static bool scene_add(struct engine *engine, const struct engine_command *command)
+{
+    struct engine_scene *scene = calloc(1, sizeof *scene);
+    if (scene)
+        scene->scene = scene_create(command->name, &engine->options.scene_limits);
+    if (!scene || !scene->scene || !reference_add(engine, scene, command)) {
+        if (scene)
+            scene_destroy(scene->scene);
+        free(scene);
+        return false;
+    }
+    scene->sharing = command->sharing;
+    scene->principal = command->principal;
+    struct engine_scene **place = &engine->scenes;
+    while (*place)
+        place = &(*place)->next;
+    *place = scene;
+    return true;
+}
+
+static void answer(struct engine *engine, const struct engine_command *command, const struct error *error,
+                   uint64_t revision)
+{
+    if (error->kind)
+        engine_post_failed(engine, command->client, command->request, error);
+    else
+        engine_post_done(engine, command->client, command->request, revision);
+}
+
+void engine_scene_open(struct engine *engine, const struct engine_command *command)
+{
+    struct error error = {0};
+    if (engine_find_reference(engine, command->client, command->scene))
+        error_set(&error, ERROR_INVALID, "scene_open.scene", "scene %u is open already", command->scene);
+    else if (name_is_free(engine, command, &error) && !scene_add(engine, command))
+        error_set(&error, ERROR_OUT_OF_MEMORY, "scene_open", "no memory for a scene");
+    answer(engine, command, &error, 0);
+}
+
+void engine_scene_attach(struct engine *engine, const struct engine_command *command)
+{
+    struct error error = {0};
+    struct engine_scene *scene = find_by_name(engine, command);
+    if (engine_find_reference(engine, command->client, command->scene)) {
+        error_set(&error, ERROR_INVALID, "scene_attach.scene", "scene %u is open already", command->scene);
+    } else if (!scene) {
+        error_set(&error, ERROR_UNKNOWN_ID, "scene_attach.name", "no scene \"%s\" is shared, or kept for you",
+                  command->name);
+        error_remedy(&error, "'farlight scenes' lists those that are");
+    } else if (!reference_add(engine, scene, command)) {
+        error_set(&error, ERROR_OUT_OF_MEMORY, "scene_attach", "no memory");
+    }
+    answer(engine, command, &error, error.kind ? 0 : scene->scene->revision);
+}
+
+void engine_scene_changed(struct engine *engine, const struct engine_reference *by)
+{
+    for (const struct engine_reference *one = by->scene->references; one; one = one->next) {
+        struct engine_event *event = one == by ? NULL : event_create(ENGINE_SCENE_CHANGED, one->client->client, 0);
+        if (!event)
+            continue; /* without memory, the next change tells of this one, too */
+        event->scene = one->id;
+        event->revision = by->scene->scene->revision;
+        engine_post(engine, event);
+    }
+}

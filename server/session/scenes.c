@@ -1,0 +1,263 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/scenes.h"
+
+#include "protocol/codec.h"
+#include "session/session.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#define LIST_MAX 256 /* of the message */
+
+struct session_scene {
+    enum session_scene_state state;
+    uint64_t changed_revision; /* to be told; 0: nothing is */
+};
+
+static struct session_scene *find(const struct session *session, uint32_t scene)
+{
+    return hashmap_get(&session->scenes, scene);
+}
+
+enum session_scene_state session_scene(const struct session *session, uint32_t scene)
+{
+    const struct session_scene *found = find(session, scene);
+    return found ? found->state : 0;
+}
+
+static void forget(struct session *session, uint32_t scene)
+{
+    free(hashmap_remove(&session->scenes, scene));
+}
+
+void scenes_finish(struct session *session)
+{
+    size_t cursor = 0;
+    void *scene;
+    while (hashmap_next(&session->scenes, &cursor, NULL, &scene))
+        free(scene);
+    hashmap_finish(&session->scenes);
+}
+
+/* ---- coming and going -------------------------------------------------------------------------------- */
+
+static bool add(struct session *session, uint32_t scene, const char *field, struct error *error)
+{
+    uint32_t limit = session->hub->options.limits.scenes_per_client;
+    if (find(session, scene))
+        return error_set(error, ERROR_INVALID, field, "scene %u is there already", scene);
+    if (session->scenes.count >= limit) {
+        error_set(error, ERROR_LIMIT, field, "%u scenes are open, the limit", limit);
+        return error_remedy(error, "close one, or raise limits.scenes in the daemon's configuration");
+    }
+    struct session_scene *added = calloc(1, sizeof *added);
+    if (!added || !hashmap_put(&session->scenes, scene, added)) {
+        free(added);
+        return error_set(error, ERROR_OUT_OF_MEMORY, field, "no memory");
+    }
+    added->state = SCENE_OPENING;
+    return true;
+}
+
+static void submit(struct session *session, struct request *request, enum engine_command_kind kind, uint32_t scene,
+                   const char *name, enum engine_sharing sharing)
+{
+    request->scene = scene;
+    struct engine_command *command = hub_command(kind, session->number, request->id);
+    if (command) {
+        command->scene = scene;
+        command->principal = session->principal;
+        command->sharing = sharing;
+        snprintf(command->name, sizeof command->name, "%s", name);
+    }
+    session_submit(session, request, command);
+}
+
+void scenes_open(struct session *session, struct request *request, const struct message_scene_open *open)
+{
+    struct error error = {0};
+    enum engine_sharing sharing = (enum engine_sharing)open->sharing;
+    /* Nobody else is ever the same user. */
+    if (sharing == SHARING_KEPT && !session->identity.known)
+        sharing = SHARING_PRIVATE;
+    if (!add(session, open->scene, "scene_open.scene", &error)) {
+        request_answer_error(session, request, &error);
+        return;
+    }
+    submit(session, request, ENGINE_SCENE_OPEN, open->scene, open->name, sharing);
+}
+
+void scenes_attach(struct session *session, struct request *request, const struct message_scene_attach *attach)
+{
+    struct error error = {0};
+    if (!add(session, attach->scene, "scene_attach.scene", &error)) {
+        request_answer_error(session, request, &error);
+        return;
+    }
+    submit(session, request, ENGINE_SCENE_ATTACH, attach->scene, attach->name, SHARING_PRIVATE);
+}
+
+/* False: there is no such scene, which was answered. One that is being opened will do: the engine carries things
+ * out in order. */
+static bool is_there(struct session *session, struct request *request, uint32_t scene, const char *field)
+{
+    enum session_scene_state state = session_scene(session, scene);
+    if (state == SCENE_OPENING || state == SCENE_OPEN)
+        return true;
+    struct error error = {0};
+    error_set(&error, ERROR_UNKNOWN_ID, field, "there is no scene %u", scene);
+    request_answer_error(session, request, &error);
+    return false;
+}
+
+void scenes_close(struct session *session, struct request *request, const struct message_scene_close *close)
+{
+    if (!is_there(session, request, close->scene, "scene_close.scene"))
+        return;
+    find(session, close->scene)->state = SCENE_CLOSING;
+    submit(session, request, ENGINE_SCENE_CLOSE, close->scene, "", SHARING_PRIVATE);
+}
+
+void scenes_opened(struct session *session, struct request *request, uint64_t revision)
+{
+    struct session_scene *scene = find(session, request->scene);
+    if (scene && scene->state == SCENE_OPENING)
+        scene->state = SCENE_OPEN;
+    request_answer_ok(session, request, revision);
+}
+
+void scenes_closed(struct session *session, struct request *request)
+{
+    forget(session, request->scene);
+    request_answer_ok(session, request, 0);
+}
+
+void scenes_failed(struct session *session, const struct request *request, bool submitted)
+{
+    struct session_scene *scene = find(session, request->scene);
+    if (request->kind == REQUEST_SCENE_OPEN || request->kind == REQUEST_SCENE_ATTACH) {
+        if (scene && scene->state == SCENE_OPENING)
+            forget(session, request->scene);
+    } else if (request->kind == REQUEST_SCENE_CLOSE) {
+        if (submitted)
+            forget(session, request->scene);
+        else if (scene)
+            scene->state = SCENE_OPEN;
+    }
+}
+
+/* ---- what there is ----------------------------------------------------------------------------------- */
+
+void scenes_list(struct session *session, struct request *request)
+{
+    submit(session, request, ENGINE_SCENE_LIST, 0, "", SHARING_PRIVATE);
+}
+
+void scenes_describe(struct session *session, struct request *request,
+                     const struct message_scene_describe *describe)
+{
+    if (is_there(session, request, describe->scene, "scene_describe.scene"))
+        submit(session, request, ENGINE_SCENE_DESCRIBE, describe->scene, "", SHARING_PRIVATE);
+}
+
+static void answer(struct session *session, struct request *request, const struct message *message)
+{
+    struct error error = {0};
+    if (session_send(session, request->id, 0, message)) {
+        request_answered(session, request);
+        return;
+    }
+    error_set(&error, ERROR_INTERNAL, NULL, "the answer cannot be sent");
+    request_answer_error(session, request, &error);
+}
+
+void scenes_listed(struct session *session, struct request *request, const struct engine_scene_list *list)
+{
+    struct record_scene_entry entries[LIST_MAX];
+    struct message message;
+    message_init(&message, MESSAGE_SCENE_LIST_REPLY);
+    message.scene_list_reply.scenes = entries;
+    message.scene_list_reply.scenes_count = (uint16_t)(list->count < LIST_MAX ? list->count : LIST_MAX);
+    for (uint32_t i = 0; i < message.scene_list_reply.scenes_count; i++) {
+        const struct engine_scene_entry *from = &list->scenes[i];
+        entries[i] = (struct record_scene_entry){
+            .revision = from->revision,
+            .triangles = from->triangles,
+            .clients = from->clients,
+            .sharing = (enum protocol_sharing)from->sharing,
+            .name = from->name,
+        };
+    }
+    answer(session, request, &message);
+}
+
+void scenes_described(struct session *session, struct request *request,
+                      const struct engine_scene_description *from)
+{
+    struct record_camera_entry cameras[ENGINE_DESCRIPTION_MAX];
+    struct record_clip_entry clips[ENGINE_DESCRIPTION_MAX];
+    struct message message;
+    message_init(&message, MESSAGE_SCENE_DESCRIPTION);
+    struct message_scene_description *told = &message.scene_description;
+    told->revision = from->revision;
+    told->triangles = from->triangles;
+    told->spheres = from->spheres;
+    told->nodes = from->nodes;
+    told->empty = from->empty;
+    for (int axis = 0; axis < 3; axis++) {
+        told->lower_world[axis] = from->lower_world[axis];
+        told->upper_world[axis] = from->upper_world[axis];
+    }
+    for (uint32_t i = 0; i < from->camera_count; i++)
+        cameras[i] = (struct record_camera_entry){.node = from->cameras[i].node, .name = from->cameras[i].name};
+    for (uint32_t i = 0; i < from->clip_count; i++)
+        clips[i] = (struct record_clip_entry){.clip = from->clips[i].clip,
+                                              .channels = from->clips[i].channels,
+                                              .duration_s = from->clips[i].duration_s,
+                                              .name = from->clips[i].name};
+    told->cameras = cameras;
+    told->cameras_count = from->camera_count;
+    told->clips = clips;
+    told->clips_count = from->clip_count;
+    /* Long names of many things are more than one message holds. */
+    while (message_payload_bytes(&message) > CODEC_CONTROL_PAYLOAD_MAX_BYTES) {
+        if (told->clips_count >= told->cameras_count)
+            told->clips_count--;
+        else
+            told->cameras_count--;
+    }
+    answer(session, request, &message);
+}
+
+/* ---- changes ----------------------------------------------------------------------------------------- */
+
+void scenes_changed(struct session *session, uint32_t scene, uint64_t revision)
+{
+    struct session_scene *changed = find(session, scene);
+    if (!changed || changed->state == SCENE_CLOSING)
+        return;
+    changed->changed_revision = revision;
+    session->scenes_changed = true;
+    connection_wake(session->connection);
+}
+
+void scenes_tell_changes(struct session *session)
+{
+    if (!session->scenes_changed)
+        return;
+    session->scenes_changed = false;
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    while (hashmap_next(&session->scenes, &cursor, &id, &value)) {
+        struct session_scene *scene = value;
+        if (!scene->changed_revision || scene->state == SCENE_CLOSING)
+            continue;
+        struct message message;
+        message_init(&message, MESSAGE_SCENE_CHANGED);
+        message.scene_changed.scene = (uint32_t)id;
+        message.scene_changed.revision = scene->changed_revision;
+        scene->changed_revision = 0;
+        session_send(session, 0, 0, &message);
+    }
+}
