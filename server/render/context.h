@@ -12,6 +12,7 @@
 #include "shared/frame.h"
 #include "trace/scene_gpu.h"
 #include "trace/tracer.h"
+#include "trace/wave_compare.h"
 
 /* Some pixels: slots of shared/frame.h's order, all in one band. Of each as many samples as are in hand together,
  * uniforms.sample_shift. */
@@ -44,7 +45,10 @@ struct render_context {
     bool sampled_hits;                      /* but for those of discs, those of the wave are stored samples */
     struct gpu_buffer hit_list, hit_places; /* of those paths that hit something, see compact.h */
     uint32_t hit_count;
-    uint32_t asked; /* shadow rays of each hit of the wave in hand that are traced already */
+    uint32_t asked;                     /* shadow rays of each hit of the wave in hand that are traced already */
+    uint32_t asking;                    /* and that are made and not traced to the end; 0: none */
+    uint32_t traced;                    /* rays that are, of the wave that is being traced; 0: none is */
+    uint32_t part_rays[RAY_KIND_COUNT]; /* how many are traced in one step, wave_trace.h */
     struct gpu_buffer block_offsets, wave_state; /* of the compaction */
     struct gpu_buffer slice_sums;                /* vec4 a sample of the slice: radiance so far, coverage */
     uint64_t shadow_rays, secondary_rays;        /* of the slice in hand */
