@@ -12,6 +12,7 @@
  * of rays that leave the scene at once. */
 #define PART_RAYS_FIRST 4096u
 #define GROWTH_MAX 2u
+#define PART_RAYS_MOST (1u << 30)
 
 static bool trace(struct render_context *context, enum ray_kind kind, const struct wave *wave, struct error *error)
 {
@@ -39,22 +40,29 @@ static bool trace_and_compare(struct render_context *context, enum ray_kind kind
     return compared;
 }
 
+/* Rays of one kind and bounce cost about the same from slice to slice. */
+static uint32_t *part_rays(struct render_context *context, enum ray_kind kind)
+{
+    const uint32_t wave = context->wave_number < PART_WAVES ? context->wave_number : PART_WAVES - 1;
+    return &context->part_rays[kind][wave];
+}
+
 /* A GPU does not say when a part is done unless it is waited for, and there a wave is a few milliseconds. */
-static uint32_t part_end(const struct render_context *context, enum ray_kind kind, const struct wave *wave)
+static uint32_t part_end(const struct render_context *context, const struct wave *wave, uint32_t rays_most)
 {
     const uint32_t left = wave->ray_count - context->traced;
-    if (!context->device->facts.software || context->part_rays[kind] >= left)
+    if (!context->device->facts.software || rays_most >= left)
         return wave->ray_count;
-    const uint32_t parts = (left - 1) / context->part_rays[kind] + 1, even = (left - 1) / parts + 1;
+    const uint32_t parts = (left - 1) / rays_most + 1, even = (left - 1) / parts + 1;
     const uint32_t rays = (even + WAVE_PART_RAYS - 1) / WAVE_PART_RAYS * WAVE_PART_RAYS;
     return rays < left ? context->traced + rays : wave->ray_count;
 }
 
-static void learn(struct render_context *context, enum ray_kind kind, uint32_t rays, uint64_t took_ns)
+static void learn(uint32_t *part_rays, uint32_t rays, uint64_t took_ns)
 {
-    const uint64_t wanted = rays * PART_NS / (took_ns + 1), most = GROWTH_MAX * (uint64_t)context->part_rays[kind];
+    const uint64_t wanted = rays * PART_NS / (took_ns + 1), most = GROWTH_MAX * (uint64_t)*part_rays;
     const uint64_t next = wanted < most ? wanted : most;
-    context->part_rays[kind] = next < WAVE_PART_RAYS ? WAVE_PART_RAYS : (uint32_t)next;
+    *part_rays = next < WAVE_PART_RAYS ? WAVE_PART_RAYS : next < PART_RAYS_MOST ? (uint32_t)next : PART_RAYS_MOST;
 }
 
 static bool trace_part(struct render_context *context, enum ray_kind kind, const struct wave *wave, bool *done,
@@ -62,11 +70,12 @@ static bool trace_part(struct render_context *context, enum ray_kind kind, const
 {
     struct wave part = *wave;
     part.first_ray = context->traced;
-    part.end_ray = part_end(context, kind, wave);
+    uint32_t *most = part_rays(context, kind);
+    part.end_ray = part_end(context, wave, *most);
     const uint64_t start_ns = clock_now_ns();
     if (!trace(context, kind, &part, error))
         return false;
-    learn(context, kind, part.end_ray - part.first_ray, clock_now_ns() - start_ns);
+    learn(most, part.end_ray - part.first_ray, clock_now_ns() - start_ns);
     *done = part.end_ray == wave->ray_count;
     context->traced = *done ? 0 : part.end_ray;
     return true;
@@ -84,5 +93,6 @@ bool wave_trace(struct render_context *context, enum ray_kind kind, const struct
 void wave_trace_forget(struct render_context *context)
 {
     for (enum ray_kind kind = 0; kind < RAY_KIND_COUNT; kind++)
-        context->part_rays[kind] = PART_RAYS_FIRST;
+        for (uint32_t wave = 0; wave < PART_WAVES; wave++)
+            context->part_rays[kind][wave] = PART_RAYS_FIRST;
 }
