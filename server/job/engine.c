@@ -94,6 +94,11 @@ static void take_commands(struct engine *engine, struct engine_command *first)
     }
 }
 
+static uint64_t lesser(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
 static void run(struct engine *engine)
 {
     while (!atomic_load(&engine->stop)) {
@@ -106,7 +111,7 @@ static void run(struct engine *engine)
         if (job)
             job_step(engine, job);
         else
-            take_commands(engine, queue_pop(engine->commands, wait_ns));
+            take_commands(engine, queue_pop(engine->commands, lesser(wait_ns, jobs_idle_ns(engine))));
     }
 }
 
