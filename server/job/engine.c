@@ -106,11 +106,6 @@ static void take_commands(struct engine *engine, struct engine_command *first)
     }
 }
 
-static uint64_t lesser(uint64_t a, uint64_t b)
-{
-    return a < b ? a : b;
-}
-
 static void run(struct engine *engine)
 {
     while (!atomic_load(&engine->stop)) {
@@ -118,9 +113,11 @@ static void run(struct engine *engine)
         atomic_store(&engine->nudged, false);
         take_commands(engine, queue_try_pop(engine->commands));
         jobs_reap(engine);
-        uint64_t wait_ns = engine_reap_scenes(engine);
-        if (!serve(engine))
-            take_commands(engine, queue_pop(engine->commands, lesser(wait_ns, jobs_idle_ns(engine))));
+        uint64_t reap_ns = engine_reap_scenes(engine);
+        if (serve(engine))
+            continue;
+        uint64_t idle_ns = jobs_idle_ns(engine);
+        take_commands(engine, queue_pop(engine->commands, idle_ns < reap_ns ? idle_ns : reap_ns));
     }
 }
 

@@ -189,10 +189,12 @@ struct engine_frame {
     size_t size_bytes;
     uint64_t digest; /* XXH3-64 of the pixels before encoding */
     float time_s, shutter_s;
-    uint64_t encoded_ns; /* clock_now_ns() when it was ready to be sent */
-    unsigned quality;    /* it was encoded with; 0: lossless */
-    bool wants_key;      /* it is to be encoded so that it can be decoded without those before .. */
-    bool key_frame;      /* .. and so it was */
+    uint64_t encoded_ns;    /* clock_now_ns() when it was ready to be sent */
+    unsigned quality;       /* it was encoded with; 0: lossless */
+    unsigned scale_eighths; /* of the width and height that the job asks for; 0: all of it */
+    uint64_t wanted_bytes;  /* that it may have, for an encoder that can be told; 0: not known */
+    bool wants_key;         /* it is to be encoded so that it can be decoded without those before .. */
+    bool key_frame;         /* .. and so it was */
     /* Of a view: what it shows last of what its client wished; all 0 before the first wish. */
     uint64_t command, received_ns;
     bool moving;

@@ -61,8 +61,9 @@ struct engine_scene {
 
 /* What a view shows, and what it may show next; see view.c. */
 struct view {
-    uint64_t credit, made; /* frames that may be begun, and that were made */
-    uint64_t due_ns;       /* no frame is begun before */
+    uint64_t credit, made;           /* frames that may be begun, and that were made */
+    uint64_t due_ns;                 /* no frame is begun before */
+    uint64_t render_ns, rendered_ns; /* of its last frame: how long it took, and until when; 0: there is none */
     /* Of its last frame; `shown`: there is one. */
     bool shown;
     uint64_t shown_command, shown_revision;

@@ -14,6 +14,7 @@ void view_follow(struct job *job, const struct job *before)
 {
     job->next_frame = before->next_frame;
     job->view.due_ns = before->view.due_ns;
+    job->view.render_ns = before->view.render_ns;
 }
 
 /* One frame has all the samples that are wanted: it is rendered like one of a batch. */
@@ -36,13 +37,26 @@ static bool may_refine(const struct job *job)
     return view->shown && !view->shown_moving && view->held_samples < job->spec.frame.samples;
 }
 
+/* When a frame may be begun so that it need not wait to be encoded: each is encoded while the next one is
+ * rendered, but one that came early would only be older when it is seen. */
+static uint64_t encoder_due_ns(const struct job *job)
+{
+    const struct view *view = &job->view;
+    uint32_t unfinished = job_output_unfinished(job->output);
+    if (unfinished != 1)
+        return unfinished ? UINT64_MAX : 0; /* the engine is told of each that is encoded */
+    uint64_t free_ns = view->rendered_ns + job_output_encode_ns(job->output);
+    return free_ns > view->render_ns ? free_ns - view->render_ns : 0;
+}
+
 uint64_t view_due_ns(const struct job *job)
 {
     /* Seen in any case, or the engine would not be told of the next wish. */
     struct view_wish wish = view_wishes_see(job->spec.wishes);
     if (job->view.made >= job->view.credit || !(has_news(job, &wish) || may_refine(job)))
         return UINT64_MAX;
-    return job->view.due_ns;
+    uint64_t encoder_ns = encoder_due_ns(job);
+    return encoder_ns > job->view.due_ns ? encoder_ns : job->view.due_ns;
 }
 
 /* Frames are begun at even intervals where that can be, and never more of them than that. */
@@ -61,6 +75,17 @@ static uint32_t samples_of_next(const struct job *job)
     return wanted < job->spec.pass_samples ? wanted : job->spec.pass_samples;
 }
 
+/* Smaller while it moves, if that is what keeps up. */
+static void apply_effort(const struct job *job, struct frame_request *request)
+{
+    const struct view_wish *wish = &job->view.wish;
+    uint32_t scale = wish->effort.scale_eighths;
+    if (!job->spec.adapt || !wish->camera.moving || !scale || scale >= 8)
+        return;
+    request->width = request->width * scale >= 8 ? request->width * scale / 8 : 1;
+    request->height = request->height * scale >= 8 ? request->height * scale / 8 : 1;
+}
+
 bool view_take_up(struct job *job, struct shot *shot, struct error *error)
 {
     struct view *view = &job->view;
@@ -77,6 +102,7 @@ bool view_take_up(struct job *job, struct shot *shot, struct error *error)
     shot->request.seed = job->spec.frame.seed; /* the same picture of the same place */
     shot->request.accumulate = adds_up(job);
     shot->request.samples = samples_of_next(job);
+    apply_effort(job, &shot->request);
     return true;
 }
 
@@ -91,6 +117,8 @@ void view_done(struct job *job, struct engine_frame *frame)
     struct view *view = &job->view;
     const struct view_camera *camera = &view->wish.camera;
     set_due(job);
+    view->render_ns = frame->rendered_ns - frame->applied_ns;
+    view->rendered_ns = frame->rendered_ns;
     view->made++;
     view->shown = true;
     view->shown_command = camera->command;
@@ -102,6 +130,12 @@ void view_done(struct job *job, struct engine_frame *frame)
     frame->moving = camera->moving;
     frame->wants_key = view->wish.key_frame;
     view->wish.key_frame = false;
+    if (camera->moving && job->spec.adapt) {
+        const struct view_effort *effort = &view->wish.effort;
+        frame->scale_eighths = effort->scale_eighths;
+        frame->quality = effort->quality ? effort->quality : frame->quality;
+        frame->wanted_bytes = effort->bytes;
+    }
     if (!camera->moving && job->spec.still_encoding != job->spec.encoding) {
         frame->encoding = job->spec.still_encoding;
         if (frame->encoding != ENCODING_JPEG)

@@ -59,6 +59,13 @@ bool view_wishes_want_key_frame(struct view_wishes *wishes)
     return tell(wishes);
 }
 
+void view_wishes_set_effort(struct view_wishes *wishes, const struct view_effort *effort)
+{
+    pthread_mutex_lock(&wishes->lock);
+    wishes->wish.effort = *effort;
+    pthread_mutex_unlock(&wishes->lock);
+}
+
 static struct view_wish see(struct view_wishes *wishes, bool take)
 {
     pthread_mutex_lock(&wishes->lock);

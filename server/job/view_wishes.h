@@ -27,9 +27,19 @@ void view_wishes_unref(struct view_wishes *wishes); /* accepts NULL */
 bool view_wishes_look(struct view_wishes *wishes, const struct view_camera *camera);
 bool view_wishes_want_key_frame(struct view_wishes *wishes);
 
+/* Of frames while it moves, for views that adapt. */
+struct view_effort {
+    unsigned scale_eighths; /* of width and height; 0: as the job says */
+    unsigned quality;       /* 0: as the job says */
+    uint64_t bytes;         /* that a frame may have; 0: not known */
+};
+/* Nothing is to be told: it counts when the next frame is begun for another reason. */
+void view_wishes_set_effort(struct view_wishes *wishes, const struct view_effort *effort);
+
 struct view_wish {
     struct view_camera camera;
     bool key_frame;
+    struct view_effort effort;
 };
 /* What is wished now, which stays wished. */
 struct view_wish view_wishes_see(struct view_wishes *wishes);
