@@ -77,7 +77,7 @@ void session_submit(struct session *session, struct request *request, struct eng
     /* The engine knows nothing of it: all is as before. */
     scenes_failed(session, request, false);
     if (request->kind == REQUEST_JOB && request->object)
-        job_failed(session, request->object, &error);
+        job_failed(session, request, &error);
     else
         request_answer_error(session, request, &error);
 }
@@ -95,7 +95,7 @@ static void on_done(struct session *session, struct request *request, const stru
         scenes_closed(session, request);
         return;
     case REQUEST_JOB:
-        job_done(session, request->object);
+        job_done(session, request);
         return;
     case REQUEST_COMMIT:
     case REQUEST_CANCEL:
@@ -117,7 +117,7 @@ static void on_failed(struct session *session, struct request *request, const st
     error_set(&error, ERROR_INTERNAL, NULL, "the engine gave no reason");
     switch (request->kind) {
     case REQUEST_JOB:
-        job_failed(session, request->object, &error);
+        job_failed(session, request, &error);
         return;
     case REQUEST_CANCEL:
         request_answer_ok(session, request, 0); /* the job had just ended */
