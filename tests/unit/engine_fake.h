@@ -209,8 +209,9 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         error_set(error, (enum error_kind)atomic_load(&fake.fail_kind), "fake", "as the test wants");
         return FRAME_FAILED;
     }
+    unsigned let_through = atomic_load(&fake.gate_seed);
     bool is_gated =
-        renderer->request.depth == GATED_DEPTH && renderer->request.seed != atomic_load(&fake.gate_seed);
+        renderer->request.depth == GATED_DEPTH && (!let_through || renderer->request.seed != let_through);
     if (is_gated && !atomic_load(&fake.gate_open)) {
         usleep(500);
         return FRAME_MORE;
