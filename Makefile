@@ -54,7 +54,9 @@ pkg_cflags = $(shell $(PKG_CONFIG) --cflags $(1) 2>/dev/null)
 pkg_libs = $(shell $(PKG_CONFIG) --libs $(1) 2>/dev/null)
 
 # ---- sources ---------------------------------------------------------------------------------------
-PROTOCOL_SRC := $(filter-out protocol/docgen.c,$(wildcard protocol/*.c))
+# Sealed connections are for the daemon and the library alone: helper programs go without libsodium.
+SEALED_SRC := $(wildcard protocol/sealed*.c)
+PROTOCOL_SRC := $(filter-out protocol/docgen.c $(SEALED_SRC),$(wildcard protocol/*.c))
 SERVER_SRC := $(filter-out server/main.c,$(wildcard server/*.c server/*/*.c))
 ifneq ($(EMBREE),1)
 SERVER_SRC := $(filter-out server/trace/reference%,$(SERVER_SRC))
@@ -78,8 +80,9 @@ endif
 
 obj = $(patsubst %.c,$(B)/%.o,$(patsubst %.cpp,$(B)/%.opp,$(1)))
 PROTOCOL_OBJ := $(call obj,$(PROTOCOL_SRC))
-SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o
-LIB_OBJ := $(call obj,$(LIB_SRC))
+SEALED_OBJ := $(call obj,$(SEALED_SRC))
+SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ)
+LIB_OBJ := $(call obj,$(LIB_SRC)) $(SEALED_OBJ)
 CLI_OBJ := $(call obj,$(CLI_SRC))
 # Helper programs share the importer's sandbox and the protocol.
 IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX))
@@ -89,7 +92,7 @@ VIDEO_OBJ := $(call obj,$(VIDEO_C) $(addprefix client/output/,channel.c file.c i
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.0
-LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC))
+LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC))
 
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video
 
@@ -169,8 +172,8 @@ $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
 $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
-$(B)/protocol-docgen: $(B)/protocol/docgen.o $(PROTOCOL_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
+$(B)/protocol-docgen: $(B)/protocol/docgen.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
 $(B)/protocol.md: $(B)/protocol-docgen
 	$< >$@.new && mv $@.new $@
 

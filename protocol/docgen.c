@@ -5,6 +5,7 @@
 
 #include "protocol/describe.h"
 #include "protocol/handshake.h"
+#include "protocol/sealed.h"
 
 static void print_rules(void)
 {
@@ -48,6 +49,56 @@ static void print_handshake(void)
         "ms, control payload bytes, bulk chunk bytes, requests in flight, scenes per client, views per client,\n"
         "nodes, texture edge, width, height, samples, idle seconds. What is missing is 0 (not told), what is\n"
         "more is skipped.\n\n");
+}
+
+static void print_sealed_messages(void)
+{
+    printf(
+        "## Sealed connections\n\n"
+        "Where the daemon has a key (%u random bytes, the same at both ends), a connection may begin with four\n"
+        "messages that prove it and give the connection keys of its own; over a network it has to. Nobody on\n"
+        "the way can then read or change what is said, repeat it, or cut off the end unnoticed. The handshake\n"
+        "and all that follows travel in records as they would go over an open connection, cut anywhere.\n"
+        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`.\n\n",
+        SEALED_KEY_BYTES);
+    printf("| message | from | bytes | layout |\n| ---: | --- | ---: | --- |\n"
+           "| 1 | client | 72 | `SEAL`, u8 1, u8 version (%u), u16 0, X25519 public key (32), nonce (32) |\n"
+           "| 2 | server | 72 | `SEAL`, u8 2, u8 status, u16 0, X25519 public key (32), nonce (32) |\n"
+           "| 3 | client | 64 | `SEAL`, u8 3, u8 0, u16 0, header of its stream (24), proof (32) |\n"
+           "| 4 | server | 64 | `SEAL`, u8 4, u8 status, u16 0, header of its stream (24), proof (32) |\n\n",
+           SEALED_VERSION);
+    printf("Public keys and nonces are random and made for one connection. The client may send records right\n"
+           "behind message 3; what they carry is not looked at before its proof. A status other than 0 ends its\n"
+           "message after 8 bytes, and the connection with it:\n\n| status | meaning |\n| ---: | --- |\n");
+    for (enum sealed_status status = SEALED_WRONG_KEY; status <= SEALED_OTHER_VERSION; status++) {
+        printf("| %d | %s |\n", (int)status, sealed_status_text(status));
+    }
+}
+
+static void print_sealed_keys(void)
+{
+    printf(
+        "\nBLAKE2b is that of RFC 7693, X25519 that of RFC 7748; a key of BLAKE2b is its own key parameter.\n"
+        "With `|` for one after the other:\n\n"
+        "- down | up = BLAKE2b-512(X25519 of the two keys | client's public key | server's public key), 32 bytes\n"
+        "  each (libsodium's crypto_kx). A public key that gives a secret of zeros, or is one's own, is\n"
+        "  refused.\n"
+        "- K(label) = BLAKE2b-256, keyed with the key of the connection, of label | up | down | message 1 |\n"
+        "  message 2. A label is ASCII, with zeros up to 32 bytes.\n"
+        "- Proof of message 3: BLAKE2b-256, keyed with K(`farlight sealed client proof`), of the first 32 bytes\n"
+        "  of message 3.\n"
+        "- Proof of message 4: BLAKE2b-256, keyed with K(`farlight sealed server proof`), of message 3 | the\n"
+        "  first 32 bytes of message 4.\n"
+        "- The streams: libsodium's crypto_secretstream_xchacha20poly1305, begun with the header of message 3\n"
+        "  and K(`farlight sealed client stream`), or that of message 4 and K(`farlight sealed server "
+        "stream`).\n\n");
+    printf(
+        "A record is u32 sealed_bytes and that many bytes: one push of the stream, with those 4 bytes as\n"
+        "additional data. It has 1 to %u bytes of plain text, 17 fewer than sealed, and the tag MESSAGE (0). The\n"
+        "last one of a direction, behind the goodbye, has none and the tag FINAL (3). Anything else, a record\n"
+        "that does not open, and one behind the last, end the connection. A daemon waits before it refuses a\n"
+        "wrong key, and hears no keys for a while from an address that has sent too many.\n\n",
+        SEALED_PLAIN_MAX_BYTES);
 }
 
 static void print_framing(void)
@@ -175,6 +226,8 @@ int main(void)
 {
     print_rules();
     print_handshake();
+    print_sealed_messages();
+    print_sealed_keys();
     print_framing();
     printf("## Enumerations\n\n");
     for (size_t i = 0; i < protocol_enum_count; i++) {

@@ -89,6 +89,18 @@ bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint
     return true;
 }
 
+/* What belongs to a job or a view may come at any time, also while something else is waited for. */
+static int consume_frames(struct fl_connection *connection, const struct framing_header *header,
+                          const struct message *message, struct fl_error *error)
+{
+    int taken = connection->view != NULL ? fl_view_take(connection->view, header, message, error) : 0;
+    if (taken == 0 && connection->job != NULL)
+        taken = fl_job_take(connection->job, header, message, error);
+    if (taken < 0)
+        fl_connection_break(connection, error);
+    return taken;
+}
+
 int fl_connection_consume(struct fl_connection *connection, const struct framing_header *header,
                           const struct message *message, struct fl_error *error)
 {
@@ -116,67 +128,61 @@ int fl_connection_consume(struct fl_connection *connection, const struct framing
         break;
     case MESSAGE_ERROR:
         if (header->request != 0)
-            return 0;
+            return consume_frames(connection, header, message, error);
         fl_error_from_message(error, &message->error);
         break;
     default:
-        return 0;
+        return consume_frames(connection, header, message, error);
     }
     connection->broken = *error;
     return -1;
 }
 
+enum fl_step fl_connection_step(struct fl_connection *connection, struct fl_received *received,
+                                uint64_t deadline_ns, struct fl_error *error)
+{
+    struct frame frame;
+    const enum fl_stream_result result = fl_stream_next(&connection->stream, &frame, &received->message, error);
+    if (result == FL_STREAM_ERROR) {
+        fl_connection_break(connection, error);
+        return FL_STEP_FAILED;
+    }
+    if (result == FL_STREAM_MESSAGE) {
+        received->header = frame.header;
+        const int consumed = fl_connection_consume(connection, &frame.header, &received->message, error);
+        return consumed < 0 ? FL_STEP_FAILED : consumed > 0 ? FL_STEP_SERVED : FL_STEP_MESSAGE;
+    }
+    if (connection->stream.ended) {
+        fail_ended(connection, error);
+        return FL_STEP_FAILED;
+    }
+    return serve(connection, deadline_ns, error) ? FL_STEP_SERVED : FL_STEP_FAILED;
+}
+
 bool fl_connection_receive(struct fl_connection *connection, struct fl_received *received, uint64_t deadline_ns,
                            struct fl_error *error)
 {
+    enum fl_step step = FL_STEP_SERVED;
     if (!fl_connection_check(connection, error))
         return false;
-    for (;;) {
-        struct frame frame;
-        const enum fl_stream_result result =
-            fl_stream_next(&connection->stream, &frame, &received->message, error);
-        if (result == FL_STREAM_ERROR)
-            return fl_connection_break(connection, error);
-        if (result == FL_STREAM_MESSAGE) {
-            received->header = frame.header;
-            const int consumed = fl_connection_consume(connection, &frame.header, &received->message, error);
-            if (consumed == 0)
-                return true;
-            if (consumed < 0)
-                return false;
-            continue;
-        }
-        if (connection->stream.ended)
-            return fail_ended(connection, error);
-        if (!serve(connection, deadline_ns, error))
-            return false;
-    }
+    while (step == FL_STEP_SERVED)
+        step = fl_connection_step(connection, received, deadline_ns, error);
+    return step == FL_STEP_MESSAGE;
 }
 
 bool fl_connection_wait_upload(struct fl_connection *connection, uint32_t request, uint64_t total,
                                uint64_t deadline_ns, struct fl_error *error)
 {
-    struct fl_stream *stream = &connection->stream;
     if (!fl_connection_check(connection, error))
         return false;
-    while (connection->upload_credit < total || !fl_stream_has_room(stream)) {
-        struct frame frame;
-        struct message message;
-        const enum fl_stream_result result = fl_stream_next(stream, &frame, &message, error);
-        if (result == FL_STREAM_ERROR)
-            return fl_connection_break(connection, error);
-        if (result == FL_STREAM_MESSAGE) {
-            const int consumed = fl_connection_consume(connection, &frame.header, &message, error);
-            if (consumed < 0)
-                return false;
-            if (consumed == 0 && frame.header.request == request && message.type == MESSAGE_ERROR)
-                return fl_error_from_message(error, &message.error);
-            continue;
-        }
-        if (stream->ended)
-            return fail_ended(connection, error);
-        if (!serve(connection, deadline_ns, error))
+    while (connection->upload_credit < total || !fl_stream_has_room(&connection->stream)) {
+        struct fl_received received;
+        const enum fl_step step = fl_connection_step(connection, &received, deadline_ns, error);
+        if (step == FL_STEP_FAILED)
             return false;
+        if (step == FL_STEP_MESSAGE && received.header.request == request &&
+            received.message.type == MESSAGE_ERROR)
+            return fl_error_from_message(error, &received.message.error);
     }
     return true;
 }
@@ -202,6 +208,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
 {
     struct fl_stream *stream = &connection->stream;
     struct handshake_hello hello = {.version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX};
+    hello.capabilities = connection->can_h264 ? HANDSHAKE_CAN_H264 : 0;
     snprintf(hello.name, sizeof hello.name, "%s", name);
     if (getrandom(hello.nonce, sizeof hello.nonce, 0) != (ssize_t)sizeof hello.nonce)
         return fl_error_set(error, FL_ERROR_SYSTEM, "", "no random numbers");
@@ -228,6 +235,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
             if (!handshake_reply_accept(&hello, &reply, &why))
                 return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "%s", why.text);
             connection->limits = reply.limits;
+            connection->can_h264 = connection->can_h264 && (reply.capabilities & HANDSHAKE_CAN_H264) != 0;
             return true;
         }
         if (stream->ended)
@@ -288,6 +296,7 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
     connection->stream.fd = -1;
     connection->process.talk_fd = -1;
     connection->interrupt_fd = options->interrupt_fd;
+    connection->can_h264 = options->can_h264;
     connection->last_channel = FL_UPLOAD_CHANNEL;
     snprintf(connection->address, sizeof connection->address, "%s",
              options->server != NULL ? options->server : "private");
@@ -331,6 +340,16 @@ uint64_t fl_connection_start_ns(const struct fl_connection *connection)
 bool fl_connection_is_local(const struct fl_connection *connection)
 {
     return connection->local;
+}
+
+bool fl_connection_can_h264(const struct fl_connection *connection)
+{
+    return connection->can_h264;
+}
+
+int fl_connection_fd(const struct fl_connection *connection)
+{
+    return connection->stream.fd;
 }
 
 const char *fl_connection_address(const struct fl_connection *connection)

@@ -19,6 +19,8 @@ struct fl_connection {
     uint64_t upload_credit;           /* the daemon's total for the upload channel */
     uint64_t upload_sent;             /* bytes of blob data sent on it so far */
     struct fl_job *job;               /* the one that runs */
+    struct fl_view *view;             /* likewise */
+    bool can_h264;                    /* this client and the daemon */
     struct fl_error broken;           /* why nothing works any more; code NONE: it does */
     struct message_stats_reply stats; /* the last answer */
     uint64_t start_ns;
@@ -43,9 +45,18 @@ uint32_t fl_connection_next_request(struct fl_connection *connection);
 bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint32_t channel,
                         const struct message *message, struct fl_error *error);
 /* Deals with what concerns the connection itself (ping, credit for uploads, blocked, goodbye, an error of
- * request 0): 1: it was that; 0: it is for the caller; -1: the connection is broken, *error says why. */
+ * request 0), its job or its view: 1: it was that; 0: it is for the caller; -1: the connection is broken, *error
+ * says why. */
 int fl_connection_consume(struct fl_connection *connection, const struct framing_header *header,
                           const struct message *message, struct fl_error *error);
+enum fl_step {
+    FL_STEP_MESSAGE, /* for the caller */
+    FL_STEP_SERVED,  /* something came or went, or a message was for the connection, its job or its view */
+    FL_STEP_FAILED
+};
+/* One message, or one round of waiting where there is none. */
+enum fl_step fl_connection_step(struct fl_connection *connection, struct fl_received *received,
+                                uint64_t deadline_ns, struct fl_error *error);
 /* The next message that is for the caller. */
 bool fl_connection_receive(struct fl_connection *connection, struct fl_received *received, uint64_t deadline_ns,
                            struct fl_error *error);
@@ -58,6 +69,17 @@ bool fl_connection_answer(struct fl_connection *connection, uint32_t request, en
                           struct fl_received *received, uint64_t deadline_ns, struct fl_error *error);
 /* The daemon's error as ours; returns false. */
 bool fl_error_from_message(struct fl_error *error, const struct message_error *message);
+
+/* ---- what a connection has besides (job.c, view.c) ---- */
+
+/* Whether a message was the job's or the view's, as fl_connection_consume: they keep what came whole until they
+ * are asked for it. */
+int fl_job_take(struct fl_job *job, const struct framing_header *header, const struct message *message,
+                struct fl_error *error);
+int fl_view_take(struct fl_view *view, const struct framing_header *header, const struct message *message,
+                 struct fl_error *error);
+/* "zero is the default", spelled out. */
+void fl_job_fill_render(struct message_render *render, const struct fl_job_options *options);
 
 /* Connects a socket to "unix:PATH" or "tcp:HOST:PORT"; -1 on failure. `local`: see fl_connection_is_local. */
 int fl_address_connect(const char *address, uint64_t deadline_ns, int interrupt_fd, bool *local,

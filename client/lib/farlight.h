@@ -96,6 +96,8 @@ FL_API void fl_connection_set_interrupt(struct fl_connection *connection, int in
 FL_API uint64_t fl_connection_start_ns(const struct fl_connection *connection);
 /* Private or on a Unix socket: bytes cost next to nothing. */
 FL_API bool fl_connection_is_local(const struct fl_connection *connection);
+/* Frames of views may be asked for in H.264: the caller said so, and the daemon has an encoder for it. */
+FL_API bool fl_connection_can_h264(const struct fl_connection *connection);
 FL_API const char *fl_connection_address(const struct fl_connection *connection);
 
 FL_API bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error);
@@ -361,6 +363,10 @@ FL_API struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_jo
                                       struct fl_error *error);
 /* The next frame, in order; NULL with error->code FL_ERROR_NONE after the last. The caller destroys it. */
 FL_API struct fl_frame *fl_render_next(struct fl_job *job, struct fl_error *error);
+/* The same, waiting at most timeout_ms for it, 0: not at all. NULL with error->code FL_ERROR_NONE: none so far, or
+ * with *done none any more. */
+FL_API struct fl_frame *fl_render_poll(struct fl_job *job, unsigned timeout_ms, bool *done,
+                                       struct fl_error *error);
 FL_API void fl_frame_destroy(struct fl_frame *frame);
 /* Ends the job early and waits until the daemon confirms it; what was sent meanwhile is dropped. */
 FL_API bool fl_render_cancel(struct fl_job *job, struct fl_error *error);

@@ -10,6 +10,7 @@
 
 /* What a JPEG may take besides the worst case of its pixels: tables and markers. */
 #define JPEG_EXTRA_BYTES 65536u
+#define H264_EXTRA_BYTES 65536u /* likewise */
 
 uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format)
 {
@@ -40,6 +41,9 @@ void fl_frame_destroy(struct fl_frame *frame)
     free(frame->pixels);
     free(frame->stages);
     free(frame->wave_comparisons);
+    free(frame->encoded);
+    free(frame->depth);
+    free(frame->normals);
     free(frame);
 }
 
@@ -53,18 +57,27 @@ void fl_assembly_finish(struct fl_assembly *assembly)
 }
 
 /* The most bytes that a picture can honestly take. */
-static uint64_t encoded_bytes_max(const struct fl_frame_expected *expected, size_t pixels_bytes)
+static uint64_t encoded_bytes_max(const struct message_frame_begin *begin, size_t pixels_bytes)
 {
-    switch (expected->encoding) {
+    switch (begin->encoding) {
     case PROTOCOL_ENCODING_RAW:
         return pixels_bytes;
     case PROTOCOL_ENCODING_ZSTD:
         return ZSTD_compressBound(pixels_bytes);
     case PROTOCOL_ENCODING_JPEG:
-        return tjBufSize((int)expected->width, (int)expected->height, TJSAMP_444) + JPEG_EXTRA_BYTES;
+        return tjBufSize((int)begin->width, (int)begin->height, TJSAMP_444) + JPEG_EXTRA_BYTES;
+    case PROTOCOL_ENCODING_H264: /* not even its uncompressed blocks take more than the pixels */
+        return pixels_bytes + H264_EXTRA_BYTES;
     default:
         return 0;
     }
+}
+
+static bool is_expected_size(const struct fl_frame_expected *expected, const struct message_frame_begin *begin)
+{
+    if (expected->is_view)
+        return begin->width <= expected->width && begin->height <= expected->height;
+    return begin->width == expected->width && begin->height == expected->height;
 }
 
 static bool check_begin(const struct fl_assembly *assembly, const struct message_frame_begin *begin,
@@ -73,11 +86,12 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
     const struct fl_frame_expected *expected = &assembly->expected;
     if (assembly->frame != NULL)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "a frame began inside another");
-    if (begin->frame != number)
+    if (expected->is_view ? begin->frame < number : begin->frame != number)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.frame", "frame %u came in place of frame %u",
                             begin->frame, number);
-    if (begin->width != expected->width || begin->height != expected->height ||
-        begin->format != expected->format || begin->encoding != expected->encoding)
+    if (!is_expected_size(expected, begin) || begin->format != expected->format ||
+        (begin->encoding != expected->encoding &&
+         (!expected->is_view || begin->encoding != expected->still_encoding)))
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "%ux%u %s %s came in place of %ux%u %s %s",
                             begin->width, begin->height, protocol_pixel_format_text(begin->format),
                             protocol_encoding_text(begin->encoding), expected->width, expected->height,
@@ -87,7 +101,7 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.layers", "the layers %#x came in place of %#x",
                             begin->layers, expected->layers);
     const size_t pixels_bytes = pixels_bytes_of(begin);
-    const uint64_t most = encoded_bytes_max(expected, pixels_bytes);
+    const uint64_t most = encoded_bytes_max(begin, pixels_bytes);
     const bool exact = begin->encoding == PROTOCOL_ENCODING_RAW;
     if (begin->size_bytes == 0 || begin->size_bytes > most || (exact && begin->size_bytes != most))
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.size_bytes",
@@ -120,7 +134,16 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->focus = begin->focus;
     frame->shutter_s = begin->shutter_s;
     frame->layers = begin->layers;
+    frame->command = begin->command;
+    frame->command_received_ns = begin->received_ns;
+    frame->command_applied_ns = begin->applied_ns;
+    frame->rendered_ns = begin->rendered_ns;
+    frame->moving = begin->moving != 0;
+    frame->key_frame = begin->key_frame != 0;
+    frame->frame_quality = begin->quality;
     frame->wire_bytes = begin->size_bytes;
+    if (begin->encoding == PROTOCOL_ENCODING_H264)
+        return frame;
     frame->pixels_bytes = pixels_bytes_of(begin);
     frame->pixels = malloc(frame->pixels_bytes);
     if (frame->pixels == NULL) {
@@ -144,7 +167,7 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
                             begin->height);
     assembly->encoded_bytes = begin->size_bytes;
     assembly->received_bytes = 0;
-    assembly->begin_ns = now_ns;
+    assembly->frame->begun_ns = now_ns;
     return true;
 }
 
@@ -205,6 +228,8 @@ static bool decode_jpeg(const struct fl_assembly *assembly, struct fl_error *err
 static bool decode(const struct fl_assembly *assembly, struct fl_error *error)
 {
     struct fl_frame *frame = assembly->frame;
+    if (frame->encoding == PROTOCOL_ENCODING_H264) /* the caller decodes it */
+        return true;
     if (frame->encoding == PROTOCOL_ENCODING_JPEG)
         return decode_jpeg(assembly, error);
     if (frame->encoding == PROTOCOL_ENCODING_ZSTD && !decode_zstd(assembly, error))
@@ -258,11 +283,57 @@ struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct mess
     *error = (struct fl_error){0};
     if (!take_costs(frame, end, error) || !decode(assembly, error))
         return NULL;
-    frame->receive_ns = now_ns - assembly->begin_ns;
-    frame->decode_ns = fl_now_ns() - decode_begin_ns;
-    if (assembly->encoded != frame->pixels)
+    frame->whole_ns = fl_now_ns();
+    frame->receive_ns = now_ns - frame->begun_ns;
+    frame->decode_ns = frame->whole_ns - decode_begin_ns;
+    if (frame->encoding == PROTOCOL_ENCODING_H264) {
+        frame->encoded = assembly->encoded;
+        frame->encoded_bytes = (size_t)assembly->encoded_bytes;
+    } else if (assembly->encoded != frame->pixels) {
         free(assembly->encoded);
+    }
     assembly->frame = NULL;
     assembly->encoded = NULL;
     return frame;
+}
+
+/* ---- frames that wait ---- */
+
+bool fl_frame_queue_init(struct fl_frame_queue *queue, size_t capacity, struct fl_error *error)
+{
+    *queue = (struct fl_frame_queue){.frames = calloc(capacity, sizeof(struct fl_frame *)), .capacity = capacity};
+    return queue->frames != NULL || fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+}
+
+bool fl_frame_queue_push(struct fl_frame_queue *queue, struct fl_frame *frame, struct fl_error *error)
+{
+    if (queue->count == queue->capacity) {
+        fl_frame_destroy(frame);
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "more frames came than were asked for");
+    }
+    queue->frames[(queue->first + queue->count++) % queue->capacity] = frame;
+    return true;
+}
+
+struct fl_frame *fl_frame_queue_pop(struct fl_frame_queue *queue)
+{
+    if (queue->count == 0)
+        return NULL;
+    struct fl_frame *frame = queue->frames[queue->first];
+    queue->first = (queue->first + 1) % queue->capacity;
+    queue->count--;
+    return frame;
+}
+
+void fl_frame_queue_clear(struct fl_frame_queue *queue)
+{
+    while (queue->count > 0)
+        fl_frame_destroy(fl_frame_queue_pop(queue));
+}
+
+void fl_frame_queue_finish(struct fl_frame_queue *queue)
+{
+    fl_frame_queue_clear(queue);
+    free(queue->frames);
+    *queue = (struct fl_frame_queue){0};
 }

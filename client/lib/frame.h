@@ -11,6 +11,9 @@ struct fl_frame_expected {
     enum protocol_pixel_format format;
     enum protocol_encoding encoding;
     unsigned layers; /* set of them, at least one; see struct fl_frame */
+    /* Of a view: frames may be smaller and leave out numbers, and those at rest have another encoding. */
+    bool is_view;
+    enum protocol_encoding still_encoding;
 };
 
 struct fl_assembly {
@@ -18,10 +21,10 @@ struct fl_assembly {
     struct fl_frame *frame; /* begun; NULL: none */
     uint8_t *encoded;       /* where its bytes go: the pixels themselves when raw */
     uint64_t encoded_bytes, received_bytes;
-    uint64_t begin_ns;
 };
 
-/* Each returns false on what is not allowed; the assembly must then be finished. */
+/* Each returns false on what is not allowed; the assembly must then be finished. `number` is the frame's; of a
+ * view the least that it may have. */
 bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_begin *begin, uint32_t number,
                        uint64_t now_ns, struct fl_error *error);
 bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_data *data, struct fl_error *error);
@@ -29,6 +32,19 @@ bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_d
 struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct message_frame_end *end,
                                  uint64_t now_ns, struct fl_error *error);
 void fl_assembly_finish(struct fl_assembly *assembly);
+
+/* Frames that came whole and wait for being asked for; the daemon's credit is their limit. */
+struct fl_frame_queue {
+    struct fl_frame **frames; /* a ring */
+    size_t first, count, capacity;
+};
+
+bool fl_frame_queue_init(struct fl_frame_queue *queue, size_t capacity, struct fl_error *error);
+/* Takes the frame over, also when it fails: more came than credit was given for. */
+bool fl_frame_queue_push(struct fl_frame_queue *queue, struct fl_frame *frame, struct fl_error *error);
+struct fl_frame *fl_frame_queue_pop(struct fl_frame_queue *queue); /* NULL: there is none */
+void fl_frame_queue_clear(struct fl_frame_queue *queue);
+void fl_frame_queue_finish(struct fl_frame_queue *queue);
 
 /* Of a picture: what comes where nothing was said of layers. */
 #define FL_LAYERS_PICTURE (1u << PROTOCOL_LAYER_BEAUTY)

@@ -3,6 +3,7 @@
 #include "lib/frame.h"
 #include "lib/scene.h"
 
+#include <limits.h>
 #include <stdlib.h>
 
 #define CANCEL_NS 10000000000ull
@@ -14,12 +15,13 @@ struct fl_job {
     uint64_t credit;     /* frames that the daemon may have sent by now */
     uint64_t next_frame; /* 64 bits: one step beyond the last cannot wrap */
     uint32_t last_frame, frame_step;
-    bool answered; /* the daemon has given its one answer: nothing more comes */
+    bool answered;           /* the daemon has given its one answer: nothing more comes */
+    struct fl_error failure; /* why it ended early; code NONE: it did not */
     struct fl_assembly assembly;
+    struct fl_frame_queue done; /* that nobody has asked for yet */
 };
 
-/* "zero is the default", spelled out. */
-static void fill_render(struct message_render *render, const struct fl_job_options *options)
+void fl_job_fill_render(struct message_render *render, const struct fl_job_options *options)
 {
     const unsigned default_quality = options->encoding == PROTOCOL_ENCODING_JPEG ? 90 : 1;
     render->width = options->width > 0 ? options->width : 1280;
@@ -97,7 +99,7 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_optio
     }
     struct message message = {.type = MESSAGE_RENDER};
     struct message_render *render = &message.render;
-    fill_render(render, options);
+    fl_job_fill_render(render, options);
     job->connection = connection;
     job->request = fl_connection_next_request(connection);
     job->channel = ++connection->last_channel;
@@ -114,7 +116,9 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_optio
     };
     render->scene = scene->scene;
     render->channel = job->channel;
-    if (!fl_connection_send(connection, job->request, 0, &message, error)) {
+    if (!fl_frame_queue_init(&job->done, render->credit, error) ||
+        !fl_connection_send(connection, job->request, 0, &message, error)) {
+        fl_frame_queue_finish(&job->done);
         free(job);
         return NULL;
     }
@@ -142,22 +146,10 @@ static bool conclude(struct fl_job *job, const struct message *message, struct f
     return true;
 }
 
-/* What the daemon broke is not to be used any more. */
-static bool fail(struct fl_job *job, struct fl_error *error)
+/* One message of the job's. */
+static bool take(struct fl_job *job, const struct message *message, struct fl_error *error)
 {
-    fl_assembly_finish(&job->assembly);
-    if (error->code == FL_ERROR_PROTOCOL)
-        fl_connection_break(job->connection, error);
-    return false;
-}
-
-/* One message; *frame when it completed one. */
-static bool take(struct fl_job *job, const struct fl_received *received, struct fl_frame **frame,
-                 struct fl_error *error)
-{
-    const struct message *message = &received->message;
-    if (received->header.request != job->request)
-        return true; /* a late answer to something given up */
+    struct fl_frame *frame = NULL;
     switch (message->type) {
     case MESSAGE_FRAME_BEGIN:
         if (job->next_frame > job->last_frame)
@@ -167,9 +159,9 @@ static bool take(struct fl_job *job, const struct fl_received *received, struct 
     case MESSAGE_FRAME_DATA:
         return fl_assembly_data(&job->assembly, &message->frame_data, error);
     case MESSAGE_FRAME_END:
-        *frame = fl_assembly_end(&job->assembly, &message->frame_end, fl_now_ns(), error);
+        frame = fl_assembly_end(&job->assembly, &message->frame_end, fl_now_ns(), error);
         job->next_frame += job->frame_step;
-        return *frame != NULL;
+        return frame != NULL && fl_frame_queue_push(&job->done, frame, error);
     case MESSAGE_OK:
     case MESSAGE_ERROR:
         return conclude(job, message, error);
@@ -179,35 +171,64 @@ static bool take(struct fl_job *job, const struct fl_received *received, struct 
     }
 }
 
-struct fl_frame *fl_render_next(struct fl_job *job, struct fl_error *error)
+int fl_job_take(struct fl_job *job, const struct framing_header *header, const struct message *message,
+                struct fl_error *error)
+{
+    struct fl_error why = {0};
+    if (header->request != job->request)
+        return 0;
+    /* What still comes of a job that was given up is dropped. */
+    if (job->answered || job->failure.code != FL_ERROR_NONE || take(job, message, &why))
+        return 1;
+    fl_assembly_finish(&job->assembly);
+    job->failure = why;
+    if (why.code != FL_ERROR_PROTOCOL)
+        return 1;
+    *error = why;
+    return -1;
+}
+
+struct fl_frame *fl_render_poll(struct fl_job *job, unsigned timeout_ms, bool *done, struct fl_error *error)
 {
     const uint64_t begin_ns = fl_now_ns();
-    struct fl_frame *frame = NULL;
+    const uint64_t deadline_ns = timeout_ms < UINT_MAX ? begin_ns + timeout_ms * 1000000ull : UINT64_MAX;
     *error = (struct fl_error){0};
-    while (frame == NULL && !job->answered) {
-        struct fl_received received;
-        if (!fl_connection_receive(job->connection, &received, UINT64_MAX, error))
-            return NULL; /* a frame that has begun is kept: an interruption is no end */
-        if (!take(job, &received, &frame, error)) {
-            fail(job, error);
-            return NULL;
+    *done = false;
+    while (job->done.count == 0 && !job->answered && job->failure.code == FL_ERROR_NONE) {
+        struct fl_received ignored; /* a late answer to something given up */
+        if (!fl_connection_check(job->connection, error) ||
+            fl_connection_step(job->connection, &ignored, deadline_ns, error) == FL_STEP_FAILED) {
+            if (error->code == FL_ERROR_TIMEOUT)
+                *error = (struct fl_error){0};
+            return NULL; /* a frame that has begun is kept: neither is an end */
         }
     }
-    if (frame == NULL)
+    struct fl_frame *frame = fl_frame_queue_pop(&job->done);
+    *done = frame == NULL;
+    if (frame == NULL) {
+        *error = job->failure;
         return NULL;
+    }
     frame->wait_ns = fl_now_ns() - begin_ns;
-    if (job->next_frame <= job->last_frame && !grant(job, error)) {
+    if (job->next_frame <= job->last_frame && !job->answered && !grant(job, error)) {
         fl_frame_destroy(frame);
         return NULL;
     }
     return frame;
 }
 
+struct fl_frame *fl_render_next(struct fl_job *job, struct fl_error *error)
+{
+    bool done = false;
+    return fl_render_poll(job, UINT_MAX, &done, error);
+}
+
 bool fl_render_cancel(struct fl_job *job, struct fl_error *error)
 {
     struct fl_connection *connection = job->connection;
     fl_assembly_finish(&job->assembly);
-    if (job->answered)
+    fl_frame_queue_clear(&job->done);
+    if (job->answered || job->failure.code != FL_ERROR_NONE)
         return true;
     struct message cancel = {.type = MESSAGE_CANCEL};
     cancel.cancel.target_request = job->request;
@@ -227,6 +248,7 @@ void fl_render_destroy(struct fl_job *job)
     if (!job->answered && job->connection->broken.code == FL_ERROR_NONE)
         fl_render_cancel(job, &ignored);
     fl_assembly_finish(&job->assembly);
+    fl_frame_queue_finish(&job->done);
     job->connection->job = NULL;
     free(job);
 }

@@ -111,7 +111,7 @@ static bool lost(const struct fl_stream *stream, int number, struct fl_error *er
                         strerror(number));
 }
 
-static bool write_waiting(struct fl_stream *stream, struct fl_error *error)
+bool fl_stream_write(struct fl_stream *stream, struct fl_error *error)
 {
     while (fl_stream_has_output(stream)) {
         const ssize_t sent =
@@ -134,7 +134,7 @@ static bool write_waiting(struct fl_stream *stream, struct fl_error *error)
 
 bool fl_stream_transfer(struct fl_stream *stream, struct fl_error *error)
 {
-    if (!write_waiting(stream, error))
+    if (!fl_stream_write(stream, error))
         return false;
     compact(stream->in, &stream->in_start, &stream->in_end);
     while (!stream->ended && has_space_to_read(stream)) {

@@ -37,6 +37,8 @@ void fl_stream_push_payload(struct fl_stream *stream, const struct framing_heade
 
 /* poll()'s events for the stream's present state; 0 when there is nothing to wait for. */
 short fl_stream_events(const struct fl_stream *stream);
+/* Writes as far as it goes without blocking; what came in stays where it is. False: the peer is lost. */
+bool fl_stream_write(struct fl_stream *stream, struct fl_error *error);
 /* Writes and reads as far as it goes without blocking. False: the peer is lost. The end of its bytes is no
  * failure: see `ended`. */
 bool fl_stream_transfer(struct fl_stream *stream, struct fl_error *error);

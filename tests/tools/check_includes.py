@@ -30,7 +30,7 @@ MAY_INCLUDE = {
     "client/video": {"protocol", "client/import", "client/output", "client/lib"},  # sandbox; channel; ycbcr, rate
     "shaders/shared": set(),
 }
-# System headers that only some folders may use.
+# System headers that only some folders may use, or in a folder only files whose names begin so.
 RESTRICTED = [
     (re.compile(r"^(epoxy|GL|EGL)/"), {"server/gpu", "server/trace", "server/render"}),
     (re.compile(r"^embree"), {"server/trace"}),
@@ -40,6 +40,8 @@ RESTRICTED = [
     (re.compile(r"^OpenImageIO/"), {"client/import", "client/output"}),
     (re.compile(r"^(tiny_gltf|tiny_obj_loader)"), {"client/import"}),
     (re.compile(r"^(turbojpeg|zstd)\.h"), {"server/encode", "client/lib"}),
+    # Of the protocol's files only those of sealed connections, which helper programs are not linked to.
+    (re.compile(r"^sodium\.h"), {"server/base", "server/session", "client/lib", "client/import", "protocol/sealed"}),
 ]
 ROOTS = ("", "server", "shaders", "client")  # as the compiler's -I
 INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"([^"]+)"|<([^>]+)>)')
@@ -79,7 +81,8 @@ def check(path, report):
             elif owner(target) != here and owner(target) not in MAY_INCLUDE[here]:
                 report(path, number, f"{here} may not include {owner(target)} ({quoted})")
         for pattern, allowed in RESTRICTED:
-            if system and pattern.match(system) and here not in allowed:
+            names = {here, f"{here}/{path.stem.partition('_')[0]}"}
+            if system and pattern.match(system) and not names & allowed:
                 report(path, number, f"<{system}> belongs to {', '.join(sorted(allowed))}")
 
 

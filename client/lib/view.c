@@ -1,0 +1,313 @@
+/* SPDX-License-Identifier: MIT */
+/* A view: cameras go out, frames of the newest one come in and are acknowledged. */
+#include "lib/frame.h"
+#include "lib/scene.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define DEFAULT_FRAMES_PER_SECOND 60
+#define DEFAULT_SAMPLES 64u
+#define DEFAULT_FRAMES_IN_FLIGHT 4u
+/* Renders that replace one another faster than the daemon answers: more than these wait for it. */
+#define ASKED_MAX 8u
+#define ANSWER_NS 30000000000ull
+#define COMMANDS_REMEMBERED 256u /* four seconds of cameras at 60 a second */
+
+/* A render of kind view that the daemon has not answered yet; the newest one holds, frames of those before may
+ * still be on their way. */
+struct asked {
+    uint32_t request;
+    struct fl_frame_expected expected;
+};
+
+struct fl_view {
+    struct fl_connection *connection;
+    uint32_t scene, channel;
+    uint64_t credit;     /* frames that the daemon may have sent by now */
+    uint32_t next_frame; /* the least number that the next one may have */
+    uint32_t last_frame; /* the last one that came whole .. */
+    bool has_frame;      /* .. if there is one */
+    struct asked asked[ASKED_MAX];
+    size_t asked_count;
+    uint64_t last_command;
+    uint64_t command_sent_ns[COMMANDS_REMEMBERED]; /* by number, modulo */
+    struct fl_error failure; /* why a render was refused; told once while an older one goes on */
+    struct fl_assembly assembly;
+    uint32_t assembled_request;
+    struct fl_frame_queue done; /* that nobody has asked for yet */
+};
+
+/* ---- going out ---- */
+
+static void fill_render(struct message_render *render, const struct fl_view *view,
+                        const struct fl_view_options *options)
+{
+    struct fl_job_options job = options->job;
+    job.format = PROTOCOL_PIXEL_FORMAT_RGBA8;
+    job.first_frame = job.last_frame = 0;
+    job.samples = job.samples > 0 ? job.samples : DEFAULT_SAMPLES;
+    job.frames_per_second = job.frames_per_second > 0 ? job.frames_per_second : DEFAULT_FRAMES_PER_SECOND;
+    fl_job_fill_render(render, &job);
+    render->kind = PROTOCOL_JOB_KIND_VIEW;
+    render->scene = view->scene;
+    render->channel = view->channel;
+    render->credit = (uint32_t)view->done.capacity;
+    render->still_encoding = options->still_encoding;
+    render->pass_samples = options->pass_samples;
+    render->weight = options->weight;
+    render->adapt = options->adapt ? 1 : 0;
+    render->attachments = options->attachments;
+}
+
+/* Of all renders of the view together. */
+static bool tell_credit(struct fl_view *view, struct fl_error *error)
+{
+    struct message credit = {.type = MESSAGE_CREDIT};
+    credit.credit.channel = view->channel;
+    credit.credit.total = view->credit;
+    return fl_connection_send(view->connection, 0, 0, &credit, error);
+}
+
+/* One more render on the view's channel. */
+static bool ask(struct fl_view *view, const struct fl_view_options *options, struct fl_error *error)
+{
+    struct message message = {.type = MESSAGE_RENDER};
+    struct message_render *render = &message.render;
+    fill_render(render, view, options);
+    struct asked *asked = &view->asked[view->asked_count];
+    asked->request = fl_connection_next_request(view->connection);
+    asked->expected = (struct fl_frame_expected){.width = render->width,
+                                                 .height = render->height,
+                                                 .format = render->format,
+                                                 .encoding = render->encoding,
+                                                 .still_encoding = render->still_encoding,
+                                                 .layers = FL_LAYERS_PICTURE,
+                                                 .is_view = true};
+    if (!fl_connection_send(view->connection, asked->request, 0, &message, error))
+        return false;
+    view->asked_count++;
+    return true;
+}
+
+struct fl_view *fl_view_start(struct fl_scene *scene, const struct fl_view_options *options,
+                              struct fl_error *error)
+{
+    struct fl_connection *connection = scene->connection;
+    const unsigned in_flight = options->job.frames_in_flight;
+    if (connection->view != NULL) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, "", "another view is there on this connection");
+        return NULL;
+    }
+    struct fl_view *view = calloc(1, sizeof *view);
+    if (view == NULL) {
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    view->connection = connection;
+    view->scene = scene->scene;
+    view->channel = ++connection->last_channel;
+    if (!fl_frame_queue_init(&view->done, in_flight > 0 ? in_flight : DEFAULT_FRAMES_IN_FLIGHT, error) ||
+        !ask(view, options, error)) {
+        fl_frame_queue_finish(&view->done);
+        free(view);
+        return NULL;
+    }
+    view->credit = view->done.capacity;
+    connection->view = view;
+    return view;
+}
+
+/* Why nothing comes any more, or why the newest render was refused. */
+static bool check(struct fl_view *view, struct fl_error *error)
+{
+    if (!fl_connection_check(view->connection, error))
+        return false;
+    if (view->failure.code == FL_ERROR_NONE)
+        return true;
+    *error = view->failure;
+    if (view->asked_count > 0)
+        view->failure = (struct fl_error){0};
+    return false;
+}
+
+bool fl_view_change(struct fl_view *view, const struct fl_view_options *options, struct fl_error *error)
+{
+    const uint64_t deadline_ns = fl_now_ns() + ANSWER_NS;
+    if (!check(view, error))
+        return false;
+    while (view->asked_count == ASKED_MAX) {
+        struct fl_received ignored;
+        if (fl_connection_step(view->connection, &ignored, deadline_ns, error) == FL_STEP_FAILED)
+            return false;
+    }
+    return ask(view, options, error) && tell_credit(view, error);
+}
+
+bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uint64_t *command,
+                  struct fl_error *error)
+{
+    struct message message = {.type = MESSAGE_VIEW_CAMERA};
+    struct message_view_camera *look = &message.view_camera;
+    look->channel = view->channel;
+    look->command = view->last_command + 1;
+    look->moving = camera->moving ? 1 : 0;
+    look->time_s = camera->time_s;
+    memcpy(look->eye_world, camera->eye_world, sizeof look->eye_world);
+    memcpy(look->look_at_world, camera->look_at_world, sizeof look->look_at_world);
+    memcpy(look->up_world, camera->up_world, sizeof look->up_world);
+    look->fov_y = camera->fov_y;
+    const uint64_t now_ns = fl_now_ns();
+    if (!check(view, error) || !fl_connection_send(view->connection, 0, 0, &message, error))
+        return false;
+    view->last_command = look->command;
+    view->command_sent_ns[look->command % COMMANDS_REMEMBERED] = now_ns;
+    if (command != NULL)
+        *command = look->command;
+    return true;
+}
+
+static void fill_ack(struct message *message, const struct fl_view *view, bool want_key_frame)
+{
+    *message = (struct message){.type = MESSAGE_FRAME_ACK};
+    message->frame_ack.channel = view->channel;
+    message->frame_ack.frame = view->last_frame;
+    message->frame_ack.want_key_frame = want_key_frame ? 1 : 0;
+}
+
+bool fl_view_want_key_frame(struct fl_view *view, struct fl_error *error)
+{
+    struct message message;
+    fill_ack(&message, view, true);
+    return check(view, error) && (!view->has_frame || fl_connection_send(view->connection, 0, 0, &message, error));
+}
+
+/* ---- coming in ---- */
+
+/* At once, before the frame is decoded: the daemon measures the link with it, not us. */
+static bool acknowledge(struct fl_view *view, uint32_t frame, struct fl_error *error)
+{
+    struct message message;
+    view->last_frame = frame;
+    view->has_frame = true;
+    view->next_frame = frame < UINT32_MAX ? frame + 1 : frame;
+    fill_ack(&message, view, false);
+    /* A daemon that takes nothing learns nothing. */
+    if (!fl_stream_has_room(&view->connection->stream))
+        return true;
+    return fl_stream_push(&view->connection->stream, 0, 0, &message, error) &&
+           fl_stream_write(&view->connection->stream, error);
+}
+
+static bool take_end(struct fl_view *view, const struct message *message, struct fl_error *error)
+{
+    const uint64_t now_ns = fl_now_ns();
+    if (view->assembly.frame != NULL && !acknowledge(view, message->frame_end.frame, error))
+        return false;
+    struct fl_frame *frame = fl_assembly_end(&view->assembly, &message->frame_end, now_ns, error);
+    if (frame == NULL)
+        return false;
+    if (frame->command > 0 && frame->command <= view->last_command &&
+        view->last_command - frame->command < COMMANDS_REMEMBERED)
+        frame->command_sent_ns = view->command_sent_ns[frame->command % COMMANDS_REMEMBERED];
+    return fl_frame_queue_push(&view->done, frame, error);
+}
+
+/* The one answer to a render: ok where a newer one took its place. */
+static bool conclude(struct fl_view *view, size_t index, const struct message *message, struct fl_error *error)
+{
+    const bool is_newest = index + 1 == view->asked_count;
+    if (view->assembly.frame != NULL && view->assembled_request == view->asked[index].request)
+        fl_assembly_finish(&view->assembly);
+    memmove(&view->asked[index], &view->asked[index + 1], (view->asked_count - index - 1) * sizeof view->asked[0]);
+    view->asked_count--;
+    if (message->type == MESSAGE_ERROR && is_newest)
+        fl_error_from_message(&view->failure, &message->error);
+    else if (is_newest)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "a view ended that nothing took the place of");
+    return true;
+}
+
+static bool take(struct fl_view *view, size_t index, const struct message *message, struct fl_error *error)
+{
+    const uint32_t request = view->asked[index].request;
+    switch (message->type) {
+    case MESSAGE_FRAME_BEGIN:
+        if (view->assembly.frame == NULL) {
+            view->assembly.expected = view->asked[index].expected;
+            view->assembled_request = request;
+        }
+        return fl_assembly_begin(&view->assembly, &message->frame_begin, view->next_frame, fl_now_ns(), error);
+    case MESSAGE_FRAME_DATA:
+    case MESSAGE_FRAME_END:
+        if (request != view->assembled_request)
+            return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data", "pieces of two frames came mixed");
+        if (message->type == MESSAGE_FRAME_DATA)
+            return fl_assembly_data(&view->assembly, &message->frame_data, error);
+        return take_end(view, message, error);
+    case MESSAGE_OK:
+    case MESSAGE_ERROR:
+        return conclude(view, index, message, error);
+    default:
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "a view is not answered by %s",
+                            message_type_text(message->type));
+    }
+}
+
+int fl_view_take(struct fl_view *view, const struct framing_header *header, const struct message *message,
+                 struct fl_error *error)
+{
+    struct fl_error why = {0};
+    size_t index = 0;
+    while (index < view->asked_count && view->asked[index].request != header->request)
+        index++;
+    if (index == view->asked_count)
+        return 0;
+    if (take(view, index, message, &why))
+        return 1;
+    /* Without memory for a frame nothing that follows can be told apart from what is broken. */
+    fl_assembly_finish(&view->assembly);
+    *error = why;
+    return -1;
+}
+
+struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct fl_error *error)
+{
+    const uint64_t begin_ns = fl_now_ns(), deadline_ns = begin_ns + timeout_ms * 1000000ull;
+    *error = (struct fl_error){0};
+    while (view->done.count == 0) {
+        struct fl_received ignored; /* a late answer to something given up */
+        if (!check(view, error))
+            return NULL;
+        if (fl_connection_step(view->connection, &ignored, deadline_ns, error) == FL_STEP_FAILED) {
+            if (error->code == FL_ERROR_TIMEOUT)
+                *error = (struct fl_error){0};
+            return NULL;
+        }
+    }
+    struct fl_frame *frame = fl_frame_queue_pop(&view->done);
+    frame->wait_ns = fl_now_ns() - begin_ns;
+    /* That the connection is lost is told by the next call. */
+    struct fl_error ignored;
+    view->credit++;
+    tell_credit(view, &ignored);
+    return frame;
+}
+
+/* The answer is not waited for: what comes until then is dropped. */
+void fl_view_destroy(struct fl_view *view)
+{
+    if (view == NULL)
+        return;
+    struct fl_connection *connection = view->connection;
+    struct fl_error ignored;
+    for (size_t i = 0; i < view->asked_count && connection->broken.code == FL_ERROR_NONE; i++) {
+        struct message cancel = {.type = MESSAGE_CANCEL};
+        cancel.cancel.target_request = view->asked[i].request;
+        fl_connection_send(connection, fl_connection_next_request(connection), 0, &cancel, &ignored);
+    }
+    fl_assembly_finish(&view->assembly);
+    fl_frame_queue_finish(&view->done);
+    connection->view = NULL;
+    free(view);
+}
