@@ -114,14 +114,13 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, st
                   struct error *error)
 {
     struct engine_options engine_options;
+    struct hub_options options;
     if ((fd < 0 && !daemon_listen(daemon, config->listen, config->insecure, error)) ||
-        !config_engine(config, &engine_options, error))
+        !config_engine(config, &engine_options, error) || !config_hub(config, &options, error))
         return false;
     struct engine *engine = engine_create(&engine_options, error);
     if (!engine)
         return false;
-    struct hub_options options;
-    config_hub(config, &options);
     options.engine = engine_port(engine);
     options.timeline = timeline;
     if (fd >= 0)

@@ -7,6 +7,7 @@
 #include "net/auth.h"
 #include "net/connection.h"
 #include "net/loop.h"
+#include "net/readers.h"
 #include "session/blob_store.h"
 #include "session/engine_port.h"
 #include "session/limits.h"
@@ -20,6 +21,7 @@ struct session;
 struct hub_options {
     struct session_limits limits;
     struct connection_limits connection_limits;
+    struct readers readers; /* of the Unix socket */
     struct engine_port engine;
     struct timeline *timeline;   /* hears of every frame that was sent; may be NULL */
     uint64_t scene_memory_bytes; /* of one scene, as the engine has it; told to clients */

@@ -216,6 +216,8 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
     if (getrandom(reply->nonce, sizeof reply->nonce, 0) < 0 ||
         getrandom(reply->session_token, sizeof reply->session_token, 0) < 0)
         snprintf(reply->text, sizeof reply->text, "no random numbers");
+    if (session->identity.read_only)
+        reply->capabilities |= HANDSHAKE_CAN_READ_ONLY;
     fill_limits(&reply->limits, &hub->options);
     snprintf(session->name, sizeof session->name, "%s", hello->name);
     return reply->text[0] == '\0';
