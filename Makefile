@@ -208,6 +208,13 @@ BENCH_PROGRAMS := $(BENCHES) $(B)/tests/bench/embree_build
 BENCH_DISTRIBUTED := $(B)/tests/bench/bench_distributed
 $(BENCH_DISTRIBUTED): %: %.o $(B)/tests/bench/paper_scene.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+# So are their steps.
+BENCH_STEPS := $(B)/tests/bench/bench_steps
+$(BENCH_STEPS): %: %.o $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,options.c scene.c sheets.c waves.c)) $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
+BENCH_CANCEL := $(B)/tests/bench/bench_cancel
+$(BENCH_CANCEL): %: %.o $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(CLIENT_LIBS) -o $@
 # EMBREE=0 leaves out what cannot be built without it.
 ifeq ($(EMBREE),0)
 UNIT_TESTS := $(filter-out $(B)/tests/unit/test_bench_contest,$(UNIT_TESTS))
@@ -236,7 +243,7 @@ PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
 .PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help
-tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump
+tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
@@ -256,7 +263,7 @@ demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out
 # The programs that are measured, and those that measure.
-BENCHED = all $(BENCHES) $(BENCH_DISTRIBUTED) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
+BENCHED = all $(BENCHES) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
 bench: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench.py $(B) $(BENCH)

@@ -39,6 +39,7 @@ extern "C" {
 /* Bits of `capabilities`. */
 #define HANDSHAKE_CAN_H264 (UINT64_C(1) << 0)      /* client: decodes it; daemon: encodes it */
 #define HANDSHAKE_CAN_READ_ONLY (UINT64_C(1) << 1) /* reply: this client may only look: it edits nothing */
+#define HANDSHAKE_NEEDS_KEY (UINT64_C(1) << 2)     /* reply of version 0: only sealed connections are let in */
 
 struct handshake_hello {
     uint16_t version_min;

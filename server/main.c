@@ -16,7 +16,18 @@
 /* glibc looks for it by name, which -fvisibility=hidden would hide. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlightd " FARLIGHT_VERSION;
 
-enum { KEY_FD = 256, KEY_CONFIG, KEY_DEVICE, KEY_LIST, KEY_LEVEL, KEY_DUMP, KEY_INSECURE, KEY_TRACE };
+enum {
+    KEY_FD = 256,
+    KEY_CONFIG,
+    KEY_DEVICE,
+    KEY_LIST,
+    KEY_LEVEL,
+    KEY_DUMP,
+    KEY_INSECURE,
+    KEY_TRACE,
+    KEY_KEY,
+    KEY_READER_KEY
+};
 
 static const struct argp_option option_table[] = {
     {"listen", 'l', "ADDRESS", 0, "Listen at unix:/PATH or tcp:HOST:PORT; may be given several times", 0},
@@ -27,6 +38,10 @@ static const struct argp_option option_table[] = {
     {"log-level", KEY_LEVEL, "LEVEL", 0, "error, warning, info or debug", 0},
     {"trace-file", KEY_TRACE, "FILE", 0,
      "Write the stages of all frames to FILE as trace events, for ui.perfetto.dev or chrome://tracing", 0},
+    {"key-file", KEY_KEY, "FILE", 0,
+     "Let clients with the key of FILE come in from everywhere, on sealed connections ('farlight key' makes one)",
+     0},
+    {"reader-key-file", KEY_READER_KEY, "FILE", 0, "The same for clients who may look, but change nothing", 0},
     {"insecure", KEY_INSECURE, NULL, 0, "Let TCP listen beyond loopback, open to everybody and unencrypted", 0},
     {"dump-config", KEY_DUMP, NULL, 0, "Print all options with their values as a configuration file, and exit", 0},
     {0},
@@ -34,7 +49,7 @@ static const struct argp_option option_table[] = {
 
 struct arguments {
     char listen[CONFIG_TEXT_BYTES]; /* all of them, each followed by a blank */
-    const char *config_file, *device, *log_level, *insecure, *trace_file;
+    const char *config_file, *device, *log_level, *insecure, *trace_file, *key_file, *reader_key_file;
     int fd;
     bool dump_config;
 };
@@ -75,6 +90,12 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
     case KEY_TRACE:
         arguments->trace_file = value;
         break;
+    case KEY_KEY:
+        arguments->key_file = value;
+        break;
+    case KEY_READER_KEY:
+        arguments->reader_key_file = value;
+        break;
     case KEY_INSECURE:
         arguments->insecure = "yes";
         break;
@@ -106,6 +127,8 @@ static bool read_config(struct config *config, const struct arguments *arguments
            config_flag(config, "server.listen", listen, "--listen", error) &&
            config_flag(config, "engine.device", arguments->device, "--device", error) &&
            config_flag(config, "server.insecure", arguments->insecure, "--insecure", error) &&
+           config_flag(config, "server.key_file", arguments->key_file, "--key-file", error) &&
+           config_flag(config, "server.reader_key_file", arguments->reader_key_file, "--reader-key-file", error) &&
            config_flag(config, "server.trace_file", arguments->trace_file, "--trace-file", error) &&
            config_flag(config, "server.log_level", arguments->log_level, "--log-level", error);
 }
@@ -114,15 +137,23 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, st
                   struct error *error)
 {
     struct engine_options engine_options;
+<<<<<<< HEAD
     struct hub_options options;
     if ((fd < 0 && !daemon_listen(daemon, config->listen, config->insecure, error)) ||
         !config_engine(config, &engine_options, error) || !config_hub(config, &options, error))
+=======
+    struct auth_keys keys;
+    if (!auth_read_keys(&keys, config->key_file, config->reader_key_file, error) ||
+        (fd < 0 && !daemon_listen(daemon, config->listen, config->insecure || keys.count, error)) ||
+        !config_engine(config, &engine_options, error))
+>>>>>>> e806b7f2559764cac10fc5075be7e313986eaa46
         return false;
     struct engine *engine = engine_create(&engine_options, error);
     if (!engine)
         return false;
     options.engine = engine_port(engine);
     options.timeline = timeline;
+    options.keys = keys;
     if (fd >= 0)
         options.connection_limits.idle_ms = 0; /* whoever started us for himself may take his time */
     bool ok = daemon_start(daemon, &options, error) && (fd < 0 || daemon_serve_fd(daemon, fd, error));

@@ -12,7 +12,8 @@ layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
 #endif
 layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; a crossing is the first
 
-uniform uint ray_count;
+uniform uint first_ray; // of this dispatch
+uniform uint ray_count; // where it ends
 
 bool is_triangle(candidate found)
 {
@@ -27,7 +28,7 @@ bool is_triangle(candidate found)
 
 void main()
 {
-    uint k = item_index();
+    uint k = first_ray + item_index();
     if (k >= ray_count)
         return;
     uvec4 crossing = imageLoad(hits, int(3u * k));

@@ -19,9 +19,11 @@ static size_t jpeg_bound(const struct picture *picture)
 {
     if (picture->bytes_per_pixel != 4 || picture->width > EDGE_MAX || picture->height > EDGE_MAX)
         return 0;
-    /* The greater of the two, whatever the quality will be. */
-    unsigned long bound = tjBufSize((int)picture->width, (int)picture->height, TJSAMP_444);
-    return bound == ULONG_MAX ? 0 : bound;
+    /* The greater of the two, whatever the quality will be: tiny pictures are padded more where chroma is halved.
+     */
+    unsigned long full = tjBufSize((int)picture->width, (int)picture->height, TJSAMP_444);
+    unsigned long halved = tjBufSize((int)picture->width, (int)picture->height, TJSAMP_420);
+    return full == ULONG_MAX || halved == ULONG_MAX ? 0 : full > halved ? full : halved;
 }
 
 static size_t jpeg_encode(const struct picture *picture, unsigned quality, uint8_t *out, size_t capacity,

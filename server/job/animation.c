@@ -11,9 +11,8 @@
 /* What the protocol lets a key have; a spline through keys near the ends may leave it. */
 #define FOV_MIN 0.001f
 #define FOV_MAX 3.1f
-/* What it lets a frame's camera and time have: composed transforms and splines may go beyond. */
+/* What it lets a frame's camera have: composed transforms and splines may go beyond. */
 #define PLACE_MAX 1e12f
-#define TIME_MAX_S 1e9
 
 double animation_time_s(const struct engine_job *job, uint32_t frame)
 {
@@ -48,8 +47,8 @@ void animation_key_at(const struct camera_key *keys, uint32_t key_count, double 
     key->fov_y = fminf(fmaxf(key->fov_y, FOV_MIN), FOV_MAX);
 }
 
-static bool camera_from_key(const struct camera_key *key, const char *field, struct frame_camera *camera,
-                            struct error *error)
+bool animation_key_camera(const struct camera_key *key, const char *field, struct frame_camera *camera,
+                          struct error *error)
 {
     if (frame_camera_look_at(camera, key->eye_world, key->look_at_world, key->up_world, key->fov_y))
         return true;
@@ -121,8 +120,7 @@ static void middle(const struct animation_bounds *bounds, float centre_world[3])
         centre_world[axis] = (float)(((double)bounds->lower[axis] + (double)bounds->upper[axis]) / 2);
 }
 
-/* Along the view; 0 where the point is not in front. */
-static float distance_to(const struct frame_camera *camera, const float point_world[3])
+float animation_distance(const struct frame_camera *camera, const float point_world[3])
 {
     const float *m = camera->world_from_view;
     double distance = 0.0;
@@ -145,7 +143,7 @@ static bool orbit_camera(const struct engine_job *job, const struct scene *scene
 {
     float centre_world[3], axis_world[3] = {0.0f, 1.0f, 0.0f};
     if (job->key_count) {
-        if (!camera_from_key(&job->keys[0], "render.keys[0]", camera, error))
+        if (!animation_key_camera(&job->keys[0], "render.keys[0]", camera, error))
             return false;
         for (int i = 0; i < 3; i++) {
             centre_world[i] = job->keys[0].look_at_world[i];
@@ -251,9 +249,9 @@ static bool keys_camera(const struct engine_job *job, const struct pose_view *gi
         memcpy(key.look_at_world, given->look_at_world, sizeof key.look_at_world);
     if (given->given & POSE_VIEW_UP)
         memcpy(key.up_world, given->up_world, sizeof key.up_world);
-    if (!camera_from_key(&key, "render.keys", camera, error))
+    if (!animation_key_camera(&key, "render.keys", camera, error))
         return false;
-    *focus = distance_to(camera, key.look_at_world);
+    *focus = animation_distance(camera, key.look_at_world);
     return true;
 }
 
@@ -295,7 +293,7 @@ static bool camera_at(const struct engine_job *job, const struct scene *scene, c
         return error_set(error, ERROR_INVALID, "render.camera_path", "%u is no camera path", (unsigned)job->path);
     }
     if (job->path == CAMERA_ORBIT && job->key_count) {
-        view->focus = distance_to(camera, job->keys[0].look_at_world);
+        view->focus = animation_distance(camera, job->keys[0].look_at_world);
         return true;
     }
     /* The bounds cost something: only a lens asks for them. */
@@ -304,20 +302,14 @@ static bool camera_at(const struct engine_job *job, const struct scene *scene, c
     if (!find_bounds(job, scene, bounds, error))
         return false;
     middle(bounds, centre_world);
-    view->focus = distance_to(camera, centre_world);
+    view->focus = animation_distance(camera, centre_world);
     return true;
 }
 
 bool animation_view(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
-                    uint32_t frame, struct animation_bounds *bounds, struct animation_view *view,
+                    double time_s, struct animation_bounds *bounds, struct animation_view *view,
                     struct error *error)
 {
-    double time_s = animation_time_s(job, frame);
-    if (!(fabs(time_s) <= TIME_MAX_S)) {
-        error_set(error, ERROR_INVALID, "render.frames_per_second", "frame %u is at %g s, beyond %g s", frame,
-                  time_s, TIME_MAX_S);
-        return error_remedy(error, "use more frames a second, or smaller frame numbers");
-    }
     struct animation_bounds own = {0};
     *view = (struct animation_view){0};
     if (!camera_at(job, scene, pose, time_s, bounds ? bounds : &own, view, error))
@@ -328,7 +320,7 @@ bool animation_view(const struct engine_job *job, const struct scene *scene, con
     for (int i = 0; i < 12; i++) {
         if (fabsf(camera->world_from_view[i]) <= PLACE_MAX) /* false for a NaN too */
             continue;
-        error_set(error, ERROR_INVALID, "render.camera_path", "in frame %u the camera is beyond %g m", frame,
+        error_set(error, ERROR_INVALID, "render.camera_path", "at %g s the camera is beyond %g m", time_s,
                   (double)PLACE_MAX);
         return error_remedy(error, "bring the camera, or what it is to show, nearer to the origin");
     }

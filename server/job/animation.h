@@ -11,6 +11,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#define ANIMATION_TIME_MAX_S 1e9 /* what the protocol lets a frame have, to both sides of 0 */
+
 /* Seconds since `time_origin_frame`; negative before it. */
 double animation_time_s(const struct engine_job *job, uint32_t frame);
 /* Catmull-Rom through the keys in time; before the first and after the last it stands still. At least one key. */
@@ -27,14 +29,19 @@ struct animation_bounds {
     uint64_t revision;
     float lower[3], upper[3];
 };
+/* That of one key; false if its vectors do not span a view. */
+bool animation_key_camera(const struct camera_key *key, const char *field, struct frame_camera *camera,
+                          struct error *error);
+/* Along the view; 0 where the point is not in front. */
+float animation_distance(const struct frame_camera *camera, const float point_world[3]);
 struct animation_view {
     struct frame_camera camera;
     float focus; /* distance along the view to what is looked at, or to the middle of the scene; metres */
 };
-/* `pose`: at the frame's time, NULL: the scene as it was committed; its view counts, as far as it is given.
- * `bounds` may be NULL. */
+/* At a time of the job. `pose`: at that time, NULL: the scene as it was committed; its view counts, as far as it
+ * is given. `bounds` may be NULL. */
 bool animation_view(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
-                    uint32_t frame, struct animation_bounds *bounds, struct animation_view *view,
+                    double time_s, struct animation_bounds *bounds, struct animation_view *view,
                     struct error *error);
 
 #endif

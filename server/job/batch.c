@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Batch jobs: every frame of a range, in order, each in slices. */
+/* Jobs: their start and end, and their frames, each in slices. A batch is every frame of a range, in order; what
+ * is different with views is in view.c. */
 #include "job/engine_private.h"
 
 #include "base/clock.h"
@@ -34,6 +35,10 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
                   (unsigned)spec->encoding, bytes_per_pixel(spec->frame.format));
         return error_remedy(error, "use the pixel format rgba8, or the encoding zstd or raw");
     }
+    if (spec->kind == JOB_VIEW && !encoder_supports(spec->still_encoding, bytes_per_pixel(spec->frame.format)))
+        return error_set(error, ERROR_UNSUPPORTED, "render.still_encoding",
+                         "encoding %u cannot carry pixels of %u bytes", (unsigned)spec->still_encoding,
+                         bytes_per_pixel(spec->frame.format));
     return tracer_find(spec->frame.tracer, "render.tracer", error) &&
            (!spec->frame.compare || tracer_find(spec->frame.compare_with, "render.compare_with", error)) &&
            shot_check(spec, scene, error);
@@ -61,6 +66,17 @@ static uint32_t window_of(const struct engine *engine, const struct frame_reques
                                                        : engine->options.frames_in_flight;
 }
 
+/* Whose place a view takes; NULL: nobody's. */
+static struct job *replaced_by(struct engine *engine, const struct engine_command *command)
+{
+    for (size_t i = 0; command->job.kind == JOB_VIEW && i < engine->job_count; i++) {
+        struct job *job = engine->jobs[i];
+        if (job->spec.wishes == command->job.wishes && !job_output_is_closed(job->output))
+            return job;
+    }
+    return NULL;
+}
+
 bool job_start(struct engine *engine, struct engine_reference *reference, struct engine_command *command,
                struct error *error)
 {
@@ -72,11 +88,14 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
         .client = command->client,
         .request = command->request,
         .window = window_of(engine, &command->job.frame),
-        .credit = command->job.credit,
+        .credit = command->job.kind == JOB_VIEW ? UINT64_MAX : command->job.credit,
     });
-    if (!job || !output || !jobs_reserve(engine)) {
+    struct job *before = replaced_by(engine, command);
+    struct engine_event *end_before = before ? event_create(ENGINE_DONE, before->client, before->request) : NULL;
+    if (!job || !output || (before && !end_before) || !jobs_reserve(engine)) {
         free(job);
         job_output_unref(output);
+        engine_event_destroy(end_before);
         return error_set(error, ERROR_OUT_OF_MEMORY, "render", "no memory for a job");
     }
     job->client = command->client;
@@ -84,11 +103,20 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
     job->spec = command->job;
     command->job.keys = NULL;
     command->job.clips = NULL;
+    command->job.wishes = NULL;
     job->reference = reference;
     job->scene = reference->scene;
     job->output = output;
     job->next_frame = job->spec.first_frame;
+    job->view.credit = job->spec.credit;
     engine->jobs[engine->job_count++] = job;
+    if (before) {
+        struct engine_scene *scene_before = before->scene;
+        view_follow(job, before);
+        job_abort(engine, before, end_before);
+        if (scene_before != job->scene)
+            engine_run_waiting(engine, scene_before);
+    }
     return true;
 }
 
@@ -128,6 +156,7 @@ static void job_remove(struct engine *engine, struct job *job)
     job_output_unref(job->output);
     free(job->spec.keys);
     free(job->spec.clips);
+    view_wishes_unref(job->spec.wishes);
     free(job);
 }
 
@@ -135,6 +164,14 @@ void job_abort(struct engine *engine, struct job *job, struct engine_event *fina
 {
     job_output_close(job->output, final);
     job_remove(engine, job);
+}
+
+void job_credit(struct job *job, uint64_t credit)
+{
+    if (job->spec.kind == JOB_BATCH)
+        job_output_credit(job->output, credit);
+    else if (credit > job->view.credit)
+        job->view.credit = credit;
 }
 
 void jobs_reap(struct engine *engine)
@@ -172,7 +209,7 @@ static void job_finish(struct job *job, const struct error *error)
 static bool wants_frame(const struct job *job)
 {
     return !job_output_is_closed(job->output) && !job->rendering && job->next_frame <= job->spec.last_frame &&
-           job_output_has_room(job->output);
+           job_output_has_room(job->output) && (job->spec.kind == JOB_BATCH || view_due_ns(job) != UINT64_MAX);
 }
 
 /* What waits for the frames in progress to end is not kept waiting by new ones. */
@@ -186,11 +223,30 @@ static bool may_begin(const struct job *job)
     return !scene->put_off || !wants_frame(scene->put_off);
 }
 
-bool job_is_ready(const struct job *job)
+/* When it is ready; in the past: now. UINT64_MAX: not before something happens. */
+static uint64_t ready_ns(const struct job *job)
 {
     if (job->rendering)
-        return !job_output_is_closed(job->output);
-    return wants_frame(job) && may_begin(job);
+        return job_output_is_closed(job->output) ? UINT64_MAX : 0;
+    if (!wants_frame(job) || !may_begin(job))
+        return UINT64_MAX;
+    return job->spec.kind == JOB_VIEW ? view_due_ns(job) : 0;
+}
+
+bool job_is_ready(const struct job *job)
+{
+    uint64_t ready = ready_ns(job);
+    return ready != UINT64_MAX && ready <= clock_now_ns();
+}
+
+uint64_t jobs_idle_ns(const struct engine *engine)
+{
+    uint64_t first_ns = UINT64_MAX, now_ns = clock_now_ns();
+    for (size_t i = 0; i < engine->job_count; i++) {
+        uint64_t ready = ready_ns(engine->jobs[i]);
+        first_ns = ready < first_ns ? ready : first_ns;
+    }
+    return first_ns == UINT64_MAX ? UINT64_MAX : first_ns > now_ns ? first_ns - now_ns : 0;
 }
 
 /* Whether the frame is worth another try; if not, the job has failed. */
@@ -240,7 +296,10 @@ static bool frame_take_up(struct engine *engine, struct job *job, struct error *
     struct engine_scene *scene = job->scene;
     struct shot shot;
     job->begin_ns = clock_now_ns();
-    if (!shot_make(&shot, &job->spec, scene->scene, (uint32_t)job->next_frame, &job->bounds, error))
+    bool made = job->spec.kind == JOB_VIEW
+                    ? view_take_up(job, &shot, error)
+                    : shot_make(&shot, &job->spec, scene->scene, (uint32_t)job->next_frame, &job->bounds, error);
+    if (!made)
         return false;
     job->frame = shot.request;
     job->time_s = shot.time_s;
@@ -272,11 +331,16 @@ static void frame_done(struct engine *engine, struct job *job, struct engine_fra
     frame->frame = (uint32_t)job->next_frame;
     frame->request = job->frame;
     frame->encoding = job->spec.encoding;
+    frame->quality = job->spec.quality;
     frame->time_s = job->time_s;
     frame->shutter_s = job->shutter_s;
+    frame->applied_ns = job->begin_ns;
+    frame->rendered_ns = clock_now_ns();
+    if (job->spec.kind == JOB_VIEW)
+        view_done(job, frame);
     job->next_frame += job->spec.frame_step;
     uint64_t position = job_output_reserve(job->output);
-    if (!encode_pool_submit(engine->pool, job->output, position, frame, job->spec.quality)) {
+    if (!encode_pool_submit(engine->pool, job->output, position, frame)) {
         struct error error = {0};
         error_set(&error, ERROR_OUT_OF_MEMORY, "render", "a frame could not be passed on to be encoded");
         struct engine_event *event = event_create(ENGINE_FAILED, job->client, job->request);
@@ -312,7 +376,9 @@ void job_step(struct engine *engine, struct job *job)
 {
     struct engine_scene *scene = job->scene;
     job->served = job->reference->client->served = scene->used = ++engine->slices;
-    if (job->rendering) {
+    if (job->rendering && job->spec.kind == JOB_VIEW && view_is_stale(job))
+        abandon_frame(engine, job);
+    else if (job->rendering) {
         frame_go_on(engine, job);
     } else {
         struct error error = {0};

@@ -19,6 +19,7 @@ void engine_command_destroy(struct engine_command *command)
     free(command->edits);
     free(command->job.keys);
     free(command->job.clips);
+    view_wishes_unref(command->job.wishes);
     free(command);
 }
 
@@ -226,11 +227,11 @@ static void job_cancel(struct engine *engine, struct engine_command *command)
     done(engine, command, 0);
 }
 
-static void job_credit(struct engine *engine, const struct engine_command *command)
+static void give_credit(struct engine *engine, const struct engine_command *command)
 {
     struct job *job = job_find(engine, command->client, command->target_request);
     if (job) {
-        job_output_credit(job->output, command->credit);
+        job_credit(job, command->credit);
         return;
     }
     struct engine_scene *waits_for;
@@ -286,11 +287,13 @@ void engine_handle(struct engine *engine, struct engine_command *command)
         engine_trim_scenes(engine);
         break;
     case ENGINE_JOB_CREDIT:
-        job_credit(engine, command);
+        give_credit(engine, command);
         break;
     case ENGINE_JOB_CANCEL:
         job_cancel(engine, command);
         break;
+    case ENGINE_VIEW_LOOK:
+        break; /* the view sees for itself whenever the thread is awake */
     case ENGINE_STATS:
         report_stats(engine, command);
         break;

@@ -17,7 +17,6 @@ struct encode_task {
     struct job_output *output;
     uint64_t position;
     struct engine_frame *frame;
-    unsigned quality;
 };
 
 struct encode_pool {
@@ -35,7 +34,7 @@ static void task_destroy(void *item)
     free(task);
 }
 
-static bool encode(struct encode_pool *pool, struct engine_frame *frame, unsigned quality, struct error *error)
+static bool encode(struct encode_pool *pool, struct engine_frame *frame, struct error *error)
 {
     struct frame_result *result = &frame->result;
     /* Layers lie one behind the other: one picture of their common height. */
@@ -48,8 +47,11 @@ static bool encode(struct encode_pool *pool, struct engine_frame *frame, unsigne
     };
     uint64_t start_ns = clock_now_ns();
     frame->digest = XXH3_64bits(result->pixels, result->size_bytes);
-    if (!encoder_encode(frame->encoding, &picture, quality, &frame->bytes, &frame->size_bytes, error))
+    if (!encoder_encode(frame->encoding, &picture, frame->quality, &frame->bytes, &frame->size_bytes, error))
         return false;
+    frame->key_frame = true;
+    if (frame->encoding != ENCODING_JPEG)
+        frame->quality = 0; /* a level, which costs no picture */
     free(result->pixels);
     result->pixels = NULL;
     frame->encoded_ns = clock_now_ns();
@@ -63,7 +65,7 @@ static void run_task(struct encode_pool *pool, struct encode_task *task)
     if (job_output_is_closed(task->output))
         return;
     struct error error = {0};
-    bool encoded = encode(pool, task->frame, task->quality, &error);
+    bool encoded = encode(pool, task->frame, &error);
     struct engine_event *event = event_create(encoded ? ENGINE_FRAME : ENGINE_FAILED, 0, 0);
     if (!event) {
         log_write(LOG_ERROR, "encode", "no memory for an event; a job ends without an answer");
@@ -132,14 +134,14 @@ void encode_pool_destroy(struct encode_pool *pool)
 }
 
 bool encode_pool_submit(struct encode_pool *pool, struct job_output *output, uint64_t position,
-                        struct engine_frame *frame, unsigned quality)
+                        struct engine_frame *frame)
 {
     struct encode_task *task = calloc(1, sizeof *task);
     if (!task) {
         engine_frame_destroy(frame);
         return false;
     }
-    *task = (struct encode_task){job_output_ref(output), position, frame, quality};
+    *task = (struct encode_task){job_output_ref(output), position, frame};
     if (queue_push(pool->tasks, task))
         return true;
     task_destroy(task);

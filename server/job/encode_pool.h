@@ -18,9 +18,10 @@ struct encode_pool_options {
 struct encode_pool *encode_pool_create(const struct encode_pool_options *options, struct error *error);
 /* Ends after the frames in hand; those that wait are dropped. Accepts NULL. */
 void encode_pool_destroy(struct encode_pool *pool);
-/* Encodes a frame (its result holds the pixels) and puts it at its position. Takes over the frame, not the output,
- * of which it holds a reference of its own. May wait; false: the pool is closed or out of memory. */
+/* Encodes a frame (its result holds the pixels) with its encoding and quality, and puts it at its position. Takes
+ * over the frame, not the output, of which it holds a reference of its own. May wait; false: the pool is closed or
+ * out of memory. */
 bool encode_pool_submit(struct encode_pool *pool, struct job_output *output, uint64_t position,
-                        struct engine_frame *frame, unsigned quality);
+                        struct engine_frame *frame);
 
 #endif

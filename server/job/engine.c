@@ -101,12 +101,14 @@ static void run(struct engine *engine)
         atomic_store(&engine->nudged, false);
         take_commands(engine, queue_try_pop(engine->commands));
         jobs_reap(engine);
-        uint64_t wait_ns = engine_reap_scenes(engine);
+        uint64_t reap_ns = engine_reap_scenes(engine);
         struct job *job = next_job(engine);
-        if (job)
+        if (job) {
             job_step(engine, job);
-        else
-            take_commands(engine, queue_pop(engine->commands, wait_ns));
+            continue;
+        }
+        uint64_t idle_ns = jobs_idle_ns(engine);
+        take_commands(engine, queue_pop(engine->commands, idle_ns < reap_ns ? idle_ns : reap_ns));
     }
 }
 

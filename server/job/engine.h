@@ -21,6 +21,7 @@
 
 struct engine;
 struct engine_backend;
+struct view_wishes;
 
 #define ENGINE_LINGERING_SCENES 16u                     /* default of lingering_scenes */
 #define ENGINE_FRAME_WINDOW_BYTES ((uint64_t)512 << 20) /* default of frame_window_bytes */
@@ -50,8 +51,11 @@ struct camera_key {
     float fov_y;
 };
 
+enum job_kind { JOB_BATCH, JOB_VIEW }; /* protocol's numbers */
+
 /* What a job asks for; per frame job/shot.h makes a request and poses of it. */
 struct engine_job {
+    enum job_kind kind;
     uint32_t scene; /* that of the command, which is the one that counts */
     uint32_t first_frame, last_frame, frame_step;
     float frames_per_second;
@@ -67,9 +71,17 @@ struct engine_job {
     uint32_t key_count;
     struct clip_use *clips; /* owned */
     uint32_t clip_count;
-    /* Frames that may be handed out so far, absolute. Beyond it, frames are rendered as far as frames_in_flight
-     * goes, and kept. */
+    /* Frames that may be handed out so far, absolute. Beyond it, frames of a batch are rendered as far as
+     * frames_in_flight goes, and kept; those of a view are not begun, so that none becomes stale. */
     uint64_t credit;
+    /* Of a view, see job/view_wishes.h; owned: a reference. It takes the place of a view that has the same wishes,
+     * which ends with ENGINE_DONE; frame numbers, counted from first_frame on, go on. */
+    struct view_wishes *wishes;
+    uint32_t pass_samples; /* that a frame of a view adds, up to frame.samples */
+    enum encoding still_encoding;
+    unsigned weight;      /* beside other clients' jobs, at least 1 */
+    bool adapt;           /* view: quality and size follow the link */
+    unsigned attachments; /* view: bits of the protocol */
 };
 
 enum engine_command_kind {
@@ -81,10 +93,11 @@ enum engine_command_kind {
     ENGINE_SCENES_TRIM,    /* scenes that nobody holds end now; no answer */
     ENGINE_COMMIT, /* waits for the frame of the scene that is in progress, what follows for that scene too */
     /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, before which come the frames that were
-     * finished and have credit. */
+     * finished and have credit. A view has no last frame: it is done when another one takes its place. */
     ENGINE_JOB_START,
     ENGINE_JOB_CREDIT, /* no answer */
     ENGINE_JOB_CANCEL, /* answered by ENGINE_DONE; the job's own request fails with ERROR_CANCELLED just before */
+    ENGINE_VIEW_LOOK,  /* a view's wishes have changed; no answer */
     ENGINE_STATS,
     ENGINE_CLIENT_GONE, /* forgets its scenes and jobs; no answer, and no event for that client comes after
                            ENGINE_CLIENT_FORGOTTEN */
@@ -177,7 +190,16 @@ struct engine_frame {
     size_t size_bytes;
     uint64_t digest; /* XXH3-64 of the pixels before encoding */
     float time_s, shutter_s;
-    uint64_t encoded_ns; /* clock_now_ns() when it was ready to be sent */
+    uint64_t encoded_ns;    /* clock_now_ns() when it was ready to be sent */
+    unsigned quality;       /* it was encoded with; 0: lossless */
+    unsigned scale_eighths; /* of the width and height that the job asks for; 0: all of it */
+    uint64_t wanted_bytes;  /* that it may have, for an encoder that can be told; 0: not known */
+    bool wants_key;         /* it is to be encoded so that it can be decoded without those before .. */
+    bool key_frame;         /* .. and so it was */
+    /* Of a view: what it shows last of what its client wished; all 0 before the first wish. */
+    uint64_t command, received_ns;
+    bool moving;
+    uint64_t applied_ns, rendered_ns; /* clock_now_ns() when it was taken up, and read back */
 };
 
 struct engine_event {

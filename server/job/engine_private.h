@@ -11,7 +11,9 @@
 #include "job/encode_pool.h"
 #include "job/engine.h"
 #include "job/output.h"
+#include "job/shot.h"
 #include "job/totals.h"
+#include "job/view_wishes.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -62,6 +64,21 @@ struct engine_scene {
     struct engine_scene_description *description; /* as of its revision; NULL: nobody has asked */
 };
 
+/* What a view shows, and what it may show next; see view.c. */
+struct view {
+    uint64_t credit, made; /* frames that may be begun, and that were made */
+    uint64_t due_ns;       /* no frame is begun before */
+    uint64_t render_ns, rendered_ns; /* of its last frame: how long it took, and until when; 0: there is none */
+    /* Of its last frame; `shown`: there is one. */
+    bool shown;
+    uint64_t shown_command, shown_revision;
+    bool shown_moving;
+    uint32_t held_samples;
+    /* Of the frame in progress. */
+    struct view_wish wish;
+    bool refining; /* it shows nothing that was not shown */
+};
+
 struct job {
     uint64_t client;
     uint32_t request;
@@ -79,6 +96,7 @@ struct job {
     struct frame_request frame;
     float time_s, shutter_s;
     uint64_t begin_ns;
+    struct view view; /* of kind JOB_VIEW */
 };
 
 struct engine {
@@ -159,12 +177,27 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
 /* A job that is not answered yet; NULL: there is none. */
 struct job *job_find(struct engine *engine, uint64_t client, uint32_t request);
 bool job_is_ready(const struct job *job);
+/* How long until one is ready, if nothing happens before; UINT64_MAX: for ever. */
+uint64_t jobs_idle_ns(const struct engine *engine);
 /* One slice: takes up a frame, or goes on with it. */
 void job_step(struct engine *engine, struct job *job);
 /* Ends it now; nothing comes after `final` (may be NULL). Does not run what waits for its scene. */
 void job_abort(struct engine *engine, struct job *job, struct engine_event *final);
 /* Lets go of jobs whose last event is out. */
 void jobs_reap(struct engine *engine);
+void job_credit(struct job *job, uint64_t credit); /* absolute */
+
+/* view.c: what batch.c asks where the job is a view. */
+/* Goes on where the view left off that `job` takes the place of. */
+void view_follow(struct job *job, const struct job *before);
+/* When its next frame may begin; in the past: now. UINT64_MAX: not before something happens. */
+uint64_t view_due_ns(const struct job *job);
+/* What its next frame shows. */
+bool view_take_up(struct job *job, struct shot *shot, struct error *error);
+/* Whether the frame in progress is not worth its end any more. */
+bool view_is_stale(const struct job *job);
+/* Its frame is made: fills in what a view's frame tells. */
+void view_done(struct job *job, struct engine_frame *frame);
 
 /* device.c: the device and what scenes keep on it. */
 bool engine_open_device(struct engine *engine, struct error *error);

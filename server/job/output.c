@@ -8,8 +8,10 @@
 struct job_output {
     struct job_output_options options;
     atomic_uint references;
-    atomic_uint in_hand; /* reserved, not taken */
-    atomic_bool closed;  /* written under the lock */
+    atomic_uint in_hand;    /* reserved, not taken */
+    atomic_uint unfinished; /* reserved, not put */
+    atomic_uint_fast64_t encode_ns;
+    atomic_bool closed; /* written under the lock */
     /* It is held while events are pushed, as that is what keeps them in order. A push may wait for the network
      * thread, which never takes this lock. */
     pthread_mutex_t lock;
@@ -64,6 +66,7 @@ bool job_output_has_room(const struct job_output *output)
 uint64_t job_output_reserve(struct job_output *output)
 {
     atomic_fetch_add(&output->in_hand, 1);
+    atomic_fetch_add(&output->unfinished, 1);
     pthread_mutex_lock(&output->lock);
     uint64_t position = output->reserved++;
     pthread_mutex_unlock(&output->lock);
@@ -116,6 +119,9 @@ void job_output_put(struct job_output *output, uint64_t position, struct engine_
 {
     event->client = output->options.client;
     event->request = output->options.request;
+    if (event->frame)
+        atomic_store(&output->encode_ns, stage_times_sum_ns(&event->frame->result.times, STAGE_ENCODE, STAGE_CPU));
+    atomic_fetch_sub(&output->unfinished, 1);
     pthread_mutex_lock(&output->lock);
     if (atomic_load(&output->closed)) {
         engine_event_destroy(event);
@@ -124,6 +130,16 @@ void job_output_put(struct job_output *output, uint64_t position, struct engine_
         advance_locked(output);
     }
     pthread_mutex_unlock(&output->lock);
+}
+
+uint32_t job_output_unfinished(const struct job_output *output)
+{
+    return atomic_load(&output->unfinished);
+}
+
+uint64_t job_output_encode_ns(const struct job_output *output)
+{
+    return atomic_load(&output->encode_ns);
 }
 
 void job_output_credit(struct job_output *output, uint64_t credit)

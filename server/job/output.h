@@ -30,6 +30,10 @@ bool job_output_has_room(const struct job_output *output);
 uint64_t job_output_reserve(struct job_output *output);
 /* The frame for a reserved place, or what went wrong with it. Takes over the event and fills in whose it is. */
 void job_output_put(struct job_output *output, uint64_t position, struct engine_event *event);
+/* Frames whose place is reserved and that are not put there: those in the hands of the encoders. */
+uint32_t job_output_unfinished(const struct job_output *output);
+/* How long the last one took to encode; 0: none has been. */
+uint64_t job_output_encode_ns(const struct job_output *output);
 void job_output_credit(struct job_output *output, uint64_t credit);
 /* The final event. `done` comes after the last frame; `failed` after the frames that credit lets out. */
 void job_output_finish(struct job_output *output, struct engine_event *final);

@@ -54,18 +54,30 @@ static bool motion_make(struct shot *shot, const struct engine_job *job, const s
     return error_set(error, local.kind, field, "%s", local.text);
 }
 
+/* The shutter and where things are while it is open. */
+static bool shot_begin(struct shot *shot, const struct engine_job *job, const struct scene *scene, double time_s,
+                       struct error *error)
+{
+    *shot = (struct shot){.request = job->frame, .time_s = (float)time_s};
+    shot->shutter_s = (float)fmin((double)job->shutter / (double)job->frames_per_second, SHUTTER_MAX_S);
+    return motion_make(shot, job, scene, time_s, error);
+}
+
 bool shot_make(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
                struct animation_bounds *bounds, struct error *error)
 {
     static const struct pose_view nothing = {0};
     double time_s = animation_time_s(job, frame);
-    *shot = (struct shot){.request = job->frame, .time_s = (float)time_s};
-    shot->shutter_s = (float)fmin((double)job->shutter / (double)job->frames_per_second, SHUTTER_MAX_S);
-    if (!motion_make(shot, job, scene, time_s, error))
+    if (!(fabs(time_s) <= ANIMATION_TIME_MAX_S)) {
+        error_set(error, ERROR_INVALID, "render.frames_per_second", "frame %u is at %g s, beyond %g s", frame,
+                  time_s, ANIMATION_TIME_MAX_S);
+        return error_remedy(error, "use more frames a second, or smaller frame numbers");
+    }
+    if (!shot_begin(shot, job, scene, time_s, error))
         return false;
     const struct scene_pose *pose = shot->motion.pose_count ? &shot->motion.poses[0] : NULL;
     struct animation_view view;
-    if (!animation_view(job, scene, pose, frame, bounds, &view, error)) {
+    if (!animation_view(job, scene, pose, time_s, bounds, &view, error)) {
         shot_finish(shot);
         return false;
     }
@@ -73,6 +85,22 @@ bool shot_make(struct shot *shot, const struct engine_job *job, const struct sce
     set_lens(&shot->request, &view, pose ? &pose->view : &nothing);
     if (!shot->request.accumulate)
         shot->request.seed = shot_seed(job->frame.seed, frame);
+    return true;
+}
+
+bool shot_look(struct shot *shot, const struct engine_job *job, const struct scene *scene,
+               const struct camera_key *key, struct error *error)
+{
+    static const struct pose_view nothing = {0};
+    struct animation_view view = {0};
+    if (!animation_key_camera(key, "view_camera.up_world", &view.camera, error) ||
+        !shot_begin(shot, job, scene, (double)key->time_s, error))
+        return false;
+    /* Where the view looks from is its client's word, whatever the clips say of the job's camera. */
+    const struct pose_view *given = shot->motion.pose_count ? &shot->motion.poses[0].view : &nothing;
+    view.focus = animation_distance(&view.camera, key->look_at_world);
+    shot->request.camera = view.camera;
+    set_lens(&shot->request, &view, given);
     return true;
 }
 

@@ -115,6 +115,21 @@ const char *address_path(const struct address *address)
                                     : "";
 }
 
+uint64_t address_network(const struct address *address)
+{
+    const uint64_t ipv4 = UINT64_C(1) << 32; /* no IPv6 network that is given to anybody begins so */
+    if (address->storage.ss_family == AF_INET)
+        return ipv4 | ntohl(as_ipv4(address).sin_addr.s_addr);
+    if (address->storage.ss_family != AF_INET6)
+        return 0;
+    struct in6_addr host = as_ipv6(address).sin6_addr;
+    size_t first = IN6_IS_ADDR_V4MAPPED(&host) ? 12 : 0, last = first ? 16 : 8;
+    uint64_t network = first ? 1 : 0;
+    for (size_t i = first; i < last; i++)
+        network = network << 8 | host.s6_addr[i];
+    return network;
+}
+
 bool address_same_host(const struct address *a, const struct address *b)
 {
     if (a->storage.ss_family != b->storage.ss_family)

@@ -24,5 +24,8 @@ bool address_is_loopback(const struct address *address); /* false for unix */
 const char *address_path(const struct address *address); /* of unix */
 /* Same host (the port aside). Unix peers have no address: all are the same. */
 bool address_same_host(const struct address *a, const struct address *b);
+/* A number for the network that one holder of addresses has: an IPv4 address, the first half of an IPv6 one. 0 for
+ * Unix. */
+uint64_t address_network(const struct address *address);
 
 #endif

@@ -1,12 +1,43 @@
 /* SPDX-License-Identifier: MIT */
 #include "net/auth.h"
 
+#include "protocol/sealed_key.h"
+
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
 
-bool auth_identify(struct auth_identity *identity, int fd, const struct address *peer, bool insecure,
+static bool read_key(struct auth_keys *keys, const char *path, bool read_only, struct error *error)
+{
+    struct decode_error why = {0};
+    if (!path[0])
+        return true;
+    if (!sealed_key_read(&keys->keys[keys->count], path, &why)) {
+        bool denied = why.code == PROTOCOL_ERROR_CODE_DENIED;
+        error_set(error, denied ? ERROR_DENIED : ERROR_INVALID, path, "%s", why.text);
+        return !denied && error_remedy(error, "'farlight key FILE' makes one");
+    }
+    keys->read_only[keys->count++] = read_only;
+    return true;
+}
+
+bool auth_read_keys(struct auth_keys *keys, const char *key_file, const char *reader_key_file, struct error *error)
+{
+    *keys = (struct auth_keys){0};
+    if (!read_key(keys, key_file, false, error) || !read_key(keys, reader_key_file, true, error))
+        return false;
+    if (keys->count == 2 && memcmp(&keys->keys[0], &keys->keys[1], sizeof keys->keys[0]) == 0)
+        return error_set(error, ERROR_INVALID, reader_key_file, "is the same key as that of clients who may edit");
+    return true;
+}
+
+bool auth_is_beyond_loopback(const struct address *own, const struct address *peer)
+{
+    return !address_is_unix(peer) && !(address_is_loopback(own) && address_is_loopback(peer));
+}
+
+bool auth_identify(struct auth_identity *identity, int fd, const struct address *peer, bool beyond_loopback,
                    struct error *error)
 {
     *identity = (struct auth_identity){0};
@@ -16,7 +47,7 @@ bool auth_identify(struct auth_identity *identity, int fd, const struct address 
         if (getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &bytes) < 0)
             return error_set(error, ERROR_DENIED, "peer", "the kernel does not say who it is: %s",
                              strerror(errno));
-        identity->known = true;
+        identity->known = identity->has_user = true;
         identity->user = credentials.uid;
         snprintf(identity->name, sizeof identity->name, "user %u", (unsigned)credentials.uid);
         return true;
@@ -24,7 +55,19 @@ bool auth_identify(struct auth_identity *identity, int fd, const struct address 
     char text[ADDRESS_TEXT_BYTES];
     address_print(peer, text);
     snprintf(identity->name, sizeof identity->name, "%.39s", text);
-    if (insecure || address_is_loopback(peer))
+    if (beyond_loopback || address_is_loopback(peer))
         return true;
     return error_set(error, ERROR_DENIED, "peer", "%s is not on this host", text);
+}
+
+void auth_identify_by_key(struct auth_identity *identity, const struct auth_keys *keys, size_t index,
+                          const struct address *peer)
+{
+    char text[ADDRESS_TEXT_BYTES];
+    address_print(peer, text);
+    identity->known = identity->has_key = true;
+    identity->key = sealed_key_number(&keys->keys[index]);
+    identity->read_only = keys->read_only[index];
+    snprintf(identity->name, sizeof identity->name, "%s, %.33s", identity->read_only ? "reader's key" : "key",
+             text);
 }

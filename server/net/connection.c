@@ -6,6 +6,7 @@
 #include "base/sys.h"
 #include "net/greeting.h"
 #include "net/patience.h"
+#include "net/sealing.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -23,6 +24,7 @@ static void on_ready(void *context, uint32_t epoll_events);
 static void on_timer(void *context);
 
 struct connection *connection_create(struct loop *loop, int fd, const struct connection_limits *limits,
+                                     const struct connection_entry *entry,
                                      const struct connection_handler *handler, void *context, struct error *error)
 {
     struct connection *connection = calloc(1, sizeof *connection);
@@ -41,6 +43,7 @@ struct connection *connection_create(struct loop *loop, int fd, const struct con
         .limits = limits,
         .handler = handler,
         .context = context,
+        .entry = *entry,
         .fd = fd,
         .watch = watch,
         .timer = {.call = on_timer, .context = connection},
@@ -62,6 +65,7 @@ static void destroy(struct connection *connection)
     loop_watch_remove(connection->watch);
     close(connection->fd);
     out_queue_finish(&connection->out);
+    sealed_link_destroy(connection->link);
     free(connection->scratch_data);
     free(connection->in);
     free(connection);
@@ -87,7 +91,7 @@ static void queue_error(struct connection *connection, enum protocol_error_code 
 void connection_finish(struct connection *connection, enum protocol_error_code code, const char *field,
                        const char *text)
 {
-    if (connection->state == CONNECTION_HELLO) {
+    if (connection->state == CONNECTION_HELLO || connection->state == CONNECTION_WRONG_KEY) {
         /* Messages may not be sent yet. */
         connection_close(connection);
         return;
@@ -164,11 +168,12 @@ static void flush(struct connection *connection)
             connection->handler->room(connection->context);
         struct iovec parts[PARTS_A_CALL];
         struct msghdr message = {.msg_iov = parts};
-        message.msg_iovlen = out_queue_gather(&connection->out, parts, PARTS_A_CALL);
+        uint64_t before_ns = clock_now_ns();
+        message.msg_iovlen = connection->link ? sealing_gather(connection, parts)
+                                              : out_queue_gather(&connection->out, parts, PARTS_A_CALL);
         connection->write_blocked = false;
         if (!message.msg_iovlen || connection->state == CONNECTION_CLOSED)
             return;
-        uint64_t before_ns = clock_now_ns();
         ssize_t sent = sys_sendmsg(connection->fd, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
         connection->write_blocked = true; /* or there is more than one turn's worth */
         if (sent < 0) {
@@ -180,7 +185,9 @@ static void flush(struct connection *connection)
         sent_bytes += (size_t)sent;
         connection->sent_bytes += (uint64_t)sent;
         connection->last_sent_ns = now_ns;
-        out_queue_advance(&connection->out, (size_t)sent, before_ns, now_ns);
+        size_t queued_sent_bytes =
+            connection->link ? sealed_link_sent(connection->link, (size_t)sent) : (size_t)sent;
+        out_queue_advance(&connection->out, queued_sent_bytes, before_ns, now_ns);
     }
 }
 
@@ -217,6 +224,18 @@ static bool process_message(struct connection *connection, size_t *offset)
     return true;
 }
 
+size_t connection_incoming_bytes(const struct connection *connection)
+{
+    return connection->in_used + (connection->link ? sealed_link_unopened(connection->link) : 0);
+}
+
+static void drop_input(struct connection *connection)
+{
+    connection->in_used = 0;
+    if (connection->link)
+        sealed_link_drop_input(connection->link);
+}
+
 static void process_messages(struct connection *connection)
 {
     size_t offset = 0;
@@ -225,20 +244,10 @@ static void process_messages(struct connection *connection)
         continue;
     connection->in_used -= offset;
     memmove(connection->in, connection->in + offset, connection->in_used);
-    if (!connection->in_used)
+    if (!connection_incoming_bytes(connection))
         connection->message_began_ns = 0;
     else if (!connection->message_began_ns)
         connection->message_began_ns = clock_now_ns();
-}
-
-static void process(struct connection *connection)
-{
-    if (connection->state == CONNECTION_HELLO)
-        greeting_process(connection);
-    if (connection->state == CONNECTION_OPEN)
-        process_messages(connection);
-    if (connection->state == CONNECTION_FLUSHING || connection->state == CONNECTION_LINGERING)
-        connection->in_used = 0;
 }
 
 void connection_hold(struct connection *connection, bool held)
@@ -258,6 +267,7 @@ static bool may_read(const struct connection *connection)
         return !connection->held && connection->out.queued_bytes <= connection->limits->queued_soft_bytes;
     case CONNECTION_LINGERING:
         return true;
+    case CONNECTION_WRONG_KEY:
     case CONNECTION_FLUSHING:
     case CONNECTION_CLOSED:
         return false;
@@ -265,12 +275,28 @@ static bool may_read(const struct connection *connection)
     return false;
 }
 
+static void process(struct connection *connection)
+{
+    do {
+        if (connection->state == CONNECTION_HELLO)
+            greeting_process(connection);
+        if (connection->state == CONNECTION_OPEN)
+            process_messages(connection);
+    } while (connection->link && sealed_is_open(connection->link->sealed) && may_read(connection) &&
+             sealing_open_next(connection));
+    if (connection->state == CONNECTION_FLUSHING || connection->state == CONNECTION_LINGERING)
+        drop_input(connection);
+}
+
 static void receive(struct connection *connection)
 {
     size_t received_bytes = 0;
     while (may_read(connection) && received_bytes < BYTES_A_TURN) {
         size_t free_bytes = connection->in_capacity - connection->in_used;
-        ssize_t got = sys_read(connection->fd, connection->in + connection->in_used, free_bytes);
+        uint8_t *space = connection->in + connection->in_used;
+        if (connection->link)
+            space = sealed_link_space(connection->link, &free_bytes);
+        ssize_t got = sys_read(connection->fd, space, free_bytes);
         if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK))
             return;
         if (got <= 0) {
@@ -306,18 +332,29 @@ static void linger(struct connection *connection)
 {
     shutdown(connection->fd, SHUT_WR);
     connection->state = CONNECTION_LINGERING;
-    connection->in_used = 0;
+    drop_input(connection);
+}
+
+static bool has_flushed(const struct connection *connection)
+{
+    return !connection->out.queued_bytes && (!connection->link || sealing_is_done(connection));
+}
+
+/* Records that came while nothing was to be read: the socket does not speak of them again. */
+static bool has_waiting_records(const struct connection *connection)
+{
+    return connection->link && may_read(connection) && sealed_link_has_record(connection->link);
 }
 
 /* After everything that happened to the connection in this turn: send, say what to wait for, or release it. */
 static void turn_end(void *context)
 {
     struct connection *connection = context;
-    if (connection->state == CONNECTION_OPEN && !connection->held && connection->in_used &&
-        !connection->message_began_ns)
-        process_messages(connection); /* what came before it was held */
+    bool was_held = connection->in_used && !connection->message_began_ns;
+    if (connection->state == CONNECTION_OPEN && !connection->held && (was_held || has_waiting_records(connection)))
+        process(connection); /* what came before it was held */
     flush(connection);
-    if (connection->state == CONNECTION_FLUSHING && !connection->out.queued_bytes)
+    if (connection->state == CONNECTION_FLUSHING && has_flushed(connection))
         linger(connection);
     if (connection->state == CONNECTION_CLOSED) {
         if (connection->turn_end.waiting)
@@ -334,6 +371,8 @@ static void turn_end(void *context)
         if (connection->message_began_ns)
             connection->message_began_ns = clock_now_ns(); /* until now it could not come */
     }
+    if (has_waiting_records(connection))
+        loop_defer(connection->loop, &connection->turn_end);
     loop_watch_change(connection->watch, (may_read(connection) ? (uint32_t)EPOLLIN : 0) |
                                              (connection->write_blocked ? (uint32_t)EPOLLOUT : 0));
     loop_timer_start(connection->loop, &connection->timer, patience_next_check_ns(connection, clock_now_ns()));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One client's socket: bytes to messages, messages to bytes, and the limits of patience and memory. Knows the
- * protocol's framing and the handshake, not what messages mean. One thread, that of the loop.
+/* One client's socket: bytes to messages, messages to bytes, sealed or not, and the limits of patience and memory.
+ * Knows the protocol's framing and the handshake, not what messages mean. One thread, that of the loop.
  *
  * A connection is destroyed by the loop at the end of a turn, never inside a call: after connection_close()
  * it is still there, silent, until the handler's closed() has returned. */
@@ -11,6 +11,7 @@
 #include "net/out_queue.h"
 #include "protocol/framing.h"
 #include "protocol/handshake.h"
+#include "protocol/sealed_link.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -18,6 +19,7 @@
 
 struct connection_limits {
     uint32_t handshake_ms;         /* until the hello is complete */
+    uint32_t wrong_key_ms;         /* so long a client waits for the answer to a wrong key */
     uint32_t progress_grace_ms;    /* so long a message may take whatever its size, .. */
     uint32_t progress_bytes_per_s; /* .. then this is the least rate */
     uint32_t idle_ms;           /* 0: never. Silence of a client that waits for nothing, or that does not read */
@@ -26,8 +28,20 @@ struct connection_limits {
     uint64_t queued_hard_bytes;
 };
 
+/* How a client may come in. */
+struct connection_entry {
+    const struct sealed_key *keys; /* the owner's; they stay while the connection is there */
+    size_t key_count;
+    bool sealed_only; /* nobody without one of them */
+};
+
 /* What is told to the layer above; `context` is that of connection_create(). */
 struct connection_handler {
+    /* A client begins a sealed connection. False: it is not to try a key now. */
+    bool (*key_allowed)(void *context);
+    void (*key_failed)(void *context);
+    /* It has the key of that index; hello comes next. */
+    void (*key_proved)(void *context, size_t index);
     /* Fills the reply. False: the client is turned away, with reply->text. */
     bool (*hello)(void *context, const struct handshake_hello *hello, struct handshake_reply *reply);
     /* Hello was answered, messages may be sent. */
@@ -45,7 +59,8 @@ struct connection_handler {
 };
 
 enum connection_state {
-    CONNECTION_HELLO, /* waits for the client's first bytes */
+    CONNECTION_HELLO,     /* waits for the client's first bytes */
+    CONNECTION_WRONG_KEY, /* it will be told so in a moment; nothing is read */
     CONNECTION_OPEN,
     CONNECTION_FLUSHING,  /* goodbye is queued; nothing is read */
     CONNECTION_LINGERING, /* goodbye is sent; what still comes is thrown away, so that the kernel delivers it */
@@ -57,13 +72,15 @@ struct connection {
     const struct connection_limits *limits;
     const struct connection_handler *handler;
     void *context;
+    struct connection_entry entry;
     int fd;
     enum connection_state state;
     struct loop_watch *watch;
     struct loop_timer timer;
     struct loop_deferred turn_end;
 
-    uint8_t *in; /* in_capacity is what the largest message allowed in this state needs */
+    struct sealed_link *link; /* NULL: the connection is not sealed */
+    uint8_t *in;              /* in_capacity is what the largest message allowed in this state needs */
     size_t in_capacity, in_used;
     struct scratch scratch;
     void *scratch_data;
@@ -81,6 +98,7 @@ struct connection {
 
 /* Takes over the descriptor (non-blocking) when it succeeds. */
 struct connection *connection_create(struct loop *loop, int fd, const struct connection_limits *limits,
+                                     const struct connection_entry *entry,
                                      const struct connection_handler *handler, void *context, struct error *error);
 
 /* Control message. False, with a line in the log: it cannot be encoded, or the connection is closing. */
@@ -92,6 +110,8 @@ void connection_send_raw(struct connection *connection, struct out_message *mess
 void connection_wake(struct connection *connection);
 bool connection_wants_bulk(const struct connection *connection);
 void connection_hold(struct connection *connection, bool held);
+/* Came, and was not enough for a message so far. */
+size_t connection_incoming_bytes(const struct connection *connection);
 
 /* Says goodbye, waits a moment until it is delivered, closes. With an error code, ERROR on request 0 goes first.
  */

@@ -2,15 +2,14 @@
 #include "net/greeting.h"
 
 #include "base/clock.h"
+#include "base/log.h"
 #include "net/connection.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-static bool queue_reply(struct connection *connection, const struct handshake_reply *reply)
+static bool queue_bytes(struct connection *connection, const uint8_t *bytes, size_t count)
 {
-    uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
-    size_t count = handshake_reply_encode(bytes, reply);
     struct out_message *message = count ? out_message_create(count) : NULL;
     if (!message) {
         connection_close(connection);
@@ -21,35 +20,120 @@ static bool queue_reply(struct connection *connection, const struct handshake_re
     return true;
 }
 
-static void refuse_hello(struct connection *connection, struct handshake_reply *reply)
+static bool queue_reply(struct connection *connection, const struct handshake_reply *reply)
 {
-    reply->version = 0;
-    if (!queue_reply(connection, reply))
-        return;
+    uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
+    return queue_bytes(connection, bytes, handshake_reply_encode(bytes, reply));
+}
+
+static void end(struct connection *connection)
+{
     connection->state = CONNECTION_FLUSHING;
     connection->closing_since_ns = clock_now_ns();
 }
 
-static bool make_room_for_messages(struct connection *connection, size_t consumed_bytes)
+static void refuse_hello(struct connection *connection, struct handshake_reply *reply)
 {
-    uint8_t *in = malloc(FRAMING_MESSAGE_MAX_BYTES);
+    reply->version = 0;
+    if (queue_reply(connection, reply))
+        end(connection);
+}
+
+static bool make_room_for_messages(struct connection *connection, size_t capacity_bytes)
+{
+    uint8_t *in = malloc(capacity_bytes);
     void *scratch_data = malloc(SCRATCH_BYTES);
     if (!in || !scratch_data) {
         free(in);
         free(scratch_data);
         return false;
     }
-    connection->in_used -= consumed_bytes;
-    memcpy(in, connection->in + consumed_bytes, connection->in_used);
+    memcpy(in, connection->in, connection->in_used);
     free(connection->in);
     connection->in = in;
-    connection->in_capacity = FRAMING_MESSAGE_MAX_BYTES;
+    connection->in_capacity = capacity_bytes;
     connection->scratch_data = scratch_data;
     scratch_init(&connection->scratch, scratch_data, SCRATCH_BYTES);
     return true;
 }
 
-void greeting_process(struct connection *connection)
+/* ---- sealed ---- */
+
+static void refuse_seal(struct connection *connection, enum sealed_status status)
+{
+    uint8_t bytes[SEALED_REFUSAL_BYTES];
+    sealed_refuse(bytes, status);
+    if (queue_bytes(connection, bytes, sizeof bytes))
+        end(connection);
+}
+
+static void begin_seal(struct connection *connection)
+{
+    const struct connection_entry *entry = &connection->entry;
+    if (!entry->key_count) {
+        refuse_seal(connection, SEALED_NO_KEY);
+        return;
+    }
+    if (!connection->handler->key_allowed(connection->context)) {
+        refuse_seal(connection, SEALED_TOO_MANY);
+        return;
+    }
+    struct sealed_link *link = sealed_link_server(entry->keys, entry->key_count);
+    if (!link) {
+        log_write(LOG_ERROR, "net", "no memory or no random numbers to let a client in");
+        connection_close(connection);
+        return;
+    }
+    size_t free_bytes;
+    memcpy(sealed_link_space(link, &free_bytes), connection->in, connection->in_used);
+    sealed_link_came(link, connection->in_used);
+    connection->in_used = 0;
+    connection->link = link;
+}
+
+/* With the reason that the link has found. */
+static void refuse_link(struct connection *connection)
+{
+    sealed_link_refuse(connection->link);
+    end(connection);
+}
+
+void greeting_refuse_key(struct connection *connection)
+{
+    refuse_link(connection);
+}
+
+static void go_on_with_seal(struct connection *connection)
+{
+    struct decode_error error = {0};
+    switch (sealed_link_handshake(connection->link, &error)) {
+    case SEALED_CONSUMED:
+        connection->handler->key_proved(connection->context, sealed_key_index(connection->link->sealed));
+        /* A record of any size behind the beginning of any message. */
+        if (!make_room_for_messages(connection, FRAMING_MESSAGE_MAX_BYTES + SEALED_PLAIN_MAX_BYTES))
+            connection_close(connection);
+        return;
+    case SEALED_NEED_MORE:
+    case SEALED_NEED_ROOM:
+        return;
+    case SEALED_REFUSED:
+        if (sealed_status(connection->link->sealed) != SEALED_WRONG_KEY) {
+            refuse_link(connection);
+            return;
+        }
+        connection->handler->key_failed(connection->context);
+        connection->state = CONNECTION_WRONG_KEY;
+        connection->closing_since_ns = clock_now_ns();
+        return;
+    case SEALED_FATAL:
+        connection_close(connection);
+        return;
+    }
+}
+
+/* ---- hello ---- */
+
+static void answer_hello(struct connection *connection)
 {
     struct handshake_hello hello;
     struct handshake_reply reply = {0};
@@ -65,16 +149,34 @@ void greeting_process(struct connection *connection)
     case HANDSHAKE_CONSUMED:
         break;
     }
+    if (!connection->link && connection->entry.sealed_only) {
+        reply.capabilities = HANDSHAKE_NEEDS_KEY;
+        strncpy(reply.text, "a key is needed here: only sealed connections are let in", sizeof reply.text - 1);
+        refuse_hello(connection, &reply);
+        return;
+    }
     if (!connection->handler->hello(connection->context, &hello, &reply)) {
         refuse_hello(connection, &reply);
         return;
     }
-    if (!make_room_for_messages(connection, consumed_bytes)) {
+    if (!connection->link && !make_room_for_messages(connection, FRAMING_MESSAGE_MAX_BYTES)) {
         connection_close(connection);
         return;
     }
+    connection->in_used -= consumed_bytes;
+    memmove(connection->in, connection->in + consumed_bytes, connection->in_used);
     if (!queue_reply(connection, &reply))
         return;
     connection->state = CONNECTION_OPEN;
     connection->handler->opened(connection->context);
+}
+
+void greeting_process(struct connection *connection)
+{
+    if (!connection->link && connection->in_used && connection->in[0] == SEALED_MAGIC[0])
+        begin_seal(connection);
+    if (connection->state == CONNECTION_HELLO && connection->link && !sealed_is_open(connection->link->sealed))
+        go_on_with_seal(connection);
+    if (connection->state == CONNECTION_HELLO && (!connection->link || sealed_is_open(connection->link->sealed)))
+        answer_hello(connection);
 }

@@ -63,16 +63,18 @@ static bool clear_path(const struct address *address, struct error *error)
     return error_remedy(error, "stop it, or listen at another path");
 }
 
-static bool check_tcp(const struct address *address, bool insecure, struct error *error)
+static bool check_tcp(const struct address *address, bool beyond_loopback, struct error *error)
 {
-    if (insecure || address_is_loopback(address))
+    if (beyond_loopback || address_is_loopback(address))
         return true;
     char text[ADDRESS_TEXT_BYTES];
     address_print(address, text);
     error_set(
         error, ERROR_DENIED, text,
         "beyond loopback a plain TCP connection is open to everybody who can reach it, and so is what it carries");
-    return error_remedy(error, "listen on 127.0.0.1 and come through ssh, or spell out --insecure");
+    return error_remedy(error,
+                        "give a key with --key-file ('farlight key FILE' makes one), listen on 127.0.0.1 and "
+                        "come through ssh, or spell out --insecure");
 }
 
 static bool bind_and_listen(struct listener *listener, const struct address *address, struct error *error)
@@ -101,13 +103,14 @@ static bool bind_and_listen(struct listener *listener, const struct address *add
     return true;
 }
 
-bool listener_open(struct listener *listener, const struct address *address, bool insecure, struct error *error)
+bool listener_open(struct listener *listener, const struct address *address, bool beyond_loopback,
+                   struct error *error)
 {
     *listener = (struct listener){.fd = -1, .address = *address};
     if (address_is_unix(address)) {
         if (!make_folder(address_path(address), error) || !clear_path(address, error))
             return false;
-    } else if (!check_tcp(address, insecure, error)) {
+    } else if (!check_tcp(address, beyond_loopback, error)) {
         return false;
     }
     listener->fd = sys.socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);

@@ -15,9 +15,10 @@ struct listener {
 };
 
 /* Unix: the file gets mode 0660; its folder is made with mode 0750 if it is missing (its parent must be
- * there); a file that nobody answers at is removed, a live daemon there is an error. TCP: only loopback,
- * unless `insecure`, as the bytes travel unprotected and nobody asks who the peer is. */
-bool listener_open(struct listener *listener, const struct address *address, bool insecure, struct error *error);
+ * there); a file that nobody answers at is removed, a live daemon there is an error. TCP: only loopback, unless
+ * `beyond_loopback` says that there is a key for those who come from there, or that none is wanted. */
+bool listener_open(struct listener *listener, const struct address *address, bool beyond_loopback,
+                   struct error *error);
 void listener_close(struct listener *listener); /* removes the socket file */
 
 /* The next client, non-blocking; -1 if none waits. *peer: where it comes from. *retry_later: the process is out of

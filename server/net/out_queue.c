@@ -82,7 +82,7 @@ void out_queue_finish(struct out_queue *queue)
     list_clear(&queue->sending);
     list_clear(&queue->control);
     list_clear(&queue->bulk);
-    queue->queued_bytes = queue->queued_bulk_bytes = queue->sending_bytes = 0;
+    queue->queued_bytes = queue->queued_bulk_bytes = queue->sending_bytes = queue->taken_bytes = 0;
 }
 
 void out_queue_push(struct out_queue *queue, struct out_message *message, bool bulk)
@@ -125,10 +125,16 @@ size_t out_queue_gather(struct out_queue *queue, struct iovec *parts, size_t par
 {
     static const uint8_t zeros[8];
     line_up(queue);
-    size_t count = 0;
+    size_t count = 0, taken_bytes = queue->taken_bytes;
     for (const struct out_message *message = queue->sending.first; message && parts_max - count >= 3;
          message = message->next) {
-        size_t skip_bytes = message->sent_bytes;
+        size_t left_bytes = out_message_bytes(message) - message->sent_bytes;
+        if (taken_bytes >= left_bytes) {
+            taken_bytes -= left_bytes;
+            continue;
+        }
+        size_t skip_bytes = message->sent_bytes + taken_bytes;
+        taken_bytes = 0;
         count += add_part(&parts[count], message->head, message->head_bytes, &skip_bytes);
         if (message->body)
             count += add_part(&parts[count], message->body->data + message->body_offset_bytes, message->body_bytes,
@@ -138,6 +144,11 @@ size_t out_queue_gather(struct out_queue *queue, struct iovec *parts, size_t par
     return count;
 }
 
+void out_queue_take(struct out_queue *queue, size_t bytes)
+{
+    queue->taken_bytes += bytes;
+}
+
 void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns, uint64_t now_ns)
 {
     /* First the books, then the calls: what they push or drop must find the queue in order. */
@@ -145,6 +156,7 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns
     list_init(&complete);
     queue->queued_bytes -= bytes;
     queue->sending_bytes -= bytes;
+    queue->taken_bytes -= bytes < queue->taken_bytes ? bytes : queue->taken_bytes;
     while (bytes) {
         struct out_message *message = queue->sending.first;
         size_t left_bytes = out_message_bytes(message) - message->sent_bytes;
@@ -168,10 +180,14 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns
 static void drop_from(struct out_queue *queue, struct out_list *list, bool any, uint32_t request)
 {
     struct out_list kept;
+    size_t taken_bytes = list == &queue->sending ? queue->taken_bytes : 0;
     list_init(&kept);
     for (struct out_message *message; (message = list_take(list));) {
         bool concerned = (message->body || message->sent) && (any || message->request == request);
-        if (concerned && message->sent_bytes == 0) {
+        size_t left_bytes = out_message_bytes(message) - message->sent_bytes;
+        bool begun = message->sent_bytes || taken_bytes;
+        taken_bytes -= left_bytes < taken_bytes ? left_bytes : taken_bytes;
+        if (concerned && !begun) {
             queue->queued_bytes -= out_message_bytes(message);
             if (list == &queue->bulk)
                 queue->queued_bulk_bytes -= out_message_bytes(message);

@@ -50,6 +50,7 @@ struct out_queue {
     size_t queued_bytes;      /* not handed to the kernel yet, all lists */
     size_t queued_bulk_bytes; /* of them in `bulk` */
     size_t sending_bytes;     /* of them in `sending` */
+    size_t taken_bytes;       /* of those, from their beginning: copied, but not with the kernel yet */
 };
 
 void out_queue_init(struct out_queue *queue);
@@ -57,8 +58,11 @@ void out_queue_finish(struct out_queue *queue); /* drops everything */
 void out_queue_push(struct out_queue *queue, struct out_message *message, bool bulk);
 /* The next bytes to be sent, at most `parts_max` (at least 3) parts; the number of parts, 0: nothing waits. */
 size_t out_queue_gather(struct out_queue *queue, struct iovec *parts, size_t parts_max);
-/* That many of the gathered bytes are with the kernel, by a call that lasted from `before_ns` to `now_ns`. Calls
- * `sent` of those complete, which may push. */
+/* That many of the gathered bytes were copied to be sent from elsewhere, and are not gathered again; what they
+ * belong to counts as begun. out_queue_advance() follows for all of them. */
+void out_queue_take(struct out_queue *queue, size_t bytes);
+/* That many of the gathered (or, where any are, taken) bytes are with the kernel, by a call that lasted from
+ * `before_ns` to `now_ns`. Calls `sent` of those complete, which may push. */
 void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns, uint64_t now_ns);
 /* Drops messages of a request that were not begun, and forgets the `sent` of one that was. Control
  * messages stay. */

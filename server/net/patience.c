@@ -3,6 +3,7 @@
 
 #include "base/log.h"
 #include "net/connection.h"
+#include "net/greeting.h"
 
 #include <stdio.h>
 
@@ -48,7 +49,7 @@ static void check_open(struct connection *connection, uint64_t now_ns)
         connection_close(connection);
         return;
     }
-    if (connection->in_used < progress_due_bytes(connection, now_ns)) {
+    if (connection_incoming_bytes(connection) < progress_due_bytes(connection, now_ns)) {
         snprintf(text, sizeof text, "a message came slower than %u bytes a second", limits->progress_bytes_per_s);
         connection_finish(connection, PROTOCOL_ERROR_CODE_TIMEOUT, "", text);
         return;
@@ -72,6 +73,10 @@ void patience_check(struct connection *connection, uint64_t now_ns)
     case CONNECTION_HELLO:
         if (since(connection->connected_ns, now_ns) >= connection->limits->handshake_ms * NS_PER_MS)
             connection_close(connection);
+        return;
+    case CONNECTION_WRONG_KEY:
+        if (since(connection->closing_since_ns, now_ns) >= connection->limits->wrong_key_ms * NS_PER_MS)
+            greeting_refuse_key(connection);
         return;
     case CONNECTION_OPEN:
         check_open(connection, now_ns);
@@ -100,6 +105,8 @@ uint64_t patience_next_check_ns(const struct connection *connection, uint64_t no
     uint64_t wait_ns = CHECK_MAX_NS;
     if (connection->state == CONNECTION_HELLO)
         no_later(&wait_ns, connection->connected_ns, limits->handshake_ms * NS_PER_MS, now_ns);
+    else if (connection->state == CONNECTION_WRONG_KEY)
+        no_later(&wait_ns, connection->closing_since_ns, limits->wrong_key_ms * NS_PER_MS, now_ns);
     else if (connection->state != CONNECTION_OPEN)
         no_later(&wait_ns, connection->closing_since_ns, GOODBYE_NS, now_ns);
     else {

@@ -12,12 +12,15 @@
 #include "shared/frame.h"
 #include "trace/scene_gpu.h"
 #include "trace/tracer.h"
+#include "trace/wave_compare.h"
 
 /* Some pixels: slots of shared/frame.h's order, all in one band. Of each as many samples as are in hand together,
  * uniforms.sample_shift. */
 struct slice {
     uint32_t first_slot, slot_count;
 };
+
+#define PART_WAVES 8 /* the last stands for all that follow */
 
 struct render_context {
     struct gpu_device *device;
@@ -44,11 +47,14 @@ struct render_context {
     bool sampled_hits;                      /* but for those of discs, those of the wave are stored samples */
     struct gpu_buffer hit_list, hit_places; /* of those paths that hit something, see compact.h */
     uint32_t hit_count;
-    uint32_t asked; /* shadow rays of each hit of the wave in hand that are traced already */
-    struct gpu_buffer block_offsets, wave_state; /* of the compaction */
-    struct gpu_buffer slice_sums;                /* vec4 a sample of the slice: radiance so far, coverage */
-    uint64_t shadow_rays, secondary_rays;        /* of the slice in hand */
-    uint32_t span_count;                         /* since the timer was collected */
+    uint32_t asked;  /* shadow rays of each hit of the wave in hand that are traced already */
+    uint32_t asking; /* and that are made and not traced to the end; 0: none */
+    uint32_t traced; /* rays that are, of the wave that is being traced; 0: none is */
+    uint32_t part_rays[RAY_KIND_COUNT][PART_WAVES]; /* how many are traced in one step, wave_trace.h */
+    struct gpu_buffer block_offsets, wave_state;    /* of the compaction */
+    struct gpu_buffer slice_sums;                   /* vec4 a sample of the slice: radiance so far, coverage */
+    uint64_t shadow_rays, secondary_rays;           /* of the slice in hand */
+    uint32_t span_count;                            /* since the timer was collected */
 };
 
 /* Spans of this frame; the ring is emptied before it is full. */

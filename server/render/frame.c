@@ -59,6 +59,11 @@ static bool rasterise(struct frame_renderer *renderer, struct error *error)
     return true;
 }
 
+static const struct primary *rasterised(const struct frame_renderer *renderer)
+{
+    return renderer->rasterise ? &renderer->primary : NULL;
+}
+
 static bool begin_slice(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->context;
@@ -69,9 +74,19 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
         return true;
     }
     layers_begin_slice(&renderer->layers);
-    renderer->phase = renderer->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
-    return primary_slice(renderer->rasterise ? &renderer->primary : NULL, context, error) &&
-           gpu_check(renderer->device, "primary hits", error);
+    renderer->phase = PHASE_PRIMARY;
+    return primary_begin_slice(rasterised(renderer), context, error) &&
+           gpu_check(renderer->device, "primary rays", error);
+}
+
+static bool find_primary(struct frame_renderer *renderer, struct error *error)
+{
+    bool done = false;
+    if (!primary_find(rasterised(renderer), &renderer->context, &done, error))
+        return false;
+    if (done)
+        renderer->phase = renderer->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
+    return gpu_check(renderer->device, "primary hits", error);
 }
 
 /* A wave did not fit. Nothing of the slice has reached the picture, so it is done again: as two halves, or, where
@@ -102,9 +117,12 @@ static bool trace_wave(struct frame_renderer *renderer, struct error *error)
         .hits = &context->hits,
         .times = context_ray_times(context),
     };
-    renderer->phase = PHASE_SHADE;
-    if (!wave_trace(context, RAY_SECONDARY, &wave, error))
+    bool done = false;
+    if (!wave_trace(context, RAY_SECONDARY, &wave, &done, error))
         return false;
+    if (!done)
+        return true;
+    renderer->phase = PHASE_SHADE;
     context->sampled_hits = context->tracer->impl->sampled;
     context_span_begin(context, STAGE_SHADE);
     bool listed = compact_hits(context, error);
@@ -213,6 +231,9 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
         break;
     case PHASE_SLICE:
         good = begin_slice(renderer, error);
+        break;
+    case PHASE_PRIMARY:
+        good = find_primary(renderer, error);
         break;
     case PHASE_LAYERS:
         good = note_layers(renderer, error);

@@ -7,16 +7,16 @@
 #include "render/camera.h"
 #include "render/frame_request.h"
 #include "render/pixel_filter.h"
+#include "render/wave_trace.h"
 
 #include <math.h>
 #include <string.h>
 
 /* Rays of a slice. Software GL has no latency to hide, and its caches are the CPU's; a GPU wants enough rays to
- * fill itself. Waves have room for twice as many: mirrors and glass rarely fill a slice. A step traces no more
- * than that: on software GL, where incoherent rays take about half a microsecond each, with some tracers several,
- * a few milliseconds. */
-#define SLICE_RAYS_SOFTWARE (1u << 14)
-#define SLICE_RAYS_SLOW (1u << 12)
+ * fill itself. Waves have room for twice as many: mirrors and glass rarely fill a slice. What takes long is traced
+ * in parts (wave_trace.h), but where tracers are compared. */
+#define SLICE_RAYS_SOFTWARE (1u << 15)
+#define SLICE_RAYS_COMPARED (1u << 14)
 #define SLICE_RAYS_HARDWARE (1u << 18)
 #define WAVE_PER_SLICE 2
 /* Textures of a picture that goes on and on are taken as if it had so many samples. */
@@ -164,7 +164,7 @@ static uint32_t slice_rays(const struct frame_renderer *renderer)
         return renderer->wanted_slice_pixels;
     if (!renderer->device->facts.software)
         return SLICE_RAYS_HARDWARE;
-    return renderer->context.tracer->impl->slow_on_software ? SLICE_RAYS_SLOW : SLICE_RAYS_SOFTWARE;
+    return renderer->context.request.compare ? SLICE_RAYS_COMPARED : SLICE_RAYS_SOFTWARE;
 }
 
 static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
@@ -227,6 +227,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
         1.0f / sqrtf(request->accumulate ? SAMPLES_GOING_ON : (float)request->samples);
     context->spread = request->samples > 1 || request->accumulate;
     fill_filter(context);
+    wave_trace_forget(context);
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
     if (!reserve_frame(renderer, error) || !gpu_check(renderer->device, "beginning a frame", error))
         return false;

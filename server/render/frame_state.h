@@ -19,6 +19,7 @@ enum frame_phase {
     PHASE_SAMPLE,
     PHASE_RASTER,
     PHASE_SLICE,
+    PHASE_PRIMARY,
     PHASE_LAYERS,
     PHASE_SHADE,
     PHASE_TRACE,

@@ -26,8 +26,8 @@ struct integrator_impl {
     bool (*reserve)(struct integrator *integrator, struct render_context *context, struct error *error);
     uint64_t (*device_bytes)(const struct integrator *integrator);
     /* Shades the wave whose hits the context holds and adds it to slice_sums. Shadow rays that it needs it has
-     * traced itself; their number goes to context->shadow_rays. A call is short: it traces no more rays than the
-     * buffers hold (wave_passes.h), and what is left waits for the next one. */
+     * traced itself; their number goes to context->shadow_rays. A call is short, and what is left waits for the
+     * next one (wave_passes.h). */
     enum integrator_progress (*shade)(struct integrator *integrator, struct render_context *context,
                                       struct error *error);
 };

@@ -40,7 +40,7 @@ bool layers_reserve(struct layers *layers, struct render_context *context, uint3
 void layers_begin_slice(struct layers *layers)
 {
     layers->noted = false;
-    layers->asked = 0;
+    layers->asked = layers->asking = 0;
 }
 
 /* A program that reads hits, in use, with all that these have bound; `own`: a define of its own, or NULL. */
@@ -102,18 +102,17 @@ static bool make_ao_rays(struct layers *layers, struct render_context *context, 
     return program != NULL;
 }
 
-static bool trace_ao_rays(struct layers *layers, struct render_context *context, uint32_t count,
-                          struct error *error)
+/* A part of those that were made. */
+static bool trace_ao_rays(struct layers *layers, struct render_context *context, bool *done, struct error *error)
 {
     const struct wave wave = {
         .kind = WAVE_ANY,
-        .ray_count = context->hit_count * count,
+        .ray_count = context->hit_count * layers->asking,
         .rays = &layers->ao_rays,
         .visibility = &layers->ao_visibility,
         .times = context->scene->has_motion ? &layers->ao_times : NULL,
     };
-    context->shadow_rays += wave.ray_count;
-    return wave_trace(context, RAY_SHADOW, &wave, error);
+    return wave_trace(context, RAY_SHADOW, &wave, done, error);
 }
 
 static uint32_t plane_of(const struct layers *layers, uint32_t layer_bit)
@@ -162,14 +161,22 @@ bool layers_step(struct layers *layers, struct render_context *context, bool *do
         *done = all == 0;
         return !any_adds(layers, context) || note_hits(layers, context, error);
     }
-    uint32_t left = all - layers->asked, together = context->wave_capacity / context->hit_count;
-    uint32_t count = left < together ? left : together;
-    if (!make_ao_rays(layers, context, count, error) || !trace_ao_rays(layers, context, count, error) ||
-        !gather_ao(layers, context, count, error))
+    if (layers->asking == 0) {
+        uint32_t left = all - layers->asked, together = context->wave_capacity / context->hit_count;
+        layers->asking = left < together ? left : together;
+        context->shadow_rays += (uint64_t)context->hit_count * layers->asking;
+        return make_ao_rays(layers, context, layers->asking, error);
+    }
+    bool traced = false;
+    if (!trace_ao_rays(layers, context, &traced, error))
         return false;
+    if (!traced)
+        return true;
+    const uint32_t count = layers->asking;
+    layers->asking = 0;
     layers->asked += count;
     *done = layers->asked == all;
-    return true;
+    return gather_ao(layers, context, count, error);
 }
 
 bool layers_accumulate(struct layers *layers, struct picture *picture, struct render_context *context,

@@ -14,6 +14,7 @@ struct layers {
     struct gpu_buffer ao_rays, ao_times, ao_visibility;
     bool noted;             /* of the slice in hand: what its hits are */
     uint32_t asked;         /* likewise: rays of ao that each hit has been given */
+    uint32_t asking;        /* likewise: and that are made and not traced to the end; 0: none */
     uint32_t plane_samples; /* likewise: its samples, so many in each plane of the sums */
 };
 
@@ -22,7 +23,7 @@ bool layers_reserve(struct layers *layers, struct render_context *context, uint3
                     struct error *error);
 /* The context has rays and hits of a new slice. */
 void layers_begin_slice(struct layers *layers);
-/* A part of a slice's work, no longer than a wave; *done: there is no more. Leaves rays and hits as they are, and
+/* A short part of a slice's work; *done: there is no more. Leaves rays and hits as they are, and
  * the rays that it traces count as shadow rays. Inside no span. */
 bool layers_step(struct layers *layers, struct render_context *context, bool *done, struct error *error);
 /* Adds the slice in hand to the picture, which may be done once it is certain that it is not done again. */

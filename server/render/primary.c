@@ -217,6 +217,7 @@ static bool fill_hits(struct render_context *context, struct error *error)
     const struct gpu_program *program = gpu_program_get(context->device, &source, error);
     if (!program)
         return false;
+    context_bind(context);
     glUseProgram(program->name);
     gpu_uniform_uint(program, "hit_count", context->hit_count);
     gpu_buffer_bind_storage(&context->rays, BIND_RAYS);
@@ -226,8 +227,7 @@ static bool fill_hits(struct render_context *context, struct error *error)
     return true;
 }
 
-/* Between two spans of the caller's. */
-static bool trace_hits(struct render_context *context, struct error *error)
+static bool trace_hits(struct render_context *context, bool *done, struct error *error)
 {
     const struct wave wave = {
         .kind = WAVE_CLOSEST,
@@ -238,22 +238,31 @@ static bool trace_hits(struct render_context *context, struct error *error)
         .shared_origin = context->request.camera.fov_y > 0.0f && !(context->uniforms.lens[0] > 0.0f), /* an eye */
         .origin_spread = context->request.camera.fov_y > 0.0f ? 2.0f * context->uniforms.lens[0] : 0.0f,
     };
-    context_span_end(context);
-    bool traced = wave_trace(context, RAY_PRIMARY, &wave, error);
-    context_span_begin(context, STAGE_PRIMARY);
-    return traced;
+    return wave_trace(context, RAY_PRIMARY, &wave, done, error);
 }
 
-bool primary_slice(const struct primary *primary, struct render_context *context, struct error *error)
+bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error)
 {
     context->ray_count = context->slice.slot_count << context->uniforms.sample_shift;
-    context->wave_number = context->asked = 0;
+    context->wave_number = context->asked = context->asking = context->traced = 0;
     context->sampled_hits = !primary && context->tracer->impl->sampled;
     context->shadow_rays = context->secondary_rays = 0;
     context_span_begin(context, STAGE_PRIMARY);
-    bool found = make_rays(primary, context, error) && (primary || trace_hits(context, error)) &&
-                 compact_hits(context, error) &&
-                 (!primary || context->hit_count == 0 || fill_hits(context, error));
+    bool made = make_rays(primary, context, error);
+    context_span_end(context);
+    return made;
+}
+
+bool primary_find(const struct primary *primary, struct render_context *context, bool *done, struct error *error)
+{
+    *done = true;
+    if (!primary && !trace_hits(context, done, error))
+        return false;
+    if (!*done)
+        return true;
+    context_span_begin(context, STAGE_PRIMARY);
+    bool found =
+        compact_hits(context, error) && (!primary || context->hit_count == 0 || fill_hits(context, error));
     context_span_end(context);
     return found;
 }

@@ -22,9 +22,10 @@ bool primary_reserve(struct primary *primary, struct render_context *context, st
  */
 void primary_rasterise_begin(struct primary *primary);
 bool primary_rasterise(struct primary *primary, struct render_context *context, bool *done, struct error *error);
-/* Rays, paths and black pixels of context->slice; also its hits, from the visibility buffer, or, where `primary`
- * is NULL, from the tracer. */
-bool primary_slice(const struct primary *primary, struct render_context *context, struct error *error);
+/* Rays, paths and black pixels of context->slice. */
+bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error);
+/* Its hits, from the visibility buffer, or, where `primary` is NULL, a part of them a call from the tracer. */
+bool primary_find(const struct primary *primary, struct render_context *context, bool *done, struct error *error);
 void primary_finish(struct primary *primary, struct gpu_device *device);
 
 #endif

@@ -170,18 +170,18 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
     return true;
 }
 
-/* The shadow rays that were made: hit_count times `rays_a_hit`. */
-static bool trace_shadows(struct wave_passes *passes, struct render_context *context, uint32_t rays_a_hit,
+/* The shadow rays that were made, a part of them. */
+static bool trace_shadows(struct wave_passes *passes, struct render_context *context, bool *done,
                           struct error *error)
 {
     struct wave wave = {
         .kind = WAVE_ANY,
-        .ray_count = context->hit_count * rays_a_hit,
+        .ray_count = context->hit_count * context->asking,
         .rays = &passes->shadow_rays,
         .visibility = &passes->visibility,
         .times = context->scene->has_motion ? &passes->shadow_times : NULL,
     };
-    return wave_trace(context, RAY_SHADOW, &wave, error);
+    return wave_trace(context, RAY_SHADOW, &wave, done, error);
 }
 
 /* Adds the light that they let through to the wave's radiance, and after the last batch that to the samples. */
@@ -265,24 +265,48 @@ static enum integrator_progress next_wave(struct wave_passes *passes, struct ren
     return progress;
 }
 
+/* How many shadow rays of each hit are made and traced together. */
+static uint32_t batch_of(const struct wave_passes *passes, const struct render_context *context)
+{
+    if (context->hit_count == 0)
+        return 0;
+    uint32_t left = passes->kind->shadow_rays_a_hit(context) - context->asked;
+    uint32_t together = context->wave_capacity * passes->kind->shadow_waves / context->hit_count;
+    return left < together ? left : together;
+}
+
+/* Shades, and makes a batch of shadow rays. */
+static bool shade_batch(struct wave_passes *passes, struct render_context *context, struct error *error)
+{
+    if (context->asked == 0 && !left_scene(passes, context, error))
+        return false;
+    context->asking = batch_of(passes, context);
+    return context->hit_count == 0 || passes->kind->shade(passes, context, context->asked, context->asking, error);
+}
+
+static enum integrator_progress finish_batch(struct wave_passes *passes, struct render_context *context,
+                                             struct error *error)
+{
+    const uint32_t count = context->asking;
+    context->asking = 0;
+    context->asked += count;
+    bool last = context->hit_count == 0 || context->asked == passes->kind->shadow_rays_a_hit(context);
+    if (!gather(passes, context, last, count, error))
+        return INTEGRATOR_FAILED;
+    return last ? next_wave(passes, context, error) : INTEGRATOR_AGAIN;
+}
+
 enum integrator_progress wave_passes_shade(struct integrator *integrator, struct render_context *context,
                                            struct error *error)
 {
     struct wave_passes *passes = (struct wave_passes *)integrator;
-    const struct wave_passes_kind *kind = passes->kind;
-    uint32_t hits = context->hit_count, first = context->asked;
-    uint32_t left = hits > 0 ? kind->shadow_rays_a_hit(context) - first : 0, count = left;
-    if (hits > 0) {
-        uint32_t together = context->wave_capacity * kind->shadow_waves / hits;
-        count = left < together ? left : together;
+    if (context->asking == 0) {
+        if (!shade_batch(passes, context, error))
+            return INTEGRATOR_FAILED;
+        return context->asking > 0 ? INTEGRATOR_AGAIN : finish_batch(passes, context, error);
     }
-    if (first == 0 && !left_scene(passes, context, error))
+    bool done = false;
+    if (!trace_shadows(passes, context, &done, error))
         return INTEGRATOR_FAILED;
-    if (hits > 0 && (!kind->shade(passes, context, first, count, error) ||
-                     (count > 0 && !trace_shadows(passes, context, count, error))))
-        return INTEGRATOR_FAILED;
-    if (!gather(passes, context, count == left, count, error))
-        return INTEGRATOR_FAILED;
-    context->asked += count;
-    return count < left ? INTEGRATOR_AGAIN : next_wave(passes, context, error);
+    return done ? finish_batch(passes, context, error) : INTEGRATOR_AGAIN;
 }

@@ -41,7 +41,8 @@ struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struc
 void wave_passes_destroy(struct integrator *integrator); /* and frees it; accepts NULL */
 bool wave_passes_reserve(struct integrator *integrator, struct render_context *context, struct error *error);
 uint64_t wave_passes_device_bytes(const struct integrator *integrator);
-/* One batch of shadow rays a call: as many of each hit as the buffers hold. */
+/* A batch of shadow rays, as many of each hit as the buffers hold, is made in one call and traced in the next
+ * ones. */
 enum integrator_progress wave_passes_shade(struct integrator *integrator, struct render_context *context,
                                            struct error *error);
 

@@ -38,24 +38,24 @@ void daemon_init(struct daemon *daemon)
     *daemon = (struct daemon){.signal_fd = -1};
 }
 
-static bool listen_at(struct daemon *daemon, const char *text, bool insecure, struct error *error)
+static bool listen_at(struct daemon *daemon, const char *text, bool beyond_loopback, struct error *error)
 {
     struct address address;
     if (daemon->listener_count == DAEMON_LISTENERS_MAX)
         return error_set(error, ERROR_LIMIT, text, "at most %d addresses", DAEMON_LISTENERS_MAX);
     if (!address_parse(&address, text, error) ||
-        !listener_open(&daemon->listeners[daemon->listener_count], &address, insecure, error))
+        !listener_open(&daemon->listeners[daemon->listener_count], &address, beyond_loopback, error))
         return false;
     daemon->listener_count++;
     return true;
 }
 
-bool daemon_listen(struct daemon *daemon, const char *addresses, bool insecure, struct error *error)
+bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loopback, struct error *error)
 {
     char *copy = strdup(addresses), *rest = copy;
     bool ok = copy != NULL || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
     for (char *address; ok && (address = strsep(&rest, " \t"));)
-        ok = !address[0] || listen_at(daemon, address, insecure, error);
+        ok = !address[0] || listen_at(daemon, address, beyond_loopback, error);
     free(copy);
     return ok && (daemon->listener_count || error_set(error, ERROR_INVALID, "server.listen", "no address"));
 }
@@ -91,7 +91,7 @@ static bool accept_one(struct daemon *daemon, const struct listener *listener)
     if (fd < 0)
         return false;
     struct error error = {0};
-    if (hub_add_client(&daemon->hub, fd, &peer, &error))
+    if (hub_add_client(&daemon->hub, fd, &listener->address, &peer, &error))
         return true;
     log_write(LOG_WARNING, "session", "a client is turned away: %s", error.text);
     close(fd);
@@ -195,17 +195,22 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
 
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error)
 {
-    struct address peer = {.storage_bytes = sizeof peer.storage};
+    struct address own = {.storage_bytes = sizeof own.storage}, peer = {.storage_bytes = sizeof peer.storage};
     char field[32];
     snprintf(field, sizeof field, "--fd %d", fd);
-    if (getpeername(fd, (struct sockaddr *)&peer.storage, &peer.storage_bytes) < 0)
+    if (getsockname(fd, (struct sockaddr *)&own.storage, &own.storage_bytes) < 0 ||
+        getpeername(fd, (struct sockaddr *)&peer.storage, &peer.storage_bytes) < 0)
         return error_set(error, ERROR_INVALID, field, "not a connected socket: %s", strerror(errno));
     int flags = fcntl(fd, F_GETFL);
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
         return error_set(error, ERROR_INVALID, field, "%s", strerror(errno));
     daemon->single_client = true;
+<<<<<<< HEAD
     daemon->hub.options.readers.count = 0; /* whoever has a daemon to himself does as he likes */
     return hub_add_client(&daemon->hub, fd, &peer, error);
+=======
+    return hub_add_client(&daemon->hub, fd, &own, &peer, error);
+>>>>>>> e806b7f2559764cac10fc5075be7e313986eaa46
 }
 
 void daemon_print_ready(const struct daemon *daemon, FILE *stream)

@@ -30,7 +30,7 @@ void daemon_block_signals(void);
 /* Zeroes it. */
 void daemon_init(struct daemon *daemon);
 /* Reserves addresses, separated by blanks (at least one); clients wait until daemon_start(). */
-bool daemon_listen(struct daemon *daemon, const char *addresses, bool insecure, struct error *error);
+bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loopback, struct error *error);
 bool daemon_start(struct daemon *daemon, const struct hub_options *options, struct error *error);
 /* Serves one client on a connected socket, then ends. Instead of listening. */
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error);

@@ -7,6 +7,7 @@
 #include "session/scenes.h"
 #include "session/session.h"
 #include "session/upload.h"
+#include "session/views.h"
 
 /* ---- connection -------------------------------------------------------------------------------------- */
 
@@ -136,6 +137,20 @@ static void on_render(struct session *session, struct request *request, const st
     jobs_start(session, request, &message->render);
 }
 
+static void on_view_camera(struct session *session, struct request *request, const struct framing_header *header,
+                           const struct message *message)
+{
+    (void)request, (void)header;
+    views_look(session, &message->view_camera);
+}
+
+static void on_frame_ack(struct session *session, struct request *request, const struct framing_header *header,
+                         const struct message *message)
+{
+    (void)request, (void)header;
+    views_acknowledge(session, &message->frame_ack);
+}
+
 /* ---- the table --------------------------------------------------------------------------------------- */
 
 static const struct dispatch_row rows[] = {
@@ -169,6 +184,8 @@ static const struct dispatch_row rows[] = {
     {MESSAGE_SET_CHANNEL, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
     {MESSAGE_REMOVE, DISPATCH_CONTINUES, REQUEST_TRANSACTION, on_edit},
     {MESSAGE_RENDER, DISPATCH_STARTS, REQUEST_JOB, on_render},
+    {MESSAGE_VIEW_CAMERA, DISPATCH_ANY, 0, on_view_camera},
+    {MESSAGE_FRAME_ACK, DISPATCH_ANY, 0, on_frame_ack},
 };
 
 const struct dispatch_row *dispatch_find(uint32_t type)

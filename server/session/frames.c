@@ -14,7 +14,8 @@
 struct pending_frame {
     struct out_chunk chunk; /* first: release() gets its address */
     struct pending_frame *next;
-    struct job *job; /* NULL: dropped */
+    struct job *job;  /* NULL: dropped */
+    uint32_t request; /* the job's, or that of a view whose place it has taken */
     struct engine_frame *frame;
     bool begun;
     bool queued; /* all of it is with the connection */
@@ -51,6 +52,7 @@ void frames_add(struct job *job, struct engine_frame *frame)
     *pending = (struct pending_frame){
         .chunk = {.references = 1, .data = frame->bytes, .size_bytes = frame->size_bytes, .release = release},
         .job = job,
+        .request = job->request,
         .frame = frame,
     };
     *job->end = pending;
@@ -68,12 +70,30 @@ static void remove_first(struct job *job)
     out_chunk_unref(&pending->chunk);
 }
 
-void frames_drop(struct session *session, struct job *job)
+uint32_t frames_drop(struct session *session, struct job *job)
 {
-    if (session->connection)
-        out_queue_drop_bulk(&session->connection->out, job->request);
+    uint32_t before = job->first && job->first->request != job->request ? job->first->request : 0;
+    while (job->first) {
+        if (session->connection)
+            out_queue_drop_bulk(&session->connection->out, job->first->request);
+        remove_first(job);
+    }
+    return before;
+}
+
+bool frames_keep_begun(struct job *job)
+{
+    struct pending_frame *begun = job->first && job->first->begun ? job->first : NULL;
+    if (begun)
+        job->first = begun->next;
     while (job->first)
         remove_first(job);
+    if (!begun)
+        return false;
+    begun->next = NULL;
+    job->first = begun;
+    job->end = &begun->next;
+    return true;
 }
 
 /* ---- messages ---------------------------------------------------------------------------------------- */
@@ -125,6 +145,13 @@ static void fill_begin(struct message_frame_begin *begin, const struct engine_fr
     begin->focus = frame->request.focus;
     begin->shutter_s = frame->shutter_s;
     begin->layers = frame->result.layers;
+    begin->command = frame->command;
+    begin->received_ns = frame->received_ns;
+    begin->applied_ns = frame->applied_ns;
+    begin->rendered_ns = frame->rendered_ns;
+    begin->moving = frame->moving;
+    begin->key_frame = frame->key_frame;
+    begin->quality = frame->quality;
 }
 
 static uint32_t fill_comparisons(struct record_wave_comparison *records, const struct frame_result *result)
@@ -216,11 +243,11 @@ static void send_end(struct pending_frame *pending, uint64_t now_ns)
     message.frame_end.comparisons_count = fill_comparisons(comparisons, &frame->result);
     message.frame_end.cubes = cubes;
     message.frame_end.cubes_count = fill_cubes(cubes, &frame->result);
-    session_send(job->session, job->request, job->channel, &message);
+    session_send(job->session, pending->request, job->channel, &message);
     const struct hub_options *hub = &job->session->hub->options;
     timeline_frame(hub->timeline, &(struct timeline_frame){.client = job->session->number,
                                                            .client_name = job->session->name,
-                                                           .job = job->request,
+                                                           .job = pending->request,
                                                            .frame = frame->frame,
                                                            .times = times});
     const struct engine_port *engine = &hub->engine;
@@ -243,9 +270,10 @@ static void on_last_sent(void *context, uint64_t begun_ns, uint64_t now_ns)
     struct job *job = pending->job;
     if (!job)
         return;
+    uint32_t request = pending->request;
     send_end(pending, now_ns);
     remove_first(job);
-    job_frame_sent(job);
+    job_frame_sent(job, request);
 }
 
 static bool queue_begin(struct pending_frame *pending)
@@ -259,11 +287,11 @@ static bool queue_begin(struct pending_frame *pending)
     struct writer writer;
     writer_init(&writer, out->head, out->head_bytes);
     struct job *job = pending->job;
-    if (!message_write(&writer, job->request, job->channel, &message)) {
+    if (!message_write(&writer, pending->request, job->channel, &message)) {
         free(out);
         return false;
     }
-    out->request = job->request;
+    out->request = pending->request;
     out->sent = on_begin_sent;
     out->context = pending;
     out->body = &pending->chunk; /* no bytes of it: it keeps the frame alive */
@@ -281,8 +309,8 @@ static bool queue_piece(struct pending_frame *pending)
     struct out_message *out = out_message_create(FRAME_DATA_HEAD_BYTES);
     if (!out)
         return false;
-    frame_data_head(out->head, job->request, job->channel, pending->queued_bytes, (uint32_t)piece_bytes);
-    out->request = job->request;
+    frame_data_head(out->head, pending->request, job->channel, pending->queued_bytes, (uint32_t)piece_bytes);
+    out->request = pending->request;
     out->context = pending;
     out->body = &pending->chunk;
     out->body_offset_bytes = pending->queued_bytes;
@@ -297,11 +325,18 @@ static bool queue_piece(struct pending_frame *pending)
     return true;
 }
 
+static bool has_something_to_queue(const struct job *job)
+{
+    const struct pending_frame *pending = job->first;
+    /* A view's frame may have been begun with the credit that one of the view before has used since. */
+    return pending && !pending->queued && (pending->begun || job->frames_sent < job->client_credit);
+}
+
 /* The first job with something to queue moves to the end of the list, so that jobs take turns. */
 static struct job *next_job(struct session *session)
 {
     struct job **place = &session->jobs;
-    while (*place && (!(*place)->first || (*place)->first->queued))
+    while (*place && !has_something_to_queue(*place))
         place = &(*place)->next;
     struct job *job = *place;
     if (!job)

@@ -19,8 +19,11 @@ struct session;
 
 /* Takes the frame over, in any case. */
 void frames_add(struct job *job, struct engine_frame *frame);
-/* Drops what of the job has not been begun on the wire, and forgets the rest. */
-void frames_drop(struct session *session, struct job *job);
+/* Drops what of the job has not been begun on the wire, and forgets the rest. The request of a view whose place it
+ * has taken, if one of those frames was that view's; 0: none was. */
+uint32_t frames_drop(struct session *session, struct job *job);
+/* Drops what has not been begun. True: one has, and will be finished. */
+bool frames_keep_begun(struct job *job);
 /* Queues pieces as long as the connection wants bulk; jobs take turns. */
 void frames_pump(struct session *session);
 void frame_data_head(uint8_t head[FRAME_DATA_HEAD_BYTES], uint32_t request, uint32_t channel,

@@ -115,18 +115,27 @@ static size_t unauthenticated_from(const struct hub *hub, const struct address *
     void *value;
     while (hashmap_next(&hub->sessions, &cursor, NULL, &value)) {
         const struct session *session = value;
-        count += session->connection->state == CONNECTION_HELLO && address_same_host(&session->peer, peer);
+        enum connection_state state = session->connection->state;
+        count += (state == CONNECTION_HELLO || state == CONNECTION_WRONG_KEY) &&
+                 address_same_host(&session->peer, peer);
     }
     return count;
 }
 
-bool hub_add_client(struct hub *hub, int fd, const struct address *peer, struct error *error)
+bool hub_add_client(struct hub *hub, int fd, const struct address *own, const struct address *peer,
+                    struct error *error)
 {
+    const struct auth_keys *keys = &hub->options.keys;
+    const struct connection_entry entry = {
+        .keys = keys->keys,
+        .key_count = keys->count,
+        .sealed_only = !hub->options.insecure && auth_is_beyond_loopback(own, peer),
+    };
     const struct session_limits *limits = &hub->options.limits;
     struct auth_identity identity;
     if (hub->stopping)
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");
-    if (!auth_identify(&identity, fd, peer, hub->options.insecure, error))
+    if (!auth_identify(&identity, fd, peer, hub->options.insecure || keys->count, error))
         return false;
     if (address_is_unix(peer) && readers_have(&hub->options.readers, identity.user))
         identity.read_only = true;
@@ -136,7 +145,7 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *peer, struct 
     if (!address_is_unix(peer) && unauthenticated_from(hub, peer) >= limits->unauthenticated_per_address)
         return error_set(error, ERROR_LIMIT, NULL, "%u connections of this host have not introduced themselves",
                          limits->unauthenticated_per_address);
-    struct session *session = session_create(hub, hub->last_number + 1, fd, peer, &identity, error);
+    struct session *session = session_create(hub, hub->last_number + 1, fd, &entry, peer, &identity, error);
     if (!session)
         return false;
     if (!hashmap_put(&hub->sessions, ++hub->last_number, session)) {

@@ -4,6 +4,7 @@
 #define FARLIGHT_SESSION_HUB_H
 
 #include "base/hashmap.h"
+#include "net/attempts.h"
 #include "net/auth.h"
 #include "net/connection.h"
 #include "net/loop.h"
@@ -25,7 +26,8 @@ struct hub_options {
     struct engine_port engine;
     struct timeline *timeline;   /* hears of every frame that was sent; may be NULL */
     uint64_t scene_memory_bytes; /* of one scene, as the engine has it; told to clients */
-    bool insecure;               /* peers beyond loopback are let in */
+    struct auth_keys keys;       /* with which clients come in sealed, from everywhere */
+    bool insecure;               /* peers beyond loopback are let in without one as well */
 };
 
 struct hub {
@@ -34,7 +36,8 @@ struct hub {
     struct blob_store *blobs;
     struct hashmap sessions; /* struct session *, by number */
     size_t unauthenticated;
-    uint64_t frame_bytes; /* what the frames of all jobs may take */
+    struct attempts attempts; /* wrong keys */
+    uint64_t frame_bytes;     /* what the frames of all jobs may take */
     uint64_t last_number, started_ns;
     bool stopping;
     loop_call_fn *emptied; /* called when the last session is gone; may be NULL */
@@ -49,8 +52,9 @@ struct hub {
 bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *options, struct error *error);
 void hub_finish(struct hub *hub); /* all sessions are gone */
 
-/* A new client; takes over the descriptor when it succeeds. */
-bool hub_add_client(struct hub *hub, int fd, const struct address *peer, struct error *error);
+/* A new client, which came to our address `own`; takes over the descriptor when it succeeds. */
+bool hub_add_client(struct hub *hub, int fd, const struct address *own, const struct address *peer,
+                    struct error *error);
 /* Says goodbye to everybody; `emptied` is called when they are gone, at once if there is nobody. */
 void hub_stop(struct hub *hub);
 

@@ -4,6 +4,7 @@
 #include "session/frames.h"
 #include "session/session.h"
 #include "session/tracer_settings.h"
+#include "session/views.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -15,6 +16,8 @@
 /* Of the 4 GiB that a frame_begin may announce; the rest is left to what zstd adds to noise. */
 #define FRAME_BYTES_MAX (UINT64_C(4080) << 20)
 #define BEAUTY_ALONE (1u << PROTOCOL_LAYER_BEAUTY)
+#define WEIGHT_OF_VIEW 4 /* somebody waits for each of its frames */
+#define WEIGHT_OF_BATCH 1
 
 static uint32_t bytes_per_pixel(enum protocol_pixel_format format)
 {
@@ -32,7 +35,7 @@ static uint32_t bytes_per_pixel(enum protocol_pixel_format format)
 
 /* ---- checks ------------------------------------------------------------------------------------------ */
 
-static struct job *job_on_channel(const struct session *session, uint32_t channel)
+struct job *jobs_find(const struct session *session, uint32_t channel)
 {
     for (struct job *job = session->jobs; job; job = job->next) {
         if (job->channel == channel)
@@ -52,6 +55,10 @@ static bool check_layers(const struct message_render *render, struct error *erro
 {
     if (!render->layers || render->layers == BEAUTY_ALONE)
         return true;
+    if (render->kind == PROTOCOL_JOB_KIND_VIEW) {
+        error_set(error, ERROR_UNSUPPORTED, "render.layers", "a view shows the picture alone");
+        return error_remedy(error, "a batch of one frame has layers; a view may have attachments");
+    }
     if (render->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || render->encoding == PROTOCOL_ENCODING_JPEG) {
         error_set(error, ERROR_UNSUPPORTED, "render.layers", "%s in %s carries the beauty alone",
                   protocol_pixel_format_text(render->format), protocol_encoding_text(render->encoding));
@@ -65,6 +72,13 @@ static bool check_layers(const struct message_render *render, struct error *erro
     return true;
 }
 
+/* The view whose place another one would take; NULL: nobody's. */
+static struct job *replaced_by(const struct session *session, const struct message_render *render)
+{
+    struct job *job = jobs_find(session, render->channel);
+    return render->kind == PROTOCOL_JOB_KIND_VIEW && job && job->view && !job->cancelled ? job : NULL;
+}
+
 static bool check_limits(const struct session *session, const struct message_render *render, struct error *error)
 {
     const struct session_limits *limits = &session->hub->options.limits;
@@ -75,7 +89,7 @@ static bool check_limits(const struct session *session, const struct message_ren
         error_set(error, ERROR_LIMIT, "render.samples", "%u, the limit is %u", render->samples, limits->samples);
     if (error->kind == ERROR_LIMIT)
         return error_remedy(error, "ask for less, or raise [limits] in the daemon's configuration");
-    if (session->job_count >= limits->jobs_per_client) {
+    if (session->job_count >= limits->jobs_per_client && !replaced_by(session, render)) {
         error_set(error, ERROR_LIMIT, "render", "%u jobs are running, the limit", session->job_count);
         error_remedy(error, "wait for one to end, or cancel it");
         error->retryable = true;
@@ -105,13 +119,15 @@ static uint64_t job_bytes_of(const struct session *session, const struct message
 static bool check_room(const struct session *session, const struct message_render *render, struct error *error)
 {
     const struct hub *hub = session->hub;
+    const struct job *before = replaced_by(session, render);
     uint64_t job_bytes = job_bytes_of(session, render), limit_bytes = hub->options.limits.frame_bytes;
-    if (!hub->frame_bytes || (hub->frame_bytes <= limit_bytes && job_bytes <= limit_bytes - hub->frame_bytes))
+    uint64_t others_bytes = hub->frame_bytes - (before ? before->frame_bytes : 0);
+    if (!others_bytes || (others_bytes <= limit_bytes && job_bytes <= limit_bytes - others_bytes))
         return true;
     error_set(error, ERROR_BUSY, "render",
               "frames of this job may take %" PRIu64 " bytes; running jobs may take %" PRIu64
               ", the limit of all is %" PRIu64,
-              job_bytes, hub->frame_bytes, limit_bytes);
+              job_bytes, others_bytes, limit_bytes);
     return error_remedy(error,
                         "try again when jobs have ended, ask for smaller frames, or raise memory.frames in the "
                         "daemon's configuration");
@@ -132,17 +148,32 @@ static bool check_camera(const struct message_render *render, struct error *erro
     return true;
 }
 
+/* What is different with views. */
+static bool check_kind(const struct message_render *render, struct error *error)
+{
+    if (render->attachments)
+        return error_set(error, ERROR_UNSUPPORTED, "render.attachments", "this daemon attaches nothing to frames");
+    if (render->kind == PROTOCOL_JOB_KIND_BATCH) {
+        if (render->last_frame < render->first_frame)
+            return error_set(error, ERROR_INVALID, "render.last_frame", "%u is before the first frame %u",
+                             render->last_frame, render->first_frame);
+        return true;
+    }
+    if (encoder_supports((enum encoding)render->still_encoding, bytes_per_pixel(render->format)))
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "render.still_encoding", "%s does not carry %s",
+              protocol_encoding_text(render->still_encoding), protocol_pixel_format_text(render->format));
+    return error_remedy(error, "raw and zstd carry every format");
+}
+
 static bool check(const struct session *session, const struct message_render *render, struct error *error)
 {
     enum session_scene_state state = session_scene(session, render->scene);
     if (state != SCENE_OPENING && state != SCENE_OPEN)
         return error_set(error, ERROR_UNKNOWN_ID, "render.scene", "there is no scene %u", render->scene);
-    if (job_on_channel(session, render->channel))
+    if (jobs_find(session, render->channel) && !replaced_by(session, render))
         return error_set(error, ERROR_INVALID, "render.channel", "a running job has channel %u", render->channel);
-    if (render->last_frame < render->first_frame)
-        return error_set(error, ERROR_INVALID, "render.last_frame", "%u is before the first frame %u",
-                         render->last_frame, render->first_frame);
-    if (!check_layers(render, error))
+    if (!check_kind(render, error) || !check_layers(render, error))
         return false;
     if (!encoder_supports((enum encoding)render->encoding, bytes_per_pixel(render->format))) {
         error_set(error, ERROR_UNSUPPORTED, "render.encoding", "%s does not carry %s",
@@ -193,19 +224,22 @@ static bool fill_keys(struct engine_job *job, const struct message_render *rende
     return true;
 }
 
-/* All but keys and clips, which are there already. */
+/* All but keys, clips and wishes, which are there already. */
 static void fill_job(struct engine_job *job, const struct session *session, const struct message_render *render,
                      uint64_t credit)
 {
+    bool is_view = render->kind == PROTOCOL_JOB_KIND_VIEW;
     *job = (struct engine_job){
         .keys = job->keys,
         .key_count = job->key_count,
         .clips = job->clips,
         .clip_count = job->clip_count,
+        .wishes = job->wishes,
+        .kind = (enum job_kind)render->kind,
         .scene = render->scene,
         .first_frame = render->first_frame,
-        .last_frame = render->last_frame,
-        .frame_step = render->frame_step,
+        .last_frame = is_view ? UINT32_MAX : render->last_frame,
+        .frame_step = is_view ? 1 : render->frame_step,
         .frames_per_second = render->frames_per_second,
         .time_origin_frame = render->time_origin_frame,
         .frame =
@@ -244,13 +278,69 @@ static void fill_job(struct engine_job *job, const struct session *session, cons
         .orbit_turn = render->orbit_turn,
         .orbit_seconds = render->orbit_seconds,
         .credit = credit,
+        .pass_samples = render->pass_samples ? render->pass_samples : 1,
+        .still_encoding = (enum encoding)render->still_encoding,
+        .weight = render->weight ? render->weight
+                  : is_view      ? WEIGHT_OF_VIEW
+                                 : WEIGHT_OF_BATCH,
+        .adapt = render->adapt != 0,
+        .attachments = render->attachments,
     };
 }
 
 static uint64_t allowed_credit(const struct job *job)
 {
-    uint64_t room = job->frames_sent + job->window;
-    return job->client_credit < room ? job->client_credit : room;
+    uint64_t left = job->client_credit - job->frames_sent;
+    return job->frames_gone + (left < job->window ? left : job->window);
+}
+
+/* A job of its own. NULL: out of memory. */
+static struct job *job_create(struct session *session, uint32_t request, const struct message_render *render)
+{
+    bool is_view = render->kind == PROTOCOL_JOB_KIND_VIEW;
+    struct job *job = calloc(1, sizeof *job);
+    struct session_view *view = is_view ? session_view_create() : NULL;
+    if (!job || (is_view && !view)) {
+        free(job);
+        return NULL;
+    }
+    *job = (struct job){
+        .next = session->jobs,
+        .session = session,
+        .request = request,
+        .channel = render->channel,
+        .scene = render->scene,
+        .client_credit = render->credit,
+        .window = is_view ? VIEW_WINDOW_FRAMES : window_of(session, render),
+        .frame_bytes = job_bytes_of(session, render),
+        .view = view,
+    };
+    job->end = &job->first;
+    job->engine_credit = allowed_credit(job);
+    session->jobs = job;
+    session->job_count++;
+    session->hub->frame_bytes += job->frame_bytes;
+    return job;
+}
+
+/* In the place of the view `job`. Its frames may be begun as far as the client's credit goes beyond those on their
+ * way. */
+static bool add_change(struct job *job, uint32_t request, const struct message_render *render)
+{
+    struct view_change *change = calloc(1, sizeof *change);
+    if (!change)
+        return false;
+    if (render->credit > job->client_credit)
+        job->client_credit = render->credit;
+    *change = (struct view_change){
+        .request = request,
+        .scene = render->scene,
+        .credit = job->client_credit > job->frames_sent ? 1 : 0,
+        .window = VIEW_WINDOW_FRAMES,
+        .frame_bytes = job_bytes_of(job->session, render),
+    };
+    view_add_change(job, change);
+    return true;
 }
 
 void jobs_start(struct session *session, struct request *request, const struct message_render *render)
@@ -260,32 +350,24 @@ void jobs_start(struct session *session, struct request *request, const struct m
         request_answer_error(session, request, &error);
         return;
     }
-    struct job *job = calloc(1, sizeof *job);
     struct engine_command *command = hub_command(ENGINE_JOB_START, session->number, request->id);
-    if (!job || !command || !fill_keys(&command->job, render) || !fill_clips(&command->job, render)) {
-        free(job);
+    if (!command || !fill_keys(&command->job, render) || !fill_clips(&command->job, render)) {
         engine_command_destroy(command);
         session_submit(session, request, NULL);
         return;
     }
-    *job = (struct job){
-        .next = session->jobs,
-        .session = session,
-        .request = request->id,
-        .channel = render->channel,
-        .scene = render->scene,
-        .frame_count = (render->last_frame - render->first_frame) / render->frame_step + UINT64_C(1),
-        .client_credit = render->credit,
-        .window = window_of(session, render),
-        .frame_bytes = job_bytes_of(session, render),
-    };
-    job->end = &job->first;
-    job->engine_credit = allowed_credit(job);
-    session->jobs = job;
-    session->job_count++;
-    session->hub->frame_bytes += job->frame_bytes;
+    struct job *job = replaced_by(session, render);
+    bool replaces = job != NULL;
+    if (replaces ? !add_change(job, request->id, render) : !(job = job_create(session, request->id, render))) {
+        engine_command_destroy(command);
+        session_submit(session, request, NULL);
+        return;
+    }
     request->object = job;
-    fill_job(&command->job, session, render, job->engine_credit);
+    if (job->view)
+        command->job.wishes = view_wishes_ref(job->view->wishes);
+    fill_job(&command->job, session, render,
+             replaces ? view_find_change(job, request->id)->credit : job->engine_credit);
     command->scene = render->scene;
     session_submit(session, request, command);
 }
@@ -310,11 +392,12 @@ static void tell_engine_credit(struct job *job)
 
 void jobs_credit(struct session *session, const struct message_credit *credit)
 {
-    struct job *job = job_on_channel(session, credit->channel);
+    struct job *job = jobs_find(session, credit->channel);
     if (!job || credit->total <= job->client_credit)
         return; /* the job may just have ended; credit never falls */
     job->client_credit = credit->total;
     tell_engine_credit(job);
+    connection_wake(session->connection);
 }
 
 bool job_is_owed(const struct job *job)
@@ -324,9 +407,19 @@ bool job_is_owed(const struct job *job)
 
 /* ---- end --------------------------------------------------------------------------------------------- */
 
+/* Those that are not with the kernel. A view whose place the job has taken has been waiting for one of them. */
+static void drop_frames(struct session *session, struct job *job)
+{
+    uint32_t before = frames_drop(session, job);
+    struct request *request = before ? request_find(session, before) : NULL;
+    if (request)
+        request_answer_ok(session, request, 0);
+}
+
 static void destroy(struct session *session, struct job *job)
 {
-    frames_drop(session, job);
+    drop_frames(session, job);
+    session_view_destroy(job);
     struct job **place = &session->jobs;
     while (*place != job)
         place = &(*place)->next;
@@ -336,18 +429,34 @@ static void destroy(struct session *session, struct job *job)
     free(job);
 }
 
-void job_failed(struct session *session, struct job *job, const struct error *error)
+/* The engine has ended the job's request: a view that was to take its place is what there is now. */
+static void end(struct session *session, struct job *job)
 {
-    struct request *request = request_find(session, job->request);
-    destroy(session, job);
+    if (!job->view || !job->view->changes) {
+        destroy(session, job);
+        return;
+    }
+    drop_frames(session, job);
+    view_switch(job);
+    tell_engine_credit(job);
+}
+
+void job_failed(struct session *session, struct request *request, const struct error *error)
+{
+    struct job *job = request->object;
+    struct view_change *change = view_find_change(job, request->id);
+    if (change)
+        view_drop_change(job, change);
+    else
+        end(session, job);
     request_answer_error(session, request, error);
 }
 
-static void fail_cancelled(struct session *session, struct job *job)
+static void fail_cancelled(struct session *session, struct request *request)
 {
     struct error error = {0};
     error_set(&error, ERROR_CANCELLED, NULL, "cancelled by the client");
-    job_failed(session, job, &error);
+    job_failed(session, request, &error);
 }
 
 static void finish_if_complete(struct session *session, struct job *job)
@@ -359,34 +468,67 @@ static void finish_if_complete(struct session *session, struct job *job)
     request_answer_ok(session, request, 0);
 }
 
-void job_done(struct session *session, struct job *job)
+/* Another view is in its place. A frame that is under way is finished before the answer. */
+static void view_replaced(struct session *session, struct job *job, struct request *request)
 {
+    bool under_way = frames_keep_begun(job);
+    view_switch(job);
+    tell_engine_credit(job);
+    if (!under_way)
+        request_answer_ok(session, request, 0);
+}
+
+void job_done(struct session *session, struct request *request)
+{
+    struct job *job = request->object;
+    if (job->view && !job->cancelled && job->view->changes) {
+        view_replaced(session, job, request);
+        return;
+    }
     job->rendered = true;
     if (job->cancelled)
-        fail_cancelled(session, job); /* it ended before the engine heard of it, but its frames are dropped */
+        fail_cancelled(session, request); /* it ended before the engine heard of it, but its frames are dropped */
     else
         finish_if_complete(session, job);
 }
 
-void job_frame_sent(struct job *job)
+void job_frame_sent(struct job *job, uint32_t request_id)
 {
     job->frames_sent++;
+    if (request_id != job->request) {
+        request_answer_ok(job->session, request_find(job->session, request_id), 0);
+        tell_engine_credit(job);
+        return;
+    }
+    job->frames_gone++;
     tell_engine_credit(job);
     finish_if_complete(job->session, job);
 }
 
-void job_cancel(struct session *session, struct job *job, struct request *cancel)
+void job_cancel(struct session *session, struct request *target, struct request *cancel)
 {
-    if (job->rendered) {
-        fail_cancelled(session, job);
+    struct job *job = target->object;
+    struct view_change *change = view_find_change(job, target->id);
+    bool current = target->id == job->request;
+    if (!current && !change) {
+        target->cancelled_by = cancel->id; /* another view is in its place, and its last frame under way */
+        return;
+    }
+    if (current && job->rendered) {
+        fail_cancelled(session, target);
         request_answer_ok(session, cancel, 0);
         return;
     }
     struct engine_command *command = hub_command(ENGINE_JOB_CANCEL, session->number, cancel->id);
     if (command) { /* else the job goes on, and another cancel may end it */
-        job->cancelled = true;
-        frames_drop(session, job);
-        command->target_request = job->request;
+        /* A view that another one is about to take the place of ends by that, if it does. */
+        if (change) {
+            change->cancelled = true;
+        } else if (!job->view || !job->view->changes) {
+            job->cancelled = true;
+            drop_frames(session, job);
+        }
+        command->target_request = target->id;
         command->scene = job->scene;
     }
     session_submit(session, cancel, command);

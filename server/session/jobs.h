@@ -11,30 +11,36 @@
 #include <stdint.h>
 
 struct pending_frame;
+struct session_view;
 
 struct job {
     struct job *next;
     struct session *session;
     uint32_t request, channel, scene;
-    uint64_t frame_count, frames_sent;
-    uint64_t client_credit;             /* frames, absolute, as the client said */
-    uint64_t engine_credit;             /* the part of it that the engine was told */
-    uint64_t window;                    /* frames that may wait here to be sent */
-    uint64_t frame_bytes;               /* what all its frames may take, in the engine and here */
+    uint64_t frames_sent;
+    uint64_t client_credit; /* frames, absolute, as the client said */
+    uint64_t engine_credit; /* the part of it that the engine was told, counted in frames of `request` .. */
+    uint64_t frames_gone;   /* .. as are these: sent, or dropped */
+    uint64_t window;        /* frames that may wait here to be sent */
+    uint64_t frame_bytes;   /* what all its frames may take, in the engine and here */
     struct pending_frame *first, **end; /* from the engine, in order; the first may be under way */
     bool rendered;                      /* the engine is done with it */
     bool cancelled;                     /* what still comes from the engine is dropped */
+    struct session_view *view;          /* owned; NULL: a batch */
 };
 
 void jobs_start(struct session *session, struct request *request, const struct message_render *render);
 void jobs_credit(struct session *session, const struct message_credit *credit);
 /* `cancel` is answered by the engine's answer to it, after the job's own request. */
-void job_cancel(struct session *session, struct job *job, struct request *cancel);
+void job_cancel(struct session *session, struct request *target, struct request *cancel);
 /* The engine's events for a job's request. */
-void job_done(struct session *session, struct job *job);
-void job_failed(struct session *session, struct job *job, const struct error *error);
-void job_frame_sent(struct job *job); /* credit and the last answer */
+void job_done(struct session *session, struct request *request);
+void job_failed(struct session *session, struct request *request, const struct error *error);
+/* A frame of that request, the job's or that of a view whose place it has taken, is with the kernel. */
+void job_frame_sent(struct job *job, uint32_t request);
 void jobs_finish(struct session *session);
 bool job_is_owed(const struct job *job); /* the daemon has work for it, the client waits */
+/* NULL: no job has that channel. */
+struct job *jobs_find(const struct session *session, uint32_t channel);
 
 #endif

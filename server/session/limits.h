@@ -9,6 +9,7 @@ struct session_limits {
     uint32_t clients;
     uint32_t unauthenticated;             /* connections whose handshake is not done, all together */
     uint32_t unauthenticated_per_address; /* from one TCP peer; Unix peers are let in by the file's mode */
+    uint32_t wrong_keys_a_minute;         /* from one network; then nobody from there may try one for a while */
     uint32_t requests_in_flight;
     uint32_t scenes_per_client;
     uint32_t jobs_per_client;

@@ -44,13 +44,23 @@ static double room_bytes(const struct pacing *pacing)
            ((double)pacing->frame_ns + (double)pacing_round_trip_ns(pacing));
 }
 
+uint64_t pacing_wait_ns(const struct pacing *pacing, unsigned coming)
+{
+    if (!pacing->in_flight_count && !coming)
+        return 0;
+    if (!(pacing->carried_ns > 0.0) || pacing->in_flight_count + coming >= PACING_IN_FLIGHT_MAX)
+        return UINT64_MAX;
+    double before_bytes = (double)pacing->in_flight_bytes + (double)pacing->last_bytes * coming;
+    double over_bytes = before_bytes + (double)pacing->last_bytes - room_bytes(pacing);
+    if (!(over_bytes > 0.0))
+        return 0;
+    /* However large it is, it may go when nothing else is under way. */
+    return (uint64_t)ceil(fmin(over_bytes, before_bytes) / pacing->carried_bytes * pacing->carried_ns);
+}
+
 bool pacing_may_send(const struct pacing *pacing)
 {
-    if (!pacing->in_flight_count)
-        return true;
-    if (!(pacing->carried_ns > 0.0) || pacing->in_flight_count == PACING_IN_FLIGHT_MAX)
-        return false;
-    return (double)(pacing->in_flight_bytes + pacing->last_bytes) <= room_bytes(pacing);
+    return pacing_wait_ns(pacing, 0) == 0;
 }
 
 void pacing_sent(struct pacing *pacing, uint32_t frame, uint64_t bytes, uint64_t now_ns)

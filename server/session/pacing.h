@@ -55,6 +55,9 @@ void pacing_init(struct pacing *pacing, uint64_t frame_ns);
 /* Whether the next frame may be begun. False: an acknowledgement will change that. Of a client that has never
  * acknowledged anything: one frame at a time, so its credit is what moves it on; tell pacing_forget() then. */
 bool pacing_may_send(const struct pacing *pacing);
+/* How long until the next frame may go if `coming` others of its size go before it, as far as can be told: 0: it
+ * may now; UINT64_MAX: only an acknowledgement will tell. */
+uint64_t pacing_wait_ns(const struct pacing *pacing, unsigned coming);
 /* A frame's first byte is about to go; `bytes` is all that it takes. */
 void pacing_sent(struct pacing *pacing, uint32_t frame, uint64_t bytes, uint64_t now_ns);
 /* FRAME_ACK; of a frame that is not in flight: ignored. */

@@ -143,7 +143,7 @@ void request_cancel(struct session *session, struct request *cancel, uint32_t ta
         request_answer_ok(session, cancel, 0);
         return;
     case REQUEST_JOB:
-        job_cancel(session, target->object, cancel);
+        job_cancel(session, target, cancel);
         return;
     case REQUEST_SCENE_OPEN:
     case REQUEST_SCENE_CLOSE:

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "session/session.h"
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "session/dispatch.h"
 #include "session/edits.h"
@@ -76,7 +77,7 @@ void session_submit(struct session *session, struct request *request, struct eng
     /* The engine knows nothing of it: all is as before. */
     scenes_failed(session, request, false);
     if (request->kind == REQUEST_JOB && request->object)
-        job_failed(session, request->object, &error);
+        job_failed(session, request, &error);
     else
         request_answer_error(session, request, &error);
 }
@@ -94,7 +95,7 @@ static void on_done(struct session *session, struct request *request, const stru
         scenes_closed(session, request);
         return;
     case REQUEST_JOB:
-        job_done(session, request->object);
+        job_done(session, request);
         return;
     case REQUEST_COMMIT:
     case REQUEST_CANCEL:
@@ -116,7 +117,7 @@ static void on_failed(struct session *session, struct request *request, const st
     error_set(&error, ERROR_INTERNAL, NULL, "the engine gave no reason");
     switch (request->kind) {
     case REQUEST_JOB:
-        job_failed(session, request->object, &error);
+        job_failed(session, request, &error);
         return;
     case REQUEST_CANCEL:
         request_answer_ok(session, request, 0); /* the job had just ended */
@@ -197,6 +198,41 @@ static void fill_limits(struct handshake_limits *told, const struct hub_options 
 static size_t introduced_count(const struct hub *hub)
 {
     return hub->sessions.count - hub->unauthenticated;
+}
+
+/* Users are 32-bit numbers, sessions are counted, keys have the top bit; a client that is not known shares with
+ * nobody. */
+static blob_principal principal_of(const struct session *session)
+{
+    const struct auth_identity *identity = &session->identity;
+    if (identity->has_key)
+        return UINT64_C(1) << 63 | identity->key;
+    return identity->has_user ? identity->user : (UINT64_C(1) << 32) + session->number;
+}
+
+static bool on_key_allowed(void *context)
+{
+    const struct session *session = context;
+    const struct hub *hub = session->hub;
+    /* Unix peers have no address that others could be kept apart from. */
+    return address_is_unix(&session->peer) ||
+           attempts_are_allowed(&hub->attempts, address_network(&session->peer),
+                                hub->options.limits.wrong_keys_a_minute, clock_now_ns());
+}
+
+static void on_key_failed(void *context)
+{
+    struct session *session = context;
+    log_write(LOG_WARNING, "session", "a wrong key came from %s", session->identity.name);
+    if (!address_is_unix(&session->peer))
+        attempts_add_failed(&session->hub->attempts, address_network(&session->peer), clock_now_ns());
+}
+
+static void on_key_proved(void *context, size_t index)
+{
+    struct session *session = context;
+    auth_identify_by_key(&session->identity, &session->hub->options.keys, index, &session->peer);
+    session->principal = principal_of(session);
 }
 
 static bool on_hello(void *context, const struct handshake_hello *hello, struct handshake_reply *reply)
@@ -290,6 +326,9 @@ static void on_closed(void *context)
 }
 
 static const struct connection_handler connection_handler = {
+    .key_allowed = on_key_allowed,
+    .key_failed = on_key_failed,
+    .key_proved = on_key_proved,
     .hello = on_hello,
     .opened = on_opened,
     .message = dispatch_message,
@@ -301,8 +340,9 @@ static const struct connection_handler connection_handler = {
 
 /* ---- life -------------------------------------------------------------------------------------------- */
 
-struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct address *peer,
-                               const struct auth_identity *identity, struct error *error)
+struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct connection_entry *entry,
+                               const struct address *peer, const struct auth_identity *identity,
+                               struct error *error)
 {
     struct session *session = calloc(1, sizeof *session);
     if (!session) {
@@ -313,10 +353,9 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, const s
     session->number = number;
     session->identity = *identity;
     session->peer = *peer;
-    /* Users are 32-bit numbers; a client whose user is unknown shares with nobody. */
-    session->principal = identity->known ? identity->user : (UINT64_C(1) << 32) + number;
-    session->connection =
-        connection_create(hub->loop, fd, &hub->options.connection_limits, &connection_handler, session, error);
+    session->principal = principal_of(session);
+    session->connection = connection_create(hub->loop, fd, &hub->options.connection_limits, entry,
+                                            &connection_handler, session, error);
     if (!session->connection) {
         free(session);
         return NULL;

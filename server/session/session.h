@@ -44,8 +44,9 @@ struct session {
     uint32_t job_count;
 };
 
-struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct address *peer,
-                               const struct auth_identity *identity, struct error *error);
+struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct connection_entry *entry,
+                               const struct address *peer, const struct auth_identity *identity,
+                               struct error *error);
 void session_stop(struct session *session); /* the daemon stops: goodbye */
 void session_close(struct session *session);
 void session_hold(struct session *session, bool held);                          /* reads no further */

@@ -184,7 +184,6 @@ const struct tracer_impl tracer_abuffer_impl = {
     .name = "abuffer",
     .depends_on = TRACER_NEEDS_SCENE,
     .still = true,
-    .slow_on_software = true,
     .create = abuffer_create,
     .destroy = abuffer_destroy,
     .update = abuffer_update,

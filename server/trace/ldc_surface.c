@@ -17,11 +17,12 @@ bool ldc_surfaces(struct ldc_store *store, const struct scene_gpu *scene, const 
     const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
     if (!program)
         return false;
-    gpu_uniform_uint(program, "ray_count", wave->ray_count);
+    gpu_uniform_uint(program, "first_ray", wave->first_ray);
+    gpu_uniform_uint(program, "ray_count", wave->end_ray);
     gpu_buffer_bind_texels(scene->device, wave->rays, UNIT_RAYS, GL_RGBA32F);
     gpu_buffer_bind_texels(scene->device, &store->geometry, UNIT_TRACER_0, GL_RG32UI);
     gpu_buffer_bind_texels(scene->device, &store->surface, UNIT_TRACER_1, GL_RGBA32UI);
     gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
-    gpu_dispatch(scene->device, program, wave->ray_count);
+    gpu_dispatch(scene->device, program, wave->end_ray - wave->first_ray);
     return true;
 }

@@ -190,19 +190,23 @@ static bool reference_trace(struct tracer *tracer, struct scene_gpu *scene, cons
     struct reference *reference = (struct reference *)tracer;
     if (!reserve_host(reference, wave->ray_count, error))
         return false;
-    gpu_buffer_read(tracer->device, wave->rays, 0, reference->rays, wave->ray_count * sizeof(struct ray));
+    const size_t first = wave->first_ray, count = wave->end_ray - wave->first_ray;
+    gpu_buffer_read(tracer->device, wave->rays, first * sizeof(struct ray), reference->rays + first,
+                    count * sizeof(struct ray));
     if (wave->times)
-        gpu_buffer_read(tracer->device, wave->times, 0, reference->times, wave->ray_count * sizeof(float));
+        gpu_buffer_read(tracer->device, wave->times, first * sizeof(float), reference->times + first,
+                        count * sizeof(float));
     uint64_t start_ns = clock_now_ns();
     reference_walk(reference, wave);
     tracer->stats.walk_ns = clock_now_ns() - start_ns;
     if (!reference_check(reference, "tracing", error))
         return false;
     if (wave->kind == WAVE_ANY)
-        gpu_buffer_write(tracer->device, wave->visibility, 0, reference->answers,
-                         wave->ray_count * sizeof(uint32_t));
+        gpu_buffer_write(tracer->device, wave->visibility, first * sizeof(uint32_t),
+                         (const uint32_t *)reference->answers + first, count * sizeof(uint32_t));
     else
-        gpu_buffer_write(tracer->device, wave->hits, 0, reference->answers, wave->ray_count * sizeof(struct hit));
+        gpu_buffer_write(tracer->device, wave->hits, first * sizeof(struct hit),
+                         (const struct hit *)reference->answers + first, count * sizeof(struct hit));
     return trace_surfaces(scene, wave, error);
 }
 

@@ -311,7 +311,7 @@ walk_packets(const struct walk *walk, struct walk_context *context, uint32_t fir
 static void walk_chunk(void *argument, uint32_t chunk)
 {
     const struct walk *walk = argument;
-    uint32_t first = chunk * CHUNK_RAYS, left = walk->wave->ray_count - first;
+    uint32_t first = walk->wave->first_ray + chunk * CHUNK_RAYS, left = walk->wave->end_ray - first;
     uint32_t end = first + (left < CHUNK_RAYS ? left : CHUNK_RAYS);
     struct walk_context context;
     unsigned mode = enter_fast_mode();
@@ -339,6 +339,6 @@ static void walk_chunk(void *argument, uint32_t chunk)
 void reference_walk(struct reference *reference, const struct wave *wave)
 {
     struct walk walk = {.reference = reference, .wave = wave, .width = reference->width};
-    uint32_t chunks = (wave->ray_count - 1) / CHUNK_RAYS + 1;
+    uint32_t chunks = (wave->end_ray - wave->first_ray - 1) / CHUNK_RAYS + 1;
     parallel_run(parallel_processors(), chunks, walk_chunk, &walk);
 }

@@ -69,10 +69,11 @@ bool trace_surfaces(const struct scene_gpu *scene, const struct wave *wave, stru
     const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
     if (!program)
         return false;
-    gpu_uniform_uint(program, "ray_count", wave->ray_count);
+    gpu_uniform_uint(program, "first_ray", wave->first_ray);
+    gpu_uniform_uint(program, "ray_count", wave->end_ray);
     bind_rays(scene, wave);
     gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
-    gpu_dispatch(scene->device, program, wave->ray_count);
+    gpu_dispatch(scene->device, program, wave->end_ray - wave->first_ray);
     return true;
 }
 
@@ -87,14 +88,14 @@ bool trace_program_run(const struct gpu_program *program, const struct scene_gpu
         gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
     gpu_uniform_uint(program, "disc_count", scene->disc_count);
     gpu_uniform_uint(program, "instance_count", scene->instance_count);
-    for (uint32_t first = 0, part; first < wave->ray_count; first += part) {
-        part = wave->ray_count - first;
+    for (uint32_t first = wave->first_ray, part; first < wave->end_ray; first += part) {
+        part = wave->end_ray - first;
         if (source->rays_a_dispatch && source->rays_a_dispatch < part)
             part = source->rays_a_dispatch;
         gpu_uniform_uint(program, "first_ray", first);
         gpu_uniform_uint(program, "ray_count", first + part);
         gpu_dispatch(scene->device, program, ((uint64_t)part + together - 1) / together);
-        if (part < wave->ray_count) /* a part of its own to the driver too, which may gather commands */
+        if (first + part < wave->end_ray) /* a part of its own to the driver too, which may gather commands */
             glFlush();
     }
     return trace_surfaces(scene, wave, error);

@@ -107,7 +107,11 @@ static bool buffer_holds(const struct gpu_buffer *buffer, uint32_t count, size_t
 
 bool tracer_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error)
 {
-    bool fits = wave->ray_count > 0 && buffer_holds(wave->rays, wave->ray_count, sizeof(struct ray));
+    struct wave part = *wave;
+    part.end_ray = wave->end_ray > 0 ? wave->end_ray : wave->ray_count;
+    bool fits = part.first_ray < part.end_ray && part.end_ray <= wave->ray_count &&
+                part.first_ray % WAVE_PART_RAYS == 0 &&
+                buffer_holds(wave->rays, wave->ray_count, sizeof(struct ray));
     if (wave->kind == WAVE_ANY)
         fits = fits && buffer_holds(wave->visibility, wave->ray_count, sizeof(uint32_t));
     else
@@ -123,7 +127,7 @@ bool tracer_trace(struct tracer *tracer, struct scene_gpu *scene, const struct w
         return false;
     gpu_push_group(tracer->device, tracer->impl->name);
     bool ok =
-        tracer->impl->trace(tracer, scene, wave, error) && gpu_check(tracer->device, tracer->impl->name, error);
+        tracer->impl->trace(tracer, scene, &part, error) && gpu_check(tracer->device, tracer->impl->name, error);
     gpu_pop_group(tracer->device);
     return ok;
 }

@@ -79,8 +79,8 @@ struct tracer_stats {
     uint64_t nodes_rebuilt;  /* by the last update */
     uint64_t nodes_refitted;
     struct tracer_cube cubes[TRACER_CUBES_MAX]; /* `ldc` */
-    uint64_t
-        walk_ns; /* `reference`: of the last wave, in Embree alone, without the copies from and to the device */
+    uint64_t walk_ns; /* `reference`: of the last wave or part, in Embree alone, without the copies from and to the
+                         device */
 };
 
 struct tracer {
@@ -98,14 +98,14 @@ struct tracer_impl {
     /* The structure knows the scene as the shutter opens: rays of a scene in which something moves meanwhile must
      * have no times. */
     bool still;
-    bool slow_on_software; /* a ray takes microseconds there: few are traced in one step of a frame */
     struct tracer *(*create)(struct gpu_device *device, const struct tracer_options *options, struct error *error);
     void (*destroy)(struct tracer *tracer);
     /* Brings the structure to the scene; `changes` is what changed since the last update of this tracer.
      * Everything is marked changed on the first. Reports STAGE_BUILD and STAGE_UPLOAD. */
     bool (*update)(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
                    struct stage_times *times, struct error *error);
-    /* Buffers of the scene are bound. Queues the work; does not wait, unless it is done on the CPU. */
+    /* Buffers of the scene are bound. Queues the work; does not wait, unless it is done on the CPU. Rays
+     * wave->first_ray .. wave->end_ray - 1, of which there are some. */
     bool (*trace)(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error);
 };
 
@@ -128,7 +128,8 @@ bool tracer_update(struct tracer *tracer, struct scene_gpu *scene, const struct 
                    struct stage_times *times, struct error *error);
 /* So does the next one: it is not known what changed. */
 void tracer_outdate(struct tracer *tracer);
-/* Traces rays 0 .. wave->ray_count - 1 (at least 1 and at most what the buffers hold, which is checked). */
+/* Traces rays 0 .. wave->ray_count - 1 (at least 1 and at most what the buffers hold, which is checked), or the
+ * part of them that the wave names. */
 bool tracer_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error);
 
 #endif

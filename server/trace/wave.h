@@ -7,6 +7,9 @@
 
 #include <stdint.h>
 
+/* Parts begin at multiples of it: rays that walk together, 8 or 3, say, stay together. */
+#define WAVE_PART_RAYS 192u
+
 enum wave_kind {
     WAVE_CLOSEST, /* fills `hits` */
     WAVE_ANY,     /* fills `visibility`: transmittance up to t_max, unorm 4x8 rgb; opaque surfaces stop it,
@@ -15,7 +18,11 @@ enum wave_kind {
 
 struct wave {
     enum wave_kind kind;
-    uint32_t ray_count;            /* on the host: how many of `rays` are to be traced */
+    uint32_t ray_count; /* on the host: how many of `rays` are to be traced */
+    /* The part of them that is traced now, so that a long wave is some short steps: from a multiple of
+     * WAVE_PART_RAYS up to end_ray; 0: to the last. Parts come in their order, and with all of them traced, and no
+     * other wave by the same tracer in between, the answers are the whole wave's to the bit. */
+    uint32_t first_ray, end_ray;
     struct gpu_buffer *rays;       /* struct ray */
     struct gpu_buffer *hits;       /* struct hit; closest */
     struct gpu_buffer *visibility; /* uint; any */

@@ -20,7 +20,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum ray_kind { RAY_PRIMARY, RAY_SECONDARY, RAY_SHADOW }; /* protocol's numbers */
+enum ray_kind { RAY_PRIMARY, RAY_SECONDARY, RAY_SHADOW, RAY_KIND_COUNT }; /* protocol's numbers */
 
 /* Waves of a frame, and kinds of ray in each; what lies beyond is counted with the last wave. The wire's number.
  */

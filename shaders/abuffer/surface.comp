@@ -9,11 +9,12 @@
 layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each
 layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; a crossing is the first
 
-uniform uint ray_count;
+uniform uint first_ray; // of this dispatch
+uniform uint ray_count; // where it ends
 
 void main()
 {
-    uint k = item_index();
+    uint k = first_ray + item_index();
     if (k >= ray_count)
         return;
     uvec4 crossing = imageLoad(hits, int(3u * k));

@@ -13,7 +13,8 @@ layout(binding = UNIT_TRACER_0) uniform usamplerBuffer sample_geometry;
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer sample_surfaces;
 layout(binding = IMAGE_HITS, rgba32ui) uniform uimageBuffer hits; // three texels each; a crossing is the first
 
-uniform uint ray_count;
+uniform uint first_ray; // of this dispatch
+uniform uint ray_count; // where it ends
 
 hit surface_sampled(uint sample_index, float distance_, vec3 direction)
 {
@@ -29,7 +30,7 @@ hit surface_sampled(uint sample_index, float distance_, vec3 direction)
 
 void main()
 {
-    uint k = item_index();
+    uint k = first_ray + item_index();
     if (k >= ray_count)
         return;
     uvec4 crossing = imageLoad(hits, int(3u * k));

@@ -352,7 +352,7 @@ static void a_wave_in_parts_has_the_answers_of_the_whole(void **state)
     struct fixture fixture;
     fixture_init(&fixture, &tracers[0], &scenes[1]);
     const struct trace_program_source parts = {.traverse = "naive/traverse.glsl", .rays_a_dispatch = 192};
-    const struct wave wave = {.ray_count = 777, .rays = &fixture.rays, .hits = &fixture.answers};
+    const struct wave wave = {.ray_count = 777, .end_ray = 777, .rays = &fixture.rays, .hits = &fixture.answers};
     struct hit *whole = trace(&fixture, WAVE_CLOSEST, wave.ray_count);
     struct hit *hits = malloc(RAY_COUNT * sizeof(struct hit));
     const struct gpu_program *program = trace_program_get(&fixture.gpu, &wave, &parts, &error);

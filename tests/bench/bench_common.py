@@ -26,6 +26,7 @@ class Bench:
         self.tiny = tiny  # the smallest scene and one run: for the test of the benchmark itself
         self.scenes = None  # folder of the bundled scenes
         self.faults = []
+        os.environ.setdefault("FARLIGHT_LIBEXEC", str(self.build))  # for clients among the programs below it
 
     def program(self, name):
         return self.build / name

@@ -58,6 +58,22 @@ def run_cmocka(tally, program, environment):
     tally.add(passed, failed, skipped)
 
 
+class Timed(unittest.TextTestResult):
+    """Says how long each test took; what its class prepares counts for its first one."""
+
+    def __init__(self, *arguments, **options):
+        super().__init__(*arguments, **options)
+        self.ended = time.monotonic()
+
+    def addSuccess(self, test):  # pylint: disable=invalid-name
+        self.stream.write(f"{time.monotonic() - self.ended:.1f} s, ")
+        super().addSuccess(test)
+
+    def stopTest(self, test):  # pylint: disable=invalid-name
+        super().stopTest(test)
+        self.ended = time.monotonic()
+
+
 def run_integration(tally, names):
     sys.path.insert(0, "tests/integration")
     loader = unittest.TestLoader()
@@ -68,7 +84,7 @@ def run_integration(tally, names):
     if not suite.countTestCases():
         return
     print("== integration", flush=True)
-    result = unittest.TextTestRunner(verbosity=2, stream=sys.stdout).run(suite)
+    result = unittest.TextTestRunner(verbosity=2, stream=sys.stdout, resultclass=Timed).run(suite)
     for test, reason in result.skipped:
         print(f"   skipped {test}: {reason}")
     bad = len(result.failures) + len(result.errors)

@@ -43,6 +43,9 @@ struct frame_renderer {
     uint64_t motion_digest;
     uint32_t pose_count, steps_left;
     bool busy;
+    struct frame_request kept_request; /* of the last frame, with the samples that it came to */
+    uint32_t kept_samples;
+    uint64_t kept_revision;
     struct stage_times times;
 };
 
@@ -211,20 +214,25 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
     }
     unsigned let_through = atomic_load(&fake.gate_seed);
     bool is_gated =
-        renderer->request.depth == GATED_DEPTH && (!let_through || renderer->request.seed != let_through);
+        renderer->request.depth == GATED_DEPTH && !(let_through && renderer->request.seed == let_through);
     if (is_gated && !atomic_load(&fake.gate_open)) {
         usleep(500);
         return FRAME_MORE;
     }
     if (--renderer->steps_left > 0)
         return FRAME_MORE;
+    bool goes_on = renderer->kept_samples && renderer->kept_revision == renderer->scene->revision &&
+                   frame_request_adds_to(&renderer->kept_request, &renderer->request);
+    renderer->kept_samples = renderer->request.samples + (goes_on ? renderer->kept_samples : 0);
+    renderer->kept_request = renderer->request;
+    renderer->kept_revision = renderer->scene->revision;
     *result = (struct frame_result){
         .width = renderer->request.width,
         .height = renderer->request.height,
         .size_bytes = (size_t)frame_request_bytes(&renderer->request),
         .format = renderer->request.format,
         .revision = renderer->scene->revision,
-        .samples = renderer->request.samples,
+        .samples = renderer->kept_samples,
         .layers = frame_request_layers(&renderer->request),
         .primary_rays = 10,
         .shadow_rays = 5,
@@ -243,6 +251,7 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
 static inline void fake_abandon(struct frame_renderer *renderer)
 {
     fake_end_frame(renderer);
+    renderer->kept_samples = 0;
     atomic_fetch_add(&fake.frames_abandoned, 1);
 }
 

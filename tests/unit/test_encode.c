@@ -139,6 +139,7 @@ static void jpeg_comes_close_and_keeps_full_chroma_from_quality_90(void **state)
     }
     int subsampling;
     assert_true(jpeg_psnr(1, 1, 95, &subsampling) > 40);
+    jpeg_psnr(4, 3, 80, &subsampling); /* padded to more than at full chroma */
     assert_true(jpeg_psnr(17, 9, 0, &subsampling) > 5); /* out of range: the lowest there is */
 }
 

@@ -1,66 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* A session from hello to goodbye, over a socketpair, with an engine that answers what it is told to. Every test
- * runs twice: with the system calls as they are, and with each of them cut short and interrupted. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
+/* A session from hello to goodbye, over a socketpair, with an engine that answers what it is told to. */
+#include "session_fixture.h"
 
 #include "base/clock.h"
 #include "base/queue.h"
-#include "base/sys.h"
-#include "session/daemon.h"
 #include "session/dispatch.h"
 #include "session/frames.h"
 
-#include <errno.h>
-#include <poll.h>
 #include <math.h>
-#include <pthread.h>
-#include <stdatomic.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #define FRAME_BYTES ((size_t)700001) /* three pieces, the last of odd size */
-
-/* ---- faults ------------------------------------------------------------------------------------------ */
-
-static struct sys_calls real;
-static atomic_uint calls;
-
-static bool interrupted(void)
-{
-    if (atomic_fetch_add(&calls, 1) % 3)
-        return false;
-    errno = EINTR;
-    return true;
-}
-
-static ssize_t short_read(int fd, void *data, size_t bytes)
-{
-    size_t least = atomic_load(&calls) % 5 + 1;
-    size_t most = bytes > 65536 ? bytes - 12345 : least; /* small messages in tiny parts, bulk in odd ones */
-    return interrupted() ? -1 : real.read(fd, data, bytes < most ? bytes : most);
-}
-
-static ssize_t short_sendmsg(int fd, const struct msghdr *message, int flags)
-{
-    struct iovec part = message->msg_iov[0];
-    struct msghdr shorter = {.msg_iov = &part, .msg_iovlen = 1};
-    size_t most = part.iov_len > 4096 ? part.iov_len - 777 : atomic_load(&calls) % 7 + 1;
-    part.iov_len = part.iov_len < most ? part.iov_len : most;
-    return interrupted() ? -1 : real.sendmsg(fd, &shorter, flags);
-}
-
-static int interrupted_wait(int fd, struct epoll_event *events, int max_events, int timeout_ms)
-{
-    return interrupted() ? -1 : real.epoll_wait(fd, events, max_events > 1 ? 1 : max_events, timeout_ms);
-}
 
 /* ---- an engine --------------------------------------------------------------------------------------- */
 
@@ -168,6 +118,8 @@ static bool submit(void *context, struct engine_command *command, struct error *
         event(ENGINE_FAILED, command, command->target_request);
         event(ENGINE_DONE, command, command->request);
         break;
+    case ENGINE_VIEW_LOOK:
+        break;
     case ENGINE_STATS:
         event(ENGINE_STATS_READY, command, command->request);
         break;
@@ -212,239 +164,20 @@ static void drop_event(void *item)
     engine_event_destroy(item);
 }
 
-/* ---- the daemon on a thread, a client here ----------------------------------------------------------- */
-
-struct client {
-    int fd;
-    uint8_t in[2 * FRAMING_MESSAGE_MAX_BYTES];
-    size_t in_used, consumed;
-    uint8_t scratch_data[SCRATCH_BYTES];
-    struct scratch scratch;
-    struct framing_header header; /* of the last message */
-    struct message message;
-    uint64_t upload_credit;
-};
-
-static struct daemon served;
-static pthread_t thread;
-static struct client client;
-
-static void *run(void *context)
-{
-    (void)context;
-    struct error error = {0};
-    daemon_run(&served, &error);
-    return NULL;
-}
-
-static void receive_some(void)
-{
-    memmove(client.in, client.in + client.consumed, client.in_used - client.consumed);
-    client.in_used -= client.consumed;
-    client.consumed = 0;
-    struct pollfd fd = {.fd = client.fd, .events = POLLIN};
-    if (poll(&fd, 1, 20000) != 1)
-        fail_msg("nothing came for 20 s");
-    ssize_t got = recv(client.fd, client.in + client.in_used, sizeof client.in - client.in_used, 0);
-    if (got <= 0)
-        fail_msg("the connection is closed");
-    client.in_used += (size_t)got;
-}
-
-static void send_bytes(const void *data, size_t bytes)
-{
-    const uint8_t *next = data;
-    while (bytes) {
-        ssize_t sent = send(client.fd, next, bytes, MSG_NOSIGNAL);
-        assert_true(sent > 0);
-        next += sent;
-        bytes -= (size_t)sent;
-    }
-}
-
-static void send_message(uint32_t request, uint32_t channel, const struct message *message)
-{
-    static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
-    struct writer writer;
-    writer_init(&writer, bytes, sizeof bytes);
-    if (!message_write(&writer, request, channel, message))
-        fail_msg("%s: %s", writer.error.field, writer.error.text);
-    send_bytes(bytes, writer.used_bytes);
-}
-
-/* The next message but credit and blocked; it stays until the next call. */
-static const struct message *receive(void)
-{
-    for (;;) {
-        struct frame frame;
-        struct decode_error error = {0};
-        enum framing_result result = framing_parse(&frame, client.in + client.consumed,
-                                                   client.in_used - client.consumed, MESSAGE_FROM_SERVER, &error);
-        if (result == FRAMING_NEED_MORE) {
-            receive_some();
-            continue;
-        }
-        if (result == FRAMING_FATAL)
-            fail_msg("%s: %s", error.field, error.text);
-        client.consumed += frame.consumed_bytes;
-        client.header = frame.header;
-        scratch_init(&client.scratch, client.scratch_data, sizeof client.scratch_data);
-        if (!message_decode(&client.message, frame.header.type, frame.payload, frame.header.payload_bytes,
-                            &client.scratch, &error))
-            fail_msg("%s: %s", error.field, error.text);
-        if (client.message.type == MESSAGE_CREDIT)
-            client.upload_credit = client.message.credit.total;
-        else
-            return &client.message;
-    }
-}
-
-static void expect(enum message_type type, uint32_t request)
-{
-    const struct message *message = receive();
-    if (message->type != type || client.header.request != request)
-        fail_msg("%s of request %u came instead of %s of %u: %s", message_type_text(message->type),
-                 client.header.request, message_type_text(type), request,
-                 message->type == MESSAGE_ERROR ? message->error.text : "");
-}
-
-static void expect_error(uint32_t request, enum protocol_error_code code)
-{
-    expect(MESSAGE_ERROR, request);
-    assert_int_equal(client.message.error.code, code);
-}
-
-static void expect_end(void)
-{
-    struct pollfd fd = {.fd = client.fd, .events = POLLIN};
-    assert_int_equal(client.in_used, client.consumed);
-    assert_int_equal(poll(&fd, 1, 20000), 1);
-    assert_int_equal(recv(client.fd, client.in, 1, 0), 0);
-}
-
-static struct message made(enum message_type type)
-{
-    struct message message;
-    message_init(&message, type);
-    return message;
-}
-
-static void expect_alive(uint32_t request)
-{
-    struct message message = made(MESSAGE_PING);
-    message.ping.sent_ns = 1234567;
-    send_message(request, 0, &message);
-    expect(MESSAGE_PONG, request);
-    assert_int_equal(client.message.pong.sent_ns, 1234567);
-}
-
-static void greet(void)
-{
-    struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "test"};
-    uint8_t bytes[HANDSHAKE_HELLO_MAX_BYTES];
-    send_bytes(bytes, handshake_hello_encode(bytes, &hello));
-    struct handshake_reply reply;
-    struct decode_error error = {0};
-    while (handshake_reply_parse(&reply, client.in, client.in_used, &client.consumed, &error) ==
-           HANDSHAKE_NEED_MORE)
-        receive_some();
-    assert_int_equal(reply.version, 1);
-    assert_int_equal(reply.limits.requests_in_flight, 64);
-}
-
-static void start(const struct connection_limits *connection_limits)
+static struct engine_port engine_begin(void)
 {
     memset(&engine, 0, sizeof engine);
     engine.events = queue_create(4096, true);
-    struct hub_options options = {
-        .limits = {.clients = 4,
-                   .unauthenticated = 4,
-                   .unauthenticated_per_address = 4,
-                   .requests_in_flight = 64,
-                   .scenes_per_client = 2,
-                   .jobs_per_client = 2,
-                   .ldc_layers = 7,
-                   .ldc_bytes = (3 << 20) + 1, /* whole MiB are told on */
-                   .abuffer_bytes = 1000,      /* less than one is a limit still */
-                   .blobs_per_client = 8,
-                   .transaction_edits = 10,
-                   .transaction_bytes = 64 << 10,
-                   .nodes = 100,
-                   .texture_edge_texels = 64,
-                   .width_pixels = 512,
-                   .height_pixels = 512,
-                   .samples = 64,
-                   .blob_bytes = 8 << 20,
-                   .blob_cache_bytes = 4 << 20,
-                   .upload_window_bytes = 1 << 20,
-                   .frame_bytes = 10 << 20,
-                   .frames_in_flight = 3,
-                   .frame_window_bytes = 64 << 20},
-        .connection_limits = *connection_limits,
-        .engine = {.submit = submit, .event_fd = event_fd, .next_event = next_event, .report_sent = report_sent},
-    };
-    struct error error = {0};
-    int pair[2];
-    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
-    daemon_init(&served);
-    assert_true(daemon_start(&served, &options, &error));
-    assert_true(daemon_serve_fd(&served, pair[0], &error));
-    memset(&client, 0, sizeof client);
-    client.fd = pair[1];
-    assert_int_equal(pthread_create(&thread, NULL, run, NULL), 0);
+    return (struct engine_port){
+        .submit = submit, .event_fd = event_fd, .next_event = next_event, .report_sent = report_sent};
 }
 
-static const struct connection_limits patient = {
-    .handshake_ms = 10000,
-    .progress_grace_ms = 10000,
-    .progress_bytes_per_s = 1,
-    .idle_ms = 60000,
-    .queued_soft_ms = 10000,
-    .queued_soft_bytes = 16 << 20,
-    .queued_hard_bytes = 64 << 20,
-};
-
-static int set_up(void **state)
+static void engine_end(void)
 {
-    (void)state;
-    real = sys;
-    start(&patient);
-    greet();
-    return 0;
-}
-
-static int set_up_with_faults(void **state)
-{
-    (void)state;
-    real = sys;
-    sys.read = short_read;
-    sys.sendmsg = short_sendmsg;
-    sys.epoll_wait = interrupted_wait;
-    start(&patient);
-    greet();
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    close(client.fd);
-    pthread_join(thread, NULL);
-    daemon_finish(&served);
     queue_destroy(engine.events, drop_event);
-    sys = real;
-    return 0;
 }
 
 /* ---- steps ------------------------------------------------------------------------------------------- */
-
-static void open_scene(uint32_t request, uint32_t scene)
-{
-    struct message message = made(MESSAGE_SCENE_OPEN);
-    message.scene_open.scene = scene;
-    send_message(request, 0, &message);
-    expect(MESSAGE_OK, request);
-}
 
 static void begin_edit(uint32_t request, uint32_t scene)
 {

@@ -1,0 +1,442 @@
+/* SPDX-License-Identifier: MIT */
+/* Views in the engine, with a renderer that the tests control: the newest camera, refinement, replacing, credit.
+ */
+#include "engine_fake.h"
+
+#include "base/clock.h"
+#include "job/engine_private.h"
+
+/* Frames need 1 sample of 4, so that they refine; the bound of frames a second is out of the way. */
+static struct engine_command *view(uint64_t client, uint32_t request, struct view_wishes *wishes)
+{
+    struct engine_command *made = render(client, request, 0, UINT32_MAX);
+    made->job.kind = JOB_VIEW;
+    made->job.frames_per_second = 100000;
+    made->job.frame.samples = 4;
+    made->job.pass_samples = 1;
+    made->job.weight = 1;
+    made->job.encoding = ENCODING_JPEG;
+    made->job.quality = 80;
+    made->job.still_encoding = ENCODING_RAW;
+    made->job.wishes = view_wishes_ref(wishes);
+    return made;
+}
+
+/* From 5 m away, at the height of the command's number. */
+static struct view_camera camera(uint64_t number, bool moving)
+{
+    return (struct view_camera){
+        .command = number,
+        .received_ns = 1000 + number,
+        .moving = moving,
+        .key = {.eye_world = {0, (float)number, 5}, .up_world = {0, 1, 0}, .fov_y = 1},
+    };
+}
+
+static void look(struct engine *engine, struct view_wishes *wishes, uint64_t number, bool moving)
+{
+    struct view_camera made = camera(number, moving);
+    if (view_wishes_look(wishes, &made))
+        submit(engine, command(ENGINE_VIEW_LOOK, 1, 0));
+}
+
+static struct engine_frame *take(struct engine_event *event)
+{
+    struct engine_frame *frame = event->frame;
+    event->frame = NULL;
+    engine_event_destroy(event);
+    return frame;
+}
+
+static void drop(struct engine_frame *frame)
+{
+    frame_result_finish(&frame->result);
+    free(frame->bytes);
+    free(frame);
+}
+
+static void a_frame_tells_of_the_camera_that_it_shows(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    struct engine_command *made = view(1, 2, wishes);
+    made->job.first_frame = 5;
+    made->job.frame.samples = 1;
+    submit(engine, made);
+    struct engine_frame *first = take(expect_frame(engine, 1, 2, 5));
+    assert_int_equal(first->command, 0);
+    assert_int_equal(first->received_ns, 0);
+    assert_false(first->moving);
+    assert_true(first->key_frame);
+    drop(first);
+    expect_silence(engine); /* nothing changes, and there are enough samples */
+    uint64_t before_ns = clock_now_ns();
+    look(engine, wishes, 7, true);
+    struct engine_frame *frame = take(expect_frame(engine, 1, 2, 6));
+    assert_int_equal(frame->command, 7);
+    assert_int_equal(frame->received_ns, 1007);
+    assert_true(frame->moving);
+    assert_true(before_ns <= frame->applied_ns && frame->applied_ns <= frame->rendered_ns);
+    assert_true(frame->rendered_ns <= frame->encoded_ns && frame->encoded_ns <= clock_now_ns());
+    /* The eye is the camera's place. */
+    assert_true(frame->request.camera.world_from_view[7] == 7.0f);
+    assert_true(frame->request.camera.world_from_view[11] == 5.0f);
+    drop(frame);
+    expect_silence(engine);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static struct engine_command *with_samples(struct engine_command *made, uint32_t samples, uint32_t pass_samples)
+{
+    made->job.frame.samples = samples;
+    made->job.pass_samples = pass_samples;
+    return made;
+}
+
+static void expect_picture(struct engine *engine, uint32_t request, uint32_t number, uint64_t command_number,
+                           uint32_t samples, enum encoding encoding)
+{
+    struct engine_frame *frame = take(expect_frame(engine, 1, request, number));
+    if (frame->command != command_number || frame->result.samples != samples || frame->encoding != encoding)
+        fail_msg("frame %u shows command %d with %u samples in encoding %d; expected %d, %u, %d", number,
+                 (int)frame->command, frame->result.samples, frame->encoding, (int)command_number, samples,
+                 encoding);
+    drop(frame);
+}
+
+static void of_many_cameras_the_newest_is_shown(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    submit(engine, gated(with_samples(view(1, 2, wishes), 1, 1)));
+    look(engine, wishes, 1, true);
+    wait_until(&fake.frames_begun, 1);
+    for (uint64_t number = 2; number <= 500; number++)
+        look(engine, wishes, number, true);
+    expect_silence(engine);
+    assert_int_equal(atomic_load(&fake.frames_begun), 1); /* what shows something new is finished */
+    atomic_store(&fake.gate_open, true);
+    struct engine_event *event = event_within(engine, 10000);
+    assert_non_null(event);
+    assert_true(event->frame->command <= 1); /* it may have been begun before the first camera came */
+    engine_event_destroy(event);
+    expect_picture(engine, 2, 1, 500, 1, ENCODING_JPEG);
+    expect_silence(engine);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static void a_picture_that_rests_is_refined_until_it_has_its_samples(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    submit(engine, with_samples(view(1, 2, wishes), 7, 3));
+    expect_picture(engine, 2, 0, 0, 3, ENCODING_RAW);
+    expect_picture(engine, 2, 1, 0, 6, ENCODING_RAW);
+    expect_picture(engine, 2, 2, 0, 7, ENCODING_RAW);
+    expect_silence(engine);
+    look(engine, wishes, 1, true);
+    expect_picture(engine, 2, 3, 1, 3, ENCODING_JPEG);
+    expect_silence(engine); /* it moves: more will follow */
+    struct view_camera stays = camera(1, false);
+    stays.command = 2; /* the same place: the samples that it has count */
+    if (view_wishes_look(wishes, &stays))
+        submit(engine, command(ENGINE_VIEW_LOOK, 1, 0));
+    expect_picture(engine, 2, 4, 2, 6, ENCODING_RAW);
+    expect_picture(engine, 2, 5, 2, 7, ENCODING_RAW);
+    expect_silence(engine);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static void an_edit_of_the_scene_begins_anew(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    submit(engine, with_samples(view(1, 2, wishes), 2, 1));
+    expect_picture(engine, 2, 0, 0, 1, ENCODING_RAW);
+    expect_picture(engine, 2, 1, 0, 2, ENCODING_RAW);
+    expect_silence(engine);
+    submit_commit(engine, 1, 3, 1);
+    assert_int_equal(expect_done(engine, 1, 3), 1);
+    struct engine_frame *frame = take(expect_frame(engine, 1, 2, 2));
+    assert_int_equal(frame->result.revision, 1);
+    assert_int_equal(frame->result.samples, 1);
+    drop(frame);
+    expect_picture(engine, 2, 3, 0, 2, ENCODING_RAW);
+    expect_silence(engine);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+/* The view has shown a frame, and a refining one is in progress until the gate is opened. */
+static struct engine *start_refining(struct view_wishes *wishes)
+{
+    struct engine *engine = start((struct engine_options){0});
+    atomic_store(&fake.gate_open, true);
+    open_scene(engine, 1, 1);
+    struct engine_command *made = gated(with_samples(view(1, 2, wishes), 1000, 1));
+    made->job.credit = 1;
+    submit(engine, made);
+    expect_picture(engine, 2, 0, 0, 1, ENCODING_RAW);
+    atomic_store(&fake.gate_open, false);
+    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 2);
+    wait_until(&fake.frames_begun, 2);
+    return engine;
+}
+
+static void refining_gives_way_to_a_new_camera(void **state)
+{
+    (void)state;
+    struct view_wishes *wishes = view_wishes_create();
+    struct engine *engine = start_refining(wishes);
+    look(engine, wishes, 9, true);
+    wait_until(&fake.frames_begun, 3);
+    assert_int_equal(atomic_load(&fake.frames_abandoned), 1);
+    look(engine, wishes, 10, true);
+    expect_silence(engine);
+    assert_int_equal(atomic_load(&fake.frames_abandoned), 1); /* what shows something new is finished */
+    atomic_store(&fake.gate_open, true);
+    expect_picture(engine, 2, 1, 9, 1, ENCODING_JPEG);
+    expect_silence(engine); /* there is no credit for a third */
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static void refining_gives_way_to_an_edit(void **state)
+{
+    (void)state;
+    struct view_wishes *wishes = view_wishes_create();
+    struct engine *engine = start_refining(wishes);
+    submit_commit(engine, 1, 3, 1);
+    assert_int_equal(expect_done(engine, 1, 3), 1); /* the gate is closed still */
+    atomic_store(&fake.gate_open, true);
+    struct engine_frame *frame = take(expect_frame(engine, 1, 2, 1));
+    assert_int_equal(frame->result.revision, 1);
+    assert_int_equal(frame->result.samples, 1);
+    drop(frame);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static void nothing_is_begun_beyond_credit_so_that_nothing_becomes_stale(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    struct engine_command *made = with_samples(view(1, 2, wishes), 1, 1);
+    made->job.credit = 0;
+    submit(engine, made);
+    look(engine, wishes, 1, true);
+    expect_silence(engine);
+    assert_int_equal(atomic_load(&fake.frames_begun), 0);
+    look(engine, wishes, 2, true);
+    submit_target(engine, ENGINE_JOB_CREDIT, 1, 0, 2, 1);
+    expect_picture(engine, 2, 0, 2, 1, ENCODING_JPEG);
+    look(engine, wishes, 3, true);
+    expect_silence(engine);
+    assert_int_equal(atomic_load(&fake.frames_begun), 1);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static void no_more_frames_come_than_were_asked_for_a_second(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    struct engine_command *made = with_samples(view(1, 2, wishes), 1000, 1);
+    made->job.frames_per_second = 100;
+    submit(engine, made);
+    uint64_t first_ns = 0, last_ns = 0;
+    for (uint32_t number = 0; number < 11; number++) {
+        struct engine_frame *frame = take(expect_frame(engine, 1, 2, number));
+        first_ns = number ? first_ns : frame->applied_ns;
+        last_ns = frame->applied_ns;
+        drop(frame);
+    }
+    assert_true(last_ns - first_ns >= 10 * UINT64_C(10000000));
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static void a_key_frame_comes_also_where_nothing_moves(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    submit(engine, with_samples(view(1, 2, wishes), 1, 1));
+    struct engine_frame *frame = take(expect_frame(engine, 1, 2, 0));
+    assert_false(frame->wants_key);
+    drop(frame);
+    expect_silence(engine);
+    assert_true(view_wishes_want_key_frame(wishes));
+    submit(engine, command(ENGINE_VIEW_LOOK, 1, 0));
+    frame = take(expect_frame(engine, 1, 2, 1));
+    assert_true(frame->wants_key);
+    drop(frame);
+    expect_silence(engine);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static void a_view_takes_the_place_of_another_and_goes_on_from_it(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create(), *others = view_wishes_create();
+    open_scene(engine, 1, 1);
+    open_scene(engine, 1, 7);
+    submit(engine, with_samples(view(1, 2, wishes), 1, 1));
+    expect_picture(engine, 2, 0, 0, 1, ENCODING_RAW);
+    submit(engine, with_samples(view(1, 20, others), 1, 1)); /* of the same client, but another one */
+    expect_picture(engine, 20, 0, 0, 1, ENCODING_RAW);
+    look(engine, wishes, 3, true);
+    expect_picture(engine, 2, 1, 3, 1, ENCODING_JPEG);
+    struct engine_command *made = with_samples(view(1, 4, wishes), 1, 1);
+    made->job.encoding = ENCODING_ZSTD;
+    made->scene = 7;
+    submit(engine, made);
+    expect_done(engine, 1, 2);
+    expect_picture(engine, 4, 2, 3, 1, ENCODING_ZSTD);
+    expect_silence(engine);
+    /* One that cannot be changes nothing. */
+    made = view(1, 5, wishes);
+    made->job.frame.tracer = 99;
+    submit(engine, made);
+    expect_failed(engine, 1, 5, ERROR_UNSUPPORTED, "render.tracer");
+    look(engine, wishes, 6, true);
+    expect_picture(engine, 4, 3, 6, 1, ENCODING_ZSTD);
+    view_wishes_unref(wishes);
+    view_wishes_unref(others);
+    stop(engine);
+}
+
+static void a_frame_in_progress_ends_with_the_view_that_is_replaced(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    submit(engine, gated(view(1, 2, wishes)));
+    wait_until(&fake.frames_begun, 1);
+    submit(engine, with_samples(view(1, 3, wishes), 1, 1));
+    expect_done(engine, 1, 2);
+    wait_until(&fake.frames_abandoned, 1);
+    expect_picture(engine, 3, 0, 0, 1, ENCODING_RAW);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static void a_cancelled_view_ends_whatever_it_does(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    submit(engine, with_samples(view(1, 2, wishes), 1, 1));
+    expect_picture(engine, 2, 0, 0, 1, ENCODING_RAW);
+    submit_target(engine, ENGINE_JOB_CANCEL, 1, 3, 2, 0); /* at rest */
+    expect_failed(engine, 1, 2, ERROR_CANCELLED, "");
+    expect_done(engine, 1, 3);
+    submit(engine, gated(view(1, 4, wishes)));
+    wait_until(&fake.frames_begun, 2);
+    submit_target(engine, ENGINE_JOB_CANCEL, 1, 5, 4, 0); /* in a frame */
+    expect_failed(engine, 1, 4, ERROR_CANCELLED, "");
+    expect_done(engine, 1, 5);
+    look(engine, wishes, 1, true);
+    expect_silence(engine);
+    submit(engine, gated(view(1, 6, wishes)));
+    wait_until(&fake.frames_begun, 3);
+    submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));
+    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 1, 0));
+    expect_silence(engine);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static void a_camera_that_spans_no_view_ends_it(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    submit(engine, with_samples(view(1, 2, wishes), 1, 1));
+    expect_picture(engine, 2, 0, 0, 1, ENCODING_RAW);
+    struct view_camera nowhere = camera(1, true);
+    memcpy(nowhere.key.look_at_world, nowhere.key.eye_world, sizeof nowhere.key.eye_world);
+    assert_true(view_wishes_look(wishes, &nowhere));
+    submit(engine, command(ENGINE_VIEW_LOOK, 1, 0));
+    expect_failed(engine, 1, 2, ERROR_INVALID, "view_camera.up_world");
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+/* The frame before it has taken 300 ns to render until 1000, and is being encoded, which took 500 the last time.
+ */
+static void a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free(void **state)
+{
+    (void)state;
+    struct queue *events = queue_create(4, false);
+    struct view_wishes *wishes = view_wishes_create();
+    struct scene *scene = scene_create("", &(struct scene_limits){0});
+    struct engine_scene held = {.scene = scene};
+    struct job job = {
+        .scene = &held,
+        .output = job_output_create(&(struct job_output_options){.events = events, .window = 3, .credit = 100}),
+        .spec = {.wishes = wishes, .frame.samples = 1, .pass_samples = 1},
+        .view = {.credit = 10, .due_ns = 700, .render_ns = 300, .rendered_ns = 1000},
+    };
+    assert_int_equal(view_due_ns(&job), 700);
+    uint64_t position = job_output_reserve(job.output);
+    struct engine_event *event = event_create(ENGINE_FRAME, 1, 1);
+    event->frame = calloc(1, sizeof *event->frame);
+    stage_times_begin(&event->frame->result.times);
+    stage_times_add(&event->frame->result.times, STAGE_ENCODE, STAGE_CPU, 0, 0, 500);
+    job_output_put(job.output, position, event);
+    assert_int_equal(view_due_ns(&job), 700);
+    job_output_reserve(job.output);
+    assert_int_equal(view_due_ns(&job), 1000 + 500 - 300);
+    job.view.render_ns = 5000;
+    assert_int_equal(view_due_ns(&job), 700);
+    job_output_reserve(job.output); /* a second one waits for the encoder */
+    assert_true(view_due_ns(&job) == UINT64_MAX);
+    job_output_unref(job.output);
+    engine_event_destroy(queue_try_pop(events));
+    queue_destroy(events, NULL);
+    scene_destroy(scene);
+    view_wishes_unref(wishes);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_frame_tells_of_the_camera_that_it_shows),
+        cmocka_unit_test(of_many_cameras_the_newest_is_shown),
+        cmocka_unit_test(a_picture_that_rests_is_refined_until_it_has_its_samples),
+        cmocka_unit_test(an_edit_of_the_scene_begins_anew),
+        cmocka_unit_test(refining_gives_way_to_a_new_camera),
+        cmocka_unit_test(refining_gives_way_to_an_edit),
+        cmocka_unit_test(nothing_is_begun_beyond_credit_so_that_nothing_becomes_stale),
+        cmocka_unit_test(no_more_frames_come_than_were_asked_for_a_second),
+        cmocka_unit_test(a_key_frame_comes_also_where_nothing_moves),
+        cmocka_unit_test(a_view_takes_the_place_of_another_and_goes_on_from_it),
+        cmocka_unit_test(a_frame_in_progress_ends_with_the_view_that_is_replaced),
+        cmocka_unit_test(a_cancelled_view_ends_whatever_it_does),
+        cmocka_unit_test(a_camera_that_spans_no_view_ends_it),
+        cmocka_unit_test(a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
