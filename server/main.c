@@ -137,16 +137,11 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, st
                   struct error *error)
 {
     struct engine_options engine_options;
-<<<<<<< HEAD
     struct hub_options options;
-    if ((fd < 0 && !daemon_listen(daemon, config->listen, config->insecure, error)) ||
-        !config_engine(config, &engine_options, error) || !config_hub(config, &options, error))
-=======
     struct auth_keys keys;
     if (!auth_read_keys(&keys, config->key_file, config->reader_key_file, error) ||
         (fd < 0 && !daemon_listen(daemon, config->listen, config->insecure || keys.count, error)) ||
-        !config_engine(config, &engine_options, error))
->>>>>>> e806b7f2559764cac10fc5075be7e313986eaa46
+        !config_engine(config, &engine_options, error) || !config_hub(config, &options, error))
         return false;
     struct engine *engine = engine_create(&engine_options, error);
     if (!engine)

@@ -205,12 +205,8 @@ bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error)
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
         return error_set(error, ERROR_INVALID, field, "%s", strerror(errno));
     daemon->single_client = true;
-<<<<<<< HEAD
     daemon->hub.options.readers.count = 0; /* whoever has a daemon to himself does as he likes */
-    return hub_add_client(&daemon->hub, fd, &peer, error);
-=======
     return hub_add_client(&daemon->hub, fd, &own, &peer, error);
->>>>>>> e806b7f2559764cac10fc5075be7e313986eaa46
 }
 
 void daemon_print_ready(const struct daemon *daemon, FILE *stream)

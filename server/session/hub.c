@@ -137,7 +137,7 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");
     if (!auth_identify(&identity, fd, peer, hub->options.insecure || keys->count, error))
         return false;
-    if (address_is_unix(peer) && readers_have(&hub->options.readers, identity.user))
+    if (identity.has_user && readers_have(&hub->options.readers, identity.user))
         identity.read_only = true;
     if (hub->unauthenticated >= limits->unauthenticated)
         return error_set(error, ERROR_LIMIT, NULL, "%zu connections have not introduced themselves",
