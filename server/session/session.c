@@ -320,9 +320,12 @@ static void on_closed(void *context)
     } else {
         hub->unauthenticated--;
     }
+    bool was_owner = session->number == hub->owner;
     free(session);
+    if (was_owner && hub->owner_gone)
+        hub->owner_gone(hub->call_context);
     if (!hub->sessions.count && hub->emptied)
-        hub->emptied(hub->emptied_context);
+        hub->emptied(hub->call_context);
 }
 
 static const struct connection_handler connection_handler = {
