@@ -78,8 +78,9 @@ struct fl_connect_options {
      * ends with the connection. ssh runs `farlight bridge unix:SOCKET` on HOST and speaks through it. */
     const char *server;
     const char *name; /* how the client calls itself in the daemon's statistics; NULL: "libfarlight" */
-    /* File of the 32 random bytes that the daemon has as well, mode 0600: the link is sealed with it. For TCP
-     * beyond loopback; NULL: nothing is sealed. */
+    /* File of the 32 random bytes that the daemon has as well, mode 0600: the connection is sealed with it, and
+     * fails if the daemon does not have it. TCP beyond loopback needs it; NULL: nothing is sealed. Of no effect
+     * for a private daemon. */
     const char *key_file;
     bool can_h264;       /* frames of views may come in H.264, for the caller to decode */
     int interrupt_fd;    /* > 0: calls give up with FL_ERROR_INTERRUPTED when it becomes readable */

@@ -231,7 +231,7 @@ static void on_key_failed(void *context)
 static void on_key_proved(void *context, size_t index)
 {
     struct session *session = context;
-    auth_identify_by_key(&session->identity, &session->hub->options.keys, index, &session->peer);
+    auth_identify_by_key(&session->identity, &session->hub->options.keys, index);
     session->principal = principal_of(session);
 }
 
