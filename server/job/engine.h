@@ -151,6 +151,7 @@ struct engine_scene_list {
 };
 struct engine_camera_entry {
     uint32_t node;
+    float fov_y; /* 0: orthographic */
     char name[SCENE_NAME_MAX + 1];
 };
 struct engine_clip_entry {
