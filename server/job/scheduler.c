@@ -46,15 +46,9 @@ static bool goes_before(const struct schedule_share *a, const struct schedule_sh
     return a->virtual_ns != b->virtual_ns ? a->virtual_ns < b->virtual_ns : a->turn < b->turn;
 }
 
-static bool keeps_turn(const struct scheduler *scheduler, const struct schedule_entry *entry)
-{
-    return entry->ready && entry->keeps_turn && scheduler->turns > 0 && entry->job->turn == scheduler->turns &&
-           scheduler->turn_ns < SCHEDULE_TURN_NS;
-}
-
 size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
 {
-    size_t best = SCHEDULE_NONE, kept = SCHEDULE_NONE;
+    size_t best = SCHEDULE_NONE, ready_clients = 0;
     scheduler->picks++;
     group_begin(&scheduler->clients);
     for (size_t i = 0; i < count; i++) {
@@ -72,10 +66,9 @@ size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *e
     for (size_t i = 0; i < count; i++) {
         const struct schedule_entry *entry = &entries[i];
         group_advance(&entry->client->jobs);
+        ready_clients += entry->client->share.ready && entry->client->share.ready_in != scheduler->picks;
         share_settle(&entry->client->share, scheduler, &scheduler->clients);
         share_settle(entry->job, scheduler, &entry->client->jobs);
-        if (keeps_turn(scheduler, entry))
-            kept = i;
         if (!entry->ready)
             continue;
         bool same = best != SCHEDULE_NONE && entries[best].client == entry->client;
@@ -83,9 +76,8 @@ size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *e
                                            : goes_before(&entry->client->share, &entries[best].client->share)))
             best = i;
     }
-    if (kept != SCHEDULE_NONE)
-        return kept;
     scheduler->turn_ns = 0;
+    scheduler->turn_end_ns = SCHEDULE_TURN_NS + ready_clients * SCHEDULE_TURN_EACH_NS;
     return best;
 }
 
@@ -95,13 +87,18 @@ static void charge(struct schedule_share *share, uint64_t virtual_ns, uint64_t t
     share->turn = turn;
 }
 
-void schedule_charge(struct scheduler *scheduler, const struct schedule_entry *entry, uint64_t slice_ns,
-                     uint32_t weight)
+void schedule_charge(struct scheduler *scheduler, struct schedule_client *client, struct schedule_share *job,
+                     uint64_t slice_ns, uint32_t weight)
 {
     /* What took no time that the clock shows counts a little all the same, or it would have every turn. */
     uint64_t virtual_ns = slice_ns / weight + 1;
     uint64_t turn = ++scheduler->turns;
     scheduler->turn_ns += slice_ns;
-    charge(&entry->client->share, virtual_ns, turn);
-    charge(entry->job, virtual_ns, turn);
+    charge(&client->share, virtual_ns, turn);
+    charge(job, virtual_ns, turn);
+}
+
+bool schedule_turn_lasts(const struct scheduler *scheduler)
+{
+    return scheduler->turn_ns < scheduler->turn_end_ns;
 }
