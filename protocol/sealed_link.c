@@ -112,7 +112,7 @@ enum sealed_result sealed_link_handshake(struct sealed_link *link, struct decode
         link->in_start += consumed_bytes;
         link->out_end += out_bytes;
     }
-    if (result == SEALED_CONSUMED && !widen(link)) {
+    if (result == SEALED_CONSUMED && link->in_capacity < OPEN_BYTES && !widen(link)) {
         decode_error_set(error, PROTOCOL_ERROR_CODE_OUT_OF_MEMORY, "", "no memory");
         return SEALED_FATAL;
     }

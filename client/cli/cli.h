@@ -28,6 +28,12 @@ int cli_compare_tracers(int argc, char **argv); /* where cli_compare finds --tra
 int cli_stats(int argc, char **argv);
 int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
+int cli_key(int argc, char **argv);
+
+/* ---- key.c ---- */
+
+/* The key file for a daemon: what --key says, else FARLIGHT_KEY where the address is one of TCP. NULL: none. */
+const char *cli_key_file(const char *server, const char *given);
 
 /* ---- talk.c: what people read ---- */
 
@@ -148,7 +154,7 @@ struct cli_channel {
 };
 
 struct cli_job {
-    const char *model, *server, *environment, *output, *camera, *keys_file, *trace_file;
+    const char *model, *server, *key_file, *environment, *output, *camera, *keys_file, *trace_file;
     enum cli_image image;
     struct cli_output outputs[CLI_OUTPUTS_MAX]; /* where the pictures go: `output`, or several of a script */
     size_t output_count;

@@ -4,7 +4,7 @@
 _farlight()
 {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]}
-    local job="--output --format --half --float --server --size --samples --depth --seed --environment --exposure
+    local job="--output --format --half --float --server --key --size --samples --depth --seed --environment --exposure
         --tone-map --camera --eye --look-at --up --fov --tracer --bvh-bounds --integrator --primary --encoding
         --quality --timings --timings=json --trace-file --quiet --help --filter --aperture --focus --shutter --clip
         --clip-once --clip-start --clip-speed --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels --ldc-images
@@ -13,7 +13,7 @@ _farlight()
     local words=
 
     if [ "$COMP_CWORD" -eq 1 ]; then
-        words="render animate info compare stats ping bridge help --version"
+        words="render animate info compare stats ping key bridge help --version"
     else
         case $before in
         --tracer) words="bvh naive reference ldc abuffer" ;;
@@ -46,14 +46,14 @@ _farlight()
                 --lossless" ;;
             info) words="--json --environment --help" ;;
             compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help
-                --tracers --far --server --size --samples --depth --seed --environment --exposure --camera --eye --look-at
+                --tracers --far --server --key --size --samples --depth --seed --environment --exposure --camera --eye --look-at
                 --up --fov --aperture --focus --shutter --filter --clip --clip-once --clip-start --clip-speed --time
                 --bvh-bounds --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels --ldc-images --ldc-block --ldc-rays
                 --abuffer-resolution --voxels --search --bounces --brdf --ao-distance --ao-falloff --ao-rays --layer-opacity
                 --integrator --encoding --quality --quiet" ;;
-            stats) words="--server --json --help" ;;
-            ping) words="--server --count --help" ;;
-            help) words="render animate info compare stats ping bridge" ;;
+            stats) words="--server --key --json --help" ;;
+            ping) words="--server --key --count --help" ;;
+            help) words="render animate info compare stats ping key bridge" ;;
             esac
             [[ $word == -* || $subcommand == help ]] || words=
             ;;

@@ -20,6 +20,8 @@ static const struct argp_option options[] = {
     {"float", KEY_FLOAT, NULL, 0, "EXR of 32-bit floats", 0},
     {"server", KEY_SERVER, "ADDRESS", 0,
      "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: a private daemon for this command)", 0},
+    {"key", KEY_KEY, "FILE", 0,
+     "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)", 0},
     {NULL, 0, NULL, 0, "Picture:", 1},
     {"size", KEY_SIZE, "WxH", 0, "Pixels (default 1280x720)", 0},
     {"samples", KEY_SAMPLES, "N", 0, "Samples per pixel (default 1; 16 for the integrator ao, 64 for path)", 0},
@@ -260,6 +262,9 @@ static error_t set_option(struct cli_job *job, int key, const char *field, const
     switch (key) {
     case KEY_SERVER:
         job->server = value;
+        return 0;
+    case KEY_KEY:
+        job->key_file = value;
         return 0;
     case KEY_OUTPUT:
         job->output = value;

@@ -10,6 +10,7 @@ enum job_key {
     KEY_OUTPUT = 'o',
     KEY_QUIET = 'q',
     KEY_TRACER = 0x100,
+    KEY_KEY,
     KEY_BVH_BOUNDS,
     KEY_INTEGRATOR,
     KEY_PRIMARY,

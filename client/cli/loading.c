@@ -45,8 +45,10 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
     loading->load.started = fl_import_start(&loading->load, error);
     if (loading->load.started == NULL)
         return false;
-    const struct fl_connect_options connect = {
-        .server = job->server, .name = "farlight", .interrupt_fd = cli_interrupt_fd()};
+    const struct fl_connect_options connect = {.server = job->server,
+                                               .key_file = cli_key_file(job->server, job->key_file),
+                                               .name = "farlight",
+                                               .interrupt_fd = cli_interrupt_fd()};
     loading->connect_begin_ns = now_ns();
     loading->connection = fl_connect(&connect, error);
     return loading->connection != NULL;

@@ -16,6 +16,7 @@ static const struct subcommand {
     {"compare", "farlight compare", cli_compare, "how far two images are apart, or two tracers"},
     {"stats", "farlight stats", cli_stats, "what a daemon has and does"},
     {"ping", "farlight ping", cli_ping, "the way to a daemon and back"},
+    {"key", "farlight key", cli_key, "a new key for sealed connections"},
     {"bridge", "farlight bridge", cli_bridge, "what ssh runs on the daemon's host"},
 };
 #define SUBCOMMAND_COUNT (sizeof subcommands / sizeof subcommands[0])

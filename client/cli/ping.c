@@ -7,14 +7,18 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#define KEY_KEY 0x400
+
 struct ping_options {
-    const char *server;
+    const char *server, *key_file;
     uint64_t count;
     struct cli_job job; /* holds the error of what was typed */
 };
 
 static const struct argp_option options[] = {
     {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
+    {"key", KEY_KEY, "FILE", 0,
+     "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)", 0},
     {"count", 'c', "N", 0, "How many times (default 5)", 0},
     {0}};
 
@@ -24,6 +28,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
     switch (key) {
     case 's':
         wanted->server = value;
+        return 0;
+    case KEY_KEY:
+        wanted->key_file = value;
         return 0;
     case 'c':
         if (fl_text_integer(value, 1, 1000000, &wanted->count, &wanted->job.error))
@@ -66,10 +73,12 @@ int cli_ping(int argc, char **argv)
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    struct fl_connection *connection = fl_connect(&(struct fl_connect_options){.server = wanted.server,
-                                                                               .name = "farlight ping",
-                                                                               .interrupt_fd = cli_interrupt_fd()},
-                                                  &error);
+    struct fl_connection *connection =
+        fl_connect(&(struct fl_connect_options){.server = wanted.server,
+                                                .key_file = cli_key_file(wanted.server, wanted.key_file),
+                                                .name = "farlight ping",
+                                                .interrupt_fd = cli_interrupt_fd()},
+                   &error);
     const bool done = connection != NULL && ping(connection, &wanted, &error);
     fl_connection_destroy(connection);
     return done ? CLI_DONE : cli_report(&error);

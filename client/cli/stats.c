@@ -7,15 +7,18 @@
 #include <stdlib.h>
 
 #define KEY_JSON 0x400
+#define KEY_KEY 0x401
 
 struct stats_options {
-    const char *server;
+    const char *server, *key_file;
     bool json;
     struct cli_job job; /* holds the error of what was typed */
 };
 
 static const struct argp_option options[] = {
     {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
+    {"key", KEY_KEY, "FILE", 0,
+     "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)", 0},
     {"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0},
     {0}};
 
@@ -25,6 +28,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
     switch (key) {
     case 's':
         wanted->server = value;
+        return 0;
+    case KEY_KEY:
+        wanted->key_file = value;
         return 0;
     case KEY_JSON:
         wanted->json = true;
@@ -194,10 +200,12 @@ int cli_stats(int argc, char **argv)
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
-    struct fl_connection *connection = fl_connect(&(struct fl_connect_options){.server = wanted.server,
-                                                                               .name = "farlight stats",
-                                                                               .interrupt_fd = cli_interrupt_fd()},
-                                                  &error);
+    struct fl_connection *connection =
+        fl_connect(&(struct fl_connect_options){.server = wanted.server,
+                                                .key_file = cli_key_file(wanted.server, wanted.key_file),
+                                                .name = "farlight stats",
+                                                .interrupt_fd = cli_interrupt_fd()},
+                   &error);
     const struct message_stats_reply *reply = NULL;
     const bool done = connection != NULL && fl_stats(connection, &reply, &error);
     if (done && wanted.json)

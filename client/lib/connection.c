@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/connection.h"
 
+#include "protocol/sealed_key.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -58,8 +60,12 @@ uint32_t fl_connection_next_request(struct fl_connection *connection)
 /* The peer has ended its side without a goodbye. */
 static bool fail_ended(struct fl_connection *connection, struct fl_error *error)
 {
-    fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon closed the connection%s",
-                 fl_stream_has_remains(&connection->stream) ? " in the middle of a message" : "");
+    const char *how = "";
+    if (fl_stream_has_remains(&connection->stream))
+        how = " in the middle of a message";
+    else if (!fl_stream_is_whole(&connection->stream))
+        how = ", or somebody on the way cut it: its sealed end is missing";
+    fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon closed the connection%s", how);
     return fl_connection_break(connection, error);
 }
 
@@ -119,6 +125,9 @@ int fl_connection_consume(struct fl_connection *connection, const struct framing
             connection->upload_credit = message->credit.total;
         return 1;
     case MESSAGE_BLOCKED:
+        return 1;
+    case MESSAGE_SCENE_CHANGED:
+        fl_scenes_changed(connection, &message->scene_changed);
         return 1;
     case MESSAGE_GOODBYE:
         fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon ended the connection: %s",
@@ -203,6 +212,29 @@ bool fl_connection_answer(struct fl_connection *connection, uint32_t request, en
 
 /* ---- beginning and end ---- */
 
+static bool tell_key_needed(const struct fl_connection *connection, struct fl_error *error)
+{
+    fl_error_set(error, FL_ERROR_REFUSED, connection->address, "the daemon lets only those in who have its key");
+    error->server_code = PROTOCOL_ERROR_CODE_DENIED;
+    return fl_error_remedy(error, "--key or FARLIGHT_KEY names the file with a copy of it");
+}
+
+/* What is said from now on is sealed with the key of the file. */
+static bool seal(struct fl_connection *connection, const char *key_file, struct fl_error *error)
+{
+    struct sealed_key key;
+    struct decode_error why = {0};
+    if (!sealed_key_read(&key, key_file, &why)) {
+        fl_error_set(error, FL_ERROR_FILE, key_file, "%s", why.text);
+        return fl_error_remedy(error, why.code == PROTOCOL_ERROR_CODE_DENIED
+                                          ? "a key is for its owner alone"
+                                          : "a key file has 32 bytes; 'farlight key FILE' makes one");
+    }
+    const bool sealed = fl_stream_seal(&connection->stream, &key, error);
+    sealed_key_wipe(&key);
+    return sealed;
+}
+
 static bool shake_hands(struct fl_connection *connection, const char *name, uint64_t deadline_ns,
                         struct fl_error *error)
 {
@@ -220,6 +252,9 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
             if (error->code == FL_ERROR_TIMEOUT)
                 fl_error_set(error, FL_ERROR_TIMEOUT, connection->address,
                              "the daemon does not answer the handshake");
+            else if (error->code == FL_ERROR_REFUSED || error->code == FL_ERROR_PROTOCOL)
+                snprintf(error->field, sizeof error->field, "%.*s", (int)sizeof error->field - 1,
+                         connection->address);
             return false;
         }
         struct handshake_reply reply;
@@ -232,9 +267,12 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
                                 "no farlight daemon answers there: %s", why.text);
         if (result == HANDSHAKE_CONSUMED) {
             stream->in_start += consumed;
+            if (reply.version == 0 && (reply.capabilities & HANDSHAKE_NEEDS_KEY) != 0)
+                return tell_key_needed(connection, error);
             if (!handshake_reply_accept(&hello, &reply, &why))
                 return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "%s", why.text);
             connection->limits = reply.limits;
+            connection->read_only = (reply.capabilities & HANDSHAKE_CAN_READ_ONLY) != 0;
             connection->can_h264 = connection->can_h264 && (reply.capabilities & HANDSHAKE_CAN_H264) != 0;
             return true;
         }
@@ -280,7 +318,8 @@ static bool open_stream(struct fl_connection *connection, const struct fl_connec
         if (fd < 0)
             return false;
     }
-    return fl_stream_init(&connection->stream, fd, MESSAGE_FROM_SERVER, "the daemon", error);
+    return fl_stream_init(&connection->stream, fd, MESSAGE_FROM_SERVER, "the daemon", error) &&
+           (options->server == NULL || options->key_file == NULL || seal(connection, options->key_file, error));
 }
 
 struct fl_connection *fl_connect(const struct fl_connect_options *options, struct fl_error *error)
@@ -320,6 +359,7 @@ void fl_connection_destroy(struct fl_connection *connection)
         struct message goodbye = {.type = MESSAGE_GOODBYE};
         goodbye.goodbye.text = "";
         struct fl_error ignored;
+        connection->stream.is_last = true;
         fl_connection_send(connection, 0, 0, &goodbye, &ignored);
     }
     fl_stream_finish(&connection->stream);
@@ -350,6 +390,11 @@ bool fl_connection_can_h264(const struct fl_connection *connection)
 int fl_connection_fd(const struct fl_connection *connection)
 {
     return connection->stream.fd;
+}
+
+bool fl_connection_is_read_only(const struct fl_connection *connection)
+{
+    return connection->read_only;
 }
 
 const char *fl_connection_address(const struct fl_connection *connection)

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/stream.h"
 
+#include "protocol/sealed_link.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -36,10 +38,22 @@ bool fl_stream_init(struct fl_stream *stream, int fd, uint32_t accept, const cha
     return true;
 }
 
+bool fl_stream_seal(struct fl_stream *stream, const struct sealed_key *key, struct fl_error *error)
+{
+    stream->link = sealed_link_client(key);
+    return stream->link != NULL || fl_error_set(error, FL_ERROR_MEMORY, "", "no memory, or no random numbers");
+}
+
+bool fl_stream_is_whole(const struct fl_stream *stream)
+{
+    return stream->link == NULL || sealed_has_opened_last(stream->link->sealed);
+}
+
 void fl_stream_finish(struct fl_stream *stream)
 {
     if (stream->fd >= 0)
         close(stream->fd);
+    sealed_link_destroy(stream->link);
     free(stream->in);
     free(stream->out);
     free(stream->scratch_data);
@@ -92,13 +106,18 @@ void fl_stream_push_payload(struct fl_stream *stream, const struct framing_heade
 
 static bool has_space_to_read(const struct fl_stream *stream)
 {
+    if (stream->link != NULL)
+        return stream->link->in_capacity - sealed_link_unopened(stream->link) > 0;
     return stream->in_end - stream->in_start < FL_STREAM_BUFFER_BYTES;
 }
 
 short fl_stream_events(const struct fl_stream *stream)
 {
     int events = 0;
-    if (fl_stream_has_output(stream))
+    size_t waiting_bytes = 0;
+    if (stream->link != NULL)
+        sealed_link_waiting(stream->link, &waiting_bytes);
+    if (waiting_bytes > 0 || (fl_stream_has_output(stream) && stream->link == NULL))
         events |= POLLOUT;
     if (!stream->ended && has_space_to_read(stream))
         events |= POLLIN;
@@ -111,25 +130,110 @@ static bool lost(const struct fl_stream *stream, int number, struct fl_error *er
                         strerror(number));
 }
 
+/* What goes to the descriptor next; NULL: nothing. */
+static const uint8_t *next_bytes(struct fl_stream *stream, size_t *bytes)
+{
+    *bytes = stream->out_end - stream->out_start;
+    if (stream->link == NULL)
+        return *bytes > 0 ? stream->out + stream->out_start : NULL;
+    stream->out_start += sealed_link_seal(stream->link, stream->out + stream->out_start, *bytes);
+    if (stream->is_last && !fl_stream_has_output(stream))
+        sealed_link_seal_last(stream->link);
+    return sealed_link_waiting(stream->link, bytes);
+}
+
+static void advance(struct fl_stream *stream, size_t bytes)
+{
+    if (stream->link != NULL)
+        sealed_link_sent(stream->link, bytes);
+    else
+        stream->out_start += bytes;
+}
+
+static void drop_output(struct fl_stream *stream)
+{
+    size_t bytes = 0;
+    stream->out_start = stream->out_end = 0;
+    if (stream->link != NULL && sealed_link_waiting(stream->link, &bytes) != NULL)
+        sealed_link_sent(stream->link, bytes);
+}
+
 bool fl_stream_write(struct fl_stream *stream, struct fl_error *error)
 {
-    while (fl_stream_has_output(stream)) {
-        const ssize_t sent =
-            send(stream->fd, stream->out + stream->out_start, stream->out_end - stream->out_start, MSG_NOSIGNAL);
+    const uint8_t *next;
+    size_t bytes;
+    while ((next = next_bytes(stream, &bytes)) != NULL) {
+        const ssize_t sent = send(stream->fd, next, bytes, MSG_NOSIGNAL);
         if (sent >= 0) {
-            stream->out_start += (size_t)sent;
+            advance(stream, (size_t)sent);
         } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
             return true;
         } else if (errno == EPIPE || errno == ECONNRESET) {
             /* Its last words may still lie in our receive buffer: they are read before the loss is reported. */
-            stream->out_start = stream->out_end = 0;
+            drop_output(stream);
             return true;
         } else if (errno != EINTR) {
             return lost(stream, errno, error);
         }
     }
-    stream->out_start = stream->out_end = 0;
+    if (!fl_stream_has_output(stream))
+        stream->out_start = stream->out_end = 0;
     return true;
+}
+
+static bool tell_refusal(enum sealed_status status, struct fl_error *error)
+{
+    fl_error_set(error, FL_ERROR_REFUSED, "", "%s", sealed_status_text(status));
+    if (status == SEALED_WRONG_KEY)
+        fl_error_remedy(error, "--key or FARLIGHT_KEY names the file with a copy of the daemon's key");
+    else if (status == SEALED_NO_KEY)
+        fl_error_remedy(error, "leave --key and FARLIGHT_KEY out, or start it with --key-file");
+    else if (status == SEALED_TOO_MANY)
+        fl_error_remedy(error, "try again in a minute");
+    if (error != NULL) {
+        error->server_code = PROTOCOL_ERROR_CODE_DENIED;
+        error->retryable = status == SEALED_TOO_MANY;
+        error->retry_after_ms = status == SEALED_TOO_MANY ? 60000 : 0;
+    }
+    return false;
+}
+
+static bool tell_broken_seal(const struct fl_stream *stream, const struct decode_error *why,
+                             struct fl_error *error)
+{
+    if (why->code == PROTOCOL_ERROR_CODE_OUT_OF_MEMORY)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    return fl_error_set(error, FL_ERROR_PROTOCOL, "", "what came is not what %s has sealed: %s: %s", stream->peer,
+                        why->field, why->text);
+}
+
+/* What the link has goes to the buffer of messages as far as there is room. */
+static bool open_records(struct fl_stream *stream, struct fl_error *error)
+{
+    struct decode_error why = {0};
+    enum sealed_result result = sealed_link_handshake(stream->link, &why);
+    while (result == SEALED_CONSUMED) {
+        size_t bytes = 0;
+        result = sealed_link_open(stream->link, stream->in + stream->in_end,
+                                  FL_STREAM_BUFFER_BYTES - stream->in_end, &bytes, &why);
+        stream->in_end += bytes;
+        if (sealed_has_opened_last(stream->link->sealed))
+            return true;
+    }
+    if (result == SEALED_REFUSED)
+        return tell_refusal(sealed_status(stream->link->sealed), error);
+    return result != SEALED_FATAL || tell_broken_seal(stream, &why, error);
+}
+
+/* Bytes that came to where they were to come. */
+static bool take(struct fl_stream *stream, size_t bytes, struct fl_error *error)
+{
+    if (stream->link == NULL) {
+        stream->in_end += bytes;
+        return true;
+    }
+    sealed_link_came(stream->link, bytes);
+    return open_records(stream, error);
 }
 
 bool fl_stream_transfer(struct fl_stream *stream, struct fl_error *error)
@@ -138,11 +242,15 @@ bool fl_stream_transfer(struct fl_stream *stream, struct fl_error *error)
         return false;
     compact(stream->in, &stream->in_start, &stream->in_end);
     while (!stream->ended && has_space_to_read(stream)) {
-        const ssize_t got =
-            recv(stream->fd, stream->in + stream->in_end, FL_STREAM_BUFFER_BYTES - stream->in_end, 0);
+        size_t bytes = FL_STREAM_BUFFER_BYTES - stream->in_end;
+        uint8_t *space =
+            stream->link != NULL ? sealed_link_space(stream->link, &bytes) : stream->in + stream->in_end;
+        const ssize_t got = recv(stream->fd, space, bytes, 0);
+        if (got > 0 && !take(stream, (size_t)got, error))
+            return false;
         if (got > 0)
-            stream->in_end += (size_t)got;
-        else if (got == 0 || errno == ECONNRESET)
+            continue;
+        if (got == 0 || errno == ECONNRESET)
             stream->ended = true;
         else if (errno == EAGAIN || errno == EWOULDBLOCK)
             return true;
@@ -174,6 +282,13 @@ enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *fra
                                                          stream->in_end - stream->in_start, stream->accept, &why);
         if (result == FRAMING_FATAL)
             return broken(stream, &why, error);
+        if (result == FRAMING_NEED_MORE && stream->link != NULL && sealed_link_has_record(stream->link)) {
+            /* It had no room before; the descriptor will not speak of it again. */
+            compact(stream->in, &stream->in_start, &stream->in_end);
+            if (!open_records(stream, error))
+                return FL_STREAM_ERROR;
+            continue;
+        }
         if (result == FRAMING_NEED_MORE)
             return FL_STREAM_NOTHING;
         stream->in_start += frame->consumed_bytes;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Messages over one non-blocking descriptor: a bounded buffer in each direction and nothing else. Used towards
- * the daemon and towards helper programs. One thread. */
+/* Messages over one non-blocking descriptor: a bounded buffer in each direction, sealed or not, and nothing else.
+ * Used towards the daemon and towards helper programs. One thread. */
 #ifndef FARLIGHT_CLIENT_LIB_STREAM_H
 #define FARLIGHT_CLIENT_LIB_STREAM_H
 
@@ -8,6 +8,9 @@
 #include "protocol/framing.h"
 
 #include <poll.h>
+
+struct sealed_key;
+struct sealed_link;
 
 /* Two of the greatest messages: one can be completed while the other is looked at. */
 #define FL_STREAM_BUFFER_BYTES (2u * FRAMING_MESSAGE_MAX_BYTES)
@@ -20,11 +23,18 @@ struct fl_stream {
     uint8_t *in, *out, *scratch_data; /* FL_STREAM_BUFFER_BYTES, the same, SCRATCH_BYTES */
     size_t in_start, in_end, out_start, out_end;
     struct scratch scratch;
+    struct sealed_link *link; /* between these buffers and the descriptor; NULL: the connection is not sealed */
+    bool is_last;             /* nothing is pushed any more: once all is sealed, so is the end */
 };
 
 /* Takes the descriptor over (also on failure) and makes it non-blocking. */
 bool fl_stream_init(struct fl_stream *stream, int fd, uint32_t accept, const char *peer, struct fl_error *error);
 void fl_stream_finish(struct fl_stream *stream);
+/* Before anything else is sent: it goes through a sealed connection, which fl_stream_transfer() begins. */
+bool fl_stream_seal(struct fl_stream *stream, const struct sealed_key *key, struct fl_error *error);
+/* It has come from somebody who has the key that its end is here, and nothing is missing. True where nothing is
+ * sealed. */
+bool fl_stream_is_whole(const struct fl_stream *stream);
 
 /* Whether any message fits behind what waits to be written. */
 bool fl_stream_has_room(const struct fl_stream *stream);

@@ -60,14 +60,12 @@ bool auth_identify(struct auth_identity *identity, int fd, const struct address 
     return error_set(error, ERROR_DENIED, "peer", "%s is not on this host", text);
 }
 
-void auth_identify_by_key(struct auth_identity *identity, const struct auth_keys *keys, size_t index,
-                          const struct address *peer)
+void auth_identify_by_key(struct auth_identity *identity, const struct auth_keys *keys, size_t index)
 {
-    char text[ADDRESS_TEXT_BYTES];
-    address_print(peer, text);
+    const struct auth_identity before = *identity;
     identity->known = identity->has_key = true;
     identity->key = sealed_key_number(&keys->keys[index]);
     identity->read_only = keys->read_only[index];
     snprintf(identity->name, sizeof identity->name, "%s, %.33s", identity->read_only ? "reader's key" : "key",
-             text);
+             before.name);
 }

@@ -37,8 +37,7 @@ bool auth_read_keys(struct auth_keys *keys, const char *key_file, const char *re
 bool auth_identify(struct auth_identity *identity, int fd, const struct address *peer, bool beyond_loopback,
                    struct error *error);
 /* The client has proved that it has the key of that index: this is who it is, from now on. */
-void auth_identify_by_key(struct auth_identity *identity, const struct auth_keys *keys, size_t index,
-                          const struct address *peer);
+void auth_identify_by_key(struct auth_identity *identity, const struct auth_keys *keys, size_t index);
 /* Whether a connection between the two, the daemon's own address first, runs beyond this host or could. */
 bool auth_is_beyond_loopback(const struct address *own, const struct address *peer);
 

@@ -275,6 +275,12 @@ static bool may_read(const struct connection *connection)
     return false;
 }
 
+/* Records that came while nothing was to be read: the socket does not speak of them again. */
+static bool has_waiting_records(const struct connection *connection)
+{
+    return connection->link && may_read(connection) && sealed_link_has_record(connection->link);
+}
+
 static void process(struct connection *connection)
 {
     do {
@@ -291,6 +297,8 @@ static void process(struct connection *connection)
 static void receive(struct connection *connection)
 {
     size_t received_bytes = 0;
+    if (has_waiting_records(connection))
+        process(connection); /* they make room */
     while (may_read(connection) && received_bytes < BYTES_A_TURN) {
         size_t free_bytes = connection->in_capacity - connection->in_used;
         uint8_t *space = connection->in + connection->in_used;
@@ -304,7 +312,10 @@ static void receive(struct connection *connection)
             return;
         }
         received_bytes += (size_t)got;
-        connection->in_used += (size_t)got;
+        if (connection->link)
+            sealed_link_came(connection->link, (size_t)got);
+        else
+            connection->in_used += (size_t)got;
         connection->received_bytes += (uint64_t)got;
         connection->last_received_ns = clock_now_ns();
         process(connection);
@@ -338,12 +349,6 @@ static void linger(struct connection *connection)
 static bool has_flushed(const struct connection *connection)
 {
     return !connection->out.queued_bytes && (!connection->link || sealing_is_done(connection));
-}
-
-/* Records that came while nothing was to be read: the socket does not speak of them again. */
-static bool has_waiting_records(const struct connection *connection)
-{
-    return connection->link && may_read(connection) && sealed_link_has_record(connection->link);
 }
 
 /* After everything that happened to the connection in this turn: send, say what to wait for, or release it. */

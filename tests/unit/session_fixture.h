@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* A daemon on a thread of its own, whose engine the including test stands in for, and a client of it here. Tests
- * run twice: with the system calls as they are, and with each of them cut short and interrupted. */
+ * run with the system calls as they are and with each of them cut short and interrupted, open and sealed. */
 #ifndef FARLIGHT_TESTS_SESSION_FIXTURE_H
 #define FARLIGHT_TESTS_SESSION_FIXTURE_H
 
 #include "base/sys.h"
+#include "protocol/sealed_link.h"
 #include "session/daemon.h"
 
 #include <errno.h>
@@ -63,6 +64,7 @@ static inline int interrupted_wait(int fd, struct epoll_event *events, int max_e
 
 struct client {
     int fd;
+    struct sealed_link *link; /* NULL: it is not sealed */
     uint8_t in[2 * FRAMING_MESSAGE_MAX_BYTES];
     size_t in_used, consumed;
     uint8_t scratch_data[SCRATCH_BYTES];
@@ -86,28 +88,96 @@ static inline void *run(void *context)
     return NULL;
 }
 
+static const struct sealed_key session_key = {.bytes = "whoever knows this may come in!"},
+                               session_reader_key = {.bytes = "whoever knows this may look on!"};
+
+/* Opens what has come; how many bytes of plain text that was. */
+static inline size_t open_records(void)
+{
+    struct decode_error error = {0};
+    size_t before = client.in_used;
+    enum sealed_result result = sealed_link_handshake(client.link, &error);
+    while (result == SEALED_CONSUMED && !sealed_has_opened_last(client.link->sealed)) {
+        size_t bytes = 0;
+        result = sealed_link_open(client.link, client.in + client.in_used, sizeof client.in - client.in_used,
+                                  &bytes, &error);
+        client.in_used += bytes;
+    }
+    if (result == SEALED_FATAL || result == SEALED_REFUSED)
+        fail_msg("%s: %s", error.field, error.text);
+    return client.in_used - before;
+}
+
+/* False: the daemon has closed the connection. */
+static inline bool receive_sealed(void)
+{
+    size_t free_bytes;
+    uint8_t *space = sealed_link_space(client.link, &free_bytes);
+    ssize_t got = recv(client.fd, space, free_bytes, 0);
+    sealed_link_came(client.link, got > 0 ? (size_t)got : 0);
+    return got > 0;
+}
+
 static inline void receive_some(void)
 {
     memmove(client.in, client.in + client.consumed, client.in_used - client.consumed);
     client.in_used -= client.consumed;
     client.consumed = 0;
+    if (client.link && open_records())
+        return;
     struct pollfd fd = {.fd = client.fd, .events = POLLIN};
     if (poll(&fd, 1, 20000) != 1)
         fail_msg("nothing came for 20 s");
+    if (client.link) {
+        if (!receive_sealed())
+            fail_msg("the connection is closed");
+        open_records();
+        return;
+    }
     ssize_t got = recv(client.fd, client.in + client.in_used, sizeof client.in - client.in_used, 0);
     if (got <= 0)
         fail_msg("the connection is closed");
     client.in_used += (size_t)got;
 }
 
-static inline void send_bytes(const void *data, size_t bytes)
+static inline void send_plainly(const uint8_t *next, size_t bytes)
 {
-    const uint8_t *next = data;
     while (bytes) {
         ssize_t sent = send(client.fd, next, bytes, MSG_NOSIGNAL);
         assert_true(sent > 0);
         next += sent;
         bytes -= (size_t)sent;
+    }
+}
+
+/* What waits in the link. */
+static inline void send_sealed(void)
+{
+    size_t bytes;
+    const uint8_t *waiting = sealed_link_waiting(client.link, &bytes);
+    send_plainly(waiting, bytes);
+    sealed_link_sent(client.link, bytes);
+}
+
+static inline void send_bytes(const void *data, size_t bytes)
+{
+    const uint8_t *next = data;
+    if (!client.link)
+        send_plainly(next, bytes);
+    for (size_t taken; client.link && bytes; next += taken, bytes -= taken) {
+        taken = sealed_link_seal(client.link, next, bytes);
+        send_sealed();
+    }
+}
+
+/* Until both have proved that they have the key. */
+static inline void seal_with(const struct sealed_key *key)
+{
+    client.link = sealed_link_client(key);
+    assert_non_null(client.link);
+    while (!sealed_is_open(client.link->sealed)) {
+        send_sealed();
+        receive_some();
     }
 }
 
@@ -169,6 +239,9 @@ static inline void expect_end(void)
 {
     struct pollfd fd = {.fd = client.fd, .events = POLLIN};
     assert_int_equal(client.in_used, client.consumed);
+    while (client.link && receive_sealed())
+        assert_int_equal(open_records(), 0);
+    assert_true(!client.link || sealed_has_opened_last(client.link->sealed));
     assert_int_equal(poll(&fd, 1, 20000), 1);
     assert_int_equal(recv(client.fd, client.in, 1, 0), 0);
 }
@@ -231,6 +304,7 @@ static inline void start(const struct connection_limits *connection_limits)
                    .frame_window_bytes = 64 << 20},
         .connection_limits = *connection_limits,
         .engine = engine_begin(),
+        .keys = {.keys = {session_key, session_reader_key}, .read_only = {false, true}, .count = 2},
     };
     struct error error = {0};
     int pair[2];
@@ -274,9 +348,33 @@ static inline int set_up_with_faults(void **state)
     return 0;
 }
 
+static inline int set_up_sealed(void **state)
+{
+    (void)state;
+    real = sys;
+    start(&patient);
+    seal_with(&session_key);
+    greet();
+    return 0;
+}
+
+static inline int set_up_sealed_with_faults(void **state)
+{
+    (void)state;
+    real = sys;
+    sys.read = short_read;
+    sys.sendmsg = short_sendmsg;
+    sys.epoll_wait = interrupted_wait;
+    start(&patient);
+    seal_with(&session_key);
+    greet();
+    return 0;
+}
+
 static inline int tear_down(void **state)
 {
     (void)state;
+    sealed_link_destroy(client.link);
     close(client.fd);
     pthread_join(thread, NULL);
     daemon_finish(&served);

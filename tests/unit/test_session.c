@@ -6,6 +6,7 @@
 #include "base/queue.h"
 #include "session/dispatch.h"
 #include "session/frames.h"
+#include "session/session.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -288,7 +289,8 @@ static void a_ping_is_answered_and_stats_are_told(void **state)
     send_message(8, 0, &message);
     expect(MESSAGE_STATS_REPLY, 8);
     assert_int_equal(client.message.stats_reply.clients_count, 1);
-    assert_non_null(strstr(client.message.stats_reply.clients[0].name, "test (user "));
+    assert_non_null(
+        strstr(client.message.stats_reply.clients[0].name, client.link ? "test (key, user " : "test (user "));
     assert_string_equal(client.message.stats_reply.device, "none");
 }
 
@@ -1017,6 +1019,26 @@ static void a_full_engine_makes_clients_wait_and_loses_nothing(void **state)
     expect_alive(3);
 }
 
+/* More than one may have come already when nothing more is to be read. */
+static void messages_that_come_while_the_engine_is_full_are_answered_later(void **state)
+{
+    (void)state;
+    enum { PINGS = 100 };
+    atomic_store(&engine.full, true);
+    struct message message = made(MESSAGE_SCENE_OPEN);
+    message.scene_open.scene = 1;
+    send_message(1, 0, &message);
+    usleep(20000);
+    message = made(MESSAGE_PING);
+    for (uint32_t request = 2; request < 2 + PINGS; request++)
+        send_message(request, 0, &message);
+    usleep(20000);
+    atomic_store(&engine.full, false);
+    expect(MESSAGE_OK, 1);
+    for (uint32_t request = 2; request < 2 + PINGS; request++)
+        expect(MESSAGE_PONG, request);
+}
+
 static void rubbish_is_told_so_and_the_connection_closed(void **state)
 {
     (void)state;
@@ -1211,11 +1233,110 @@ static void who_does_not_read_is_closed(void **state)
     assert_int_equal(atomic_load(&engine.gone), 1);
 }
 
+/* ---- keys ---------------------------------------------------------------------------------------------- */
+
+static void who_is_sealed_but_does_not_introduce_himself_is_closed(void **state)
+{
+    (void)state;
+    struct connection_limits limits = patient;
+    limits.handshake_ms = 200;
+    start(&limits);
+    seal_with(&session_key);
+    expect_closed_within_5_s();
+}
+
+static void who_does_not_finish_a_record_is_closed(void **state)
+{
+    (void)state;
+    struct connection_limits limits = patient;
+    limits.progress_grace_ms = 50;
+    limits.progress_bytes_per_s = 1000000;
+    start(&limits);
+    seal_with(&session_key);
+    greet();
+    const uint8_t length_and_a_byte[5] = {200};
+    send_plainly(length_and_a_byte, sizeof length_and_a_byte);
+    expect_closed_within_5_s();
+}
+
+static void a_record_that_was_changed_is_told_so_and_the_connection_closed(void **state)
+{
+    (void)state;
+    start(&patient);
+    seal_with(&session_key);
+    greet();
+    uint8_t record[21] = {17};
+    send_plainly(record, sizeof record);
+    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    assert_string_equal(client.message.error.field, "record");
+    expect(MESSAGE_GOODBYE, 0);
+    expect_end();
+}
+
+/* The only session; the daemon's thread sleeps. */
+static const struct session *only_session(void)
+{
+    size_t cursor = 0;
+    void *session = NULL;
+    assert_true(hashmap_next(&served.hub.sessions, &cursor, NULL, &session));
+    return session;
+}
+
+static void a_key_says_who_it_is_and_what_he_may_do(void **state)
+{
+    (void)state;
+    static const struct sealed_key *const keys[] = {&session_key, &session_reader_key, NULL};
+    blob_principal principals[3];
+    for (size_t i = 0; i < 3; i++) {
+        start(&patient);
+        if (keys[i])
+            seal_with(keys[i]);
+        greet();
+        expect_alive(1);
+        const struct session *session = only_session();
+        principals[i] = session->principal;
+        assert_true(session->identity.known);
+        assert_int_equal(session->identity.has_key, keys[i] != NULL);
+        assert_int_equal(session->identity.read_only, keys[i] == &session_reader_key);
+        if (i < 2)
+            tear_down(NULL);
+    }
+    assert_int_not_equal(principals[0], principals[1]);
+    assert_int_equal(principals[2], getuid());
+    assert_true(principals[0] > UINT32_MAX && principals[1] > UINT32_MAX);
+}
+
+static void a_wrong_key_is_answered_after_a_while(void **state)
+{
+    (void)state;
+    static const struct sealed_key wrong = {.bytes = "nobody knows this one"};
+    struct connection_limits limits = patient;
+    limits.wrong_key_ms = 300;
+    start(&limits);
+    uint64_t before_ns = clock_now_ns();
+    struct decode_error error = {0};
+    enum sealed_result result;
+    client.link = sealed_link_client(&wrong);
+    while ((result = sealed_link_handshake(client.link, &error)) == SEALED_NEED_MORE) {
+        struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+        send_sealed();
+        assert_int_equal(poll(&fd, 1, 20000), 1);
+        assert_true(receive_sealed());
+    }
+    assert_in_range((clock_now_ns() - before_ns) / 1000000, 300, 5000);
+    assert_int_equal(result, SEALED_REFUSED);
+    assert_int_equal(sealed_status(client.link->sealed), SEALED_WRONG_KEY);
+    assert_false(receive_sealed());
+}
+
+/* Open and sealed, and both with whole calls and with calls that are cut short. */
+/* clang-format off */
 #define BOTH(test)                                                                                                \
     cmocka_unit_test_setup_teardown(test, set_up, tear_down),                                                     \
-    {                                                                                                             \
-#test " (calls cut short)", test, set_up_with_faults, tear_down, NULL                                     \
-    }
+    {#test " (calls cut short)", test, set_up_with_faults, tear_down, NULL},                                      \
+    {#test " (sealed)", test, set_up_sealed, tear_down, NULL},                                                    \
+    {#test " (sealed, calls cut short)", test, set_up_sealed_with_faults, tear_down, NULL}
+/* clang-format on */
 
 int main(void)
 {
@@ -1249,6 +1370,7 @@ int main(void)
         BOTH(cubes_of_a_frame_are_told),
         BOTH(a_job_whose_frames_have_no_room_waits_for_others_to_end),
         BOTH(a_full_engine_makes_clients_wait_and_loses_nothing),
+        BOTH(messages_that_come_while_the_engine_is_full_are_answered_later),
         BOTH(rubbish_is_told_so_and_the_connection_closed),
         BOTH(a_request_number_in_flight_cannot_be_used_again),
         BOTH(the_65th_request_in_flight_is_refused_and_can_be_retried),
@@ -1261,6 +1383,13 @@ int main(void)
                                         real_calls, tear_down),
         cmocka_unit_test_setup_teardown(who_is_silent_is_closed_but_not_while_he_waits, real_calls, tear_down),
         cmocka_unit_test_setup_teardown(who_does_not_read_is_closed, real_calls, tear_down),
+        cmocka_unit_test_setup_teardown(who_is_sealed_but_does_not_introduce_himself_is_closed, real_calls,
+                                        tear_down),
+        cmocka_unit_test_setup_teardown(who_does_not_finish_a_record_is_closed, real_calls, tear_down),
+        cmocka_unit_test_setup_teardown(a_record_that_was_changed_is_told_so_and_the_connection_closed, real_calls,
+                                        tear_down),
+        cmocka_unit_test_setup_teardown(a_key_says_who_it_is_and_what_he_may_do, real_calls, tear_down),
+        cmocka_unit_test_setup_teardown(a_wrong_key_is_answered_after_a_while, real_calls, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: MIT */
+/* Keys of sealed connections. */
+#include "cli/cli.h"
+
+#include "protocol/sealed_key.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *cli_key_file(const char *server, const char *given)
+{
+    const char *usual = getenv("FARLIGHT_KEY");
+    const bool is_tcp = server != NULL && strncmp(server, "tcp:", 4) == 0;
+    return given == NULL && is_tcp && usual != NULL && usual[0] != '\0' ? usual : given;
+}
+
+struct key_options {
+    const char *path;
+    struct cli_job job; /* holds the error of what was typed */
+};
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct key_options *wanted = state->input;
+    if (key != ARGP_KEY_ARG)
+        return ARGP_ERR_UNKNOWN;
+    if (wanted->path != NULL)
+        return cli_usage(&wanted->job, value, "only one file at a time");
+    wanted->path = value;
+    return 0;
+}
+
+int cli_key(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .parser = parse,
+        .args_doc = "FILE",
+        .doc = "Make a new key: 32 random bytes in a new file of mode 0600. A daemon that has it (farlightd "
+               "--key-file) "
+               "lets those in who have a copy (--key), from everywhere; what they say is sealed with it."};
+    struct key_options wanted = {0};
+    if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
+        return cli_report(&wanted.job.error);
+    if (wanted.path == NULL) {
+        cli_usage(&wanted.job, "FILE", "no file is named");
+        return cli_report(&wanted.job.error);
+    }
+    struct decode_error why = {0};
+    struct fl_error error = {0};
+    if (sealed_key_create(wanted.path, &why))
+        return CLI_DONE;
+    fl_error_set(&error, FL_ERROR_FILE, wanted.path, "%s", why.text);
+    return cli_report(&error);
+}
