@@ -35,6 +35,9 @@ struct option {
 static const struct option options[] = {
     {"server", "listen", OPTION_TEXT, AT(listen), "unix:/run/farlight/farlight.sock", 0, 0, "",
      "Addresses to listen at, separated by blanks: unix:/PATH, tcp:HOST:PORT"},
+    {"server", "readers", OPTION_TEXT, AT(readers), "", 0, 0, "",
+     "Users who may only look, over the Unix socket: names or numbers, separated by blanks. They attach to shared "
+     "scenes and render them, and change nothing"},
     {"server", "insecure", OPTION_BOOL, AT(insecure), "no", 0, 1, "",
      "Let TCP listen beyond loopback without a key: nothing is encrypted and nobody is asked who he is"},
     {"server", "key_file", OPTION_TEXT, AT(key_file), "", 0, 0, "",
@@ -83,6 +86,10 @@ static const struct option options[] = {
     {"limits", "requests", OPTION_U32, AT(limits.requests_in_flight), "64", 1, 65536, "",
      "Requests of one client in flight"},
     {"limits", "scenes", OPTION_U32, AT(limits.scenes_per_client), "8", 1, 65536, "", "Open scenes of one client"},
+    {"limits", "scene_linger", OPTION_U32, AT(scene_linger_s), "120", 0, 86400, "s",
+     "How long a kept or shared scene stays when its last client is gone, to be come back to; 0: not at all"},
+    {"limits", "scenes_lingering", OPTION_U32, AT(lingering_scenes), "16", 1, 65536, "",
+     "Scenes that stay so, of all clients; of more the one that was left first ends"},
     {"limits", "jobs", OPTION_U32, AT(limits.jobs_per_client), "4", 1, 65536, "", "Running jobs of one client"},
     {"limits", "blobs", OPTION_U32, AT(limits.blobs_per_client), "262144", 1, 16777216, "",
      "Blobs that one connection may name"},
@@ -306,6 +313,8 @@ bool config_engine(const struct config *config, struct engine_options *engine, s
         .queue_capacity = config->engine_queue,
         .frames_in_flight = config->frames_in_flight,
         .scene_limits = {.host_bytes = config->scene_bytes, .nodes = config->limits.nodes},
+        .scene_linger_ms = config->scene_linger_s * UINT64_C(1000),
+        .lingering_scenes = config->lingering_scenes,
         .device_bytes_limit = config->device_bytes,
     };
 #ifdef FARLIGHT_DEBUG
@@ -326,7 +335,7 @@ bool config_engine(const struct config *config, struct engine_options *engine, s
     return true;
 }
 
-void config_hub(const struct config *config, struct hub_options *hub)
+bool config_hub(const struct config *config, struct hub_options *hub, struct error *error)
 {
     *hub = (struct hub_options){
         .limits = config->limits,
@@ -335,6 +344,7 @@ void config_hub(const struct config *config, struct hub_options *hub)
         .insecure = config->insecure,
     };
     hub->limits.frames_in_flight = config->frames_in_flight;
+    return readers_parse(&hub->readers, config->readers, "server.readers", error);
 }
 
 /* ---- dump -------------------------------------------------------------------------------------------- */

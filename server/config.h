@@ -17,7 +17,8 @@
 #define CONFIG_TEXT_BYTES 512
 
 struct config {
-    char listen[CONFIG_TEXT_BYTES]; /* addresses, separated by blanks */
+    char listen[CONFIG_TEXT_BYTES];  /* addresses, separated by blanks */
+    char readers[CONFIG_TEXT_BYTES]; /* users, separated by blanks */
     bool insecure;
     char key_file[CONFIG_TEXT_BYTES], reader_key_file[CONFIG_TEXT_BYTES]; /* empty: none */
     uint32_t log_level;
@@ -26,6 +27,7 @@ struct config {
     char device[CONFIG_TEXT_BYTES]; /* "auto", "software" or a number */
     uint32_t encode_threads, frames_in_flight, engine_queue;
     uint64_t scene_bytes, device_bytes;
+    uint32_t scene_linger_s, lingering_scenes;
     struct session_limits limits;
     struct connection_limits connection;
 };
@@ -40,8 +42,8 @@ bool config_read_file(struct config *config, const char *path, bool optional, st
 bool config_read_environment(struct config *config, struct error *error);
 /* The engine's share; false: the device is not said in a way that can be understood. */
 bool config_engine(const struct config *config, struct engine_options *options, struct error *error);
-/* The network's share; the engine is not in it. */
-void config_hub(const struct config *config, struct hub_options *options);
+/* The network's share; the engine is not in it. False: something cannot be understood. */
+bool config_hub(const struct config *config, struct hub_options *options, struct error *error);
 bool config_dump(const struct config *config, FILE *stream); /* false: the stream fails */
 
 #endif

@@ -31,7 +31,8 @@ enum {
 
 static const struct argp_option option_table[] = {
     {"listen", 'l', "ADDRESS", 0, "Listen at unix:/PATH or tcp:HOST:PORT; may be given several times", 0},
-    {"fd", KEY_FD, "N", 0, "Serve the one client at the connected socket N, then exit", 0},
+    {"fd", KEY_FD, "N", 0,
+     "Serve the client at the connected socket N, and exit with it; listen only where --listen says so", 0},
     {"config", KEY_CONFIG, "FILE", 0, "Read options from FILE, after " CONFIG_SYSTEM_FILE, 0},
     {"device", KEY_DEVICE, "N|software|auto", 0, "GPU to use", 0},
     {"list-devices", KEY_LIST, NULL, 0, "Print the GPUs that can be used, and exit", 0},
@@ -133,24 +134,24 @@ static bool read_config(struct config *config, const struct arguments *arguments
            config_flag(config, "server.log_level", arguments->log_level, "--log-level", error);
 }
 
-static bool serve(struct daemon *daemon, const struct config *config, int fd, struct timeline *timeline,
-                  struct error *error)
+/* `fd` < 0: there is no client yet. */
+static bool serve(struct daemon *daemon, const struct config *config, int fd, bool listens,
+                  struct timeline *timeline, struct error *error)
 {
     struct engine_options engine_options;
+    struct hub_options options;
     struct auth_keys keys;
     if (!auth_read_keys(&keys, config->key_file, config->reader_key_file, error) ||
-        (fd < 0 && !daemon_listen(daemon, config->listen, config->insecure || keys.count, error)) ||
-        !config_engine(config, &engine_options, error))
+        (listens && !daemon_listen(daemon, config->listen, config->insecure || keys.count, error)) ||
+        !config_engine(config, &engine_options, error) || !config_hub(config, &options, error))
         return false;
     struct engine *engine = engine_create(&engine_options, error);
     if (!engine)
         return false;
-    struct hub_options options;
-    config_hub(config, &options);
     options.engine = engine_port(engine);
     options.timeline = timeline;
     options.keys = keys;
-    if (fd >= 0)
+    if (!listens)
         options.connection_limits.idle_ms = 0; /* whoever started us for himself may take his time */
     bool ok = daemon_start(daemon, &options, error) && (fd < 0 || daemon_serve_fd(daemon, fd, error));
     if (ok) {
@@ -176,12 +177,14 @@ int main(int argc, char **argv)
         return !config_dump(&config, stdout);
     log_set_level((enum log_level)config.log_level);
     daemon_block_signals();
+    bool listens = arguments.fd < 0 || arguments.listen[0];
     struct daemon daemon;
     daemon_init(&daemon);
     struct timeline *timeline = NULL;
     if (config.trace_file[0])
         timeline = timeline_create(config.trace_file, config.trace_file_bytes, &error);
-    bool ok = (timeline || !config.trace_file[0]) && serve(&daemon, &config, arguments.fd, timeline, &error);
+    bool ok =
+        (timeline || !config.trace_file[0]) && serve(&daemon, &config, arguments.fd, listens, timeline, &error);
     daemon_finish(&daemon); /* what was begun before it failed */
     timeline_destroy(timeline);
     return ok ? EXIT_SUCCESS : fail(&error);

@@ -142,6 +142,17 @@ static bool send_channels(const struct clip *clip, uint32_t request, uint32_t id
     return true;
 }
 
+/* Of a clip that is there now. Where there is no memory to remember it, it stays in a scene of others'. */
+static bool take_note(struct fl_scene *scene, uint32_t id, uint64_t revision)
+{
+    if (revision > scene->revision)
+        scene->revision = revision;
+    if (scene->attached &&
+        fl_grow((void **)&scene->clips, &scene->clip_capacity, scene->clip_count, sizeof *scene->clips, NULL))
+        scene->clips[scene->clip_count++] = id;
+    return true;
+}
+
 static bool commit(const struct clip *clip, const char *name, uint32_t id, const struct fl_channel *channels,
                    size_t channel_count, uint64_t deadline_ns, struct fl_error *error)
 {
@@ -161,7 +172,8 @@ static bool commit(const struct clip *clip, const char *name, uint32_t id, const
     return edit(clip, request, &begin, deadline_ns, error) && edit(clip, request, &set, deadline_ns, error) &&
            send_channels(clip, request, id, channels, channel_count, deadline_ns, error) &&
            edit(clip, request, &end, deadline_ns, error) &&
-           fl_connection_answer(connection, request, MESSAGE_OK, &received, deadline_ns, error);
+           fl_connection_answer(connection, request, MESSAGE_OK, &received, deadline_ns, error) &&
+           take_note(clip->scene, id, received.message.ok.revision);
 }
 
 bool fl_scene_add_clip(struct fl_scene *scene, const char *name, const struct fl_channel *channels,

@@ -126,6 +126,9 @@ int fl_connection_consume(struct fl_connection *connection, const struct framing
         return 1;
     case MESSAGE_BLOCKED:
         return 1;
+    case MESSAGE_SCENE_CHANGED:
+        fl_scenes_changed(connection, &message->scene_changed);
+        return 1;
     case MESSAGE_GOODBYE:
         fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon ended the connection: %s",
                      message->goodbye.text[0] != '\0' ? message->goodbye.text
@@ -269,6 +272,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
             if (!handshake_reply_accept(&hello, &reply, &why))
                 return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address, "%s", why.text);
             connection->limits = reply.limits;
+            connection->read_only = (reply.capabilities & HANDSHAKE_CAN_READ_ONLY) != 0;
             connection->can_h264 = connection->can_h264 && (reply.capabilities & HANDSHAKE_CAN_H264) != 0;
             return true;
         }
@@ -386,6 +390,11 @@ bool fl_connection_can_h264(const struct fl_connection *connection)
 int fl_connection_fd(const struct fl_connection *connection)
 {
     return connection->stream.fd;
+}
+
+bool fl_connection_is_read_only(const struct fl_connection *connection)
+{
+    return connection->read_only;
 }
 
 const char *fl_connection_address(const struct fl_connection *connection)

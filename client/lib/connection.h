@@ -20,6 +20,8 @@ struct fl_connection {
     uint64_t upload_sent;             /* bytes of blob data sent on it so far */
     struct fl_job *job;               /* the one that runs */
     struct fl_view *view;             /* likewise */
+    struct fl_scene *scenes;          /* all that are there */
+    bool read_only;                   /* the daemon lets it change nothing */
     bool can_h264;                    /* this client and the daemon */
     struct fl_error broken;           /* why nothing works any more; code NONE: it does */
     struct message_stats_reply stats; /* the last answer */
@@ -44,9 +46,9 @@ uint32_t fl_connection_next_request(struct fl_connection *connection);
 /* Sends one message and waits until the kernel has it. */
 bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint32_t channel,
                         const struct message *message, struct fl_error *error);
-/* Deals with what concerns the connection itself (ping, credit for uploads, blocked, goodbye, an error of
- * request 0), its job or its view: 1: it was that; 0: it is for the caller; -1: the connection is broken, *error
- * says why. */
+/* Deals with what concerns the connection itself (ping, credit for uploads, blocked, scene_changed, goodbye, an
+ * error of request 0), its job or its view: 1: it was that; 0: it is for the caller; -1: the connection is broken,
+ * *error says why. */
 int fl_connection_consume(struct fl_connection *connection, const struct framing_header *header,
                           const struct message *message, struct fl_error *error);
 enum fl_step {
@@ -70,7 +72,7 @@ bool fl_connection_answer(struct fl_connection *connection, uint32_t request, en
 /* The daemon's error as ours; returns false. */
 bool fl_error_from_message(struct fl_error *error, const struct message_error *message);
 
-/* ---- what a connection has besides (job.c, view.c) ---- */
+/* ---- what a connection has besides (job.c, view.c, attach.c) ---- */
 
 /* Whether a message was the job's or the view's, as fl_connection_consume: they keep what came whole until they
  * are asked for it. */
@@ -78,6 +80,8 @@ int fl_job_take(struct fl_job *job, const struct framing_header *header, const s
                 struct fl_error *error);
 int fl_view_take(struct fl_view *view, const struct framing_header *header, const struct message *message,
                  struct fl_error *error);
+/* Of another client's doing. */
+void fl_scenes_changed(struct fl_connection *connection, const struct message_scene_changed *changed);
 /* "zero is the default", spelled out. */
 void fl_job_fill_render(struct message_render *render, const struct fl_job_options *options);
 

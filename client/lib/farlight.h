@@ -85,7 +85,7 @@ struct fl_connect_options {
     bool can_h264;       /* frames of views may come in H.264, for the caller to decode */
     int interrupt_fd;    /* > 0: calls give up with FL_ERROR_INTERRUPTED when it becomes readable */
     unsigned timeout_ms; /* to connect, start and shake hands; 0: 30 s */
-    const char *const *daemon_arguments; /* for a private daemon, NULL-terminated; NULL: none */
+    const char *const *daemon_arguments; /* for a private daemon, NULL-terminated, at most 28; NULL: none */
 };
 
 FL_API struct fl_connection *fl_connect(const struct fl_connect_options *options, struct fl_error *error);
@@ -100,6 +100,14 @@ FL_API bool fl_connection_is_local(const struct fl_connection *connection);
 /* Frames of views may be asked for in H.264: the caller said so, and the daemon has an encoder for it. */
 FL_API bool fl_connection_can_h264(const struct fl_connection *connection);
 FL_API const char *fl_connection_address(const struct fl_connection *connection);
+
+/* Where a private daemon listens besides, as `--listen` among its arguments says, with the port that was chosen.
+ * False: there is no address of that index. */
+FL_API bool fl_connection_listens_at(const struct fl_connection *connection, size_t index, char *address,
+                                     size_t address_bytes);
+/* Serves the connection for so long, as every call does while it waits: changes of scenes are heard of, the
+ * daemon's pings answered. False: it was interrupted, or the daemon is gone. */
+FL_API bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error);
 
 FL_API bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error);
 /* The daemon lets this client look, but edit nothing. */

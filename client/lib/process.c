@@ -243,3 +243,19 @@ void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *
     }
     snprintf(text, text_bytes, "%s%s%s", how, how[0] != '\0' && line[0] != '\0' ? ": " : "", line);
 }
+
+bool fl_process_find_line(const struct fl_process *process, const char *start, size_t index, char *text,
+                          size_t text_bytes)
+{
+    char talk[8192];
+    const ssize_t got = process->talk_fd >= 0 ? pread(process->talk_fd, talk, sizeof talk - 1, 0) : 0;
+    char *rest = talk;
+    talk[got > 0 ? got : 0] = '\0';
+    for (char *line; (line = strsep(&rest, "\n")) != NULL;) {
+        if (strncmp(line, start, strlen(start)) != 0 || rest == NULL || index-- > 0)
+            continue;
+        snprintf(text, text_bytes, "%s", line + strlen(start));
+        return true;
+    }
+    return false;
+}

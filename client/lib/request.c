@@ -30,3 +30,21 @@ bool fl_stats(struct fl_connection *connection, const struct message_stats_reply
     *reply = &connection->stats;
     return true;
 }
+
+bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error)
+{
+    const uint64_t deadline_ns = fl_now_ns() + timeout_ms * UINT64_C(1000000);
+    struct fl_received dropped; /* nobody waits for it any more */
+    while (fl_connection_receive(connection, &dropped, deadline_ns, error))
+        continue;
+    if (error->code != FL_ERROR_TIMEOUT)
+        return false;
+    *error = (struct fl_error){0};
+    return true;
+}
+
+bool fl_connection_listens_at(const struct fl_connection *connection, size_t index, char *address,
+                              size_t address_bytes)
+{
+    return fl_process_find_line(&connection->process, "READY ", index, address, address_bytes);
+}

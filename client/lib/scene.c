@@ -171,13 +171,24 @@ static bool relay_all(struct load *load, struct fl_error *error)
     }
 }
 
-static bool open_scene(struct fl_connection *connection, uint32_t scene, const char *name, struct fl_error *error)
+static const char *base_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+static bool open_scene(struct fl_connection *connection, uint32_t scene, const struct fl_load_options *options,
+                       struct fl_error *error)
 {
     struct message open = {.type = MESSAGE_SCENE_OPEN};
     char short_name[129];
-    const char *slash = name != NULL ? strrchr(name, '/') : NULL;
-    fl_text_utf8(slash != NULL ? slash + 1 : name != NULL ? name : "", short_name, sizeof short_name);
+    const char *name = options->scene_name    ? options->scene_name
+                       : options->model       ? base_name(options->model)
+                       : options->environment ? base_name(options->environment)
+                                              : "";
+    fl_text_utf8(name, short_name, sizeof short_name);
     open.scene_open.scene = scene;
+    open.scene_open.sharing = options->sharing;
     open.scene_open.name = short_name;
     const uint32_t request = fl_connection_next_request(connection);
     struct fl_received received;
@@ -189,7 +200,7 @@ static bool open_scene(struct fl_connection *connection, uint32_t scene, const c
 static bool load_with(struct fl_importer *importer, struct fl_scene *scene, struct fl_error *error)
 {
     struct fl_connection *connection = scene->connection;
-    if (!open_scene(connection, scene->scene, importer->options.model, error))
+    if (!open_scene(connection, scene->scene, &importer->options, error))
         return false;
     struct load load = {.connection = connection, .importer = importer};
     load.relay = (struct fl_relay){
@@ -228,11 +239,12 @@ static void adopt_callbacks(struct fl_importer *importer, const struct fl_load_o
     importer->options.note = options->note;
     importer->options.progress = options->progress;
     importer->options.user = options->user;
+    importer->options.sharing = options->sharing;
+    importer->options.scene_name = options->scene_name;
     importer->begin_ns = fl_now_ns(); /* `load_ns` is what the caller waits */
 }
 
-static struct fl_scene *load_started(struct fl_connection *connection, struct fl_importer *importer,
-                                     struct fl_error *error)
+struct fl_scene *fl_scene_create(struct fl_connection *connection, struct fl_error *error)
 {
     struct fl_scene *scene = calloc(1, sizeof *scene);
     if (scene == NULL) {
@@ -241,6 +253,17 @@ static struct fl_scene *load_started(struct fl_connection *connection, struct fl
     }
     scene->connection = connection;
     scene->scene = ++connection->last_scene;
+    scene->next = connection->scenes;
+    connection->scenes = scene;
+    return scene;
+}
+
+static struct fl_scene *load_started(struct fl_connection *connection, struct fl_importer *importer,
+                                     struct fl_error *error)
+{
+    struct fl_scene *scene = fl_scene_create(connection, error);
+    if (scene == NULL)
+        return NULL;
     const bool loaded = load_with(importer, scene, error);
     fl_importer_stop(importer);
     if (!loaded) {
@@ -248,6 +271,8 @@ static struct fl_scene *load_started(struct fl_connection *connection, struct fl
         return NULL;
     }
     scene->stats = importer->stats;
+    if (scene->stats.revision > scene->revision)
+        scene->revision = scene->stats.revision;
     scene->cameras = importer->cameras;
     scene->camera_count = importer->camera_count;
     importer->cameras = NULL;
@@ -273,15 +298,39 @@ struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl
     return scene;
 }
 
-/* The answer is not waited for: it is dropped when it comes. */
+/* Clips that were added to a scene of others'. */
+static void take_clips_away(const struct fl_scene *scene)
+{
+    struct message begin = {.type = MESSAGE_EDIT_BEGIN}, remove = {.type = MESSAGE_REMOVE},
+                   commit = {.type = MESSAGE_EDIT_COMMIT};
+    const uint32_t request = fl_connection_next_request(scene->connection);
+    struct fl_error ignored;
+    begin.edit_begin.scene = scene->scene;
+    fl_connection_send(scene->connection, request, 0, &begin, &ignored);
+    for (size_t i = 0; i < scene->clip_count; i++) {
+        remove.remove.kind = PROTOCOL_OBJECT_KIND_CLIP;
+        remove.remove.object = scene->clips[i];
+        fl_connection_send(scene->connection, request, 0, &remove, &ignored);
+    }
+    fl_connection_send(scene->connection, request, 0, &commit, &ignored);
+}
+
+/* Answers are not waited for: they are dropped when they come. */
 void fl_scene_destroy(struct fl_scene *scene)
 {
     if (scene == NULL)
         return;
     struct message close = {.type = MESSAGE_SCENE_CLOSE};
     struct fl_error ignored;
+    if (scene->clip_count > 0)
+        take_clips_away(scene);
     close.scene_close.scene = scene->scene;
     fl_connection_send(scene->connection, fl_connection_next_request(scene->connection), 0, &close, &ignored);
+    struct fl_scene **place = &scene->connection->scenes;
+    while (*place != scene)
+        place = &(*place)->next;
+    *place = scene->next;
+    free(scene->clips);
     free(scene->cameras);
     fl_catalogue_finish(&scene->catalogue);
     free(scene);

@@ -113,6 +113,7 @@ static void describe_cameras(struct engine_scene_description *description, const
         const struct scene_camera *camera = scene_camera(scene, node->object);
         struct engine_camera_entry *entry = &description->cameras[i];
         entry->node = nodes[i];
+        entry->fov_y = camera ? camera->fov_y : 0;
         memcpy(entry->name, node->base.name[0] || !camera ? node->base.name : camera->base.name,
                sizeof entry->name);
     }

@@ -79,8 +79,8 @@ struct engine_job {
     struct view_wishes *wishes;
     uint32_t pass_samples; /* that a frame of a view adds, up to frame.samples */
     enum encoding still_encoding;
-    unsigned weight;      /* beside other clients' jobs, at least 1 */
-    bool adapt;           /* view: quality and size follow the link */
+    unsigned weight; /* how much of the device's time it gets beside other clients' jobs, and their own; 0: 1 */
+    bool adapt;      /* view: quality and size follow the link */
     unsigned attachments; /* view: bits of the protocol */
 };
 
@@ -151,6 +151,7 @@ struct engine_scene_list {
 };
 struct engine_camera_entry {
     uint32_t node;
+    float fov_y; /* 0: orthographic */
     char name[SCENE_NAME_MAX + 1];
 };
 struct engine_clip_entry {

@@ -152,8 +152,15 @@ static void on_signal(void *context, uint32_t epoll_events)
 static void on_emptied(void *context)
 {
     struct daemon *daemon = context;
-    if (daemon->hub.stopping || daemon->single_client)
+    if (daemon->hub.stopping)
         loop_stop(daemon->loop);
+}
+
+static void on_owner_gone(void *context)
+{
+    struct daemon *daemon = context;
+    if (!daemon->hub.stopping)
+        stop(daemon);
 }
 
 /* ---- life -------------------------------------------------------------------------------------------- */
@@ -179,8 +186,9 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
         return false;
     }
     daemon->loop = loop;
+    daemon->hub.owner_gone = on_owner_gone;
     daemon->hub.emptied = on_emptied;
-    daemon->hub.emptied_context = daemon;
+    daemon->hub.call_context = daemon;
     daemon->accept_timer = (struct loop_timer){.call = on_accept_timer, .context = daemon};
     if (!watch_signals(daemon, error))
         return false;
@@ -204,7 +212,7 @@ bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error)
     int flags = fcntl(fd, F_GETFL);
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0 || fcntl(fd, F_SETFD, FD_CLOEXEC) < 0)
         return error_set(error, ERROR_INVALID, field, "%s", strerror(errno));
-    daemon->single_client = true;
+    daemon->hub.owner = daemon->hub.last_number + 1;
     return hub_add_client(&daemon->hub, fd, &own, &peer, error);
 }
 

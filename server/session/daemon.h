@@ -21,7 +21,6 @@ struct daemon {
     int signal_fd;
     struct loop_watch *signal_watch;
     struct loop_timer accept_timer; /* after which listeners are looked at again */
-    bool single_client;             /* ends with the one client it was given */
 };
 
 /* SIGTERM and SIGINT are blocked in the calling thread, to be taken by the loop; before any thread starts, so that
@@ -32,11 +31,11 @@ void daemon_init(struct daemon *daemon);
 /* Reserves addresses, separated by blanks (at least one); clients wait until daemon_start(). */
 bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loopback, struct error *error);
 bool daemon_start(struct daemon *daemon, const struct hub_options *options, struct error *error);
-/* Serves one client on a connected socket, then ends. Instead of listening. */
+/* Serves the client at a connected socket, and ends with it. It may listen besides. */
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error);
-/* "READY ADDRESS", one line an address, with the port that was chosen; "READY" alone with a single client. */
+/* "READY ADDRESS", one line an address, with the port that was chosen; "READY" alone where it listens nowhere. */
 void daemon_print_ready(const struct daemon *daemon, FILE *stream);
-/* Until a signal comes, or the single client is gone. Says goodbye to all. */
+/* Until a signal comes, or the client of daemon_serve_fd() is gone. Says goodbye to all. */
 bool daemon_run(struct daemon *daemon, struct error *error);
 void daemon_finish(struct daemon *daemon); /* whatever was begun; before the engine is destroyed */
 

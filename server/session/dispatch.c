@@ -224,6 +224,41 @@ static struct request *started(struct session *session, const struct dispatch_ro
     return request;
 }
 
+/* Answers a message that is not carried out; what still comes of its request is skipped. */
+static void refuse(struct session *session, const struct dispatch_row *row, uint32_t id, const struct error *error)
+{
+    struct request *request;
+    if (row->rule == DISPATCH_STARTS) {
+        request = started(session, row, id);
+        if (request && row->kind == REQUEST_TRANSACTION)
+            requests_bury(session, id);
+        if (request)
+            request_answer_error(session, request, error);
+    } else if (row->kind == REQUEST_UPLOAD) {
+        upload_invalid(session, id, error);
+    } else {
+        request = continued(session, row, id);
+        if (request)
+            edits_fail(session, request, error);
+    }
+}
+
+/* Edits are nothing without their edit_begin. */
+static bool changes_something(enum message_type type)
+{
+    return type == MESSAGE_SCENE_OPEN || type == MESSAGE_BLOB_OFFER || type == MESSAGE_BLOB_DATA ||
+           type == MESSAGE_EDIT_BEGIN;
+}
+
+static bool is_allowed(const struct session *session, enum message_type type, struct error *error)
+{
+    if (!session->identity.read_only || !changes_something(type))
+        return true;
+    error_set(error, ERROR_DENIED, message_type_text(type), "this client may only look");
+    return error_remedy(error,
+                        "attach to a shared scene, or ask whoever runs the daemon to let you change things");
+}
+
 void dispatch_message(void *context, const struct framing_header *header, const struct message *message)
 {
     struct session *session = context;
@@ -232,6 +267,11 @@ void dispatch_message(void *context, const struct framing_header *header, const 
         struct error error = {0};
         error_set(&error, ERROR_PROTOCOL, NULL, "%s is no message for a daemon", message_type_text(message->type));
         session_fail(session, &error);
+        return;
+    }
+    struct error error = {0};
+    if (!is_allowed(session, message->type, &error)) {
+        refuse(session, row, header->request, &error);
         return;
     }
     struct request *request = NULL;
@@ -254,20 +294,5 @@ void dispatch_invalid(void *context, const struct framing_header *header, const 
         session_fail(session, &error);
         return;
     }
-    struct request *request;
-    if (row->rule == DISPATCH_STARTS) {
-        request = started(session, row, header->request);
-        if (request && row->kind == REQUEST_TRANSACTION)
-            requests_bury(session, header->request);
-        if (request)
-            request_answer_error(session, request, &error);
-        return;
-    }
-    if (row->kind == REQUEST_UPLOAD) {
-        upload_invalid(session, header->request, &error);
-        return;
-    }
-    request = continued(session, row, header->request);
-    if (request)
-        edits_fail(session, request, &error);
+    refuse(session, row, header->request, &error);
 }

@@ -137,6 +137,9 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");
     if (!auth_identify(&identity, fd, peer, hub->options.insecure || keys->count, error))
         return false;
+    bool is_owner = hub->last_number + 1 == hub->owner; /* who does as he likes */
+    if (!is_owner && identity.has_user && readers_have(&hub->options.readers, identity.user))
+        identity.read_only = true;
     if (hub->unauthenticated >= limits->unauthenticated)
         return error_set(error, ERROR_LIMIT, NULL, "%zu connections have not introduced themselves",
                          hub->unauthenticated);
@@ -164,7 +167,7 @@ void hub_stop(struct hub *hub)
     while (hashmap_next(&hub->sessions, &cursor, NULL, &session))
         session_stop(session);
     if (!hub->sessions.count && hub->emptied)
-        hub->emptied(hub->emptied_context);
+        hub->emptied(hub->call_context);
 }
 
 /* ---- life -------------------------------------------------------------------------------------------- */

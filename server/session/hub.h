@@ -8,6 +8,7 @@
 #include "net/auth.h"
 #include "net/connection.h"
 #include "net/loop.h"
+#include "net/readers.h"
 #include "session/blob_store.h"
 #include "session/engine_port.h"
 #include "session/limits.h"
@@ -21,6 +22,7 @@ struct session;
 struct hub_options {
     struct session_limits limits;
     struct connection_limits connection_limits;
+    struct readers readers; /* of the Unix socket */
     struct engine_port engine;
     struct timeline *timeline;   /* hears of every frame that was sent; may be NULL */
     uint64_t scene_memory_bytes; /* of one scene, as the engine has it; told to clients */
@@ -38,8 +40,10 @@ struct hub {
     uint64_t frame_bytes;     /* what the frames of all jobs may take */
     uint64_t last_number, started_ns;
     bool stopping;
-    loop_call_fn *emptied; /* called when the last session is gone; may be NULL */
-    void *emptied_context;
+    uint64_t owner; /* number of the client for whom all this is there; 0: nobody */
+    loop_call_fn *owner_gone,
+        *emptied; /* called when that one is gone, and when the last session is; may be NULL */
+    void *call_context;
 
     struct loop_watch *engine_watch;
     /* Commands that the engine had no room for, in order. While one waits, no session reads on. */

@@ -209,7 +209,8 @@ void scenes_described(struct session *session, struct request *request,
         told->upper_world[axis] = from->upper_world[axis];
     }
     for (uint32_t i = 0; i < from->camera_count; i++)
-        cameras[i] = (struct record_camera_entry){.node = from->cameras[i].node, .name = from->cameras[i].name};
+        cameras[i] = (struct record_camera_entry){
+            .node = from->cameras[i].node, .fov_y = from->cameras[i].fov_y, .name = from->cameras[i].name};
     for (uint32_t i = 0; i < from->clip_count; i++)
         clips[i] = (struct record_clip_entry){.clip = from->clips[i].clip,
                                               .channels = from->clips[i].channels,

@@ -252,6 +252,8 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
     if (getrandom(reply->nonce, sizeof reply->nonce, 0) < 0 ||
         getrandom(reply->session_token, sizeof reply->session_token, 0) < 0)
         snprintf(reply->text, sizeof reply->text, "no random numbers");
+    if (session->identity.read_only)
+        reply->capabilities |= HANDSHAKE_CAN_READ_ONLY;
     fill_limits(&reply->limits, &hub->options);
     snprintf(session->name, sizeof session->name, "%s", hello->name);
     return reply->text[0] == '\0';
@@ -318,9 +320,12 @@ static void on_closed(void *context)
     } else {
         hub->unauthenticated--;
     }
+    bool was_owner = session->number == hub->owner;
     free(session);
+    if (was_owner && hub->owner_gone)
+        hub->owner_gone(hub->call_context);
     if (!hub->sessions.count && hub->emptied)
-        hub->emptied(hub->emptied_context);
+        hub->emptied(hub->call_context);
 }
 
 static const struct connection_handler connection_handler = {

@@ -153,6 +153,49 @@ static void what_is_dumped_reads_back_the_same(void **state)
     free(text);
 }
 
+static void readers_are_names_and_numbers_of_users(void **state)
+{
+    (void)state;
+    struct config config;
+    struct hub_options options;
+    struct error error = {0};
+    assert_true(read_text(&config, "[server]\nreaders = root 4294967 0\n", &error));
+    assert_true(config_hub(&config, &options, &error));
+    assert_int_equal(options.readers.count, 3);
+    assert_true(readers_have(&options.readers, 0));
+    assert_true(readers_have(&options.readers, 4294967));
+    assert_false(readers_have(&options.readers, 1));
+    static const char *const wrong[] = {"nobody-has-this-name", "-1", "4294967295", "1x"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        char text[64];
+        snprintf(text, sizeof text, "[server]\nreaders = 0 %s\n", wrong[i]);
+        error = (struct error){0};
+        assert_true(read_text(&config, text, &error));
+        assert_false(config_hub(&config, &options, &error));
+        assert_string_equal(error.field, "server.readers");
+        assert_non_null(strstr(error.text, wrong[i]));
+    }
+    config_defaults(&config);
+    assert_true(config_hub(&config, &options, &error));
+    assert_int_equal(options.readers.count, 0);
+}
+
+static void scenes_linger_as_long_as_the_file_says(void **state)
+{
+    (void)state;
+    struct config config;
+    struct engine_options options;
+    struct error error = {0};
+    config_defaults(&config);
+    assert_true(config_engine(&config, &options, &error));
+    assert_int_equal(options.scene_linger_ms, 120000);
+    assert_int_equal(options.lingering_scenes, 16);
+    assert_true(read_text(&config, "[limits]\nscene_linger = 0\nscenes_lingering = 3\n", &error));
+    assert_true(config_engine(&config, &options, &error));
+    assert_int_equal(options.scene_linger_ms, 0);
+    assert_int_equal(options.lingering_scenes, 3);
+}
+
 static void the_file_in_conf_is_what_is_dumped(void **state)
 {
     (void)state;
@@ -185,6 +228,8 @@ int main(void)
         cmocka_unit_test(the_environment_goes_over_the_file_and_a_flag_over_both),
         cmocka_unit_test(a_missing_file_is_an_error_only_if_it_was_asked_for),
         cmocka_unit_test(what_is_dumped_reads_back_the_same),
+        cmocka_unit_test(readers_are_names_and_numbers_of_users),
+        cmocka_unit_test(scenes_linger_as_long_as_the_file_says),
         cmocka_unit_test(the_file_in_conf_is_what_is_dumped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

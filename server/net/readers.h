@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: MIT */
+/* Users of the Unix socket who may look, but change nothing. */
+#ifndef FARLIGHT_NET_READERS_H
+#define FARLIGHT_NET_READERS_H
+
+#include "base/error.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define READERS_MAX 64
+
+struct readers {
+    uint32_t users[READERS_MAX];
+    size_t count;
+};
+
+/* From names and numbers, separated by blanks. False with ERROR_INVALID: one is unknown, or there are too many;
+ * `field` names what was read. */
+bool readers_parse(struct readers *readers, const char *text, const char *field, struct error *error);
+bool readers_have(const struct readers *readers, uint32_t user);
+
+#endif
