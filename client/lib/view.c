@@ -167,31 +167,29 @@ bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uin
     return true;
 }
 
-static void fill_ack(struct message *message, const struct fl_view *view, bool want_key_frame)
+static void fill_ack(struct message *message, const struct fl_view *view, uint32_t frame, bool whole)
 {
     *message = (struct message){.type = MESSAGE_FRAME_ACK};
     message->frame_ack.channel = view->channel;
-    message->frame_ack.frame = view->last_frame;
-    message->frame_ack.want_key_frame = want_key_frame ? 1 : 0;
+    message->frame_ack.frame = frame;
+    message->frame_ack.whole = whole ? 1 : 0;
 }
 
 bool fl_view_want_key_frame(struct fl_view *view, struct fl_error *error)
 {
     struct message message;
-    fill_ack(&message, view, true);
+    fill_ack(&message, view, view->last_frame, true);
+    message.frame_ack.want_key_frame = 1;
     return check(view, error) && (!view->has_frame || fl_connection_send(view->connection, 0, 0, &message, error));
 }
 
 /* ---- coming in ---- */
 
 /* At once, before the frame is decoded: the daemon measures the link with it, not us. */
-static bool acknowledge(struct fl_view *view, uint32_t frame, struct fl_error *error)
+static bool acknowledge(struct fl_view *view, uint32_t frame, bool whole, struct fl_error *error)
 {
     struct message message;
-    view->last_frame = frame;
-    view->has_frame = true;
-    view->next_frame = frame < UINT32_MAX ? frame + 1 : frame;
-    fill_ack(&message, view, false);
+    fill_ack(&message, view, frame, whole);
     /* A daemon that takes nothing learns nothing. */
     if (!fl_stream_has_room(&view->connection->stream))
         return true;
@@ -202,8 +200,14 @@ static bool acknowledge(struct fl_view *view, uint32_t frame, struct fl_error *e
 static bool take_end(struct fl_view *view, const struct message *message, struct fl_error *error)
 {
     const uint64_t now_ns = fl_now_ns();
-    if (view->assembly.frame != NULL && !acknowledge(view, message->frame_end.frame, error))
-        return false;
+    const uint32_t number = message->frame_end.frame;
+    if (view->assembly.frame != NULL) {
+        view->last_frame = number;
+        view->has_frame = true;
+        view->next_frame = number < UINT32_MAX ? number + 1 : number;
+        if (!acknowledge(view, number, true, error))
+            return false;
+    }
     struct fl_frame *frame = fl_assembly_end(&view->assembly, &message->frame_end, now_ns, error);
     if (frame == NULL)
         return false;
@@ -237,7 +241,8 @@ static bool take(struct fl_view *view, size_t index, const struct message *messa
             view->assembly.expected = view->asked[index].expected;
             view->assembled_request = request;
         }
-        return fl_assembly_begin(&view->assembly, &message->frame_begin, view->next_frame, fl_now_ns(), error);
+        return fl_assembly_begin(&view->assembly, &message->frame_begin, view->next_frame, fl_now_ns(), error) &&
+               acknowledge(view, message->frame_begin.frame, false, error);
     case MESSAGE_FRAME_DATA:
     case MESSAGE_FRAME_END:
         if (request != view->assembled_request)

@@ -53,6 +53,10 @@ static bool jobs_reserve(struct engine *engine)
     if (!jobs)
         return false;
     engine->jobs = jobs;
+    struct schedule_entry *entries = realloc(engine->entries, capacity * sizeof *entries);
+    if (!entries)
+        return false;
+    engine->entries = entries;
     engine->job_capacity = capacity;
     return true;
 }
@@ -259,9 +263,6 @@ static void frame_failed(struct engine *engine, struct job *job, const struct er
         struct error rebuild_error = {0};
         if (!engine_need_device(engine, &rebuild_error))
             job_finish(job, &rebuild_error);
-        /* No frame is in progress any more, in any scene. */
-        for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
-            engine_run_waiting(engine, scene);
         return;
     }
     if (error->kind == ERROR_OUT_OF_MEMORY && !job->evicted && engine_evict_idle(engine, job)) {
@@ -374,16 +375,13 @@ static void frame_go_on(struct engine *engine, struct job *job)
 
 void job_step(struct engine *engine, struct job *job)
 {
-    struct engine_scene *scene = job->scene;
-    job->served = job->reference->client->served = scene->used = ++engine->slices;
-    if (job->rendering && job->spec.kind == JOB_VIEW && view_is_stale(job))
+    if (job->rendering && job->spec.kind == JOB_VIEW && view_is_stale(job)) {
         abandon_frame(engine, job);
-    else if (job->rendering) {
+    } else if (job->rendering) {
         frame_go_on(engine, job);
     } else {
         struct error error = {0};
         if (!frame_take_up(engine, job, &error))
             frame_failed(engine, job, &error);
     }
-    engine_run_waiting(engine, scene);
 }

@@ -5,8 +5,6 @@
 #include "base/clock.h"
 #include "base/log.h"
 
-#include <stdlib.h>
-
 /* Share of the device's memory that is used if nothing is configured. */
 #define DEVICE_SHARE_PERCENT 70
 
@@ -24,25 +22,21 @@ bool engine_open_device(struct engine *engine, struct error *error)
 
 /* ---- what scenes and jobs keep ------------------------------------------------------------------ */
 
-static struct engine_idle *find_idle(const struct engine_scene *scene, uint64_t client)
+bool reference_drop_idle(struct engine *engine, struct engine_reference *reference)
 {
-    for (size_t i = 0; i < scene->idle_count; i++)
-        if (scene->idle[i].client == client)
-            return &scene->idle[i];
-    return NULL;
+    if (!reference->idle)
+        return false;
+    engine->backend->renderer_destroy(reference->idle);
+    reference->idle = NULL;
+    return true;
 }
 
-bool scene_drop_idle(struct engine *engine, struct engine_scene *scene, const uint64_t *client)
+static bool drop_all_idle(struct engine *engine, const struct engine_scene *scene)
 {
-    size_t left = 0, count = scene->idle_count;
-    for (size_t i = 0; i < count; i++) {
-        if (client && scene->idle[i].client != *client)
-            scene->idle[left++] = scene->idle[i];
-        else
-            engine->backend->renderer_destroy(scene->idle[i].renderer);
-    }
-    scene->idle_count = left;
-    return left < count;
+    bool found = false;
+    for (struct engine_reference *one = scene->references; one; one = one->next)
+        found |= reference_drop_idle(engine, one);
+    return found;
 }
 
 static bool drop_renderer(struct engine *engine, struct job *job)
@@ -59,7 +53,7 @@ void scene_drop_shared(struct engine *engine, struct engine_scene *scene)
     for (size_t i = 0; i < engine->job_count; i++)
         if (engine->jobs[i]->scene == scene)
             drop_renderer(engine, engine->jobs[i]);
-    scene_drop_idle(engine, scene, NULL);
+    drop_all_idle(engine, scene);
     engine->backend->scene_destroy(scene->shared);
     scene->shared = NULL;
 }
@@ -69,10 +63,9 @@ bool job_need_renderer(struct engine *engine, struct job *job, struct error *err
     struct engine_scene *scene = job->scene;
     if (!scene->shared && !(scene->shared = engine->backend->scene_create(engine->device, error)))
         return false;
-    struct engine_idle *idle = job->renderer ? NULL : find_idle(scene, job->client);
-    if (idle) {
-        job->renderer = idle->renderer;
-        *idle = scene->idle[--scene->idle_count];
+    if (!job->renderer) {
+        job->renderer = job->reference->idle;
+        job->reference->idle = NULL;
     }
     if (!job->renderer)
         job->renderer = engine->backend->renderer_create(scene->shared, error);
@@ -81,17 +74,10 @@ bool job_need_renderer(struct engine *engine, struct job *job, struct error *err
 
 void job_leave_renderer(struct engine *engine, struct job *job)
 {
-    struct engine_scene *scene = job->scene;
     if (!job->renderer)
         return;
-    scene_drop_idle(engine, scene, &job->client);
-    struct engine_idle *idle = realloc(scene->idle, (scene->idle_count + 1) * sizeof *idle);
-    if (!idle) {
-        drop_renderer(engine, job);
-        return;
-    }
-    scene->idle = idle;
-    idle[scene->idle_count++] = (struct engine_idle){job->client, job->renderer};
+    reference_drop_idle(engine, job->reference);
+    job->reference->idle = job->renderer;
     job->renderer = NULL;
 }
 
@@ -101,8 +87,8 @@ uint64_t scene_device_bytes(const struct engine *engine, const struct engine_sce
     for (size_t i = 0; i < engine->job_count; i++)
         if (engine->jobs[i]->scene == scene && engine->jobs[i]->renderer)
             bytes += engine->backend->renderer_bytes(engine->jobs[i]->renderer);
-    for (size_t i = 0; i < scene->idle_count; i++)
-        bytes += engine->backend->renderer_bytes(scene->idle[i].renderer);
+    for (const struct engine_reference *one = scene->references; one; one = one->next)
+        bytes += one->idle ? engine->backend->renderer_bytes(one->idle) : 0;
     return bytes;
 }
 
@@ -160,7 +146,7 @@ bool engine_evict_idle(struct engine *engine, const struct job *keep)
             found |= drop_renderer(engine, job);
     }
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
-        found |= scene_drop_idle(engine, scene, NULL);
+        found |= drop_all_idle(engine, scene);
         if (scene == keep->scene || scene->frames || !scene->shared)
             continue;
         scene_drop_shared(engine, scene);

@@ -4,8 +4,8 @@
 
 #include "job/engine_private.h"
 
+#include "base/clock.h"
 #include "base/log.h"
-#include "job/scheduler.h"
 
 #include <signal.h>
 #include <stdlib.h>
@@ -61,27 +61,39 @@ void engine_nudge(struct engine *engine)
 
 /* ---- the thread --------------------------------------------------------------------------------- */
 
-static struct job *next_job(struct engine *engine)
+/* What a frame ended that kept it waiting; with the device all of them end. */
+static void run_all_waiting(struct engine *engine)
 {
-    if (!engine->job_count)
-        return NULL;
-    struct schedule_entry few[64] = {0};
-    size_t count = engine->job_count;
-    struct schedule_entry *entries = count > sizeof few / sizeof few[0] ? malloc(count * sizeof *entries) : few;
-    if (!entries) {
-        /* Out of memory: some jobs go on, and with them the hope for more. */
-        entries = few;
-        count = sizeof few / sizeof few[0];
+    for (struct engine_scene *scene = engine->scenes; scene;) {
+        bool waits = scene->waiting_count && !scene->frames;
+        if (waits)
+            engine_run_waiting(engine, scene);
+        scene = waits ? engine->scenes : scene->next; /* scenes may have ended */
     }
-    for (size_t i = 0; i < count; i++) {
-        const struct job *job = engine->jobs[i];
-        entries[i] =
-            (struct schedule_entry){job->client, job->reference->client->served, job->served, job_is_ready(job)};
+}
+
+/* Gives the next slice to whose turn it is. False: nobody is ready. */
+static bool serve(struct engine *engine)
+{
+    for (size_t i = 0; i < engine->job_count; i++) {
+        struct job *job = engine->jobs[i];
+        engine->entries[i] = (struct schedule_entry){
+            .client = &job->reference->client->schedule,
+            .job = &job->schedule,
+            .ready = job_is_ready(job),
+            .keeps_turn = job->rendering && job->spec.kind == JOB_VIEW,
+        };
     }
-    size_t picked = schedule_pick(entries, count);
-    if (entries != few)
-        free(entries);
-    return picked == SCHEDULE_NONE ? NULL : engine->jobs[picked];
+    size_t picked = schedule_pick(&engine->scheduler, engine->entries, engine->job_count);
+    if (picked == SCHEDULE_NONE)
+        return false;
+    struct job *job = engine->jobs[picked];
+    uint64_t start_ns = clock_now_ns();
+    job_step(engine, job);
+    schedule_charge(&engine->scheduler, &engine->entries[picked], clock_now_ns() - start_ns,
+                    job->spec.weight ? job->spec.weight : 1);
+    run_all_waiting(engine);
+    return true;
 }
 
 static void take_commands(struct engine *engine, struct engine_command *first)
@@ -102,11 +114,8 @@ static void run(struct engine *engine)
         take_commands(engine, queue_try_pop(engine->commands));
         jobs_reap(engine);
         uint64_t reap_ns = engine_reap_scenes(engine);
-        struct job *job = next_job(engine);
-        if (job) {
-            job_step(engine, job);
+        if (serve(engine))
             continue;
-        }
         uint64_t idle_ns = jobs_idle_ns(engine);
         take_commands(engine, queue_pop(engine->commands, idle_ns < reap_ns ? idle_ns : reap_ns));
     }
@@ -240,6 +249,7 @@ void engine_destroy(struct engine *engine)
     queue_destroy(engine->events, drop_event);
     hashmap_finish(&engine->clients);
     free(engine->jobs);
+    free(engine->entries);
     pthread_cond_destroy(&engine->start_changed);
     pthread_mutex_destroy(&engine->start_lock);
     free(engine);

@@ -79,8 +79,8 @@ struct engine_job {
     struct view_wishes *wishes;
     uint32_t pass_samples; /* that a frame of a view adds, up to frame.samples */
     enum encoding still_encoding;
-    unsigned weight;      /* beside other clients' jobs, at least 1 */
-    bool adapt;           /* view: quality and size follow the link */
+    unsigned weight; /* how much of the device's time it gets beside other clients' jobs, and their own; 0: 1 */
+    bool adapt;      /* view: quality and size follow the link */
     unsigned attachments; /* view: bits of the protocol */
 };
 

@@ -11,6 +11,7 @@
 #include "job/encode_pool.h"
 #include "job/engine.h"
 #include "job/output.h"
+#include "job/scheduler.h"
 #include "job/shot.h"
 #include "job/totals.h"
 #include "job/view_wishes.h"
@@ -24,7 +25,7 @@
 struct engine_client {
     uint64_t client;
     struct hashmap references; /* struct engine_reference *, by the client's number */
-    uint64_t served;           /* number of the slice that it had last */
+    struct schedule_client schedule;
 };
 
 /* A client's hold on a scene. */
@@ -33,12 +34,9 @@ struct engine_reference {
     struct engine_client *client;
     struct engine_scene *scene;
     uint32_t id; /* the client's number for it */
-};
-
-/* What a client's last job on a scene left: its next one goes on from the samples that it holds. */
-struct engine_idle {
-    uint64_t client;
-    struct frame_renderer *renderer; /* owned */
+    /* Owned: what the last job that has ended had, and the next one goes on from, its samples included; NULL:
+     * there is none, or it made room. */
+    struct frame_renderer *idle;
 };
 
 struct engine_scene {
@@ -52,12 +50,9 @@ struct engine_scene {
     uint32_t frames;            /* in progress, of all jobs */
     /* Its frame may not begin beside those, and no other begins before it; NULL: there is none. */
     struct job *put_off;
-    struct engine_idle *idle; /* owned; at most one for each client */
-    size_t idle_count;
     struct engine_command **waiting; /* owned: commands for when no frame is in progress, in order */
     size_t waiting_count;
     uint64_t apply_start_ns, apply_ns; /* of the commits since the last frame */
-    uint64_t used;                     /* number of the slice that used it last */
     /* For stats, as of that revision: a large scene is not gone through each time that somebody asks. */
     uint64_t counted_revision, triangles, spheres;
     uint32_t instances;
@@ -66,8 +61,8 @@ struct engine_scene {
 
 /* What a view shows, and what it may show next; see view.c. */
 struct view {
-    uint64_t credit, made; /* frames that may be begun, and that were made */
-    uint64_t due_ns;       /* no frame is begun before */
+    uint64_t credit, made;           /* frames that may be begun, and that were made */
+    uint64_t due_ns;                 /* no frame is begun before */
     uint64_t render_ns, rendered_ns; /* of its last frame: how long it took, and until when; 0: there is none */
     /* Of its last frame; `shown`: there is one. */
     bool shown;
@@ -88,7 +83,7 @@ struct job {
     struct frame_renderer *renderer;    /* owned; NULL until the first frame, and after the device was lost */
     struct job_output *output;
     uint64_t next_frame; /* number in the range; beyond its end: all rendered */
-    uint64_t served;
+    struct schedule_share schedule;
     struct animation_bounds bounds;
     /* of the frame in progress */
     bool rendering;
@@ -124,7 +119,8 @@ struct engine {
     struct engine_scene *scenes; /* owned */
     struct job **jobs;           /* owned, in the order of their start */
     size_t job_count, job_capacity;
-    uint64_t slices;
+    struct scheduler scheduler;
+    struct schedule_entry *entries; /* owned; room for as many as there is for jobs */
     uint64_t frames, rays;
     uint64_t table_bytes; /* of all scenes */
 };
@@ -179,7 +175,7 @@ struct job *job_find(struct engine *engine, uint64_t client, uint32_t request);
 bool job_is_ready(const struct job *job);
 /* How long until one is ready, if nothing happens before; UINT64_MAX: for ever. */
 uint64_t jobs_idle_ns(const struct engine *engine);
-/* One slice: takes up a frame, or goes on with it. */
+/* One slice: takes up a frame, or goes on with it. Does not run what waits for its scene. */
 void job_step(struct engine *engine, struct job *job);
 /* Ends it now; nothing comes after `final` (may be NULL). Does not run what waits for its scene. */
 void job_abort(struct engine *engine, struct job *job, struct engine_event *final);
@@ -208,12 +204,12 @@ void engine_drop_device(struct engine *engine);
 /* Lets go of what is kept on the device and no frame in progress needs, nor the next one of `keep`. False: nothing
  * was there. */
 bool engine_evict_idle(struct engine *engine, const struct job *keep);
-/* A renderer for a job that has none: what the client's last one left, or a new one. */
+/* A renderer for a job that has none: what its reference has, or a new one. */
 bool job_need_renderer(struct engine *engine, struct job *job, struct error *error);
-/* Leaves it to the client's next job on the scene. */
+/* Leaves it to the next job by its reference. */
 void job_leave_renderer(struct engine *engine, struct job *job);
-/* What that client's jobs left, or (`client` NULL) all. False: nothing was there. */
-bool scene_drop_idle(struct engine *engine, struct engine_scene *scene, const uint64_t *client);
+/* False: there was none. */
+bool reference_drop_idle(struct engine *engine, struct engine_reference *reference);
 /* Everything of it on the device; its jobs have ended, or no frame is in progress. */
 void scene_drop_shared(struct engine *engine, struct engine_scene *scene);
 uint64_t scene_device_bytes(const struct engine *engine, const struct engine_scene *scene);

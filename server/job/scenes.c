@@ -51,7 +51,7 @@ static bool reference_add(struct engine *engine, struct engine_scene *scene, con
 static void reference_remove(struct engine *engine, struct engine_reference *reference)
 {
     struct engine_reference **place = &reference->scene->references;
-    scene_drop_idle(engine, reference->scene, &reference->client->client);
+    reference_drop_idle(engine, reference);
     while (*place != reference)
         place = &(*place)->next;
     *place = reference->next;
@@ -113,7 +113,6 @@ static void scene_free(struct engine *engine, struct engine_scene *scene)
     engine->table_bytes -= scene->scene->table_bytes;
     scene_destroy(scene->scene);
     free(scene->description);
-    free(scene->idle);
     free(scene->waiting);
     free(scene);
 }

@@ -1,19 +1,107 @@
 /* SPDX-License-Identifier: MIT */
 #include "job/scheduler.h"
 
-static bool goes_before(const struct schedule_entry *a, const struct schedule_entry *b)
+static uint64_t at_most(uint64_t a, uint64_t b)
 {
-    if (a->client_served != b->client_served)
-        return a->client_served < b->client_served;
-    return a->job_served < b->job_served;
+    return a < b ? a : b;
 }
 
-size_t schedule_pick(const struct schedule_entry *entries, size_t count)
+static void group_begin(struct schedule_group *group)
 {
-    size_t best = SCHEDULE_NONE;
+    group->next_ns = UINT64_MAX;
+}
+
+static bool was_ready(const struct scheduler *scheduler, const struct schedule_share *share)
+{
+    return share->ready_in + 1 == scheduler->picks && share->ready_in > 0;
+}
+
+/* Those who were ready and still are say how far the group is. */
+static void group_look(struct schedule_group *group, const struct scheduler *scheduler,
+                       const struct schedule_share *share)
+{
+    if (share->ready && was_ready(scheduler, share))
+        group->next_ns = at_most(group->next_ns, share->virtual_ns);
+}
+
+static void group_advance(struct schedule_group *group)
+{
+    if (group->next_ns != UINT64_MAX && group->next_ns > group->least_ns)
+        group->least_ns = group->next_ns;
+}
+
+/* More than once, if the share is a client's. */
+static void share_settle(struct schedule_share *share, const struct scheduler *scheduler,
+                         const struct schedule_group *group)
+{
+    if (!share->ready || share->ready_in == scheduler->picks)
+        return;
+    if (!was_ready(scheduler, share) && share->virtual_ns < group->least_ns)
+        share->virtual_ns = group->least_ns;
+    share->ready_in = scheduler->picks;
+}
+
+static bool goes_before(const struct schedule_share *a, const struct schedule_share *b)
+{
+    return a->virtual_ns != b->virtual_ns ? a->virtual_ns < b->virtual_ns : a->turn < b->turn;
+}
+
+static bool keeps_turn(const struct scheduler *scheduler, const struct schedule_entry *entry)
+{
+    return entry->ready && entry->keeps_turn && scheduler->turns > 0 && entry->job->turn == scheduler->turns &&
+           scheduler->turn_ns < SCHEDULE_TURN_NS;
+}
+
+size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
+{
+    size_t best = SCHEDULE_NONE, kept = SCHEDULE_NONE;
+    scheduler->picks++;
+    group_begin(&scheduler->clients);
     for (size_t i = 0; i < count; i++) {
-        if (entries[i].ready && (best == SCHEDULE_NONE || goes_before(&entries[i], &entries[best])))
+        entries[i].client->share.ready = false;
+        group_begin(&entries[i].client->jobs);
+    }
+    for (size_t i = 0; i < count; i++) {
+        entries[i].job->ready = entries[i].ready;
+        entries[i].client->share.ready |= entries[i].ready;
+        group_look(&entries[i].client->jobs, scheduler, entries[i].job);
+    }
+    for (size_t i = 0; i < count; i++)
+        group_look(&scheduler->clients, scheduler, &entries[i].client->share);
+    group_advance(&scheduler->clients);
+    for (size_t i = 0; i < count; i++) {
+        const struct schedule_entry *entry = &entries[i];
+        group_advance(&entry->client->jobs);
+        share_settle(&entry->client->share, scheduler, &scheduler->clients);
+        share_settle(entry->job, scheduler, &entry->client->jobs);
+        if (keeps_turn(scheduler, entry))
+            kept = i;
+        if (!entry->ready)
+            continue;
+        bool same = best != SCHEDULE_NONE && entries[best].client == entry->client;
+        if (best == SCHEDULE_NONE || (same ? goes_before(entry->job, entries[best].job)
+                                           : goes_before(&entry->client->share, &entries[best].client->share)))
             best = i;
     }
+    if (kept != SCHEDULE_NONE)
+        return kept;
+    scheduler->turn_ns = 0;
     return best;
+}
+
+static void charge(struct schedule_share *share, uint64_t virtual_ns, uint64_t turn)
+{
+    share->virtual_ns += virtual_ns;
+    share->turn = turn;
+}
+
+void schedule_charge(struct scheduler *scheduler, const struct schedule_entry *entry, uint64_t slice_ns,
+                     uint32_t weight)
+{
+    /* What took no time that the clock shows counts a little all the same, or it would have every turn. */
+    uint64_t virtual_ns = slice_ns / weight + 1;
+    uint64_t turn = ++scheduler->turns;
+    scheduler->turn_ns += slice_ns;
+    charge(&entry->client->share, virtual_ns, turn);
+    charge(entry->job, virtual_ns, turn);
 }

@@ -1,8 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Whose slice is next. Pure: no clock, no GL, no socket.
  *
- * Round robin between clients, and between the jobs of a client: whoever has waited longest is next. Waiting is
- * counted in slices, so that a client who comes back after a pause has no claim on what it missed. */
+ * Fair queueing by virtual time: what the thread that owns the device has spent on somebody, divided by the weight
+ * of the job that it was spent on. Whoever has least of it is next, first among clients, then among the jobs of
+ * that client; so each gets its share of time however long its slices are, and however many jobs others have. Who
+ * comes, or comes back after a pause, begins at the least of those who are ready: it is next, or one of the next,
+ * but has no claim on what it missed.
+ *
+ * A frame that somebody looks at is better finished than begun beside others: with sixty of them in turns by
+ * slices each would show a camera that is sixty frames old. So it keeps the turn, for SCHEDULE_TURN_NS at most; it
+ * is charged all the same. */
 #ifndef FARLIGHT_JOB_SCHEDULER_H
 #define FARLIGHT_JOB_SCHEDULER_H
 
@@ -10,16 +17,46 @@
 #include <stddef.h>
 #include <stdint.h>
 
-struct schedule_entry {
-    uint64_t client;
-    uint64_t client_served; /* number of the slice that the client had last; 0: none yet */
-    uint64_t job_served;    /* likewise the job */
-    bool ready;
+/* Of a client, or of a job among those of its client. All-zero is one that has just come. */
+struct schedule_share {
+    uint64_t virtual_ns;
+    uint64_t turn;     /* number of its last slice; among equals who has waited longest is next */
+    uint64_t ready_in; /* number of the last pick that found it ready */
+    bool ready;        /* during a pick */
 };
 
+/* Those who compete with each other: all clients, or the jobs of one. */
+struct schedule_group {
+    uint64_t least_ns; /* virtual time of whoever of those that were ready had least; never goes back */
+    uint64_t next_ns;  /* during a pick */
+};
+
+struct schedule_client {
+    struct schedule_share share;
+    struct schedule_group jobs;
+};
+
+struct scheduler {
+    struct schedule_group clients;
+    uint64_t picks, turns;
+    uint64_t turn_ns; /* since whoever had the last slice was picked */
+};
+
+struct schedule_entry {
+    struct schedule_client *client; /* of several jobs the same one */
+    struct schedule_share *job;
+    bool ready;
+    bool keeps_turn; /* once it has it */
+};
+
+#define SCHEDULE_TURN_NS 10000000u /* as a slice on software GL */
 #define SCHEDULE_NONE SIZE_MAX
 
-/* Position of the entry whose slice is next; SCHEDULE_NONE: nobody is ready. Among equals the first. */
-size_t schedule_pick(const struct schedule_entry *entries, size_t count);
+/* Position of the entry whose slice is next, and is to be charged; SCHEDULE_NONE: nobody is ready. Who is not
+ * named is not ready. */
+size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count);
+/* That entry's slice took so long. `weight`: of the job, at least 1. */
+void schedule_charge(struct scheduler *scheduler, const struct schedule_entry *entry, uint64_t slice_ns,
+                     uint32_t weight);
 
 #endif

@@ -4,6 +4,7 @@
 #include "base/timeline.h"
 #include "session/jobs.h"
 #include "session/session.h"
+#include "session/views.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -57,6 +58,8 @@ void frames_add(struct job *job, struct engine_frame *frame)
     };
     *job->end = pending;
     job->end = &pending->next;
+    if (job->view)
+        view_frame_made(job, frame);
     connection_wake(job->session->connection);
 }
 
@@ -79,6 +82,16 @@ uint32_t frames_drop(struct session *session, struct job *job)
         remove_first(job);
     }
     return before;
+}
+
+unsigned frames_of_before(const struct job *job)
+{
+    return job->first && job->first->request != job->request;
+}
+
+unsigned frames_on_the_wire(const struct job *job)
+{
+    return job->first && job->first->begun_ns;
 }
 
 bool frames_keep_begun(struct job *job)
@@ -261,6 +274,8 @@ static void on_begin_sent(void *context, uint64_t begun_ns, uint64_t now_ns)
     (void)now_ns;
     struct pending_frame *pending = context;
     pending->begun_ns = begun_ns;
+    if (pending->job && pending->job->view)
+        view_frame_begun(pending->job, pending->frame, begun_ns);
 }
 
 static void on_last_sent(void *context, uint64_t begun_ns, uint64_t now_ns)
@@ -328,8 +343,12 @@ static bool queue_piece(struct pending_frame *pending)
 static bool has_something_to_queue(const struct job *job)
 {
     const struct pending_frame *pending = job->first;
-    /* A view's frame may have been begun with the credit that one of the view before has used since. */
-    return pending && !pending->queued && (pending->begun || job->frames_sent < job->client_credit);
+    if (!pending || pending->queued)
+        return false;
+    if (pending->begun)
+        return true;
+    /* A view's frame may have been made with the credit that one of the view before has used since. */
+    return job->frames_sent < job->client_credit && (!job->view || view_may_send(job));
 }
 
 /* The first job with something to queue moves to the end of the list, so that jobs take turns. */

@@ -24,6 +24,10 @@ void frames_add(struct job *job, struct engine_frame *frame);
 uint32_t frames_drop(struct session *session, struct job *job);
 /* Drops what has not been begun. True: one has, and will be finished. */
 bool frames_keep_begun(struct job *job);
+/* Its frames under way that are those of a view whose place it has taken: 0 or 1. */
+unsigned frames_of_before(const struct job *job);
+/* Its frames whose first byte has gone, but not the last: 0 or 1. */
+unsigned frames_on_the_wire(const struct job *job);
 /* Queues pieces as long as the connection wants bulk; jobs take turns. */
 void frames_pump(struct session *session);
 void frame_data_head(uint8_t head[FRAME_DATA_HEAD_BYTES], uint32_t request, uint32_t channel,

@@ -288,8 +288,10 @@ static void fill_job(struct engine_job *job, const struct session *session, cons
     };
 }
 
-static uint64_t allowed_credit(const struct job *job)
+static uint64_t allowed_credit(struct job *job)
 {
+    if (job->view)
+        return view_allowed_credit(job);
     uint64_t left = job->client_credit - job->frames_sent;
     return job->frames_gone + (left < job->window ? left : job->window);
 }
@@ -299,7 +301,8 @@ static struct job *job_create(struct session *session, uint32_t request, const s
 {
     bool is_view = render->kind == PROTOCOL_JOB_KIND_VIEW;
     struct job *job = calloc(1, sizeof *job);
-    struct session_view *view = is_view ? session_view_create() : NULL;
+    struct view_terms terms = view_terms_of(render);
+    struct session_view *view = is_view ? session_view_create(&terms) : NULL;
     if (!job || (is_view && !view)) {
         free(job);
         return NULL;
@@ -311,7 +314,7 @@ static struct job *job_create(struct session *session, uint32_t request, const s
         .channel = render->channel,
         .scene = render->scene,
         .client_credit = render->credit,
-        .window = is_view ? VIEW_WINDOW_FRAMES : window_of(session, render),
+        .window = window_of(session, render),
         .frame_bytes = job_bytes_of(session, render),
         .view = view,
     };
@@ -336,8 +339,8 @@ static bool add_change(struct job *job, uint32_t request, const struct message_r
         .request = request,
         .scene = render->scene,
         .credit = job->client_credit > job->frames_sent ? 1 : 0,
-        .window = VIEW_WINDOW_FRAMES,
         .frame_bytes = job_bytes_of(job->session, render),
+        .terms = view_terms_of(render),
     };
     view_add_change(job, change);
     return true;
@@ -390,14 +393,19 @@ static void tell_engine_credit(struct job *job)
         job->engine_credit = allowed;
 }
 
+void job_pace(struct job *job)
+{
+    tell_engine_credit(job);
+    connection_wake(job->session->connection);
+}
+
 void jobs_credit(struct session *session, const struct message_credit *credit)
 {
     struct job *job = jobs_find(session, credit->channel);
     if (!job || credit->total <= job->client_credit)
         return; /* the job may just have ended; credit never falls */
     job->client_credit = credit->total;
-    tell_engine_credit(job);
-    connection_wake(session->connection);
+    job_pace(job);
 }
 
 bool job_is_owed(const struct job *job)
@@ -438,6 +446,7 @@ static void end(struct session *session, struct job *job)
     }
     drop_frames(session, job);
     view_switch(job);
+    view_forget_frames(job);
     tell_engine_credit(job);
 }
 
@@ -495,6 +504,8 @@ void job_done(struct session *session, struct request *request)
 void job_frame_sent(struct job *job, uint32_t request_id)
 {
     job->frames_sent++;
+    if (job->view)
+        view_frame_sent(job);
     if (request_id != job->request) {
         request_answer_ok(job->session, request_find(job->session, request_id), 0);
         tell_engine_credit(job);

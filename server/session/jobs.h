@@ -38,6 +38,8 @@ void job_done(struct session *session, struct request *request);
 void job_failed(struct session *session, struct request *request, const struct error *error);
 /* A frame of that request, the job's or that of a view whose place it has taken, is with the kernel. */
 void job_frame_sent(struct job *job, uint32_t request);
+/* Something has changed that may let frames be begun, or go. */
+void job_pace(struct job *job);
 void jobs_finish(struct session *session);
 bool job_is_owed(const struct job *job); /* the daemon has work for it, the client waits */
 /* NULL: no job has that channel. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "session/views.h"
 
+#include "base/clock.h"
 #include "session/frames.h"
 #include "session/session.h"
 
@@ -8,12 +9,40 @@
 #include <stdlib.h>
 #include <string.h>
 
-struct session_view *session_view_create(void)
+/* Frames of a view that are rendered, encoded or sent at once: while one is sent, the next one is encoded and the
+ * one after it rendered. */
+#define IN_HAND_MAX 3
+/* A client that has not acknowledged its first frame by then acknowledges none. */
+#define SILENCE_NS UINT64_C(250000000)
+/* So long nothing has come before the client is told why. */
+#define BLOCKED_NS UINT64_C(100000000)
+#define SECOND_NS 1e9
+
+/* ---- life -------------------------------------------------------------------------------------------- */
+
+static void on_pace_timer(void *context);
+static void on_silence_timer(void *context);
+static void on_blocked_timer(void *context);
+
+struct view_terms view_terms_of(const struct message_render *render)
+{
+    bool has_quality = render->encoding == PROTOCOL_ENCODING_JPEG || render->encoding == PROTOCOL_ENCODING_H264;
+    return (struct view_terms){
+        .frame_ns = (uint64_t)(SECOND_NS / (double)render->frames_per_second),
+        .samples = render->samples,
+        .quality = has_quality ? render->quality : 0,
+        .adapt = render->adapt != 0,
+    };
+}
+
+struct session_view *session_view_create(const struct view_terms *terms)
 {
     struct session_view *view = calloc(1, sizeof *view);
     if (!view)
         return NULL;
+    view->terms = *terms;
     view->changes_end = &view->changes;
+    pacing_init(&view->pacing, terms->frame_ns);
     view->wishes = view_wishes_create();
     if (view->wishes)
         return view;
@@ -26,10 +55,21 @@ void session_view_destroy(struct job *job)
     struct session_view *view = job->view;
     if (!view)
         return;
+    struct loop *loop = job->session->hub->loop;
+    loop_timer_stop(loop, &view->pace_timer);
+    loop_timer_stop(loop, &view->silence_timer);
+    loop_timer_stop(loop, &view->blocked_timer);
     while (view->changes)
         view_drop_change(job, view->changes);
     view_wishes_unref(view->wishes);
     free(view);
+}
+
+static void start_timer(struct job *job, struct loop_timer *timer, loop_call_fn *call, uint64_t delay_ns)
+{
+    timer->call = call;
+    timer->context = job;
+    loop_timer_start(job->session->hub->loop, timer, delay_ns);
 }
 
 /* ---- one view in the place of another ---------------------------------------------------------------- */
@@ -69,17 +109,156 @@ void view_drop_change(struct job *job, struct view_change *change)
 
 void view_switch(struct job *job)
 {
-    struct view_change *change = job->view->changes;
-    take_out(job->view, change);
+    struct session_view *view = job->view;
+    struct view_change *change = view->changes;
+    take_out(view, change);
     job->session->hub->frame_bytes -= job->frame_bytes;
     job->request = change->request;
     job->scene = change->scene;
-    job->window = change->window;
     job->frame_bytes = change->frame_bytes;
     job->engine_credit = change->credit;
     job->frames_gone = 0;
     job->cancelled = change->cancelled;
+    view->terms = change->terms;
+    view->pacing.frame_ns = change->terms.frame_ns;
+    view->shown_samples = 0;
     free(change);
+}
+
+void view_forget_frames(struct job *job)
+{
+    pacing_init(&job->view->pacing, job->view->terms.frame_ns);
+}
+
+/* ---- pace -------------------------------------------------------------------------------------------- */
+
+/* The client has seen less than it asked for, as far as is known here. */
+static bool wants_more(const struct job *job)
+{
+    const struct session_view *view = job->view;
+    return view->last_command > view->shown_command ||
+           (!view->shown_moving && view->shown_samples < view->terms.samples);
+}
+
+/* Why nothing comes, if it is for the client to change that; NULL: it is not. */
+static const char *blocked_by(const struct job *job)
+{
+    const struct session_view *view = job->view;
+    if (job->frames_sent >= job->client_credit)
+        return "the credit is used up";
+    if (pacing_wait_ns(&view->pacing, 0) == UINT64_MAX)
+        return "frames on their way are not acknowledged";
+    return NULL;
+}
+
+static void watch_for_blocks(struct job *job)
+{
+    struct session_view *view = job->view;
+    if (!view->blocked_timer.running && view->blocked_told != job->frames_sent + 1 && wants_more(job) &&
+        blocked_by(job))
+        start_timer(job, &view->blocked_timer, on_blocked_timer, BLOCKED_NS);
+}
+
+static void on_blocked_timer(void *context)
+{
+    struct job *job = context;
+    const char *why = wants_more(job) ? blocked_by(job) : NULL;
+    if (!why)
+        return;
+    job->view->blocked_told = job->frames_sent + 1;
+    struct message message;
+    message_init(&message, MESSAGE_BLOCKED);
+    message.blocked.channel = job->channel;
+    message.blocked.total = job->frames_sent;
+    message.blocked.text = why;
+    session_send(job->session, 0, 0, &message);
+}
+
+uint64_t view_allowed_credit(struct job *job)
+{
+    struct session_view *view = job->view;
+    uint64_t allowed = job->engine_credit;
+    uint64_t before = frames_of_before(job);
+    loop_timer_stop(job->session->hub->loop, &view->pace_timer);
+    for (;;) {
+        uint64_t in_hand = allowed - job->frames_gone + before;
+        if (in_hand >= IN_HAND_MAX || job->frames_sent + in_hand >= job->client_credit)
+            break;
+        /* It is begun so early that it comes when it may go. */
+        uint64_t wait_ns = pacing_wait_ns(&view->pacing, (unsigned)(in_hand - frames_on_the_wire(job)));
+        if (wait_ns > view->made_ns && !view->due) {
+            if (wait_ns != UINT64_MAX)
+                start_timer(job, &view->pace_timer, on_pace_timer, wait_ns - view->made_ns);
+            break;
+        }
+        view->due = false;
+        allowed++;
+    }
+    watch_for_blocks(job);
+    return allowed;
+}
+
+static void on_pace_timer(void *context)
+{
+    struct job *job = context;
+    job->view->due = true;
+    job_pace(job);
+}
+
+/* The client has had its time to acknowledge the first frame. */
+static void on_silence_timer(void *context)
+{
+    struct job *job = context;
+    struct session_view *view = job->view;
+    if (view->pacing.acknowledges)
+        return;
+    view->silent = true;
+    pacing_forget(&view->pacing);
+    job_pace(job);
+}
+
+bool view_may_send(const struct job *job)
+{
+    return pacing_may_send(&job->view->pacing);
+}
+
+void view_frame_made(struct job *job, const struct engine_frame *frame)
+{
+    struct session_view *view = job->view;
+    view->made_ns = frame->encoded_ns > frame->applied_ns ? frame->encoded_ns - frame->applied_ns : 0;
+    if (!frame->moving)
+        return;
+    unsigned scale_eighths = frame->scale_eighths ? frame->scale_eighths : PACING_SCALE_FULL;
+    pacing_learn(&view->pacing, scale_eighths, frame->quality, frame->rendered_ns - frame->applied_ns,
+                 frame->size_bytes);
+    if (!view->terms.adapt)
+        return;
+    unsigned wanted = view->terms.quality ? view->terms.quality : PACING_QUALITY_REFERENCE;
+    struct pacing_advice advice = pacing_advise(&view->pacing, wanted);
+    struct view_effort effort = {
+        .scale_eighths = advice.scale_eighths,
+        .quality = view->terms.quality ? advice.quality : 0,
+        .bytes = advice.bytes,
+    };
+    view_wishes_set_effort(view->wishes, &effort);
+}
+
+void view_frame_begun(struct job *job, const struct engine_frame *frame, uint64_t begun_ns)
+{
+    struct session_view *view = job->view;
+    pacing_sent(&view->pacing, frame->frame, frame->size_bytes, begun_ns);
+    view->shown_command = frame->command;
+    view->shown_moving = frame->moving;
+    view->shown_samples = frame->result.samples;
+}
+
+void view_frame_sent(struct job *job)
+{
+    struct session_view *view = job->view;
+    if (view->silent)
+        pacing_forget(&view->pacing);
+    else if (!view->pacing.acknowledges && !view->silence_timer.running)
+        start_timer(job, &view->silence_timer, on_silence_timer, SILENCE_NS);
 }
 
 /* ---- wishes ------------------------------------------------------------------------------------------ */
@@ -129,11 +308,18 @@ void views_look(struct session *session, const struct message_view_camera *messa
     memcpy(camera.key.up_world, message->up_world, sizeof camera.key.up_world);
     if (view_wishes_look(job->view->wishes, &camera))
         tell_engine(job);
+    watch_for_blocks(job);
 }
 
 void views_acknowledge(struct session *session, const struct message_frame_ack *message)
 {
     struct job *job = find_view(session, message->channel);
-    if (job && message->want_key_frame && view_wishes_want_key_frame(job->view->wishes))
+    if (!job)
+        return;
+    struct session_view *view = job->view;
+    view->silent = false;
+    pacing_acknowledged(&view->pacing, message->frame, message->whole != 0, session->connection->last_received_ns);
+    if (message->want_key_frame && view_wishes_want_key_frame(view->wishes))
         tell_engine(job);
+    job_pace(job);
 }

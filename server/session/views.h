@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a session keeps of a view beside what it keeps of every job: the wishes that the engine looks at, and the
- * views that are to take its place.
+/* What a session keeps of a view beside what it keeps of every job: the wishes that the engine looks at, the pace
+ * at which its link takes frames, and the views that are to take its place.
  *
  * The views that follow each other on a channel are one struct job: its credit, frame count and wishes go on. A
  * view takes the place of the one before when the engine says so, in the order in which the client asked for them;
@@ -10,28 +10,49 @@
 #define FARLIGHT_SESSION_VIEWS_H
 
 #include "job/view_wishes.h"
+#include "net/loop.h"
 #include "protocol/messages.h"
 #include "session/jobs.h"
+#include "session/pacing.h"
 
-/* Frames of a view that are rendered, encoded or sent at once: while one is sent, the next one is made. */
-#define VIEW_WINDOW_FRAMES 2
+/* A view's terms, as its render has them. */
+struct view_terms {
+    uint64_t frame_ns; /* from one frame to the next, at least */
+    uint32_t samples;  /* that a picture is to have */
+    unsigned quality;  /* of motion */
+    bool adapt;
+};
 
 /* A view that is to take the place of the one that is there. */
 struct view_change {
     struct view_change *next;
     uint32_t request, scene;
-    uint64_t credit, window, frame_bytes; /* as of struct job */
+    uint64_t credit, frame_bytes; /* as of struct job: engine_credit, frame_bytes */
+    struct view_terms terms;
     bool cancelled;
 };
 
 struct session_view {
     struct view_wishes *wishes;
+    struct view_terms terms;
     struct view_change *changes, **changes_end; /* the engine has not answered them yet; in order */
-    uint64_t last_command;
+    struct pacing pacing;
+    struct loop_timer pace_timer; /* until the next frame is begun, if nothing happens before .. */
+    bool due;                     /* .. which it is now */
+    struct loop_timer silence_timer;
+    bool silent;      /* the client acknowledges nothing */
+    uint64_t made_ns; /* what the last frame took from being taken up until it was encoded */
+    /* What came last of the client, and what it was shown last. */
+    uint64_t last_command, shown_command;
+    bool shown_moving;
+    uint32_t shown_samples;
+    struct loop_timer blocked_timer;
+    uint64_t blocked_told; /* frames that had been sent when the client was told last that nothing comes, and 1 */
 };
 
-struct session_view *session_view_create(void); /* NULL: out of memory */
-void session_view_destroy(struct job *job);     /* of a job that ends; accepts one that is no view */
+struct view_terms view_terms_of(const struct message_render *render);
+struct session_view *session_view_create(const struct view_terms *terms); /* NULL: out of memory */
+void session_view_destroy(struct job *job); /* of a job that ends; accepts one that is no view */
 
 /* Takes `change` over. */
 void view_add_change(struct job *job, struct view_change *change);
@@ -40,6 +61,17 @@ struct view_change *view_find_change(const struct job *job, uint32_t request); /
 void view_drop_change(struct job *job, struct view_change *change);
 /* The first change is what the job is from now on. */
 void view_switch(struct job *job);
+/* Frames on their way were dropped: no acknowledgement of them will come. */
+void view_forget_frames(struct job *job);
+
+/* Frames that the engine may have begun by now, so that each comes when the link takes it. */
+uint64_t view_allowed_credit(struct job *job);
+
+/* A frame has come from the engine; its first byte is about to go; its last one is with the kernel. */
+void view_frame_made(struct job *job, const struct engine_frame *frame);
+bool view_may_send(const struct job *job);
+void view_frame_begun(struct job *job, const struct engine_frame *frame, uint64_t begun_ns);
+void view_frame_sent(struct job *job);
 
 /* VIEW_CAMERA and FRAME_ACK */
 void views_look(struct session *session, const struct message_view_camera *message);

@@ -3,6 +3,7 @@
 #ifndef FARLIGHT_TESTS_ENGINE_FAKE_H
 #define FARLIGHT_TESTS_ENGINE_FAKE_H
 
+#include "base/clock.h"
 #include "job/backend.h"
 #include "job/engine.h"
 #include "render/frame_request.h"
@@ -20,8 +21,8 @@
 
 /* ---- a renderer that renders nothing ------------------------------------------------------------ */
 
-/* Steps that a frame takes are its samples. A frame of depth 7 goes on until the gate is opened, to all or to its
- * seed; one of depth 8 changes what the frames of a scene share. */
+/* Steps that a frame takes are its samples, and each takes ao_rays microseconds. A frame of depth 7 goes on until
+ * the gate is opened, to all or to its seed; one of depth 8 changes what the frames of a scene share. */
 #define GATED_DEPTH 7
 #define CHANGING_DEPTH 8
 #define STEPS_MAX 4096
@@ -61,6 +62,7 @@ static struct {
     atomic_int in_progress; /* frames, of all scenes */
     atomic_int step_count;
     uint64_t step_seeds[STEPS_MAX]; /* whose step it was: the request's seed */
+    uint64_t step_ns[STEPS_MAX];    /* how long it took */
 } fake;
 
 static inline struct gpu_device *fake_device_create(const struct gpu_options *options, struct error *error)
@@ -200,12 +202,22 @@ static inline bool fake_begin(struct frame_renderer *renderer, const struct scen
     return true;
 }
 
+static inline void fake_work(const struct frame_renderer *renderer)
+{
+    int step = atomic_fetch_add(&fake.step_count, 1);
+    uint64_t start_ns = clock_now_ns(), now_ns = start_ns;
+    while (now_ns - start_ns < renderer->request.ao_rays * UINT64_C(1000))
+        now_ns = clock_now_ns();
+    if (step >= STEPS_MAX)
+        return;
+    fake.step_seeds[step] = renderer->request.seed;
+    fake.step_ns[step] = now_ns - start_ns;
+}
+
 static inline enum frame_progress fake_step(struct frame_renderer *renderer, struct frame_result *result,
                                             struct error *error)
 {
-    int step = atomic_fetch_add(&fake.step_count, 1);
-    if (step < STEPS_MAX)
-        fake.step_seeds[step] = renderer->request.seed;
+    fake_work(renderer);
     int fail_from = atomic_load(&fake.fail_from_frame);
     if (atomic_load(&fake.fail_steps) > 0 || (fail_from && atomic_load(&fake.frames_begun) >= fail_from)) {
         atomic_fetch_sub(&fake.fail_steps, 1);
@@ -379,6 +391,34 @@ static inline void expect_silence(struct engine *engine)
     if (event)
         fail_msg("event kind %d for client %d, request %u; expected none", event->kind, (int)event->client,
                  event->request);
+}
+
+/* That as long as both had work left each had its share of the time, a divided by its weight as much as b, within
+ * one step of each and what the clock shows outside of steps where the machine has other work. */
+static inline void expect_shares(uint64_t seed_a, uint32_t weight_a, uint64_t seed_b, uint32_t weight_b)
+{
+    const uint64_t seeds[2] = {seed_a, seed_b}, slack_ns = 20000000;
+    const uint32_t weights[2] = {weight_a, weight_b};
+    uint64_t had_ns[2] = {0}, longest_ns[2] = {0};
+    int count = atomic_load(&fake.step_count), last[2] = {0};
+    assert_true(count <= STEPS_MAX);
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < 2; k++)
+            last[k] = fake.step_seeds[i] == seeds[k] ? i : last[k];
+    for (int i = 0; i < (last[0] < last[1] ? last[0] : last[1]); i++) {
+        for (int k = 0; k < 2; k++) {
+            if (fake.step_seeds[i] != seeds[k])
+                continue;
+            uint64_t virtual_ns = fake.step_ns[i] / weights[k];
+            had_ns[k] += virtual_ns;
+            longest_ns[k] = virtual_ns > longest_ns[k] ? virtual_ns : longest_ns[k];
+        }
+        uint64_t more = had_ns[0] > had_ns[1] ? had_ns[0] - had_ns[1] : had_ns[1] - had_ns[0];
+        if (more > longest_ns[0] + longest_ns[1] + slack_ns)
+            fail_msg("after %d steps one had %.1f ms, divided by its weight, the other %.1f", i + 1,
+                     (double)had_ns[0] * 1e-6, (double)had_ns[1] * 1e-6);
+    }
+    assert_true(had_ns[0] > 2 * slack_ns); /* else nothing was shown */
 }
 
 static inline void wait_until(const atomic_int *counter, int value)

@@ -14,6 +14,7 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -71,6 +72,8 @@ struct client {
     struct framing_header header; /* of the last message */
     struct message message;
     uint64_t upload_credit;
+    unsigned blocked; /* how often it was told so, and why the last time */
+    char blocked_text[129];
 };
 
 static struct daemon served;
@@ -210,6 +213,8 @@ static inline const struct message *receive(void)
             fail_msg("%s: %s", error.field, error.text);
         if (client.message.type == MESSAGE_CREDIT)
             client.upload_credit = client.message.credit.total;
+        else if (client.message.type == MESSAGE_BLOCKED && ++client.blocked)
+            snprintf(client.blocked_text, sizeof client.blocked_text, "%s", client.message.blocked.text);
         else
             return &client.message;
     }

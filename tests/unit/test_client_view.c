@@ -12,7 +12,7 @@ static uint8_t pixels[EDGE * EDGE * 4];
 
 /* What the daemon saw of the client; read once its thread has ended. */
 static struct {
-    unsigned renders, cameras, acks, key_frames, cancels;
+    unsigned renders, cameras, acks, begun_acks, key_frames, cancels;
     uint64_t credit, last_command;
     uint32_t last_acked;
     struct message_render first, last;
@@ -84,7 +84,8 @@ static bool look(struct daemon *daemon, struct framing_header *header, struct me
         seen.was_moving = message->view_camera.moving != 0;
         break;
     case MESSAGE_FRAME_ACK:
-        seen.acks += message->frame_ack.want_key_frame == 0;
+        seen.acks += message->frame_ack.want_key_frame == 0 && message->frame_ack.whole;
+        seen.begun_acks += !message->frame_ack.whole;
         seen.key_frames += message->frame_ack.want_key_frame;
         seen.last_acked = message->frame_ack.frame;
         break;
@@ -222,6 +223,7 @@ static void frames_are_acknowledged_and_credit_follows_those_that_are_taken(void
     fl_view_destroy(view);
     fl_connection_destroy(scene.connection);
     stop(daemon);
+    assert_int_equal(seen.begun_acks, 3);
     assert_int_equal(seen.acks, 3);
     assert_int_equal(seen.last_acked, 2);
     assert_int_equal(seen.key_frames, 1);

@@ -136,28 +136,36 @@ static void frames_that_nobody_takes_stop_the_rendering(void **state)
     stop(engine);
 }
 
-static void jobs_of_two_clients_take_turns_by_slices(void **state)
+/* Slices of one client take ten times as long as those of the other. */
+static void run_beside_each_other(uint32_t weight_of_first)
 {
-    (void)state;
     struct engine *engine = start((struct engine_options){0});
-    open_scene(engine, 1, 1);
-    open_scene(engine, 2, 1);
+    for (uint64_t client = 1; client <= 2; client++)
+        open_scene(engine, client, 1);
     for (uint64_t client = 1; client <= 2; client++) {
-        struct engine_command *made = gated(render(client, 5, 0, 0));
-        made->job.frame.samples = 40;
+        struct engine_command *made = render(client, 5, 0, 0);
+        made->job.frame.samples = client == 1 ? 40 : 400;
+        made->job.frame.ao_rays = client == 1 ? 5000 : 500;
         made->job.frame.seed = client;
+        made->job.weight = client == 1 ? weight_of_first : 0;
         submit(engine, made);
     }
-    wait_until(&fake.frames_begun, 2);
-    atomic_store(&fake.step_count, 0);
-    atomic_store(&fake.gate_open, true);
-    for (int i = 0; i < 2; i++)
+    for (int i = 0; i < 4; i++)
         engine_event_destroy(event_within(engine, 10000));
-    for (int i = 2; i < 60; i++) {
-        if (fake.step_seeds[i] == fake.step_seeds[i - 1])
-            fail_msg("client %d had slices %d and %d", (int)fake.step_seeds[i], i - 1, i);
-    }
+    expect_shares(1, weight_of_first, 2, 1);
     stop(engine);
+}
+
+static void clients_have_the_same_share_of_time_however_long_their_slices_are(void **state)
+{
+    (void)state;
+    run_beside_each_other(1);
+}
+
+static void the_weight_of_a_job_is_its_clients_share(void **state)
+{
+    (void)state;
+    run_beside_each_other(4);
 }
 
 /* ---- edits -------------------------------------------------------------------------------------- */
@@ -402,7 +410,8 @@ int main(void)
         cmocka_unit_test(no_frame_goes_out_beyond_its_credit),
         cmocka_unit_test(large_frames_are_fewer_in_flight_but_always_one),
         cmocka_unit_test(frames_that_nobody_takes_stop_the_rendering),
-        cmocka_unit_test(jobs_of_two_clients_take_turns_by_slices),
+        cmocka_unit_test(clients_have_the_same_share_of_time_however_long_their_slices_are),
+        cmocka_unit_test(the_weight_of_a_job_is_its_clients_share),
         cmocka_unit_test(edits_wait_for_the_frame_in_hand_and_others_do_not),
         cmocka_unit_test(what_waits_for_a_frame_keeps_its_order_and_can_be_cancelled),
         cmocka_unit_test(a_refused_commit_names_its_field),

@@ -206,6 +206,7 @@ static void tcp_tells_its_port_and_stays_on_loopback(void **state)
     assert_true(address_parse(&address, "tcp:0.0.0.0:0", &error));
     assert_false(listener_open(&listener, &address, false, &error));
     assert_int_equal(error.kind, ERROR_DENIED);
+    assert_non_null(strstr(error.remedy, "--key-file"));
     assert_non_null(strstr(error.remedy, "--insecure"));
     assert_true(listener_open(&listener, &address, true, &error));
     listener_close(&listener);
@@ -472,6 +473,46 @@ static void what_is_dropped_is_not_sent_but_what_was_begun_is_finished(void **st
     assert_int_equal(released, 1);
 }
 
+/* What a sealed connection has copied, but the kernel has not taken yet. */
+static void what_was_taken_is_begun_but_not_sent(void **state)
+{
+    (void)state;
+    struct out_queue queue;
+    struct out_chunk body = {
+        .references = 1, .data = (const uint8_t *)"abcdef", .size_bytes = 6, .release = on_release};
+    struct iovec parts[16];
+    char text[64];
+    released = sent_calls = 0;
+    out_queue_init(&queue);
+    push(&queue, "B1", 7, &body, true); /* 7 bytes each */
+    push(&queue, "B2", 7, &body, true);
+    push(&queue, "B3", 7, &body, true);
+    out_queue_gather(&queue, parts, 16);
+    out_queue_take(&queue, 9); /* B1 and the head of B2 */
+    assert_int_equal(out_queue_gather(&queue, parts, 16), 5);
+    assert_int_equal(parts[0].iov_len, 3);
+    assert_memory_equal(parts[0].iov_base, "bcd", 3);
+    assert_int_equal(queue.queued_bytes, 21);
+    push(&queue, "C1", 7, NULL, false);
+    out_queue_drop_bulk(&queue, 7); /* B3 only: the others are under way */
+    assert_int_equal(queue.queued_bytes, 16);
+    out_queue_advance(&queue, 4, 1, 2);
+    assert_int_equal(queue.queued_bytes, 12);
+    assert_int_equal(queue.taken_bytes, 5);
+    assert_int_equal(sent_calls, 0);
+    out_queue_advance(&queue, 5, 1, 2);
+    assert_int_equal(queue.taken_bytes, 0);
+    drain(&queue, 100, text);
+    assert_string_equal(text, "bcd..C1");
+    assert_int_equal(sent_calls, 0); /* of a request that was dropped */
+    assert_int_equal(queue.queued_bytes, 0);
+    assert_int_equal(queue.sending_bytes, 0);
+    assert_int_equal(queue.queued_bulk_bytes, 0);
+    out_queue_finish(&queue);
+    out_chunk_unref(&body);
+    assert_int_equal(released, 1);
+}
+
 /* A client may ask for a great many short answers and then read them all at once. */
 static void many_short_messages_are_sent_without_looking_at_all_of_them_each_time(void **state)
 {
@@ -620,6 +661,7 @@ int main(void)
         cmocka_unit_test(a_watch_that_was_removed_is_not_called_even_in_the_same_turn),
         cmocka_unit_test(control_goes_first_and_nothing_is_lost_however_little_is_taken),
         cmocka_unit_test(what_is_dropped_is_not_sent_but_what_was_begun_is_finished),
+        cmocka_unit_test(what_was_taken_is_begun_but_not_sent),
         cmocka_unit_test(many_short_messages_are_sent_without_looking_at_all_of_them_each_time),
         cmocka_unit_test(a_hash_is_no_key_to_somebody_elses_blob),
         cmocka_unit_test(the_cache_drops_what_was_used_longest_ago_and_never_what_is_in_use),

@@ -8,7 +8,8 @@
 #include "job/view_wishes.h"
 
 #define CHANNEL 5u
-#define FRAME_BYTES ((size_t)300001) /* two pieces, the last of odd size */
+#define FRAME_BYTES ((size_t)300001)        /* two pieces, the last of odd size */
+#define LARGE_FRAME_BYTES ((size_t)5 << 20) /* more than sockets and queues hold */
 
 /* ---- an engine --------------------------------------------------------------------------------------- */
 
@@ -121,7 +122,7 @@ static void told_nothing(void)
 }
 
 /* A frame of a view, that shows a command and was taken up, read back and encoded at 100, 200 and 300 ns. */
-static void say_frame(uint32_t request, uint32_t number, uint64_t command)
+static void say_frame_of(uint32_t request, uint32_t number, uint64_t command, size_t bytes)
 {
     struct engine_event *made = calloc(1, sizeof *made);
     struct engine_frame *frame = calloc(1, sizeof *frame);
@@ -133,10 +134,10 @@ static void say_frame(uint32_t request, uint32_t number, uint64_t command)
     frame->frame = number;
     frame->request.width = frame->request.height = 1;
     frame->result.samples = frame->result.layers = 1;
-    frame->size_bytes = FRAME_BYTES;
-    frame->bytes = malloc(FRAME_BYTES);
+    frame->size_bytes = bytes;
+    frame->bytes = malloc(bytes);
     assert_non_null(frame->bytes);
-    memset(frame->bytes, (int)number, FRAME_BYTES);
+    memset(frame->bytes, (int)number, bytes);
     frame->command = command;
     frame->received_ns = command ? 50 : 0;
     frame->moving = command % 2;
@@ -149,6 +150,16 @@ static void say_frame(uint32_t request, uint32_t number, uint64_t command)
     assert_true(queue_push(engine.events, made));
 }
 
+static void say_frame(uint32_t request, uint32_t number, uint64_t command)
+{
+    say_frame_of(request, number, command, FRAME_BYTES);
+}
+
+static void say_large_frame(uint32_t request, uint32_t number)
+{
+    say_frame_of(request, number, 0, LARGE_FRAME_BYTES);
+}
+
 /* ---- steps ------------------------------------------------------------------------------------------- */
 
 static struct message view_message(uint32_t credit)
@@ -159,9 +170,18 @@ static struct message view_message(uint32_t credit)
     message.render.channel = CHANNEL;
     message.render.credit = credit;
     message.render.samples = 16;
+    message.render.frames_per_second = 1; /* the link is never what holds frames back */
     message.render.encoding = PROTOCOL_ENCODING_JPEG;
     message.render.still_encoding = PROTOCOL_ENCODING_ZSTD;
     return message;
+}
+
+static void expect_told_start(uint32_t request, enum job_kind kind)
+{
+    struct engine_command *command = told(ENGINE_JOB_START);
+    assert_int_equal(command->request, request);
+    assert_int_equal(command->job.kind, kind);
+    engine_command_destroy(command);
 }
 
 /* Opens scene 1 as request 1 and a view of it; what the engine was told is the caller's. */
@@ -196,6 +216,16 @@ static void send_credit(uint64_t total)
     struct message message = made(MESSAGE_CREDIT);
     message.credit.channel = CHANNEL;
     message.credit.total = total;
+    send_message(0, 0, &message);
+}
+
+static void send_ack(uint32_t frame, bool whole, bool want_key_frame)
+{
+    struct message message = made(MESSAGE_FRAME_ACK);
+    message.frame_ack.channel = CHANNEL;
+    message.frame_ack.frame = frame;
+    message.frame_ack.whole = whole;
+    message.frame_ack.want_key_frame = want_key_frame;
     send_message(0, 0, &message);
 }
 
@@ -253,24 +283,313 @@ static void a_frame_names_the_camera_that_it_shows(void **state)
     engine_command_destroy(start);
 }
 
-static void frames_are_begun_one_ahead_of_those_sent_and_not_beyond_credit(void **state)
+/* Frame 0 shows command 0 and is acknowledged; from then on three frames are in hand, as far as credit goes. */
+static struct engine_command *start_acknowledged_view(uint32_t request, uint32_t credit)
+{
+    struct engine_command *start = start_view(request, credit);
+    assert_int_equal(start->job.credit, 1);
+    say_frame(request, 0, 0);
+    take_frame(request, 0);
+    send_ack(0, true, false);
+    return start;
+}
+
+static void frames_are_begun_ahead_of_those_sent_and_not_beyond_credit(void **state)
 {
     (void)state;
-    struct engine_command *start = start_view(2, 3);
-    assert_int_equal(start->job.credit, 2);
-    say_frame(2, 0, 0);
-    take_frame(2, 0);
-    told_credit(2, 3);
-    say_frame(2, 1, 0);
-    say_frame(2, 2, 0);
-    take_frame(2, 1);
-    take_frame(2, 2);
-    told_nothing();
-    send_credit(4);
+    struct engine_command *start = start_acknowledged_view(2, 5);
     told_credit(2, 4);
-    send_credit(4); /* absolute: the same again is nothing new */
+    say_frame(2, 1, 0);
+    take_frame(2, 1);
+    told_credit(2, 5);
+    say_frame(2, 2, 0);
+    say_frame(2, 3, 0);
+    say_frame(2, 4, 0);
+    take_frame(2, 2);
+    send_ack(1, true, false);
+    send_ack(2, true, false);
+    take_frame(2, 3);
+    take_frame(2, 4);
+    send_ack(4, true, false);
+    told_nothing();
+    send_credit(6);
+    told_credit(2, 6);
+    send_credit(6); /* absolute: the same again is nothing new */
     told_nothing();
     engine_command_destroy(start);
+}
+
+static void who_acknowledges_nothing_gets_one_frame_at_a_time(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_view(2, 100);
+    assert_int_equal(start->job.credit, 1);
+    for (uint32_t frame = 0; frame < 5; frame++) {
+        say_frame(2, frame, 0);
+        take_frame(2, frame);
+        told_credit(2, frame + 2);
+    }
+    told_nothing();
+    engine_command_destroy(start);
+}
+
+static void a_flood_of_cameras_is_told_once_until_the_engine_looks(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_view(2, 1);
+    for (uint64_t number = 1; number <= 1000; number++)
+        send_camera(number, true);
+    expect_alive(9);
+    told_and_forgotten(ENGINE_VIEW_LOOK);
+    told_nothing();
+    assert_int_equal(view_wishes_take(start->job.wishes).camera.command, 1000);
+    send_camera(1001, false);
+    told_and_forgotten(ENGINE_VIEW_LOOK);
+    assert_false(view_wishes_take(start->job.wishes).camera.moving);
+    engine_command_destroy(start);
+}
+
+static void a_camera_of_no_view_is_ignored_and_one_out_of_order_is_not(void **state)
+{
+    (void)state;
+    send_camera(5, false); /* the view may just have ended */
+    send_ack(3, true, true);
+    expect_alive(9);
+    struct engine_command *start = start_view(2, 1);
+    send_camera(5, false);
+    told_and_forgotten(ENGINE_VIEW_LOOK);
+    send_camera(5, false);
+    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    assert_string_equal(client.message.error.field, "view_camera.command");
+    expect(MESSAGE_GOODBYE, 0);
+    engine_command_destroy(start);
+}
+
+static void a_key_frame_is_wished_of_the_engine(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_acknowledged_view(2, 1);
+    send_ack(0, true, true);
+    told_and_forgotten(ENGINE_VIEW_LOOK);
+    assert_true(view_wishes_take(start->job.wishes).key_frame);
+    assert_false(view_wishes_take(start->job.wishes).key_frame);
+    engine_command_destroy(start);
+}
+
+static void who_has_no_credit_left_is_told_that_nothing_comes(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_acknowledged_view(2, 1);
+    for (unsigned i = 0; !client.blocked && i < 200; i++) {
+        expect_alive(9);
+        usleep(10000);
+    }
+    assert_int_equal(client.blocked, 1);
+    assert_string_equal(client.blocked_text, "the credit is used up");
+    usleep(250000);
+    expect_alive(9);
+    assert_int_equal(client.blocked, 1); /* once is enough */
+    engine_command_destroy(start);
+}
+
+/* ---- one view in the place of another ---------------------------------------------------------------- */
+
+static struct engine_command *replace_view(uint32_t request, uint32_t width)
+{
+    struct message message = view_message(0);
+    message.render.width = width;
+    send_message(request, 0, &message);
+    struct engine_command *command = told(ENGINE_JOB_START);
+    assert_int_equal(command->request, request);
+    assert_int_equal(command->job.frame.width, width);
+    return command;
+}
+
+static void a_view_takes_the_place_of_another_on_its_channel(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_acknowledged_view(2, 100);
+    told_credit(2, 4);
+    send_camera(7, true);
+    told_and_forgotten(ENGINE_VIEW_LOOK);
+    struct engine_command *change = replace_view(3, 17);
+    assert_ptr_equal(change->job.wishes, start->job.wishes);
+    say_frame(2, 1, 7); /* the engine has not seen it yet */
+    take_frame(2, 1);
+    told_credit(2, 5);
+    say(ENGINE_DONE, 2, ERROR_NONE);
+    told_credit(3, 3); /* the engine counts anew */
+    say_frame(3, 2, 7);
+    expect(MESSAGE_OK, 2);
+    take_frame(3, 2);
+    told_credit(3, 4);
+    engine_command_destroy(change);
+    /* It is one job still: another one has room, and the third has not. */
+    struct message message = view_message(1);
+    message.render.channel = CHANNEL + 1;
+    send_message(4, 0, &message);
+    told_and_forgotten(ENGINE_JOB_START);
+    message.render.channel = CHANNEL + 2;
+    send_message(5, 0, &message);
+    expect_error(5, PROTOCOL_ERROR_CODE_LIMIT);
+    engine_command_destroy(start);
+}
+
+static void a_frame_under_way_comes_whole_before_the_answer(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_acknowledged_view(2, 100);
+    told_credit(2, 4);
+    engine_command_destroy(replace_view(3, 17));
+    /* Large enough that the socket does not take it at once: it is under way when it is replaced. */
+    say_large_frame(2, 1);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    say_frame(2, 2, 0); /* not begun on the wire: it is dropped */
+    say(ENGINE_DONE, 2, ERROR_NONE);
+    say_frame(3, 3, 0);
+    uint64_t bytes = 0;
+    while (bytes < LARGE_FRAME_BYTES) {
+        expect(MESSAGE_FRAME_DATA, 2);
+        assert_int_equal(client.message.frame_data.offset_bytes, bytes);
+        bytes += client.message.frame_data.data_bytes;
+    }
+    expect(MESSAGE_FRAME_END, 2);
+    expect(MESSAGE_OK, 2);
+    take_frame(3, 3);
+    engine_command_destroy(start);
+}
+
+static void a_view_that_cannot_be_leaves_the_one_that_is(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_acknowledged_view(2, 100);
+    told_credit(2, 4);
+    struct message message = view_message(0);
+    message.render.width = 4096; /* more than the limit: the session says so itself */
+    send_message(3, 0, &message);
+    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    engine_command_destroy(replace_view(4, 17));
+    engine_command_destroy(replace_view(5, 18));
+    say(ENGINE_FAILED, 4, ERROR_UNSUPPORTED); /* as the engine does here */
+    expect_error(4, PROTOCOL_ERROR_CODE_UNSUPPORTED);
+    say_frame(2, 1, 0);
+    take_frame(2, 1);
+    say(ENGINE_DONE, 2, ERROR_NONE);
+    expect(MESSAGE_OK, 2);
+    say_frame(5, 2, 0);
+    take_frame(5, 2);
+    engine_command_destroy(start);
+}
+
+static void a_view_that_fails_leaves_its_channel_to_the_next(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_acknowledged_view(2, 100);
+    told_credit(2, 4);
+    engine_command_destroy(replace_view(3, 17));
+    say(ENGINE_FAILED, 2, ERROR_OUT_OF_MEMORY);
+    expect_error(2, PROTOCOL_ERROR_CODE_OUT_OF_MEMORY);
+    say_frame(3, 0, 0);
+    take_frame(3, 0);
+    say(ENGINE_FAILED, 3, ERROR_OUT_OF_MEMORY);
+    expect_error(3, PROTOCOL_ERROR_CODE_OUT_OF_MEMORY);
+    /* The channel is free. */
+    while (queue_length(engine.commands))
+        told_and_forgotten(ENGINE_JOB_CREDIT);
+    struct message message = made(MESSAGE_RENDER);
+    message.render.scene = 1;
+    message.render.channel = CHANNEL;
+    send_message(4, 0, &message);
+    expect_told_start(4, JOB_BATCH);
+    engine_command_destroy(start);
+}
+
+static void a_cancelled_view_is_answered_and_nothing_follows(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_acknowledged_view(2, 100);
+    told_credit(2, 4);
+    struct message message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 2;
+    send_message(3, 0, &message);
+    struct engine_command *cancel = told(ENGINE_JOB_CANCEL);
+    assert_int_equal(cancel->target_request, 2);
+    engine_command_destroy(cancel);
+    say_frame(2, 1, 0); /* was on its way */
+    say(ENGINE_FAILED, 2, ERROR_CANCELLED);
+    say(ENGINE_DONE, 3, ERROR_NONE);
+    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect(MESSAGE_OK, 3);
+    send_camera(1, false);
+    expect_alive(9);
+    told_nothing();
+    engine_command_destroy(start);
+}
+
+static void a_view_may_be_cancelled_while_another_takes_its_place(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_acknowledged_view(2, 100);
+    told_credit(2, 4);
+    engine_command_destroy(replace_view(3, 17));
+    struct message message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 3;
+    send_message(4, 0, &message);
+    told_and_forgotten(ENGINE_JOB_CANCEL);
+    say(ENGINE_DONE, 2, ERROR_NONE);
+    say_frame(3, 1, 0); /* dropped */
+    say(ENGINE_FAILED, 3, ERROR_CANCELLED);
+    say(ENGINE_DONE, 4, ERROR_NONE);
+    expect(MESSAGE_OK, 2);
+    expect_error(3, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect(MESSAGE_OK, 4);
+    engine_command_destroy(start);
+}
+
+static void a_client_that_vanishes_takes_its_view_along(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_acknowledged_view(2, 100);
+    told_credit(2, 4);
+    engine_command_destroy(replace_view(3, 17));
+    say_large_frame(2, 1);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    close(client.fd);
+    for (unsigned i = 0; !atomic_load(&engine.gone) && i < 2000; i++)
+        usleep(10000);
+    assert_int_equal(atomic_load(&engine.gone), 1);
+    engine_command_destroy(start);
+}
+
+/* ---- what cannot be ---------------------------------------------------------------------------------- */
+
+static void expect_refused(uint32_t request, const struct message *message, enum protocol_error_code code,
+                           const char *field)
+{
+    send_message(request, 0, message);
+    expect_error(request, code);
+    assert_string_equal(client.message.error.field, field);
+}
+
+static void a_view_that_cannot_be_is_refused_by_its_field(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = view_message(1);
+    message.render.layers = 1u << PROTOCOL_LAYER_DEPTH;
+    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.layers");
+    message = view_message(1);
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
+    message.render.encoding = PROTOCOL_ENCODING_RAW;
+    message.render.still_encoding = PROTOCOL_ENCODING_JPEG;
+    expect_refused(3, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.still_encoding");
+    message = made(MESSAGE_RENDER); /* a batch has its channel to itself */
+    message.render.scene = 1;
+    message.render.channel = CHANNEL;
+    send_message(4, 0, &message);
+    expect_told_start(4, JOB_BATCH);
+    message = view_message(1);
+    expect_refused(5, &message, PROTOCOL_ERROR_CODE_INVALID, "render.channel");
 }
 
 #define BOTH(name)                                                                                                \
@@ -281,7 +600,20 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         BOTH(a_frame_names_the_camera_that_it_shows),
-        BOTH(frames_are_begun_one_ahead_of_those_sent_and_not_beyond_credit),
+        BOTH(frames_are_begun_ahead_of_those_sent_and_not_beyond_credit),
+        BOTH(who_acknowledges_nothing_gets_one_frame_at_a_time),
+        BOTH(a_flood_of_cameras_is_told_once_until_the_engine_looks),
+        BOTH(a_camera_of_no_view_is_ignored_and_one_out_of_order_is_not),
+        BOTH(a_key_frame_is_wished_of_the_engine),
+        BOTH(who_has_no_credit_left_is_told_that_nothing_comes),
+        BOTH(a_view_takes_the_place_of_another_on_its_channel),
+        BOTH(a_frame_under_way_comes_whole_before_the_answer),
+        BOTH(a_view_that_cannot_be_leaves_the_one_that_is),
+        BOTH(a_view_that_fails_leaves_its_channel_to_the_next),
+        BOTH(a_cancelled_view_is_answered_and_nothing_follows),
+        BOTH(a_view_may_be_cancelled_while_another_takes_its_place),
+        BOTH(a_client_that_vanishes_takes_its_view_along),
+        BOTH(a_view_that_cannot_be_is_refused_by_its_field),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
