@@ -6,9 +6,23 @@ static uint64_t at_most(uint64_t a, uint64_t b)
     return a < b ? a : b;
 }
 
+static uint64_t turn_ns(uint32_t ready_count)
+{
+    return SCHEDULE_TURN_NS + ready_count * (uint64_t)SCHEDULE_TURN_EACH_NS;
+}
+
+/* How far one may be beyond the least. Turns themselves are not cut short by it, or it would give more to those
+ * who have long ones. */
+static uint64_t debt_max_ns(uint32_t ready_count)
+{
+    uint64_t waited_ns = SCHEDULE_WAIT_MAX_NS / ready_count, two_turns_ns = 2 * turn_ns(ready_count);
+    return waited_ns > two_turns_ns ? waited_ns : two_turns_ns;
+}
+
 static void group_begin(struct schedule_group *group)
 {
     group->next_ns = UINT64_MAX;
+    group->ready_count = 0;
 }
 
 static bool was_ready(const struct scheduler *scheduler, const struct schedule_share *share)
@@ -38,6 +52,7 @@ static void share_settle(struct schedule_share *share, const struct scheduler *s
         return;
     if (!was_ready(scheduler, share) && share->virtual_ns < group->least_ns)
         share->virtual_ns = group->least_ns;
+    share->virtual_ns = at_most(share->virtual_ns, group->least_ns + debt_max_ns(group->ready_count));
     share->ready_in = scheduler->picks;
 }
 
@@ -48,7 +63,7 @@ static bool goes_before(const struct schedule_share *a, const struct schedule_sh
 
 size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
 {
-    size_t best = SCHEDULE_NONE, ready_clients = 0;
+    size_t best = SCHEDULE_NONE;
     scheduler->picks++;
     group_begin(&scheduler->clients);
     for (size_t i = 0; i < count; i++) {
@@ -56,9 +71,12 @@ size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *e
         group_begin(&entries[i].client->jobs);
     }
     for (size_t i = 0; i < count; i++) {
+        struct schedule_client *client = entries[i].client;
+        scheduler->clients.ready_count += entries[i].ready && !client->share.ready;
+        client->jobs.ready_count += entries[i].ready;
+        client->share.ready |= entries[i].ready;
         entries[i].job->ready = entries[i].ready;
-        entries[i].client->share.ready |= entries[i].ready;
-        group_look(&entries[i].client->jobs, scheduler, entries[i].job);
+        group_look(&client->jobs, scheduler, entries[i].job);
     }
     for (size_t i = 0; i < count; i++)
         group_look(&scheduler->clients, scheduler, &entries[i].client->share);
@@ -66,7 +84,6 @@ size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *e
     for (size_t i = 0; i < count; i++) {
         const struct schedule_entry *entry = &entries[i];
         group_advance(&entry->client->jobs);
-        ready_clients += entry->client->share.ready && entry->client->share.ready_in != scheduler->picks;
         share_settle(&entry->client->share, scheduler, &scheduler->clients);
         share_settle(entry->job, scheduler, &entry->client->jobs);
         if (!entry->ready)
@@ -77,7 +94,7 @@ size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *e
             best = i;
     }
     scheduler->turn_ns = 0;
-    scheduler->turn_end_ns = SCHEDULE_TURN_NS + ready_clients * SCHEDULE_TURN_EACH_NS;
+    scheduler->turn_end_ns = turn_ns(scheduler->clients.ready_count);
     return best;
 }
 

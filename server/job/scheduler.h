@@ -7,6 +7,9 @@
  * comes, or comes back after a pause, begins at the least of those who are ready: it is next, or one of the next,
  * but has no claim on what it missed.
  *
+ * Some slices are very long: the first ones compile programs, upload the scene and build its structures, for all
+ * who come after. Whoever had one waits for it, but not much longer than SCHEDULE_WAIT_MAX_NS.
+ *
  * A frame that somebody looks at is better finished than begun beside others: with sixty of them in turns by
  * slices each would show a camera that is sixty frames old. So it may keep the turn for a while, and is charged
  * all the same. The while grows with the number of those who wait, and no faster than they are owed time: with n
@@ -29,7 +32,9 @@ struct schedule_share {
 /* Those who compete with each other: all clients, or the jobs of one. */
 struct schedule_group {
     uint64_t least_ns; /* virtual time of whoever of those that were ready had least; never goes back */
-    uint64_t next_ns;  /* during a pick */
+    /* During a pick. */
+    uint64_t next_ns;
+    uint32_t ready_count;
 };
 
 struct schedule_client {
@@ -49,8 +54,9 @@ struct schedule_entry {
     bool ready;
 };
 
-#define SCHEDULE_TURN_NS 10000000u     /* about a slice on software GL */
-#define SCHEDULE_TURN_EACH_NS 2000000u /* longer for each client that is ready: a short frame */
+#define SCHEDULE_TURN_NS 10000000u    /* about a slice on software GL */
+#define SCHEDULE_TURN_EACH_NS 500000u /* longer for each client that is ready */
+#define SCHEDULE_WAIT_MAX_NS UINT64_C(2000000000)
 #define SCHEDULE_NONE SIZE_MAX
 
 /* Position of the entry whose slice is next, and is to be charged; SCHEDULE_NONE: nobody is ready. Who is not
