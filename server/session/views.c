@@ -197,6 +197,7 @@ uint64_t view_allowed_credit(struct job *job)
         view->due = false;
         allowed++;
     }
+    view->due = false;
     watch_for_blocks(job);
     return allowed;
 }
