@@ -8,6 +8,9 @@
 
 #include <stdlib.h>
 
+/* So long nothing has come before the client is told why. */
+#define BLOCKED_NS UINT64_C(100000000)
+
 struct job *jobs_find(const struct session *session, uint32_t channel)
 {
     for (struct job *job = session->jobs; job; job = job->next) {
@@ -34,12 +37,10 @@ static struct job *job_create(struct session *session, uint32_t request, const s
     struct job *job = calloc(1, sizeof *job);
     struct view_terms terms = view_terms_of(render);
     struct session_view *view = job && is_view ? session_view_create(&terms) : NULL;
-    if (is_view && !view) {
+    if (!job || (is_view && !view)) {
         free(job);
         return NULL;
     }
-    if (!job)
-        return NULL;
     *job = (struct job){
         .next = session->jobs,
         .session = session,
@@ -56,6 +57,7 @@ static struct job *job_create(struct session *session, uint32_t request, const s
     session->jobs = job;
     session->job_count++;
     session->hub->frame_bytes += job->frame_bytes;
+    job_watch_for_blocks(job);
     return job;
 }
 
@@ -109,10 +111,45 @@ void jobs_start(struct session *session, struct request *request, const struct m
 
 /* ---- pace -------------------------------------------------------------------------------------------- */
 
+/* Why nothing comes, if it is for the client to change that; NULL: it is not. */
+static const char *blocked_by(const struct job *job)
+{
+    if (job->rendered || job->cancelled || (job->view && !view_wants_more(job)))
+        return NULL;
+    if (job->frames_sent >= job->client_credit)
+        return "the credit is used up";
+    return job->view && view_is_unacknowledged(job) ? "frames on their way are not acknowledged" : NULL;
+}
+
+static void on_blocked_timer(void *context)
+{
+    struct job *job = context;
+    const char *why = blocked_by(job);
+    if (!why)
+        return;
+    job->blocked_told = job->frames_sent + 1;
+    struct message message;
+    message_init(&message, MESSAGE_BLOCKED);
+    message.blocked.channel = job->channel;
+    message.blocked.total = job->frames_sent;
+    message.blocked.text = why;
+    session_send(job->session, 0, 0, &message);
+}
+
+void job_watch_for_blocks(struct job *job)
+{
+    if (job->blocked_timer.running || job->blocked_told == job->frames_sent + 1 || !blocked_by(job))
+        return;
+    job->blocked_timer.call = on_blocked_timer;
+    job->blocked_timer.context = job;
+    loop_timer_start(job->session->hub->loop, &job->blocked_timer, BLOCKED_NS);
+}
+
 static void tell_engine_credit(struct job *job)
 {
     struct session *session = job->session;
     uint64_t allowed = allowed_credit(job);
+    job_watch_for_blocks(job);
     if (allowed <= job->engine_credit || job->rendered || job->cancelled)
         return;
     struct engine_command *command = hub_command(ENGINE_JOB_CREDIT, session->number, job->request);
@@ -160,6 +197,7 @@ static void destroy(struct session *session, struct job *job)
 {
     drop_frames(session, job);
     session_view_destroy(job);
+    loop_timer_stop(session->hub->loop, &job->blocked_timer);
     struct job **place = &session->jobs;
     while (*place != job)
         place = &(*place)->next;
