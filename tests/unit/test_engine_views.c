@@ -438,6 +438,30 @@ static void a_camera_that_spans_no_view_ends_it(void **state)
     stop(engine);
 }
 
+/* 20 ms to render, and 16 MiB to hash and copy. */
+static void the_next_frame_is_rendered_while_one_is_encoded(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    atomic_store(&fake.step_us, 20000);
+    struct engine_command *made = with_samples(view(1, 2, wishes), 1000, 1);
+    made->job.frame.width = made->job.frame.height = 2048;
+    submit(engine, made);
+    uint64_t encoded_ns = 0;
+    unsigned overlaps = 0;
+    for (uint32_t number = 0; number < 6; number++) {
+        struct engine_frame *frame = take(expect_frame(engine, 1, 2, number));
+        overlaps += frame->applied_ns < encoded_ns;
+        encoded_ns = frame->encoded_ns;
+        drop(frame);
+    }
+    assert_true(overlaps > 0); /* of 5; how many it is depends on who else computes */
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
 /* The frame before it has taken 300 ns to render until 1000, and is being encoded, which took 500 the last time.
  */
 static void a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free(void **state)
@@ -492,6 +516,7 @@ int main(void)
         cmocka_unit_test(a_view_that_adapts_is_smaller_while_it_moves),
         cmocka_unit_test(a_view_that_does_not_adapt_stays_as_it_was_asked_for),
         cmocka_unit_test(a_camera_that_spans_no_view_ends_it),
+        cmocka_unit_test(the_next_frame_is_rendered_while_one_is_encoded),
         cmocka_unit_test(a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
