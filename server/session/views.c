@@ -12,6 +12,9 @@
 /* Frames of a view that are rendered, encoded or sent at once: while one is sent, the next one is encoded and the
  * one after it rendered. */
 #define IN_HAND_MAX 3
+/* What is expected to take a while may take less than that: a frame that comes so much too early is hardly older.
+ */
+#define EARLY_NS UINT64_C(500000)
 /* A client that has not acknowledged its first frame by then acknowledges none. */
 #define SILENCE_NS UINT64_C(250000000)
 /* A frame that a link takes longer for than that is not sent again and again while a picture is refined. */
@@ -153,11 +156,12 @@ uint64_t view_allowed_credit(struct job *job)
         uint64_t in_hand = allowed - job->frames_gone + before;
         if (in_hand >= IN_HAND_MAX || job->frames_sent + in_hand >= job->client_credit)
             break;
-        /* It is begun so early that it comes when it may go. */
+        /* It is begun so early that it comes just before it may go. */
         uint64_t wait_ns = pacing_wait_ns(&view->pacing, (unsigned)(in_hand - frames_on_the_wire(job)));
-        if (wait_ns > view->made_ns && !view->due) {
+        uint64_t lead_ns = view->made_ns + EARLY_NS;
+        if (wait_ns > lead_ns && !view->due) {
             if (wait_ns != UINT64_MAX)
-                start_timer(job, &view->pace_timer, on_pace_timer, wait_ns - view->made_ns);
+                start_timer(job, &view->pace_timer, on_pace_timer, wait_ns - lead_ns);
             break;
         }
         view->due = false;
