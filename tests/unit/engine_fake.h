@@ -205,7 +205,8 @@ static inline bool fake_begin(struct frame_renderer *renderer, const struct scen
 
 static inline void fake_work(const struct frame_renderer *renderer)
 {
-    usleep(atomic_load(&fake.step_us));
+    if (atomic_load(&fake.step_us))
+        usleep(atomic_load(&fake.step_us));
     int step = atomic_fetch_add(&fake.step_count, 1);
     uint64_t start_ns = clock_now_ns(), now_ns = start_ns;
     while (now_ns - start_ns < renderer->request.ao_rays * UINT64_C(1000))
