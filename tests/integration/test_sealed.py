@@ -87,6 +87,15 @@ class Keys(Case):
             result = self.expect(farlight("stats", "--server", daemon.reached, "--key", self.folder / "reader"), 0)
             self.assertIn("reader's key", result.stdout)
 
+    def test_a_readers_key_is_for_looking(self):
+        with SealedDaemon(self.folder) as daemon:
+            options = (bundled_scenes() / "teapot.glb", "--size", "32x24", "-o", self.folder / "a.png",
+                       "--server", daemon.reached)
+            result = self.expect(farlight("render", *options, "--key", self.folder / "reader"), 1)
+            self.assertIn("look", result.stderr)
+            self.assertFalse((self.folder / "a.png").exists())
+            self.expect(farlight("render", *options, "--key", self.folder / "key"), 0)
+
     def test_a_wrong_key_is_told_after_a_second_and_too_many_are_not_heard(self):
         with SealedDaemon(self.folder) as daemon:
             other = ("ping", "--server", daemon.reached, "--key", self.folder / "other")
