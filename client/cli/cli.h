@@ -25,9 +25,12 @@ int cli_animate(int argc, char **argv);
 int cli_info(int argc, char **argv);
 int cli_compare(int argc, char **argv);
 int cli_compare_tracers(int argc, char **argv); /* where cli_compare finds --tracers */
+int cli_serve(int argc, char **argv);
+int cli_scenes(int argc, char **argv);
 int cli_stats(int argc, char **argv);
 int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
+int cli_view(int argc, char **argv);
 int cli_key(int argc, char **argv);
 
 /* ---- key.c ---- */
@@ -154,6 +157,7 @@ struct cli_channel {
 };
 
 struct cli_job {
+    const char *scene; /* one that is up at the server, in place of the model */
     const char *model, *server, *key_file, *environment, *output, *camera, *keys_file, *trace_file;
     enum cli_image image;
     struct cli_output outputs[CLI_OUTPUTS_MAX]; /* where the pictures go: `output`, or several of a script */
@@ -190,6 +194,8 @@ struct cli_job {
 extern const struct argp cli_job_argp;
 /* Likewise, without what says where the picture goes, which tracer makes it and how its first hits are found. */
 const struct argp *cli_picture_argp(void);
+/* Likewise for a window, without what is of files; samples and integrator have other defaults there. */
+const struct argp *cli_view_argp(void);
 /* Defaults, then FARLIGHT_*; before the command line is read. */
 bool cli_job_begin(struct cli_job *job);
 /* As if "--OPTION VALUE" had been typed; NULL for an option without a value. ARGP_ERR_UNKNOWN: there is none. */
@@ -199,6 +205,8 @@ error_t cli_usage(struct cli_job *job, const char *field, const char *format, ..
     __attribute__((format(printf, 3, 4)));
 /* After the command line: what depends on several options. `is_series`: output is a pattern. */
 bool cli_job_complete(struct cli_job *job, bool is_series);
+/* The same for a window: there is no output. */
+bool cli_job_complete_view(struct cli_job *job);
 
 /* What can only be said once the scene is there: clips, what the script keys, the range of frames where none is
  * given, and what goes by it. For each scene anew. */
@@ -207,11 +215,14 @@ bool cli_writes_to_stdout(const struct cli_job *job);
 
 /* ---- loading.c: from what the command line named to a scene on a daemon ---- */
 
-/* `job` and `progress` are the caller's; the rest is zero at first. */
+/* `job` and `progress`, and how the scene is shared, are the caller's; the rest is zero at first. */
 struct cli_loading {
     const struct cli_job *job;
     struct cli_progress *progress;
     bool again; /* what there is to say about the model has been said */
+    enum protocol_sharing sharing;
+    const char *scene_name;              /* NULL: the model's file name */
+    const char *const *daemon_arguments; /* of a private one; NULL: none */
     struct fl_load_options load;
     struct fl_connection *connection;
     struct fl_scene *scene;
