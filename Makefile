@@ -354,12 +354,13 @@ help:
 FUZZ_SECONDS ?= 20
 FUZZERS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_SEED := $(B)/tests/fuzz/seed
-$(FUZZ_SEED): %: %.o $(PROTOCOL_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
+$(FUZZ_SEED): %: %.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
 $(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ))
-$(B)/tests/fuzz/fuzz_scene: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
+$(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
+$(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_sealed: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
 .PHONY: fuzz $(addprefix run-fuzz-,$(FUZZERS))
 ifeq ($(config),fuzz)
 fuzz: $(addprefix run-fuzz-,$(FUZZERS))
