@@ -48,6 +48,7 @@ CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
 IMPORT_PKGS := OpenImageIO tinygltf tinyobjloader libsodium libseccomp
 EXPORT_PKGS := OpenImageIO libjxl libseccomp
 VIDEO_PKGS := libavformat libavcodec libavutil libseccomp
+VIEWER_PKGS := sdl2 SDL2_ttf libavcodec libswscale libavutil
 TEST_PKGS := cmocka
 # pkg-config is only asked when something is built.
 pkg_cflags = $(shell $(PKG_CONFIG) --cflags $(1) 2>/dev/null)
@@ -68,6 +69,7 @@ IMPORT_CXX := $(wildcard client/import/*.cpp)
 EXPORT_C := $(wildcard client/output/*.c)
 EXPORT_CXX := $(wildcard client/output/*.cpp)
 VIDEO_C := $(wildcard client/video/*.c)
+VIEWER_C := $(wildcard client/viewer/*.c)
 SHADERS := $(sort $(patsubst shaders/%,%,$(wildcard shaders/*/*.h shaders/*/*.glsl shaders/*/*.comp shaders/*/*.vert \
            shaders/*/*.geom shaders/*/*.frag shaders/*.comp)))
 
@@ -90,11 +92,15 @@ EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/client/import/sandbox.o
 VIDEO_OBJ := $(call obj,$(VIDEO_C) $(addprefix client/output/,channel.c file.c incoming.c) \
     $(addprefix client/lib/,rate.c ycbcr.c)) $(B)/client/import/sandbox.o
 
+# The viewer takes the command line as render does.
+VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interrupt.c job_complete.c job_light.c job_options.c \
+    job_tracer.c key.c talk.c))
+
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.0
 LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC))
 
-PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video
+PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
 
 .PHONY: all
 all: $(PROGRAMS) $(B)/$(SONAME) $(B)/protocol.md
@@ -116,6 +122,7 @@ $(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
 $(B)/client/import/%.opp $(B)/client/import/%.o: INCLUDES = -Iclient $(IMPORT_CFLAGS)
 $(B)/client/output/%.opp $(B)/client/output/%.o: INCLUDES = -Iclient $(EXPORT_CFLAGS)
 $(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
+$(B)/client/viewer/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS) $(VIEWER_CFLAGS)
 $(B)/tests/%.o: INCLUDES = -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS) $(TEST_CFLAGS)
 SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS)))$(SERVER_CFLAGS)
 CLIENT_CFLAGS = $(eval CLIENT_CFLAGS := $(call pkg_cflags,$(CLIENT_PKGS)))$(CLIENT_CFLAGS)
@@ -123,6 +130,7 @@ TEST_CFLAGS = $(eval TEST_CFLAGS := $(call pkg_cflags,$(TEST_PKGS)))$(TEST_CFLAG
 # Others' C++ headers are system headers: our warnings are for our own files.
 IMPORT_CFLAGS = $(eval IMPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(IMPORT_PKGS))))$(IMPORT_CFLAGS)
 VIDEO_CFLAGS = $(eval VIDEO_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(VIDEO_PKGS))))$(VIDEO_CFLAGS)
+VIEWER_CFLAGS = $(eval VIEWER_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(VIEWER_PKGS))))$(VIEWER_CFLAGS)
 EXPORT_CFLAGS = $(eval EXPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(EXPORT_PKGS))))$(EXPORT_CFLAGS)
 
 $(B)/%.o: %.c
@@ -161,6 +169,7 @@ CLIENT_LIBS = $(call pkg_libs,$(CLIENT_PKGS)) -lm
 IMPORT_LIBS = $(call pkg_libs,$(IMPORT_PKGS)) -lm
 EXPORT_LIBS = $(call pkg_libs,$(EXPORT_PKGS)) -lm
 VIDEO_LIBS = $(call pkg_libs,$(VIDEO_PKGS)) -lm
+VIEWER_LIBS = $(call pkg_libs,$(VIEWER_PKGS) $(CLIENT_PKGS)) -lm
 
 $(B)/farlightd: $(B)/server/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(SERVER_LIBS) -o $@
@@ -172,6 +181,8 @@ $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
 $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
+$(B)/farlight-view: $(VIEWER_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIEWER_LIBS) -o $@
 $(B)/protocol-docgen: $(B)/protocol/docgen.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
 $(B)/protocol.md: $(B)/protocol-docgen
@@ -237,9 +248,9 @@ $(B)/tests/tools/pose_dump: $(B)/tests/tools/pose_dump.o $(MODEL_OBJ) $(SERVER_O
 # ---- what people call ------------------------------------------------------------------------------
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libjxl-dev libtinygltf-dev \
-    libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libegl1 libgl1-mesa-dri
-TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg
-PLOT_PACKAGES := gnuplot-nox fonts-dejavu-core
+    libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
+TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb
+PLOT_PACKAGES := gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
 .PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help

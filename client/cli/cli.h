@@ -30,6 +30,7 @@ int cli_scenes(int argc, char **argv);
 int cli_stats(int argc, char **argv);
 int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
+int cli_view(int argc, char **argv);
 int cli_key(int argc, char **argv);
 
 /* ---- key.c ---- */
@@ -193,6 +194,8 @@ struct cli_job {
 extern const struct argp cli_job_argp;
 /* Likewise, without what says where the picture goes, which tracer makes it and how its first hits are found. */
 const struct argp *cli_picture_argp(void);
+/* Likewise for a window, without what is of files; samples and integrator have other defaults there. */
+const struct argp *cli_view_argp(void);
 /* Defaults, then FARLIGHT_*; before the command line is read. */
 bool cli_job_begin(struct cli_job *job);
 /* As if "--OPTION VALUE" had been typed; NULL for an option without a value. ARGP_ERR_UNKNOWN: there is none. */
@@ -202,6 +205,8 @@ error_t cli_usage(struct cli_job *job, const char *field, const char *format, ..
     __attribute__((format(printf, 3, 4)));
 /* After the command line: what depends on several options. `is_series`: output is a pattern. */
 bool cli_job_complete(struct cli_job *job, bool is_series);
+/* The same for a window: there is no output. */
+bool cli_job_complete_view(struct cli_job *job);
 
 /* What can only be said once the scene is there: clips, what the script keys, the range of frames where none is
  * given, and what goes by it. For each scene anew. */

@@ -288,3 +288,18 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
     return complete_tracer(job) && complete_clips(job) && complete_outputs(job, is_series) &&
            complete_encoding(job) && complete_camera(job);
 }
+
+bool cli_job_complete_view(struct cli_job *job)
+{
+    struct fl_job_options *wanted = &job->options;
+    if (wanted->width == 0) {
+        wanted->width = 1280;
+        wanted->height = 720;
+    }
+    /* What makes no noise is the better one while it moves. */
+    if (!job->has_integrator && (wanted->aperture > 0 || wanted->shutter > 0))
+        wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;
+    if (wanted->encoding == PROTOCOL_ENCODING_ZSTD && wanted->quality > 19)
+        return cli_usage(job, "--quality", "zstd has levels 1 to 19") == 0;
+    return complete_tracer(job) && complete_clips(job) && complete_camera(job);
+}

@@ -343,20 +343,37 @@ error_t cli_job_set(struct cli_job *job, const char *name, const char *value)
 
 const struct argp cli_job_argp = {.options = options, .parser = parse};
 
+/* Some of the options are left out. */
+static void keep(struct argp_option *kept, const int *left_out, size_t left_out_count)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
+        bool is_kept = true;
+        for (size_t k = 0; k < left_out_count; k++)
+            is_kept = is_kept && options[i].key != left_out[k];
+        if (is_kept)
+            kept[count++] = options[i];
+    }
+}
+
 const struct argp *cli_picture_argp(void)
 {
     static const int left_out[] = {KEY_OUTPUT, KEY_FORMAT,  KEY_HALF,    KEY_FLOAT,      KEY_TONE_MAP,
                                    KEY_TRACER, KEY_PRIMARY, KEY_TIMINGS, KEY_TRACE_FILE, KEY_LAYERS};
     static struct argp_option kept[sizeof options / sizeof options[0]];
     static const struct argp argp = {.options = kept, .parser = parse};
-    size_t count = 0;
-    for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
-        bool is_kept = true;
-        for (size_t k = 0; k < sizeof left_out / sizeof left_out[0]; k++)
-            is_kept = is_kept && options[i].key != left_out[k];
-        if (is_kept)
-            kept[count++] = options[i];
-    }
+    keep(kept, left_out, sizeof left_out / sizeof left_out[0]);
+    return &argp;
+}
+
+const struct argp *cli_view_argp(void)
+{
+    static const int left_out[] = {KEY_OUTPUT,  KEY_FORMAT,     KEY_HALF,      KEY_FLOAT,
+                                   KEY_SAMPLES, KEY_INTEGRATOR, KEY_TIMINGS,   KEY_TRACE_FILE,
+                                   KEY_LAYERS,  KEY_CLIP_ONCE,  KEY_CLIP_START};
+    static struct argp_option kept[sizeof options / sizeof options[0]];
+    static const struct argp argp = {.options = kept, .parser = parse};
+    keep(kept, left_out, sizeof left_out / sizeof left_out[0]);
     return &argp;
 }
 

@@ -12,6 +12,7 @@ static const struct subcommand {
 } subcommands[] = {
     {"render", "farlight render", cli_render, "one picture of a model"},
     {"animate", "farlight animate", cli_animate, "a series of pictures along a camera's path"},
+    {"view", "farlight view", cli_view, "a window on a scene that is rendered elsewhere"},
     {"info", "farlight info", cli_info, "what a model file holds"},
     {"compare", "farlight compare", cli_compare, "how far two images are apart, or two tracers"},
     {"serve", "farlight serve", cli_serve, "puts a model up for others"},

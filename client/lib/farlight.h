@@ -357,6 +357,7 @@ struct fl_frame {
     uint64_t command_received_ns, command_applied_ns, rendered_ns; /* the daemon's clock */
     uint64_t command_sent_ns;                                      /* when fl_view_look was called for it */
     uint64_t begun_ns, whole_ns;                                   /* first byte, and decoded */
+    uint64_t change; /* how many fl_view_change came before what it shows */
     bool moving, key_frame;
     unsigned frame_quality; /* as encoded; 0: lossless */
     uint8_t *encoded;       /* H.264 access unit; NULL: pixels are decoded */

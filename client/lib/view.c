@@ -18,6 +18,7 @@
  * still be on their way. */
 struct asked {
     uint32_t request;
+    uint64_t change; /* counted from 0 */
     struct fl_frame_expected expected;
 };
 
@@ -30,6 +31,7 @@ struct fl_view {
     bool has_frame;      /* .. if there is one */
     struct asked asked[ASKED_MAX];
     size_t asked_count;
+    uint64_t changes;
     uint64_t last_command;
     uint64_t command_sent_ns[COMMANDS_REMEMBERED]; /* by number, modulo */
     struct fl_error failure; /* why a render was refused; told once while an older one goes on */
@@ -77,6 +79,7 @@ static bool ask(struct fl_view *view, const struct fl_view_options *options, str
     fill_render(render, view, options);
     struct asked *asked = &view->asked[view->asked_count];
     asked->request = fl_connection_next_request(view->connection);
+    asked->change = view->changes;
     asked->expected = (struct fl_frame_expected){.width = render->width,
                                                  .height = render->height,
                                                  .format = render->format,
@@ -118,16 +121,14 @@ struct fl_view *fl_view_start(struct fl_scene *scene, const struct fl_view_optio
     return view;
 }
 
-/* Why nothing comes any more, or why the newest render was refused. */
-static bool check(struct fl_view *view, struct fl_error *error)
+/* Why nothing comes any more. */
+static bool check(const struct fl_view *view, struct fl_error *error)
 {
     if (!fl_connection_check(view->connection, error))
         return false;
-    if (view->failure.code == FL_ERROR_NONE)
+    if (view->asked_count > 0)
         return true;
     *error = view->failure;
-    if (view->asked_count > 0)
-        view->failure = (struct fl_error){0};
     return false;
 }
 
@@ -141,6 +142,7 @@ bool fl_view_change(struct fl_view *view, const struct fl_view_options *options,
         if (fl_connection_step(view->connection, &ignored, deadline_ns, error) == FL_STEP_FAILED)
             return false;
     }
+    view->changes++;
     return ask(view, options, error) && tell_credit(view, error);
 }
 
@@ -197,7 +199,7 @@ static bool acknowledge(struct fl_view *view, uint32_t frame, bool whole, struct
            fl_stream_write(&view->connection->stream, error);
 }
 
-static bool take_end(struct fl_view *view, const struct message *message, struct fl_error *error)
+static bool take_end(struct fl_view *view, uint64_t change, const struct message *message, struct fl_error *error)
 {
     const uint64_t now_ns = fl_now_ns();
     const uint32_t number = message->frame_end.frame;
@@ -211,6 +213,7 @@ static bool take_end(struct fl_view *view, const struct message *message, struct
     struct fl_frame *frame = fl_assembly_end(&view->assembly, &message->frame_end, now_ns, error);
     if (frame == NULL)
         return false;
+    frame->change = change;
     if (frame->command > 0 && frame->command <= view->last_command &&
         view->last_command - frame->command < COMMANDS_REMEMBERED)
         frame->command_sent_ns = view->command_sent_ns[frame->command % COMMANDS_REMEMBERED];
@@ -249,7 +252,7 @@ static bool take(struct fl_view *view, size_t index, const struct message *messa
             return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data", "pieces of two frames came mixed");
         if (message->type == MESSAGE_FRAME_DATA)
             return fl_assembly_data(&view->assembly, &message->frame_data, error);
-        return take_end(view, message, error);
+        return take_end(view, view->asked[index].change, message, error);
     case MESSAGE_OK:
     case MESSAGE_ERROR:
         return conclude(view, index, message, error);
@@ -284,6 +287,11 @@ struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct 
         struct fl_received ignored; /* a late answer to something given up */
         if (!check(view, error))
             return NULL;
+        if (view->failure.code != FL_ERROR_NONE) {
+            *error = view->failure;
+            view->failure = (struct fl_error){0};
+            return NULL;
+        }
         if (fl_connection_step(view->connection, &ignored, deadline_ns, error) == FL_STEP_FAILED) {
             if (error->code == FL_ERROR_TIMEOUT)
                 *error = (struct fl_error){0};

@@ -28,6 +28,7 @@ MAY_INCLUDE = {
     "client/import": {"protocol"},
     "client/output": {"protocol", "client/import"},  # the sandbox is shared
     "client/video": {"protocol", "client/import", "client/output", "client/lib"},  # sandbox; channel; ycbcr, rate
+    "client/viewer": {"protocol", "client/lib", "client/cli"},  # the command line is parsed as that of render
     "shaders/shared": set(),
 }
 # System headers that only some folders may use, or in a folder only files whose names begin so.
@@ -36,7 +37,8 @@ RESTRICTED = [
     (re.compile(r"^embree"), {"server/trace"}),
     (re.compile(r"^(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h"),
      {"server/base", "server/net", "client/lib", "client/import", "client/output", "client/cli"}),
-    (re.compile(r"^lib(av|sw)"), {"client/video"}),
+    (re.compile(r"^lib(av|sw)"), {"client/video", "client/viewer"}),
+    (re.compile(r"^SDL2?/"), {"client/viewer"}),
     (re.compile(r"^OpenImageIO/"), {"client/import", "client/output"}),
     (re.compile(r"^(tiny_gltf|tiny_obj_loader)"), {"client/import"}),
     (re.compile(r"^(turbojpeg|zstd)\.h"), {"server/encode", "client/lib"}),

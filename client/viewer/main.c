@@ -1,0 +1,251 @@
+/* SPDX-License-Identifier: MIT */
+/* farlight-view: a window on a scene that a daemon renders. Started by `farlight view`; a program of its own so
+ * that nothing else links SDL and libavcodec. */
+#include "cli/cli.h"
+#include "lib/text.h"
+#include "viewer/input.h"
+#include "viewer/viewer.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define DEFAULT_SAMPLES 64u
+
+/* The C library looks for it by name, past our hidden visibility. */
+__attribute__((visibility("default"))) const char *argp_program_version = "farlight-view " FARLIGHT_VERSION;
+
+enum key {
+    KEY_SCENE = 0x500,
+    KEY_HEADLESS,
+    KEY_REPLAY,
+    KEY_RATE,
+    KEY_SAMPLES,
+    KEY_INTEGRATOR,
+    KEY_PASS,
+    KEY_STILL_ENCODING,
+    KEY_SCALE,
+    KEY_ADAPT,
+    KEY_NO_ADAPT,
+    KEY_WEIGHT
+};
+
+static const struct argp_option options[] = {
+    {NULL, 0, NULL, 0, "Window:", -2},
+    {"scene", KEY_SCENE, "NAME", 0, "Come to a scene that the daemon has, in place of a MODEL", -2},
+    {"samples", KEY_SAMPLES, "N", 0, "Samples per pixel that a picture at rest gets (default 64)", -2},
+    {"pass-samples", KEY_PASS, "N", 0, "Of them, how many each frame adds (default 1)", -2},
+    {"integrator", KEY_INTEGRATOR, "NAME", 0,
+     "whitted (default), distributed (with a lens or a shutter), raycast, ao, path", -2},
+    {"fps", KEY_RATE, "N", 0, "Frames per second, at most (default 60)", -2},
+    {"scale", KEY_SCALE, "N", 0, "Render one pixel for so many of the window, each way: 1 (default), 2, 4, 8", -2},
+    {"still-encoding", KEY_STILL_ENCODING, "NAME", 0,
+     "How pixels travel while nothing moves (default: raw on this machine, else lossless); --encoding is that of "
+     "motion (default: raw on this machine, else h264)",
+     -2},
+    {"adapt", KEY_ADAPT, NULL, 0, "Quality and size follow the link while it moves (default over a network)", -2},
+    {"no-adapt", KEY_NO_ADAPT, NULL, 0, "They stay; only fewer frames come", -2},
+    {"weight", KEY_WEIGHT, "N", 0, "Share of the device beside other clients, 1 to 16 (default: the daemon's)",
+     -2},
+    {"replay", KEY_REPLAY, "INPUT.json", 0, "Timed events in place of a person; ends after the last", -2},
+    {"headless", KEY_HEADLESS, NULL, 0, "No window; needs --replay", -2},
+    {0}};
+
+struct command_line {
+    struct cli_job job;
+    struct viewer_options viewer;
+};
+
+static error_t name_field(struct cli_job *job, const char *field, bool good)
+{
+    if (good)
+        return 0;
+    snprintf(job->error.field, sizeof job->error.field, "%s", field);
+    return EINVAL;
+}
+
+static error_t set_integer(struct cli_job *job, const char *field, const char *value, uint64_t least,
+                           uint64_t greatest, uint32_t *out)
+{
+    uint64_t number = *out;
+    const error_t status = name_field(job, field, fl_text_integer(value, least, greatest, &number, &job->error));
+    *out = (uint32_t)number;
+    return status;
+}
+
+static error_t set_scale(struct command_line *line, const char *value)
+{
+    static const char *const scales[] = {"1", "2", "4", "8"};
+    for (unsigned i = 0; i < sizeof scales / sizeof scales[0]; i++)
+        if (strcmp(value, scales[i]) == 0) {
+            line->viewer.coarser = i;
+            return 0;
+        }
+    return cli_usage(&line->job, "--scale", "is 1, 2, 4 or 8");
+}
+
+static error_t set_encoding(struct command_line *line, const char *value)
+{
+    struct viewer_options *viewer = &line->viewer;
+    viewer->has_still_encoding = true;
+    if (protocol_encoding_parse(value, &viewer->view.still_encoding) &&
+        viewer->view.still_encoding != PROTOCOL_ENCODING_H264)
+        return 0;
+    return cli_usage(&line->job, "--still-encoding", "'%s' is not raw, zstd, predicted or jpeg", value);
+}
+
+static error_t set_integrator(struct command_line *line, const char *value)
+{
+    line->job.has_integrator = true;
+    if (protocol_integrator_parse(value, &line->job.options.integrator))
+        return 0;
+    return cli_usage(&line->job, "--integrator", "unknown integrator '%s'", value);
+}
+
+static error_t set_rate(struct command_line *line, const char *value)
+{
+    double real = 0;
+    const error_t status =
+        name_field(&line->job, "--fps", fl_text_real(value, 0.1, 1000, &real, &line->job.error));
+    line->job.options.frames_per_second = (float)real;
+    return status;
+}
+
+static error_t set_model(struct command_line *line, const char *value)
+{
+    if (line->job.model != NULL)
+        return cli_usage(&line->job, value, "only one model can be looked at");
+    line->job.model = value;
+    return 0;
+}
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct command_line *line = state->input;
+    struct viewer_options *viewer = &line->viewer;
+    switch (key) {
+    case ARGP_KEY_INIT:
+        state->child_inputs[0] = &line->job;
+        return 0;
+    case ARGP_KEY_ARG:
+        return set_model(line, value);
+    case KEY_SCENE:
+        viewer->scene_name = value;
+        return 0;
+    case KEY_HEADLESS:
+        viewer->headless = true;
+        return 0;
+    case KEY_REPLAY:
+        viewer->replay = value;
+        return 0;
+    case KEY_ADAPT:
+        viewer->always_adapt = true;
+        return 0;
+    case KEY_NO_ADAPT:
+        viewer->never_adapt = true;
+        return 0;
+    case KEY_RATE:
+        return set_rate(line, value);
+    case KEY_SAMPLES:
+        return set_integer(&line->job, "--samples", value, 1, 65536, &line->job.options.samples);
+    case KEY_PASS:
+        return set_integer(&line->job, "--pass-samples", value, 1, 256, &viewer->view.pass_samples);
+    case KEY_WEIGHT:
+        return set_integer(&line->job, "--weight", value, 1, 16, &viewer->view.weight);
+    case KEY_INTEGRATOR:
+        return set_integrator(line, value);
+    case KEY_SCALE:
+        return set_scale(line, value);
+    case KEY_STILL_ENCODING:
+        return set_encoding(line, value);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* The list of keys, behind the options. */
+static char *help_filter(int key, const char *text, void *input)
+{
+    (void)input;
+    char *list = NULL;
+    size_t bytes = 0;
+    FILE *out = key == ARGP_KEY_HELP_POST_DOC ? open_memstream(&list, &bytes) : NULL;
+    if (out == NULL)
+        return (char *)(uintptr_t)text; /* argp hands it back as const */
+    fprintf(out, "%s\n\nKeys:\n", text);
+    input_print_bindings(out);
+    fclose(out);
+    return list;
+}
+
+static bool complete(struct command_line *line)
+{
+    struct cli_job *job = &line->job;
+    struct viewer_options *viewer = &line->viewer;
+    if (job->model == NULL && job->environment == NULL && viewer->scene_name == NULL)
+        return cli_usage(job, "MODEL", "no model file is named") == 0;
+    if (viewer->scene_name != NULL && (job->model != NULL || job->environment != NULL))
+        return cli_usage(job, "--scene", "a scene that is there is not loaded") == 0;
+    if (viewer->scene_name != NULL && job->server == NULL) {
+        cli_usage(job, "--scene", "no daemon is named that has it");
+        return fl_error_remedy(&job->error, "add --server ADDRESS");
+    }
+    if (viewer->headless && viewer->replay == NULL)
+        return cli_usage(job, "--headless", "without a window there is nobody but --replay") == 0;
+    if (job->clip_count > 1)
+        return cli_usage(job, "--clip", "one clip is played at a time") == 0;
+    if ((job->model != NULL && !cli_check_input(job->model, &job->error)) ||
+        (job->environment != NULL && !cli_check_input(job->environment, &job->error)))
+        return false;
+    return cli_job_complete_view(job);
+}
+
+static void on_note(void *user, const struct fl_note *note)
+{
+    (void)user;
+    cli_note(note, false);
+}
+
+static void fill(struct command_line *line)
+{
+    const struct cli_job *job = &line->job;
+    struct viewer_options *viewer = &line->viewer;
+    viewer->server = job->server != NULL && job->server[0] != '\0' ? job->server : NULL;
+    viewer->key_file = cli_key_file(viewer->server, job->key_file);
+    viewer->model = job->model;
+    viewer->environment = job->environment;
+    viewer->view.job = job->options;
+    viewer->view.job.samples = job->options.samples > 0 ? job->options.samples : DEFAULT_SAMPLES;
+    viewer->has_encoding = job->has_encoding;
+    viewer->has_primary = job->has_primary;
+    viewer->has_integrator = job->has_integrator;
+    viewer->camera = job->camera;
+    viewer->clip = job->clip_count > 0 ? job->clips[0].which : NULL;
+    viewer->speed = job->clip_count > 0 ? job->clips[0].speed : 1;
+    viewer->interrupt_fd = cli_interrupt_fd();
+    viewer->interrupt_signal = cli_interrupt_signal;
+    viewer->note = job->quiet ? NULL : on_note;
+}
+
+int main(int argc, char **argv)
+{
+    static struct argp_child children[2];
+    children[0].argp = cli_view_argp();
+    static const struct argp argp = {
+        .options = options,
+        .parser = parse,
+        .args_doc = "MODEL",
+        .doc = "Open a window on a model, or on a scene that a daemon has.\v"
+               "MODEL is glTF, GLB, OBJ or NFF. FARLIGHT_SERVER, FARLIGHT_SIZE and so on give defaults.",
+        .children = children,
+        .help_filter = help_filter};
+    static struct command_line line;
+    argp_err_exit_status = CLI_USAGE;
+    if (!cli_job_begin(&line.job) || argp_parse(&argp, argc, argv, 0, NULL, &line) != 0 || !complete(&line))
+        return cli_report(&line.job.error);
+    struct fl_error error = {0};
+    if (!cli_interrupt_begin(&error))
+        return cli_report(&error);
+    fill(&line);
+    return viewer_run(&line.viewer, &error) ? CLI_DONE : cli_report(&error);
+}

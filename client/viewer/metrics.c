@@ -1,0 +1,153 @@
+/* SPDX-License-Identifier: MIT */
+#include "viewer/metrics.h"
+
+#include <stdlib.h>
+
+#define SECOND_NS 1000000000ull
+
+const char *const lane_names[LANE_COUNT] = {"input",   "scene",  "primary", "trace",  "shade",
+                                            "resolve", "encode", "receive", "decode", "show"};
+
+/* LANE_COUNT: not drawn. */
+static enum lane lane_of(enum protocol_stage stage)
+{
+    switch (stage) {
+    case PROTOCOL_STAGE_APPLY:
+    case PROTOCOL_STAGE_BUILD:
+    case PROTOCOL_STAGE_UPLOAD:
+        return LANE_SCENE;
+    case PROTOCOL_STAGE_PRIMARY:
+        return LANE_PRIMARY;
+    case PROTOCOL_STAGE_TRACE:
+        return LANE_TRACE;
+    case PROTOCOL_STAGE_SHADE:
+        return LANE_SHADE;
+    case PROTOCOL_STAGE_RESOLVE:
+    case PROTOCOL_STAGE_READBACK:
+        return LANE_RESOLVE;
+    case PROTOCOL_STAGE_ENCODE:
+        return LANE_ENCODE;
+    default:
+        return LANE_COUNT;
+    }
+}
+
+/* Waves follow one another: once there is no room left, the last span of the lane grows over the gap. */
+static void add_span(struct metrics_frame *frame, enum lane lane, int64_t begin_ns, int64_t end_ns)
+{
+    struct span *last = NULL;
+    for (size_t i = 0; i < frame->span_count; i++)
+        if (frame->spans[i].lane == lane)
+            last = &frame->spans[i];
+    if (frame->span_count < METRICS_SPANS - LANE_COUNT || last == NULL) {
+        frame->spans[frame->span_count++] = (struct span){.lane = lane, .begin_ns = begin_ns, .end_ns = end_ns};
+        return;
+    }
+    last->begin_ns = begin_ns < last->begin_ns ? begin_ns : last->begin_ns;
+    last->end_ns = end_ns > last->end_ns ? end_ns : last->end_ns;
+}
+
+/* The daemon counts from when the frame was taken up; that ended when it was read back. */
+static void add_stages(struct metrics_frame *made, const struct fl_frame *frame)
+{
+    uint64_t whole_ns = 0;
+    for (size_t i = 0; i < frame->stage_count; i++)
+        if (frame->stages[i].stage == PROTOCOL_STAGE_FRAME)
+            whole_ns = frame->stages[i].duration_ns;
+    const int64_t taken_up_ns = (int64_t)(frame->rendered_ns - whole_ns);
+    for (size_t i = 0; i < frame->stage_count; i++) {
+        const struct record_stage_time *stage = &frame->stages[i];
+        const enum lane lane = lane_of(stage->stage);
+        const int64_t begin_ns = taken_up_ns + (int64_t)stage->start_ns;
+        if (lane != LANE_COUNT)
+            add_span(made, lane, begin_ns, begin_ns + (int64_t)stage->duration_ns);
+    }
+}
+
+void metrics_add(struct metrics *metrics, const struct fl_frame *frame, uint64_t decoded_ns)
+{
+    struct metrics_frame *made = &metrics->frames[metrics->next];
+    *made = (struct metrics_frame){.frame = frame->frame,
+                                   .command = frame->command,
+                                   .command_sent_ns = frame->command_sent_ns,
+                                   .command_received_ns = frame->command_received_ns,
+                                   .command_applied_ns = frame->command_applied_ns,
+                                   .rendered_ns = frame->rendered_ns,
+                                   .begun_ns = frame->begun_ns,
+                                   .whole_ns = decoded_ns,
+                                   .shown_ns = decoded_ns,
+                                   .wire_bytes = frame->wire_bytes,
+                                   .first_of_command =
+                                       frame->command > metrics->last_command && frame->command_sent_ns > 0};
+    add_stages(made, frame);
+    if (made->first_of_command)
+        metrics->last_command = frame->command;
+    metrics->next = (metrics->next + 1) % METRICS_FRAMES;
+    metrics->count += metrics->count < METRICS_FRAMES;
+    const uint64_t received_ns = frame->begun_ns + frame->receive_ns;
+    add_span(made, LANE_RECEIVE, (int64_t)frame->begun_ns, (int64_t)received_ns);
+    add_span(made, LANE_DECODE, (int64_t)received_ns, (int64_t)decoded_ns);
+    metrics->unshown += metrics->unshown < METRICS_FRAMES;
+}
+
+void metrics_show(struct metrics *metrics, uint64_t shown_ns)
+{
+    for (; metrics->unshown > 0; metrics->unshown--) {
+        struct metrics_frame *frame =
+            &metrics->frames[(metrics->next + METRICS_FRAMES - metrics->unshown) % METRICS_FRAMES];
+        add_span(frame, LANE_SHOW, (int64_t)frame->shown_ns, (int64_t)shown_ns);
+        frame->shown_ns = shown_ns;
+    }
+}
+
+const struct metrics_frame *metrics_frame(const struct metrics *metrics, size_t back)
+{
+    if (back >= metrics->count)
+        return NULL;
+    return &metrics->frames[(metrics->next + METRICS_FRAMES - 1 - back) % METRICS_FRAMES];
+}
+
+int64_t metrics_clock_offset_ns(const struct metrics *metrics)
+{
+    int64_t least = INT64_MIN, most = INT64_MAX;
+    for (size_t i = 0; i < metrics->count; i++) {
+        const struct metrics_frame *frame = &metrics->frames[i];
+        const int64_t from_input = (int64_t)(frame->command_sent_ns - frame->command_received_ns);
+        const int64_t from_frame = (int64_t)(frame->begun_ns - frame->rendered_ns);
+        if (frame->command_sent_ns > 0 && from_input > least)
+            least = from_input;
+        if (frame->rendered_ns > 0 && from_frame < most)
+            most = from_frame;
+    }
+    if (least == INT64_MIN)
+        return most == INT64_MAX ? 0 : most;
+    return most == INT64_MAX ? least : least + (most - least) / 2;
+}
+
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+void metrics_summarise(const struct metrics *metrics, uint64_t now_ns, struct metrics_summary *summary)
+{
+    double latencies[METRICS_FRAMES];
+    size_t latency_count = 0;
+    *summary = (struct metrics_summary){0};
+    for (size_t back = 0; back < metrics->count; back++) {
+        const struct metrics_frame *frame = metrics_frame(metrics, back);
+        const bool is_recent = frame->shown_ns + SECOND_NS > now_ns;
+        if (is_recent) {
+            summary->frames_per_second += 1;
+            summary->bits_per_second += (double)frame->wire_bytes * 8;
+        }
+        if (frame->first_of_command && (is_recent || latency_count == 0))
+            latencies[latency_count++] = (double)(frame->shown_ns - frame->command_sent_ns) * 1e-9;
+    }
+    if (latency_count == 0)
+        return;
+    qsort(latencies, latency_count, sizeof latencies[0], by_value);
+    summary->has_latency = true;
+    summary->latency_s = latencies[latency_count / 2];
+}

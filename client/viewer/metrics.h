@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: MIT */
+/* What the last frames cost and how late they came. Monotonic nanoseconds of this process, but where the daemon's
+ * clock is named. No window, no daemon. */
+#ifndef FARLIGHT_CLIENT_VIEWER_METRICS_H
+#define FARLIGHT_CLIENT_VIEWER_METRICS_H
+
+#include "lib/farlight.h"
+
+#define METRICS_FRAMES 128u
+#define METRICS_SPANS 24u
+
+/* Rows of the timeline, in the order of the way of the data. */
+enum lane {
+    LANE_INPUT, /* the camera's way to the daemon, and until it is taken up */
+    LANE_SCENE, /* apply, build, upload */
+    LANE_PRIMARY,
+    LANE_TRACE,
+    LANE_SHADE,
+    LANE_RESOLVE, /* and read-back */
+    LANE_ENCODE,
+    LANE_RECEIVE, /* from its first byte to its last */
+    LANE_DECODE,
+    LANE_SHOW, /* until the window shows it */
+    LANE_COUNT
+};
+extern const char *const lane_names[LANE_COUNT];
+
+struct span {
+    enum lane lane;
+    int64_t begin_ns, end_ns; /* before LANE_RECEIVE: of the daemon's clock */
+};
+
+struct metrics_frame {
+    uint32_t frame;
+    uint64_t command, command_sent_ns;
+    uint64_t command_received_ns, command_applied_ns, rendered_ns; /* the daemon's clock */
+    uint64_t begun_ns, whole_ns, shown_ns;
+    uint64_t wire_bytes;
+    bool first_of_command; /* no frame before shows the same camera */
+    size_t span_count;
+    struct span spans[METRICS_SPANS]; /* of neighbours in a lane one */
+};
+
+struct metrics {
+    struct metrics_frame frames[METRICS_FRAMES]; /* a ring */
+    size_t next, count;
+    size_t unshown; /* of the last ones */
+    uint64_t last_command;
+};
+
+/* A frame that came and was decoded at `decoded_ns`; it counts as shown until metrics_show() says when it was. */
+void metrics_add(struct metrics *metrics, const struct fl_frame *frame, uint64_t decoded_ns);
+/* What came since it was called last was shown now. */
+void metrics_show(struct metrics *metrics, uint64_t shown_ns);
+/* The frame of so many before the last; NULL: not that many are remembered. */
+const struct metrics_frame *metrics_frame(const struct metrics *metrics, size_t back);
+/* What is added to the daemon's clock to get ours: as a camera cannot come before it was sent, nor a frame before
+ * it was rendered, the middle between the two. */
+int64_t metrics_clock_offset_ns(const struct metrics *metrics);
+
+struct metrics_summary {
+    double frames_per_second, bits_per_second; /* over the last second */
+    bool has_latency;
+    double latency_s; /* from camera to picture, median of the last second's; else the last one */
+};
+void metrics_summarise(const struct metrics *metrics, uint64_t now_ns, struct metrics_summary *summary);
+
+#endif

@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: MIT */
+/* A list of timed events in JSON, in place of a person. Knows no window. */
+#ifndef FARLIGHT_CLIENT_VIEWER_REPLAY_H
+#define FARLIGHT_CLIENT_VIEWER_REPLAY_H
+
+#include "viewer/input.h"
+
+enum replay_kind {
+    REPLAY_INPUT,
+    REPLAY_REST, /* wait until the picture rests, with all samples or `samples` of them, or the map is there */
+    REPLAY_LIVE, /* wait until the scene is there */
+    REPLAY_LOST, /* wait until the connection is lost */
+    REPLAY_SCREENSHOT, /* into `path` */
+    REPLAY_STATE       /* one line of JSON on standard output */
+};
+
+struct replay_event {
+    enum replay_kind kind;
+    size_t number;  /* in the file, counted from 0 */
+    double after_s; /* since the event before was done */
+    struct input input;
+    unsigned samples; /* 0: all */
+    double timeout_s; /* of a wait */
+    char path[4096];
+};
+
+struct replay {
+    struct replay_event *events;
+    size_t count;
+};
+
+/* Reads
+ *   [{"mouse": "down", "button": "left", "x": 100, "y": 80, "clicks": 1, "shift": false},
+ *    {"mouse": "move", "x": 120, "y": 80, "after": 0.02}, {"mouse": "up", "button": "left", "x": 120, "y": 80},
+ *    {"wheel": 2}, {"key": "t", "shift": true}, {"key": "w", "hold": 0.5},
+ *    {"resize": [640, 360]}, {"wait": "rest", "samples": 8, "timeout": 60}, {"wait": "live"}, {"wait": "lost"},
+ *    {"screenshot": "a.png"}, {"state": "name"}]
+ * "after" is in seconds since the event before was done, default 0. Errors name the file, the line and the event.
+ */
+bool replay_load(struct replay *replay, const char *path, struct fl_error *error);
+void replay_finish(struct replay *replay);
+
+#endif

@@ -1,0 +1,339 @@
+/* SPDX-License-Identifier: MIT */
+#include "viewer/session.h"
+
+#include <inttypes.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+
+#define FIRST_PAUSE_NS 250000000ull
+#define LONGEST_PAUSE_NS 4000000000ull
+#define AGAIN_TIMEOUT_MS 5000u
+
+struct session {
+    struct session_options options;
+    char kept_name[40]; /* by which a scene that we loaded is found again */
+    enum session_state state;
+    unsigned times_live;
+    struct fl_error error;
+    uint64_t retry_ns, pause_ns;
+
+    /* Of the thread while it runs, ours else. */
+    pthread_t thread;
+    bool has_thread;
+    atomic_bool opened; /* the thread is at its end */
+    struct fl_connection *connection;
+    struct fl_scene *scene;
+    struct fl_error open_error;
+
+    pthread_mutex_t lock; /* guards what follows */
+    char doing[160];
+    double share;
+    char doing_copy[160]; /* as it was told last */
+
+    struct fl_view *view;
+    uint64_t changes; /* of `view` */
+    struct fl_job *job;
+};
+
+/* ---- opening, in the thread ---- */
+
+static void set_progress(struct session *session, const char *what, double share)
+{
+    pthread_mutex_lock(&session->lock);
+    snprintf(session->doing, sizeof session->doing, "%s", what);
+    session->share = share;
+    pthread_mutex_unlock(&session->lock);
+}
+
+static void on_progress(void *user, uint64_t done_bytes, uint64_t total_bytes, const char *what)
+{
+    set_progress(user, what, total_bytes > 0 ? (double)done_bytes / (double)total_bytes : 0);
+}
+
+static void on_note(void *user, const struct fl_note *note)
+{
+    struct session *session = user;
+    if (session->options.note != NULL && session->times_live == 0)
+        session->options.note(session->options.user, note);
+}
+
+/* A daemon that was there all the time still has the scene; another one is given it again. */
+static struct fl_scene *come_to_scene(struct session *session, struct fl_error *error)
+{
+    const struct session_options *options = &session->options;
+    if (options->scene_name != NULL)
+        return fl_scene_attach(session->connection, options->scene_name, error);
+    struct fl_scene *scene = NULL;
+    if (session->times_live > 0 && options->server != NULL)
+        scene = fl_scene_attach(session->connection, session->kept_name, error);
+    if (scene != NULL || error->code == FL_ERROR_CONNECTION || error->code == FL_ERROR_INTERRUPTED)
+        return scene;
+    *error = (struct fl_error){0};
+    /* A private daemon ends with its connection, and its scenes with it. */
+    const struct fl_load_options load = {.model = options->model,
+                                         .environment = options->environment,
+                                         .note = on_note,
+                                         .progress = on_progress,
+                                         .user = session,
+                                         .sharing = options->server != NULL ? PROTOCOL_SHARING_KEPT
+                                                                            : PROTOCOL_SHARING_PRIVATE,
+                                         .scene_name = options->server != NULL ? session->kept_name : NULL};
+    return fl_scene_load(session->connection, &load, error);
+}
+
+static void *open_all(void *argument)
+{
+    struct session *session = argument;
+    const struct session_options *options = &session->options;
+    const struct fl_connect_options connect = {.server = options->server,
+                                               .key_file = options->key_file,
+                                               .name = "farlight view",
+                                               .can_h264 = true,
+                                               .interrupt_fd = options->interrupt_fd,
+                                               .timeout_ms = session->times_live > 0 ? AGAIN_TIMEOUT_MS : 0};
+    set_progress(session, options->server != NULL ? options->server : "a daemon is started", 0);
+    session->connection = fl_connect(&connect, &session->open_error);
+    if (session->connection != NULL)
+        session->scene = come_to_scene(session, &session->open_error);
+    atomic_store(&session->opened, true);
+    return NULL;
+}
+
+static bool begin_opening(struct session *session)
+{
+    session->open_error = (struct fl_error){0};
+    session->state = SESSION_OPENING;
+    atomic_store(&session->opened, false);
+    session->has_thread = pthread_create(&session->thread, NULL, open_all, session) == 0;
+    return session->has_thread || fl_error_set(&session->error, FL_ERROR_SYSTEM, "", "no thread can be started");
+}
+
+/* ---- from state to state ---- */
+
+static void close_all(struct session *session)
+{
+    fl_render_destroy(session->job);
+    fl_view_destroy(session->view);
+    fl_scene_destroy(session->scene);
+    fl_connection_destroy(session->connection);
+    session->job = NULL;
+    session->view = NULL;
+    session->scene = NULL;
+    session->connection = NULL;
+}
+
+static void lose(struct session *session, const struct fl_error *error, uint64_t now_ns)
+{
+    session->error = *error;
+    close_all(session);
+    if (session->times_live == 0) {
+        session->state = SESSION_FAILED;
+        return;
+    }
+    session->state = SESSION_LOST;
+    session->retry_ns = now_ns + session->pause_ns;
+    session->pause_ns = session->pause_ns < LONGEST_PAUSE_NS / 2 ? session->pause_ns * 2 : LONGEST_PAUSE_NS;
+}
+
+static void end_opening(struct session *session, uint64_t now_ns)
+{
+    pthread_join(session->thread, NULL);
+    session->has_thread = false;
+    if (session->scene == NULL) {
+        const struct fl_error error = session->open_error;
+        lose(session, &error, now_ns);
+        return;
+    }
+    session->times_live++;
+    session->pause_ns = FIRST_PAUSE_NS;
+    session->state = SESSION_LIVE;
+}
+
+enum session_state session_step(struct session *session, uint64_t now_ns)
+{
+    if (session->state == SESSION_OPENING && atomic_load(&session->opened))
+        end_opening(session, now_ns);
+    else if (session->state == SESSION_LIVE && session->error.code != FL_ERROR_NONE) {
+        const struct fl_error error = session->error;
+        lose(session, &error, now_ns);
+    } else if (session->state == SESSION_LOST && now_ns >= session->retry_ns) {
+        if (!begin_opening(session))
+            session->state = SESSION_FAILED;
+        else
+            session->error = (struct fl_error){0};
+    }
+    return session->state;
+}
+
+struct session *session_create(const struct session_options *options, struct fl_error *error)
+{
+    struct session *session = calloc(1, sizeof *session);
+    uint64_t number = 0;
+    if (session == NULL || getrandom(&number, sizeof number, 0) != (ssize_t)sizeof number) {
+        fl_error_set(error, FL_ERROR_SYSTEM, "", "no memory, or no random numbers");
+        free(session);
+        return NULL;
+    }
+    session->options = *options;
+    session->pause_ns = FIRST_PAUSE_NS;
+    snprintf(session->kept_name, sizeof session->kept_name, "view-%016" PRIx64, number);
+    pthread_mutex_init(&session->lock, NULL);
+    if (begin_opening(session))
+        return session;
+    *error = session->error;
+    session_destroy(session);
+    return NULL;
+}
+
+/* Without waiting for a daemon that does not answer: the interruption descriptor is readable by then. */
+void session_destroy(struct session *session)
+{
+    if (session == NULL)
+        return;
+    if (session->has_thread)
+        pthread_join(session->thread, NULL);
+    if (session->connection != NULL)
+        fl_connection_set_interrupt(session->connection, 0);
+    close_all(session);
+    pthread_mutex_destroy(&session->lock);
+    free(session);
+}
+
+unsigned session_times_live(const struct session *session)
+{
+    return session->times_live;
+}
+
+const char *session_progress(struct session *session, double *share)
+{
+    pthread_mutex_lock(&session->lock);
+    memcpy(session->doing_copy, session->doing, sizeof session->doing);
+    *share = session->share;
+    pthread_mutex_unlock(&session->lock);
+    return session->doing_copy;
+}
+
+const struct fl_error *session_error(const struct session *session)
+{
+    return &session->error;
+}
+
+uint64_t session_retry_ns(const struct session *session)
+{
+    return session->retry_ns;
+}
+
+/* ---- the view ---- */
+
+struct fl_scene *session_scene(struct session *session)
+{
+    return session->scene;
+}
+
+bool session_is_local(const struct session *session)
+{
+    return fl_connection_is_local(session->connection);
+}
+
+bool session_can_h264(const struct session *session)
+{
+    return fl_connection_can_h264(session->connection);
+}
+
+/* What another try on another connection may mend: all but what this request was refused for. */
+static bool is_lost(const struct fl_error *error)
+{
+    if (error->code == FL_ERROR_REFUSED)
+        return error->retryable || error->server_code == PROTOCOL_ERROR_CODE_DEVICE_LOST ||
+               error->server_code == PROTOCOL_ERROR_CODE_SHUTTING_DOWN;
+    return error->code != FL_ERROR_NONE && error->code != FL_ERROR_ARGUMENT && error->code != FL_ERROR_INTERRUPTED;
+}
+
+/* Notes a loss for the next step; what else went wrong goes to *refusal. */
+static bool fail(struct session *session, const struct fl_error *error, struct fl_error *refusal)
+{
+    if (is_lost(error))
+        session->error = *error;
+    else if (error->code != FL_ERROR_INTERRUPTED)
+        *refusal = *error;
+    return false;
+}
+
+bool session_show(struct session *session, const struct fl_view_options *options, uint64_t *change)
+{
+    struct fl_error error = {0}, ignored;
+    if (session->view != NULL && fl_view_change(session->view, options, &error)) {
+        *change = ++session->changes;
+        return true;
+    }
+    if (session->view != NULL && error.code != FL_ERROR_REFUSED)
+        return fail(session, &error, &ignored);
+    fl_view_destroy(session->view); /* it was refused from the beginning */
+    session->changes = *change = 0;
+    session->view = fl_view_start(session->scene, options, &error);
+    return session->view != NULL || fail(session, &error, &ignored);
+}
+
+bool session_look(struct session *session, const struct fl_view_camera *camera, uint64_t *command)
+{
+    struct fl_error error = {0}, ignored;
+    if (session->view == NULL)
+        return false;
+    return fl_view_look(session->view, camera, command, &error) || fail(session, &error, &ignored);
+}
+
+void session_want_key_frame(struct session *session)
+{
+    struct fl_error error = {0}, ignored;
+    if (session->view != NULL && !fl_view_want_key_frame(session->view, &error))
+        fail(session, &error, &ignored);
+}
+
+struct fl_frame *session_next(struct session *session, unsigned timeout_ms, struct fl_error *refusal)
+{
+    struct fl_error error = {0};
+    *refusal = (struct fl_error){0};
+    if (session->view == NULL)
+        return NULL;
+    struct fl_frame *frame = fl_view_next(session->view, timeout_ms, &error);
+    if (frame == NULL && error.code != FL_ERROR_NONE)
+        fail(session, &error, refusal);
+    return frame;
+}
+
+/* ---- beside the view ---- */
+
+bool session_ask(struct session *session, const struct fl_job_options *options, struct fl_error *refusal)
+{
+    struct fl_error error = {0};
+    session_give_up(session);
+    session->job = fl_render_start(session->scene, options, &error);
+    return session->job != NULL || fail(session, &error, refusal);
+}
+
+struct fl_frame *session_answer(struct session *session, struct fl_error *refusal)
+{
+    struct fl_error error = {0};
+    bool done = false;
+    *refusal = (struct fl_error){0};
+    if (session->job == NULL)
+        return NULL;
+    struct fl_frame *frame = fl_render_poll(session->job, 0, &done, &error);
+    if (frame == NULL && error.code != FL_ERROR_NONE)
+        fail(session, &error, refusal);
+    if (frame != NULL || refusal->code != FL_ERROR_NONE) {
+        fl_render_destroy(session->job);
+        session->job = NULL;
+    }
+    return frame;
+}
+
+void session_give_up(struct session *session)
+{
+    fl_render_destroy(session->job);
+    session->job = NULL;
+}

@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: MIT */
+#include "viewer/settings.h"
+
+#include <stdlib.h>
+
+#define EXPOSURE_THIRDS_MAX 36 /* twelve stops */
+
+static int around(int value, int step, int count)
+{
+    return (value + step + count) % count;
+}
+
+/* What the daemon has to be told of. */
+static bool change_view(struct settings *settings, enum action action)
+{
+    const struct settings before = *settings;
+    switch (action) {
+    case ACTION_NEXT_TRACER:
+    case ACTION_PREVIOUS_TRACER:
+        do /* the naive one is for tests: nobody waits for it */
+            settings->tracer = (enum protocol_tracer)around(
+                (int)settings->tracer, action == ACTION_NEXT_TRACER ? 1 : -1, PROTOCOL_TRACER_COUNT);
+        while (settings->tracer == PROTOCOL_TRACER_NAIVE);
+        return true;
+    case ACTION_NEXT_INTEGRATOR:
+    case ACTION_PREVIOUS_INTEGRATOR:
+        settings->integrator = (enum protocol_integrator)around(
+            (int)settings->integrator, action == ACTION_NEXT_INTEGRATOR ? 1 : -1, PROTOCOL_INTEGRATOR_COUNT);
+        return true;
+    case ACTION_NEXT_TONE_MAP:
+        settings->tone_map = (enum protocol_tone_map)around((int)settings->tone_map, 1, PROTOCOL_TONE_MAP_COUNT);
+        return true;
+    case ACTION_DARKER:
+    case ACTION_BRIGHTER:
+        settings->exposure_thirds += action == ACTION_DARKER ? -1 : 1;
+        if (abs(settings->exposure_thirds) > EXPOSURE_THIRDS_MAX)
+            settings->exposure_thirds = before.exposure_thirds;
+        return settings->exposure_thirds != before.exposure_thirds;
+    case ACTION_COARSER:
+        settings->coarser += settings->coarser < SETTINGS_COARSEST;
+        return settings->coarser != before.coarser;
+    case ACTION_FINER:
+        settings->coarser -= settings->coarser > 0;
+        return settings->coarser != before.coarser;
+    default:
+        return false;
+    }
+}
+
+enum settings_change settings_act(struct settings *settings, enum action action)
+{
+    switch (action) {
+    case ACTION_ERROR_MAP:
+        settings->error_map = !settings->error_map;
+        return SETTINGS_DRAWN;
+    case ACTION_HELP:
+        settings->help = !settings->help;
+        return SETTINGS_DRAWN;
+    case ACTION_OVERLAY:
+        settings->overlay = (enum overlay_mode)around((int)settings->overlay, 1, OVERLAY_MODE_COUNT);
+        return SETTINGS_DRAWN;
+    default:
+        return change_view(settings, action) ? SETTINGS_VIEW : SETTINGS_SAME;
+    }
+}

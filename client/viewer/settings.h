@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* How the picture is made, as keys change it. Knows no window and no daemon. */
+#ifndef FARLIGHT_CLIENT_VIEWER_SETTINGS_H
+#define FARLIGHT_CLIENT_VIEWER_SETTINGS_H
+
+#include "viewer/input.h"
+
+enum overlay_mode { OVERLAY_ALL, OVERLAY_FIGURES, OVERLAY_NONE, OVERLAY_MODE_COUNT };
+
+struct settings {
+    enum protocol_tracer tracer;
+    enum protocol_integrator integrator;
+    enum protocol_tone_map tone_map;
+    int exposure_thirds; /* of a stop, added to that of the command line */
+    int coarser;         /* pixels along an edge are divided by 2 to this power */
+    bool error_map, help;
+    enum overlay_mode overlay;
+};
+
+#define SETTINGS_COARSEST 3
+
+enum settings_change {
+    SETTINGS_SAME,
+    SETTINGS_DRAWN, /* the overlay is another */
+    SETTINGS_VIEW   /* the daemon has to be told */
+};
+enum settings_change settings_act(struct settings *settings, enum action action);
+
+#endif

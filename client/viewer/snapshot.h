@@ -1,0 +1,10 @@
+/* SPDX-License-Identifier: MIT */
+#ifndef FARLIGHT_CLIENT_VIEWER_SNAPSHOT_H
+#define FARLIGHT_CLIENT_VIEWER_SNAPSHOT_H
+
+#include "viewer/picture.h"
+
+/* Writes a PNG; it is complete when this returns true. */
+bool snapshot_write(const char *path, const struct picture *picture, struct fl_error *error);
+
+#endif

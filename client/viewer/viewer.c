@@ -1,0 +1,227 @@
+/* SPDX-License-Identifier: MIT */
+#include "viewer/viewer.h"
+#include "viewer/viewer_state.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#define NOTICE_NS 4000000000ull
+#define GLIDE_NS 350000000ull
+#define BUSY_WAIT_MS 2u /* while somebody is at it; frames end the wait, input does not */
+#define IDLE_WAIT_MS 15u
+#define BUSY_NS 1000000000ull
+#define REDRAW_NS 250000000ull /* figures go on while no frame comes */
+
+uint64_t viewer_now_ns(void)
+{
+    struct timespec now = {0};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+}
+
+void viewer_say(struct viewer *viewer, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(viewer->notice, sizeof viewer->notice, format, arguments);
+    va_end(arguments);
+    viewer->notice_ns = viewer_now_ns() + NOTICE_NS;
+    viewer->must_draw = true;
+}
+
+/* ---- a scene that has become live ---- */
+
+/* What the command line names can be looked up now. */
+static bool settle(struct viewer *viewer, struct fl_error *error)
+{
+    const struct viewer_options *options = viewer->options;
+    struct fl_job_options *job = &viewer->view.job;
+    struct fl_scene *scene = session_scene(viewer->session);
+    const struct fl_camera_info *first = fl_scene_camera(scene, 0);
+    uint32_t clip = 0;
+    tour_begin(&viewer->tour, fl_scene_camera_count(scene), fl_scene_clip_count(scene));
+    viewer->tour.speed = options->speed;
+    if (options->camera != NULL) {
+        job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        if (!fl_scene_find_camera(scene, options->camera, &job->camera_node, error))
+            return false;
+    } else if (job->key_count == 0 && first != NULL) {
+        job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        job->camera_node = first->node;
+    }
+    if (options->clip == NULL)
+        return true;
+    if (!fl_scene_find_clip(scene, options->clip, &clip, NULL, error))
+        return false;
+    for (size_t i = 0; i < viewer->tour.clip_count; i++)
+        if (fl_scene_clip(scene, i)->clip == clip)
+            viewer_choose_clip(viewer, tour_clip(&viewer->tour, (int)i - viewer->tour.clip));
+    return true;
+}
+
+static void begin_showing(struct viewer *viewer)
+{
+    if (viewer->times_live == 0 && !settle(viewer, &viewer->failure))
+        return;
+    viewer->times_live = session_times_live(viewer->session);
+    viewer_drop_errands(viewer);
+    viewer->metrics = (struct metrics){0}; /* another daemon has another clock */
+    viewer->has_looked = viewer->told_moving = false;
+    viewer->frame.command = 0;
+    viewer->must_show = true;
+}
+
+/* ---- the loop ---- */
+
+/* What moves by itself. */
+static void tick(struct viewer *viewer, uint64_t now_ns)
+{
+    const double seconds = (double)(now_ns - viewer->tick_ns) * 1e-9;
+    bool moved = false;
+    viewer->tick_ns = now_ns;
+    if (!viewer->has_camera)
+        return;
+    if (viewer->glide_begin_ns != 0) {
+        const double share = (double)(now_ns - viewer->glide_begin_ns) / GLIDE_NS;
+        camera_between(&viewer->glide_from, &viewer->glide_to, share < 1 ? share : 1, &viewer->camera);
+        viewer->glide_begin_ns = share < 1 ? viewer->glide_begin_ns : 0;
+        moved = true;
+    }
+    moved = controls_fly(&viewer->controls, seconds, &viewer->camera) || moved;
+    moved = tour_advance(&viewer->tour, seconds) || moved;
+    viewer->must_look = viewer->must_look || moved;
+    viewer->moved_ns = moved ? now_ns : viewer->moved_ns;
+}
+
+static void take_input(struct viewer *viewer, uint64_t now_ns)
+{
+    struct input input;
+    while (viewer->window != NULL && window_poll(viewer->window, &input))
+        /* A replay is not disturbed but by the end. */
+        if (viewer->options->replay == NULL || input.kind == INPUT_QUIT || input.kind == INPUT_RESIZE)
+            viewer_input(viewer, &input);
+    if (viewer->options->replay != NULL)
+        viewer_replay(viewer, now_ns);
+}
+
+static void serve(struct viewer *viewer, uint64_t now_ns)
+{
+    const enum session_state state = session_step(viewer->session, now_ns);
+    const bool is_busy = viewer->moved_ns + BUSY_NS > now_ns || viewer->replay.count > 0;
+    const unsigned wait_ms = viewer->must_draw ? 0 : is_busy ? BUSY_WAIT_MS : IDLE_WAIT_MS;
+    if (state == SESSION_FAILED) {
+        viewer->failure = *session_error(viewer->session);
+        return;
+    }
+    if (state != SESSION_LIVE) {
+        poll(NULL, 0, (int)IDLE_WAIT_MS);
+        return;
+    }
+    if (viewer->times_live != session_times_live(viewer->session))
+        begin_showing(viewer);
+    if (viewer->failure.code != FL_ERROR_NONE)
+        return;
+    viewer_tell(viewer, now_ns);
+    viewer_receive(viewer, wait_ms);
+    viewer_errands(viewer);
+}
+
+static void draw(struct viewer *viewer)
+{
+    struct hud_state state;
+    if (viewer->window == NULL)
+        return;
+    viewer->must_draw |= window_wants_drawing(viewer->window);
+    if (!viewer->must_draw && viewer_now_ns() < viewer->drawn_ns + REDRAW_NS)
+        return;
+    viewer_hud(viewer, &state);
+    window_show(viewer->window, viewer_picture(viewer), &state);
+    metrics_show(&viewer->metrics, viewer_now_ns());
+    viewer->drawn_ns = viewer_now_ns();
+}
+
+static bool run(struct viewer *viewer)
+{
+    viewer->replay_ns = viewer->tick_ns = viewer_now_ns();
+    while (!viewer->quit && viewer->failure.code == FL_ERROR_NONE) {
+        const uint64_t now_ns = viewer_now_ns();
+        take_input(viewer, now_ns);
+        tick(viewer, now_ns);
+        serve(viewer, now_ns);
+        draw(viewer);
+        viewer->must_draw = false;
+        if (viewer->options->interrupt_signal() != 0)
+            fl_error_set(&viewer->failure, FL_ERROR_INTERRUPTED, "", "interrupted");
+    }
+    return viewer->failure.code == FL_ERROR_NONE;
+}
+
+/* ---- beginning and end ---- */
+
+static bool open_viewer(struct viewer *viewer, struct fl_error *error)
+{
+    const struct viewer_options *options = viewer->options;
+    const struct session_options session = {.server = options->server,
+                                            .key_file = options->key_file,
+                                            .model = options->model,
+                                            .environment = options->environment,
+                                            .scene_name = options->scene_name,
+                                            .interrupt_fd = options->interrupt_fd,
+                                            .note = options->note};
+    if (options->replay != NULL && !replay_load(&viewer->replay, options->replay, error))
+        return false;
+    viewer->session = session_create(&session, error); /* it opens while the window does */
+    if (viewer->session == NULL || options->headless)
+        return viewer->session != NULL;
+    viewer->window = window_create(options->scene_name != NULL ? options->scene_name
+                                   : options->model != NULL    ? options->model
+                                                               : options->environment,
+                                   viewer->width, viewer->height, error);
+    if (viewer->window != NULL)
+        window_size(viewer->window, &viewer->width, &viewer->height, &viewer->scale);
+    return viewer->window != NULL;
+}
+
+static void close_viewer(struct viewer *viewer)
+{
+    const uint64_t one = 1;
+    /* Whoever still opens a connection in the other thread gives up. */
+    if (write(viewer->options->interrupt_fd, &one, sizeof one) < 0)
+        errno = 0; /* it is readable already */
+    window_destroy(viewer->window);
+    session_destroy(viewer->session);
+    decoder_destroy(viewer->decoder);
+    picture_finish(&viewer->live);
+    picture_finish(&viewer->compared);
+    picture_finish(&viewer->heat);
+    replay_finish(&viewer->replay);
+}
+
+bool viewer_run(const struct viewer_options *options, struct fl_error *error)
+{
+    struct viewer *viewer = calloc(1, sizeof *viewer);
+    if (viewer == NULL)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    viewer->options = options;
+    viewer->view = options->view;
+    viewer->width = (int)options->view.job.width;
+    viewer->height = (int)options->view.job.height;
+    viewer->scale = 1;
+    viewer->settings = (struct settings){.tracer = options->view.job.tracer,
+                                         .integrator = options->view.job.integrator,
+                                         .tone_map = options->view.job.tone_map,
+                                         .coarser = (int)options->coarser};
+    const bool opened = open_viewer(viewer, error);
+    const bool done = opened && run(viewer);
+    if (opened && !done)
+        *error = viewer->failure;
+    close_viewer(viewer);
+    free(viewer);
+    return done;
+}

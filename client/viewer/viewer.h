@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* The viewer: what comes in (people or a replay, frames, losses) and what is shown, in one loop for a window and
+ * for none. */
+#ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_H
+#define FARLIGHT_CLIENT_VIEWER_VIEWER_H
+
+#include "lib/farlight.h"
+
+struct viewer_options {
+    const char *server, *key_file, *model, *environment, *scene_name; /* as of session_options */
+    /* As of the command line; width and height are the window's, as of the desktop. */
+    struct fl_view_options view;
+    bool has_encoding, has_still_encoding, has_primary, has_integrator;
+    bool always_adapt, never_adapt;
+    const char *camera, *clip; /* names or numbers; NULL: none is named */
+    double speed;              /* of the clip */
+    unsigned coarser;          /* as of struct settings */
+    bool headless;
+    const char *replay; /* path; NULL: a person */
+    bool quiet;
+    int interrupt_fd;
+    int (*interrupt_signal)(void); /* which one came; 0: none */
+    void (*note)(void *user, const struct fl_note *note);
+};
+
+/* Until the window is closed, the replay has ended, or something cannot be mended. */
+bool viewer_run(const struct viewer_options *options, struct fl_error *error);
+
+#endif

@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: MIT */
+/* What the viewer tells of itself: picture and overlay, screenshots, its state as JSON. */
+#include "viewer/paint.h"
+#include "viewer/snapshot.h"
+#include "viewer/viewer_state.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+const struct picture *viewer_picture(const struct viewer *viewer)
+{
+    return viewer->has_heat ? &viewer->heat : &viewer->live;
+}
+
+static const char *file_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+static void fill_names(struct viewer *viewer, struct hud_state *state)
+{
+    const struct viewer_options *options = viewer->options;
+    struct fl_scene *scene = session_scene(viewer->session);
+    const struct tour *tour = &viewer->tour;
+    state->scene = options->scene_name != NULL ? options->scene_name
+                   : options->model != NULL    ? file_name(options->model)
+                                               : file_name(options->environment);
+    state->server = options->server != NULL ? options->server : "";
+    state->camera = state->clip = "";
+    if (scene != NULL && tour->camera != TOUR_NONE)
+        state->camera = fl_scene_camera(scene, (size_t)tour->camera)->name;
+    if (scene != NULL && tour->clip != TOUR_NONE)
+        state->clip = fl_scene_clip(scene, (size_t)tour->clip)->name;
+}
+
+static void fill_status(struct viewer *viewer, struct hud_state *state)
+{
+    static char text[HUD_TEXT_MAX];
+    const bool was_live = viewer->times_live > 0;
+    text[0] = '\0';
+    state->status_text = text;
+    if (session_scene(viewer->session) != NULL) {
+        state->status = viewer->frames > 0 ? HUD_LIVE : HUD_LOADING;
+        snprintf(text, sizeof text, "the first picture is made");
+        return;
+    }
+    state->status = was_live ? HUD_LOST : HUD_LOADING;
+    const struct fl_error *error = session_error(viewer->session);
+    if (was_live && error->code != FL_ERROR_NONE) {
+        const uint64_t retry_ns = session_retry_ns(viewer->session), now_ns = state->now_ns;
+        const double left_s = retry_ns > now_ns ? (double)(retry_ns - now_ns) * 1e-9 : 0;
+        snprintf(text, sizeof text, "%.80s; trying again in %.1f s", error->text, left_s);
+        return;
+    }
+    const char *what = session_progress(viewer->session, &state->progress);
+    snprintf(text, sizeof text, "%s%.100s", was_live ? "trying again: " : "", what);
+}
+
+void viewer_hud(struct viewer *viewer, struct hud_state *state)
+{
+    *state = (struct hud_state){.width = viewer->width,
+                                .height = viewer->height,
+                                .scale = viewer->scale,
+                                .notice = "",
+                                .settings = &viewer->settings,
+                                .exposure_stops = (double)viewer->view.job.exposure_stops +
+                                                  viewer->settings.exposure_thirds / 3.0,
+                                .tour = &viewer->tour,
+                                .metrics = &viewer->metrics,
+                                .now_ns = viewer_now_ns(),
+                                .picture_width = viewer->frame.width,
+                                .picture_height = viewer->frame.height,
+                                .samples = viewer->frame.samples,
+                                .samples_wanted = viewer->view.job.samples,
+                                .moving = viewer->frame.moving,
+                                .revision = viewer->frame.revision,
+                                .wire_bytes = viewer->frame.wire_bytes,
+                                .encoding = viewer->frame.encoding,
+                                .quality = viewer->frame.frame_quality,
+                                .heat = viewer->has_heat             ? HUD_HEAT_SHOWN
+                                        : viewer->settings.error_map ? HUD_HEAT_WAITING
+                                                                     : HUD_HEAT_NONE,
+                                .heat_figures = viewer->heat_figures,
+                                .heat_top = HEAT_TOP};
+    fill_names(viewer, state);
+    fill_status(viewer, state);
+    if (viewer->notice_ns > state->now_ns)
+        state->notice = viewer->notice;
+}
+
+bool viewer_screenshot(struct viewer *viewer, const char *path, struct fl_error *error)
+{
+    struct hud_state state;
+    struct picture made = {0};
+    viewer_hud(viewer, &state);
+    const bool done =
+        paint_in_memory(viewer->width, viewer->height, viewer_picture(viewer), &state, &made, error) &&
+        snapshot_write(path, &made, error);
+    picture_finish(&made);
+    return done;
+}
+
+static json_t *vector_json(const double vector[3])
+{
+    return json_pack("[f,f,f]", vector[0], vector[1], vector[2]);
+}
+
+void viewer_print_state(struct viewer *viewer, const char *name)
+{
+    static const char *const statuses[] = {"loading", "live", "lost"};
+    struct hud_state state;
+    struct metrics_summary summary;
+    viewer_hud(viewer, &state);
+    metrics_summarise(&viewer->metrics, state.now_ns, &summary);
+    json_t *line = json_pack(
+        "{s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, s:o, s:o, "
+        "s:f, "
+        "s:f, s:f}",
+        "state", name, "status", statuses[state.status], "tracer", protocol_tracer_text(viewer->frame.tracer),
+        "integrator", protocol_integrator_text(viewer->frame.integrator), "tone_map",
+        protocol_tone_map_text(viewer->settings.tone_map), "exposure_stops", (double)viewer->frame.exposure_stops,
+        "samples", (int)state.samples, "samples_wanted", (int)state.samples_wanted, "moving", (int)state.moving,
+        "width", (int)state.picture_width, "height", (int)state.picture_height, "frames",
+        (json_int_t)viewer->frames, "times_live", (int)viewer->times_live, "revision", (json_int_t)state.revision,
+        "camera", state.camera, "clip", state.clip, "time_s", (double)viewer->frame.time_s, "playing",
+        (int)viewer->tour.playing, "eye", vector_json(viewer->camera.eye), "look_at",
+        vector_json(viewer->camera.look_at), "fov_y", viewer->camera.fov_y, "frames_per_second",
+        summary.frames_per_second, "latency_s", summary.latency_s);
+    if (line != NULL && viewer->has_heat)
+        json_object_set_new(line, "errors",
+                            json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "greatest",
+                                      viewer->heat_figures.greatest, "beyond", viewer->heat_figures.beyond));
+    if (line != NULL && viewer->notice_ns > state.now_ns)
+        json_object_set_new(line, "notice", json_string(viewer->notice));
+    char *text = json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    if (text != NULL)
+        puts(text);
+    fflush(stdout);
+    free(text);
+    json_decref(line);
+}

@@ -1,0 +1,278 @@
+/* SPDX-License-Identifier: MIT */
+/* Jobs beside the view: where cameras are, what is under the pointer, what the reference says. */
+#include "viewer/viewer_state.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define COMPARED_SAMPLES 4u /* of a pixel: the reference may take long */
+
+void viewer_go(struct viewer *viewer, const struct viewer_camera *camera)
+{
+    if (!viewer->has_camera || viewer->options->replay != NULL) {
+        viewer->camera = *camera;
+        viewer->glide_begin_ns = 0;
+    } else {
+        viewer->glide_from = viewer->camera;
+        viewer->glide_to = *camera;
+        viewer->glide_begin_ns = viewer_now_ns();
+    }
+    viewer->has_camera = true;
+    viewer->must_look = true;
+    viewer->moved_ns = viewer_now_ns();
+}
+
+/* ---- asking ---- */
+
+/* One ray through the middle of one pixel, which tells where it ends. */
+static void fill_probe(const struct viewer *viewer, struct fl_job_options *job)
+{
+    *job = viewer->view.job;
+    job->width = job->height = 1;
+    job->samples = 1;
+    job->depth = FL_DEPTH_NONE;
+    job->tracer = viewer->settings.tracer;
+    job->integrator = PROTOCOL_INTEGRATOR_WHITTED;
+    job->aperture = job->shutter = 0;
+    job->layers = 1u << PROTOCOL_LAYER_POSITION;
+    job->format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    job->encoding = PROTOCOL_ENCODING_RAW;
+}
+
+static void fill_key(const struct viewer_camera *camera, struct record_camera_key *key)
+{
+    struct fl_view_camera out;
+    camera_export(camera, &out);
+    memcpy(key->eye_world, out.eye_world, sizeof key->eye_world);
+    memcpy(key->look_at_world, out.look_at_world, sizeof key->look_at_world);
+    memcpy(key->up_world, out.up_world, sizeof key->up_world);
+    key->fov_y = out.fov_y;
+}
+
+static void use_key(struct fl_job_options *job, struct record_camera_key *key)
+{
+    job->camera_path = PROTOCOL_CAMERA_PATH_KEYS;
+    job->keys = key;
+    job->key_count = 1;
+}
+
+/* The frame at the job's time 0 is that at the tour's time. */
+static void use_clip(const struct viewer *viewer, struct fl_job_options *job, struct record_clip_use *use)
+{
+    const struct tour *tour = &viewer->tour;
+    const struct fl_clip_info *clip =
+        tour->clip != TOUR_NONE ? fl_scene_clip(session_scene(viewer->session), (size_t)tour->clip) : NULL;
+    if (clip == NULL || clip->clip == 0)
+        return;
+    *use = (struct record_clip_use){.clip = clip->clip, .start_s = -(float)tour->time_s, .speed = 1, .loop = 1};
+    job->clips = use;
+    job->clip_count = 1;
+}
+
+static void aim(const struct viewer *viewer, struct record_camera_key *key)
+{
+    struct viewer_camera camera = viewer->camera;
+    double direction[3];
+    camera_ray(&camera, (double)viewer->live.width / viewer->live.height, viewer->focus_x, viewer->focus_y,
+               direction);
+    const double distance = camera_distance(&camera);
+    for (int i = 0; i < 3; i++)
+        camera.look_at[i] = camera.eye[i] + direction[i] * distance;
+    fill_key(&camera, key);
+}
+
+/* All but the tracer as in the view. */
+static void fill_reference(const struct viewer *viewer, struct fl_job_options *job, struct record_camera_key *key)
+{
+    *job = viewer->view.job;
+    job->width = (uint32_t)viewer->compared.width;
+    job->height = (uint32_t)viewer->compared.height;
+    job->samples = viewer->frame.samples;
+    job->tracer = PROTOCOL_TRACER_REFERENCE;
+    /* First hits are found as in the view: rasterised samples lie elsewhere than traced ones. */
+    job->integrator = viewer->settings.integrator;
+    job->tone_map = viewer->settings.tone_map;
+    job->exposure_stops += (float)viewer->settings.exposure_thirds / 3;
+    job->accumulate = true; /* with the random numbers of a view */
+    job->encoding = session_is_local(viewer->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_ZSTD;
+    fill_key(&viewer->camera, key);
+    use_key(job, key);
+}
+
+static bool ask(struct viewer *viewer, enum errand errand, struct fl_error *refusal)
+{
+    struct fl_job_options job;
+    struct record_camera_key key = {0};
+    struct record_clip_use use;
+    fill_probe(viewer, &job);
+    switch (errand) {
+    case ERRAND_CAMERA:
+        job.camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        job.camera_node = viewer->camera_node;
+        break;
+    case ERRAND_FOCUS:
+        aim(viewer, &key);
+        use_key(&job, &key);
+        break;
+    case ERRAND_REFERENCE:
+        if (!picture_copy(&viewer->compared, &viewer->live, refusal))
+            return false;
+        viewer->heat_command = viewer->command;
+        viewer->heat_change = viewer->change;
+        viewer->heat_revision = viewer->frame.revision;
+        fill_reference(viewer, &job, &key);
+        break;
+    default:
+        break;
+    }
+    use_clip(viewer, &job, &use);
+    return session_ask(viewer->session, &job, refusal);
+}
+
+/* ---- answers ---- */
+
+/* What the ray met; false: nothing. */
+static bool met(const struct fl_frame *frame, double place[3])
+{
+    float values[4];
+    memcpy(values, frame->pixels, sizeof values);
+    for (int i = 0; i < 3; i++)
+        place[i] = (double)values[i];
+    return values[3] > 0;
+}
+
+/* Where there is nothing in the middle of the picture, the middle of the scene is as far away as anything. */
+static double distance_from(const struct viewer *viewer, const struct fl_frame *frame)
+{
+    double place[3], square = 0;
+    const bool has_place = met(frame, place);
+    struct fl_scene_bounds bounds = {.empty = true};
+    struct fl_error ignored;
+    if (!has_place && fl_scene_get_bounds(session_scene(viewer->session), &bounds, &ignored) && !bounds.empty)
+        for (int i = 0; i < 3; i++)
+            place[i] = ((double)bounds.lower_world[i] + (double)bounds.upper_world[i]) / 2;
+    else if (!has_place)
+        return viewer->has_camera ? camera_distance(&viewer->camera) : 1;
+    for (int i = 0; i < 3; i++)
+        square += pow(place[i] - (double)frame->world_from_view[i * 4 + 3], 2);
+    return square > 0 ? sqrt(square) : 1;
+}
+
+static void take_camera(struct viewer *viewer, enum errand errand, const struct fl_frame *frame)
+{
+    struct viewer_camera camera;
+    camera_from_frame(&camera, frame, distance_from(viewer, frame));
+    if (errand == ERRAND_HOME) {
+        viewer->home = camera;
+        viewer->has_home = true;
+    }
+    viewer_go(viewer, &camera);
+}
+
+static void take_focus(struct viewer *viewer, const struct fl_frame *frame)
+{
+    double place[3];
+    struct viewer_camera camera = viewer->camera;
+    if (!met(frame, place)) {
+        viewer_say(viewer, "there is nothing to focus on");
+        return;
+    }
+    camera_focus(&camera, place);
+    viewer_go(viewer, &camera);
+    viewer_say(viewer, "focus: %.4g m away", camera_distance(&camera));
+}
+
+static void take_reference(struct viewer *viewer, struct fl_frame *frame)
+{
+    const struct picture *compared = &viewer->compared;
+    if (!picture_resize(&viewer->heat, compared->width, compared->height, &viewer->failure))
+        return;
+    struct picture reference = {0};
+    picture_take(&reference, frame); /* over black, as the other */
+    heat_map(compared->pixels, reference.pixels, (size_t)compared->width * (size_t)compared->height, HEAT_TOP,
+             viewer->heat.pixels, &viewer->heat_figures);
+    picture_finish(&reference);
+    viewer->has_heat = true;
+    viewer->must_draw = true;
+}
+
+static void take(struct viewer *viewer, struct fl_frame *frame)
+{
+    const enum errand errand = viewer->errand;
+    viewer->errand = ERRAND_NONE;
+    if (errand == ERRAND_FOCUS)
+        take_focus(viewer, frame);
+    else if (errand == ERRAND_REFERENCE)
+        take_reference(viewer, frame);
+    else
+        take_camera(viewer, errand, frame);
+    fl_frame_destroy(frame);
+}
+
+static void refuse(struct viewer *viewer, enum errand errand, const struct fl_error *refusal)
+{
+    viewer->errand = ERRAND_NONE;
+    if (refusal->code == FL_ERROR_NONE) /* the connection is lost */
+        return;
+    viewer_say(viewer, "not possible: %s", refusal->text);
+    if (errand == ERRAND_REFERENCE)
+        viewer->heat_refused = true;
+    if (errand == ERRAND_HOME && !viewer->has_camera)
+        viewer->failure = *refusal;
+}
+
+/* ---- which one ---- */
+
+static bool is_compared(const struct viewer *viewer)
+{
+    return viewer->heat_command == viewer->command && viewer->heat_change == viewer->change &&
+           viewer->heat_revision == viewer->frame.revision;
+}
+
+static enum errand next_errand(struct viewer *viewer)
+{
+    const enum errand wanted = viewer->wanted;
+    viewer->wanted = ERRAND_NONE;
+    if (wanted != ERRAND_NONE)
+        return wanted;
+    if (viewer->errand != ERRAND_NONE)
+        return ERRAND_NONE;
+    if (!viewer->has_home)
+        return ERRAND_HOME;
+    if (viewer->settings.error_map && !viewer->has_heat && !viewer->heat_refused &&
+        viewer_is_at_rest(viewer, COMPARED_SAMPLES))
+        return ERRAND_REFERENCE;
+    return ERRAND_NONE;
+}
+
+void viewer_errands(struct viewer *viewer)
+{
+    struct fl_error refusal = {0};
+    /* An answer for another picture is worth nothing. */
+    if (!viewer->settings.error_map || !is_compared(viewer)) {
+        viewer->must_draw = viewer->must_draw || viewer->has_heat;
+        viewer->has_heat = viewer->heat_refused = false;
+        if (viewer->errand == ERRAND_REFERENCE) {
+            session_give_up(viewer->session);
+            viewer->errand = ERRAND_NONE;
+        }
+    }
+    const enum errand next = next_errand(viewer);
+    if (next != ERRAND_NONE) {
+        viewer->errand = next;
+        if (!ask(viewer, next, &refusal))
+            refuse(viewer, next, &refusal);
+    }
+    struct fl_frame *frame = session_answer(viewer->session, &refusal);
+    if (frame != NULL)
+        take(viewer, frame);
+    else if (refusal.code != FL_ERROR_NONE)
+        refuse(viewer, viewer->errand, &refusal);
+}
+
+void viewer_drop_errands(struct viewer *viewer)
+{
+    viewer->errand = ERRAND_NONE;
+    viewer->has_heat = false;
+}

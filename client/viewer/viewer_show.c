@@ -1,0 +1,151 @@
+/* SPDX-License-Identifier: MIT */
+/* The view: what the daemon is told of it, and the frames that come. */
+#include "viewer/viewer_state.h"
+
+#include <string.h>
+
+#define LOOK_PAUSE_NS 4000000ull   /* between cameras: no screen shows more */
+#define REST_PAUSE_NS 120000000ull /* without movement: that was all of it */
+#define EDGE_LEAST 16u
+
+/* Even edges: the colours of a video come in pairs. */
+void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *height)
+{
+    const uint32_t divisor = 1u << viewer->settings.coarser;
+    *width = ((uint32_t)viewer->width / divisor) & ~1u;
+    *height = ((uint32_t)viewer->height / divisor) & ~1u;
+    *width = *width > EDGE_LEAST ? *width < 8192 ? *width : 8192 : EDGE_LEAST;
+    *height = *height > EDGE_LEAST ? *height < 8192 ? *height : 8192 : EDGE_LEAST;
+}
+
+/* On this machine pixels travel as they are; over a network as video while they move, and without loss at rest. */
+static void choose_encodings(const struct viewer *viewer, struct fl_view_options *view)
+{
+    const struct viewer_options *options = viewer->options;
+    const bool is_local = session_is_local(viewer->session);
+    if (!options->has_encoding)
+        view->job.encoding = is_local                            ? PROTOCOL_ENCODING_RAW
+                             : session_can_h264(viewer->session) ? PROTOCOL_ENCODING_H264
+                                                                 : PROTOCOL_ENCODING_JPEG;
+    if (!options->has_still_encoding)
+        view->still_encoding = is_local ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_ZSTD;
+    view->adapt = options->always_adapt || (!is_local && !options->never_adapt);
+}
+
+static void show(struct viewer *viewer)
+{
+    struct fl_view_options view = viewer->view;
+    const struct settings *settings = &viewer->settings;
+    struct record_clip_use use = {.speed = 1, .loop = 1};
+    const struct fl_clip_info *clip =
+        viewer->tour.clip != TOUR_NONE ? fl_scene_clip(session_scene(viewer->session), (size_t)viewer->tour.clip)
+                                       : NULL;
+    viewer_render_size(viewer, &view.job.width, &view.job.height);
+    choose_encodings(viewer, &view);
+    view.job.tracer = settings->tracer;
+    view.job.integrator = settings->integrator;
+    view.job.tone_map = settings->tone_map;
+    view.job.exposure_stops += (float)settings->exposure_thirds / 3;
+    /* Else most of the "truth" would be the rasteriser's. */
+    if (!viewer->options->has_primary && settings->tracer == PROTOCOL_TRACER_REFERENCE)
+        view.job.primary = PROTOCOL_PRIMARY_TRACE;
+    if (clip != NULL && clip->clip != 0) {
+        use.clip = clip->clip;
+        view.job.clips = &use;
+        view.job.clip_count = 1;
+    }
+    viewer->must_show = !session_show(viewer->session, &view, &viewer->change);
+    viewer->must_look = true; /* frames name a camera from which on they are the new ones */
+}
+
+static void look(struct viewer *viewer, bool moving, uint64_t now_ns)
+{
+    struct fl_view_camera camera = {.time_s = (float)viewer->tour.time_s, .moving = moving};
+    camera_export(&viewer->camera, &camera);
+    if (!session_look(viewer->session, &camera, &viewer->command))
+        return;
+    viewer->must_look = false;
+    viewer->has_looked = true;
+    viewer->told_moving = moving;
+    viewer->looked_ns = now_ns;
+}
+
+void viewer_tell(struct viewer *viewer, uint64_t now_ns)
+{
+    if (viewer->must_show)
+        show(viewer);
+    if (!viewer->has_camera)
+        return;
+    const bool is_moving = viewer->moved_ns + REST_PAUSE_NS > now_ns;
+    if (viewer->must_look && now_ns >= viewer->looked_ns + LOOK_PAUSE_NS)
+        look(viewer, is_moving, now_ns);
+    else if (viewer->told_moving && !is_moving)
+        look(viewer, false, now_ns);
+}
+
+/* ---- frames ---- */
+
+static bool decode(struct viewer *viewer, struct fl_frame *frame)
+{
+    struct fl_error error = {0};
+    if (frame->encoded == NULL) {
+        picture_take(&viewer->live, frame);
+        return true;
+    }
+    if (viewer->decoder == NULL)
+        viewer->decoder = decoder_create(&viewer->failure);
+    if (viewer->decoder != NULL && decoder_decode(viewer->decoder, frame, &viewer->live, &error))
+        return true;
+    session_want_key_frame(viewer->session);
+    return false;
+}
+
+static void take(struct viewer *viewer, struct fl_frame *frame)
+{
+    if (!decode(viewer, frame))
+        return;
+    metrics_add(&viewer->metrics, frame, viewer_now_ns());
+    viewer->frame = *frame;
+    viewer->frame.stages = NULL;
+    viewer->frame.wave_comparisons = NULL;
+    viewer->frame.encoded = NULL;
+    viewer->frame.depth = NULL;
+    viewer->frame.normals = NULL;
+    viewer->frame.pixels = NULL;
+    viewer->frames++;
+    viewer->taken = viewer->settings;
+    viewer->must_draw = true;
+}
+
+/* A change that the daemon does not carry out is taken back. */
+static void refuse(struct viewer *viewer, const struct fl_error *refusal)
+{
+    if (viewer->frames == 0) {
+        viewer->failure = *refusal;
+        return;
+    }
+    viewer_say(viewer, "not possible: %s", refusal->text);
+    viewer->settings = viewer->taken;
+    viewer->must_show = true;
+}
+
+void viewer_receive(struct viewer *viewer, unsigned timeout_ms)
+{
+    struct fl_error refusal = {0};
+    struct fl_frame *frame = session_next(viewer->session, timeout_ms, &refusal);
+    for (; frame != NULL; frame = session_next(viewer->session, 0, &refusal)) {
+        take(viewer, frame);
+        fl_frame_destroy(frame);
+    }
+    if (refusal.code != FL_ERROR_NONE)
+        refuse(viewer, &refusal);
+}
+
+bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples)
+{
+    const unsigned most = viewer->view.job.samples, enough = samples > 0 && samples < most ? samples : most;
+    return viewer->has_camera && viewer->has_looked && !viewer->must_show && !viewer->must_look &&
+           !viewer->told_moving && viewer->glide_begin_ns == 0 && viewer->frames > 0 &&
+           viewer->frame.command == viewer->command && viewer->frame.change == viewer->change &&
+           !viewer->frame.moving && viewer->frame.samples >= enough;
+}

@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: MIT */
+/* Inside of the viewer: what its files share. */
+#ifndef FARLIGHT_CLIENT_VIEWER_VIEWER_STATE_H
+#define FARLIGHT_CLIENT_VIEWER_VIEWER_STATE_H
+
+#include "viewer/decode.h"
+#include "viewer/hud.h"
+#include "viewer/replay.h"
+#include "viewer/session.h"
+#include "viewer/viewer.h"
+#include "viewer/window.h"
+
+/* What a job beside the view is asked for. */
+enum errand {
+    ERRAND_NONE,
+    ERRAND_HOME,     /* where the command line, the model or the whole scene put the camera */
+    ERRAND_CAMERA,   /* where a camera of the scene is */
+    ERRAND_FOCUS,    /* what is under the pointer */
+    ERRAND_REFERENCE /* the resting picture, by the reference */
+};
+
+struct viewer {
+    const struct viewer_options *options;
+    struct fl_view_options view; /* of the options, with what only the scene could tell */
+    struct session *session;
+    unsigned times_live;   /* of the session, as of when its view was started */
+    struct window *window; /* NULL: headless */
+    int width, height;
+    double scale;
+    bool quit;
+
+    struct settings settings, taken; /* `taken`: with which frames came */
+    struct tour tour;
+    struct controls controls;
+    double pointer_x, pointer_y;
+
+    struct viewer_camera camera, home;
+    bool has_camera, has_home;
+    struct viewer_camera glide_from, glide_to; /* from .. to, since then; 0: it does not glide */
+    uint64_t glide_begin_ns;
+
+    /* What the daemon was told last. */
+    bool must_show, must_look;
+    uint64_t change, command, looked_ns, moved_ns;
+    bool told_moving, has_looked;
+
+    struct decoder *decoder;
+    struct picture live;   /* the last frame */
+    struct fl_frame frame; /* what it told, without its arrays */
+    uint64_t frames;
+    struct metrics metrics;
+    bool must_draw;
+    uint64_t drawn_ns;
+
+    enum errand errand, wanted; /* that is under way; that waits for it */
+    double focus_x, focus_y;    /* shares of the picture */
+    uint32_t camera_node;
+    struct picture compared, heat; /* the picture as it was; its errors */
+    struct heat_figures heat_figures;
+    uint64_t heat_command, heat_change, heat_revision; /* of what was compared */
+    bool has_heat, heat_refused;
+
+    char notice[HUD_TEXT_MAX];
+    uint64_t notice_ns; /* until then */
+    unsigned screenshots;
+
+    struct replay replay;
+    size_t replay_next;
+    uint64_t replay_ns; /* since when the next event is looked at */
+    bool replay_waits;
+    uint64_t tick_ns;
+    struct fl_error failure; /* why it ends */
+};
+
+#define HEAT_TOP 0.25 /* a quarter of white is the brightest colour of the error map */
+
+uint64_t viewer_now_ns(void);
+__attribute__((format(printf, 2, 3))) void viewer_say(struct viewer *viewer, const char *format, ...);
+
+/* ---- viewer_show.c: what the daemon is asked for ---- */
+
+void viewer_tell(struct viewer *viewer, uint64_t now_ns); /* of the view and the camera, where they changed */
+void viewer_receive(struct viewer *viewer, unsigned timeout_ms);
+/* The frame shows what was asked for last, and more than `samples` do not come (0: all). */
+bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples);
+/* The pixels that the daemon renders for the window. */
+void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *height);
+
+/* ---- viewer_errands.c ---- */
+
+void viewer_errands(struct viewer *viewer);
+void viewer_drop_errands(struct viewer *viewer); /* of a connection that is gone */
+/* Goes there; gently, but for a replay. */
+void viewer_go(struct viewer *viewer, const struct viewer_camera *camera);
+
+/* ---- viewer_act.c ---- */
+
+void viewer_input(struct viewer *viewer, const struct input *input);
+void viewer_replay(struct viewer *viewer, uint64_t now_ns);
+/* Chooses a clip of the scene, TOUR_NONE: none. */
+void viewer_choose_clip(struct viewer *viewer, int clip);
+
+/* ---- viewer_draw.c ---- */
+
+const struct picture *viewer_picture(const struct viewer *viewer); /* the live one, or the error map */
+void viewer_hud(struct viewer *viewer, struct hud_state *state);
+bool viewer_screenshot(struct viewer *viewer, const char *path, struct fl_error *error);
+void viewer_print_state(struct viewer *viewer, const char *name);
+
+#endif

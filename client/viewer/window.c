@@ -1,0 +1,179 @@
+/* SPDX-License-Identifier: MIT */
+#include "viewer/window.h"
+#include "viewer/paint.h"
+
+#include <SDL2/SDL.h>
+#include <ctype.h>
+#include <stdlib.h>
+
+struct window {
+    SDL_Window *window;
+    SDL_Renderer *renderer;
+    struct painter *painter;
+    bool wants_drawing, is_full_screen;
+};
+
+struct window *window_create(const char *title, int width, int height, struct fl_error *error)
+{
+    struct window *made = calloc(1, sizeof *made);
+    if (made == NULL) {
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        return NULL;
+    }
+    SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1"); /* the program has its own */
+    SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");
+    if (SDL_Init(SDL_INIT_VIDEO) != 0) {
+        fl_error_set(error, FL_ERROR_SYSTEM, "", "there is no display for a window: %s", SDL_GetError());
+        fl_error_remedy(error, "set DISPLAY or WAYLAND_DISPLAY, or use --headless --replay");
+        window_destroy(made);
+        return NULL;
+    }
+    SDL_EnableScreenSaver();
+    made->window = SDL_CreateWindow(title, SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
+                                    SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
+    if (made->window != NULL)
+        made->renderer = SDL_CreateRenderer(made->window, -1, SDL_RENDERER_PRESENTVSYNC);
+    if (made->renderer == NULL)
+        fl_error_set(error, FL_ERROR_SYSTEM, "", "the window cannot be made: %s", SDL_GetError());
+    else
+        made->painter = painter_create(made->renderer, error);
+    if (made->painter == NULL) {
+        window_destroy(made);
+        return NULL;
+    }
+    made->wants_drawing = true;
+    return made;
+}
+
+void window_size(const struct window *window, int *width, int *height, double *scale)
+{
+    int desktop_width = 1, desktop_height = 1;
+    SDL_GetWindowSize(window->window, &desktop_width, &desktop_height);
+    if (SDL_GetRendererOutputSize(window->renderer, width, height) != 0) {
+        *width = desktop_width;
+        *height = desktop_height;
+    }
+    *scale = desktop_width > 0 ? (double)*width / desktop_width : 1;
+}
+
+/* ---- what happens ---- */
+
+static void take_key(const SDL_Event *event, struct input *input)
+{
+    const char *name = SDL_GetKeyName(event->key.keysym.sym);
+    size_t length = 0;
+    for (; name[length] != '\0' && length + 1 < sizeof input->key; length++)
+        input->key[length] = (char)tolower((unsigned char)name[length]);
+    input->kind = event->type == SDL_KEYDOWN ? INPUT_KEY_DOWN : INPUT_KEY_UP;
+}
+
+static bool take_button(const SDL_Event *event, double scale, struct input *input)
+{
+    const Uint8 button = event->button.button;
+    if (button != SDL_BUTTON_LEFT && button != SDL_BUTTON_MIDDLE && button != SDL_BUTTON_RIGHT)
+        return false;
+    input->kind = event->type == SDL_MOUSEBUTTONDOWN ? INPUT_BUTTON_DOWN : INPUT_BUTTON_UP;
+    input->button = (enum input_button)(button - SDL_BUTTON_LEFT);
+    input->clicks = event->button.clicks;
+    input->x = event->button.x * scale;
+    input->y = event->button.y * scale;
+    /* A drag goes on beyond the window's edge. */
+    SDL_CaptureMouse(event->type == SDL_MOUSEBUTTONDOWN ? SDL_TRUE : SDL_FALSE);
+    return true;
+}
+
+static bool take_window_event(struct window *window, const SDL_Event *event, struct input *input)
+{
+    window->wants_drawing = true;
+    switch (event->window.event) {
+    case SDL_WINDOWEVENT_SIZE_CHANGED:
+        input->kind = INPUT_RESIZE;
+        window_size(window, &input->width, &input->height, &input->scale);
+        return true;
+    case SDL_WINDOWEVENT_FOCUS_LOST:
+        input->kind = INPUT_FOCUS_LOST;
+        return true;
+    case SDL_WINDOWEVENT_CLOSE:
+        input->kind = INPUT_QUIT;
+        return true;
+    default:
+        return false;
+    }
+}
+
+/* False: it means nothing to us. */
+static bool take_event(struct window *window, const SDL_Event *event, struct input *input)
+{
+    int width = 0, height = 0;
+    double scale = 1;
+    window_size(window, &width, &height, &scale);
+    *input = (struct input){.shift = (SDL_GetModState() & KMOD_SHIFT) != 0, .scale = scale};
+    switch (event->type) {
+    case SDL_QUIT:
+        input->kind = INPUT_QUIT;
+        return true;
+    case SDL_KEYDOWN:
+    case SDL_KEYUP:
+        take_key(event, input);
+        return event->key.repeat == 0;
+    case SDL_MOUSEBUTTONDOWN:
+    case SDL_MOUSEBUTTONUP:
+        return take_button(event, scale, input);
+    case SDL_MOUSEMOTION:
+        input->kind = INPUT_MOTION;
+        input->x = event->motion.x * scale;
+        input->y = event->motion.y * scale;
+        return true;
+    case SDL_MOUSEWHEEL:
+        input->kind = INPUT_WHEEL;
+        input->wheel = (double)event->wheel.preciseY;
+        return true;
+    case SDL_WINDOWEVENT:
+        return take_window_event(window, event, input);
+    default:
+        return false;
+    }
+}
+
+bool window_poll(struct window *window, struct input *input)
+{
+    SDL_Event event;
+    while (SDL_PollEvent(&event) != 0)
+        if (take_event(window, &event, input))
+            return true;
+    return false;
+}
+
+bool window_wants_drawing(struct window *window)
+{
+    const bool wants = window->wants_drawing;
+    window->wants_drawing = false;
+    return wants;
+}
+
+/* ---- what is shown ---- */
+
+void window_show(struct window *window, const struct picture *picture, const struct hud_state *state)
+{
+    painter_draw(window->painter, (int)state->width, (int)state->height, picture, state);
+    SDL_RenderPresent(window->renderer);
+}
+
+void window_toggle_full_screen(struct window *window)
+{
+    window->is_full_screen = !window->is_full_screen;
+    SDL_SetWindowFullscreen(window->window, window->is_full_screen ? SDL_WINDOW_FULLSCREEN_DESKTOP : 0);
+}
+
+void window_destroy(struct window *window)
+{
+    if (window == NULL)
+        return;
+    painter_destroy(window->painter);
+    if (window->renderer != NULL)
+        SDL_DestroyRenderer(window->renderer);
+    if (window->window != NULL)
+        SDL_DestroyWindow(window->window);
+    SDL_Quit();
+    free(window);
+}

@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: MIT */
+/* The window: what happens in it, and what is shown there. */
+#ifndef FARLIGHT_CLIENT_VIEWER_WINDOW_H
+#define FARLIGHT_CLIENT_VIEWER_WINDOW_H
+
+#include "viewer/hud.h"
+#include "viewer/picture.h"
+
+struct window;
+
+/* `width` and `height` as of the desktop: on a fine screen it has more pixels. */
+struct window *window_create(const char *title, int width, int height, struct fl_error *error);
+/* The next thing that happened; false: nothing did. */
+bool window_poll(struct window *window, struct input *input);
+/* Whether something asks for drawing again though nothing of ours has changed: it was covered, say. */
+bool window_wants_drawing(struct window *window);
+void window_size(const struct window *window, int *width, int *height, double *scale); /* as of struct input */
+/* Draws and shows it: waits for the screen. */
+void window_show(struct window *window, const struct picture *picture, const struct hud_state *state);
+void window_toggle_full_screen(struct window *window);
+void window_destroy(struct window *window);
+
+#endif
