@@ -153,7 +153,7 @@ bool window_wants_drawing(struct window *window)
 
 /* ---- what is shown ---- */
 
-void window_show(struct window *window, const struct picture *picture, const struct hud_state *state)
+void window_show(struct window *window, const struct pixmap *picture, const struct hud_state *state)
 {
     painter_draw(window->painter, (int)state->width, (int)state->height, picture, state);
     SDL_RenderPresent(window->renderer);
