@@ -19,7 +19,8 @@ enum key {
     KEY_RETRIES,
     KEY_SCRIPT,
     KEY_LOSSLESS,
-    KEY_DRY_RUN
+    KEY_DRY_RUN,
+    KEY_SCENE
 };
 
 #define DEFAULT_RETRIES 5u
@@ -37,6 +38,8 @@ static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Animation:", -2},
     {"script", KEY_SCRIPT, "SHOT.json", 0,
      "What to render, from a file (farlight-shot(5)); options of the command line go before it", 0},
+    {"scene", KEY_SCENE, "NAME", 0,
+     "A scene that is up at --server, in place of MODEL ('farlight scenes' lists them)", 0},
     {"dry-run", KEY_DRY_RUN, NULL, 0, "Check options and script, and render nothing", 0},
     {"frames", KEY_FRAMES, "A-B[:STEP]", 0, "Which frames (default: once through the clips)", 0},
     {"fps", KEY_FPS, "N", 0, "Frames per second (default 24); frame A is at time 0", 0},
@@ -116,6 +119,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_DRY_RUN:
         animation->dry_run = true;
+        return 0;
+    case KEY_SCENE:
+        job->scene = value;
         return 0;
     case ARGP_KEY_ARG:
         if (job->model != NULL)
@@ -204,7 +210,8 @@ static bool read_all(struct animation *animation, int argc, char **argv)
     static const struct argp argp = {
         .options = options,
         .parser = parse,
-        .args_doc = "MODEL --frames A-B -o 'DIR/%04d.exr'\nMODEL --clip NAME -o MOVIE.mp4\n--script SHOT.json",
+        .args_doc = "MODEL --frames A-B -o 'DIR/%04d.exr'\nMODEL --clip NAME -o MOVIE.mp4\n"
+                    "--scene NAME --server ADDRESS --frames A-B -o 'DIR/%04d.exr'\n--script SHOT.json",
         .doc = "Render a series of pictures, or a video, of a model that moves or that a camera moves about.\v"
                "In the name of the images %d or %04d stands for the frame's number, %% for a percent sign. Videos "
                "end "
@@ -218,7 +225,7 @@ static bool read_all(struct animation *animation, int argc, char **argv)
     }
     /* The command line once more, over the script. */
     good = begin(animation) && apply_script(animation, &typed);
-    const char *model = animation->job.model;
+    const char *model = typed.job.scene == NULL ? animation->job.model : NULL; /* which --scene replaces */
     animation->job.model = NULL;
     good = good && argp_parse(&argp, argc, argv, 0, NULL, animation) == 0;
     if (animation->job.model == NULL)

@@ -25,6 +25,8 @@ int cli_animate(int argc, char **argv);
 int cli_info(int argc, char **argv);
 int cli_compare(int argc, char **argv);
 int cli_compare_tracers(int argc, char **argv); /* where cli_compare finds --tracers */
+int cli_serve(int argc, char **argv);
+int cli_scenes(int argc, char **argv);
 int cli_stats(int argc, char **argv);
 int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
@@ -155,6 +157,7 @@ struct cli_channel {
 };
 
 struct cli_job {
+    const char *scene; /* one that is up at the server, in place of the model */
     const char *model, *server, *key_file, *environment, *output, *camera, *keys_file, *trace_file;
     enum cli_image image;
     struct cli_output outputs[CLI_OUTPUTS_MAX]; /* where the pictures go: `output`, or several of a script */
@@ -212,11 +215,14 @@ bool cli_writes_to_stdout(const struct cli_job *job);
 
 /* ---- loading.c: from what the command line named to a scene on a daemon ---- */
 
-/* `job` and `progress` are the caller's; the rest is zero at first. */
+/* `job` and `progress`, and how the scene is shared, are the caller's; the rest is zero at first. */
 struct cli_loading {
     const struct cli_job *job;
     struct cli_progress *progress;
     bool again; /* what there is to say about the model has been said */
+    enum protocol_sharing sharing;
+    const char *scene_name;              /* NULL: the model's file name */
+    const char *const *daemon_arguments; /* of a private one; NULL: none */
     struct fl_load_options load;
     struct fl_connection *connection;
     struct fl_scene *scene;

@@ -13,7 +13,7 @@ _farlight()
     local words=
 
     if [ "$COMP_CWORD" -eq 1 ]; then
-        words="render animate info compare stats ping key bridge help --version"
+        words="render animate info compare serve scenes stats ping key bridge help --version"
     else
         case $before in
         --tracer) words="bvh naive reference ldc abuffer" ;;
@@ -41,8 +41,8 @@ _farlight()
         --fail-above) words="psnr= mean= rms= max= beyond= ssim= butteraugli= visible= nonfinite= agree=" ;;
         *)
             case $subcommand in
-            render) words="$job --time --progressive" ;;
-            animate) words="$job --script --dry-run --frames --fps --orbit --keys --shard --resume --retries
+            render) words="$job --scene --time --progressive" ;;
+            animate) words="$job --scene --script --dry-run --frames --fps --orbit --keys --shard --resume --retries
                 --lossless" ;;
             info) words="--json --environment --help" ;;
             compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help
@@ -51,9 +51,11 @@ _farlight()
                 --bvh-bounds --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels --ldc-images --ldc-block --ldc-rays
                 --abuffer-resolution --voxels --search --bounces --brdf --ao-distance --ao-falloff --ao-rays --layer-opacity
                 --integrator --encoding --quality --quiet" ;;
+            serve) words="--listen --server --key --name --environment --quiet --help" ;;
+            scenes) words="--server --key --json --help" ;;
             stats) words="--server --key --json --help" ;;
             ping) words="--server --key --count --help" ;;
-            help) words="render animate info compare stats ping key bridge" ;;
+            help) words="render animate info compare serve scenes stats ping key bridge" ;;
             esac
             [[ $word == -* || $subcommand == help ]] || words=
             ;;

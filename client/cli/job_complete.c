@@ -260,10 +260,25 @@ static bool complete_clips(struct cli_job *job)
     return true;
 }
 
+/* What is up already cannot be given another light, and only a daemon that others can reach has it. */
+static bool complete_scene(struct cli_job *job)
+{
+    if (job->scene == NULL)
+        return job->model != NULL || cli_usage(job, "MODEL", "no model file is named") == 0;
+    if (job->model != NULL)
+        return cli_usage(job, "--scene", "cannot go with the model %s: it is one or the other", job->model) == 0;
+    if (job->environment != NULL)
+        return cli_usage(job, "--environment", "cannot go with --scene: that has its light already") == 0;
+    if (job->server != NULL)
+        return true;
+    cli_usage(job, "--scene", "no daemon is named that has it");
+    return fl_error_remedy(&job->error, "add --server ADDRESS");
+}
+
 bool cli_job_complete(struct cli_job *job, bool is_series)
 {
-    if (job->model == NULL)
-        return cli_usage(job, "MODEL", "no model file is named") == 0;
+    if (!complete_scene(job))
+        return false;
     if (job->options.width == 0) {
         job->options.width = 1280;
         job->options.height = 720;

@@ -30,9 +30,24 @@ static void on_progress(void *user, uint64_t done_bytes, uint64_t total_bytes, c
     cli_progress_import(loading->progress, done_bytes, total_bytes, what);
 }
 
+static bool connect_to(struct cli_loading *loading, struct fl_error *error)
+{
+    const struct cli_job *job = loading->job;
+    const struct fl_connect_options connect = {.server = job->server,
+                                               .key_file = cli_key_file(job->server, job->key_file),
+                                               .name = "farlight",
+                                               .interrupt_fd = cli_interrupt_fd(),
+                                               .daemon_arguments = loading->daemon_arguments};
+    loading->connect_begin_ns = now_ns();
+    loading->connection = fl_connect(&connect, error);
+    return loading->connection != NULL;
+}
+
 bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
 {
     const struct cli_job *job = loading->job;
+    if (job->scene != NULL)
+        return connect_to(loading, error);
     if ((job->model != NULL && !cli_check_input(job->model, error)) ||
         (job->environment != NULL && !cli_check_input(job->environment, error)))
         return false;
@@ -40,22 +55,22 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
                                              .environment = job->environment,
                                              .note = on_note,
                                              .progress = on_progress,
-                                             .user = loading};
+                                             .user = loading,
+                                             .sharing = loading->sharing,
+                                             .scene_name = loading->scene_name};
     loading->import_begin_ns = now_ns();
     loading->load.started = fl_import_start(&loading->load, error);
     if (loading->load.started == NULL)
         return false;
-    const struct fl_connect_options connect = {.server = job->server,
-                                               .key_file = cli_key_file(job->server, job->key_file),
-                                               .name = "farlight",
-                                               .interrupt_fd = cli_interrupt_fd()};
-    loading->connect_begin_ns = now_ns();
-    loading->connection = fl_connect(&connect, error);
-    return loading->connection != NULL;
+    return connect_to(loading, error);
 }
 
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
 {
+    if (loading->job->scene != NULL) {
+        loading->scene = fl_scene_attach(loading->connection, loading->job->scene, error);
+        return loading->scene != NULL;
+    }
     loading->scene = fl_scene_load(loading->connection, &loading->load, error);
     loading->load.started = NULL; /* the load took it over */
     if (loading->warnings > NOTES_SHOWN) {

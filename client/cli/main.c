@@ -15,6 +15,8 @@ static const struct subcommand {
     {"view", "farlight view", cli_view, "a window on a scene that is rendered elsewhere"},
     {"info", "farlight info", cli_info, "what a model file holds"},
     {"compare", "farlight compare", cli_compare, "how far two images are apart, or two tracers"},
+    {"serve", "farlight serve", cli_serve, "puts a model up for others"},
+    {"scenes", "farlight scenes", cli_scenes, "which scenes a daemon has that others may come to"},
     {"stats", "farlight stats", cli_stats, "what a daemon has and does"},
     {"ping", "farlight ping", cli_ping, "the way to a daemon and back"},
     {"key", "farlight key", cli_key, "a new key for sealed connections"},

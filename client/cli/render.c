@@ -6,9 +6,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE };
+enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE, KEY_SCENE };
 
 static const struct argp_option options[] = {
+    {"scene", KEY_SCENE, "NAME", 0,
+     "A scene that is up at --server, in place of MODEL ('farlight scenes' lists them)", -1},
     {"time", KEY_TIME, "SECONDS", 0, "The moment of the clips that is shown (default 0)", -1},
     {"progressive", KEY_PROGRESSIVE, "N", OPTION_ARG_OPTIONAL,
      "Write the picture again after every N samples (default: after 1, 2, 4, 8 ..) until --samples are reached, "
@@ -34,6 +36,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         good = value == NULL || fl_text_integer(value, 1, 65536, &number, &job->error);
         job->pass_samples = (uint32_t)number;
         break;
+    case KEY_SCENE:
+        job->scene = value;
+        return 0;
     case ARGP_KEY_ARG:
         if (job->model != NULL)
             return cli_usage(job, value, "only one model can be rendered");
@@ -68,7 +73,7 @@ int cli_render(int argc, char **argv)
     static const struct argp_child children[] = {{&cli_job_argp, 0, NULL, 0}, {0}};
     static const struct argp argp = {.options = options,
                                      .parser = parse,
-                                     .args_doc = "MODEL -o IMAGE",
+                                     .args_doc = "MODEL -o IMAGE\n--scene NAME --server ADDRESS -o IMAGE",
                                      .doc = "Render one picture of a model.\v"
                                             "MODEL is glTF, GLB, OBJ or NFF. FARLIGHT_SERVER, FARLIGHT_SIZE, "
                                             "FARLIGHT_SAMPLES and so on give defaults.",

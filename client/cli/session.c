@@ -81,7 +81,9 @@ static bool load_scene(struct session *session, struct fl_error *error)
                    fl_connection_start_ns(loading->connection));
     if (!start_sinks(session, error) || !cli_loading_end(loading, error))
         return false;
-    cli_trace_import(session->trace, fl_scene_import_stats(loading->scene), loading->import_begin_ns, now_ns());
+    if (session->job->scene == NULL)
+        cli_trace_import(session->trace, fl_scene_import_stats(loading->scene), loading->import_begin_ns,
+                         now_ns());
     session->was_loaded = true;
     return cli_choose_camera(session->job, loading->scene, error) &&
            cli_settle(session->job, loading->scene, session->is_series, error);

@@ -91,7 +91,7 @@ static bool start_video(struct cli_sink *sink, struct fl_error *error)
     }
     const struct fl_video_options options = {.path = sink->path,
                                              .format = cli_image_name(sink->output.image),
-                                             .model = job->model,
+                                             .model = job->model != NULL ? job->model : job->scene,
                                              .frames_per_second = job->options.frames_per_second,
                                              .quality = job->file_quality,
                                              .lossless = job->lossless,
@@ -107,7 +107,7 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
     const struct cli_job *job = sink->job;
     /* An interruption is how progressive pictures end: a file that has begun is finished. */
     const struct fl_exporter_options options = {.folder = sink->folder,
-                                                .model = job->model,
+                                                .model = job->model != NULL ? job->model : job->scene,
                                                 .frames_per_second =
                                                     sink->is_series ? job->options.frames_per_second : 0,
                                                 .interrupt_fd = job->progressive ? 0 : cli_interrupt_fd()};

@@ -284,10 +284,21 @@ static void print_part(const struct cli_timings *timings, const char *name, uint
     fprintf(timings->out, "  %-16s%12.3f  %s\n", name, ms(ns), doc);
 }
 
+static void print_import(const struct cli_timings *timings, const struct fl_import_stats *import)
+{
+    char upload[120];
+    snprintf(upload, sizeof upload, "%.3f MB of %.3f MB offered", (double)import->uploaded_bytes * 1e-6,
+             (double)import->offered_bytes * 1e-6);
+    print_part(timings, "load", import->load_ns, "waited for the scene; of that or beside it:");
+    print_part(timings, "  read", import->read_ns, "importer: files");
+    print_part(timings, "  parse", import->parse_ns, "importer: parsing and decoding");
+    print_part(timings, "  hash", import->hash_ns, "importer: hashing");
+    print_part(timings, "  upload", import->upload_ns, upload);
+    print_part(timings, "  commit", import->commit_ns, "daemon: edits taken");
+}
+
 static void print_table(struct cli_timings *timings, const struct cli_client_times *times)
 {
-    const struct fl_import_stats *import = times->import;
-    char upload[120];
     if (timings->frames > 0) {
         fprintf(timings->out, "%s; %" PRIu64 " frame%s%s\n", timings->title, timings->frames,
                 timings->frames == 1 ? "" : "s", timings->frames == 1 ? "" : ", means of one");
@@ -295,16 +306,10 @@ static void print_table(struct cli_timings *timings, const struct cli_client_tim
         print_rays(timings);
         print_cubes(timings);
     }
-    snprintf(upload, sizeof upload, "%.3f MB of %.3f MB offered", (double)import->uploaded_bytes * 1e-6,
-             (double)import->offered_bytes * 1e-6);
     fprintf(timings->out, "  %-16s%12s  all frames together\n", "client", "ms");
     print_part(timings, "start", times->start_ns, "daemon started or reached");
-    print_part(timings, "load", import->load_ns, "waited for the scene; of that or beside it:");
-    print_part(timings, "  read", import->read_ns, "importer: files");
-    print_part(timings, "  parse", import->parse_ns, "importer: parsing and decoding");
-    print_part(timings, "  hash", import->hash_ns, "importer: hashing");
-    print_part(timings, "  upload", import->upload_ns, upload);
-    print_part(timings, "  commit", import->commit_ns, "daemon: edits taken");
+    if (times->import->load_ns > 0) /* else the scene was there */
+        print_import(timings, times->import);
     print_part(timings, "wait", timings->wait_ns, "for frames; of that:");
     print_part(timings, "  receive", timings->receive_ns, "first byte to last");
     print_part(timings, "  decode", timings->decode_ns, "and digest");

@@ -111,13 +111,20 @@ static bool has_space_to_read(const struct fl_stream *stream)
     return stream->in_end - stream->in_start < FL_STREAM_BUFFER_BYTES;
 }
 
+/* Before the daemon has answered, what is to be sealed has to wait for that. */
+static bool has_something_to_write(const struct fl_stream *stream)
+{
+    size_t bytes = 0;
+    if (stream->link == NULL)
+        return fl_stream_has_output(stream);
+    return sealed_link_waiting(stream->link, &bytes) != NULL ||
+           (fl_stream_has_output(stream) && sealed_link_room(stream->link) > 0);
+}
+
 short fl_stream_events(const struct fl_stream *stream)
 {
     int events = 0;
-    size_t waiting_bytes = 0;
-    if (stream->link != NULL)
-        sealed_link_waiting(stream->link, &waiting_bytes);
-    if (waiting_bytes > 0 || (fl_stream_has_output(stream) && stream->link == NULL))
+    if (has_something_to_write(stream))
         events |= POLLOUT;
     if (!stream->ended && has_space_to_read(stream))
         events |= POLLIN;

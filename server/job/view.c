@@ -136,7 +136,8 @@ void view_done(struct job *job, struct engine_frame *frame)
         frame->quality = effort->quality ? effort->quality : frame->quality;
         frame->wanted_bytes = effort->bytes;
     }
-    if (!camera->moving && job->spec.still_encoding != job->spec.encoding) {
+    bool spares = job->spec.adapt && view->wish.effort.sparing && view->held_samples < job->spec.frame.samples;
+    if (!camera->moving && !spares && job->spec.still_encoding != job->spec.encoding) {
         frame->encoding = job->spec.still_encoding;
         if (frame->encoding != ENCODING_JPEG)
             frame->quality = 0; /* the other one's: the fastest level */

@@ -27,11 +27,15 @@ void view_wishes_unref(struct view_wishes *wishes); /* accepts NULL */
 bool view_wishes_look(struct view_wishes *wishes, const struct view_camera *camera);
 bool view_wishes_want_key_frame(struct view_wishes *wishes);
 
-/* Of frames while it moves, for views that adapt. */
+/* For views that adapt. */
 struct view_effort {
+    /* Of frames while it moves. */
     unsigned scale_eighths; /* of width and height; 0: as the job says */
     unsigned quality;       /* 0: as the job says */
     uint64_t bytes;         /* that a frame may have; 0: not known */
+    /* Frames in the encoding of rest would keep the link from what moves next for long: only the one that has all
+     * samples comes in it. */
+    bool sparing;
 };
 /* Nothing is to be told: it counts when the next frame is begun for another reason. */
 void view_wishes_set_effort(struct view_wishes *wishes, const struct view_effort *effort);

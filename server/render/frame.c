@@ -13,9 +13,10 @@
 
 void frame_abandon(struct frame_renderer *renderer)
 {
-    if (renderer->phase != PHASE_IDLE)
-        gpu_timer_collect(renderer->context.timer, NULL);
-    renderer->context.span_count = 0;
+    if (renderer->phase != PHASE_IDLE) {
+        gpu_timer_collect(renderer->work->context.timer, NULL);
+        renderer->work->context.span_count = 0;
+    }
     picture_drop_pixels(&renderer->picture);
     frame_end(renderer);
 }
@@ -23,9 +24,9 @@ void frame_abandon(struct frame_renderer *renderer)
 /* Where all pixels have the sample in hand, if each does not have a place of its own. */
 static void place_sample(struct frame_renderer *renderer)
 {
-    struct frame_uniforms *uniforms = &renderer->context.uniforms;
+    struct frame_uniforms *uniforms = &renderer->work->context.uniforms;
     uniforms->jitter_pixel[0] = uniforms->jitter_pixel[1] = 0.5f;
-    if (!renderer->context.spread)
+    if (!renderer->work->context.spread)
         return;
     float numbers[2];
     sequence_pair(numbers, sequence_seed(UINT32_MAX, uniforms->seed), SEQUENCE_PIXEL, uniforms->sample_index);
@@ -35,7 +36,7 @@ static void place_sample(struct frame_renderer *renderer)
 
 static bool begin_sample(struct frame_renderer *renderer, struct error *error)
 {
-    struct render_context *context = &renderer->context;
+    struct render_context *context = &renderer->work->context;
     uint32_t left = context->request.samples - renderer->sample;
     context->uniforms.sample_index = renderer->samples_before + renderer->sample;
     context->uniforms.sample_shift = renderer->rasterise ? 0 : slices_sample_shift(&renderer->slices, left);
@@ -46,14 +47,14 @@ static bool begin_sample(struct frame_renderer *renderer, struct error *error)
     context->wave_number = 0;
     slices_restart(&renderer->slices);
     renderer->phase = renderer->rasterise ? PHASE_RASTER : PHASE_SLICE;
-    primary_rasterise_begin(&renderer->primary);
+    primary_rasterise_begin(&renderer->work->primary);
     return context_upload_uniforms(context, error);
 }
 
 static bool rasterise(struct frame_renderer *renderer, struct error *error)
 {
     bool done = false;
-    if (!primary_rasterise(&renderer->primary, &renderer->context, &done, error))
+    if (!primary_rasterise(&renderer->work->primary, &renderer->work->context, &done, error))
         return false;
     renderer->phase = done ? PHASE_SLICE : PHASE_RASTER;
     return true;
@@ -61,19 +62,19 @@ static bool rasterise(struct frame_renderer *renderer, struct error *error)
 
 static const struct primary *rasterised(const struct frame_renderer *renderer)
 {
-    return renderer->rasterise ? &renderer->primary : NULL;
+    return renderer->rasterise ? &renderer->work->primary : NULL;
 }
 
 static bool begin_slice(struct frame_renderer *renderer, struct error *error)
 {
-    struct render_context *context = &renderer->context;
+    struct render_context *context = &renderer->work->context;
     uint32_t sample_shift = context->uniforms.sample_shift;
     if (!slices_take(&renderer->slices, &renderer->picture, sample_shift, &context->slice)) {
         renderer->sample += 1u << sample_shift;
         renderer->phase = renderer->sample < context->request.samples ? PHASE_SAMPLE : PHASE_RESOLVE;
         return true;
     }
-    layers_begin_slice(&renderer->layers);
+    layers_begin_slice(&renderer->work->layers);
     renderer->phase = PHASE_PRIMARY;
     return primary_begin_slice(rasterised(renderer), context, error) &&
            gpu_check(renderer->device, "primary rays", error);
@@ -82,10 +83,10 @@ static bool begin_slice(struct frame_renderer *renderer, struct error *error)
 static bool find_primary(struct frame_renderer *renderer, struct error *error)
 {
     bool done = false;
-    if (!primary_find(rasterised(renderer), &renderer->context, &done, error))
+    if (!primary_find(rasterised(renderer), &renderer->work->context, &done, error))
         return false;
     if (done)
-        renderer->phase = renderer->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
+        renderer->phase = renderer->work->layers.wanted ? PHASE_LAYERS : PHASE_SHADE;
     return gpu_check(renderer->device, "primary hits", error);
 }
 
@@ -93,7 +94,7 @@ static bool find_primary(struct frame_renderer *renderer, struct error *error)
  * one pixel's rays alone are too many, with more room. */
 static bool split_slice(struct frame_renderer *renderer, struct error *error)
 {
-    struct render_context *context = &renderer->context;
+    struct render_context *context = &renderer->work->context;
     renderer->result.splits++;
     if (context->comparison)
         comparison_drop_slice(context->comparison);
@@ -109,7 +110,7 @@ static bool split_slice(struct frame_renderer *renderer, struct error *error)
 
 static bool trace_wave(struct frame_renderer *renderer, struct error *error)
 {
-    struct render_context *context = &renderer->context;
+    struct render_context *context = &renderer->work->context;
     const struct wave wave = {
         .kind = WAVE_CLOSEST,
         .ray_count = context->ray_count,
@@ -132,20 +133,20 @@ static bool trace_wave(struct frame_renderer *renderer, struct error *error)
 
 static bool finish_slice(struct frame_renderer *renderer, struct error *error)
 {
-    struct render_context *context = &renderer->context;
+    struct render_context *context = &renderer->work->context;
     renderer->result.shadow_rays += context->shadow_rays;
     renderer->result.secondary_rays += context->secondary_rays;
     renderer->phase = PHASE_SLICE;
     bool has_beauty = renderer->picture.layers & 1u << LAYER_BEAUTY; /* then it is the first plane */
     return (!context->comparison || comparison_keep_slice(context->comparison, error)) &&
            (!has_beauty || picture_accumulate(&renderer->picture, context, 0, &context->slice_sums, 0, error)) &&
-           layers_accumulate(&renderer->layers, &renderer->picture, context, error);
+           layers_accumulate(&renderer->work->layers, &renderer->picture, context, error);
 }
 
 static bool note_layers(struct frame_renderer *renderer, struct error *error)
 {
     bool done = false;
-    if (!layers_step(&renderer->layers, &renderer->context, &done, error))
+    if (!layers_step(&renderer->work->layers, &renderer->work->context, &done, error))
         return false;
     if (!done)
         return true;
@@ -157,8 +158,8 @@ static bool note_layers(struct frame_renderer *renderer, struct error *error)
 
 static bool shade_wave(struct frame_renderer *renderer, struct error *error)
 {
-    struct render_context *context = &renderer->context;
-    switch (renderer->integrator->impl->shade(renderer->integrator, context, error)) {
+    struct render_context *context = &renderer->work->context;
+    switch (renderer->work->integrator->impl->shade(renderer->work->integrator, context, error)) {
     case INTEGRATOR_AGAIN:
         return true;
     case INTEGRATOR_MORE:
@@ -178,9 +179,9 @@ static bool shade_wave(struct frame_renderer *renderer, struct error *error)
 static bool read_band(struct frame_renderer *renderer, struct error *error)
 {
     struct picture *picture = &renderer->picture;
-    renderer->context.wave_number = 0;
-    bool good = picture_resolve_band(picture, &renderer->context, renderer->plane, renderer->band, error) &&
-                picture_read_band(picture, &renderer->context, renderer->plane, renderer->band, error);
+    renderer->work->context.wave_number = 0;
+    bool good = picture_resolve_band(picture, &renderer->work->context, renderer->plane, renderer->band, error) &&
+                picture_read_band(picture, &renderer->work->context, renderer->plane, renderer->band, error);
     if (++renderer->band == picture->band_count) {
         renderer->band = 0;
         renderer->plane++;
@@ -190,7 +191,7 @@ static bool read_band(struct frame_renderer *renderer, struct error *error)
 
 static bool hand_out(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
 {
-    struct render_context *context = &renderer->context;
+    struct render_context *context = &renderer->work->context;
     const struct frame_request *request = &context->request;
     if (context->comparison && !comparison_take(context->comparison, &renderer->result.comparisons,
                                                 &renderer->result.comparison_count, error))

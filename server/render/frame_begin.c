@@ -74,7 +74,7 @@ static void note_showing(struct frame_scene *shared, uint64_t revision_before, c
 static bool update_scene(struct frame_renderer *renderer, const struct scene *scene,
                          const struct scene_motion *motion, struct error *error)
 {
-    struct render_context *context = &renderer->context;
+    struct render_context *context = &renderer->work->context;
     const struct frame_request *request = &context->request;
     struct frame_scene *shared = renderer->shared;
     struct scene_changes changes = {0};
@@ -114,18 +114,20 @@ void frame_end(struct frame_renderer *renderer)
     if (renderer->phase != PHASE_IDLE)
         renderer->shared->frames--;
     renderer->phase = PHASE_IDLE;
+    frame_work_give(renderer->shared, renderer->work);
+    renderer->work = NULL;
 }
 
 /* The second tracer's structure is no part of what the frame's own tracer cost. */
 static bool begin_comparison(struct frame_renderer *renderer, struct error *error)
 {
-    struct render_context *context = &renderer->context;
+    struct render_context *context = &renderer->work->context;
     struct frame_scene *shared = renderer->shared;
     const struct frame_request *request = &context->request;
     context->comparison = NULL;
     if (!request->compare) {
-        comparison_destroy(renderer->comparison);
-        renderer->comparison = NULL;
+        comparison_destroy(renderer->work->comparison);
+        renderer->work->comparison = NULL;
         return true;
     }
     uint64_t start_ns = clock_now_ns();
@@ -134,13 +136,13 @@ static bool begin_comparison(struct frame_renderer *renderer, struct error *erro
         return false;
     renderer->second =
         tracer_set_take(&shared->tracers, &shared->copy, impl, &request->tracer_options, NULL, error);
-    if (!renderer->comparison)
-        renderer->comparison = comparison_create(renderer->device, error);
-    if (!renderer->second || !renderer->comparison)
+    if (!renderer->work->comparison)
+        renderer->work->comparison = comparison_create(renderer->device, error);
+    if (!renderer->second || !renderer->work->comparison)
         return false;
-    comparison_begin(renderer->comparison, &shared->copy, context->tracer, renderer->second,
+    comparison_begin(renderer->work->comparison, &shared->copy, context->tracer, renderer->second,
                      request->compare_far_share);
-    context->comparison = renderer->comparison;
+    context->comparison = renderer->work->comparison;
     stage_times_add(&context->times, STAGE_COMPARE, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return true;
 }
@@ -152,10 +154,10 @@ static uint32_t at_least(uint32_t value, uint32_t least)
 
 bool frame_reserve_waves(struct frame_renderer *renderer, struct error *error)
 {
-    struct render_context *context = &renderer->context;
+    struct render_context *context = &renderer->work->context;
     return context_reserve(context, renderer->slices.slice_rays, error) &&
-           layers_reserve(&renderer->layers, context, renderer->slices.slice_rays, error) &&
-           renderer->integrator->impl->reserve(renderer->integrator, context, error);
+           layers_reserve(&renderer->work->layers, context, renderer->slices.slice_rays, error) &&
+           renderer->work->integrator->impl->reserve(renderer->work->integrator, context, error);
 }
 
 static uint32_t slice_rays(const struct frame_renderer *renderer)
@@ -164,26 +166,19 @@ static uint32_t slice_rays(const struct frame_renderer *renderer)
         return renderer->wanted_slice_pixels;
     if (!renderer->device->facts.software)
         return SLICE_RAYS_HARDWARE;
-    return renderer->context.request.compare ? SLICE_RAYS_COMPARED : SLICE_RAYS_SOFTWARE;
+    return renderer->work->context.request.compare ? SLICE_RAYS_COMPARED : SLICE_RAYS_SOFTWARE;
 }
 
 static bool reserve_frame(struct frame_renderer *renderer, struct error *error)
 {
-    struct render_context *context = &renderer->context;
-    const struct integrator_impl *impl = integrator_impl_by_number(context->request.integrator);
-    if (!renderer->integrator || renderer->integrator->impl != impl) {
-        frame_drop_integrator(renderer);
-        renderer->integrator = impl->create(renderer->device, error);
-        if (!renderer->integrator)
-            return false;
-    }
+    struct render_context *context = &renderer->work->context;
     if (!picture_begin(&renderer->picture, context, renderer->samples_before, error))
         return false;
     const struct frame_request *request = &context->request;
     bool flat = !(request->aperture > 0.0f) && !renderer->shared->copy.has_motion;
     /* A picture too large for the visibility buffer is traced from the first ray: the same hits, another way. */
     renderer->rasterise = flat && request->primary == PRIMARY_RASTER && !request->compare &&
-                          primary_reserve(&renderer->primary, context, NULL);
+                          primary_reserve(&renderer->work->primary, context, NULL);
     uint32_t rays = slice_rays(renderer);
     uint64_t all = picture_slot_count(&renderer->picture);
     all *= renderer->rasterise ? 1 : SLICES_SAMPLES_TOGETHER;
@@ -210,9 +205,12 @@ static void fill_filter(struct render_context *context)
 static bool begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
                   const struct frame_request *request, struct error *error)
 {
-    struct render_context *context = &renderer->context;
     if (!check_request(renderer, request, error))
         return false;
+    renderer->work = frame_work_take(renderer->shared, integrator_impl_by_number(request->integrator), error);
+    if (!renderer->work)
+        return false;
+    struct render_context *context = &renderer->work->context;
     context->request = *request;
     renderer->result = (struct frame_result){0};
     renderer->samples_before = may_go_on(renderer, request) ? renderer->kept_samples : 0;

@@ -27,6 +27,7 @@ void frame_scene_destroy(struct frame_scene *shared)
 {
     if (!shared)
         return;
+    frame_work_finish(shared);
     tracer_set_finish(&shared->tracers);
     environment_finish(&shared->environment, shared->device);
     scene_gpu_finish(&shared->copy);
@@ -35,7 +36,10 @@ void frame_scene_destroy(struct frame_scene *shared)
 
 uint64_t frame_scene_device_bytes(const struct frame_scene *shared)
 {
-    return scene_gpu_device_bytes(&shared->copy) + tracer_set_device_bytes(&shared->tracers);
+    uint64_t sum = scene_gpu_device_bytes(&shared->copy) + tracer_set_device_bytes(&shared->tracers);
+    for (const struct frame_work *work = shared->idle; work; work = work->next)
+        sum += frame_work_device_bytes(work);
+    return sum;
 }
 
 struct frame_renderer *frame_renderer_create(struct frame_scene *shared, struct error *error)
@@ -47,37 +51,15 @@ struct frame_renderer *frame_renderer_create(struct frame_scene *shared, struct 
     }
     renderer->device = shared->device;
     renderer->shared = shared;
-    renderer->context.device = shared->device;
-    renderer->context.scene = &shared->copy;
-    renderer->context.environment = &shared->environment;
-    renderer->context.timer = gpu_timer_create(shared->device);
-    if (!renderer->context.timer) {
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the frame's timer");
-        frame_renderer_destroy(renderer);
-        return NULL;
-    }
     return renderer;
-}
-
-void frame_drop_integrator(struct frame_renderer *renderer)
-{
-    if (renderer->integrator)
-        renderer->integrator->impl->destroy(renderer->integrator);
-    renderer->integrator = NULL;
 }
 
 void frame_renderer_destroy(struct frame_renderer *renderer)
 {
     if (!renderer)
         return;
-    frame_end(renderer);
-    frame_drop_integrator(renderer);
-    comparison_destroy(renderer->comparison);
-    primary_finish(&renderer->primary, renderer->device);
+    frame_abandon(renderer);
     picture_finish(&renderer->picture, renderer->device);
-    layers_finish(&renderer->layers, renderer->device);
-    context_finish(&renderer->context);
-    gpu_timer_destroy(renderer->context.timer);
     free(renderer);
 }
 
@@ -95,12 +77,6 @@ void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, c
 
 uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer)
 {
-    uint64_t sum = context_device_bytes(&renderer->context) + renderer->primary.visible.size_bytes +
-                   renderer->primary.depth.size_bytes + picture_device_bytes(&renderer->picture) +
-                   layers_device_bytes(&renderer->layers);
-    if (renderer->integrator)
-        sum += renderer->integrator->impl->device_bytes(renderer->integrator);
-    if (renderer->comparison)
-        sum += comparison_device_bytes(renderer->comparison);
-    return sum;
+    return picture_device_bytes(&renderer->picture) +
+           (renderer->work ? frame_work_device_bytes(renderer->work) : 0);
 }

@@ -31,24 +31,32 @@ struct frame_scene {
     struct scene_gpu copy;
     struct tracer_set tracers;
     struct environment environment;
-    uint64_t showing; /* counts up when the copy is of something else: a revision, poses */
-    uint32_t frames;  /* in progress, of all renderers */
+    uint64_t showing;        /* counts up when the copy is of something else: a revision, poses */
+    uint32_t frames;         /* in progress, of all renderers */
+    struct frame_work *idle; /* owned: what frames that have ended leave to those that begin */
+    uint32_t idle_count;
+};
+
+/* What a frame needs while it is in progress, of which nothing is kept. */
+struct frame_work {
+    struct frame_work *next; /* idle */
+    struct integrator *integrator;
+    struct render_context context;
+    struct primary primary;
+    struct layers layers;
+    struct comparison *comparison; /* NULL: the last frame asked for none */
 };
 
 struct frame_renderer {
     struct gpu_device *device;
     struct frame_scene *shared;
-    struct integrator *integrator;
-    struct render_context context;
-    struct primary primary;
     struct picture picture;
-    struct layers layers;
-    struct comparison *comparison; /* NULL: no frame has asked for one */
     const struct tracer_impl *stand_in;
     unsigned stand_in_number;
     uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */
     /* the frame in hand */
     enum frame_phase phase;
+    struct frame_work *work;        /* owned until it ends */
     struct tracer *tracer, *second; /* held; NULL: none */
     bool rasterise;
     uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
@@ -62,8 +70,12 @@ struct frame_renderer {
     struct frame_result result; /* counts, until the last step hands it out */
 };
 
-/* frame_renderer.c. There is none afterwards. */
-void frame_drop_integrator(struct frame_renderer *renderer);
+/* frame_work.c. One that has what that integrator needs, if there is one. */
+struct frame_work *frame_work_take(struct frame_scene *shared, const struct integrator_impl *impl,
+                                   struct error *error);
+void frame_work_give(struct frame_scene *shared, struct frame_work *work); /* accepts NULL */
+void frame_work_finish(struct frame_scene *shared);                        /* all that are idle */
+uint64_t frame_work_device_bytes(const struct frame_work *work);
 /* frame_begin.c. Lets go of what the frame in hand holds of what is shared. */
 void frame_end(struct frame_renderer *renderer);
 /* frame_begin.c. Room for slices of slices.slice_rays and waves of context.wave_capacity rays. */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/primary.h"
 
-#include "render/wave_trace.h"
-
+#include "base/clock.h"
 #include "render/compact.h"
+#include "render/wave_trace.h"
 #include "shared/bindings.h"
 #include "shared/path.h"
 
@@ -13,6 +13,10 @@
  * triangles are small. On a GPU as many as an int numbers, with room to spare. */
 #define DRAW_VERTICES_SOFTWARE (3u << 16)
 #define DRAW_VERTICES_HARDWARE (3u << 24)
+/* Fewer where such a part takes long: larger triangles, other work on the machine. Each part costs something of
+ * its own, so only then. */
+#define DRAW_VERTICES_LEAST (3u << 12)
+#define DRAW_NS_MOST UINT64_C(25000000)
 
 enum primitive_kind { PRIMITIVE_TRIANGLES, PRIMITIVE_SPHERES, PRIMITIVE_DISCS };
 static const unsigned vertices_per_primitive[] = {3, 36, 6};
@@ -113,9 +117,17 @@ static bool draw_sort(struct primary *primary, struct render_context *context, u
     return true;
 }
 
+static void learn(struct primary *primary, uint64_t took_ns)
+{
+    if (took_ns > DRAW_NS_MOST && primary->part_vertices > DRAW_VERTICES_LEAST)
+        primary->part_vertices /= 2;
+    else if (took_ns < DRAW_NS_MOST / 4 && primary->part_vertices < DRAW_VERTICES_SOFTWARE)
+        primary->part_vertices *= 2;
+}
+
 static bool draw_part(struct primary *primary, struct render_context *context, struct error *error)
 {
-    uint32_t budget = context->device->facts.software ? DRAW_VERTICES_SOFTWARE : DRAW_VERTICES_HARDWARE;
+    uint32_t budget = context->device->facts.software ? primary->part_vertices : DRAW_VERTICES_HARDWARE;
     bool drawn = true;
     while (drawn && budget > 0 && primary->sort < SORT_COUNT) {
         if (primary->sort == SORT_SPHERES) { /* of a sphere's box the inner sides: they are there also when the eye
@@ -146,6 +158,9 @@ void primary_rasterise_begin(struct primary *primary)
 
 bool primary_rasterise(struct primary *primary, struct render_context *context, bool *done, struct error *error)
 {
+    const uint64_t start_ns = clock_now_ns();
+    if (primary->part_vertices == 0)
+        primary->part_vertices = DRAW_VERTICES_SOFTWARE;
     context_span_begin(context, STAGE_PRIMARY);
     gpu_push_group(context->device, "rasterise primary");
     context_bind(context);
@@ -167,6 +182,7 @@ bool primary_rasterise(struct primary *primary, struct render_context *context, 
     *done = primary->sort == SORT_COUNT;
     if (!*done || context->device->facts.software)
         glFinish(); /* else all parts would be waited for at the end, at once */
+    learn(primary, clock_now_ns() - start_ns);
     gpu_pop_group(context->device);
     context_span_end(context);
     return drawn && gpu_check(context->device, "rasterising primary hits", error);

@@ -14,6 +14,7 @@ struct primary {
     /* where drawing goes on */
     uint32_t sort, instance, primitive;
     bool cleared;
+    uint32_t part_vertices; /* that are drawn in one step on software GL; 0: not known yet */
 };
 
 /* Makes the buffer fit the request's size. */

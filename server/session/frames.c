@@ -368,9 +368,25 @@ static struct job *next_job(struct session *session)
     return job;
 }
 
+/* Frames that waited for the link until they were not worth it any more. */
+static void drop_outdated(struct session *session)
+{
+    for (struct job *job = session->jobs; job; job = job->next) {
+        bool dropped = false;
+        while (job->view && job->first && !job->first->begun && view_is_outdated(job, job->first->frame)) {
+            remove_first(job);
+            job->frames_gone++;
+            dropped = true;
+        }
+        if (dropped)
+            job_pace(job);
+    }
+}
+
 void frames_pump(struct session *session)
 {
     struct job *job;
+    drop_outdated(session);
     while (connection_wants_bulk(session->connection) && (job = next_job(session))) {
         struct pending_frame *pending = job->first;
         if ((pending->begun || queue_begin(pending)) && queue_piece(pending))

@@ -16,6 +16,8 @@
 #define SILENCE_NS UINT64_C(250000000)
 /* So long nothing has come before the client is told why. */
 #define BLOCKED_NS UINT64_C(100000000)
+/* A frame that a link takes longer for than that is not sent again and again while a picture is refined. */
+#define SPARING_NS 250000000.0
 #define SECOND_NS 1e9
 
 /* ---- life -------------------------------------------------------------------------------------------- */
@@ -30,6 +32,7 @@ struct view_terms view_terms_of(const struct message_render *render)
     return (struct view_terms){
         .frame_ns = (uint64_t)(SECOND_NS / (double)render->frames_per_second),
         .samples = render->samples,
+        .still_encoding = (enum encoding)render->still_encoding,
         .quality = has_quality ? render->quality : 0,
         .adapt = render->adapt != 0,
     };
@@ -222,25 +225,39 @@ bool view_may_send(const struct job *job)
     return pacing_may_send(&job->view->pacing);
 }
 
+/* What the link and the renderer carry is learned from each frame; the next ones are to be as good as that allows.
+ */
+static void adapt(struct session_view *view, const struct engine_frame *frame)
+{
+    if (frame->moving) {
+        unsigned wanted = view->terms.quality ? view->terms.quality : PACING_QUALITY_REFERENCE;
+        struct pacing_advice advice = pacing_advise(&view->pacing, wanted);
+        view->effort.scale_eighths = advice.scale_eighths;
+        view->effort.quality = view->terms.quality ? advice.quality : 0;
+        view->effort.bytes = advice.bytes;
+    } else if (frame->encoding == view->terms.still_encoding) {
+        double bytes_per_second = (double)pacing_bytes_per_second(&view->pacing);
+        view->effort.sparing = (double)frame->size_bytes * SECOND_NS > SPARING_NS * bytes_per_second;
+    }
+    view_wishes_set_effort(view->wishes, &view->effort);
+}
+
 void view_frame_made(struct job *job, const struct engine_frame *frame)
 {
     struct session_view *view = job->view;
     view->made_ns = frame->encoded_ns > frame->applied_ns ? frame->encoded_ns - frame->applied_ns : 0;
-    if (!frame->moving)
-        return;
-    unsigned scale_eighths = frame->scale_eighths ? frame->scale_eighths : PACING_SCALE_FULL;
-    pacing_learn(&view->pacing, scale_eighths, frame->quality, frame->rendered_ns - frame->applied_ns,
-                 frame->size_bytes);
-    if (!view->terms.adapt)
-        return;
-    unsigned wanted = view->terms.quality ? view->terms.quality : PACING_QUALITY_REFERENCE;
-    struct pacing_advice advice = pacing_advise(&view->pacing, wanted);
-    struct view_effort effort = {
-        .scale_eighths = advice.scale_eighths,
-        .quality = view->terms.quality ? advice.quality : 0,
-        .bytes = advice.bytes,
-    };
-    view_wishes_set_effort(view->wishes, &effort);
+    if (frame->moving)
+        pacing_learn(&view->pacing, frame->scale_eighths ? frame->scale_eighths : PACING_SCALE_FULL,
+                     frame->quality, frame->rendered_ns - frame->applied_ns, frame->size_bytes);
+    if (view->terms.adapt)
+        adapt(view, frame);
+}
+
+bool view_is_outdated(const struct job *job, const struct engine_frame *frame)
+{
+    const struct session_view *view = job->view;
+    return frame->key_frame && view->last_command > frame->command &&
+           clock_now_ns() - frame->encoded_ns > view->terms.frame_ns + view->made_ns;
 }
 
 void view_frame_begun(struct job *job, const struct engine_frame *frame, uint64_t begun_ns)

@@ -19,7 +19,8 @@
 struct view_terms {
     uint64_t frame_ns; /* from one frame to the next, at least */
     uint32_t samples;  /* that a picture is to have */
-    unsigned quality;  /* of motion */
+    enum encoding still_encoding;
+    unsigned quality; /* of motion; 0: lossless */
     bool adapt;
 };
 
@@ -40,8 +41,9 @@ struct session_view {
     struct loop_timer pace_timer; /* until the next frame is begun, if nothing happens before .. */
     bool due;                     /* .. which it is now */
     struct loop_timer silence_timer;
-    bool silent;      /* the client acknowledges nothing */
-    uint64_t made_ns; /* what the last frame took from being taken up until it was encoded */
+    bool silent;               /* the client acknowledges nothing */
+    struct view_effort effort; /* as the engine has it */
+    uint64_t made_ns;          /* what the last frame took from being taken up until it was encoded */
     /* What came last of the client, and what it was shown last. */
     uint64_t last_command, shown_command;
     bool shown_moving;
@@ -70,6 +72,9 @@ uint64_t view_allowed_credit(struct job *job);
 /* A frame has come from the engine; its first byte is about to go; its last one is with the kernel. */
 void view_frame_made(struct job *job, const struct engine_frame *frame);
 bool view_may_send(const struct job *job);
+/* It has waited for the link so long that another one of what its client wishes now is better, and could be had.
+ */
+bool view_is_outdated(const struct job *job, const struct engine_frame *frame);
 void view_frame_begun(struct job *job, const struct engine_frame *frame, uint64_t begun_ns);
 void view_frame_sent(struct job *job);
 

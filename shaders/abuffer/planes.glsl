@@ -5,11 +5,13 @@
 
 // A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit what it leaves. So
 // near its origin a ray does not cross planes that pass the origin as near as this. From behind, which is how a ray that
-// goes away outside meets what it leaves, that is generous; from the front, which is how it meets another wall in a
+// goes away outside meets what it leaves, that is generous. From the front, which is how it meets another wall in a
 // corner, and how a ray that was refracted meets what it has entered by, it is what a surface needs that bends by a
-// radius of six cells: 1.5^2 / (2 * 6).
+// radius of six cells, about: from a neighbour's middle, which is up to 0.78 cells beyond the crossing, to the origin it
+// falls by (way + 0.78)^2 / (2 * 6). So what is crossed steeply may be nearer than what is met along the surface: in a
+// corner rays meet the wall beside which they begin.
 const float OWN_WAY = 1.5;
-const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.2;
+const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.05, OWN_RISE = 0.1; // the rise is for a cell of way
 
 // Where a ray (o, d in the image) crosses a sample's plane; whether that is not the plane which it begins on. `side` is
 // positive where it comes from behind.
@@ -18,8 +20,8 @@ bool cross_plane(vec3 o, vec3 d, float s_least, ivec2 texel, column_sample p, ou
     float height = dot(p.normal, vec3(vec2(texel) + 0.5, p.depth) - o);
     side = dot(p.normal, d);
     s = height / side;
-    float own = side > 0.0 ? OWN_BEHIND * OWN_BEHIND : OWN_BEFORE * OWN_BEFORE;
-    return s > s_least && !(s < s_least + OWN_WAY && height * height < own * dot(p.normal, p.normal));
+    float way = s - s_least, own = side > 0.0 ? OWN_BEHIND : OWN_BEFORE + OWN_RISE * way;
+    return way > 0.0 && !(way < OWN_WAY && height * height < own * own * dot(p.normal, p.normal));
 }
 
 // Some surfaces are in several images, and are looked for in those that show them.

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Linear search by a few steps a voxel, ABUFFER_STEPS of them, and between two steps binary search: paper, section 3.2.
+// Linear search by a few steps, ABUFFER_STEPS of them, and between two steps binary search: paper, section 3.2. There
+// the steps are those of a voxel; here of each subvoxel that holds something. Steps as long as voxels pass much of what is
+// thin twice, and much of an open room's walls beside where they look.
 //
 // Inside or outside is decided by a column's samples: how many bodies a point is in is what the samples before it say
 // together. Where that is something else at a step's end than at its begin, a surface was passed. What is passed twice in
@@ -19,11 +21,11 @@ const float FOLLOW_ALONG = 4.0; // beyond a step, of an open surface
 // Cells from a ray's origin within which it is looked for more closely what it meets.
 const float NEAR_ORIGIN = 4.0;
 
-// Where a ray is among the steps of a voxel.
+// Where a ray is among the steps of a subvoxel.
 struct step_walk {
     found_voxel here; // `what` 0: past it
     float size;       // of its steps
-    int next;         // step of the voxel; 0: what is known at its begin
+    int next;         // step of the subvoxel; 0: what is known at its begin
     uint images;      // in which it looks yet at this step; 0: not yet at it
     // Of how many bodies the ray is inside, where it was last looked.
     int winding;
@@ -60,10 +62,11 @@ int winding_at_origin(voxel_walk w, uint what)
     float nearest = OWN_BEHIND;
     int own_winding = 0;
     bool is_own = false, goes_along = false;
-    int axis;
+    int own_axis = image_of(what, w.ray.d);
     uint images = what & ABUFFER_VOXEL_IMAGES;
+    // All of them: in a corner one shows the other wall, which may be near too.
     do {
-        axis = findLSB(images);
+        int axis = findLSB(images);
         vec3 p = place_in_image(w, axis, w.s_least), d = in_image(w.ray.d, axis);
         ivec2 texel = texel_of(p.xy);
         column_scan c = scan_of(column_at(axis, texel));
@@ -79,14 +82,14 @@ int winding_at_origin(voxel_walk w, uint what)
             if (is_one && !is_behind && q.step_ != 0 && distance_ < nearest) {
                 nearest = distance_;
                 is_own = true;
+                own_axis = axis;
                 goes_along = abs(side) < OWN_ALONG;
                 own_winding = (side > 0.0) == (q.normal.z > 0.0) ? q.behind : q.behind - q.step_;
             }
         } while (c.next < c.end && !is_behind);
         images &= images - 1u;
-    } while (images != 0u && !is_own);
-    axis = is_own ? axis : image_of(what, w.ray.d);
-    int there = winding_at(axis, place_in_image(w, axis, w.s_least + OWN_WAY));
+    } while (images != 0u);
+    int there = winding_at(own_axis, place_in_image(w, own_axis, w.s_least + OWN_WAY));
     return is_own && !goes_along ? own_winding : there;
 }
 
@@ -178,7 +181,7 @@ void search_passage(trace_ray r, inout voxel_walk w, inout abuffer_found found, 
 
 #endif
 
-// The next step of the voxel. Whether something may be passed there.
+// The next step of the subvoxel. Whether something may be passed there.
 //
 // In a body the samples of the column at its end say how many bodies it is in; of an open surface the plane of one of them
 // may be crossed within the step or not far from it.

@@ -4,8 +4,8 @@
 //
 // The host (trace/abuffer_trace.c) sets, besides the defines of trace.comp, those that the files included here name.
 //
-// Defines: ABUFFER_STEPS the search is by so many steps a voxel (abuffer/steps.glsl), else by 2D DDA (abuffer/planes.glsl);
-// ABUFFER_EMPTY there is nothing to be found.
+// Defines: ABUFFER_STEPS the search is by so many steps a subvoxel (abuffer/steps.glsl), else by 2D DDA
+// (abuffer/planes.glsl); ABUFFER_EMPTY there is nothing to be found.
 #include "abuffer/steps.glsl"
 
 void walk_ray(trace_ray r, inout abuffer_found found)

@@ -98,15 +98,10 @@ void step_on(inout voxel_walk w, inout found_voxel found)
     uvec3 b = voxel & 3u;
     uint bit = b.x | b.y << 2 | (b.z & 1u) << 4; // of 32
     bool is_set = ((b.z < 2u ? words.x : words.y) >> bit & 1u) != 0u;
-#ifdef ABUFFER_STEPS
-    uvec2 inner = uvec2(0xffffffffu);
-    bool is_whole = is_set;
-#else
     int inside = subvoxels_at(voxel);
     uvec2 in_x = texelFetch(abuffer_subvoxels, inside).xy, in_y = texelFetch(abuffer_subvoxels, inside + 1).xy;
     uvec2 in_z = texelFetch(abuffer_subvoxels, inside + 2).xy, inner = in_x | in_y | in_z;
     bool is_whole = is_set && !abuffer_has_subvoxels;
-#endif
     // The next of 64 voxels, or of a voxel's 64 subvoxels.
     uvec2 bits = is_set ? inner : words.xy;
     uvec3 p = is_set ? subvoxel & 3u : b;
@@ -126,13 +121,11 @@ void step_on(inout voxel_walk w, inout found_voxel found)
     s_out = s_out > w.s ? s_out : w.s;
     if (is_found)
         found = found_voxel(what_of(block, b), w.s, s_out);
-#ifndef ABUFFER_STEPS
     // Where one image does not show all of a voxel, in those that show best what is in the subvoxel.
     uvec3 shown = (p.z < 2u ? uvec3(in_x.x, in_y.x, in_z.x) : uvec3(in_x.y, in_y.y, in_z.y)) >> bit & 1u;
     uint best = shown.x | shown.y << 1 | shown.z << 2;
     if (is_found && bitCount(found.what & ABUFFER_VOXEL_IMAGES) > 1)
         found.what &= best | ABUFFER_VOXEL_BODY;
-#endif
     ivec3 next = clamp(ivec3(w.o + s_out * w.d), w.subvoxel, border - 1);
     // In whole numbers, so that each step goes on.
     next = mix(next, border, lessThanEqual(exits, vec3(s_out)));

@@ -299,6 +299,39 @@ static void samples_are_not_added_to_those_from_before_others_moved_something(vo
     frame_renderer_destroy(second);
 }
 
+static void who_has_no_frame_in_progress_holds_a_picture_only(void **state)
+{
+    enum { WATCHERS = 8 };
+    struct fixture *fixture = *state;
+    struct frame_renderer *renderers[WATCHERS];
+    build_scene(fixture);
+    fixture->request.tracer = TRACER_BVH;
+    fixture->request.width = 160;
+    fixture->request.height = 120;
+    begin(fixture, fixture->renderer, &fixture->request);
+    struct frame_result result = finish(fixture->renderer);
+    frame_result_finish(&result);
+    uint64_t picture_bytes = frame_renderer_device_bytes(fixture->renderer);
+    uint64_t shared_bytes = frame_scene_device_bytes(fixture->shared),
+             used_bytes = fixture->device->memory_used_bytes;
+    /* A sum of four floats for each pixel and what is read back of it, all bands at once here. */
+    assert_int_equal(picture_bytes, 160 * 120 * (16 + 16));
+    for (int i = 0; i < WATCHERS; i++) {
+        renderers[i] = another_renderer(fixture);
+        begin(fixture, renderers[i], &fixture->request);
+    }
+    assert_true(fixture->device->memory_used_bytes > used_bytes + WATCHERS * 2 * picture_bytes);
+    for (int i = 0; i < WATCHERS; i++) {
+        result = finish(renderers[i]);
+        frame_result_finish(&result);
+        assert_int_equal(frame_renderer_device_bytes(renderers[i]), picture_bytes);
+    }
+    assert_int_equal(frame_scene_device_bytes(fixture->shared), shared_bytes);
+    assert_true(fixture->device->memory_used_bytes <= used_bytes + WATCHERS * picture_bytes);
+    for (int i = 0; i < WATCHERS; i++)
+        frame_renderer_destroy(renderers[i]);
+}
+
 int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup(name, fixture_clear)
@@ -308,6 +341,7 @@ int main(void)
         TEST(another_revision_waits_for_the_frames_of_the_one_before),
         TEST(tracers_in_use_stay),
         TEST(a_renderer_that_goes_in_the_middle_lets_go),
+        TEST(who_has_no_frame_in_progress_holds_a_picture_only),
         TEST(samples_are_not_added_to_those_from_before_others_moved_something),
     };
     return cmocka_run_group_tests(tests, fixture_setup, fixture_teardown);

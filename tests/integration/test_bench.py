@@ -78,7 +78,7 @@ class Benchmark(unittest.TestCase):
         cls.out = pathlib.Path(tempfile.mkdtemp(prefix="farlight-bench-"))
         cls.result = subprocess.run([sys.executable, BENCH / "bench.py", BIN, *PARTS, "--tiny", "--runs", "1", "--out",
                                      cls.out], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False,
-                                    timeout=TIMEOUT_S, cwd=ROOT, env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"})
+                                    timeout=3 * TIMEOUT_S, cwd=ROOT, env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"})
         text = (cls.out / "bench.json").read_text() if (cls.out / "bench.json").is_file() else "{}"
         cls.document = json.loads(text)
 

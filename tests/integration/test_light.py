@@ -1,17 +1,29 @@
 # SPDX-License-Identifier: MIT
 """The integrators as a person meets them: defaults, options that arrive, that each goes with every tracer."""
 import farlight_test
-from farlight_test import Case, bundled_scenes, farlight, frames_of, grid_means, read_exr, read_png
+from farlight_test import Case, Daemon, bundled_scenes, farlight, frames_of, grid_means, read_exr, read_png
 
 SIZE = ["--size", "96x72"]
 INTEGRATORS = ("whitted", "distributed", "raycast", "ao", "path")
 
 
 class Light(Case):
-    def render(self, *options, scene="cornell.glb", name="x.png"):
+    """One daemon for all, which compiles once; `alone`: by one of its own."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Daemon()
+        cls.daemon.__enter__()
+        cls.addClassCleanup(cls.daemon.__exit__)
+
+    def try_render(self, *options, scene="cornell.glb", name="x.png", alone=False):
         path = self.folder / name
-        return path, frames_of(self.expect(farlight("render", bundled_scenes() / scene, "-o", path, *SIZE, "--timings=json",
-                                                    *options), 0))[0]
+        server = [] if alone else ["--server", self.daemon.address]
+        return path, farlight("render", bundled_scenes() / scene, "-o", path, *SIZE, "--timings=json", *server, *options)
+
+    def render(self, *options, **more):
+        path, result = self.try_render(*options, **more)
+        return path, frames_of(self.expect(result, 0))[0]
 
     def digest(self, *options, **more):
         return self.render(*options, **more)[1]["digest"]
@@ -40,8 +52,7 @@ class Light(Case):
             wanted = grid_means(self.render(*options)[0])
             for tracer in ("reference", "ldc", "abuffer"):
                 with self.subTest(integrator=integrator, tracer=tracer):
-                    path = self.folder / f"{tracer}.png"
-                    result = farlight("render", bundled_scenes() / "cornell.glb", "-o", path, *SIZE, *options, "--tracer", tracer)
+                    path, result = self.try_render(*options, "--tracer", tracer, name=f"{tracer}.png")
                     if "libembree-dev" in result.stderr:
                         continue  # this farlightd was built without Embree
                     self.expect(result, 0)
@@ -52,7 +63,7 @@ class Light(Case):
     def test_one_request_gives_one_picture(self):
         for integrator in ("raycast", "ao", "path"):
             options = ["--integrator", integrator, "--samples", "2"]
-            self.assertEqual(self.digest(*options), self.digest(*options), integrator)
+            self.assertEqual(self.digest(*options), self.digest(*options, alone=True), integrator)
             self.assertEqual(self.digest(*options, "--bounces", "2"), self.digest(*options, "--depth", "2"), integrator)
 
     def test_options_of_ambient_occlusion_arrive(self):

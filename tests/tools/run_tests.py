@@ -5,7 +5,11 @@
 Usage: run_tests.py BUILD_FOLDER [PART_OF_A_NAME ..]
 Unit and accuracy tests are cmocka programs below BUILD_FOLDER/tests; integration tests are unittest modules
 in tests/integration, which find the programs through FARLIGHT_BIN. The rules of the sources are checked first.
+Programs and modules run side by side, as most of them leave processors idle: FARLIGHT_TEST_JOBS at a time (default:
+as many as there are processors, at most 4).
 """
+import concurrent.futures
+import io
 import os
 import pathlib
 import re
@@ -14,31 +18,22 @@ import sys
 import time
 import unittest
 
-UNIT_TIMEOUT_S = 300
+UNIT_TIMEOUT_S = 600  # of a program, beside others
+JOBS_MAX = 4  # each holds pictures, structures and daemons
+MODULE = "--module"  # run_tests.py --module NAME: one module of integration tests, for run_module()
 
 
-class Tally:
-    def __init__(self):
-        self.passed = self.failed = self.skipped = 0
-
-    def add(self, passed, failed, skipped=0):
-        self.passed += passed
-        self.failed += failed
-        self.skipped += skipped
-
-
-def run_check(tally, name, command):
+def run_check(name, command):
     result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
-    print(f"== {name}\n{result.stdout}", end="", flush=True)
-    tally.add(result.returncode == 0, result.returncode != 0)
+    return f"== {name}\n{result.stdout}", (result.returncode == 0, result.returncode != 0, 0)
 
 
-def run_cmocka(tally, program, environment):
-    print(f"== {program.name}", flush=True)
+def run_cmocka(program):
+    """(text, (passed, failed, skipped))"""
     begin = time.monotonic()
     try:
         result = subprocess.run([program], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
-                                errors="replace", timeout=UNIT_TIMEOUT_S, env=environment)
+                                errors="replace", timeout=UNIT_TIMEOUT_S)
         output, status = result.stdout, result.returncode
     except subprocess.TimeoutExpired as timeout:
         output, status = (timeout.stdout or b"").decode(errors="replace") + "\ntimed out\n", -1
@@ -47,15 +42,14 @@ def run_cmocka(tally, program, environment):
     passed, failed, skipped = counts
     if status != 0 and failed == 0:  # it died
         failed = 1
+    lines = [f"== {program.name}"]
     if status != 0 or os.environ.get("VERBOSE"):
-        print(output, flush=True)
+        lines.append(output)
     else:
-        for line in output.splitlines():
-            if "SKIPPED" in line or line.startswith("skipped"):
-                print(line)
-    print(f"   {passed} passed, {failed} failed, {skipped} skipped in {time.monotonic() - begin:.1f} s"
-          + (f" (exit status {status})" if status else ""), flush=True)
-    tally.add(passed, failed, skipped)
+        lines += [line for line in output.splitlines() if "SKIPPED" in line or line.startswith("skipped")]
+    lines.append(f"   {passed} passed, {failed} failed, {skipped} skipped in {time.monotonic() - begin:.1f} s"
+                 + (f" (exit status {status})" if status else ""))
+    return "\n".join(lines) + "\n", (passed, failed, skipped)
 
 
 class Timed(unittest.TextTestResult):
@@ -74,42 +68,69 @@ class Timed(unittest.TextTestResult):
         self.ended = time.monotonic()
 
 
-def run_integration(tally, names):
+def module_main(name):
+    """In a process of its own: the tests' report, and their counts in a last line."""
     sys.path.insert(0, "tests/integration")
-    loader = unittest.TestLoader()
-    suite = unittest.TestSuite()
-    for path in sorted(pathlib.Path("tests/integration").glob("test_*.py")):
-        if not names or any(name in path.stem for name in names):
-            suite.addTests(loader.loadTestsFromName(path.stem))
-    if not suite.countTestCases():
-        return
-    print("== integration", flush=True)
-    result = unittest.TextTestRunner(verbosity=2, stream=sys.stdout, resultclass=Timed).run(suite)
+    stream = io.StringIO()
+    result = unittest.TextTestRunner(verbosity=2, stream=stream, resultclass=Timed).run(
+        unittest.TestLoader().loadTestsFromName(name))
+    print(stream.getvalue(), end="")
     for test, reason in result.skipped:
         print(f"   skipped {test}: {reason}")
-    bad = len(result.failures) + len(result.errors)
-    tally.add(result.testsRun - bad - len(result.skipped), bad, len(result.skipped))
+    failed = len(result.failures) + len(result.errors)
+    print(result.testsRun - failed - len(result.skipped), failed, len(result.skipped))
+
+
+def run_module(name):
+    result = subprocess.run([sys.executable, __file__, MODULE, name], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                            text=True, errors="replace", check=False)
+    text, _, last = result.stdout.rstrip("\n").rpartition("\n")
+    if result.returncode != 0 or not re.fullmatch(r"\d+ \d+ \d+", last):  # it died
+        return f"== {name}\n{result.stdout}\n", (0, 1, 0)
+    return f"== {name}\n{text}\n", tuple(map(int, last.split()))
+
+
+def tasks(build, names):
+    """What there is to run, as functions."""
+    def is_asked(name):
+        return not names or any(part in name for part in names)
+    for path in sorted(pathlib.Path("tests/integration").glob("test_*.py")):  # first: some take longest
+        if is_asked(path.stem):
+            yield lambda name=path.stem: run_module(name)
+    for program in sorted(build.glob("tests/unit/test_*")) + sorted(build.glob("tests/accuracy/test_*")):
+        if program.suffix == "" and is_asked(program.name):
+            yield lambda program=program: run_cmocka(program)
+
+
+def run_all(build, names):
+    """Prints what each has to say as soon as it is done; the sums of (passed, failed, skipped)."""
+    sums = [0, 0, 0]
+
+    def tell(text, counts):
+        print(text, end="", flush=True)
+        sums[:] = map(sum, zip(sums, counts))
+    if not names:
+        tell(*run_check("include rules", [sys.executable, "tests/tools/check_includes.py"]))
+        tell(*run_check("headers alone", ["make", "-s", "check-headers"]))
+    jobs = int(os.environ.get("FARLIGHT_TEST_JOBS") or min(JOBS_MAX, len(os.sched_getaffinity(0))))
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        for done in concurrent.futures.as_completed([pool.submit(task) for task in tasks(build, names)]):
+            tell(*done.result())
+    return sums
 
 
 def main():
+    if sys.argv[1] == MODULE:
+        module_main(sys.argv[2])
+        return 0
     build = pathlib.Path(sys.argv[1])
-    names = sys.argv[2:]
-    tally = Tally()
-    environment = dict(os.environ)
     # Mesa's driver keeps memory until the process ends; that is not ours to free.
-    environment.setdefault("LSAN_OPTIONS", "suppressions=tests/tools/lsan.supp:print_suppressions=0")
-    environment.setdefault("UBSAN_OPTIONS", "print_stacktrace=1")
-    os.environ.update(environment)
+    os.environ.setdefault("LSAN_OPTIONS", "suppressions=tests/tools/lsan.supp:print_suppressions=0")
+    os.environ.setdefault("UBSAN_OPTIONS", "print_stacktrace=1")
     os.environ["FARLIGHT_BIN"] = str(build.resolve())
-    if not names:
-        run_check(tally, "include rules", [sys.executable, "tests/tools/check_includes.py"])
-        run_check(tally, "headers alone", ["make", "-s", "check-headers"])
-    for program in sorted(build.glob("tests/unit/test_*")) + sorted(build.glob("tests/accuracy/test_*")):
-        if program.suffix == "" and (not names or any(name in program.name for name in names)):
-            run_cmocka(tally, program, os.environ)
-    run_integration(tally, names)
-    print(f"\n{tally.passed} passed, {tally.failed} failed, {tally.skipped} skipped")
-    return 1 if tally.failed or not tally.passed else 0
+    passed, failed, skipped = run_all(build, sys.argv[2:])
+    print(f"\n{passed} passed, {failed} failed, {skipped} skipped")
+    return 1 if failed or not passed else 0
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The engine with the real renderer: frames of clients that take turns are those that each would get alone. */
-#include "job/engine.h"
+#include "job/view_wishes.h"
 
 #include <poll.h>
 #include <setjmp.h>
@@ -337,12 +337,92 @@ static void views_of_one_scene_at_once_show_what_each_shows_alone(void **state)
     engine_event_destroy(event);
 }
 
+#define VIEW_SAMPLES 6
+
+static struct engine_command picture(uint32_t request, struct camera_key *key)
+{
+    struct engine_command made = {
+        .kind = ENGINE_JOB_START,
+        .client = 1,
+        .request = request,
+        .scene = 1,
+        .job =
+            {
+                .frame_step = 1,
+                .frames_per_second = 1000,
+                .frame = {.width = 200,
+                          .height = 150,
+                          .samples = VIEW_SAMPLES,
+                          .depth = 2,
+                          .seed = 5,
+                          .accumulate = true},
+                .path = CAMERA_KEYS,
+                .keys = malloc(sizeof *key),
+                .key_count = 1,
+                .credit = 1000,
+            },
+    };
+    assert_non_null(made.job.keys);
+    *made.job.keys = *key;
+    return made;
+}
+
+/* Two views of one scene, from two places, whose frames of 2 samples each come between each other's. */
+static void views_beside_each_other_come_to_the_pictures_of_single_frames(void **state)
+{
+    (void)state;
+    if (!engine)
+        skip();
+    make_scene(1, 0.7f);
+    struct camera_key keys[2] = {{.eye_world = {0, 1, 3}, .up_world = {0, 1, 0}, .fov_y = 1},
+                                 {.eye_world = {2, 2, 1}, .up_world = {0, 1, 0}, .fov_y = 1}};
+    uint64_t expected[2], seen[2] = {0};
+    for (uint32_t i = 0; i < 2; i++) {
+        submit(picture(10 + i, &keys[i]));
+        struct engine_event *event = next_event();
+        assert_int_equal(event->kind, ENGINE_FRAME);
+        expected[i] = event->frame->digest;
+        engine_event_destroy(event);
+        expect_done();
+    }
+    assert_true(expected[0] != expected[1]);
+    for (uint32_t i = 0; i < 2; i++) {
+        struct engine_command made = picture(20 + i, &keys[1 - i]); /* where it does not look from */
+        struct view_wishes *wishes = view_wishes_create();
+        assert_non_null(wishes);
+        view_wishes_look(wishes, &(struct view_camera){.command = 1, .key = keys[i]});
+        made.job.kind = JOB_VIEW;
+        made.job.last_frame = UINT32_MAX;
+        made.job.pass_samples = 2;
+        made.job.wishes = wishes;
+        submit(made);
+    }
+    while (!seen[0] || !seen[1]) {
+        struct engine_event *event = next_event();
+        assert_int_equal(event->kind, ENGINE_FRAME);
+        const struct engine_frame *frame = event->frame;
+        assert_int_equal(frame->command, 1);
+        assert_int_equal(frame->result.samples, 2 * (frame->frame + 1));
+        if (frame->result.samples == VIEW_SAMPLES)
+            seen[event->request - 20] = frame->digest;
+        else
+            assert_true(frame->digest != expected[event->request - 20]);
+        engine_event_destroy(event);
+    }
+    assert_memory_equal(seen, expected, sizeof seen);
+    submit((struct engine_command){.kind = ENGINE_CLIENT_GONE, .client = 1});
+    struct engine_event *event = next_event();
+    assert_int_equal(event->kind, ENGINE_CLIENT_FORGOTTEN);
+    engine_event_destroy(event);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(clients_that_take_turns_get_the_frames_they_would_get_alone),
         cmocka_unit_test(jobs_switch_tracers_on_one_scene_while_both_run),
         cmocka_unit_test(views_of_one_scene_at_once_show_what_each_shows_alone),
+        cmocka_unit_test(views_beside_each_other_come_to_the_pictures_of_single_frames),
     };
     return cmocka_run_group_tests(tests, start, stop);
 }

@@ -367,6 +367,60 @@ static void a_cancelled_view_ends_whatever_it_does(void **state)
     stop(engine);
 }
 
+static void a_view_that_adapts_is_smaller_while_it_moves(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    struct engine_command *made = with_samples(view(1, 2, wishes), 2, 1);
+    made->job.adapt = true;
+    made->job.frame.width = 80;
+    made->job.frame.height = 48;
+    view_wishes_set_effort(wishes, &(struct view_effort){3, 55, 1234, true});
+    submit(engine, made);
+    struct engine_frame *frame = take(expect_frame(engine, 1, 2, 0));
+    assert_int_equal(frame->result.width, 80);
+    assert_int_equal(frame->encoding, ENCODING_JPEG); /* the link is to be spared until all samples are there */
+    assert_int_equal(frame->quality, 80);
+    drop(frame);
+    expect_picture(engine, 2, 1, 0, 2, ENCODING_RAW);
+    look(engine, wishes, 1, true);
+    frame = take(expect_frame(engine, 1, 2, 2));
+    assert_int_equal(frame->request.width, 30);
+    assert_int_equal(frame->result.height, 18);
+    assert_int_equal(frame->scale_eighths, 3);
+    assert_int_equal(frame->quality, 55);
+    assert_int_equal(frame->wanted_bytes, 1234);
+    drop(frame);
+    look(engine, wishes, 2, false);
+    frame = take(expect_frame(engine, 1, 2, 3));
+    assert_int_equal(frame->result.height, 48);
+    drop(frame);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+static void a_view_that_does_not_adapt_stays_as_it_was_asked_for(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    struct engine_command *made = with_samples(view(1, 2, wishes), 2, 1);
+    view_wishes_set_effort(wishes, &(struct view_effort){3, 55, 1234, true});
+    submit(engine, made);
+    expect_picture(engine, 2, 0, 0, 1, ENCODING_RAW);
+    expect_picture(engine, 2, 1, 0, 2, ENCODING_RAW);
+    look(engine, wishes, 1, true);
+    struct engine_frame *frame = take(expect_frame(engine, 1, 2, 2));
+    assert_int_equal(frame->result.width, 4);
+    assert_int_equal(frame->quality, 80);
+    drop(frame);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
 static void a_camera_that_spans_no_view_ends_it(void **state)
 {
     (void)state;
@@ -435,6 +489,8 @@ int main(void)
         cmocka_unit_test(a_view_takes_the_place_of_another_and_goes_on_from_it),
         cmocka_unit_test(a_frame_in_progress_ends_with_the_view_that_is_replaced),
         cmocka_unit_test(a_cancelled_view_ends_whatever_it_does),
+        cmocka_unit_test(a_view_that_adapts_is_smaller_while_it_moves),
+        cmocka_unit_test(a_view_that_does_not_adapt_stays_as_it_was_asked_for),
         cmocka_unit_test(a_camera_that_spans_no_view_ends_it),
         cmocka_unit_test(a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free),
     };

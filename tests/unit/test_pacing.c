@@ -324,6 +324,32 @@ static void does_not_flicker(void **state)
     assert_in_range(changes, 0, 2); /* ten seconds */
 }
 
+/* 1 MB a second and a round trip of 20 ms; a frame of 10 KB takes 10 ms. Room for one frame time and the way. */
+static void the_wait_for_the_next_frame_is_what_has_to_drain(void **state)
+{
+    (void)state;
+    struct pacing pacing;
+    pacing_init(&pacing, 10 * MS);
+    assert_int_equal(pacing_wait_ns(&pacing, 0), 0);
+    assert_true(pacing_wait_ns(&pacing, 1) == UINT64_MAX); /* nothing is known of the link */
+    pacing_sent(&pacing, 0, 10000, 0);
+    assert_true(pacing_wait_ns(&pacing, 0) == UINT64_MAX);
+    pacing_acknowledged(&pacing, 0, false, 20 * MS);
+    pacing_acknowledged(&pacing, 0, true, 30 * MS);
+    /* 30 KB: three frames. */
+    assert_int_equal(pacing_wait_ns(&pacing, 2), 0);
+    assert_in_range(pacing_wait_ns(&pacing, 3), 10 * MS - 1, 10 * MS + 1);
+    pacing_sent(&pacing, 1, 10000, 30 * MS);
+    assert_int_equal(pacing_wait_ns(&pacing, 1), 0);
+    assert_in_range(pacing_wait_ns(&pacing, 3), 20 * MS - 1, 20 * MS + 1);
+    /* One that is larger than all the room waits until nothing is before it. */
+    pacing_acknowledged(&pacing, 1, false, 50 * MS);
+    pacing_acknowledged(&pacing, 1, true, 60 * MS);
+    pacing_sent(&pacing, 2, 100000, 60 * MS);
+    assert_in_range(pacing_wait_ns(&pacing, 0), 100 * MS - 1, 100 * MS + 1);
+    assert_false(pacing_may_send(&pacing));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -339,6 +365,7 @@ int main(void)
         cmocka_unit_test(makes_frames_smaller_that_take_long_to_render),
         cmocka_unit_test(makes_frames_fit_the_link),
         cmocka_unit_test(does_not_flicker),
+        cmocka_unit_test(the_wait_for_the_next_frame_is_what_has_to_drain),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

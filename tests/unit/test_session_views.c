@@ -392,6 +392,61 @@ static void who_has_no_credit_left_is_told_that_nothing_comes(void **state)
     engine_command_destroy(start);
 }
 
+/* Frame 1 is on its way and not acknowledged; the link was slow before, and there may be one of its kind at once.
+ */
+static void a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = view_message(100);
+    message.render.frames_per_second = 100000;
+    send_message(2, 0, &message);
+    struct engine_command *start = told(ENGINE_JOB_START);
+    say_frame(2, 0, 0);
+    take_frame(2, 0);
+    usleep(50000);
+    send_ack(0, true, false); /* so long it took */
+    told_credit(2, 2);
+    say_frame(2, 1, 0);
+    take_frame(2, 1);
+    /* The next one is begun when that one is expected to have come, and waits for it. */
+    told_credit(2, 3);
+    say_frame(2, 2, 0);
+    send_camera(8, true);
+    told_and_forgotten(ENGINE_VIEW_LOOK);
+    usleep(20000);
+    send_ack(1, true, false);
+    told_credit(2, 4); /* instead of frame 2 */
+    say_frame(2, 3, 8);
+    take_frame(2, 3);
+    engine_command_destroy(start);
+}
+
+static void a_view_that_adapts_tells_the_engine_what_the_link_carries(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = view_message(100);
+    message.render.adapt = 1;
+    message.render.quality = 90;
+    message.render.frames_per_second = 1000;
+    send_message(2, 0, &message);
+    struct engine_command *start = told(ENGINE_JOB_START);
+    assert_true(start->job.adapt);
+    say_frame(2, 0, 1); /* 300 KB and moving */
+    take_frame(2, 0);
+    usleep(100000);
+    send_ack(0, true, false); /* 3 MB a second at most, or 3 KB in a millisecond */
+    told_credit(2, 2);
+    say_frame(2, 1, 3);
+    take_frame(2, 1);
+    const struct view_effort effort = view_wishes_see(start->job.wishes).effort;
+    assert_true(effort.scale_eighths < 8);
+    assert_true(effort.quality < 90);
+    assert_true(effort.bytes < FRAME_BYTES);
+    engine_command_destroy(start);
+}
+
 /* ---- one view in the place of another ---------------------------------------------------------------- */
 
 static struct engine_command *replace_view(uint32_t request, uint32_t width)
@@ -592,6 +647,29 @@ static void a_view_that_cannot_be_is_refused_by_its_field(void **state)
     expect_refused(5, &message, PROTOCOL_ERROR_CODE_INVALID, "render.channel");
 }
 
+/* What frames of 512 x 512 may take: 7 of them, the limit is 10 MiB. */
+static void views_have_room_for_their_frames_or_are_refused(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = view_message(1);
+    message.render.width = message.render.height = 512;
+    send_message(2, 0, &message);
+    expect_told_start(2, JOB_VIEW);
+    message.render.channel = CHANNEL + 1;
+    expect_refused(3, &message, PROTOCOL_ERROR_CODE_BUSY, "render");
+    message.render.channel = CHANNEL; /* in the place of the first it fits */
+    send_message(4, 0, &message);
+    expect_told_start(4, JOB_VIEW);
+    say(ENGINE_DONE, 2, ERROR_NONE);
+    expect(MESSAGE_OK, 2);
+    say(ENGINE_FAILED, 4, ERROR_CANCELLED);
+    expect_error(4, PROTOCOL_ERROR_CODE_CANCELLED);
+    message.render.channel = CHANNEL + 1;
+    send_message(5, 0, &message);
+    expect_told_start(5, JOB_VIEW);
+}
+
 #define BOTH(name)                                                                                                \
     cmocka_unit_test_setup_teardown(name, set_up, tear_down),                                                     \
         cmocka_unit_test_setup_teardown(name, set_up_with_faults, tear_down)
@@ -606,6 +684,8 @@ int main(void)
         BOTH(a_camera_of_no_view_is_ignored_and_one_out_of_order_is_not),
         BOTH(a_key_frame_is_wished_of_the_engine),
         BOTH(who_has_no_credit_left_is_told_that_nothing_comes),
+        BOTH(a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera),
+        BOTH(a_view_that_adapts_tells_the_engine_what_the_link_carries),
         BOTH(a_view_takes_the_place_of_another_on_its_channel),
         BOTH(a_frame_under_way_comes_whole_before_the_answer),
         BOTH(a_view_that_cannot_be_leaves_the_one_that_is),
@@ -614,6 +694,7 @@ int main(void)
         BOTH(a_view_may_be_cancelled_while_another_takes_its_place),
         BOTH(a_client_that_vanishes_takes_its_view_along),
         BOTH(a_view_that_cannot_be_is_refused_by_its_field),
+        BOTH(views_have_room_for_their_frames_or_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

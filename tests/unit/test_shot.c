@@ -296,6 +296,44 @@ static void noise_is_another_in_every_frame_but_in_none_that_accumulates(void **
     scene_destroy(scene);
 }
 
+static void who_looks_for_himself_sees_the_scene_of_that_time_from_where_he_says(void **state)
+{
+    (void)state;
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_turning(&list, 90);
+    add_clip(&list, 3, (float[]){0, 9, 9, 9, 0.25f}, 5);
+    struct scene_channel *eye = add_channel(&list, 4, 3, CHANNEL_VIEW_EYE, 0, 3, 1);
+    eye->first_value = 1;
+    struct scene_channel *aperture = add_channel(&list, 5, 3, CHANNEL_VIEW_APERTURE, 0, 1, 1);
+    aperture->first_value = 4;
+    expect_commit(scene, &list);
+    struct clip_use uses[] = {{.clip = 1, .speed = 1}, {.clip = 3, .speed = 1}};
+    struct engine_job job = job_of(CAMERA_KEYS, uses, 2);
+    struct shot frame = shot_at(&job, scene, 5), look;
+    struct camera_key key = home;
+    key.time_s = 0.5f;
+    assert_true(shot_look(&look, &job, scene, &key, NULL));
+    assert_true(look.time_s == frame.time_s);
+    assert_int_equal(look.motion.pose_count, frame.motion.pose_count);
+    assert_memory_equal(look.motion.poses[0].nodes[0].parent_from_node,
+                        frame.motion.poses[0].nodes[0].parent_from_node, 48);
+    assert_true(frame.request.camera.world_from_view[3] == 9.0f);
+    assert_true(look.request.camera.world_from_view[3] == 0.0f);
+    assert_true(look.request.camera.world_from_view[11] == 5.0f);
+    assert_true(look.request.aperture == 0.25f);
+    assert_true(look.request.focus == 5.0f);
+    assert_int_equal(look.request.seed, 77); /* from one place there is one picture */
+    shot_finish(&frame);
+    shot_finish(&look);
+    struct error error = {0};
+    memcpy(key.up_world, (float[]){0, 0, 2}, 12); /* along the view */
+    assert_false(shot_look(&look, &job, scene, &key, &error));
+    assert_int_equal(error.kind, ERROR_INVALID);
+    assert_string_equal(error.field, "view_camera.up_world");
+    scene_destroy(scene);
+}
+
 /* ---- ranges -------------------------------------------------------------------------------------- */
 
 /* What a frame shows, whichever job it comes from. */
@@ -427,6 +465,7 @@ int main(void)
         cmocka_unit_test(noise_is_another_in_every_frame_but_in_none_that_accumulates),
         cmocka_unit_test(frames_show_the_same_however_their_range_was_divided),
         cmocka_unit_test(a_clip_that_goes_ends_the_job_and_says_which),
+        cmocka_unit_test(who_looks_for_himself_sees_the_scene_of_that_time_from_where_he_says),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,270 @@
+/* SPDX-License-Identifier: MIT */
+/* Puts a scene up for others: on a daemon of its own, which listens where it is told to and ends with the command,
+ * or on one that runs already. */
+#include "cli/cli.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define KEY_LISTEN 0x400
+#define KEY_NAME 0x401
+#define KEY_ENVIRONMENT 0x402
+#define KEY_KEY 0x403
+
+#define LISTENS_MAX 8
+#define DAEMON_WORDS_MAX 28 /* of fl_connect */
+#define WAIT_MS 3600000u
+
+struct serving {
+    struct cli_job job; /* model, environment, server, key file; and the error of what was typed */
+    const char *name;
+    const char *listens[LISTENS_MAX];
+    size_t listen_count;
+    const char *words[DAEMON_WORDS_MAX + 1]; /* the daemon's arguments, and a NULL */
+    size_t word_count;
+    char usual_address[300];
+};
+
+static const struct argp_option options[] = {
+    {"listen", KEY_LISTEN, "ADDRESS", 0,
+     "Where the daemon listens: unix:/PATH or tcp:HOST:PORT; may be repeated (default: a socket in "
+     "$XDG_RUNTIME_DIR)",
+     0},
+    {"server", 's', "ADDRESS", 0,
+     "Put the scene up on a daemon that runs there: unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]", 0},
+    {"key", KEY_KEY, "FILE", 0,
+     "Key for TCP beyond this host ('farlight key' makes one): of the daemon that is started, or of --server", 0},
+    {"name", KEY_NAME, "NAME", 0, "What others call the scene (default: the model's file name)", 0},
+    {"environment", KEY_ENVIRONMENT, "FILE", 0, "Equirectangular image (HDR or EXR) that lights the scene", 0},
+    {"quiet", 'q', NULL, 0, "No progress, no notes about the model", 0},
+    {0}};
+
+static error_t add_word(struct serving *serving, const char *word)
+{
+    if (serving->word_count == DAEMON_WORDS_MAX)
+        return cli_usage(&serving->job, word, "too many options for the daemon");
+    serving->words[serving->word_count++] = word;
+    return 0;
+}
+
+/* In order, so that what is behind -- can be told from what is before. */
+static error_t take_argument(struct serving *serving, char *value, const struct argp_state *state)
+{
+    if (state->quoted > 0 && state->next > state->quoted)
+        return add_word(serving, value);
+    if (serving->job.model != NULL)
+        return cli_usage(&serving->job, value, "one model at a time; options of the daemon come behind --");
+    serving->job.model = value;
+    return 0;
+}
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct serving *serving = state->input;
+    struct cli_job *job = &serving->job;
+    switch (key) {
+    case KEY_LISTEN:
+        if (serving->listen_count == LISTENS_MAX)
+            return cli_usage(job, "--listen", "at most %d addresses", LISTENS_MAX);
+        serving->listens[serving->listen_count++] = value;
+        return 0;
+    case 's':
+        job->server = value;
+        return 0;
+    case KEY_KEY:
+        job->key_file = value;
+        return 0;
+    case KEY_NAME:
+        serving->name = value;
+        return 0;
+    case KEY_ENVIRONMENT:
+        job->environment = value;
+        return 0;
+    case 'q':
+        job->quiet = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        return take_argument(serving, value, state);
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+/* ---- the daemon's command line ---- */
+
+static const char *usual_address(struct serving *serving)
+{
+    const char *folder = getenv("XDG_RUNTIME_DIR");
+    if (folder == NULL || folder[0] != '/')
+        folder = P_tmpdir;
+    snprintf(serving->usual_address, sizeof serving->usual_address, "unix:%s/farlight-%ld.sock", folder,
+             (long)getpid());
+    return serving->usual_address;
+}
+
+/* What was typed for it comes last: the later of two options counts. */
+static bool complete_daemon(struct serving *serving)
+{
+    const char *typed[DAEMON_WORDS_MAX];
+    const size_t typed_count = serving->word_count;
+    error_t status = 0;
+    memcpy(typed, serving->words, typed_count * sizeof *typed);
+    serving->word_count = 0;
+    if (serving->listen_count == 0)
+        serving->listens[serving->listen_count++] = usual_address(serving);
+    for (size_t i = 0; i < serving->listen_count && status == 0; i++)
+        status = add_word(serving, "--listen") != 0 ? EINVAL : add_word(serving, serving->listens[i]);
+    if (serving->job.key_file != NULL && status == 0)
+        status = add_word(serving, "--key-file") != 0 ? EINVAL : add_word(serving, serving->job.key_file);
+    /* It writes to nobody but us, who show its last line when it fails. */
+    if (status == 0)
+        status = add_word(serving, "--log-level") != 0 ? EINVAL : add_word(serving, "error");
+    for (size_t i = 0; i < typed_count && status == 0; i++)
+        status = add_word(serving, typed[i]);
+    return status == 0;
+}
+
+static bool complete(struct serving *serving)
+{
+    struct cli_job *job = &serving->job;
+    if (job->model == NULL)
+        return cli_usage(job, "MODEL", "no model file is named") == 0;
+    if (serving->name != NULL && serving->name[0] == '\0')
+        return cli_usage(job, "--name", "others need a name to come by") == 0;
+    if (job->server == NULL)
+        return complete_daemon(serving);
+    if (serving->listen_count > 0)
+        return cli_usage(job, "--listen", "the daemon at --server listens already") == 0;
+    if (serving->word_count > 0)
+        return cli_usage(job, serving->words[0], "the daemon at --server has its options already") == 0;
+    return true;
+}
+
+/* ---- what people are told ---- */
+
+/* As one word of a shell. */
+static void print_word(const char *word)
+{
+    const char *harmless = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-+@%,=:[]";
+    if (word[0] != '\0' && word[strspn(word, harmless)] == '\0') {
+        fputs(word, stdout);
+        return;
+    }
+    putchar('\'');
+    for (; *word != '\0'; word++) {
+        if (*word == '\'')
+            fputs("'\\''", stdout);
+        else
+            putchar((unsigned char)*word < 0x20 || *word == 0x7f ? '?' : *word);
+    }
+    putchar('\'');
+}
+
+/* Where everything is listened to, others need this host's name. */
+static void print_address(const char *address)
+{
+    static const char *const all[] = {"tcp:0.0.0.0:", "tcp:[::]:"};
+    char host[256] = "";
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        const size_t bytes = strlen(all[i]);
+        if (strncmp(address, all[i], bytes) != 0 || gethostname(host, sizeof host - 1) != 0)
+            continue;
+        printf("tcp:%s:%s", host, address + bytes);
+        return;
+    }
+    print_word(address);
+}
+
+static void print_line(const struct serving *serving, const char *name, const char *address)
+{
+    fputs("  farlight view --scene ", stdout);
+    print_word(name);
+    fputs(" --server ", stdout);
+    print_address(address);
+    if (serving->job.key_file != NULL && strncmp(address, "tcp:", 4) == 0) {
+        fputs(" --key ", stdout);
+        print_word(serving->job.key_file);
+    }
+    putchar('\n');
+}
+
+static bool announce(const struct serving *serving, const struct cli_loading *loading, struct fl_error *error)
+{
+    const char *name = loading->scene_name;
+    struct fl_scene_bounds bounds;
+    char address[300];
+    if (!fl_scene_get_bounds(loading->scene, &bounds, error))
+        return false;
+    fputs("serving \"", stdout);
+    cli_print_name(name);
+    printf("\", %llu triangles and %llu spheres; look at it by\n", (unsigned long long)bounds.triangles,
+           (unsigned long long)bounds.spheres);
+    if (serving->job.server != NULL)
+        print_line(serving, name, serving->job.server);
+    for (size_t i = 0; fl_connection_listens_at(loading->connection, i, address, sizeof address); i++)
+        print_line(serving, name, address);
+    if (fflush(stdout) != 0)
+        return fl_error_set(error, FL_ERROR_FILE, "standard output", "cannot be written: %s", strerror(errno));
+    return true;
+}
+
+/* ---- serving ---- */
+
+static const char *base_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+/* Until it is told to end, which is the good end, or the daemon is gone. */
+static bool stay(struct fl_connection *connection, struct fl_error *error)
+{
+    while (fl_connection_wait(connection, WAIT_MS, error))
+        continue;
+    if (error->code != FL_ERROR_INTERRUPTED)
+        return false;
+    *error = (struct fl_error){0};
+    return true;
+}
+
+static bool put_up(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
+{
+    if (!cli_loading_begin(loading, error) || !cli_loading_end(loading, error))
+        return false;
+    cli_progress_end(loading->progress, true);
+    return announce(serving, loading, error);
+}
+
+int cli_serve(int argc, char **argv)
+{
+    static const struct argp argp = {
+        .options = options,
+        .parser = parse,
+        .args_doc = "MODEL [-- OPTION OF FARLIGHTD...]",
+        .doc = "Put a model up for others to look at and to render, until Ctrl-C.\v"
+               "Without --server a daemon is started for it, which ends with this command. What is behind -- are "
+               "options of that daemon, such as --device software."};
+    struct serving serving = {0};
+    struct fl_error error = {0};
+    if (argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &serving) != 0 || !complete(&serving))
+        return cli_report(&serving.job.error);
+    if (!cli_interrupt_begin(&error))
+        return cli_report(&error);
+    struct cli_progress progress;
+    struct cli_loading loading = {.job = &serving.job,
+                                  .progress = &progress,
+                                  .sharing = PROTOCOL_SHARING_SHARED,
+                                  .scene_name = serving.name != NULL ? serving.name : base_name(serving.job.model),
+                                  .daemon_arguments = serving.words};
+    cli_progress_begin(&progress, serving.job.quiet);
+    const bool is_up = put_up(&serving, &loading, &error);
+    cli_progress_end(&progress, is_up);
+    const bool done = is_up && stay(loading.connection, &error);
+    if (loading.connection != NULL)
+        fl_connection_set_interrupt(loading.connection, 0); /* it is still told in order */
+    cli_loading_close(&loading);
+    return done ? CLI_DONE : cli_report(&error);
+}

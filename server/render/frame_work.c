@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: MIT */
+/* What frames in progress need, handed on from one to the next: of many who look at a scene few have a frame in
+ * progress at a time, and between two frames each keeps no more than its picture. */
+#include "render/frame_state.h"
+
+#include <stdlib.h>
+
+static void drop_integrator(struct frame_work *work)
+{
+    if (work->integrator)
+        work->integrator->impl->destroy(work->integrator);
+    work->integrator = NULL;
+}
+
+static void work_destroy(struct frame_work *work, struct gpu_device *device)
+{
+    drop_integrator(work);
+    comparison_destroy(work->comparison);
+    primary_finish(&work->primary, device);
+    layers_finish(&work->layers, device);
+    context_finish(&work->context);
+    gpu_timer_destroy(work->context.timer);
+    free(work);
+}
+
+static struct frame_work *work_create(struct frame_scene *shared, struct error *error)
+{
+    struct frame_work *work = calloc(1, sizeof(*work));
+    if (work)
+        work->context.timer = gpu_timer_create(shared->device);
+    if (!work || !work->context.timer) {
+        free(work);
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a frame");
+        return NULL;
+    }
+    work->context.device = shared->device;
+    work->context.scene = &shared->copy;
+    work->context.environment = &shared->environment;
+    return work;
+}
+
+static struct frame_work *take_idle(struct frame_scene *shared, const struct integrator_impl *impl)
+{
+    struct frame_work **place = &shared->idle;
+    if (!*place)
+        return NULL;
+    for (struct frame_work **one = place; *one; one = &(*one)->next)
+        if ((*one)->integrator && (*one)->integrator->impl == impl)
+            place = one;
+    struct frame_work *work = *place;
+    *place = work->next;
+    shared->idle_count--;
+    return work;
+}
+
+struct frame_work *frame_work_take(struct frame_scene *shared, const struct integrator_impl *impl,
+                                   struct error *error)
+{
+    struct frame_work *work = take_idle(shared, impl);
+    if (!work)
+        work = work_create(shared, error);
+    if (!work || (work->integrator && work->integrator->impl == impl))
+        return work;
+    drop_integrator(work);
+    work->integrator = impl->create(shared->device, error);
+    if (work->integrator)
+        return work;
+    work_destroy(work, shared->device);
+    return NULL;
+}
+
+/* As many stay as are in use, and one. */
+void frame_work_give(struct frame_scene *shared, struct frame_work *work)
+{
+    if (!work)
+        return;
+    work->next = shared->idle;
+    shared->idle = work;
+    shared->idle_count++;
+    while (shared->idle_count > shared->frames + 1) {
+        struct frame_work *extra = shared->idle->next;
+        shared->idle->next = extra->next;
+        shared->idle_count--;
+        work_destroy(extra, shared->device);
+    }
+}
+
+void frame_work_finish(struct frame_scene *shared)
+{
+    while (shared->idle) {
+        struct frame_work *next = shared->idle->next;
+        work_destroy(shared->idle, shared->device);
+        shared->idle = next;
+    }
+    shared->idle_count = 0;
+}
+
+uint64_t frame_work_device_bytes(const struct frame_work *work)
+{
+    uint64_t sum = context_device_bytes(&work->context) + work->primary.visible.size_bytes +
+                   work->primary.depth.size_bytes + layers_device_bytes(&work->layers);
+    if (work->integrator)
+        sum += work->integrator->impl->device_bytes(work->integrator);
+    if (work->comparison)
+        sum += comparison_device_bytes(work->comparison);
+    return sum;
+}
