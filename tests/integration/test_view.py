@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: MIT
 """`farlight view`: the viewer without a window, driven by replays, and once in a real window under Xvfb."""
+import contextlib
 import json
 import math
 import os
 import pathlib
 import shutil
 import signal
+import socket
 import struct
 import subprocess
 import tempfile
+import threading
 import unittest
 
 from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, read_png
@@ -182,12 +185,71 @@ class WithoutAWindow(Viewer):
             self.assertIn(part, result.stderr)
         self.assertEqual(farlight("view", "/nonexistent.glb", "--headless", "--replay", scene).returncode, 1)
 
+    def test_without_a_display_there_is_no_window(self):
+        environment = {name: value for name, value in os.environ.items()
+                       if name not in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")}
+        result = self.expect(farlight("view", bundled_scenes() / "teapot.glb", env=environment), 1)
+        self.assertIn("no display", result.stderr)
+
     def test_help_lists_the_keys(self):
         for arguments in (["view", "--help"], ["help", "view"]):
             text = self.expect(farlight(*arguments), 0).stdout
             for part in ("Shift+T", "next, previous tracer", "--replay", "--tracer", "Double click"):
                 self.assertIn(part, text)
             self.assertNotIn("--output", text)
+
+
+class Relay:
+    """A socket before a daemon's that can be cut; counts what clients send."""
+
+    def __init__(self, target, path):
+        self.target, self.path = target, path
+        self.pairs, self.sent = [], 0
+
+    def __enter__(self):
+        self.listener = socket.socket(socket.AF_UNIX)
+        self.listener.bind(str(self.path))
+        self.listener.listen()
+        threading.Thread(target=self.accept, daemon=True).start()
+        return self
+
+    def accept(self):
+        while True:
+            try:
+                client = self.listener.accept()[0]
+            except OSError:
+                return
+            server = socket.socket(socket.AF_UNIX)
+            server.connect(str(self.target))
+            self.pairs.append((client, server))
+            threading.Thread(target=self.copy, args=(client, server, True), daemon=True).start()
+            threading.Thread(target=self.copy, args=(server, client, False), daemon=True).start()
+
+    def copy(self, source, target, counts):
+        try:
+            while data := source.recv(65536):
+                self.sent += len(data) * counts
+                target.sendall(data)
+        except OSError:
+            pass
+        for end in (source, target):
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+        source.close()
+
+    def cut(self):
+        """Ends what is connected; what clients have sent since the last cut."""
+        for pair in self.pairs:
+            for end in pair:
+                with contextlib.suppress(OSError):
+                    end.shutdown(socket.SHUT_RDWR)
+        self.pairs, sent, self.sent = [], self.sent, 0
+        return sent
+
+    def __exit__(self, *_):
+        self.listener.shutdown(socket.SHUT_RDWR)
+        self.listener.close()
+        self.cut()
 
 
 class OnADaemon(Viewer):
@@ -228,6 +290,36 @@ class OnADaemon(Viewer):
         states = self.replay([*events[:-2], {"screenshot": "private.png"}, {"state": "private"}])
         self.assertEqual(states["private"]["samples"], 8)
         self.assertEqual(difference(self.folder / "tcp.png", self.folder / "private.png"), 0)
+
+    def test_a_cut_connection_comes_back_to_the_scene_that_the_daemon_kept(self):
+        events = [rest(), {"state": "before"}, {"wait": "lost"}, {"wait": "live"}, rest(8), {"state": "after"},
+                  {"after": 1}]
+        with Daemon() as daemon, Relay(daemon.path, self.folder / "relay") as relay:
+            process = self.start(events, "--headless", "--server", f"unix:{self.folder}/relay")
+            self.assertIn("before", process.stdout.readline())
+            uploaded = relay.cut()
+            after = json.loads(process.stdout.readline())
+            stats = json.loads(self.expect(farlight("stats", "--json", "--server", daemon.address), 0).stdout)
+            self.end(process)
+            again = relay.cut()
+        self.assertEqual((after["status"], after["times_live"], after["samples"]), ("live", 2, 8))
+        self.assertEqual(len(stats["scenes"]), 1)
+        # Its blobs and edits did not travel a second time: cameras and questions are a few hundred bytes each.
+        self.assertGreater(uploaded, 100_000)
+        self.assertLess(again, 20_000)
+
+    def test_a_scene_that_is_up_is_come_to_by_its_name(self):
+        command = [BIN / "farlight", "serve", bundled_scenes() / "teapot.glb", "--name", "pot", "--listen",
+                   f"unix:{self.folder}/up"]
+        with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True) as server:
+            while "farlight view" not in (line := server.stdout.readline()):
+                self.assertNotEqual(line, "")
+            address = f"unix:{self.folder}/up"
+            states = self.replay([rest(8), {"state": "up"}], "--scene", "pot", "--server", address, scene=None)
+            self.replay([rest(8)], "--scene", "pan", "--server", address, scene=None, status=1)
+            server.send_signal(signal.SIGTERM)
+        self.assertEqual(states["up"]["samples"], 8)
+        self.assertIn("pan", self.errors)
 
     def test_a_daemon_that_is_not_there_ends_the_viewer(self):
         self.replay([rest()], "--server", f"unix:{self.folder}/nothing", status=1)
