@@ -206,6 +206,13 @@ RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIV
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
 $(B)/tests/unit/test_load_model $(B)/tests/accuracy/test_abuffer_against_reference: $(MODEL_OBJ)
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
+$(B)/tests/unit/test_viewer_camera: $(call obj,$(addprefix client/viewer/,camera.c input.c settings.c tour.c))
+$(B)/tests/unit/test_viewer_figures: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c))
+$(B)/tests/unit/test_viewer_replay: $(B)/client/viewer/replay.o
+$(B)/tests/unit/test_viewer_decode: $(call obj,$(addprefix client/viewer/,decode.c pixmap.c))
+$(B)/tests/unit/test_viewer_window: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c paint.c \
+    pixmap.c window.c))
+$(B)/tests/unit/test_viewer_decode $(B)/tests/unit/test_viewer_window: TEST_LIBS += $(VIEWER_LIBS)
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/unit/test_bench_svo: $(RIVAL_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
