@@ -57,7 +57,7 @@ pkg_libs = $(shell $(PKG_CONFIG) --libs $(1) 2>/dev/null)
 # ---- sources ---------------------------------------------------------------------------------------
 # Sealed connections are for the daemon and the library alone: helper programs go without libsodium.
 SEALED_SRC := $(wildcard protocol/sealed*.c)
-PROTOCOL_SRC := $(filter-out protocol/docgen.c $(SEALED_SRC),$(wildcard protocol/*.c))
+PROTOCOL_SRC := $(filter-out protocol/docgen% $(SEALED_SRC),$(wildcard protocol/*.c))
 SERVER_SRC := $(filter-out server/main.c,$(wildcard server/*.c server/*/*.c))
 ifneq ($(EMBREE),1)
 SERVER_SRC := $(filter-out server/trace/reference%,$(SERVER_SRC))
@@ -183,10 +183,10 @@ $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
 $(B)/farlight-view: $(VIEWER_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIEWER_LIBS) -o $@
-$(B)/protocol-docgen: $(B)/protocol/docgen.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
-$(B)/protocol.md: $(B)/protocol-docgen
-	$< >$@.new && mv $@.new $@
+$(B)/protocol-docgen: $(call obj,$(wildcard protocol/docgen*.c)) $(PROTOCOL_OBJ) $(SEALED_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libxxhash) -o $@
+$(B)/protocol.md: $(B)/protocol-docgen protocol/guide.md
+	$^ >$@.new && mv $@.new $@
 
 # ---- tests -----------------------------------------------------------------------------------------
 # What has shaders of its own has them in place of the daemon's alone.
