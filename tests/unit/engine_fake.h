@@ -56,6 +56,7 @@ struct frame_renderer {
 static struct {
     atomic_bool gate_open;
     atomic_uint gate_seed;
+    atomic_uint step_us; /* how long a step takes */
     atomic_int devices_made, devices, scenes, renderers_made, renderers, frames_begun, frames_done,
         frames_abandoned;
     atomic_int fail_steps;      /* the next steps that fail */
@@ -209,6 +210,8 @@ static inline bool fake_begin(struct frame_renderer *renderer, const struct scen
 
 static inline void fake_work(struct frame_renderer *renderer)
 {
+    if (atomic_load(&fake.step_us))
+        usleep(atomic_load(&fake.step_us));
     int step = renderer->last_step = atomic_fetch_add(&fake.step_count, 1);
     uint64_t start_ns = clock_now_ns(), now_ns = start_ns;
     while (now_ns - start_ns < renderer->request.ao_rays * UINT64_C(1000))
@@ -301,6 +304,7 @@ static inline struct engine *start(struct engine_options options)
 {
     atomic_store(&fake.gate_open, false);
     atomic_store(&fake.gate_seed, 0);
+    atomic_store(&fake.step_us, 0);
     atomic_store(&fake.fail_steps, 0);
     atomic_store(&fake.fail_seed, 0);
     atomic_store(&fake.fail_from_frame, 0);
