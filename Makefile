@@ -57,7 +57,7 @@ pkg_libs = $(shell $(PKG_CONFIG) --libs $(1) 2>/dev/null)
 # ---- sources ---------------------------------------------------------------------------------------
 # Sealed connections are for the daemon and the library alone: helper programs go without libsodium.
 SEALED_SRC := $(wildcard protocol/sealed*.c)
-PROTOCOL_SRC := $(filter-out protocol/docgen.c $(SEALED_SRC),$(wildcard protocol/*.c))
+PROTOCOL_SRC := $(filter-out protocol/docgen% $(SEALED_SRC),$(wildcard protocol/*.c))
 SERVER_SRC := $(filter-out server/main.c,$(wildcard server/*.c server/*/*.c))
 ifneq ($(EMBREE),1)
 SERVER_SRC := $(filter-out server/trace/reference%,$(SERVER_SRC))
@@ -183,10 +183,10 @@ $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
 $(B)/farlight-view: $(VIEWER_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIEWER_LIBS) -o $@
-$(B)/protocol-docgen: $(B)/protocol/docgen.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
-$(B)/protocol.md: $(B)/protocol-docgen
-	$< >$@.new && mv $@.new $@
+$(B)/protocol-docgen: $(call obj,$(wildcard protocol/docgen*.c)) $(PROTOCOL_OBJ) $(SEALED_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libxxhash) -o $@
+$(B)/protocol.md: $(B)/protocol-docgen protocol/guide.md
+	$^ >$@.new && mv $@.new $@
 
 # ---- tests -----------------------------------------------------------------------------------------
 # What has shaders of its own has them in place of the daemon's alone.
@@ -206,6 +206,13 @@ RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIV
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
 $(B)/tests/unit/test_load_model $(B)/tests/accuracy/test_abuffer_against_reference: $(MODEL_OBJ)
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
+$(B)/tests/unit/test_viewer_camera: $(call obj,$(addprefix client/viewer/,camera.c input.c settings.c tour.c))
+$(B)/tests/unit/test_viewer_figures: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c))
+$(B)/tests/unit/test_viewer_replay: $(B)/client/viewer/replay.o
+$(B)/tests/unit/test_viewer_decode: $(call obj,$(addprefix client/viewer/,decode.c pixmap.c))
+$(B)/tests/unit/test_viewer_window: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c paint.c \
+    pixmap.c window.c))
+$(B)/tests/unit/test_viewer_decode $(B)/tests/unit/test_viewer_window: TEST_LIBS += $(VIEWER_LIBS)
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/unit/test_bench_svo: $(RIVAL_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
