@@ -210,7 +210,9 @@ $(B)/tests/unit/test_viewer_camera: $(call obj,$(addprefix client/viewer/,camera
 $(B)/tests/unit/test_viewer_figures: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c))
 $(B)/tests/unit/test_viewer_replay: $(B)/client/viewer/replay.o
 $(B)/tests/unit/test_viewer_decode: $(call obj,$(addprefix client/viewer/,decode.c pixmap.c))
-$(B)/tests/unit/test_viewer_decode: TEST_LIBS += $(VIEWER_LIBS)
+$(B)/tests/unit/test_viewer_window: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c paint.c \
+    pixmap.c window.c))
+$(B)/tests/unit/test_viewer_decode $(B)/tests/unit/test_viewer_window: TEST_LIBS += $(VIEWER_LIBS)
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/unit/test_bench_svo: $(RIVAL_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
