@@ -34,7 +34,7 @@ _farlight()
         --brdf) words="ggx ward" ;;
         --layers) words="beauty,albedo,normal beauty,depth beauty,albedo,normal,depth,position,ao,id" ;;
         --primary) words="raster trace" ;;
-        --encoding) words="raw zstd jpeg" ;;
+        --encoding) words="raw zstd predicted jpeg" ;;
         --tone-map) words="neutral aces none" ;;
         --format) words="png jpeg exr hdr mp4 mkv y4m" ;;
         --layout) words="heat side" ;;
