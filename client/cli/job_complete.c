@@ -292,6 +292,8 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
 bool cli_job_complete_view(struct cli_job *job)
 {
     struct fl_job_options *wanted = &job->options;
+    if (!complete_scene(job))
+        return false;
     if (wanted->width == 0) {
         wanted->width = 1280;
         wanted->height = 720;

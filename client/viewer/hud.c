@@ -231,17 +231,6 @@ static double place_on(const struct axis *axis, int64_t at_ns)
     return axis->x + fmax(0, fmin(1, (double)(at_ns - axis->begin_ns) / axis->length_ns)) * axis->width;
 }
 
-/* The offset that makes one clock of both. */
-static int64_t span_begin_ns(const struct span *span, int64_t offset_ns)
-{
-    return span->begin_ns + (span->lane < LANE_RECEIVE ? offset_ns : 0);
-}
-
-static int64_t span_end_ns(const struct span *span, int64_t offset_ns)
-{
-    return span->end_ns + (span->lane < LANE_RECEIVE ? offset_ns : 0);
-}
-
 /* 1, 2 or 5 times a power of ten: the least of which no more than `most` are in the length. */
 static double tick_ns(double length_ns, double most)
 {
@@ -254,11 +243,12 @@ static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct
     int64_t begin_ns = INT64_MAX, end_ns = INT64_MIN;
     for (size_t back = 0; back < TIMELINE_FRAMES; back++) {
         const struct metrics_frame *frame = metrics_frame(metrics, back);
-        for (size_t i = 0; frame != NULL && i < frame->span_count; i++) {
-            const int64_t first = span_begin_ns(&frame->spans[i], offset_ns);
-            const int64_t last = span_end_ns(&frame->spans[i], offset_ns);
-            begin_ns = first < begin_ns ? first : begin_ns;
-            end_ns = last > end_ns ? last : end_ns;
+        for (int lane = 0; frame != NULL && lane < LANE_COUNT; lane++) {
+            struct span span;
+            if (!metrics_span(frame, (enum lane)lane, offset_ns, &span))
+                continue;
+            begin_ns = span.begin_ns < begin_ns ? span.begin_ns : begin_ns;
+            end_ns = span.end_ns > end_ns ? span.end_ns : end_ns;
         }
         /* A pause between frames is not worth its room. */
         const struct metrics_frame *before = metrics_frame(metrics, back + 1);
@@ -273,12 +263,12 @@ static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct
     return true;
 }
 
-static void draw_span(struct layout *layout, const struct axis *axis, double top, enum lane lane, int64_t begin_ns,
-                      int64_t end_ns, bool is_even)
+static void draw_span(struct layout *layout, const struct axis *axis, double top, enum lane lane,
+                      const struct span *span, bool is_even)
 {
-    const double s = layout->scale, from = place_on(axis, begin_ns), to = place_on(axis, end_ns);
+    const double s = layout->scale, from = place_on(axis, span->begin_ns), to = place_on(axis, span->end_ns);
     struct hud_colour colour = lane_colours[lane];
-    if (end_ns < axis->begin_ns)
+    if (span->end_ns < axis->begin_ns)
         return;
     colour.a = is_even ? 255 : 150; /* neighbours are told apart */
     box(layout, from, top + (double)lane * ROW * s + 2 * s, fmax(to - from, s), ROW * s - 3 * s, colour);
@@ -293,12 +283,11 @@ static void draw_frames(struct layout *layout, const struct axis *axis, double t
         if (frame == NULL || (int64_t)frame->shown_ns < axis->begin_ns)
             break;
         const bool is_even = frame->frame % 2 == 0;
-        for (size_t i = 0; i < frame->span_count; i++)
-            draw_span(layout, axis, top, frame->spans[i].lane, span_begin_ns(&frame->spans[i], offset_ns),
-                      span_end_ns(&frame->spans[i], offset_ns), is_even);
-        if (frame->first_of_command)
-            draw_span(layout, axis, top, LANE_INPUT, (int64_t)frame->command_sent_ns,
-                      (int64_t)frame->command_applied_ns + offset_ns, is_even);
+        for (int lane = 0; lane < LANE_COUNT; lane++) {
+            struct span span;
+            if (metrics_span(frame, (enum lane)lane, offset_ns, &span))
+                draw_span(layout, axis, top, (enum lane)lane, &span, is_even);
+        }
         box(layout, place_on(axis, (int64_t)frame->shown_ns), top, s, ROW * s * LANE_COUNT,
             (struct hud_colour){255, 255, 255, 60});
     }
