@@ -33,7 +33,7 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
     if (!encoder_supports(spec->encoding, bytes_per_pixel(spec->frame.format))) {
         error_set(error, ERROR_UNSUPPORTED, "render.encoding", "encoding %u cannot carry pixels of %u bytes",
                   (unsigned)spec->encoding, bytes_per_pixel(spec->frame.format));
-        return error_remedy(error, "use the pixel format rgba8, or the encoding zstd or raw");
+        return error_remedy(error, "use the pixel format rgba8, or the encoding raw, zstd or predicted");
     }
     if (spec->kind == JOB_VIEW && !encoder_supports(spec->still_encoding, bytes_per_pixel(spec->frame.format)))
         return error_set(error, ERROR_UNSUPPORTED, "render.still_encoding",
