@@ -120,6 +120,7 @@ void view_switch(struct job *job)
     job->frame_bytes = change->frame_bytes;
     job->engine_credit = change->credit;
     job->frames_gone = 0;
+    job->rendered = false;
     job->cancelled = change->cancelled;
     view->terms = change->terms;
     view->pacing.frame_ns = change->terms.frame_ns;
