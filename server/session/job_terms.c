@@ -52,7 +52,7 @@ static bool check_layers(const struct message_render *render, struct error *erro
     if (render->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || render->encoding == PROTOCOL_ENCODING_JPEG) {
         error_set(error, ERROR_UNSUPPORTED, "render.layers", "%s in %s carries the beauty alone",
                   protocol_pixel_format_text(render->format), protocol_encoding_text(render->encoding));
-        return error_remedy(error, "layers need the format rgba32f and the encoding raw or zstd");
+        return error_remedy(error, "layers need the format rgba32f and the encoding raw, zstd or predicted");
     }
     if (frame_bytes_of(render) > FRAME_BYTES_MAX) {
         error_set(error, ERROR_LIMIT, "render.layers", "frames of %" PRIu64 " bytes, the limit is %" PRIu64,
@@ -150,7 +150,7 @@ static bool check_kind(const struct message_render *render, struct error *error)
         return true;
     error_set(error, ERROR_UNSUPPORTED, "render.still_encoding", "%s does not carry %s",
               protocol_encoding_text(render->still_encoding), protocol_pixel_format_text(render->format));
-    return error_remedy(error, "raw and zstd carry every format");
+    return error_remedy(error, "raw, zstd and predicted carry every format");
 }
 
 bool job_check(const struct session *session, const struct message_render *render, struct error *error)
@@ -165,11 +165,12 @@ bool job_check(const struct session *session, const struct message_render *rende
     if (!encoder_supports((enum encoding)render->encoding, bytes_per_pixel(render->format))) {
         error_set(error, ERROR_UNSUPPORTED, "render.encoding", "%s does not carry %s",
                   protocol_encoding_text(render->encoding), protocol_pixel_format_text(render->format));
-        return error_remedy(error, "raw and zstd carry every format");
+        return error_remedy(error, "raw, zstd and predicted carry every format");
     }
-    if (render->encoding == PROTOCOL_ENCODING_ZSTD && render->quality > ZSTD_LEVEL_MAX)
-        return error_set(error, ERROR_INVALID, "render.quality", "zstd has levels up to %u, not %u",
-                         ZSTD_LEVEL_MAX, render->quality);
+    bool has_level = render->encoding == PROTOCOL_ENCODING_ZSTD || render->encoding == PROTOCOL_ENCODING_PREDICTED;
+    if (has_level && render->quality > ZSTD_LEVEL_MAX)
+        return error_set(error, ERROR_INVALID, "render.quality", "%s has levels up to %u, not %u",
+                         protocol_encoding_text(render->encoding), ZSTD_LEVEL_MAX, render->quality);
     return tracer_settings_check(render, error) && check_limits(session, render, error) &&
            check_camera(render, error) && check_room(session, render, error);
 }

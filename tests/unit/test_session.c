@@ -1353,15 +1353,6 @@ static void a_wrong_key_is_answered_after_a_while(void **state)
     assert_false(receive_sealed());
 }
 
-/* Open and sealed, and both with whole calls and with calls that are cut short. */
-/* clang-format off */
-#define BOTH(test)                                                                                                \
-    cmocka_unit_test_setup_teardown(test, set_up, tear_down),                                                     \
-    {#test " (calls cut short)", test, set_up_with_faults, tear_down, NULL},                                      \
-    {#test " (sealed)", test, set_up_sealed, tear_down, NULL},                                                    \
-    {#test " (sealed, calls cut short)", test, set_up_sealed_with_faults, tear_down, NULL}
-/* clang-format on */
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {

@@ -878,10 +878,6 @@ static void whatever_happens_each_request_has_one_answer(void **state)
         play_from(chance);
 }
 
-#define BOTH(name)                                                                                                \
-    cmocka_unit_test_setup_teardown(name, set_up, tear_down),                                                     \
-        cmocka_unit_test_setup_teardown(name, set_up_with_faults, tear_down)
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
