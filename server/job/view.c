@@ -34,6 +34,12 @@ static bool has_news(const struct job *job, const struct view_wish *wish)
            job->scene->scene->revision != view->shown_revision;
 }
 
+bool view_has_news(const struct job *job)
+{
+    struct view_wish wish = view_wishes_see(job->spec.wishes);
+    return has_news(job, &wish);
+}
+
 static bool may_refine(const struct job *job)
 {
     const struct view *view = &job->view;
