@@ -1,21 +1,66 @@
 /* SPDX-License-Identifier: MIT */
-/* Prints the document of the wire format, in Markdown, from the table. */
+/* Prints the document of the wire format, in Markdown: from the table, from the prose in the file that is its
+ * argument, and from the messages of docgen_example.c. */
 #include <inttypes.h>
 #include <stdio.h>
 
 #include "protocol/describe.h"
+#include "protocol/docgen_example.h"
 #include "protocol/handshake.h"
 #include "protocol/sealed.h"
 
 static void print_rules(void)
 {
     printf("# The wire format of farlight, version %u\n\n"
-           "Written from `protocol/messages.def`; do not edit.\n\n"
+           "Written from `protocol/messages.def` and `protocol/guide.md`; do not edit.\n\n"
            "All numbers are little-endian. A connection begins with the handshake; after it both sides send\n"
            "messages. Lengths are metres, angles radians unless a field says degrees, colours linear Rec. 709,\n"
            "times nanoseconds. Matrices are 3x4 row-major (rows x, y, z; the fourth column is the translation).\n"
            "Identifiers are chosen by the client, unique per scene and kind, and never 0.\n\n",
            HANDSHAKE_VERSION_MAX);
+}
+
+static void print_limits(void)
+{
+    static const struct {
+        unsigned bytes;
+        const char *what;
+    } limits[] = {
+        {8, "bytes that may wait for a client that does not read"},
+        {8, "memory of a scene, bytes"},
+        {4, "milliseconds for the handshake"},
+        {4, "payload of a message without bulk data, bytes"},
+        {4, "bulk data of one message from the daemon, bytes"},
+        {4, "requests in flight"},
+        {4, "scenes of a client"},
+        {4, "jobs of a client at once"},
+        {4, "nodes of a scene"},
+        {4, "texels along a side of a texture"},
+        {4, "width of a picture, pixels"},
+        {4, "height of a picture, pixels"},
+        {4, "samples of a pixel"},
+        {4, "seconds of silence; 0: any"},
+    };
+    unsigned offset = 0;
+    printf("The limits in force at the daemon. What is missing at the end is 0 (not told), what is more is "
+           "skipped.\n\n"
+           "| offset | type | limit |\n| ---: | --- | --- |\n");
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
+        printf("| %u | u%u | %s |\n", 48 + offset, 8 * limits[i].bytes, limits[i].what);
+        offset += limits[i].bytes;
+    }
+    printf("\n");
+}
+
+static void print_capabilities(void)
+{
+    printf("Capabilities are bits; others than these are 0 from who does not know them:\n\n"
+           "| bit | meaning |\n| ---: | --- |\n"
+           "| %d | of a client: it decodes the encoding h264; of a reply: the daemon encodes it, too |\n"
+           "| %d | of a reply: this client may only look, it changes nothing |\n"
+           "| %d | of a reply of version 0: only sealed connections are let in |\n\n",
+           __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
+           __builtin_ctzll(HANDSHAKE_NEEDS_KEY));
 }
 
 static void print_handshake(void)
@@ -44,11 +89,8 @@ static void print_handshake(void)
            "| | u8, bytes | text: why there is no version in common; at most %u bytes |\n"
            "| | | zeros up to a multiple of 8 |\n\n",
            HANDSHAKE_REPLY_MAX_BYTES, HANDSHAKE_NAME_MAX_BYTES, HANDSHAKE_TEXT_MAX_BYTES);
-    printf(
-        "The limits in force at the daemon, packed: u64 queued output bytes, scene memory bytes; u32 handshake\n"
-        "ms, control payload bytes, bulk chunk bytes, requests in flight, scenes per client, views per client,\n"
-        "nodes, texture edge, width, height, samples, idle seconds. What is missing is 0 (not told), what is\n"
-        "more is skipped.\n\n");
+    print_limits();
+    print_capabilities();
 }
 
 static void print_sealed_messages(void)
@@ -59,7 +101,8 @@ static void print_sealed_messages(void)
         "messages that prove it and give the connection keys of its own; over a network it has to. Nobody on\n"
         "the way can then read or change what is said, repeat it, or cut off the end unnoticed. The handshake\n"
         "and all that follows travel in records as they would go over an open connection, cut anywhere.\n"
-        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`.\n\n",
+        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`. A daemon that lets\n"
+        "only sealed connections in answers the other handshake with version 0 and bit 2 of the capabilities.\n\n",
         SEALED_KEY_BYTES);
     printf("| message | from | bytes | layout |\n| ---: | --- | ---: | --- |\n"
            "| 1 | client | 72 | `SEAL`, u8 1, u8 version (%u), u16 0, X25519 public key (32), nonce (32) |\n"
@@ -222,9 +265,49 @@ static void print_message(const struct message_desc *desc)
     print_fields(body, 2);
 }
 
-int main(void)
+static void print_predicted(void)
 {
+    printf(
+        "## The encoding `predicted`\n\n"
+        "One frame of Zstandard (RFC 8878). Unpacked it has as many bytes as the pixels, as planes one behind "
+        "the\n"
+        "other, of which there are as many as a pixel has bytes: plane b is for byte b of every pixel, rows from\n"
+        "the top, without gaps. Several layers are one picture of their common height.\n\n"
+        "What a plane has for a byte is that byte less its prediction, modulo 256. The prediction comes of three\n"
+        "bytes of the same plane: left of it (a), above it (b), and left of that (c); what lies outside the\n"
+        "picture is 0:\n\n"
+        "    c >= max(a, b): min(a, b)\n"
+        "    c <= min(a, b): max(a, b)\n"
+        "    else:           a + b - c\n\n"
+        "So a decoder goes through the rows from the top and from left to right, and adds what it finds to the\n"
+        "prediction that it makes of the bytes that it has restored.\n\n");
+}
+
+static bool copy_file(const char *path)
+{
+    FILE *file = fopen(path, "r");
+    if (file == NULL) {
+        perror(path);
+        return false;
+    }
+    for (int byte; (byte = getc(file)) != EOF;) {
+        putchar(byte);
+    }
+    bool ok = !ferror(file);
+    fclose(file);
+    return ok;
+}
+
+int main(int argument_count, char **arguments)
+{
+    if (argument_count != 2) {
+        fprintf(stderr, "usage: %s GUIDE\n", arguments[0]);
+        return 2;
+    }
     print_rules();
+    if (!copy_file(arguments[1])) {
+        return 1;
+    }
     print_handshake();
     print_sealed_messages();
     print_sealed_keys();
@@ -243,5 +326,7 @@ int main(void)
     for (size_t i = 0; i < protocol_message_count; i++) {
         print_message(&protocol_messages[i]);
     }
+    print_predicted();
+    docgen_print_example();
     return ferror(stdout) || fflush(stdout) != 0 ? 1 : 0;
 }

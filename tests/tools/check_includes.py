@@ -43,7 +43,8 @@ RESTRICTED = [
     (re.compile(r"^(tiny_gltf|tiny_obj_loader)"), {"client/import"}),
     (re.compile(r"^(turbojpeg|zstd)\.h"), {"server/encode", "client/lib"}),
     # Of the protocol's files only those of sealed connections, which helper programs are not linked to.
-    (re.compile(r"^sodium\.h"), {"server/base", "server/session", "client/lib", "client/import", "protocol/sealed"}),
+    (re.compile(r"^sodium\.h"), {"server/base", "server/session", "client/lib", "client/import", "protocol/sealed",
+                                  "protocol/docgen"}),
 ]
 ROOTS = ("", "server", "shaders", "client")  # as the compiler's -I
 INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"([^"]+)"|<([^>]+)>)')

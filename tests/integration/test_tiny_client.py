@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: MIT
+"""That protocol.md is enough to write a client: one that was written from it puts up a scene, renders and looks on, and
+the session that the document writes out byte by byte is what a daemon really says."""
+import json
+import math
+import re
+import socket
+import struct
+
+import farlight_test
+import tiny_client
+from farlight_test import Case, Daemon, farlight, frames_of
+from tiny_client import BATCH, CANCELLED, SHARED, VIEW, Client
+
+ABOVE, LEFT = ((0, 1, 5), (0, 0, 0), (0, 1, 0), 0.8), ((-1, 1, 5), (0, 0, 0), (0, 1, 0), 0.8)
+GRID = 300  # 90,601 vertices: positions of more than a megabyte
+
+
+def srgb(linear):
+    return 255 * (12.92 * linear if linear <= 0.0031308 else 1.055 * linear**(1 / 2.4) - 0.055)
+
+
+def grid():
+    """A wavy sheet of many triangles: blobs of several chunks and pieces."""
+    points = [((i % (GRID + 1)) * 4 / GRID - 2, (i // (GRID + 1)) * 4 / GRID - 2) for i in range((GRID + 1)**2)]
+    positions = struct.pack(f"<{3 * len(points)}f",
+                            *[v for x, y in points for v in (x, y, math.sin(3 * x) * math.cos(2 * y) / 4)])
+    corners = [first + step for row in range(GRID) for column in range(GRID) for first in [row * (GRID + 1) + column]
+               for step in (0, 1, GRID + 2, 0, GRID + 2, GRID + 1)]
+    return positions, struct.pack(f"<{len(corners)}I", *corners)
+
+
+def grid_scene():
+    blobs = list(grid())
+    edits = [tiny_client.set_material(1, (0.7, 0.5, 0.3)),
+             tiny_client.set_mesh(1, (GRID + 1)**2, 2 * GRID**2, blobs, 1),
+             tiny_client.set_node(1, tiny_client.NODE_MESH, 1),
+             tiny_client.set_light(1, tiny_client.DIRECTIONAL, (3, 3, 3)),
+             tiny_client.set_node(2, tiny_client.NODE_LIGHT, 1)]
+    return blobs, edits
+
+
+class Document(Case):
+    """The session at the end of protocol.md."""
+
+    def steps(self):
+        """(what, bytes) of each step."""
+        text = (farlight_test.BIN / "protocol.md").read_text()
+        session = text[text.index("## A session, byte by byte"):]
+        found = re.findall(r"^([^\n]+):\n\n```\n([^`]*)```$", session, re.M)
+        self.assertGreater(len(found), 20)
+        return [(what, bytes.fromhex(shown)) for what, shown in found]
+
+    @staticmethod
+    def message(connection):
+        head = connection.recv(16, socket.MSG_WAITALL)
+        size, = struct.unpack_from("<I", head)
+        return head + connection.recv(size + -size % 8, socket.MSG_WAITALL)
+
+    def compare(self, what, came, shown):
+        if "`credit`" in what:  # the total is the daemon's to choose
+            came, shown = came[:22], shown[:22]
+        elif "`frame_begin`" in what:  # digest, and when it was taken up and read back
+            for start, end in ((154, 170), (50, 58)):
+                came = came[:16 + start] + came[16 + end:]
+                shown = shown[:16 + start] + shown[16 + end:]
+        elif "`frame_data`" in what:
+            self.assertEqual(came[:32], shown[:32])
+            for a, b in zip(came[32:], shown[32:]):
+                self.assertLessEqual(abs(a - b), 1, f"{came[32:].hex(' ')} is not {shown[32:].hex(' ')}")
+            return
+        self.assertEqual(came.hex(" "), shown.hex(" "), what)
+
+    def test_a_daemon_answers_the_documents_bytes_as_the_document_says(self):
+        with Daemon() as daemon, socket.socket(socket.AF_UNIX) as connection:
+            connection.settimeout(240)
+            connection.connect(daemon.path)
+            kinds = set()
+            for what, shown in self.steps():
+                kinds.add(what.split(",")[0].split(" ")[0])
+                if what.startswith("Client"):
+                    connection.sendall(shown)
+                    if "hello" in what:
+                        self.take_reply(connection)
+                    continue
+                came = self.message(connection)
+                if "`ok`" in what and came[4:6] == b"\x12\x02":
+                    came = self.message(connection)  # frame_end is not written out
+                self.compare(what, came, shown)
+            self.assertEqual(kinds, {"Client", "Daemon"})
+            self.assertEqual(connection.recv(1), b"")
+
+    def take_reply(self, connection):
+        reply = connection.recv(48, socket.MSG_WAITALL)
+        self.assertEqual(reply[:6], b"FARL\1\0")
+        limits_bytes, = struct.unpack_from("<H", reply, 6)
+        reply += connection.recv(limits_bytes, socket.MSG_WAITALL)
+        for _ in range(2):
+            length = connection.recv(1, socket.MSG_WAITALL)
+            reply += length + connection.recv(length[0], socket.MSG_WAITALL)
+        connection.recv(-len(reply) % 8, socket.MSG_WAITALL)
+
+    def test_the_client_sends_what_the_document_shows(self):
+        sent = b"".join(shown for what, shown in self.steps() if what.startswith("Client"))
+        blobs, edits = tiny_client.triangle()
+        for blob in blobs:
+            self.assertIn(tiny_client.blob_reference(blob), sent)
+        for _, body in edits:
+            self.assertIn(body, sent)
+
+
+class Session(Case):
+    """One daemon for all."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Daemon()
+        cls.daemon.__enter__()
+        cls.addClassCleanup(cls.daemon.__exit__)
+
+    def connect(self, scene=None, sharing=tiny_client.PRIVATE, name="", **options):
+        client = Client(self.daemon.path, **options)
+        self.addCleanup(client.socket.close)
+        if scene:
+            blobs, edits = scene
+            client.open_scene(1, name, sharing)
+            client.upload(blobs)
+            self.assertEqual(client.commit(1, edits), 1)
+        return client
+
+    def test_a_frame_has_the_size_and_the_revision_that_were_asked_for(self):
+        client = self.connect(tiny_client.triangle())
+        job = client.render(1, 2, (31, 17), ABOVE)
+        frame = client.next_frame()
+        client.wait(job)
+        self.assertEqual((frame.width, frame.height, frame.samples, frame.revision), (31, 17, 1, 1))
+        self.assertEqual(len(frame.pixels), 31 * 17 * 4)
+        self.assertEqual(client.say_goodbye(), b"")
+
+    def test_pixels_are_where_and_what_they_have_to_be(self):
+        """A square that is not lit, 1 m wide and 2 m high, in the right half of what is seen at its distance.
+        A light, so that there is no sky."""
+        blobs = [struct.pack("<12f", 0, -1, 0, 1, -1, 0, 1, 1, 0, 0, 1, 0), struct.pack("<6I", 0, 1, 2, 0, 2, 3)]
+        linear = (0.5, 0.25, 0.05)  # below what the tone map bends
+        edits = [tiny_client.set_material(1, linear, unlit=1), tiny_client.set_mesh(1, 4, 2, blobs, 1),
+                 tiny_client.set_node(1, tiny_client.NODE_MESH, 1),
+                 tiny_client.set_light(1, tiny_client.DIRECTIONAL, (1, 1, 1)),
+                 tiny_client.set_node(2, tiny_client.NODE_LIGHT, 1)]
+        client = self.connect((blobs, edits))
+        camera = ((0, 0, 2), (0, 0, 0), (0, 1, 0), 2 * math.atan(0.5))  # 2 m high at 2 m
+        client.wait(client.render(1, 2, (16, 16), camera))
+        frame = client.next_frame()
+        # Khronos PBR neutral takes an offset away that the least of the three channels gives.
+        least = min(linear)
+        offset = least - 6.25 * least**2 if least < 0.08 else 0.04
+        for y in range(16):
+            for x in range(16):
+                pixel = frame.pixels[4 * (16 * y + x):4 * (16 * y + x) + 4]
+                self.assertEqual(pixel[3], 255 if x >= 8 else 0, (x, y))
+                for got, channel in zip(pixel, linear):
+                    self.assertAlmostEqual(got, srgb(channel - offset) if x >= 8 else 0, delta=1, msg=f"{x} {y}")
+
+    def test_the_picture_is_that_of_farlights_own_client(self):
+        client = self.connect(grid_scene(), SHARED, "sheet")
+        client.wait(client.render(1, 2, (160, 120), ABOVE))
+        digest = client.next_frame().digest
+        result = self.expect(farlight("render", "--scene", "sheet", "--server", self.daemon.address, "--size", "160x120",
+                                      "--eye", "0,1,5", "--look-at", "0,0,0", "--fov", math.degrees(0.8),
+                                      "-o", self.folder / "a.png", "--timings=json"), 0)
+        self.assertEqual(int(frames_of(result)[0]["digest"], 16), digest)
+
+    def test_the_picture_is_that_of_the_same_model_in_a_file(self):
+        blobs, edits = tiny_client.triangle()
+        (self.folder / "triangle.bin").write_bytes(b"".join(blobs))
+        (self.folder / "triangle.gltf").write_text(json.dumps(gltf_triangle()))
+        client = self.connect((blobs, edits))
+        client.wait(client.render(1, 2, (40, 30), ABOVE))
+        digest = client.next_frame().digest
+        result = self.expect(farlight("render", self.folder / "triangle.gltf", "--size", "40x30", "--eye", "0,1,5",
+                                      "--look-at", "0,0,0", "--fov", math.degrees(0.8), "-o", self.folder / "a.png",
+                                      "--server", self.daemon.address, "--timings=json"), 0)
+        self.assertEqual(int(frames_of(result)[0]["digest"], 16), digest)
+
+    def test_a_view_shows_the_camera_that_it_was_told_and_ends(self):
+        client = self.connect(tiny_client.triangle())
+        view = client.render(1, 2, (32, 24), ABOVE, kind=VIEW, samples=4, credit=2)
+        first = client.next_frame()
+        self.assertEqual((first.command, first.width, first.height), (0, 32, 24))
+        client.look(2, 5, LEFT)
+        credit = 2
+        frame = first
+        while frame.command != 5 or frame.samples != 4:
+            credit += 1
+            client.raise_credit(2, credit)
+            frame = client.next_frame()
+            self.assertIn(frame.command, (0, 5))
+        self.assertEqual(frame.request, view)
+        ended = client.cancel(view)
+        self.assertEqual(ended.code, CANCELLED)
+        # The same again, as a batch: the channel is free, and the scene is there.
+        client.wait(client.render(1, 2, (32, 24), LEFT, kind=BATCH))
+        self.assertEqual(client.frames[-1].command, 0)
+        self.assertEqual(client.say_goodbye(), b"")
+
+    def test_blobs_that_are_there_are_not_sent_again(self):
+        client = self.connect(grid_scene())
+        self.assertEqual(client.upload(list(grid())), 0)
+
+    def test_another_attached_client_hears_of_changes(self):
+        watcher, editor = Client(self.daemon.path), self.connect(tiny_client.triangle(), SHARED, "watched")
+        self.addCleanup(watcher.socket.close)
+        attached = watcher.ask(0x0103, tiny_client.payload(struct.pack("<I", 7), tiny_client.string("watched")))
+        self.assertEqual(watcher.revision(attached), 1)
+        self.assertEqual(editor.commit(1, [tiny_client.set_material(1, (0.1, 0.2, 0.3))]), 2)
+        while not watcher.changes:
+            watcher.receive()
+        self.assertEqual(watcher.changes, [(7, 2)])
+
+    def test_an_error_ends_its_request_alone(self):
+        client = self.connect(tiny_client.triangle())
+        with self.assertRaises(tiny_client.Failed) as raised:
+            client.wait(client.render(9, 2, (8, 8), ABOVE))
+        self.assertEqual(raised.exception.field, "render.scene")
+        client.wait(client.render(1, 2, (8, 8), ABOVE))
+
+
+def gltf_triangle():
+    """The same objects in glTF's words; the importer takes its lux for W/m2."""
+    return {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+        "extensionsUsed": ["KHR_lights_punctual"],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": 3.1415927}]}},
+        "nodes": [{"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.4, 0.2, 1], "metallicFactor": 0,
+                                                "roughnessFactor": 1}}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+        "buffers": [{"uri": "triangle.bin", "byteLength": 48}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 12}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, -1, 0],
+                       "max": [3, 3, 0]},
+                      {"bufferView": 1, "componentType": 5125, "count": 3, "type": "SCALAR"}],
+    }
