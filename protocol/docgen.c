@@ -101,7 +101,8 @@ static void print_sealed_messages(void)
         "messages that prove it and give the connection keys of its own; over a network it has to. Nobody on\n"
         "the way can then read or change what is said, repeat it, or cut off the end unnoticed. The handshake\n"
         "and all that follows travel in records as they would go over an open connection, cut anywhere.\n"
-        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`.\n\n",
+        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`. A daemon that lets\n"
+        "only sealed connections in answers the other handshake with version 0 and bit 2 of the capabilities.\n\n",
         SEALED_KEY_BYTES);
     printf("| message | from | bytes | layout |\n| ---: | --- | ---: | --- |\n"
            "| 1 | client | 72 | `SEAL`, u8 1, u8 version (%u), u16 0, X25519 public key (32), nonce (32) |\n"

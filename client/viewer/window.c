@@ -18,9 +18,8 @@ struct window {
 static bool is_seen(const char *driver)
 {
     const char *asked = getenv("SDL_VIDEODRIVER");
-    return (asked != NULL && asked[0] != '\0') ||
-           (driver != NULL && strcmp(driver, "offscreen") != 0 && strcmp(driver, "dummy") != 0 &&
-            strcmp(driver, "evdev") != 0);
+    return (asked != NULL && asked[0] != '\0') || (driver != NULL && strcmp(driver, "offscreen") != 0 &&
+                                                   strcmp(driver, "dummy") != 0 && strcmp(driver, "evdev") != 0);
 }
 
 struct window *window_create(const char *title, int width, int height, struct fl_error *error)

@@ -241,11 +241,32 @@ static void the_overlay_tells_what_it_should_within_the_window(void **state)
     assert_true(tells("mean 0.12") && tells("a notice") && tells("moving") && tells("Shift+T"));
 }
 
+/* What does not fit is left out; nothing lies over something else but help and status. */
+static void in_a_small_window_there_is_less(void **state)
+{
+    (void)state;
+    for (uint32_t i = 0; i < 20; i++)
+        add(i, i + 1, (1000 + i * 20) * MS);
+    struct hud_state shown = some_state(360, 180); /* the widest line has 27 letters */
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("refining") && !tells("input to picture") && !tells("resolve"));
+    shown = some_state(700, 180);
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("input to picture") && !tells("resolve"));
+    shown = some_state(700, 420);
+    settings.help = true;
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("resolve") && tells("full screen"));
+}
+
 static void what_is_not_wanted_is_not_drawn_but_a_loss_is(void **state)
 {
     (void)state;
     add(0, 1, 1000 * MS);
-    struct hud_state shown = some_state(640, 480);
+    struct hud_state shown = some_state(700, 480);
     settings.overlay = OVERLAY_FIGURES;
     hud_layout(&hud, &shown, measure, NULL);
     assert_true(tells("input to picture") && !tells("resolve"));
@@ -295,6 +316,7 @@ int main(void)
         cmocka_unit_test(errors_become_colours_and_figures),
         cmocka_unit_test(hotter_is_brighter),
         cmocka_unit_test_setup(the_overlay_tells_what_it_should_within_the_window, begin),
+        cmocka_unit_test_setup(in_a_small_window_there_is_less, begin),
         cmocka_unit_test_setup(what_is_not_wanted_is_not_drawn_but_a_loss_is, begin),
         cmocka_unit_test_setup(the_timeline_has_times_on_its_axis_that_do_not_overlap, begin),
     };

@@ -61,7 +61,8 @@ static struct window *open_window(void)
 static struct input next(struct window *window)
 {
     struct input input = {0};
-    if (!window_poll(window, &input))
+    /* SDL says once that there is nothing between what was there and what came meanwhile. */
+    if (!window_poll(window, &input) && !window_poll(window, &input))
         fail_msg("nothing happened");
     return input;
 }
