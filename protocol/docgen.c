@@ -300,6 +300,18 @@ static void print_predicted(void)
         "prediction that it makes of the bytes that it has restored.\n\n");
 }
 
+static void print_h264(void)
+{
+    printf(
+        "## The encoding `h264`\n\n"
+        "The frames of a view that have it are one stream, whatever others come between them: an access unit\n"
+        "each, in the byte stream format of ITU-T H.264 annex B, 4:2:0 with 8 bits, colours by BT.709 in the\n"
+        "limited range. Each gives its picture at once, as none needs a later one. A key frame is an IDR\n"
+        "picture with the parameter sets before it; the stream begins with one, one comes where frames change\n"
+        "their size, and otherwise only on request (`want_key_frame` of frame_ack). What is decoded has an even\n"
+        "width and height: where the frame's is odd, its last column or row is one too many.\n\n");
+}
+
 static bool copy_file(const char *path)
 {
     FILE *file = fopen(path, "r");
@@ -345,6 +357,7 @@ int main(int argument_count, char **arguments)
         print_message(&protocol_messages[i]);
     }
     print_predicted();
+    print_h264();
     docgen_print_example();
     return ferror(stdout) || fflush(stdout) != 0 ? 1 : 0;
 }
