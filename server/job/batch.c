@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "encode/stream.h"
 #include "job/shot.h"
 #include "render/frame_request.h"
 
@@ -16,6 +17,13 @@
 static uint32_t bytes_per_pixel(enum frame_format format)
 {
     return format == FRAME_RGBA8 ? 4 : format == FRAME_RGBA16F ? 8 : 16;
+}
+
+static bool can_encode(const struct engine_job *spec, enum encoding encoding)
+{
+    uint32_t pixel_bytes = bytes_per_pixel(spec->frame.format);
+    return encoder_supports(encoding, pixel_bytes) ||
+           (spec->kind == JOB_VIEW && encoder_stream_supports(encoding, pixel_bytes));
 }
 
 static bool spec_check(const struct engine_job *spec, const struct scene *scene, struct error *error)
@@ -30,12 +38,12 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
                          "a picture has at least one pixel");
     if (!spec->frame.samples)
         return error_set(error, ERROR_INVALID, "render.samples", "a pixel has at least one sample");
-    if (!encoder_supports(spec->encoding, bytes_per_pixel(spec->frame.format))) {
+    if (!can_encode(spec, spec->encoding)) {
         error_set(error, ERROR_UNSUPPORTED, "render.encoding", "encoding %u cannot carry pixels of %u bytes",
                   (unsigned)spec->encoding, bytes_per_pixel(spec->frame.format));
         return error_remedy(error, "use the pixel format rgba8, or the encoding raw, zstd or predicted");
     }
-    if (spec->kind == JOB_VIEW && !encoder_supports(spec->still_encoding, bytes_per_pixel(spec->frame.format)))
+    if (spec->kind == JOB_VIEW && !can_encode(spec, spec->still_encoding))
         return error_set(error, ERROR_UNSUPPORTED, "render.still_encoding",
                          "encoding %u cannot carry pixels of %u bytes", (unsigned)spec->still_encoding,
                          bytes_per_pixel(spec->frame.format));
@@ -94,11 +102,14 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
         .window = window_of(engine, &command->job.frame),
         .credit = command->job.kind == JOB_VIEW ? UINT64_MAX : command->job.credit,
     });
+    bool streams = command->job.encoding == ENCODING_H264 || command->job.still_encoding == ENCODING_H264;
+    struct encode_lane *lane = streams ? encode_lane_create(command->job.frames_per_second) : NULL;
     struct job *before = replaced_by(engine, command);
     struct engine_event *end_before = before ? event_create(ENGINE_DONE, before->client, before->request) : NULL;
-    if (!job || !output || (before && !end_before) || !jobs_reserve(engine)) {
+    if (!job || !output || (streams && !lane) || (before && !end_before) || !jobs_reserve(engine)) {
         free(job);
         job_output_unref(output);
+        encode_lane_unref(lane);
         engine_event_destroy(end_before);
         return error_set(error, ERROR_OUT_OF_MEMORY, "render", "no memory for a job");
     }
@@ -113,6 +124,7 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
     job->output = output;
     job->next_frame = job->spec.first_frame;
     job->view.credit = job->spec.credit;
+    job->view.lane = lane;
     engine->jobs[engine->job_count++] = job;
     if (before) {
         struct engine_scene *scene_before = before->scene;
@@ -163,6 +175,7 @@ static void job_remove(struct engine *engine, struct job *job)
         i++;
     memmove(&engine->jobs[i], &engine->jobs[i + 1], (--engine->job_count - i) * sizeof(struct job *));
     job_output_unref(job->output);
+    encode_lane_unref(job->view.lane);
     free(job->spec.keys);
     free(job->spec.clips);
     view_wishes_unref(job->spec.wishes);
@@ -387,7 +400,7 @@ static void frame_done(struct engine *engine, struct job *job, struct engine_fra
         view_done(job, frame);
     job->next_frame += job->spec.frame_step;
     uint64_t position = job_output_reserve(job->output);
-    if (!encode_pool_submit(engine->pool, job->output, position, frame)) {
+    if (!encode_pool_submit(engine->pool, job->output, job->view.lane, position, frame)) {
         struct error error = {0};
         error_set(&error, ERROR_OUT_OF_MEMORY, "render", "a frame could not be passed on to be encoded");
         struct engine_event *event = event_create(ENGINE_FAILED, job->client, job->request);

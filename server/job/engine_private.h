@@ -73,6 +73,9 @@ struct view {
     /* Of the frame in progress. */
     struct view_wish wish;
     bool refining; /* it shows nothing that was not shown */
+    /* If some of its frames are a stream; NULL: none are. */
+    struct encode_lane *lane;
+    bool owes_key_frame; /* it was wished and has not come */
 };
 
 struct job {

@@ -138,7 +138,7 @@ void view_done(struct job *job, struct engine_frame *frame)
     frame->command = camera->command;
     frame->received_ns = camera->received_ns;
     frame->moving = camera->moving;
-    frame->wants_key = view->wish.key_frame;
+    view->owes_key_frame |= view->wish.key_frame;
     view->wish.key_frame = false;
     if (camera->moving && job->spec.adapt) {
         const struct view_effort *effort = &view->wish.effort;
@@ -152,4 +152,8 @@ void view_done(struct job *job, struct engine_frame *frame)
         if (frame->encoding != ENCODING_JPEG)
             frame->quality = 0; /* the other one's: the fastest level */
     }
+    frame->wants_key = view->owes_key_frame;
+    /* One of rest may stand alone, but it helps nobody who has lost the stream. */
+    if (!view->lane || frame->encoding == ENCODING_H264)
+        view->owes_key_frame = false;
 }

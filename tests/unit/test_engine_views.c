@@ -4,6 +4,7 @@
 #include "engine_fake.h"
 
 #include "base/clock.h"
+#include "encode/stream.h"
 #include "job/engine_private.h"
 
 #define MS UINT64_C(1000000)
@@ -349,6 +350,60 @@ static void a_key_frame_comes_also_where_nothing_moves(void **state)
     stop(engine);
 }
 
+/* Takes the frame that shows the next camera. */
+static struct engine_frame *take_next(struct engine *engine, struct view_wishes *wishes, uint64_t number,
+                                      bool moving)
+{
+    look(engine, wishes, number, moving);
+    struct engine_frame *frame = take(event_within(engine, 10000));
+    assert_int_equal(frame->command, number);
+    return frame;
+}
+
+static void expect_encoded(struct engine_frame *frame, enum encoding encoding, bool key_frame)
+{
+    assert_int_equal(frame->encoding, encoding);
+    assert_int_equal(frame->key_frame, key_frame);
+    drop(frame);
+}
+
+static void a_stream_goes_on_over_frames_of_rest_and_begins_again_where_it_is_wished(void **state)
+{
+    (void)state;
+    if (!encoder_stream_supports(ENCODING_H264, 4)) {
+        print_message("skipped: no encoder of H.264 is here\n");
+        return;
+    }
+    struct engine *engine = start((struct engine_options){.encode_threads = 4});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    struct engine_command *made = with_samples(view(1, 2, wishes), 1, 1);
+    made->job.encoding = ENCODING_H264;
+    submit(engine, made);
+    expect_encoded(take(expect_frame(engine, 1, 2, 0)), ENCODING_RAW, true);
+    expect_encoded(take_next(engine, wishes, 1, true), ENCODING_H264, true);
+    expect_encoded(take_next(engine, wishes, 2, true), ENCODING_H264, false);
+    expect_encoded(take_next(engine, wishes, 3, false), ENCODING_RAW, true);
+    expect_encoded(take_next(engine, wishes, 4, true), ENCODING_H264, false);
+    /* One of rest comes at once, and the stream begins again with the next motion. */
+    look(engine, wishes, 5, false);
+    expect_encoded(take(event_within(engine, 10000)), ENCODING_RAW, true);
+    assert_true(view_wishes_want_key_frame(wishes));
+    submit(engine, command(ENGINE_VIEW_LOOK, 1, 0));
+    expect_encoded(take(event_within(engine, 10000)), ENCODING_RAW, true);
+    expect_encoded(take_next(engine, wishes, 6, true), ENCODING_H264, true);
+    expect_encoded(take_next(engine, wishes, 7, true), ENCODING_H264, false);
+    /* So it does with a view that takes the place of this one. */
+    made = with_samples(view(1, 3, wishes), 1, 1);
+    made->job.encoding = made->job.still_encoding = ENCODING_H264;
+    submit(engine, made);
+    expect_done(engine, 1, 2);
+    expect_encoded(take(event_within(engine, 10000)), ENCODING_H264, true);
+    expect_encoded(take_next(engine, wishes, 8, false), ENCODING_H264, false);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
 static void a_view_takes_the_place_of_another_and_goes_on_from_it(void **state)
 {
     (void)state;
@@ -568,6 +623,7 @@ int main(void)
         cmocka_unit_test(nothing_is_begun_beyond_credit_so_that_nothing_becomes_stale),
         cmocka_unit_test(no_more_frames_come_than_were_asked_for_a_second),
         cmocka_unit_test(a_key_frame_comes_also_where_nothing_moves),
+        cmocka_unit_test(a_stream_goes_on_over_frames_of_rest_and_begins_again_where_it_is_wished),
         cmocka_unit_test(a_view_takes_the_place_of_another_and_goes_on_from_it),
         cmocka_unit_test(a_frame_in_progress_ends_with_the_view_that_is_replaced),
         cmocka_unit_test(a_cancelled_view_ends_whatever_it_does),
