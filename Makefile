@@ -209,6 +209,13 @@ $(B)/tests/unit/test_load_model $(B)/tests/accuracy/test_abuffer_against_referen
 SERVING_OBJ := $(call obj,$(addprefix tests/fuzz/,engine_recorder.c serving.c))
 SERVING_WRAP := -Wl,--wrap=clock_now_ns
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
+$(B)/tests/unit/test_viewer_camera: $(call obj,$(addprefix client/viewer/,camera.c input.c settings.c tour.c))
+$(B)/tests/unit/test_viewer_figures: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c))
+$(B)/tests/unit/test_viewer_replay: $(B)/client/viewer/replay.o
+$(B)/tests/unit/test_viewer_decode: $(call obj,$(addprefix client/viewer/,decode.c pixmap.c))
+$(B)/tests/unit/test_viewer_window: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c paint.c \
+    pixmap.c window.c))
+$(B)/tests/unit/test_viewer_decode $(B)/tests/unit/test_viewer_window: TEST_LIBS += $(VIEWER_LIBS)
 $(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
 $(B)/tests/unit/test_bench_svo: $(RIVAL_OBJ)
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
@@ -229,6 +236,10 @@ $(BENCH_STEPS): %: %.o $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,op
 BENCH_CANCEL := $(B)/tests/bench/bench_cancel
 $(BENCH_CANCEL): %: %.o $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(CLIENT_LIBS) -o $@
+# What sealing costs.
+BENCH_LINK := $(B)/tests/bench/bench_link
+$(BENCH_LINK): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(TEST_LIBS) -o $@
 # EMBREE=0 leaves out what cannot be built without it.
 ifeq ($(EMBREE),0)
 UNIT_TESTS := $(filter-out $(B)/tests/unit/test_bench_contest,$(UNIT_TESTS))
@@ -257,7 +268,7 @@ PLOT_PACKAGES := gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
 .PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help
-tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump
+tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
@@ -277,7 +288,7 @@ demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out
 # The programs that are measured, and those that measure.
-BENCHED = all $(BENCHES) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
+BENCHED = all $(BENCHES) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
 bench: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench.py $(B) $(BENCH)
@@ -353,12 +364,13 @@ help:
 FUZZ_SECONDS ?= 20
 FUZZERS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_SEED := $(B)/tests/fuzz/seed
-$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(B)/server/base/blob.o $(PROTOCOL_OBJ)
+$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(B)/server/base/blob.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
 $(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ))
-$(B)/tests/fuzz/fuzz_scene: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
+$(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
+$(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_sealed: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
 $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
 $(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
 .PHONY: fuzz $(addprefix run-fuzz-,$(FUZZERS))

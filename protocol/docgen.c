@@ -101,7 +101,8 @@ static void print_sealed_messages(void)
         "messages that prove it and give the connection keys of its own; over a network it has to. Nobody on\n"
         "the way can then read or change what is said, repeat it, or cut off the end unnoticed. The handshake\n"
         "and all that follows travel in records as they would go over an open connection, cut anywhere.\n"
-        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`.\n\n",
+        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`. A daemon that lets\n"
+        "only sealed connections in answers the other handshake with version 0 and bit 2 of the capabilities.\n\n",
         SEALED_KEY_BYTES);
     printf("| message | from | bytes | layout |\n| ---: | --- | ---: | --- |\n"
            "| 1 | client | 72 | `SEAL`, u8 1, u8 version (%u), u16 0, X25519 public key (32), nonce (32) |\n"
@@ -264,6 +265,24 @@ static void print_message(const struct message_desc *desc)
     print_fields(body, 2);
 }
 
+static void print_predicted(void)
+{
+    printf(
+        "## The encoding `predicted`\n\n"
+        "One frame of Zstandard (RFC 8878). Unpacked it has as many bytes as the pixels, as planes one behind "
+        "the\n"
+        "other, of which there are as many as a pixel has bytes: plane b is for byte b of every pixel, rows from\n"
+        "the top, without gaps. Several layers are one picture of their common height.\n\n"
+        "What a plane has for a byte is that byte less its prediction, modulo 256. The prediction comes of three\n"
+        "bytes of the same plane: left of it (a), above it (b), and left of that (c); what lies outside the\n"
+        "picture is 0:\n\n"
+        "    c >= max(a, b): min(a, b)\n"
+        "    c <= min(a, b): max(a, b)\n"
+        "    else:           a + b - c\n\n"
+        "So a decoder goes through the rows from the top and from left to right, and adds what it finds to the\n"
+        "prediction that it makes of the bytes that it has restored.\n\n");
+}
+
 static bool copy_file(const char *path)
 {
     FILE *file = fopen(path, "r");
@@ -307,6 +326,7 @@ int main(int argument_count, char **arguments)
     for (size_t i = 0; i < protocol_message_count; i++) {
         print_message(&protocol_messages[i]);
     }
+    print_predicted();
     docgen_print_example();
     return ferror(stdout) || fflush(stdout) != 0 ? 1 : 0;
 }

@@ -13,7 +13,7 @@ _farlight()
     local words=
 
     if [ "$COMP_CWORD" -eq 1 ]; then
-        words="render animate info compare serve scenes stats ping key bridge help --version"
+        words="render animate view info compare serve scenes stats ping key bridge help --version"
     else
         case $before in
         --tracer) words="bvh naive reference ldc abuffer" ;;
@@ -34,7 +34,9 @@ _farlight()
         --brdf) words="ggx ward" ;;
         --layers) words="beauty,albedo,normal beauty,depth beauty,albedo,normal,depth,position,ao,id" ;;
         --primary) words="raster trace" ;;
-        --encoding) words="raw zstd jpeg" ;;
+        --scale) words="1 2 4 8" ;;
+        --still-encoding) words="raw zstd predicted jpeg" ;;
+        --encoding) words="raw zstd predicted jpeg" ;;
         --tone-map) words="neutral aces none" ;;
         --format) words="png jpeg exr hdr mp4 mkv y4m" ;;
         --layout) words="heat side" ;;
@@ -44,6 +46,12 @@ _farlight()
             render) words="$job --scene --time --progressive" ;;
             animate) words="$job --scene --script --dry-run --frames --fps --orbit --keys --shard --resume --retries
                 --lossless" ;;
+            view) words="--scene --server --key --size --samples --pass-samples --fps --scale --encoding --still-encoding
+                --quality --adapt --no-adapt --weight --replay --headless --depth --seed --environment --exposure --tone-map
+                --camera --eye --look-at --up --fov --tracer --bvh-bounds --integrator --primary --filter --aperture --focus
+                --shutter --clip --clip-speed --bvh-rays --ldc-resolution --ldc-tolerance --ldc-build --ldc-levels --ldc-images
+                --ldc-block --ldc-rays --abuffer-resolution --voxels --search --bounces --brdf --ao-distance --ao-falloff
+                --ao-rays --layer-opacity --quiet --help" ;;
             info) words="--json --environment --help" ;;
             compare) words="--output --layout --heat-top --threshold --fail-above --ignore-alpha --json --help
                 --tracers --far --server --key --size --samples --depth --seed --environment --exposure --camera --eye --look-at
@@ -55,7 +63,7 @@ _farlight()
             scenes) words="--server --key --json --help" ;;
             stats) words="--server --key --json --help" ;;
             ping) words="--server --key --count --help" ;;
-            help) words="render animate info compare serve scenes stats ping key bridge" ;;
+            help) words="render animate view info compare serve scenes stats ping key bridge" ;;
             esac
             [[ $word == -* || $subcommand == help ]] || words=
             ;;

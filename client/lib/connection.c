@@ -219,20 +219,15 @@ static bool tell_key_needed(const struct fl_connection *connection, struct fl_er
     return fl_error_remedy(error, "--key or FARLIGHT_KEY names the file with a copy of it");
 }
 
-/* What is said from now on is sealed with the key of the file. */
-static bool seal(struct fl_connection *connection, const char *key_file, struct fl_error *error)
+static bool read_key(struct sealed_key *key, const char *key_file, struct fl_error *error)
 {
-    struct sealed_key key;
     struct decode_error why = {0};
-    if (!sealed_key_read(&key, key_file, &why)) {
-        fl_error_set(error, FL_ERROR_FILE, key_file, "%s", why.text);
-        return fl_error_remedy(error, why.code == PROTOCOL_ERROR_CODE_DENIED
-                                          ? "a key is for its owner alone"
-                                          : "a key file has 32 bytes; 'farlight key FILE' makes one");
-    }
-    const bool sealed = fl_stream_seal(&connection->stream, &key, error);
-    sealed_key_wipe(&key);
-    return sealed;
+    if (sealed_key_read(key, key_file, &why))
+        return true;
+    fl_error_set(error, FL_ERROR_FILE, key_file, "%s", why.text);
+    return fl_error_remedy(error, why.code == PROTOCOL_ERROR_CODE_DENIED
+                                      ? "a key is for its owner alone"
+                                      : "a key file has 32 bytes; 'farlight key FILE' makes one");
 }
 
 static bool shake_hands(struct fl_connection *connection, const char *name, uint64_t deadline_ns,
@@ -318,8 +313,21 @@ static bool open_stream(struct fl_connection *connection, const struct fl_connec
         if (fd < 0)
             return false;
     }
-    return fl_stream_init(&connection->stream, fd, MESSAGE_FROM_SERVER, "the daemon", error) &&
-           (options->server == NULL || options->key_file == NULL || seal(connection, options->key_file, error));
+    return fl_stream_init(&connection->stream, fd, MESSAGE_FROM_SERVER, "the daemon", error);
+}
+
+/* The key is read first: without it nobody need be asked. */
+static bool open_link(struct fl_connection *connection, const struct fl_connect_options *options,
+                      uint64_t deadline_ns, struct fl_error *error)
+{
+    struct sealed_key key;
+    if (options->server == NULL || options->key_file == NULL)
+        return open_stream(connection, options, deadline_ns, error);
+    const bool opened = read_key(&key, options->key_file, error) &&
+                        open_stream(connection, options, deadline_ns, error) &&
+                        fl_stream_seal(&connection->stream, &key, error);
+    sealed_key_wipe(&key);
+    return opened;
 }
 
 struct fl_connection *fl_connect(const struct fl_connect_options *options, struct fl_error *error)
@@ -339,7 +347,7 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
     connection->last_channel = FL_UPLOAD_CHANNEL;
     snprintf(connection->address, sizeof connection->address, "%s",
              options->server != NULL ? options->server : "private");
-    if (!open_stream(connection, options, deadline_ns, error) ||
+    if (!open_link(connection, options, deadline_ns, error) ||
         !shake_hands(connection, options->name != NULL ? options->name : "libfarlight", deadline_ns, error)) {
         if (error->field[0] == '\0' && error->code == FL_ERROR_CONNECTION)
             snprintf(error->field, sizeof error->field, "%.*s", (int)sizeof error->field - 1, connection->address);

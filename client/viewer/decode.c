@@ -40,7 +40,7 @@ struct decoder *decoder_create(struct fl_error *error)
     return NULL;
 }
 
-static bool to_pixels(struct decoder *decoder, struct picture *picture, struct fl_error *error)
+static bool to_pixels(struct decoder *decoder, struct pixmap *picture, struct fl_error *error)
 {
     const AVFrame *frame = decoder->frame;
     const int *matrix =
@@ -65,7 +65,7 @@ static bool is_of_size(const AVFrame *decoded, const struct fl_frame *frame)
     return (uint32_t)decoded->width - frame->width <= 1 && (uint32_t)decoded->height - frame->height <= 1;
 }
 
-bool decoder_decode(struct decoder *decoder, const struct fl_frame *frame, struct picture *picture,
+bool decoder_decode(struct decoder *decoder, const struct fl_frame *frame, struct pixmap *picture,
                     struct fl_error *error)
 {
     if (decoder->lost && !frame->key_frame)
@@ -81,7 +81,7 @@ bool decoder_decode(struct decoder *decoder, const struct fl_frame *frame, struc
     av_packet_unref(decoder->packet);
     if (!good || !is_of_size(decoder->frame, frame))
         return fl_error_set(error, FL_ERROR_PROTOCOL, "", "a frame in H.264 cannot be decoded");
-    decoder->lost = !picture_resize(picture, (int)frame->width, (int)frame->height, error) ||
+    decoder->lost = !pixmap_resize(picture, (int)frame->width, (int)frame->height, error) ||
                     !to_pixels(decoder, picture, error);
     return !decoder->lost;
 }

@@ -27,6 +27,7 @@ struct layout {
     hud_measure *measure;
     void *user;
     double scale;
+    double line; /* height of the texts that follow */
 };
 
 /* ---- marks ---- */
@@ -52,7 +53,7 @@ static void box(struct layout *layout, double x, double y, double width, double 
 
 static double text_width(const struct layout *layout, enum hud_font font, const char *text)
 {
-    return layout->measure(layout->user, font, LINE * layout->scale, text);
+    return layout->measure(layout->user, font, layout->line, text);
 }
 
 __attribute__((format(printf, 6, 7))) static void text(struct layout *layout, double x, double y,
@@ -66,7 +67,7 @@ __attribute__((format(printf, 6, 7))) static void text(struct layout *layout, do
     va_end(arguments);
     mark->x = x;
     mark->y = y;
-    mark->height = LINE * layout->scale;
+    mark->height = layout->line;
     mark->font = font;
     mark->colour = colour;
 }
@@ -83,7 +84,7 @@ __attribute__((format(printf, 6, 7))) static void text_to(struct layout *layout,
     va_end(arguments);
     mark->x = x;
     mark->y = y;
-    mark->height = LINE * layout->scale;
+    mark->height = layout->line;
     mark->font = font;
     mark->colour = colour;
     mark->is_right = true;
@@ -117,7 +118,12 @@ struct row {
     char value[HUD_TEXT_MAX];
 };
 
-static void draw_scene(struct layout *layout)
+/* Where its panel ends. */
+struct corner {
+    double right, bottom;
+};
+
+static struct corner draw_scene(struct layout *layout)
 {
     const struct hud_state *state = layout->state;
     const struct settings *settings = state->settings;
@@ -161,6 +167,7 @@ static void draw_scene(struct layout *layout)
         box(layout, x + inner, at, widest, 3 * s, rule);
         box(layout, x + inner, at, widest * share, 3 * s, share < 1 ? accent : calm);
     }
+    return (struct corner){x + widest + 2 * inner, y + ((double)count + 1) * line + 2 * inner + 3 * s + bar};
 }
 
 /* ---- how fast, at the top right ---- */
@@ -174,7 +181,8 @@ static void print_amount(double amount, const char *unit, char *out, size_t byte
     snprintf(out, bytes, amount < 9.95 && factor > 0 ? "%.1f %s%s" : "%.0f %s%s", amount, factors[factor], unit);
 }
 
-static void draw_figures(struct layout *layout)
+/* Its bottom; not drawn where it does not fit beside `left`. */
+static double draw_figures(struct layout *layout, double left)
 {
     const struct hud_state *state = layout->state;
     const double s = layout->scale, line = LINE * s, inner = PADDING * s;
@@ -210,12 +218,15 @@ static void draw_figures(struct layout *layout)
     }
     const double width = names + values + 12 * s + 2 * inner, x = state->width - MARGIN * s - width,
                  y = MARGIN * s;
+    if (x < left + MARGIN * s)
+        return 0;
     box(layout, x, y, width, (double)count * line + 2 * inner, panel);
     for (size_t i = 0; i < count; i++) {
         const double at = y + inner + line * (double)i;
         text(layout, x + inner, at, HUD_PLAIN, faint, "%s", rows[i].name);
         text_to(layout, x + width - inner, at, HUD_PLAIN, i == 0 ? accent : ink, "%s", rows[i].value);
     }
+    return y + (double)count * line + 2 * inner;
 }
 
 /* ---- the timeline, at the bottom ---- */
@@ -231,17 +242,6 @@ static double place_on(const struct axis *axis, int64_t at_ns)
     return axis->x + fmax(0, fmin(1, (double)(at_ns - axis->begin_ns) / axis->length_ns)) * axis->width;
 }
 
-/* The offset that makes one clock of both. */
-static int64_t span_begin_ns(const struct span *span, int64_t offset_ns)
-{
-    return span->begin_ns + (span->lane < LANE_RECEIVE ? offset_ns : 0);
-}
-
-static int64_t span_end_ns(const struct span *span, int64_t offset_ns)
-{
-    return span->end_ns + (span->lane < LANE_RECEIVE ? offset_ns : 0);
-}
-
 /* 1, 2 or 5 times a power of ten: the least of which no more than `most` are in the length. */
 static double tick_ns(double length_ns, double most)
 {
@@ -254,11 +254,12 @@ static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct
     int64_t begin_ns = INT64_MAX, end_ns = INT64_MIN;
     for (size_t back = 0; back < TIMELINE_FRAMES; back++) {
         const struct metrics_frame *frame = metrics_frame(metrics, back);
-        for (size_t i = 0; frame != NULL && i < frame->span_count; i++) {
-            const int64_t first = span_begin_ns(&frame->spans[i], offset_ns);
-            const int64_t last = span_end_ns(&frame->spans[i], offset_ns);
-            begin_ns = first < begin_ns ? first : begin_ns;
-            end_ns = last > end_ns ? last : end_ns;
+        for (int lane = 0; frame != NULL && lane < LANE_COUNT; lane++) {
+            struct span span;
+            if (!metrics_span(frame, (enum lane)lane, offset_ns, &span))
+                continue;
+            begin_ns = span.begin_ns < begin_ns ? span.begin_ns : begin_ns;
+            end_ns = span.end_ns > end_ns ? span.end_ns : end_ns;
         }
         /* A pause between frames is not worth its room. */
         const struct metrics_frame *before = metrics_frame(metrics, back + 1);
@@ -273,12 +274,12 @@ static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct
     return true;
 }
 
-static void draw_span(struct layout *layout, const struct axis *axis, double top, enum lane lane, int64_t begin_ns,
-                      int64_t end_ns, bool is_even)
+static void draw_span(struct layout *layout, const struct axis *axis, double top, enum lane lane,
+                      const struct span *span, bool is_even)
 {
-    const double s = layout->scale, from = place_on(axis, begin_ns), to = place_on(axis, end_ns);
+    const double s = layout->scale, from = place_on(axis, span->begin_ns), to = place_on(axis, span->end_ns);
     struct hud_colour colour = lane_colours[lane];
-    if (end_ns < axis->begin_ns)
+    if (span->end_ns < axis->begin_ns)
         return;
     colour.a = is_even ? 255 : 150; /* neighbours are told apart */
     box(layout, from, top + (double)lane * ROW * s + 2 * s, fmax(to - from, s), ROW * s - 3 * s, colour);
@@ -293,18 +294,18 @@ static void draw_frames(struct layout *layout, const struct axis *axis, double t
         if (frame == NULL || (int64_t)frame->shown_ns < axis->begin_ns)
             break;
         const bool is_even = frame->frame % 2 == 0;
-        for (size_t i = 0; i < frame->span_count; i++)
-            draw_span(layout, axis, top, frame->spans[i].lane, span_begin_ns(&frame->spans[i], offset_ns),
-                      span_end_ns(&frame->spans[i], offset_ns), is_even);
-        if (frame->first_of_command)
-            draw_span(layout, axis, top, LANE_INPUT, (int64_t)frame->command_sent_ns,
-                      (int64_t)frame->command_applied_ns + offset_ns, is_even);
+        for (int lane = 0; lane < LANE_COUNT; lane++) {
+            struct span span;
+            if (metrics_span(frame, (enum lane)lane, offset_ns, &span))
+                draw_span(layout, axis, top, (enum lane)lane, &span, is_even);
+        }
         box(layout, place_on(axis, (int64_t)frame->shown_ns), top, s, ROW * s * LANE_COUNT,
             (struct hud_colour){255, 255, 255, 60});
     }
 }
 
-static void draw_timeline(struct layout *layout)
+/* Not drawn where it would come above `top_least`. */
+static void draw_timeline(struct layout *layout, double top_least)
 {
     const struct hud_state *state = layout->state;
     const double s = layout->scale, inner = PADDING * s, line = LINE * s;
@@ -313,17 +314,15 @@ static void draw_timeline(struct layout *layout)
     const int64_t offset_ns = metrics_clock_offset_ns(state->metrics);
     struct axis axis = {.x = x + inner + 62 * s};
     axis.width = x + width - inner - axis.x;
-    if (axis.width < 40 * s || y < state->height * 0.25 || !choose_axis(state->metrics, offset_ns, &axis))
+    if (axis.width < 40 * s || y < top_least + MARGIN * s || !choose_axis(state->metrics, offset_ns, &axis))
         return;
     box(layout, x, y, width, height, panel);
     const double top = y + inner;
-    for (int lane = 0; lane < LANE_COUNT; lane++) {
-        struct hud_mark *mark = NULL;
+    layout->line = (ROW + 2) * s;
+    for (int lane = 0; lane < LANE_COUNT; lane++)
         text(layout, x + inner, top + lane * ROW * s - 1 * s, HUD_PLAIN, lane_colours[lane], "%s",
              lane_names[lane]);
-        mark = &layout->hud->marks[layout->hud->count - 1];
-        mark->height = (ROW + 2) * s;
-    }
+    layout->line = line;
     const double label = text_width(layout, HUD_PLAIN, "0000 ms") + 10 * s;
     const double tick = tick_ns(axis.length_ns, fmax(1, axis.width / label));
     for (double at = tick; at <= axis.length_ns; at += tick) {
@@ -370,19 +369,21 @@ static double draw_legend(struct layout *layout, double bottom)
 static void draw_help(struct layout *layout)
 {
     const struct hud_state *state = layout->state;
-    const double s = layout->scale, inner = 18 * s;
+    const double s = layout->scale, inner = 14 * s, gap = 24 * s, usual = layout->line;
     double keys = 0, docs = 0;
     size_t count = 0;
+    for (size_t i = 0; i < input_binding_count; i++)
+        count += input_bindings[i].keys != NULL;
+    /* In a small window the lines move together, and the letters become smaller. */
+    double line = fmin(usual + 3 * s, (state->height - 2 * inner) / (double)count);
+    layout->line = fmin(usual, line);
     for (size_t i = 0; i < input_binding_count; i++) {
         if (input_bindings[i].keys == NULL)
             continue;
         keys = fmax(keys, text_width(layout, HUD_BOLD, input_bindings[i].keys));
         docs = fmax(docs, text_width(layout, HUD_PLAIN, input_bindings[i].doc));
-        count++;
     }
-    /* In a low window the lines move together. */
-    const double line = fmin(LINE * s + 3 * s, (state->height - 2 * inner) / (double)(count + 1));
-    const double width = keys + docs + 24 * s + 2 * inner, height = line * (double)count + 2 * inner;
+    const double width = keys + docs + gap + 2 * inner, height = line * (double)count + 2 * inner;
     const double x = (state->width - width) / 2, y = (state->height - height) / 2;
     double at = y + inner;
     box(layout, x, y, width, height, (struct hud_colour){14, 17, 22, 235});
@@ -390,9 +391,10 @@ static void draw_help(struct layout *layout)
         if (input_bindings[i].keys == NULL)
             continue;
         text(layout, x + inner, at, HUD_BOLD, accent, "%s", input_bindings[i].keys);
-        text(layout, x + inner + keys + 24 * s, at, HUD_PLAIN, ink, "%s", input_bindings[i].doc);
+        text(layout, x + inner + keys + gap, at, HUD_PLAIN, ink, "%s", input_bindings[i].doc);
         at += line;
     }
+    layout->line = usual;
 }
 
 /* In the middle of the window: nothing else is as important. */
@@ -433,17 +435,21 @@ static void draw_notice(struct layout *layout, double bottom)
 
 void hud_layout(struct hud *hud, const struct hud_state *state, hud_measure *measure, void *user)
 {
-    struct layout layout = {.hud = hud, .state = state, .measure = measure, .user = user, .scale = state->scale};
+    struct layout layout = {.hud = hud,
+                            .state = state,
+                            .measure = measure,
+                            .user = user,
+                            .scale = state->scale,
+                            .line = LINE * state->scale};
     const enum overlay_mode overlay = state->settings->overlay;
     double bottom = state->height - MARGIN * state->scale;
     hud->count = 0;
     if (state->status != HUD_LOADING && overlay != OVERLAY_NONE) {
-        draw_scene(&layout);
-        draw_figures(&layout);
-    }
-    if (state->status != HUD_LOADING && overlay == OVERLAY_ALL) {
+        const struct corner corner = draw_scene(&layout);
+        const double figures = draw_figures(&layout, corner.right);
         const size_t before = hud->count;
-        draw_timeline(&layout);
+        if (overlay == OVERLAY_ALL)
+            draw_timeline(&layout, fmax(corner.bottom, figures));
         if (hud->count > before) /* its first mark is its panel */
             bottom = hud->marks[before].y - MARGIN * state->scale;
     }

@@ -32,7 +32,8 @@ enum key {
 
 static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Window:", -2},
-    {"scene", KEY_SCENE, "NAME", 0, "Come to a scene that the daemon has, in place of a MODEL", -2},
+    {"scene", KEY_SCENE, "NAME", 0,
+     "A scene that is up at --server, in place of MODEL ('farlight scenes' lists them)", -2},
     {"samples", KEY_SAMPLES, "N", 0, "Samples per pixel that a picture at rest gets (default 64)", -2},
     {"pass-samples", KEY_PASS, "N", 0, "Of them, how many each frame adds (default 1)", -2},
     {"integrator", KEY_INTEGRATOR, "NAME", 0,
@@ -130,7 +131,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case ARGP_KEY_ARG:
         return set_model(line, value);
     case KEY_SCENE:
-        viewer->scene_name = value;
+        line->job.scene = value;
         return 0;
     case KEY_HEADLESS:
         viewer->headless = true;
@@ -182,14 +183,6 @@ static bool complete(struct command_line *line)
 {
     struct cli_job *job = &line->job;
     struct viewer_options *viewer = &line->viewer;
-    if (job->model == NULL && job->environment == NULL && viewer->scene_name == NULL)
-        return cli_usage(job, "MODEL", "no model file is named") == 0;
-    if (viewer->scene_name != NULL && (job->model != NULL || job->environment != NULL))
-        return cli_usage(job, "--scene", "a scene that is there is not loaded") == 0;
-    if (viewer->scene_name != NULL && job->server == NULL) {
-        cli_usage(job, "--scene", "no daemon is named that has it");
-        return fl_error_remedy(&job->error, "add --server ADDRESS");
-    }
     if (viewer->headless && viewer->replay == NULL)
         return cli_usage(job, "--headless", "without a window there is nobody but --replay") == 0;
     if (job->clip_count > 1)
@@ -214,6 +207,7 @@ static void fill(struct command_line *line)
     viewer->key_file = cli_key_file(viewer->server, job->key_file);
     viewer->model = job->model;
     viewer->environment = job->environment;
+    viewer->scene_name = job->scene;
     viewer->view.job = job->options;
     viewer->view.job.samples = job->options.samples > 0 ? job->options.samples : DEFAULT_SAMPLES;
     viewer->has_encoding = job->has_encoding;

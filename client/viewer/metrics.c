@@ -32,21 +32,6 @@ static enum lane lane_of(enum protocol_stage stage)
     }
 }
 
-/* Waves follow one another: once there is no room left, the last span of the lane grows over the gap. */
-static void add_span(struct metrics_frame *frame, enum lane lane, int64_t begin_ns, int64_t end_ns)
-{
-    struct span *last = NULL;
-    for (size_t i = 0; i < frame->span_count; i++)
-        if (frame->spans[i].lane == lane)
-            last = &frame->spans[i];
-    if (frame->span_count < METRICS_SPANS - LANE_COUNT || last == NULL) {
-        frame->spans[frame->span_count++] = (struct span){.lane = lane, .begin_ns = begin_ns, .end_ns = end_ns};
-        return;
-    }
-    last->begin_ns = begin_ns < last->begin_ns ? begin_ns : last->begin_ns;
-    last->end_ns = end_ns > last->end_ns ? end_ns : last->end_ns;
-}
-
 /* The daemon counts from when the frame was taken up; that ended when it was read back. */
 static void add_stages(struct metrics_frame *made, const struct fl_frame *frame)
 {
@@ -55,12 +40,23 @@ static void add_stages(struct metrics_frame *made, const struct fl_frame *frame)
         if (frame->stages[i].stage == PROTOCOL_STAGE_FRAME)
             whole_ns = frame->stages[i].duration_ns;
     const int64_t taken_up_ns = (int64_t)(frame->rendered_ns - whole_ns);
+    /* Most work is measured by both clocks. */
+    int64_t begins_ns[LANE_COUNT], sums_ns[LANE_COUNT][PROTOCOL_CLOCK_COUNT] = {{0}};
     for (size_t i = 0; i < frame->stage_count; i++) {
         const struct record_stage_time *stage = &frame->stages[i];
         const enum lane lane = lane_of(stage->stage);
         const int64_t begin_ns = taken_up_ns + (int64_t)stage->start_ns;
-        if (lane != LANE_COUNT)
-            add_span(made, lane, begin_ns, begin_ns + (int64_t)stage->duration_ns);
+        if (lane == LANE_COUNT || stage->clock >= PROTOCOL_CLOCK_COUNT)
+            continue;
+        const bool is_first = sums_ns[lane][PROTOCOL_CLOCK_CPU] + sums_ns[lane][PROTOCOL_CLOCK_GPU] == 0;
+        begins_ns[lane] = is_first || begin_ns < begins_ns[lane] ? begin_ns : begins_ns[lane];
+        sums_ns[lane][stage->clock] += (int64_t)stage->duration_ns;
+    }
+    for (int lane = 0; lane < LANE_COUNT; lane++) {
+        const int64_t cpu_ns = sums_ns[lane][PROTOCOL_CLOCK_CPU], gpu_ns = sums_ns[lane][PROTOCOL_CLOCK_GPU];
+        if (cpu_ns > 0 || gpu_ns > 0)
+            made->spans[lane] =
+                (struct span){begins_ns[lane], begins_ns[lane] + (cpu_ns > gpu_ns ? cpu_ns : gpu_ns)};
     }
 }
 
@@ -85,8 +81,8 @@ void metrics_add(struct metrics *metrics, const struct fl_frame *frame, uint64_t
     metrics->next = (metrics->next + 1) % METRICS_FRAMES;
     metrics->count += metrics->count < METRICS_FRAMES;
     const uint64_t received_ns = frame->begun_ns + frame->receive_ns;
-    add_span(made, LANE_RECEIVE, (int64_t)frame->begun_ns, (int64_t)received_ns);
-    add_span(made, LANE_DECODE, (int64_t)received_ns, (int64_t)decoded_ns);
+    made->spans[LANE_RECEIVE] = (struct span){(int64_t)frame->begun_ns, (int64_t)received_ns};
+    made->spans[LANE_DECODE] = (struct span){(int64_t)received_ns, (int64_t)decoded_ns};
     metrics->unshown += metrics->unshown < METRICS_FRAMES;
 }
 
@@ -95,7 +91,7 @@ void metrics_show(struct metrics *metrics, uint64_t shown_ns)
     for (; metrics->unshown > 0; metrics->unshown--) {
         struct metrics_frame *frame =
             &metrics->frames[(metrics->next + METRICS_FRAMES - metrics->unshown) % METRICS_FRAMES];
-        add_span(frame, LANE_SHOW, (int64_t)frame->shown_ns, (int64_t)shown_ns);
+        frame->spans[LANE_SHOW] = (struct span){(int64_t)frame->shown_ns, (int64_t)shown_ns};
         frame->shown_ns = shown_ns;
     }
 }
@@ -105,6 +101,16 @@ const struct metrics_frame *metrics_frame(const struct metrics *metrics, size_t 
     if (back >= metrics->count)
         return NULL;
     return &metrics->frames[(metrics->next + METRICS_FRAMES - 1 - back) % METRICS_FRAMES];
+}
+
+bool metrics_span(const struct metrics_frame *frame, enum lane lane, int64_t offset_ns, struct span *span)
+{
+    *span = frame->spans[lane];
+    if (lane == LANE_INPUT && frame->first_of_command)
+        *span = (struct span){(int64_t)frame->command_sent_ns, (int64_t)frame->command_applied_ns + offset_ns};
+    else if (lane < LANE_RECEIVE && span->end_ns != 0)
+        *span = (struct span){span->begin_ns + offset_ns, span->end_ns + offset_ns};
+    return span->end_ns != 0;
 }
 
 int64_t metrics_clock_offset_ns(const struct metrics *metrics)

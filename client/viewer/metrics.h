@@ -7,7 +7,6 @@
 #include "lib/farlight.h"
 
 #define METRICS_FRAMES 128u
-#define METRICS_SPANS 24u
 
 /* Rows of the timeline, in the order of the way of the data. */
 enum lane {
@@ -25,8 +24,9 @@ enum lane {
 };
 extern const char *const lane_names[LANE_COUNT];
 
+/* Of one lane: begins with the first of its work and is as long as all of it, which may have been done in pieces
+ * between others. No end: nothing was done. */
 struct span {
-    enum lane lane;
     int64_t begin_ns, end_ns; /* before LANE_RECEIVE: of the daemon's clock */
 };
 
@@ -36,9 +36,8 @@ struct metrics_frame {
     uint64_t command_received_ns, command_applied_ns, rendered_ns; /* the daemon's clock */
     uint64_t begun_ns, whole_ns, shown_ns;
     uint64_t wire_bytes;
-    bool first_of_command; /* no frame before shows the same camera */
-    size_t span_count;
-    struct span spans[METRICS_SPANS]; /* of neighbours in a lane one */
+    bool first_of_command;         /* no frame before shows the same camera */
+    struct span spans[LANE_COUNT]; /* as they were measured: see metrics_span() */
 };
 
 struct metrics {
@@ -57,6 +56,9 @@ const struct metrics_frame *metrics_frame(const struct metrics *metrics, size_t 
 /* What is added to the daemon's clock to get ours: as a camera cannot come before it was sent, nor a frame before
  * it was rendered, the middle between the two. */
 int64_t metrics_clock_offset_ns(const struct metrics *metrics);
+
+/* A lane of a frame in our clock, with that offset; false: it is empty. */
+bool metrics_span(const struct metrics_frame *frame, enum lane lane, int64_t offset_ns, struct span *span);
 
 struct metrics_summary {
     double frames_per_second, bits_per_second; /* over the last second */

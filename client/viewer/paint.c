@@ -118,7 +118,7 @@ static void draw_text(struct painter *painter, const struct hud_mark *mark)
 
 /* ---- the picture ---- */
 
-static bool load_picture(struct painter *painter, const struct picture *picture)
+static bool load_picture(struct painter *painter, const struct pixmap *picture)
 {
     if (painter->texture == NULL || painter->texture_width != picture->width ||
         painter->texture_height != picture->height) {
@@ -141,7 +141,7 @@ static bool load_picture(struct painter *painter, const struct picture *picture)
 }
 
 /* As large as it fits, in the middle. */
-static SDL_Rect picture_place(int width, int height, const struct picture *picture)
+static SDL_Rect picture_place(int width, int height, const struct pixmap *picture)
 {
     const double across = (double)width / picture->width, down = (double)height / picture->height;
     const double scale = across < down ? across : down;
@@ -149,7 +149,7 @@ static SDL_Rect picture_place(int width, int height, const struct picture *pictu
     return (SDL_Rect){(width - w) / 2, (height - h) / 2, w, h};
 }
 
-void painter_draw(struct painter *painter, int width, int height, const struct picture *picture,
+void painter_draw(struct painter *painter, int width, int height, const struct pixmap *picture,
                   const struct hud_state *state)
 {
     painter->drawn++;
@@ -213,10 +213,10 @@ void painter_destroy(struct painter *painter)
     free(painter);
 }
 
-bool paint_in_memory(int width, int height, const struct picture *picture, const struct hud_state *state,
-                     struct picture *made, struct fl_error *error)
+bool paint_in_memory(int width, int height, const struct pixmap *picture, const struct hud_state *state,
+                     struct pixmap *made, struct fl_error *error)
 {
-    if (!picture_resize(made, width, height, error))
+    if (!pixmap_resize(made, width, height, error))
         return false;
     SDL_Surface *surface =
         SDL_CreateRGBSurfaceWithFormatFrom(made->pixels, width, height, 32, width * 4, SDL_PIXELFORMAT_RGBA32);

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-bool snapshot_write(const char *path, const struct picture *picture, struct fl_error *error)
+bool snapshot_write(const char *path, const struct pixmap *picture, struct fl_error *error)
 {
     char folder[4096] = ".";
     const char *slash = strrchr(path, '/');

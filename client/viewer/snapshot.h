@@ -2,9 +2,9 @@
 #ifndef FARLIGHT_CLIENT_VIEWER_SNAPSHOT_H
 #define FARLIGHT_CLIENT_VIEWER_SNAPSHOT_H
 
-#include "viewer/picture.h"
+#include "viewer/pixmap.h"
 
 /* Writes a PNG; it is complete when this returns true. */
-bool snapshot_write(const char *path, const struct picture *picture, struct fl_error *error);
+bool snapshot_write(const char *path, const struct pixmap *picture, struct fl_error *error);
 
 #endif

@@ -197,9 +197,9 @@ static void close_viewer(struct viewer *viewer)
     window_destroy(viewer->window);
     session_destroy(viewer->session);
     decoder_destroy(viewer->decoder);
-    picture_finish(&viewer->live);
-    picture_finish(&viewer->compared);
-    picture_finish(&viewer->heat);
+    pixmap_finish(&viewer->live);
+    pixmap_finish(&viewer->compared);
+    pixmap_finish(&viewer->heat);
     replay_finish(&viewer->replay);
 }
 

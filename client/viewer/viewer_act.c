@@ -114,6 +114,7 @@ static void act(struct viewer *viewer, enum action action)
     const enum settings_change change = settings_act(&viewer->settings, action);
     viewer->must_show |= change == SETTINGS_VIEW;
     viewer->must_draw = true;
+    viewer->has_heat = viewer->has_heat && viewer->settings.error_map;
     if (action == ACTION_QUIT && viewer->settings.help)
         viewer->settings.help = false;
     else if (action == ACTION_QUIT)
@@ -208,10 +209,6 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
         viewer->replay_next++;
         /* What took long, such as a screenshot, is not made up for. */
         viewer->replay_ns = event->kind == REPLAY_INPUT ? due_ns : viewer_now_ns();
-        /* The daemon sees what a wait is about before it is waited for. */
-        if (event->kind == REPLAY_INPUT)
-            continue;
-        now_ns = viewer_now_ns();
     }
     if (viewer->replay_next == viewer->replay.count)
         viewer->quit = true;

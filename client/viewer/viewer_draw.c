@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const struct picture *viewer_picture(const struct viewer *viewer)
+const struct pixmap *viewer_picture(const struct viewer *viewer)
 {
     return viewer->has_heat ? &viewer->heat : &viewer->live;
 }
@@ -94,12 +94,12 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
 bool viewer_screenshot(struct viewer *viewer, const char *path, struct fl_error *error)
 {
     struct hud_state state;
-    struct picture made = {0};
+    struct pixmap made = {0};
     viewer_hud(viewer, &state);
     const bool done =
         paint_in_memory(viewer->width, viewer->height, viewer_picture(viewer), &state, &made, error) &&
         snapshot_write(path, &made, error);
-    picture_finish(&made);
+    pixmap_finish(&made);
     return done;
 }
 

@@ -116,7 +116,7 @@ static bool ask(struct viewer *viewer, enum errand errand, struct fl_error *refu
         use_key(&job, &key);
         break;
     case ERRAND_REFERENCE:
-        if (!picture_copy(&viewer->compared, &viewer->live, refusal))
+        if (!pixmap_copy(&viewer->compared, &viewer->live, refusal))
             return false;
         viewer->heat_command = viewer->command;
         viewer->heat_change = viewer->change;
@@ -185,14 +185,14 @@ static void take_focus(struct viewer *viewer, const struct fl_frame *frame)
 
 static void take_reference(struct viewer *viewer, struct fl_frame *frame)
 {
-    const struct picture *compared = &viewer->compared;
-    if (!picture_resize(&viewer->heat, compared->width, compared->height, &viewer->failure))
+    const struct pixmap *compared = &viewer->compared;
+    if (!pixmap_resize(&viewer->heat, compared->width, compared->height, &viewer->failure))
         return;
-    struct picture reference = {0};
-    picture_take(&reference, frame); /* over black, as the other */
+    struct pixmap reference = {0};
+    pixmap_take(&reference, frame); /* over black, as the other */
     heat_map(compared->pixels, reference.pixels, (size_t)compared->width * (size_t)compared->height, HEAT_TOP,
              viewer->heat.pixels, &viewer->heat_figures);
-    picture_finish(&reference);
+    pixmap_finish(&reference);
     viewer->has_heat = true;
     viewer->must_draw = true;
 }

@@ -89,7 +89,7 @@ static bool decode(struct viewer *viewer, struct fl_frame *frame)
 {
     struct fl_error error = {0};
     if (frame->encoded == NULL) {
-        picture_take(&viewer->live, frame);
+        pixmap_take(&viewer->live, frame);
         return true;
     }
     if (viewer->decoder == NULL)

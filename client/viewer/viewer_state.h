@@ -45,7 +45,7 @@ struct viewer {
     bool told_moving, has_looked;
 
     struct decoder *decoder;
-    struct picture live;   /* the last frame */
+    struct pixmap live;    /* the last frame */
     struct fl_frame frame; /* what it told, without its arrays */
     uint64_t frames;
     struct metrics metrics;
@@ -55,7 +55,7 @@ struct viewer {
     enum errand errand, wanted; /* that is under way; that waits for it */
     double focus_x, focus_y;    /* shares of the picture */
     uint32_t camera_node;
-    struct picture compared, heat; /* the picture as it was; its errors */
+    struct pixmap compared, heat; /* the picture as it was; its errors */
     struct heat_figures heat_figures;
     uint64_t heat_command, heat_change, heat_revision; /* of what was compared */
     bool has_heat, heat_refused;
@@ -102,7 +102,7 @@ void viewer_choose_clip(struct viewer *viewer, int clip);
 
 /* ---- viewer_draw.c ---- */
 
-const struct picture *viewer_picture(const struct viewer *viewer); /* the live one, or the error map */
+const struct pixmap *viewer_picture(const struct viewer *viewer); /* the live one, or the error map */
 void viewer_hud(struct viewer *viewer, struct hud_state *state);
 bool viewer_screenshot(struct viewer *viewer, const char *path, struct fl_error *error);
 void viewer_print_state(struct viewer *viewer, const char *name);

@@ -5,6 +5,7 @@
 #include <SDL2/SDL.h>
 #include <ctype.h>
 #include <stdlib.h>
+#include <string.h>
 
 struct window {
     SDL_Window *window;
@@ -12,6 +13,14 @@ struct window {
     struct painter *painter;
     bool wants_drawing, is_full_screen;
 };
+
+/* Without a display SDL draws where nobody looks, also if it was not asked to. */
+static bool is_seen(const char *driver)
+{
+    const char *asked = getenv("SDL_VIDEODRIVER");
+    return (asked != NULL && asked[0] != '\0') || (driver != NULL && strcmp(driver, "offscreen") != 0 &&
+                                                   strcmp(driver, "dummy") != 0 && strcmp(driver, "evdev") != 0);
+}
 
 struct window *window_create(const char *title, int width, int height, struct fl_error *error)
 {
@@ -22,8 +31,8 @@ struct window *window_create(const char *title, int width, int height, struct fl
     }
     SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1"); /* the program has its own */
     SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");
-    if (SDL_Init(SDL_INIT_VIDEO) != 0) {
-        fl_error_set(error, FL_ERROR_SYSTEM, "", "there is no display for a window: %s", SDL_GetError());
+    if (SDL_Init(SDL_INIT_VIDEO) != 0 || !is_seen(SDL_GetCurrentVideoDriver())) {
+        fl_error_set(error, FL_ERROR_SYSTEM, "", "there is no display for a window");
         fl_error_remedy(error, "set DISPLAY or WAYLAND_DISPLAY, or use --headless --replay");
         window_destroy(made);
         return NULL;
@@ -153,7 +162,7 @@ bool window_wants_drawing(struct window *window)
 
 /* ---- what is shown ---- */
 
-void window_show(struct window *window, const struct picture *picture, const struct hud_state *state)
+void window_show(struct window *window, const struct pixmap *picture, const struct hud_state *state)
 {
     painter_draw(window->painter, (int)state->width, (int)state->height, picture, state);
     SDL_RenderPresent(window->renderer);

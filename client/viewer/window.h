@@ -4,7 +4,7 @@
 #define FARLIGHT_CLIENT_VIEWER_WINDOW_H
 
 #include "viewer/hud.h"
-#include "viewer/picture.h"
+#include "viewer/pixmap.h"
 
 struct window;
 
@@ -16,7 +16,7 @@ bool window_poll(struct window *window, struct input *input);
 bool window_wants_drawing(struct window *window);
 void window_size(const struct window *window, int *width, int *height, double *scale); /* as of struct input */
 /* Draws and shows it: waits for the screen. */
-void window_show(struct window *window, const struct picture *picture, const struct hud_state *state);
+void window_show(struct window *window, const struct pixmap *picture, const struct hud_state *state);
 void window_toggle_full_screen(struct window *window);
 void window_destroy(struct window *window);
 

@@ -33,7 +33,7 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
     if (!encoder_supports(spec->encoding, bytes_per_pixel(spec->frame.format))) {
         error_set(error, ERROR_UNSUPPORTED, "render.encoding", "encoding %u cannot carry pixels of %u bytes",
                   (unsigned)spec->encoding, bytes_per_pixel(spec->frame.format));
-        return error_remedy(error, "use the pixel format rgba8, or the encoding zstd or raw");
+        return error_remedy(error, "use the pixel format rgba8, or the encoding raw, zstd or predicted");
     }
     if (spec->kind == JOB_VIEW && !encoder_supports(spec->still_encoding, bytes_per_pixel(spec->frame.format)))
         return error_set(error, ERROR_UNSUPPORTED, "render.still_encoding",
@@ -152,6 +152,10 @@ static void job_remove(struct engine *engine, struct job *job)
     abandon_frame(engine, job);
     if (job->scene->put_off == job)
         job->scene->put_off = NULL;
+    if (engine->turn_of == job)
+        engine->turn_of = NULL;
+    if (engine->needs_all == job)
+        engine->needs_all = NULL;
     job_leave_renderer(engine, job);
     size_t i = 0;
     while (engine->jobs[i] != job)
@@ -216,11 +220,23 @@ static bool wants_frame(const struct job *job)
            job_output_has_room(job->output) && (job->spec.kind == JOB_BATCH || view_due_ns(job) != UINT64_MAX);
 }
 
+static bool any_frame(const struct engine *engine)
+{
+    bool any = false;
+    for (size_t i = 0; i < engine->job_count; i++)
+        any = any || engine->jobs[i]->rendering;
+    return any;
+}
+
 /* What waits for the frames in progress to end is not kept waiting by new ones. */
-static bool may_begin(const struct job *job)
+static bool may_begin(const struct engine *engine, const struct job *job)
 {
     const struct engine_scene *scene = job->scene;
     if (scene->waiting_count)
+        return false;
+    if (engine->needs_all == job)
+        return !any_frame(engine);
+    if (engine->needs_all && wants_frame(engine->needs_all))
         return false;
     if (scene->put_off == job)
         return !scene->frames;
@@ -228,18 +244,18 @@ static bool may_begin(const struct job *job)
 }
 
 /* When it is ready; in the past: now. UINT64_MAX: not before something happens. */
-static uint64_t ready_ns(const struct job *job)
+static uint64_t ready_ns(const struct engine *engine, const struct job *job)
 {
     if (job->rendering)
         return job_output_is_closed(job->output) ? UINT64_MAX : 0;
-    if (!wants_frame(job) || !may_begin(job))
+    if (!wants_frame(job) || !may_begin(engine, job))
         return UINT64_MAX;
     return job->spec.kind == JOB_VIEW ? view_due_ns(job) : 0;
 }
 
-bool job_is_ready(const struct job *job)
+bool job_is_ready(const struct engine *engine, const struct job *job)
 {
-    uint64_t ready = ready_ns(job);
+    uint64_t ready = ready_ns(engine, job);
     return ready != UINT64_MAX && ready <= clock_now_ns();
 }
 
@@ -247,7 +263,7 @@ uint64_t jobs_idle_ns(const struct engine *engine)
 {
     uint64_t first_ns = UINT64_MAX, now_ns = clock_now_ns();
     for (size_t i = 0; i < engine->job_count; i++) {
-        uint64_t ready = ready_ns(engine->jobs[i]);
+        uint64_t ready = ready_ns(engine, engine->jobs[i]);
         first_ns = ready < first_ns ? ready : first_ns;
     }
     return first_ns == UINT64_MAX ? UINT64_MAX : first_ns > now_ns ? first_ns - now_ns : 0;
@@ -270,6 +286,12 @@ static void frame_failed(struct engine *engine, struct job *job, const struct er
         log_write(LOG_INFO, "engine", "what was idle gave up its device memory for a frame");
         return;
     }
+    if (error->kind == ERROR_OUT_OF_MEMORY && any_frame(engine)) {
+        /* What they have is idle afterwards. */
+        job->evicted = false;
+        engine->needs_all = job;
+        return;
+    }
     job_finish(job, error);
 }
 
@@ -285,6 +307,8 @@ static bool frame_begin_shot(struct engine *engine, struct job *job, const struc
         return true;
     }
     scene->put_off = NULL;
+    if (engine->needs_all == job)
+        engine->needs_all = NULL;
     if (!engine->backend->begin(job->renderer, scene->scene, motion, &shot->request, error))
         return false;
     job->rendering = true;

@@ -72,26 +72,36 @@ static void run_all_waiting(struct engine *engine)
     }
 }
 
-/* Gives the next slice to whose turn it is. False: nobody is ready. */
-static bool serve(struct engine *engine)
+/* Whose turn it is; NULL: nobody is ready. */
+static struct job *next_job(struct engine *engine)
 {
+    const struct job *before = engine->turn_of;
+    if (before && before->rendering && before->spec.kind == JOB_VIEW && job_is_ready(engine, before) &&
+        schedule_turn_lasts(&engine->scheduler))
+        return engine->turn_of;
     for (size_t i = 0; i < engine->job_count; i++) {
         struct job *job = engine->jobs[i];
         engine->entries[i] = (struct schedule_entry){
             .client = &job->reference->client->schedule,
             .job = &job->schedule,
-            .ready = job_is_ready(job),
-            .keeps_turn = job->rendering && job->spec.kind == JOB_VIEW,
+            .ready = job_is_ready(engine, job),
         };
     }
     size_t picked = schedule_pick(&engine->scheduler, engine->entries, engine->job_count);
-    if (picked == SCHEDULE_NONE)
+    engine->turn_of = picked == SCHEDULE_NONE ? NULL : engine->jobs[picked];
+    return engine->turn_of;
+}
+
+/* Gives the next slice to whose turn it is. False: nobody is ready. */
+static bool serve(struct engine *engine)
+{
+    struct job *job = next_job(engine);
+    if (!job)
         return false;
-    struct job *job = engine->jobs[picked];
     uint64_t start_ns = clock_now_ns();
     job_step(engine, job);
-    schedule_charge(&engine->scheduler, &engine->entries[picked], clock_now_ns() - start_ns,
-                    job->spec.weight ? job->spec.weight : 1);
+    schedule_charge(&engine->scheduler, &job->reference->client->schedule, &job->schedule,
+                    clock_now_ns() - start_ns, job->spec.weight ? job->spec.weight : 1);
     run_all_waiting(engine);
     return true;
 }

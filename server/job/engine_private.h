@@ -121,6 +121,10 @@ struct engine {
     size_t job_count, job_capacity;
     struct scheduler scheduler;
     struct schedule_entry *entries; /* owned; room for as many as there is for jobs */
+    /* There was no memory for its frame beside those in progress, so none begins before it; NULL: there is none.
+     */
+    struct job *needs_all;
+    struct job *turn_of; /* who had the last slice; NULL: it has ended, or nobody was ready */
     uint64_t frames, rays;
     uint64_t table_bytes; /* of all scenes */
 };
@@ -172,7 +176,7 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
                struct error *error); /* takes the keys over on success */
 /* A job that is not answered yet; NULL: there is none. */
 struct job *job_find(struct engine *engine, uint64_t client, uint32_t request);
-bool job_is_ready(const struct job *job);
+bool job_is_ready(const struct engine *engine, const struct job *job);
 /* How long until one is ready, if nothing happens before; UINT64_MAX: for ever. */
 uint64_t jobs_idle_ns(const struct engine *engine);
 /* One slice: takes up a frame, or goes on with it. Does not run what waits for its scene. */

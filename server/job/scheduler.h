@@ -7,9 +7,13 @@
  * comes, or comes back after a pause, begins at the least of those who are ready: it is next, or one of the next,
  * but has no claim on what it missed.
  *
+ * Some slices are very long: the first ones compile programs, upload the scene and build its structures, for all
+ * who come after. Whoever had one waits for it, but not much longer than SCHEDULE_WAIT_MAX_NS.
+ *
  * A frame that somebody looks at is better finished than begun beside others: with sixty of them in turns by
- * slices each would show a camera that is sixty frames old. So it keeps the turn, for SCHEDULE_TURN_NS at most; it
- * is charged all the same. */
+ * slices each would show a camera that is sixty frames old. So it may keep the turn for a while, and is charged
+ * all the same. The while grows with the number of those who wait, and no faster than they are owed time: with n
+ * of them, who has short frames is due again after n of these. */
 #ifndef FARLIGHT_JOB_SCHEDULER_H
 #define FARLIGHT_JOB_SCHEDULER_H
 
@@ -28,7 +32,9 @@ struct schedule_share {
 /* Those who compete with each other: all clients, or the jobs of one. */
 struct schedule_group {
     uint64_t least_ns; /* virtual time of whoever of those that were ready had least; never goes back */
-    uint64_t next_ns;  /* during a pick */
+    /* During a pick. */
+    uint64_t next_ns;
+    uint32_t ready_count;
 };
 
 struct schedule_client {
@@ -39,24 +45,28 @@ struct schedule_client {
 struct scheduler {
     struct schedule_group clients;
     uint64_t picks, turns;
-    uint64_t turn_ns; /* since whoever had the last slice was picked */
+    uint64_t turn_ns, turn_end_ns; /* since whoever had the last slice was picked */
 };
 
 struct schedule_entry {
     struct schedule_client *client; /* of several jobs the same one */
     struct schedule_share *job;
     bool ready;
-    bool keeps_turn; /* once it has it */
 };
 
-#define SCHEDULE_TURN_NS 10000000u /* as a slice on software GL */
+#define SCHEDULE_TURN_NS 10000000u    /* about a slice on software GL */
+#define SCHEDULE_TURN_EACH_NS 500000u /* longer for each client that is ready */
+#define SCHEDULE_WAIT_MAX_NS UINT64_C(2000000000)
 #define SCHEDULE_NONE SIZE_MAX
 
 /* Position of the entry whose slice is next, and is to be charged; SCHEDULE_NONE: nobody is ready. Who is not
  * named is not ready. */
 size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count);
-/* That entry's slice took so long. `weight`: of the job, at least 1. */
-void schedule_charge(struct scheduler *scheduler, const struct schedule_entry *entry, uint64_t slice_ns,
-                     uint32_t weight);
+/* A slice of that job took so long. `weight`: of the job, at least 1. */
+void schedule_charge(struct scheduler *scheduler, struct schedule_client *client, struct schedule_share *job,
+                     uint64_t slice_ns, uint32_t weight);
+
+/* Whether who had the last slice may go on without another pick, if it has begun what is better finished. */
+bool schedule_turn_lasts(const struct scheduler *scheduler);
 
 #endif

@@ -50,6 +50,7 @@ struct render_context {
     uint32_t asked;  /* shadow rays of each hit of the wave in hand that are traced already */
     uint32_t asking; /* and that are made and not traced to the end; 0: none */
     uint32_t traced; /* rays that are, of the wave that is being traced; 0: none is */
+    uint32_t chosen; /* for it by its tracer */
     uint32_t part_rays[RAY_KIND_COUNT][PART_WAVES]; /* how many are traced in one step, wave_trace.h */
     struct gpu_buffer block_offsets, wave_state;    /* of the compaction */
     struct gpu_buffer slice_sums;                   /* vec4 a sample of the slice: radiance so far, coverage */

@@ -70,6 +70,7 @@ static bool trace_part(struct render_context *context, enum ray_kind kind, const
 {
     struct wave part = *wave;
     part.first_ray = context->traced;
+    part.chosen = &context->chosen;
     uint32_t *most = part_rays(context, kind);
     part.end_ray = part_end(context, wave, *most);
     const uint64_t start_ns = clock_now_ns();

@@ -2,38 +2,14 @@
 #include "session/jobs.h"
 
 #include "session/frames.h"
+#include "session/job_terms.h"
 #include "session/session.h"
-#include "session/tracer_settings.h"
 #include "session/views.h"
 
-#include <inttypes.h>
 #include <stdlib.h>
-#include <string.h>
 
-/* More frames than this need not wait here: the engine renders the next ones meanwhile. */
-#define WINDOW_FRAMES_MAX 4
-#define ZSTD_LEVEL_MAX 19
-/* Of the 4 GiB that a frame_begin may announce; the rest is left to what zstd adds to noise. */
-#define FRAME_BYTES_MAX (UINT64_C(4080) << 20)
-#define BEAUTY_ALONE (1u << PROTOCOL_LAYER_BEAUTY)
-#define WEIGHT_OF_VIEW 4 /* somebody waits for each of its frames */
-#define WEIGHT_OF_BATCH 1
-
-static uint32_t bytes_per_pixel(enum protocol_pixel_format format)
-{
-    switch (format) {
-    case PROTOCOL_PIXEL_FORMAT_RGBA8:
-        return 4;
-    case PROTOCOL_PIXEL_FORMAT_RGBA16F:
-        return 8;
-    case PROTOCOL_PIXEL_FORMAT_RGBA32F:
-    case PROTOCOL_PIXEL_FORMAT_COUNT:
-        break;
-    }
-    return 16;
-}
-
-/* ---- checks ------------------------------------------------------------------------------------------ */
+/* So long nothing has come before the client is told why. */
+#define BLOCKED_NS UINT64_C(100000000)
 
 struct job *jobs_find(const struct session *session, uint32_t channel)
 {
@@ -44,249 +20,7 @@ struct job *jobs_find(const struct session *session, uint32_t channel)
     return NULL;
 }
 
-static uint64_t frame_bytes_of(const struct message_render *render)
-{
-    uint32_t layers = render->layers ? render->layers : BEAUTY_ALONE;
-    return (uint64_t)render->width * render->height * bytes_per_pixel(render->format) *
-           (uint64_t)__builtin_popcount(layers);
-}
-
-static bool check_layers(const struct message_render *render, struct error *error)
-{
-    if (!render->layers || render->layers == BEAUTY_ALONE)
-        return true;
-    if (render->kind == PROTOCOL_JOB_KIND_VIEW) {
-        error_set(error, ERROR_UNSUPPORTED, "render.layers", "a view shows the picture alone");
-        return error_remedy(error, "a batch of one frame has layers; a view may have attachments");
-    }
-    if (render->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || render->encoding == PROTOCOL_ENCODING_JPEG) {
-        error_set(error, ERROR_UNSUPPORTED, "render.layers", "%s in %s carries the beauty alone",
-                  protocol_pixel_format_text(render->format), protocol_encoding_text(render->encoding));
-        return error_remedy(error, "layers need the format rgba32f and the encoding raw or zstd");
-    }
-    if (frame_bytes_of(render) > FRAME_BYTES_MAX) {
-        error_set(error, ERROR_LIMIT, "render.layers", "frames of %" PRIu64 " bytes, the limit is %" PRIu64,
-                  frame_bytes_of(render), FRAME_BYTES_MAX);
-        return error_remedy(error, "ask for fewer layers, or for a smaller picture");
-    }
-    return true;
-}
-
-/* The view whose place another one would take; NULL: nobody's. */
-static struct job *replaced_by(const struct session *session, const struct message_render *render)
-{
-    struct job *job = jobs_find(session, render->channel);
-    return render->kind == PROTOCOL_JOB_KIND_VIEW && job && job->view && !job->cancelled ? job : NULL;
-}
-
-static bool check_limits(const struct session *session, const struct message_render *render, struct error *error)
-{
-    const struct session_limits *limits = &session->hub->options.limits;
-    if (render->width > limits->width_pixels || render->height > limits->height_pixels)
-        error_set(error, ERROR_LIMIT, "render.width", "%u x %u pixels, the limit is %u x %u", render->width,
-                  render->height, limits->width_pixels, limits->height_pixels);
-    else if (render->samples > limits->samples)
-        error_set(error, ERROR_LIMIT, "render.samples", "%u, the limit is %u", render->samples, limits->samples);
-    if (error->kind == ERROR_LIMIT)
-        return error_remedy(error, "ask for less, or raise [limits] in the daemon's configuration");
-    if (session->job_count >= limits->jobs_per_client && !replaced_by(session, render)) {
-        error_set(error, ERROR_LIMIT, "render", "%u jobs are running, the limit", session->job_count);
-        error_remedy(error, "wait for one to end, or cancel it");
-        error->retryable = true;
-        return false;
-    }
-    return true;
-}
-
-/* How many frames of the job may wait in memory to be sent: at least one, whatever its size. */
-static uint64_t window_of(const struct session *session, const struct message_render *render)
-{
-    uint64_t window = session->hub->options.limits.frame_window_bytes / frame_bytes_of(render);
-    return window < 1 ? 1 : window > WINDOW_FRAMES_MAX ? WINDOW_FRAMES_MAX : window;
-}
-
-/* The most that its frames can take: those in the engine, and those that wait here. */
-static uint64_t job_bytes_of(const struct session *session, const struct message_render *render)
-{
-    uint64_t frame_bytes = frame_bytes_of(render);
-    uint64_t in_engine = ENGINE_FRAME_WINDOW_BYTES / frame_bytes;
-    uint64_t in_flight = session->hub->options.limits.frames_in_flight;
-    in_engine = in_engine < 1 ? 1 : in_engine < in_flight ? in_engine : in_flight;
-    return frame_bytes * (in_engine + window_of(session, render));
-}
-
-/* A job that has begun is never short of room for its next frame: there is room for it, or it does not begin. */
-static bool check_room(const struct session *session, const struct message_render *render, struct error *error)
-{
-    const struct hub *hub = session->hub;
-    const struct job *before = replaced_by(session, render);
-    uint64_t job_bytes = job_bytes_of(session, render), limit_bytes = hub->options.limits.frame_bytes;
-    uint64_t others_bytes = hub->frame_bytes - (before ? before->frame_bytes : 0);
-    if (!others_bytes || (others_bytes <= limit_bytes && job_bytes <= limit_bytes - others_bytes))
-        return true;
-    error_set(error, ERROR_BUSY, "render",
-              "frames of this job may take %" PRIu64 " bytes; running jobs may take %" PRIu64
-              ", the limit of all is %" PRIu64,
-              job_bytes, others_bytes, limit_bytes);
-    return error_remedy(error,
-                        "try again when jobs have ended, ask for smaller frames, or raise memory.frames in the "
-                        "daemon's configuration");
-}
-
-static bool check_camera(const struct message_render *render, struct error *error)
-{
-    if (render->camera_path == PROTOCOL_CAMERA_PATH_KEYS && !render->keys_count)
-        return error_set(error, ERROR_INVALID, "render.keys", "camera path keys needs at least one key");
-    if (render->camera_path == PROTOCOL_CAMERA_PATH_NODE && !render->camera_node)
-        return error_set(error, ERROR_INVALID, "render.camera_node", "camera path node needs a node");
-    for (uint32_t i = 1; i < render->keys_count; i++) {
-        if (!(render->keys[i].time_s > render->keys[i - 1].time_s))
-            return error_set(error, ERROR_INVALID, "render.keys",
-                             "key %u is at %g s, not after the one before at %g s", i,
-                             (double)render->keys[i].time_s, (double)render->keys[i - 1].time_s);
-    }
-    return true;
-}
-
-/* What is different with views. */
-static bool check_kind(const struct message_render *render, struct error *error)
-{
-    if (render->attachments)
-        return error_set(error, ERROR_UNSUPPORTED, "render.attachments", "this daemon attaches nothing to frames");
-    if (render->kind == PROTOCOL_JOB_KIND_BATCH) {
-        if (render->last_frame < render->first_frame)
-            return error_set(error, ERROR_INVALID, "render.last_frame", "%u is before the first frame %u",
-                             render->last_frame, render->first_frame);
-        return true;
-    }
-    if (encoder_supports((enum encoding)render->still_encoding, bytes_per_pixel(render->format)))
-        return true;
-    error_set(error, ERROR_UNSUPPORTED, "render.still_encoding", "%s does not carry %s",
-              protocol_encoding_text(render->still_encoding), protocol_pixel_format_text(render->format));
-    return error_remedy(error, "raw and zstd carry every format");
-}
-
-static bool check(const struct session *session, const struct message_render *render, struct error *error)
-{
-    enum session_scene_state state = session_scene(session, render->scene);
-    if (state != SCENE_OPENING && state != SCENE_OPEN)
-        return error_set(error, ERROR_UNKNOWN_ID, "render.scene", "there is no scene %u", render->scene);
-    if (jobs_find(session, render->channel) && !replaced_by(session, render))
-        return error_set(error, ERROR_INVALID, "render.channel", "a running job has channel %u", render->channel);
-    if (!check_kind(render, error) || !check_layers(render, error))
-        return false;
-    if (!encoder_supports((enum encoding)render->encoding, bytes_per_pixel(render->format))) {
-        error_set(error, ERROR_UNSUPPORTED, "render.encoding", "%s does not carry %s",
-                  protocol_encoding_text(render->encoding), protocol_pixel_format_text(render->format));
-        return error_remedy(error, "raw and zstd carry every format");
-    }
-    if (render->encoding == PROTOCOL_ENCODING_ZSTD && render->quality > ZSTD_LEVEL_MAX)
-        return error_set(error, ERROR_INVALID, "render.quality", "zstd has levels up to %u, not %u",
-                         ZSTD_LEVEL_MAX, render->quality);
-    return tracer_settings_check(render, error) && check_limits(session, render, error) &&
-           check_camera(render, error) && check_room(session, render, error);
-}
-
 /* ---- start ------------------------------------------------------------------------------------------- */
-
-static bool fill_clips(struct engine_job *job, const struct message_render *render)
-{
-    if (!render->clips_count)
-        return true;
-    job->clips = calloc(render->clips_count, sizeof *job->clips);
-    if (!job->clips)
-        return false;
-    job->clip_count = render->clips_count;
-    for (uint32_t i = 0; i < render->clips_count; i++) {
-        const struct record_clip_use *from = &render->clips[i];
-        job->clips[i] = (struct clip_use){from->clip, from->start_s, from->speed, from->loop != 0};
-    }
-    return true;
-}
-
-static bool fill_keys(struct engine_job *job, const struct message_render *render)
-{
-    if (!render->keys_count)
-        return true;
-    job->keys = calloc(render->keys_count, sizeof *job->keys);
-    if (!job->keys)
-        return false;
-    job->key_count = render->keys_count;
-    for (uint32_t i = 0; i < render->keys_count; i++) {
-        const struct record_camera_key *from = &render->keys[i];
-        struct camera_key *key = &job->keys[i];
-        key->time_s = from->time_s;
-        memcpy(key->eye_world, from->eye_world, sizeof key->eye_world);
-        memcpy(key->look_at_world, from->look_at_world, sizeof key->look_at_world);
-        memcpy(key->up_world, from->up_world, sizeof key->up_world);
-        key->fov_y = from->fov_y;
-    }
-    return true;
-}
-
-/* All but keys, clips and wishes, which are there already. */
-static void fill_job(struct engine_job *job, const struct session *session, const struct message_render *render,
-                     uint64_t credit)
-{
-    bool is_view = render->kind == PROTOCOL_JOB_KIND_VIEW;
-    *job = (struct engine_job){
-        .keys = job->keys,
-        .key_count = job->key_count,
-        .clips = job->clips,
-        .clip_count = job->clip_count,
-        .wishes = job->wishes,
-        .kind = (enum job_kind)render->kind,
-        .scene = render->scene,
-        .first_frame = render->first_frame,
-        .last_frame = is_view ? UINT32_MAX : render->last_frame,
-        .frame_step = is_view ? 1 : render->frame_step,
-        .frames_per_second = render->frames_per_second,
-        .time_origin_frame = render->time_origin_frame,
-        .frame =
-            {
-                .width = render->width,
-                .height = render->height,
-                .samples = render->samples,
-                .depth = render->depth,
-                .seed = render->seed,
-                .tracer = render->tracer,
-                .tracer_options = tracer_settings(&session->hub->options.limits, render),
-                .integrator = (enum frame_integrator)render->integrator,
-                .primary = (enum frame_primary)render->primary,
-                .tone_map = (enum frame_tone_map)render->tone_map,
-                .format = (enum frame_format)render->format,
-                .exposure_stops = render->exposure_stops,
-                .aperture = render->aperture,
-                .focus = render->focus,
-                .filter = (enum frame_filter)render->pixel_filter,
-                .brdf = (enum frame_brdf)render->brdf,
-                .ao_distance = render->ao_distance,
-                .ao_falloff = render->ao_falloff,
-                .ao_rays = render->ao_rays,
-                .layer_opacity = render->layer_opacity,
-                .layers = render->layers,
-                .accumulate = render->accumulate != 0,
-                .compare = render->compare != 0,
-                .compare_with = render->compare_with,
-                .compare_far_share = render->compare_far,
-            },
-        .shutter = render->shutter,
-        .encoding = (enum encoding)render->encoding,
-        .quality = render->quality,
-        .path = (enum camera_path)render->camera_path,
-        .camera_node = render->camera_node,
-        .orbit_turn = render->orbit_turn,
-        .orbit_seconds = render->orbit_seconds,
-        .credit = credit,
-        .pass_samples = render->pass_samples ? render->pass_samples : 1,
-        .still_encoding = (enum encoding)render->still_encoding,
-        .weight = render->weight ? render->weight
-                  : is_view      ? WEIGHT_OF_VIEW
-                                 : WEIGHT_OF_BATCH,
-        .adapt = render->adapt != 0,
-        .attachments = render->attachments,
-    };
-}
 
 static uint64_t allowed_credit(struct job *job)
 {
@@ -302,7 +36,7 @@ static struct job *job_create(struct session *session, uint32_t request, const s
     bool is_view = render->kind == PROTOCOL_JOB_KIND_VIEW;
     struct job *job = calloc(1, sizeof *job);
     struct view_terms terms = view_terms_of(render);
-    struct session_view *view = is_view ? session_view_create(&terms) : NULL;
+    struct session_view *view = job && is_view ? session_view_create(&terms) : NULL;
     if (!job || (is_view && !view)) {
         free(job);
         return NULL;
@@ -314,8 +48,8 @@ static struct job *job_create(struct session *session, uint32_t request, const s
         .channel = render->channel,
         .scene = render->scene,
         .client_credit = render->credit,
-        .window = window_of(session, render),
-        .frame_bytes = job_bytes_of(session, render),
+        .window = job_window(session, render),
+        .frame_bytes = job_bytes(session, render),
         .view = view,
     };
     job->end = &job->first;
@@ -323,6 +57,7 @@ static struct job *job_create(struct session *session, uint32_t request, const s
     session->jobs = job;
     session->job_count++;
     session->hub->frame_bytes += job->frame_bytes;
+    job_watch_for_blocks(job);
     return job;
 }
 
@@ -339,7 +74,7 @@ static bool add_change(struct job *job, uint32_t request, const struct message_r
         .request = request,
         .scene = render->scene,
         .credit = job->client_credit > job->frames_sent ? 1 : 0,
-        .frame_bytes = job_bytes_of(job->session, render),
+        .frame_bytes = job_bytes(job->session, render),
         .terms = view_terms_of(render),
     };
     view_add_change(job, change);
@@ -349,17 +84,17 @@ static bool add_change(struct job *job, uint32_t request, const struct message_r
 void jobs_start(struct session *session, struct request *request, const struct message_render *render)
 {
     struct error error = {0};
-    if (!check(session, render, &error)) {
+    if (!job_check(session, render, &error)) {
         request_answer_error(session, request, &error);
         return;
     }
     struct engine_command *command = hub_command(ENGINE_JOB_START, session->number, request->id);
-    if (!command || !fill_keys(&command->job, render) || !fill_clips(&command->job, render)) {
+    if (!command || !job_fill(&command->job, session, render)) {
         engine_command_destroy(command);
         session_submit(session, request, NULL);
         return;
     }
-    struct job *job = replaced_by(session, render);
+    struct job *job = job_replaced_by(session, render);
     bool replaces = job != NULL;
     if (replaces ? !add_change(job, request->id, render) : !(job = job_create(session, request->id, render))) {
         engine_command_destroy(command);
@@ -369,18 +104,52 @@ void jobs_start(struct session *session, struct request *request, const struct m
     request->object = job;
     if (job->view)
         command->job.wishes = view_wishes_ref(job->view->wishes);
-    fill_job(&command->job, session, render,
-             replaces ? view_find_change(job, request->id)->credit : job->engine_credit);
+    command->job.credit = replaces ? view_find_change(job, request->id)->credit : job->engine_credit;
     command->scene = render->scene;
     session_submit(session, request, command);
 }
 
 /* ---- pace -------------------------------------------------------------------------------------------- */
 
+/* Why nothing comes, if it is for the client to change that; NULL: it is not. */
+static const char *blocked_by(const struct job *job)
+{
+    if (job->rendered || job->cancelled || (job->view && !view_wants_more(job)))
+        return NULL;
+    if (job->frames_sent >= job->client_credit)
+        return "the credit is used up";
+    return job->view && view_is_unacknowledged(job) ? "frames on their way are not acknowledged" : NULL;
+}
+
+static void on_blocked_timer(void *context)
+{
+    struct job *job = context;
+    const char *why = blocked_by(job);
+    if (!why)
+        return;
+    job->blocked_told = job->frames_sent + 1;
+    struct message message;
+    message_init(&message, MESSAGE_BLOCKED);
+    message.blocked.channel = job->channel;
+    message.blocked.total = job->frames_sent;
+    message.blocked.text = why;
+    session_send(job->session, 0, 0, &message);
+}
+
+void job_watch_for_blocks(struct job *job)
+{
+    if (job->blocked_timer.running || job->blocked_told == job->frames_sent + 1 || !blocked_by(job))
+        return;
+    job->blocked_timer.call = on_blocked_timer;
+    job->blocked_timer.context = job;
+    loop_timer_start(job->session->hub->loop, &job->blocked_timer, BLOCKED_NS);
+}
+
 static void tell_engine_credit(struct job *job)
 {
     struct session *session = job->session;
     uint64_t allowed = allowed_credit(job);
+    job_watch_for_blocks(job);
     if (allowed <= job->engine_credit || job->rendered || job->cancelled)
         return;
     struct engine_command *command = hub_command(ENGINE_JOB_CREDIT, session->number, job->request);
@@ -428,6 +197,7 @@ static void destroy(struct session *session, struct job *job)
 {
     drop_frames(session, job);
     session_view_destroy(job);
+    loop_timer_stop(session->hub->loop, &job->blocked_timer);
     struct job **place = &session->jobs;
     while (*place != job)
         place = &(*place)->next;

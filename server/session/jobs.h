@@ -4,6 +4,7 @@
 #define FARLIGHT_SESSION_JOBS_H
 
 #include "job/engine.h"
+#include "net/loop.h"
 #include "protocol/framing.h"
 #include "session/requests.h"
 
@@ -26,6 +27,8 @@ struct job {
     struct pending_frame *first, **end; /* from the engine, in order; the first may be under way */
     bool rendered;                      /* the engine is done with it */
     bool cancelled;                     /* what still comes from the engine is dropped */
+    struct loop_timer blocked_timer;    /* until the client is told that nothing comes .. */
+    uint64_t blocked_told;              /* .. which it was when so many frames, and 1, had been sent */
     struct session_view *view;          /* owned; NULL: a batch */
 };
 
@@ -40,6 +43,8 @@ void job_failed(struct session *session, struct request *request, const struct e
 void job_frame_sent(struct job *job, uint32_t request);
 /* Something has changed that may let frames be begun, or go. */
 void job_pace(struct job *job);
+/* The client is told after a while if nothing comes because of it. */
+void job_watch_for_blocks(struct job *job);
 void jobs_finish(struct session *session);
 bool job_is_owed(const struct job *job); /* the daemon has work for it, the client waits */
 /* NULL: no job has that channel. */

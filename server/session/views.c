@@ -12,10 +12,11 @@
 /* Frames of a view that are rendered, encoded or sent at once: while one is sent, the next one is encoded and the
  * one after it rendered. */
 #define IN_HAND_MAX 3
+/* What is expected to take a while may take less than that: a frame that comes so much too early is hardly older.
+ */
+#define EARLY_NS UINT64_C(500000)
 /* A client that has not acknowledged its first frame by then acknowledges none. */
 #define SILENCE_NS UINT64_C(250000000)
-/* So long nothing has come before the client is told why. */
-#define BLOCKED_NS UINT64_C(100000000)
 /* A frame that a link takes longer for than that is not sent again and again while a picture is refined. */
 #define SPARING_NS 250000000.0
 #define SECOND_NS 1e9
@@ -24,7 +25,6 @@
 
 static void on_pace_timer(void *context);
 static void on_silence_timer(void *context);
-static void on_blocked_timer(void *context);
 
 struct view_terms view_terms_of(const struct message_render *render)
 {
@@ -61,7 +61,6 @@ void session_view_destroy(struct job *job)
     struct loop *loop = job->session->hub->loop;
     loop_timer_stop(loop, &view->pace_timer);
     loop_timer_stop(loop, &view->silence_timer);
-    loop_timer_stop(loop, &view->blocked_timer);
     while (view->changes)
         view_drop_change(job, view->changes);
     view_wishes_unref(view->wishes);
@@ -135,46 +134,16 @@ void view_forget_frames(struct job *job)
 
 /* ---- pace -------------------------------------------------------------------------------------------- */
 
-/* The client has seen less than it asked for, as far as is known here. */
-static bool wants_more(const struct job *job)
+bool view_wants_more(const struct job *job)
 {
     const struct session_view *view = job->view;
     return view->last_command > view->shown_command ||
            (!view->shown_moving && view->shown_samples < view->terms.samples);
 }
 
-/* Why nothing comes, if it is for the client to change that; NULL: it is not. */
-static const char *blocked_by(const struct job *job)
+bool view_is_unacknowledged(const struct job *job)
 {
-    const struct session_view *view = job->view;
-    if (job->frames_sent >= job->client_credit)
-        return "the credit is used up";
-    if (pacing_wait_ns(&view->pacing, 0) == UINT64_MAX)
-        return "frames on their way are not acknowledged";
-    return NULL;
-}
-
-static void watch_for_blocks(struct job *job)
-{
-    struct session_view *view = job->view;
-    if (!view->blocked_timer.running && view->blocked_told != job->frames_sent + 1 && wants_more(job) &&
-        blocked_by(job))
-        start_timer(job, &view->blocked_timer, on_blocked_timer, BLOCKED_NS);
-}
-
-static void on_blocked_timer(void *context)
-{
-    struct job *job = context;
-    const char *why = wants_more(job) ? blocked_by(job) : NULL;
-    if (!why)
-        return;
-    job->view->blocked_told = job->frames_sent + 1;
-    struct message message;
-    message_init(&message, MESSAGE_BLOCKED);
-    message.blocked.channel = job->channel;
-    message.blocked.total = job->frames_sent;
-    message.blocked.text = why;
-    session_send(job->session, 0, 0, &message);
+    return pacing_wait_ns(&job->view->pacing, 0) == UINT64_MAX;
 }
 
 uint64_t view_allowed_credit(struct job *job)
@@ -187,17 +156,18 @@ uint64_t view_allowed_credit(struct job *job)
         uint64_t in_hand = allowed - job->frames_gone + before;
         if (in_hand >= IN_HAND_MAX || job->frames_sent + in_hand >= job->client_credit)
             break;
-        /* It is begun so early that it comes when it may go. */
+        /* It is begun so early that it comes just before it may go. */
         uint64_t wait_ns = pacing_wait_ns(&view->pacing, (unsigned)(in_hand - frames_on_the_wire(job)));
-        if (wait_ns > view->made_ns && !view->due) {
+        uint64_t lead_ns = view->made_ns + EARLY_NS;
+        if (wait_ns > lead_ns && !view->due) {
             if (wait_ns != UINT64_MAX)
-                start_timer(job, &view->pace_timer, on_pace_timer, wait_ns - view->made_ns);
+                start_timer(job, &view->pace_timer, on_pace_timer, wait_ns - lead_ns);
             break;
         }
         view->due = false;
         allowed++;
     }
-    watch_for_blocks(job);
+    view->due = false;
     return allowed;
 }
 
@@ -325,7 +295,7 @@ void views_look(struct session *session, const struct message_view_camera *messa
     memcpy(camera.key.up_world, message->up_world, sizeof camera.key.up_world);
     if (view_wishes_look(job->view->wishes, &camera))
         tell_engine(job);
-    watch_for_blocks(job);
+    job_watch_for_blocks(job);
 }
 
 void views_acknowledge(struct session *session, const struct message_frame_ack *message)

@@ -10,7 +10,6 @@
 #define FARLIGHT_SESSION_VIEWS_H
 
 #include "job/view_wishes.h"
-#include "net/loop.h"
 #include "protocol/messages.h"
 #include "session/jobs.h"
 #include "session/pacing.h"
@@ -48,8 +47,6 @@ struct session_view {
     uint64_t last_command, shown_command;
     bool shown_moving;
     uint32_t shown_samples;
-    struct loop_timer blocked_timer;
-    uint64_t blocked_told; /* frames that had been sent when the client was told last that nothing comes, and 1 */
 };
 
 struct view_terms view_terms_of(const struct message_render *render);
@@ -71,6 +68,10 @@ uint64_t view_allowed_credit(struct job *job);
 
 /* A frame has come from the engine; its first byte is about to go; its last one is with the kernel. */
 void view_frame_made(struct job *job, const struct engine_frame *frame);
+/* The client has seen less than it asked for, as far as is known here. */
+bool view_wants_more(const struct job *job);
+/* Nothing goes before its client acknowledges a frame. */
+bool view_is_unacknowledged(const struct job *job);
 bool view_may_send(const struct job *job);
 /* It has waited for the link so long that another one of what its client wishes now is better, and could be had.
  */

@@ -17,7 +17,6 @@ struct bvh {
     struct gpu_buffer transform_buffer;
     float leaf_extent_world;     /* diagonal of a leaf's box, in the mean over what the instances show */
     struct gpu_buffer coherence; /* what bvh/coherence.comp counts */
-    uint32_t rays_together;      /* what was chosen by it for the last wave, whose parts may follow */
 };
 
 /* How far apart rays that are walked together may begin, in world space. Those of a lens, all over it: they meet

@@ -76,9 +76,12 @@ uint32_t bvh_rays_together(struct bvh *bvh, const struct scene_gpu *scene, const
     if (!scene->device->facts.software || wave->ray_count < COHERENCE_RAYS_MIN)
         return 1;
     if (wave->first_ray > 0)
-        return bvh->rays_together;
+        return *wave->chosen;
     if (!measure_coherence(bvh, scene, wave, counts, error))
         return 0;
-    return bvh->rays_together =
-               counts[0] >= (uint64_t)RAYS_A_WALK_MIN * counts[1] && counts[1] > 0 ? TOGETHER_SOFTWARE : 1;
+    uint32_t together =
+        counts[0] >= (uint64_t)RAYS_A_WALK_MIN * counts[1] && counts[1] > 0 ? TOGETHER_SOFTWARE : 1;
+    if (wave->chosen)
+        *wave->chosen = together;
+    return together;
 }

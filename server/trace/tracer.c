@@ -110,7 +110,7 @@ bool tracer_trace(struct tracer *tracer, struct scene_gpu *scene, const struct w
     struct wave part = *wave;
     part.end_ray = wave->end_ray > 0 ? wave->end_ray : wave->ray_count;
     bool fits = part.first_ray < part.end_ray && part.end_ray <= wave->ray_count &&
-                part.first_ray % WAVE_PART_RAYS == 0 &&
+                part.first_ray % WAVE_PART_RAYS == 0 && (part.first_ray == 0 || part.chosen) &&
                 buffer_holds(wave->rays, wave->ray_count, sizeof(struct ray));
     if (wave->kind == WAVE_ANY)
         fits = fits && buffer_holds(wave->visibility, wave->ray_count, sizeof(uint32_t));

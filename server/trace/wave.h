@@ -20,9 +20,12 @@ struct wave {
     enum wave_kind kind;
     uint32_t ray_count; /* on the host: how many of `rays` are to be traced */
     /* The part of them that is traced now, so that a long wave is some short steps: from a multiple of
-     * WAVE_PART_RAYS up to end_ray; 0: to the last. Parts come in their order, and with all of them traced, and no
-     * other wave by the same tracer in between, the answers are the whole wave's to the bit. */
+     * WAVE_PART_RAYS up to end_ray; 0: to the last. Parts come in their order, others' waves may come in between,
+     * and with all of them traced the answers are the whole wave's to the bit. */
     uint32_t first_ray, end_ray;
+    /* What a tracer chooses for a wave by its first part; the caller's, for the parts after it. May be NULL where
+     * the first part is the whole. */
+    uint32_t *chosen;
     struct gpu_buffer *rays;       /* struct ray */
     struct gpu_buffer *hits;       /* struct hit; closest */
     struct gpu_buffer *visibility; /* uint; any */

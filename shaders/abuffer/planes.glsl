@@ -6,12 +6,12 @@
 // A ray that begins on a surface may begin a little beyond a neighbour's plane, and would at once hit what it leaves. So
 // near its origin a ray does not cross planes that pass the origin as near as this. From behind, which is how a ray that
 // goes away outside meets what it leaves, that is generous. From the front, which is how it meets another wall in a
-// corner, and how a ray that was refracted meets what it has entered by, it is what a surface needs that bends by a
-// radius of six cells, about: from a neighbour's middle, which is up to 0.78 cells beyond the crossing, to the origin it
-// falls by (way + 0.78)^2 / (2 * 6). So what is crossed steeply may be nearer than what is met along the surface: in a
-// corner rays meet the wall beside which they begin.
+// corner, and how a ray that was refracted meets what it has entered by, it is what a surface needs that bends inwards by
+// a radius of two to three cells, as the inner side of a handle does: from a neighbour's middle, 0.78 cells beyond at
+// most, to the origin it falls by 0.78^2 / (2 * 2.5). So what is crossed steeply may be nearer than what is met along the
+// surface: in a corner rays meet the wall beside which they begin, but for the last tenth of a cell.
 const float OWN_WAY = 1.5;
-const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.05, OWN_RISE = 0.1; // the rise is for a cell of way
+const float OWN_BEHIND = 0.5, OWN_BEFORE = 0.12, OWN_RISE = 0.05; // the rise is for a cell of way
 
 // Where a ray (o, d in the image) crosses a sample's plane; whether that is not the plane which it begins on. `side` is
 // positive where it comes from behind.

@@ -3,9 +3,9 @@
 """`make bench`: where the time goes, in tables and as JSON. Usage: bench.py BUILD_FOLDER [PART ..] [--out FOLDER]
 
 Parts: start, oneshot, frames, animation, tracers, forms, family, pixels, rays, parallel, instances, refit, flake, distributed,
-steps, ldc, abuffer, reach; all of them where none is named. Each figure is the median of several runs after a warm-up, with
-the median absolute deviation beside it; what is compared takes turns, run by run. Scenes of FARLIGHT_SCENES (default:
-../shared/scenes beside the checkout) are left out, and named, where missing.
+steps, link, ldc, abuffer, reach; all of them where none is named. Each figure is the median of several runs after a
+warm-up, with the median absolute deviation beside it; what is compared takes turns, run by run. Scenes of FARLIGHT_SCENES
+(default: ../shared/scenes beside the checkout) are left out, and named, where missing.
 
 Writes FOLDER/bench.txt and FOLDER/bench.json (FOLDER: out). Parts that an earlier run on the same device and commit left
 there stay. The JSON: {"format": 1, "environment": {date, commit, processor, processors, device, vendor, version, software,
@@ -13,9 +13,9 @@ embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are obje
 and runs; keys end with their unit. tracers, reach, family, pixels and rays have `results`, one for each call of
 bench_tracers: title, triangles, spheres, instances, width, height, rays_per_pixel, `structures` (tracer, form, build,
 memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, form, way, time, rays_per_s, agreement).
-`distributed` is described in bench_frames.py, `steps` in bench_steps.py, `ldc` in bench_ldc.py, `abuffer` in
-bench_abuffer.py. `wanted` has the lines that are to be reached: line, wanted, measured, met, within_spread (missed by no more
-than twice its deviation), where.
+`distributed` is described in bench_frames.py, `steps` in bench_steps.py, `link` in bench_link.py, `ldc` in bench_ldc.py,
+`abuffer` in bench_abuffer.py. `wanted` has the lines that are to be reached: line, wanted, measured, met, within_spread
+(missed by no more than twice its deviation), where.
 
 Exit status 1 if something failed, or a tracer gave wrong answers; a line that was missed is no failure.
 """
@@ -34,6 +34,7 @@ import bench_client
 import bench_frames
 import bench_ldc
 import bench_ldc_show
+import bench_link
 import bench_rays
 import bench_reach
 import bench_steps
@@ -57,6 +58,7 @@ PARTS = {
     "distributed": ("Distributed ray tracing, whole frames", bench_frames.measure_distributed,
                     bench_frames.show_distributed),
     "steps": ("Steps of a frame", bench_steps.measure, bench_steps.show),
+    "link": ("A sealed connection beside an open one", bench_link.measure, bench_link.show),
     "ldc": ("Layered depth cubes", bench_ldc.measure, bench_ldc_show.show),
     "abuffer": ("Voxels and A-buffers", bench_abuffer.measure, bench_abuffer_show.show),
     "reach": ("bvh beside Embree", bench_rays.measure_reach, bench_rays.show_reach),

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Writes what the fuzzers start from: seed FOLDER makes FOLDER/protocol.dict out of the table, and valid inputs in
- * FOLDER/codec, FOLDER/framing and FOLDER/handshake, noise in FOLDER/scene, sessions in FOLDER/session. */
+ * FOLDER/codec, FOLDER/framing, FOLDER/handshake and FOLDER/sealed, noise in FOLDER/scene, sessions in
+ * FOLDER/session. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
@@ -8,6 +9,7 @@
 
 #include "protocol/handshake.h"
 #include "tests/fuzz/recorded_session.h"
+#include "tests/fuzz/sealed_random.h"
 #include "tests/unit/protocol_cases.h"
 
 static struct case_maker maker;
@@ -145,6 +147,53 @@ static bool write_handshakes(const char *folder)
            write_file(folder, "handshake", "reply", 1, bytes, handshake_reply_encode(bytes, &refusal));
 }
 
+/* ---- sealed ---- */
+
+struct said {
+    uint8_t bytes[4096]; /* the first says who hears it, and in which pieces */
+    size_t count;
+};
+
+/* What one end has to say goes to the other one, and is kept. */
+static bool pass(struct sealed_link *from, struct sealed_link *to, unsigned hearing_end, struct said *said)
+{
+    struct decode_error error;
+    size_t bytes, room;
+    const uint8_t *waiting = sealed_link_waiting(from, &bytes);
+    uint8_t *space = sealed_link_space(to, &room);
+    if (bytes == 0 || bytes > room || bytes > sizeof said->bytes - said->count) {
+        return bytes == 0;
+    }
+    memcpy(space, waiting, bytes);
+    memcpy(said->bytes + said->count, waiting, bytes);
+    said->count += bytes;
+    sealed_link_sent(from, bytes);
+    sealed_link_came(to, bytes);
+    sealed_random_end = hearing_end;
+    return sealed_link_handshake(to, &error) != SEALED_FATAL;
+}
+
+static bool write_sealed(const char *folder)
+{
+    struct said up = {.bytes = {0xff}, .count = 1}, down = {.bytes = {0xfe}, .count = 1};
+    randombytes_set_implementation(&sealed_random);
+    sealed_random_begin();
+    sealed_random_end = 0;
+    struct sealed_link *client = sealed_link_client(&sealed_fuzz_key);
+    struct sealed_link *server = sealed_link_server(&sealed_fuzz_key, 1);
+    bool ok = client != NULL && server != NULL;
+    for (int round = 0; ok && round < 3; round++) {
+        ok = pass(client, server, 1, &up) && pass(server, client, 0, &down);
+    }
+    ok = ok && sealed_link_seal(client, maker.memory, 300) == 300 &&
+         sealed_link_seal(server, maker.memory, 300) == 300 && sealed_link_seal_last(client) &&
+         sealed_link_seal_last(server) && pass(client, server, 1, &up) && pass(server, client, 0, &down);
+    sealed_link_destroy(client);
+    sealed_link_destroy(server);
+    return ok && write_file(folder, "sealed", "up", 0, up.bytes, up.count) &&
+           write_file(folder, "sealed", "down", 0, down.bytes, down.count);
+}
+
 /* Bytes that a generator makes, for fuzzers that read any as something. */
 static bool write_noise(const char *folder)
 {
@@ -263,6 +312,7 @@ int main(int argument_count, char **arguments)
         return 2;
     }
     bool ok = make_folder(arguments[1]) && write_dictionary(arguments[1]) && write_messages(arguments[1]) &&
-              write_handshakes(arguments[1]) && write_noise(arguments[1]) && write_sessions(arguments[1]);
+              write_handshakes(arguments[1]) && write_sealed(arguments[1]) && write_noise(arguments[1]) &&
+              write_sessions(arguments[1]);
     return ok ? 0 : 1;
 }

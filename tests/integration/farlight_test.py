@@ -47,17 +47,18 @@ def farlight(*arguments, **options):
 class Daemon:
     """A farlightd on a socket of its own; a context manager."""
 
-    def __init__(self, *arguments, listen=None):
+    def __init__(self, *arguments, listen=None, environment=None):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-daemon-"))
         self.address = listen or f"unix:{self.folder}/farlight.sock"
         self.arguments = list(map(str, arguments))
+        self.environment = environment  # None: as it is here
         self.process = None
         self.ready = []
 
     def __enter__(self):
         self.log = open(self.folder / "log", "w+")
         self.process = subprocess.Popen([BIN / "farlightd", "--listen", self.address, *self.arguments],
-                                        stdout=subprocess.PIPE, stderr=self.log, text=True)
+                                        stdout=subprocess.PIPE, stderr=self.log, text=True, env=self.environment)
         for line in self.process.stdout:
             self.ready.append(line.strip())
             if line.startswith("READY"):

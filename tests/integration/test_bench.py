@@ -22,7 +22,7 @@ import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of bench_tracers
-PARTS = ("frames", "distributed", "steps", "tracers", "family", "pixels", "rays", "parallel", "instances",
+PARTS = ("frames", "distributed", "steps", "link", "tracers", "family", "pixels", "rays", "parallel", "instances",
          "refit", "flake", "ldc", "abuffer", "reach")
 
 
@@ -166,6 +166,11 @@ class Benchmark(unittest.TestCase):
         text = (self.out / "bench.txt").read_text()
         for row in data["wanted"]:
             self.assertIn(row["line"], text)
+
+    def test_sealing_costs_what_it_costs_at_both_ends(self):
+        data = self.document["parts"]["link"]
+        for end in ("daemon", "client"):
+            self.assertGreater(data["sealed"][end]["median"], data["open"][end]["median"])
 
     def test_steps_are_told_by_stage(self):
         forms = self.document["parts"]["steps"]["results"][0]["forms"]

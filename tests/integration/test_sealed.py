@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Sealed connections, from outside: the stored session computed again by other means, a daemon that others than the
 loopback may reach, keys that are right, wrong or open to others, and somebody on the way."""
+import json
 import os
 import pathlib
 import socket
@@ -40,9 +41,9 @@ class Golden(Case):
 class SealedDaemon(Daemon):
     """Listens where everybody could reach it."""
 
-    def __init__(self, folder, *arguments):
+    def __init__(self, folder, *arguments, environment=None):
         super().__init__("--key-file", folder / "key", "--reader-key-file", folder / "reader", *arguments,
-                         listen="tcp:0.0.0.0:0")
+                         listen="tcp:0.0.0.0:0", environment=environment)
 
     @property
     def port(self):
@@ -77,6 +78,23 @@ class Keys(Case):
                 digests.append(farlight_test.frames_of(result)[0]["digest"])
         self.assertEqual(len(set(digests)), 1, digests)
 
+    def test_what_was_sent_is_held_for_whoever_has_the_key_and_for_nobody_else(self):
+        def uploaded(*options):
+            result = self.expect(farlight("render", bundled_scenes() / "teapot.glb", "--size", "16x16", "--timings=json",
+                                          "-o", self.folder / "a.png", *options), 0)
+            return next(record["uploaded_bytes"] for record in map(json.loads, result.stdout.splitlines())
+                        if record["kind"] == "client")
+
+        with SealedDaemon(self.folder, "--listen", f"unix:{self.folder}/s") as daemon:
+            sealed = ("--server", daemon.reached, "--key", self.folder / "key")
+            here = ("--server", f"unix:{self.folder}/s")
+            self.assertGreater(uploaded(*sealed), 0)
+            self.assertEqual(uploaded(*sealed), 0)
+            self.assertGreater(uploaded(*here), 0)
+            self.assertEqual(uploaded(*here), 0)
+            # Over the Unix socket too the key says who it is.
+            self.assertEqual(uploaded(*here, "--key", self.folder / "key"), 0)
+
     def test_nobody_comes_in_without_a_key_where_everybody_could_knock(self):
         with SealedDaemon(self.folder) as daemon:
             result = self.expect(farlight("ping", "--server", daemon.reached), 1)
@@ -86,6 +104,15 @@ class Keys(Case):
             self.expect(farlight("ping", "--server", daemon.reached, env=named), 0)
             result = self.expect(farlight("stats", "--server", daemon.reached, "--key", self.folder / "reader"), 0)
             self.assertIn("reader's key", result.stdout)
+
+    def test_a_readers_key_is_for_looking(self):
+        with SealedDaemon(self.folder) as daemon:
+            options = (bundled_scenes() / "teapot.glb", "--size", "32x24", "-o", self.folder / "a.png",
+                       "--server", daemon.reached)
+            result = self.expect(farlight("render", *options, "--key", self.folder / "reader"), 1)
+            self.assertIn("look", result.stderr)
+            self.assertFalse((self.folder / "a.png").exists())
+            self.expect(farlight("render", *options, "--key", self.folder / "key"), 0)
 
     def test_a_wrong_key_is_told_after_a_second_and_too_many_are_not_heard(self):
         with SealedDaemon(self.folder) as daemon:
@@ -189,6 +216,29 @@ class Peer:
             payload = self.read(size + -size % 8)[:size]
             if of == request:
                 return kind, payload
+
+
+def try_key(daemon, key):
+    """A connection that has sent its proof."""
+    connection, seal = daemon.connect(), sealed_link.Client(key)
+    connection.sendall(seal.message_1)
+    connection.sendall(seal.proving(read_exactly(connection, 72)))
+    return connection
+
+
+class WrongKeys(Case):
+    def test_those_who_wait_for_their_refusal_count_as_not_introduced(self):
+        for name in ("key", "reader"):
+            self.expect(farlight("key", self.folder / name), 0)
+        slowly = dict(os.environ, FARLIGHT_NETWORK_WRONG_KEY="5000", FARLIGHT_LIMITS_WRONG_KEYS="16")
+        with SealedDaemon(self.folder, environment=slowly) as daemon:
+            tries = [try_key(daemon, bytes([i]) * 32) for i in range(8)]
+            with daemon.connect() as ninth:
+                self.assertEqual(ninth.recv(1), b"")
+            for each in tries:
+                self.assertEqual(read_exactly(each, 8), b"SEAL\4\1\0\0")
+                each.close()
+            self.expect(farlight("ping", "--server", daemon.reached, "--key", self.folder / "key"), 0)
 
 
 class OnTheWay(Case):

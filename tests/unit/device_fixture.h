@@ -36,6 +36,7 @@ static inline void trace_rays(wave_tracer *tracer, void *user, enum wave_kind ki
     expect_ok(gpu_buffer_reserve(device, &answers, count * sizeof *hits, &error), &error);
     const struct wave wave = {.kind = kind,
                               .ray_count = count,
+                              .end_ray = count,
                               .rays = &ray_buffer,
                               .hits = &answers,
                               .visibility = &answers,

@@ -53,9 +53,11 @@ struct frame_renderer {
 static struct {
     atomic_bool gate_open;
     atomic_uint gate_seed;
+    atomic_uint step_us; /* how long a step takes */
     atomic_int devices_made, devices, scenes, renderers_made, renderers, frames_begun, frames_done,
         frames_abandoned;
     atomic_int fail_steps;      /* the next steps that fail */
+    atomic_uint fail_seed;      /* of these, those of frames of that seed; 0: all */
     atomic_int fail_kind;       /* enum error_kind */
     atomic_int fail_from_frame; /* frames from this number on fail; 0: none */
     atomic_bool no_device;
@@ -204,6 +206,8 @@ static inline bool fake_begin(struct frame_renderer *renderer, const struct scen
 
 static inline void fake_work(const struct frame_renderer *renderer)
 {
+    if (atomic_load(&fake.step_us))
+        usleep(atomic_load(&fake.step_us));
     int step = atomic_fetch_add(&fake.step_count, 1);
     uint64_t start_ns = clock_now_ns(), now_ns = start_ns;
     while (now_ns - start_ns < renderer->request.ao_rays * UINT64_C(1000))
@@ -219,7 +223,9 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
 {
     fake_work(renderer);
     int fail_from = atomic_load(&fake.fail_from_frame);
-    if (atomic_load(&fake.fail_steps) > 0 || (fail_from && atomic_load(&fake.frames_begun) >= fail_from)) {
+    bool is_meant = !atomic_load(&fake.fail_seed) || renderer->request.seed == atomic_load(&fake.fail_seed);
+    if ((atomic_load(&fake.fail_steps) > 0 && is_meant) ||
+        (fail_from && atomic_load(&fake.frames_begun) >= fail_from)) {
         atomic_fetch_sub(&fake.fail_steps, 1);
         error_set(error, (enum error_kind)atomic_load(&fake.fail_kind), "fake", "as the test wants");
         return FRAME_FAILED;
@@ -288,7 +294,9 @@ static inline struct engine *start(struct engine_options options)
 {
     atomic_store(&fake.gate_open, false);
     atomic_store(&fake.gate_seed, 0);
+    atomic_store(&fake.step_us, 0);
     atomic_store(&fake.fail_steps, 0);
+    atomic_store(&fake.fail_seed, 0);
     atomic_store(&fake.fail_from_frame, 0);
     atomic_store(&fake.no_device, false);
     atomic_store(&fake.step_count, 0);

@@ -5,6 +5,8 @@
 
 #include "lib/scene.h"
 
+#include "protocol/sealed_link.h"
+
 #include <poll.h>
 #include <pthread.h>
 #include <setjmp.h>
@@ -23,7 +25,8 @@ struct daemon {
     pthread_t thread;
     void (*play)(struct daemon *daemon);
     char folder[64], path[96], address[112];
-    uint8_t in[FRAMING_MESSAGE_MAX_BYTES];
+    struct sealed_link *link; /* NULL: nothing is sealed */
+    uint8_t in[FRAMING_MESSAGE_MAX_BYTES + SEALED_PLAIN_MAX_BYTES];
     size_t in_bytes;
     uint8_t scratch_data[SCRATCH_BYTES];
     struct scratch scratch;
@@ -31,8 +34,44 @@ struct daemon {
 
 static struct fl_error error;
 
+static inline void put_plainly(struct daemon *daemon, const void *bytes, size_t count)
+{
+    if (send(daemon->fd, bytes, count, MSG_NOSIGNAL) != (ssize_t)count)
+        shutdown(daemon->fd, SHUT_RDWR);
+}
+
+/* What waits in the link. */
+static inline void put_link(struct daemon *daemon)
+{
+    size_t count;
+    const uint8_t *bytes = sealed_link_waiting(daemon->link, &count);
+    if (bytes != NULL)
+        put_plainly(daemon, bytes, count);
+    sealed_link_sent(daemon->link, count);
+}
+
+/* Answers what belongs to the link itself, and opens what has come. */
+static inline bool more_sealed(struct daemon *daemon)
+{
+    struct decode_error why;
+    size_t room, opened = 0;
+    uint8_t *space = sealed_link_space(daemon->link, &room);
+    const ssize_t got = recv(daemon->fd, space, room, 0);
+    sealed_link_came(daemon->link, got > 0 ? (size_t)got : 0);
+    enum sealed_result result = sealed_link_handshake(daemon->link, &why);
+    if (result == SEALED_REFUSED)
+        sealed_link_refuse(daemon->link);
+    put_link(daemon);
+    for (; result == SEALED_CONSUMED; daemon->in_bytes += opened)
+        result = sealed_link_open(daemon->link, daemon->in + daemon->in_bytes,
+                                  sizeof daemon->in - daemon->in_bytes, &opened, &why);
+    return got > 0 && result != SEALED_REFUSED && result != SEALED_FATAL;
+}
+
 static inline bool more(struct daemon *daemon)
 {
+    if (daemon->link != NULL)
+        return more_sealed(daemon);
     const ssize_t got = recv(daemon->fd, daemon->in + daemon->in_bytes, sizeof daemon->in - daemon->in_bytes, 0);
     daemon->in_bytes += got > 0 ? (size_t)got : 0;
     return got > 0;
@@ -46,8 +85,13 @@ static inline void used(struct daemon *daemon, size_t count)
 
 static inline void put(struct daemon *daemon, const void *bytes, size_t count)
 {
-    if (send(daemon->fd, bytes, count, MSG_NOSIGNAL) != (ssize_t)count)
-        shutdown(daemon->fd, SHUT_RDWR);
+    const uint8_t *next = bytes;
+    if (daemon->link == NULL)
+        put_plainly(daemon, bytes, count);
+    for (size_t sealed; daemon->link != NULL && count > 0; next += sealed, count -= sealed) {
+        sealed = sealed_link_seal(daemon->link, next, count);
+        put_link(daemon);
+    }
 }
 
 static inline void greet(struct daemon *daemon)
@@ -127,6 +171,7 @@ static inline void stop(struct daemon *daemon)
     close(daemon->listener);
     unlink(daemon->path);
     rmdir(daemon->folder);
+    sealed_link_destroy(daemon->link);
     free(daemon);
 }
 

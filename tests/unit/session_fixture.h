@@ -383,6 +383,15 @@ static inline int tear_down(void **state)
     return 0;
 }
 
+/* Open and sealed, and both with whole calls and with calls that are cut short. */
+/* clang-format off */
+#define BOTH(test)                                                                                                \
+    cmocka_unit_test_setup_teardown(test, set_up, tear_down),                                                     \
+    {#test " (calls cut short)", test, set_up_with_faults, tear_down, NULL},                                      \
+    {#test " (sealed)", test, set_up_sealed, tear_down, NULL},                                                    \
+    {#test " (sealed, calls cut short)", test, set_up_sealed_with_faults, tear_down, NULL}
+/* clang-format on */
+
 /* ---- steps ------------------------------------------------------------------------------------------- */
 
 static inline void open_scene(uint32_t request, uint32_t scene)

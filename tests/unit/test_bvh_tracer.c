@@ -334,7 +334,7 @@ static void detail_that_a_grid_cannot_tell_apart_is_walked_in_floats(void **stat
 }
 
 /* Eight neighbours at a time are `spread` radians from one direction, and begin at one point. */
-static uint32_t rays_together(struct fixture *fixture, float spread)
+static uint32_t rays_together(struct fixture *fixture, float spread, uint32_t first_ray, uint32_t *chosen)
 {
     struct error error = {0};
     struct gpu_buffer buffer = {0};
@@ -345,7 +345,8 @@ static uint32_t rays_together(struct fixture *fixture, float spread)
             rays[k] = make_ray(0, 0, 20, 0.5f + test_uniform(&seed, -spread, spread),
                                0.5f + test_uniform(&seed, -spread, spread), -1);
     expect_ok(gpu_buffer_upload(device, &buffer, rays, RAY_COUNT * sizeof(struct ray), &error), &error);
-    const struct wave wave = {.ray_count = RAY_COUNT, .rays = &buffer};
+    const struct wave wave = {
+        .ray_count = RAY_COUNT, .first_ray = first_ray, .end_ray = RAY_COUNT, .chosen = chosen, .rays = &buffer};
     uint32_t together = bvh_rays_together((struct bvh *)fixture->tracer, &fixture->gpu, &wave, &error);
     expect_ok(together > 0, &error);
     gpu_buffer_finish(device, &buffer);
@@ -358,8 +359,22 @@ static void rays_walk_together_where_neighbours_go_the_same_way(void **state)
     (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_instances(), NULL);
-    assert_int_equal(rays_together(&fixture, 0.002f), device->facts.software ? 8 : 1);
-    assert_int_equal(rays_together(&fixture, 0.4f), 1);
+    assert_int_equal(rays_together(&fixture, 0.002f, 0, NULL), device->facts.software ? 8 : 1);
+    assert_int_equal(rays_together(&fixture, 0.4f, 0, NULL), 1);
+    fixture_finish(&fixture);
+}
+
+static void parts_of_a_wave_walk_as_its_first_part_did_whatever_was_traced_in_between(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    uint32_t chosen[2] = {0};
+    fixture_init(&fixture, scene_of_instances(), NULL);
+    uint32_t close = rays_together(&fixture, 0.002f, 0, &chosen[0]),
+             apart = rays_together(&fixture, 0.4f, 0, &chosen[1]);
+    /* What is left of either is as the other one was: it is not looked at. */
+    assert_int_equal(rays_together(&fixture, 0.4f, WAVE_PART_RAYS, &chosen[0]), close);
+    assert_int_equal(rays_together(&fixture, 0.002f, WAVE_PART_RAYS, &chosen[1]), apart);
     fixture_finish(&fixture);
 }
 
@@ -397,6 +412,7 @@ int main(void)
         cmocka_unit_test(transforms_behind_the_origin_and_around_it_are_entered),
         cmocka_unit_test(detail_that_a_grid_cannot_tell_apart_is_walked_in_floats),
         cmocka_unit_test(rays_walk_together_where_neighbours_go_the_same_way),
+        cmocka_unit_test(parts_of_a_wave_walk_as_its_first_part_did_whatever_was_traced_in_between),
         cmocka_unit_test(rays_beside_one_that_is_no_number_hit_as_by_brute_force),
         cmocka_unit_test(a_number_of_rays_that_cannot_walk_together_is_refused),
     };

@@ -135,6 +135,54 @@ static void idle_scenes_give_way_when_device_memory_runs_out(void **state)
     stop(engine);
 }
 
+static struct engine_command *seeded(uint64_t client, uint32_t seed)
+{
+    struct engine_command *made = render(client, seed, 0, 0);
+    made->job.frame.seed = seed;
+    return made;
+}
+
+static void a_frame_for_which_there_is_no_memory_waits_until_others_have_ended(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    for (uint64_t client = 1; client <= 3; client++)
+        open_scene(engine, client, 1);
+    submit(engine, gated(seeded(1, 11)));
+    wait_until(&fake.frames_begun, 1);
+    atomic_store(&fake.fail_kind, ERROR_OUT_OF_MEMORY);
+    atomic_store(&fake.fail_seed, 12);
+    atomic_store(&fake.fail_steps, 1);
+    submit(engine, seeded(2, 12));
+    wait_until(&fake.frames_begun, 2);
+    expect_silence(engine); /* it is neither failed nor begun again */
+    submit(engine, seeded(3, 13));
+    expect_silence(engine); /* nobody overtakes it */
+    assert_int_equal(atomic_load(&fake.frames_begun), 2);
+    atomic_store(&fake.fail_steps, 1); /* once more alone: what the first one has is idle by then */
+    atomic_store(&fake.gate_open, true);
+    take_frame(engine, 1, 11, 0);
+    expect_done(engine, 1, 11);
+    for (int i = 0; i < 4; i++) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        assert_true(event->kind == ENGINE_FRAME || event->kind == ENGINE_DONE);
+        assert_true(event->client == 2 || event->client == 3);
+        engine_event_destroy(event);
+    }
+    assert_int_equal(atomic_load(&fake.frames_begun), 5);
+    assert_int_equal(atomic_load(&fake.scenes), 2);
+    /* Alone on the device, and nothing is left to make room. */
+    for (uint64_t client = 1; client <= 3; client += 2) {
+        submit(engine, command(ENGINE_SCENE_CLOSE, client, 20));
+        expect_done(engine, client, 20);
+    }
+    atomic_store(&fake.fail_steps, 1);
+    submit(engine, seeded(2, 12));
+    expect_failed(engine, 2, 12, ERROR_OUT_OF_MEMORY, "fake");
+    stop(engine);
+}
+
 static void without_a_device_there_is_no_engine(void **state)
 {
     (void)state;
@@ -240,6 +288,7 @@ int main(void)
         cmocka_unit_test(a_device_that_is_lost_again_and_again_ends_the_job),
         cmocka_unit_test(edits_that_waited_for_a_lost_frame_are_applied),
         cmocka_unit_test(idle_scenes_give_way_when_device_memory_runs_out),
+        cmocka_unit_test(a_frame_for_which_there_is_no_memory_waits_until_others_have_ended),
         cmocka_unit_test(without_a_device_there_is_no_engine),
         cmocka_unit_test(a_full_queue_is_told_and_nothing_is_lost),
         cmocka_unit_test(stats_add_up),

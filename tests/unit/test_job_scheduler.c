@@ -20,7 +20,8 @@ struct simulation {
     uint32_t weights[JOBS_MAX];
     uint64_t slice_ns[JOBS_MAX];
     uint64_t had_ns[JOBS_MAX], waited_ns[JOBS_MAX], longest_wait_ns[JOBS_MAX];
-    size_t count;
+    bool keeps_turn[JOBS_MAX]; /* as it has begun something */
+    size_t count, before;
     uint64_t now_ns;
 };
 
@@ -36,11 +37,15 @@ static size_t add(struct simulation *simulation, size_t client, uint32_t weight,
 
 static size_t serve(struct simulation *simulation)
 {
-    size_t picked = schedule_pick(&simulation->scheduler, simulation->entries, simulation->count);
+    size_t picked = simulation->before;
+    if (!simulation->keeps_turn[picked] || !schedule_turn_lasts(&simulation->scheduler))
+        picked = schedule_pick(&simulation->scheduler, simulation->entries, simulation->count);
     if (picked == SCHEDULE_NONE)
         return picked;
     uint64_t slice_ns = simulation->slice_ns[picked];
-    schedule_charge(&simulation->scheduler, &simulation->entries[picked], slice_ns, simulation->weights[picked]);
+    schedule_charge(&simulation->scheduler, simulation->entries[picked].client, simulation->entries[picked].job,
+                    slice_ns, simulation->weights[picked]);
+    simulation->before = picked;
     simulation->now_ns += slice_ns;
     simulation->had_ns[picked] += slice_ns;
     simulation->waited_ns[picked] = 0;
@@ -254,7 +259,7 @@ static void a_frame_that_is_looked_at_is_finished_before_another_is_begun(void *
     struct simulation simulation = {0};
     for (size_t i = 0; i < 3; i++) {
         add(&simulation, i, 4, 2 * MS);
-        simulation.entries[i].keeps_turn = true;
+        simulation.keeps_turn[i] = true;
     }
     size_t batch = add(&simulation, 3, 1, 2 * MS);
     /* Frames of four slices; of a next one nothing is begun when one is done. */
@@ -262,10 +267,10 @@ static void a_frame_that_is_looked_at_is_finished_before_another_is_begun(void *
         size_t now = serve(&simulation);
         assert_true(now != before || now == batch);
         if (before != batch)
-            simulation.entries[before].keeps_turn = true;
+            simulation.keeps_turn[before] = true;
         for (int slice = 1; slice < 4 && now != batch; slice++)
             assert_int_equal(serve(&simulation), now);
-        simulation.entries[now].keeps_turn = false;
+        simulation.keeps_turn[now] = false;
         before = now;
     }
     for (size_t i = 0; i < 3; i++) {
@@ -280,11 +285,47 @@ static void a_long_frame_does_not_keep_the_turn_for_ever(void **state)
     (void)state;
     struct simulation simulation = {0};
     size_t heavy = add(&simulation, 0, 1, 3 * MS), light = add(&simulation, 1, 1, 3 * MS);
-    simulation.entries[heavy].keeps_turn = true;
+    simulation.keeps_turn[heavy] = true;
     serve_for(&simulation, 3000 * MS);
     expect_had(&simulation, heavy, 1500 * MS);
     expect_had(&simulation, light, 1500 * MS);
-    assert_true(simulation.longest_wait_ns[light] <= SCHEDULE_TURN_NS + 3 * MS);
+    assert_true(simulation.longest_wait_ns[light] <= SCHEDULE_TURN_NS + 2 * SCHEDULE_TURN_EACH_NS + 3 * MS);
+}
+
+static void who_had_a_very_long_slice_does_not_pay_for_it_for_ever(void **state)
+{
+    (void)state;
+    struct simulation simulation = {0};
+    for (size_t i = 0; i < JOBS_MAX; i++)
+        add(&simulation, i, 1, 5 * MS);
+    serve_for(&simulation, 1000 * MS);
+    size_t first = 3;
+    simulation.slice_ns[first] = 5000 * MS; /* programs are compiled, a large scene is built */
+    while (serve(&simulation) != first)
+        continue;
+    simulation.slice_ns[first] = 5 * MS;
+    memset(simulation.longest_wait_ns, 0, sizeof simulation.longest_wait_ns);
+    memset(simulation.waited_ns, 0, sizeof simulation.waited_ns);
+    serve_for(&simulation, 10000 * MS);
+    /* Of so many, two turns of each; and one round, as the others were not alike far either. */
+    uint64_t turn_ns = SCHEDULE_TURN_NS + JOBS_MAX * (uint64_t)SCHEDULE_TURN_EACH_NS;
+    assert_true(simulation.longest_wait_ns[first] <= JOBS_MAX * (2 * turn_ns + 5 * MS));
+    assert_true(simulation.longest_wait_ns[first] >= SCHEDULE_WAIT_MAX_NS);
+}
+
+static void short_frames_come_as_often_as_they_are_due_beside_many_long_ones(void **state)
+{
+    (void)state;
+    struct simulation simulation = {0};
+    size_t light = add(&simulation, 0, 1, 2 * MS);
+    for (size_t i = 1; i < JOBS_MAX; i++)
+        simulation.keeps_turn[add(&simulation, i, 1, 3 * MS)] = true;
+    uint32_t frames = 0;
+    while (simulation.now_ns < 20000 * MS)
+        frames += serve(&simulation) == light;
+    /* A 64th of the time, in frames of 2 ms. */
+    assert_true(frames >= 20000 / 64 / 2 * 9 / 10);
+    expect_had(&simulation, light, frames * 2 * MS);
 }
 
 int main(void)
@@ -303,6 +344,8 @@ int main(void)
         cmocka_unit_test(many_clients_are_all_served),
         cmocka_unit_test(a_frame_that_is_looked_at_is_finished_before_another_is_begun),
         cmocka_unit_test(a_long_frame_does_not_keep_the_turn_for_ever),
+        cmocka_unit_test(who_had_a_very_long_slice_does_not_pay_for_it_for_ever),
+        cmocka_unit_test(short_frames_come_as_often_as_they_are_due_beside_many_long_ones),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -299,7 +299,7 @@ static void makes_frames_fit_the_link(void **state)
     assert_true(frames_per_second > 27.0); /* of 30 */
     assert_true(advice.scale_eighths < PACING_SCALE_FULL);
     assert_true(advice.quality >= PACING_QUALITY_LEAST);
-    assert_true(advice.bytes <= 10e6 / 8 / 30);
+    assert_true((double)advice.bytes <= 10e6 / 8 / 30);
     /* A better link: better frames, and not more than were asked for. */
     link.bytes_per_ns *= 20;
     advice = follow(&pacing, &link, &now_ns, 5 * MS, 150000, 600);

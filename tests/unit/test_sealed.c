@@ -752,13 +752,14 @@ static void a_link_takes_little_memory_until_the_peer_is_known(void **state)
     struct decode_error error = {0};
     size_t bytes;
     assert_non_null(link);
-    memset(sealed_link_space(link, &bytes), 'S', 1);
+    *sealed_link_space(link, &bytes) = 'S';
     assert_true(bytes <= 1024);
     sealed_link_came(link, 1);
     assert_int_equal(sealed_link_handshake(link, &error), SEALED_NEED_MORE);
     assert_int_equal(sealed_link_room(link), 0);
     assert_false(sealed_link_seal_last(link));
-    memset(sealed_link_space(link, &bytes), 'S', bytes);
+    uint8_t *space = sealed_link_space(link, &bytes);
+    memset(space, 'S', bytes);
     sealed_link_came(link, bytes);
     assert_int_equal(sealed_link_handshake(link, &error), SEALED_FATAL);
     assert_int_equal(error.code, PROTOCOL_ERROR_CODE_PROTOCOL);

@@ -532,6 +532,30 @@ static void a_cancelled_job_has_one_answer_and_nothing_follows_it(void **state)
 }
 
 /* Cancelled in the middle of its frames: pieces may be in the socket, nothing comes after the answer. */
+static void a_job_whose_credit_is_used_up_is_told_so_once(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = render_message(2, 2);
+    send_message(2, 0, &message);
+    expect_frame(2, 0);
+    expect_frame(2, 1);
+    for (unsigned i = 0; !client.blocked && i < 200; i++) {
+        expect_alive(9);
+        usleep(10000);
+    }
+    assert_string_equal(client.blocked_text, "the credit is used up");
+    usleep(250000);
+    expect_alive(9);
+    assert_int_equal(client.blocked, 1);
+    message = made(MESSAGE_CREDIT);
+    message.credit.channel = 2;
+    message.credit.total = 3;
+    send_message(0, 0, &message);
+    expect_frame(2, 2);
+    expect(MESSAGE_OK, 2);
+}
+
 static void a_job_cancelled_while_it_sends_ends_at_its_answer(void **state)
 {
     (void)state;
@@ -1329,15 +1353,6 @@ static void a_wrong_key_is_answered_after_a_while(void **state)
     assert_false(receive_sealed());
 }
 
-/* Open and sealed, and both with whole calls and with calls that are cut short. */
-/* clang-format off */
-#define BOTH(test)                                                                                                \
-    cmocka_unit_test_setup_teardown(test, set_up, tear_down),                                                     \
-    {#test " (calls cut short)", test, set_up_with_faults, tear_down, NULL},                                      \
-    {#test " (sealed)", test, set_up_sealed, tear_down, NULL},                                                    \
-    {#test " (sealed, calls cut short)", test, set_up_sealed_with_faults, tear_down, NULL}
-/* clang-format on */
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -1355,6 +1370,7 @@ int main(void)
         BOTH(blob_data_on_another_channel_ends_the_connection),
         BOTH(frames_come_whole_in_order_and_as_far_as_credit_goes),
         BOTH(a_cancelled_job_has_one_answer_and_nothing_follows_it),
+        BOTH(a_job_whose_credit_is_used_up_is_told_so_once),
         BOTH(a_job_cancelled_while_it_sends_ends_at_its_answer),
         BOTH(a_job_that_cannot_be_is_refused_by_its_field),
         BOTH(skins_clips_and_channels_become_edits),

@@ -670,10 +670,6 @@ static void views_have_room_for_their_frames_or_are_refused(void **state)
     expect_told_start(5, JOB_VIEW);
 }
 
-#define BOTH(name)                                                                                                \
-    cmocka_unit_test_setup_teardown(name, set_up, tear_down),                                                     \
-        cmocka_unit_test_setup_teardown(name, set_up_with_faults, tear_down)
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {

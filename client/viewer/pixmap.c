@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-#include "viewer/picture.h"
+#include "viewer/pixmap.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-bool picture_resize(struct picture *picture, int width, int height, struct fl_error *error)
+bool pixmap_resize(struct pixmap *picture, int width, int height, struct fl_error *error)
 {
     picture->version++;
     if (picture->width == width && picture->height == height)
         return true;
     const uint64_t version = picture->version;
-    picture_finish(picture);
+    pixmap_finish(picture);
     picture->version = version;
     picture->pixels = malloc((size_t)width * (size_t)height * 4);
     if (picture->pixels == NULL)
@@ -20,11 +20,11 @@ bool picture_resize(struct picture *picture, int width, int height, struct fl_er
     return true;
 }
 
-void picture_take(struct picture *picture, struct fl_frame *frame)
+void pixmap_take(struct pixmap *picture, struct fl_frame *frame)
 {
     const uint64_t version = picture->version + 1;
-    picture_finish(picture);
-    *picture = (struct picture){
+    pixmap_finish(picture);
+    *picture = (struct pixmap){
         .width = (int)frame->width, .height = (int)frame->height, .pixels = frame->pixels, .version = version};
     frame->pixels = NULL;
     uint8_t *pixel = picture->pixels;
@@ -37,16 +37,16 @@ void picture_take(struct picture *picture, struct fl_frame *frame)
     }
 }
 
-bool picture_copy(struct picture *to, const struct picture *from, struct fl_error *error)
+bool pixmap_copy(struct pixmap *to, const struct pixmap *from, struct fl_error *error)
 {
-    if (!picture_resize(to, from->width, from->height, error))
+    if (!pixmap_resize(to, from->width, from->height, error))
         return false;
     memcpy(to->pixels, from->pixels, (size_t)from->width * (size_t)from->height * 4);
     return true;
 }
 
-void picture_finish(struct picture *picture)
+void pixmap_finish(struct pixmap *picture)
 {
     free(picture->pixels);
-    *picture = (struct picture){0};
+    *picture = (struct pixmap){0};
 }

@@ -1,0 +1,282 @@
+/* SPDX-License-Identifier: MIT */
+#include "session/job_terms.h"
+
+#include "session/jobs.h"
+#include "session/session.h"
+#include "session/tracer_settings.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* More frames than this need not wait here: the engine renders the next ones meanwhile. */
+#define WINDOW_FRAMES_MAX 4
+#define ZSTD_LEVEL_MAX 19
+/* Of the 4 GiB that a frame_begin may announce; the rest is left to what zstd adds to noise. */
+#define FRAME_BYTES_MAX (UINT64_C(4080) << 20)
+#define BEAUTY_ALONE (1u << PROTOCOL_LAYER_BEAUTY)
+#define WEIGHT_OF_VIEW 4 /* somebody waits for each of its frames */
+#define WEIGHT_OF_BATCH 1
+
+static uint32_t bytes_per_pixel(enum protocol_pixel_format format)
+{
+    switch (format) {
+    case PROTOCOL_PIXEL_FORMAT_RGBA8:
+        return 4;
+    case PROTOCOL_PIXEL_FORMAT_RGBA16F:
+        return 8;
+    case PROTOCOL_PIXEL_FORMAT_RGBA32F:
+    case PROTOCOL_PIXEL_FORMAT_COUNT:
+        break;
+    }
+    return 16;
+}
+
+/* ---- checks ------------------------------------------------------------------------------------------ */
+
+static uint64_t frame_bytes_of(const struct message_render *render)
+{
+    uint32_t layers = render->layers ? render->layers : BEAUTY_ALONE;
+    return (uint64_t)render->width * render->height * bytes_per_pixel(render->format) *
+           (uint64_t)__builtin_popcount(layers);
+}
+
+static bool check_layers(const struct message_render *render, struct error *error)
+{
+    if (!render->layers || render->layers == BEAUTY_ALONE)
+        return true;
+    if (render->kind == PROTOCOL_JOB_KIND_VIEW) {
+        error_set(error, ERROR_UNSUPPORTED, "render.layers", "a view shows the picture alone");
+        return error_remedy(error, "a batch of one frame has layers; a view may have attachments");
+    }
+    if (render->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || render->encoding == PROTOCOL_ENCODING_JPEG) {
+        error_set(error, ERROR_UNSUPPORTED, "render.layers", "%s in %s carries the beauty alone",
+                  protocol_pixel_format_text(render->format), protocol_encoding_text(render->encoding));
+        return error_remedy(error, "layers need the format rgba32f and the encoding raw, zstd or predicted");
+    }
+    if (frame_bytes_of(render) > FRAME_BYTES_MAX) {
+        error_set(error, ERROR_LIMIT, "render.layers", "frames of %" PRIu64 " bytes, the limit is %" PRIu64,
+                  frame_bytes_of(render), FRAME_BYTES_MAX);
+        return error_remedy(error, "ask for fewer layers, or for a smaller picture");
+    }
+    return true;
+}
+
+struct job *job_replaced_by(const struct session *session, const struct message_render *render)
+{
+    struct job *job = jobs_find(session, render->channel);
+    return render->kind == PROTOCOL_JOB_KIND_VIEW && job && job->view && !job->cancelled ? job : NULL;
+}
+
+static bool check_limits(const struct session *session, const struct message_render *render, struct error *error)
+{
+    const struct session_limits *limits = &session->hub->options.limits;
+    if (render->width > limits->width_pixels || render->height > limits->height_pixels)
+        error_set(error, ERROR_LIMIT, "render.width", "%u x %u pixels, the limit is %u x %u", render->width,
+                  render->height, limits->width_pixels, limits->height_pixels);
+    else if (render->samples > limits->samples)
+        error_set(error, ERROR_LIMIT, "render.samples", "%u, the limit is %u", render->samples, limits->samples);
+    if (error->kind == ERROR_LIMIT)
+        return error_remedy(error, "ask for less, or raise [limits] in the daemon's configuration");
+    if (session->job_count >= limits->jobs_per_client && !job_replaced_by(session, render)) {
+        error_set(error, ERROR_LIMIT, "render", "%u jobs are running, the limit", session->job_count);
+        error_remedy(error, "wait for one to end, or cancel it");
+        error->retryable = true;
+        return false;
+    }
+    return true;
+}
+
+uint64_t job_window(const struct session *session, const struct message_render *render)
+{
+    uint64_t window = session->hub->options.limits.frame_window_bytes / frame_bytes_of(render);
+    return window < 1 ? 1 : window > WINDOW_FRAMES_MAX ? WINDOW_FRAMES_MAX : window;
+}
+
+uint64_t job_bytes(const struct session *session, const struct message_render *render)
+{
+    uint64_t frame_bytes = frame_bytes_of(render);
+    uint64_t in_engine = ENGINE_FRAME_WINDOW_BYTES / frame_bytes;
+    uint64_t in_flight = session->hub->options.limits.frames_in_flight;
+    in_engine = in_engine < 1 ? 1 : in_engine < in_flight ? in_engine : in_flight;
+    return frame_bytes * (in_engine + job_window(session, render));
+}
+
+/* A job that has begun is never short of room for its next frame: there is room for it, or it does not begin. */
+static bool check_room(const struct session *session, const struct message_render *render, struct error *error)
+{
+    const struct hub *hub = session->hub;
+    const struct job *before = job_replaced_by(session, render);
+    uint64_t bytes = job_bytes(session, render), limit_bytes = hub->options.limits.frame_bytes;
+    uint64_t others_bytes = hub->frame_bytes - (before ? before->frame_bytes : 0);
+    if (!others_bytes || (others_bytes <= limit_bytes && bytes <= limit_bytes - others_bytes))
+        return true;
+    error_set(error, ERROR_BUSY, "render",
+              "frames of this job may take %" PRIu64 " bytes; running jobs may take %" PRIu64
+              ", the limit of all is %" PRIu64,
+              bytes, others_bytes, limit_bytes);
+    return error_remedy(error,
+                        "try again when jobs have ended, ask for smaller frames, or raise memory.frames in the "
+                        "daemon's configuration");
+}
+
+static bool check_camera(const struct message_render *render, struct error *error)
+{
+    if (render->camera_path == PROTOCOL_CAMERA_PATH_KEYS && !render->keys_count)
+        return error_set(error, ERROR_INVALID, "render.keys", "camera path keys needs at least one key");
+    if (render->camera_path == PROTOCOL_CAMERA_PATH_NODE && !render->camera_node)
+        return error_set(error, ERROR_INVALID, "render.camera_node", "camera path node needs a node");
+    for (uint32_t i = 1; i < render->keys_count; i++) {
+        if (!(render->keys[i].time_s > render->keys[i - 1].time_s))
+            return error_set(error, ERROR_INVALID, "render.keys",
+                             "key %u is at %g s, not after the one before at %g s", i,
+                             (double)render->keys[i].time_s, (double)render->keys[i - 1].time_s);
+    }
+    return true;
+}
+
+/* What is different with views. */
+static bool check_kind(const struct message_render *render, struct error *error)
+{
+    if (render->attachments)
+        return error_set(error, ERROR_UNSUPPORTED, "render.attachments", "this daemon attaches nothing to frames");
+    if (render->kind == PROTOCOL_JOB_KIND_BATCH) {
+        if (render->last_frame < render->first_frame)
+            return error_set(error, ERROR_INVALID, "render.last_frame", "%u is before the first frame %u",
+                             render->last_frame, render->first_frame);
+        return true;
+    }
+    if (encoder_supports((enum encoding)render->still_encoding, bytes_per_pixel(render->format)))
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "render.still_encoding", "%s does not carry %s",
+              protocol_encoding_text(render->still_encoding), protocol_pixel_format_text(render->format));
+    return error_remedy(error, "raw, zstd and predicted carry every format");
+}
+
+bool job_check(const struct session *session, const struct message_render *render, struct error *error)
+{
+    enum session_scene_state state = session_scene(session, render->scene);
+    if (state != SCENE_OPENING && state != SCENE_OPEN)
+        return error_set(error, ERROR_UNKNOWN_ID, "render.scene", "there is no scene %u", render->scene);
+    if (jobs_find(session, render->channel) && !job_replaced_by(session, render))
+        return error_set(error, ERROR_INVALID, "render.channel", "a running job has channel %u", render->channel);
+    if (!check_kind(render, error) || !check_layers(render, error))
+        return false;
+    if (!encoder_supports((enum encoding)render->encoding, bytes_per_pixel(render->format))) {
+        error_set(error, ERROR_UNSUPPORTED, "render.encoding", "%s does not carry %s",
+                  protocol_encoding_text(render->encoding), protocol_pixel_format_text(render->format));
+        return error_remedy(error, "raw, zstd and predicted carry every format");
+    }
+    bool has_level = render->encoding == PROTOCOL_ENCODING_ZSTD || render->encoding == PROTOCOL_ENCODING_PREDICTED;
+    if (has_level && render->quality > ZSTD_LEVEL_MAX)
+        return error_set(error, ERROR_INVALID, "render.quality", "%s has levels up to %u, not %u",
+                         protocol_encoding_text(render->encoding), ZSTD_LEVEL_MAX, render->quality);
+    return tracer_settings_check(render, error) && check_limits(session, render, error) &&
+           check_camera(render, error) && check_room(session, render, error);
+}
+
+/* ---- for the engine ---------------------------------------------------------------------------------- */
+
+static bool fill_clips(struct engine_job *job, const struct message_render *render)
+{
+    if (!render->clips_count)
+        return true;
+    job->clips = calloc(render->clips_count, sizeof *job->clips);
+    if (!job->clips)
+        return false;
+    job->clip_count = render->clips_count;
+    for (uint32_t i = 0; i < render->clips_count; i++) {
+        const struct record_clip_use *from = &render->clips[i];
+        job->clips[i] = (struct clip_use){from->clip, from->start_s, from->speed, from->loop != 0};
+    }
+    return true;
+}
+
+static bool fill_keys(struct engine_job *job, const struct message_render *render)
+{
+    if (!render->keys_count)
+        return true;
+    job->keys = calloc(render->keys_count, sizeof *job->keys);
+    if (!job->keys)
+        return false;
+    job->key_count = render->keys_count;
+    for (uint32_t i = 0; i < render->keys_count; i++) {
+        const struct record_camera_key *from = &render->keys[i];
+        struct camera_key *key = &job->keys[i];
+        key->time_s = from->time_s;
+        memcpy(key->eye_world, from->eye_world, sizeof key->eye_world);
+        memcpy(key->look_at_world, from->look_at_world, sizeof key->look_at_world);
+        memcpy(key->up_world, from->up_world, sizeof key->up_world);
+        key->fov_y = from->fov_y;
+    }
+    return true;
+}
+
+/* All but keys and clips, which are there already. */
+static void fill_rest(struct engine_job *job, const struct session *session, const struct message_render *render)
+{
+    bool is_view = render->kind == PROTOCOL_JOB_KIND_VIEW;
+    *job = (struct engine_job){
+        .keys = job->keys,
+        .key_count = job->key_count,
+        .clips = job->clips,
+        .clip_count = job->clip_count,
+        .kind = (enum job_kind)render->kind,
+        .scene = render->scene,
+        .first_frame = render->first_frame,
+        .last_frame = is_view ? UINT32_MAX : render->last_frame,
+        .frame_step = is_view ? 1 : render->frame_step,
+        .frames_per_second = render->frames_per_second,
+        .time_origin_frame = render->time_origin_frame,
+        .frame =
+            {
+                .width = render->width,
+                .height = render->height,
+                .samples = render->samples,
+                .depth = render->depth,
+                .seed = render->seed,
+                .tracer = render->tracer,
+                .tracer_options = tracer_settings(&session->hub->options.limits, render),
+                .integrator = (enum frame_integrator)render->integrator,
+                .primary = (enum frame_primary)render->primary,
+                .tone_map = (enum frame_tone_map)render->tone_map,
+                .format = (enum frame_format)render->format,
+                .exposure_stops = render->exposure_stops,
+                .aperture = render->aperture,
+                .focus = render->focus,
+                .filter = (enum frame_filter)render->pixel_filter,
+                .brdf = (enum frame_brdf)render->brdf,
+                .ao_distance = render->ao_distance,
+                .ao_falloff = render->ao_falloff,
+                .ao_rays = render->ao_rays,
+                .layer_opacity = render->layer_opacity,
+                .layers = render->layers,
+                .accumulate = render->accumulate != 0,
+                .compare = render->compare != 0,
+                .compare_with = render->compare_with,
+                .compare_far_share = render->compare_far,
+            },
+        .shutter = render->shutter,
+        .encoding = (enum encoding)render->encoding,
+        .quality = render->quality,
+        .path = (enum camera_path)render->camera_path,
+        .camera_node = render->camera_node,
+        .orbit_turn = render->orbit_turn,
+        .orbit_seconds = render->orbit_seconds,
+        .pass_samples = render->pass_samples ? render->pass_samples : 1,
+        .still_encoding = (enum encoding)render->still_encoding,
+        .weight = render->weight ? render->weight
+                  : is_view      ? WEIGHT_OF_VIEW
+                                 : WEIGHT_OF_BATCH,
+        .adapt = render->adapt != 0,
+        .attachments = render->attachments,
+    };
+}
+
+bool job_fill(struct engine_job *job, const struct session *session, const struct message_render *render)
+{
+    if (!fill_keys(job, render) || !fill_clips(job, render))
+        return false;
+    fill_rest(job, session, render);
+    return true;
+}

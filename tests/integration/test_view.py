@@ -1,0 +1,368 @@
+# SPDX-License-Identifier: MIT
+"""`farlight view`: the viewer without a window, driven by replays, and once in a real window under Xvfb."""
+import contextlib
+import json
+import math
+import os
+import pathlib
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import tempfile
+import threading
+import unittest
+
+from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, farlight, read_png
+
+SIZE = (320, 180)
+HIDE = [{"key": "o"}, {"key": "o"}]  # the overlay
+
+
+def rest(samples=1):
+    return {"wait": "rest", "samples": samples}
+
+
+def drag(x, y, right, down, **more):
+    return [{"mouse": "down", "button": "left", "x": x, "y": y, **more},
+            {"mouse": "move", "x": x + right / 2, "y": y + down / 2, "after": 0.02},
+            {"mouse": "move", "x": x + right, "y": y + down, "after": 0.02},
+            {"mouse": "up", "button": "left", "x": x + right, "y": y + down, "after": 0.02}]
+
+
+def distance(a, b):
+    return math.dist(a, b)
+
+
+def difference(a, b):
+    """Mean difference of two PNGs' colours, of 255."""
+    (width, height, rows_a, channels_a), (width_b, height_b, rows_b, channels_b) = read_png(a), read_png(b)
+    assert (width, height) == (width_b, height_b)
+    total = 0
+    for row_a, row_b in zip(rows_a, rows_b):
+        for channel in range(3):
+            total += sum(abs(x - y) for x, y in zip(row_a[channel::channels_a], row_b[channel::channels_b]))
+    return total / (3 * width * height)
+
+
+class Viewer(Case):
+    def start(self, events, *options, scene="teapot.glb", size=SIZE, environment=None):
+        path = self.folder / "replay.json"
+        path.write_text(json.dumps(events))
+        model = [bundled_scenes() / scene] if scene else []
+        command = [BIN / "farlight", "view", *model, "--replay", path, "--size", f"{size[0]}x{size[1]}",
+                   "--samples", "8", *options]
+        return subprocess.Popen(list(map(str, command)), cwd=self.folder, stdout=subprocess.PIPE,
+                                stderr=subprocess.PIPE, text=True, env={**os.environ, **(environment or {})})
+
+    def end(self, process, status=0):
+        """Its states by name, as it ended."""
+        out, errors = process.communicate(timeout=TIMEOUT_S)
+        self.assertEqual(process.returncode, status, f"\nstdout: {out}\nstderr: {errors}")
+        self.errors = errors
+        return {state["state"]: state for state in map(json.loads, out.splitlines())}
+
+    def replay(self, events, *options, status=0, **more):
+        return self.end(self.start(events, "--headless", *options, **more), status)
+
+
+class WithoutAWindow(Viewer):
+    def test_an_orbit_changes_the_picture_and_rest_refines_it(self):
+        states = self.replay([rest(1), {"state": "first"}, rest(4), {"state": "refined"}, *HIDE,
+                              {"screenshot": "before.png"}, *drag(160, 90, 60, 20), {"state": "dragged"}, rest(),
+                              {"state": "orbited"}, rest(8), {"state": "rested"}, {"screenshot": "after.png"}])
+        self.assertGreaterEqual(states["refined"]["samples"], 4)
+        self.assertGreater(states["refined"]["frames"], states["first"]["frames"])
+        self.assertLess(states["orbited"]["samples"], 8)  # another place begins from new
+        self.assertEqual(states["rested"]["samples"], 8)
+        for at in range(3):
+            self.assertEqual(states["first"]["look_at"][at], states["rested"]["look_at"][at])
+        self.assertAlmostEqual(distance(states["first"]["eye"], states["first"]["look_at"]),
+                               distance(states["rested"]["eye"], states["rested"]["look_at"]), 5)
+        self.assertGreater(distance(states["first"]["eye"], states["rested"]["eye"]), 1)
+        self.assertGreater(states["rested"]["latency_s"], 0)
+        self.assertGreater(difference(self.folder / "before.png", self.folder / "after.png"), 5)
+
+    def test_what_rests_is_the_picture_that_render_makes(self):
+        """Same camera, same samples, same random numbers: the view and a batch are one picture."""
+        self.replay([rest(8), *HIDE, {"screenshot": "view.png"}])
+        result = farlight("render", bundled_scenes() / "teapot.glb", "-q", "-o", self.folder / "render.png", "--size",
+                          f"{SIZE[0]}x{SIZE[1]}", "--samples", "8", "--integrator", "whitted", "--progressive")
+        self.expect(result, 0)
+        # Rounding in the order of the passes: a step of 8 bits here and there.
+        self.assertLess(difference(self.folder / "view.png", self.folder / "render.png"), 0.05)
+
+    def test_a_double_click_focuses_on_what_is_there(self):
+        click = [{"mouse": "down", "button": "left", "x": 250, "y": 100, "clicks": clicks} for clicks in (1, 2)]
+        states = self.replay([rest(), {"state": "before"}, click[0], {**click[0], "mouse": "up"}, click[1],
+                              {**click[1], "mouse": "up"}, rest(), {"state": "after"},
+                              {"mouse": "move", "x": 160, "y": 90}, {"key": "f"}, rest(), {"state": "again"}])
+        before, after, again = states["before"], states["after"], states["again"]
+        self.assertEqual(before["eye"], after["eye"])
+        self.assertGreater(distance(before["look_at"], after["look_at"]), 0.3)
+        self.assertGreater(after["look_at"][0], before["look_at"][0])  # to the right of the middle
+        self.assertIn("focus", after["notice"])
+        # It is in the middle now: focusing there changes nothing but rounding of single precision.
+        self.assertLess(distance(after["look_at"], again["look_at"]), 1e-4)
+
+    def test_keys_switch_tracer_integrator_exposure_and_tone_map(self):
+        states = self.replay([rest(), *HIDE, {"screenshot": "first.png"}, {"state": "first"}, {"key": "]"}, {"key": "]"},
+                              {"key": "]"}, rest(), {"state": "brighter"}, {"screenshot": "brighter.png"},
+                              {"key": "["}, {"key": "["}, {"key": "["}, {"key": "t", "shift": True}, rest(),
+                              {"state": "abuffer"}, {"key": "t"}, {"key": "i", "shift": True}, rest(), {"state": "path"},
+                              {"key": "i"}, {"key": "m"}, rest(), {"state": "back"}])
+        self.assertEqual([states[name]["tracer"] for name in ("first", "brighter", "abuffer", "path", "back")],
+                         ["bvh", "bvh", "abuffer", "bvh", "bvh"])
+        self.assertEqual([states[name]["integrator"] for name in ("first", "abuffer", "path", "back")],
+                         ["whitted", "whitted", "path", "whitted"])
+        self.assertAlmostEqual(states["brighter"]["exposure_stops"], 1, 5)
+        self.assertEqual(states["back"]["exposure_stops"], 0)
+        self.assertEqual([states["path"]["tone_map"], states["back"]["tone_map"]], ["neutral", "aces"])
+        means = [sum(map(sum, read_png(self.folder / name)[2])) for name in ("first.png", "brighter.png")]
+        self.assertGreater(means[1], means[0] * 1.1)
+
+    def test_the_error_map_is_black_where_the_tracer_is_exact(self):
+        states = self.replay([{"key": "x"}, rest(4), {"state": "bvh"}, *HIDE, {"screenshot": "bvh.png"}, {"key": "x"},
+                              rest(4), {"state": "off"}, {"key": "x"}, {"key": "t"}, {"key": "t"}, rest(4),
+                              {"state": "ldc"}])
+        self.assertEqual(states["ldc"]["tracer"], "ldc")
+        self.assertNotIn("errors", states["off"])
+        # The bvh differs from the reference by rounding alone; samples along axes do not.
+        self.assertLess(states["bvh"]["errors"]["mean"], 1e-4)
+        self.assertGreater(states["ldc"]["errors"]["mean"], 10 * states["bvh"]["errors"]["mean"])
+        rows, channels = read_png(self.folder / "bvh.png")[2:]
+        middle = rows[SIZE[1] // 2]
+        self.assertLess(max(middle[0::channels]), 64)
+
+    def test_cameras_and_clips_are_gone_through(self):
+        states = self.replay([rest(), {"state": "first"}, {"key": "v"}, {"state": "chosen"}, {"after": 0.5},
+                              {"key": "space"}, rest(), {"state": "paused"}, {"screenshot": "paused.png"},
+                              {"key": "right"}, rest(), {"state": "stepped"}, *drag(160, 90, 50, 0), {"key": "c"},
+                              rest(), {"state": "camera"}, {"key": "home"}, rest(), {"state": "home"}],
+                             scene="carousel.glb")
+        self.assertEqual(states["first"]["clip"], "")
+        self.assertEqual(states["chosen"]["clip"], "ride")
+        self.assertTrue(states["chosen"]["playing"])
+        self.assertFalse(states["paused"]["playing"])
+        self.assertGreater(states["paused"]["time_s"], 0)
+        self.assertAlmostEqual(states["stepped"]["time_s"], states["paused"]["time_s"] + 1 / 24, 4)
+        self.assertNotEqual(states["camera"]["camera"], "")
+        self.assertEqual(states["first"]["eye"], states["home"]["eye"])
+        self.assertEqual(states["home"]["camera"], "")
+
+    def test_keys_that_are_held_fly_and_the_wheel_goes_nearer(self):
+        states = self.replay([rest(), {"state": "first"}, {"key": "d", "hold": 0.3}, rest(), {"state": "right"},
+                              {"wheel": 3}, rest(), {"state": "near"}])
+        first, right, near = states["first"], states["right"], states["near"]
+        self.assertGreater(distance(first["eye"], right["eye"]), 0.1)
+        for at in range(3):
+            self.assertAlmostEqual(right["eye"][at] - first["eye"][at], right["look_at"][at] - first["look_at"][at], 5)
+        self.assertLess(distance(near["eye"], near["look_at"]), 0.8 * distance(right["eye"], right["look_at"]))
+
+    def test_the_window_may_change_its_size_and_pixels_their_number(self):
+        states = self.replay([rest(), {"resize": [200, 150]}, rest(), {"state": "small"}, {"screenshot": "small.png"},
+                              {"key": "-"}, rest(), {"state": "coarse"}, {"screenshot": "coarse.png"}, {"key": "="},
+                              rest(), {"state": "fine"}])
+        self.assertEqual([(states[name]["width"], states[name]["height"]) for name in ("small", "coarse", "fine")],
+                         [(200, 150), (100, 74), (200, 150)])
+        for name in ("small.png", "coarse.png"):
+            self.assertEqual(read_png(self.folder / name)[:2], (200, 150))
+
+    def test_what_is_waited_for_in_vain_is_told(self):
+        self.replay([{"wait": "lost", "timeout": 0.2}], status=1)
+        self.assertIn("event 0", self.errors)
+        self.replay([{"nothing": 1}], status=1)
+        self.assertIn("[0]", self.errors)
+
+    def test_wrong_usage_is_told(self):
+        scene = bundled_scenes() / "teapot.glb"
+        for arguments, part in (([], "MODEL"), ([scene, "--headless"], "--replay"), ([scene, "--scene", "a"], "--scene"),
+                                (["--scene", "a"], "--server"), ([scene, "--scale", "3"], "--scale"),
+                                ([scene, "--integrator", "x"], "--integrator"), ([scene, "--samples", "0"], "--samples"),
+                                ([scene, scene], "one model")):
+            result = self.expect(farlight("view", *arguments, env={**os.environ, "DISPLAY": ""}), 2)
+            self.assertIn(part, result.stderr)
+        self.assertEqual(farlight("view", "/nonexistent.glb", "--headless", "--replay", scene).returncode, 1)
+
+    def test_without_a_display_there_is_no_window(self):
+        environment = {name: value for name, value in os.environ.items()
+                       if name not in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")}
+        result = self.expect(farlight("view", bundled_scenes() / "teapot.glb", env=environment), 1)
+        self.assertIn("no display", result.stderr)
+
+    def test_help_lists_the_keys(self):
+        for arguments in (["view", "--help"], ["help", "view"]):
+            text = self.expect(farlight(*arguments), 0).stdout
+            for part in ("Shift+T", "next, previous tracer", "--replay", "--tracer", "Double click"):
+                self.assertIn(part, text)
+            self.assertNotIn("--output", text)
+
+
+class Relay:
+    """A socket before a daemon's that can be cut; counts what clients send."""
+
+    def __init__(self, target, path):
+        self.target, self.path = target, path
+        self.pairs, self.sent = [], 0
+
+    def __enter__(self):
+        self.listener = socket.socket(socket.AF_UNIX)
+        self.listener.bind(str(self.path))
+        self.listener.listen()
+        threading.Thread(target=self.accept, daemon=True).start()
+        return self
+
+    def accept(self):
+        while True:
+            try:
+                client = self.listener.accept()[0]
+            except OSError:
+                return
+            server = socket.socket(socket.AF_UNIX)
+            server.connect(str(self.target))
+            self.pairs.append((client, server))
+            threading.Thread(target=self.copy, args=(client, server, True), daemon=True).start()
+            threading.Thread(target=self.copy, args=(server, client, False), daemon=True).start()
+
+    def copy(self, source, target, counts):
+        try:
+            while data := source.recv(65536):
+                self.sent += len(data) * counts
+                target.sendall(data)
+        except OSError:
+            pass
+        for end in (source, target):
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+        source.close()
+
+    def cut(self):
+        """Ends what is connected; what clients have sent since the last cut."""
+        for pair in self.pairs:
+            for end in pair:
+                with contextlib.suppress(OSError):
+                    end.shutdown(socket.SHUT_RDWR)
+        self.pairs, sent, self.sent = [], self.sent, 0
+        return sent
+
+    def __exit__(self, *_):
+        self.listener.shutdown(socket.SHUT_RDWR)
+        self.listener.close()
+        self.cut()
+
+
+class OnADaemon(Viewer):
+    def test_a_daemon_that_comes_back_shows_the_scene_again(self):
+        events = [rest(), *drag(160, 90, 40, 10), rest(), {"state": "before"}, *HIDE, {"screenshot": "before.png"},
+                  {"wait": "lost"}, {"state": "lost"}, {"screenshot": "lost.png"}, {"wait": "live"}, rest(8),
+                  {"state": "after"}, {"screenshot": "after.png"}]
+        with Daemon() as first:
+            process = self.start(events, "--headless", "--server", first.address)
+            lines = []
+            for line in process.stdout:
+                lines.append(json.loads(line))
+                if lines[-1]["state"] == "before":
+                    break
+            while not (self.folder / "before.png").exists() and process.poll() is None:
+                pass
+            first.stop(signal.SIGKILL)
+            pathlib.Path(first.path).unlink(missing_ok=True)
+            with Daemon(listen=first.address):
+                out, errors = process.communicate(timeout=TIMEOUT_S)
+            self.assertEqual(process.returncode, 0, errors)
+        lines += map(json.loads, out.splitlines())
+        before, lost, after = lines
+        self.assertEqual([state["status"] for state in lines], ["live", "lost", "live"])
+        self.assertEqual([state["times_live"] for state in lines], [1, 1, 2])
+        self.assertEqual((before["eye"], before["look_at"]), (after["eye"], after["look_at"]))
+        # The picture stays while the connection is lost, with a word about it in its middle, and is made again.
+        rows = {name: read_png(self.folder / f"{name}.png")[2] for name in ("before", "lost")}
+        self.assertEqual(rows["before"][:30], rows["lost"][:30])
+        self.assertNotEqual(rows["before"][SIZE[1] // 2], rows["lost"][SIZE[1] // 2])
+        self.assertLess(difference(self.folder / "before.png", self.folder / "after.png"), 2)
+
+    def test_over_tcp_pictures_travel_encoded_and_rest_without_loss(self):
+        events = [rest(), *drag(160, 90, 40, 10), rest(8), *HIDE, {"screenshot": "tcp.png"}, {"state": "tcp"}]
+        with Daemon(listen="tcp:127.0.0.1:0") as daemon:
+            address = next(line for line in daemon.ready if "tcp:" in line).split()[-1]
+            self.replay(events, "--server", address)
+        states = self.replay([*events[:-2], {"screenshot": "private.png"}, {"state": "private"}])
+        self.assertEqual(states["private"]["samples"], 8)
+        self.assertEqual(difference(self.folder / "tcp.png", self.folder / "private.png"), 0)
+
+    def test_a_cut_connection_comes_back_to_the_scene_that_the_daemon_kept(self):
+        events = [rest(), {"state": "before"}, {"wait": "lost"}, {"wait": "live"}, rest(8), {"state": "after"},
+                  {"after": 1}]
+        with Daemon() as daemon, Relay(daemon.path, self.folder / "relay") as relay:
+            process = self.start(events, "--headless", "--server", f"unix:{self.folder}/relay")
+            self.assertIn("before", process.stdout.readline())
+            uploaded = relay.cut()
+            after = json.loads(process.stdout.readline())
+            stats = json.loads(self.expect(farlight("stats", "--json", "--server", daemon.address), 0).stdout)
+            self.end(process)
+            again = relay.cut()
+        self.assertEqual((after["status"], after["times_live"], after["samples"]), ("live", 2, 8))
+        self.assertEqual(len(stats["scenes"]), 1)
+        # Its blobs and edits did not travel a second time: cameras and questions are a few hundred bytes each.
+        self.assertGreater(uploaded, 100_000)
+        self.assertLess(again, 20_000)
+
+    def test_a_scene_that_is_up_is_come_to_by_its_name(self):
+        command = [BIN / "farlight", "serve", bundled_scenes() / "teapot.glb", "--name", "pot", "--listen",
+                   f"unix:{self.folder}/up"]
+        with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True) as server:
+            while "farlight view" not in (line := server.stdout.readline()):
+                self.assertNotEqual(line, "")
+            address = f"unix:{self.folder}/up"
+            states = self.replay([rest(8), {"state": "up"}], "--scene", "pot", "--server", address, scene=None)
+            self.replay([rest(8)], "--scene", "pan", "--server", address, scene=None, status=1)
+            server.send_signal(signal.SIGTERM)
+        self.assertEqual(states["up"]["samples"], 8)
+        self.assertIn("pan", self.errors)
+
+    def test_a_daemon_that_is_not_there_ends_the_viewer(self):
+        self.replay([rest()], "--server", f"unix:{self.folder}/nothing", status=1)
+        self.assertIn("nothing", self.errors)
+
+
+@unittest.skipUnless(shutil.which("Xvfb"), "no Xvfb")
+class InAWindow(Viewer):
+    def screen(self, folder):
+        """The screen's rows of red, green and blue, from Xvfb's file in the format of xwd."""
+        data = (folder / "Xvfb_screen0").read_bytes()
+        header = struct.unpack(">25I", data[:100])
+        offset, (width, height), stride = header[0] + header[19] * 12, header[4:6], header[12]
+        rows = []
+        for y in range(height):
+            row = data[offset + y * stride:offset + y * stride + width * 4]
+            rows.append(bytes(value for x in range(0, width * 4, 4) for value in (row[x + 2], row[x + 1], row[x])))
+        return width, height, rows
+
+    def test_the_window_shows_what_a_screenshot_shows(self):
+        frames = pathlib.Path(tempfile.mkdtemp(prefix="farlight-xvfb-"))
+        self.addCleanup(shutil.rmtree, frames, ignore_errors=True)
+        reading, writing = os.pipe()
+        xvfb = subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x24", "-fbdir",
+                                 frames, "-nolisten", "tcp"], pass_fds=[writing], stderr=subprocess.DEVNULL)
+        os.close(writing)
+        try:
+            with os.fdopen(reading) as numbers:
+                display = ":" + numbers.readline().strip()
+            events = [rest(8), *HIDE, {"screenshot": "memory.png"}, {"after": 0.5}, {"state": "shown"}, {"after": 60}]
+            process = self.start(events, environment={"DISPLAY": display, "SDL_VIDEODRIVER": "x11",
+                                                      "SDL_RENDER_DRIVER": "software"})
+            state = json.loads(process.stdout.readline() or "{}")
+            width, height, rows = self.screen(frames)
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=TIMEOUT_S)
+            self.assertEqual(process.returncode, 130, errors)
+        finally:
+            xvfb.terminate()
+            xvfb.wait()
+        self.assertEqual(state.get("samples"), 8, errors)
+        _, _, wanted, channels = read_png(self.folder / "memory.png")
+        self.assertEqual((width, height), SIZE)
+        differing = sum(row != bytes(value for x in range(0, len(want), channels) for value in want[x:x + 3])
+                        for row, want in zip(rows, wanted))
+        self.assertEqual(differing, 0)
