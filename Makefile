@@ -208,6 +208,8 @@ $(B)/tests/unit/test_load_model $(B)/tests/accuracy/test_abuffer_against_referen
 # Sessions live in a time of their own.
 SERVING_OBJ := $(call obj,$(addprefix tests/fuzz/,engine_recorder.c serving.c))
 SERVING_WRAP := -Wl,--wrap=clock_now_ns
+$(B)/tests/unit/test_session_faults: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
+$(B)/tests/unit/test_session_faults: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
 $(B)/tests/unit/test_viewer_camera: $(call obj,$(addprefix client/viewer/,camera.c input.c settings.c tour.c))
 $(B)/tests/unit/test_viewer_figures: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c))

@@ -194,7 +194,7 @@ void serving_begin(void)
                    .height_pixels = 512,
                    .samples = 64,
                    .blob_bytes = 1 << 20,
-                   .blob_cache_bytes = 64 << 10,
+                   .blob_cache_bytes = 0, /* what nobody uses is gone */
                    .upload_window_bytes = 512 << 10,
                    .frame_bytes = 32 << 20,
                    .frames_in_flight = 3,
@@ -227,6 +227,7 @@ void serving_check_empty(void)
     FUZZ_REQUIRE(serving_hub.unauthenticated == 0);
     FUZZ_REQUIRE(serving_hub.frame_bytes == 0);
     FUZZ_REQUIRE(serving_hub.waiting == NULL);
+    FUZZ_REQUIRE(blob_store_bytes(serving_hub.blobs) == 0);
     FUZZ_REQUIRE(recorder_jobs() == 0);
     FUZZ_REQUIRE(recorder_references() == 0);
 }

@@ -22,7 +22,7 @@ struct serving_client {
     uint64_t received_bytes;
     uint32_t answers[MESSAGE_FRAME_END +
                      1]; /* messages that came, by type; those that may be ignored are not counted */
-    uint32_t errors; /* set of enum protocol_error_code, as bits */
+    uint32_t errors;     /* set of enum protocol_error_code, as bits */
 };
 
 extern struct hub serving_hub;
