@@ -208,7 +208,8 @@ static void adapt(struct session_view *view, const struct engine_frame *frame)
         view->effort.bytes = advice.bytes;
     } else if (frame->encoding == view->terms.still_encoding) {
         double bytes_per_second = (double)pacing_bytes_per_second(&view->pacing);
-        view->effort.sparing = (double)frame->size_bytes * SECOND_NS > SPARING_NS * bytes_per_second;
+        if (bytes_per_second > 0.0)
+            view->effort.sparing = (double)frame->size_bytes * SECOND_NS > SPARING_NS * bytes_per_second;
     }
     view_wishes_set_effort(view->wishes, &view->effort);
 }
