@@ -228,7 +228,8 @@ void view_frame_made(struct job *job, const struct engine_frame *frame)
 bool view_is_outdated(const struct job *job, const struct engine_frame *frame)
 {
     const struct session_view *view = job->view;
-    return frame->key_frame && view->last_command > frame->command &&
+    /* Those of a stream are needed for the ones behind them. */
+    return frame->encoding != ENCODING_H264 && view->last_command > frame->command &&
            clock_now_ns() - frame->encoded_ns > view->terms.frame_ns + view->made_ns;
 }
 

@@ -277,9 +277,11 @@ static inline void expect_alive(uint32_t request)
     assert_int_equal(client.message.pong.sent_ns, 1234567);
 }
 
-static inline void greet(void)
+/* The capabilities that both have. */
+static inline uint64_t greet_with(uint64_t capabilities)
 {
-    struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "test"};
+    struct handshake_hello hello = {
+        .version_min = 1, .version_max = 1, .capabilities = capabilities, .name = "test"};
     uint8_t bytes[HANDSHAKE_HELLO_MAX_BYTES];
     send_bytes(bytes, handshake_hello_encode(bytes, &hello));
     struct handshake_reply reply;
@@ -289,6 +291,12 @@ static inline void greet(void)
         receive_some();
     assert_int_equal(reply.version, 1);
     assert_int_equal(reply.limits.requests_in_flight, 64);
+    return reply.capabilities;
+}
+
+static inline void greet(void)
+{
+    assert_int_equal(greet_with(0) & HANDSHAKE_CAN_H264, 0);
 }
 
 static inline void start(const struct connection_limits *connection_limits)
@@ -348,6 +356,15 @@ static inline int set_up(void **state)
     real = sys;
     start(&patient);
     greet();
+    return 0;
+}
+
+/* The test greets. */
+static inline int set_up_ungreeted(void **state)
+{
+    (void)state;
+    real = sys;
+    start(&patient);
     return 0;
 }
 

@@ -3,6 +3,8 @@
  * test has it say. */
 #include "session_fixture.h"
 
+#include "encode/stream.h"
+
 #include "base/clock.h"
 #include "base/queue.h"
 #include "job/view_wishes.h"
@@ -666,6 +668,48 @@ static void a_view_that_cannot_be_is_refused_by_its_field(void **state)
     expect_refused(5, &message, PROTOCOL_ERROR_CODE_INVALID, "render.channel");
 }
 
+static void video_needs_the_word_of_both_sides_and_a_view_of_8_bits(void **state)
+{
+    (void)state;
+    struct message message;
+    uint64_t both = greet_with(HANDSHAKE_CAN_H264 | (UINT64_C(1) << 63)); /* one that nobody knows yet */
+    if (!encoder_stream_supports(ENCODING_H264, 4)) {
+        print_message("skipped: no encoder of H.264 is here\n");
+        return;
+    }
+    assert_int_equal(both, HANDSHAKE_CAN_H264);
+    open_scene(1, 1);
+    message = view_message(1);
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
+    message.render.encoding = PROTOCOL_ENCODING_H264;
+    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.encoding");
+    message = made(MESSAGE_RENDER);
+    message.render.scene = 1;
+    message.render.channel = CHANNEL;
+    message.render.encoding = PROTOCOL_ENCODING_H264;
+    expect_refused(3, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.encoding");
+    assert_true(strlen(client.message.error.remedy) > 0);
+    message = view_message(1);
+    message.render.encoding = message.render.still_encoding = PROTOCOL_ENCODING_H264;
+    send_message(4, 0, &message);
+    struct engine_command *command = told(ENGINE_JOB_START);
+    assert_int_equal(command->job.encoding, ENCODING_H264);
+    engine_command_destroy(command);
+}
+
+static void video_without_the_word_for_it_is_refused(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = view_message(1);
+    message.render.encoding = PROTOCOL_ENCODING_H264;
+    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.encoding");
+    assert_true(strlen(client.message.error.remedy) > 0);
+    message = view_message(1);
+    message.render.still_encoding = PROTOCOL_ENCODING_H264;
+    expect_refused(3, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.still_encoding");
+}
+
 /* What frames of 512 x 512 may take: 7 of them, the limit is 10 MiB. */
 static void views_have_room_for_their_frames_or_are_refused(void **state)
 {
@@ -908,6 +952,9 @@ int main(void)
         BOTH(a_view_may_be_cancelled_while_another_takes_its_place),
         BOTH(a_client_that_vanishes_takes_its_view_along),
         BOTH(a_view_that_cannot_be_is_refused_by_its_field),
+        BOTH(video_without_the_word_for_it_is_refused),
+        cmocka_unit_test_setup_teardown(video_needs_the_word_of_both_sides_and_a_view_of_8_bits, set_up_ungreeted,
+                                        tear_down),
         BOTH(views_have_room_for_their_frames_or_are_refused),
         BOTH(whatever_happens_each_request_has_one_answer),
     };
