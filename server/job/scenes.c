@@ -259,6 +259,7 @@ static bool scene_add(struct engine *engine, const struct engine_command *comman
         free(scene);
         return false;
     }
+    scene->frames_ended = 1;
     scene->sharing = command->sharing;
     scene->principal = command->principal;
     struct engine_scene **place = &engine->scenes;
