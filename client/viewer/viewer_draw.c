@@ -116,7 +116,7 @@ void viewer_print_state(struct viewer *viewer, const char *name)
     viewer_hud(viewer, &state);
     metrics_summarise(&viewer->metrics, state.now_ns, &summary);
     json_t *line = json_pack(
-        "{s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, s:o, s:o, "
+        "{s:s, s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, s:o, s:o, "
         "s:f, "
         "s:f, s:f}",
         "state", name, "status", statuses[state.status], "tracer", protocol_tracer_text(viewer->frame.tracer),
