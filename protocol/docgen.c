@@ -101,7 +101,8 @@ static void print_sealed_messages(void)
         "messages that prove it and give the connection keys of its own; over a network it has to. Nobody on\n"
         "the way can then read or change what is said, repeat it, or cut off the end unnoticed. The handshake\n"
         "and all that follows travel in records as they would go over an open connection, cut anywhere.\n"
-        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`.\n\n",
+        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`. A daemon that lets\n"
+        "only sealed connections in answers the other handshake with version 0 and bit 2 of the capabilities.\n\n",
         SEALED_KEY_BYTES);
     printf("| message | from | bytes | layout |\n| ---: | --- | ---: | --- |\n"
            "| 1 | client | 72 | `SEAL`, u8 1, u8 version (%u), u16 0, X25519 public key (32), nonce (32) |\n"
@@ -141,6 +142,23 @@ static void print_sealed_keys(void)
         "that does not open, and one behind the last, end the connection. A daemon waits before it refuses a\n"
         "wrong key, and hears no keys for a while from an address that has sent too many.\n\n",
         SEALED_PLAIN_MAX_BYTES);
+}
+
+static void print_sealed_stream(void)
+{
+    printf(
+        "What crypto_secretstream_xchacha20poly1305 does, for who has no libsodium (ChaCha20 and Poly1305 of RFC\n"
+        "8439, HChaCha20 as in XChaCha20): k = HChaCha20 of K and bytes 0 to 15 of the header; n = its bytes 16 "
+        "to\n"
+        "23; a counter begins at 1. A push has the nonce u32 counter | n and takes, of ChaCha20 with k and it,\n"
+        "the first 32 bytes of block 0 as the key of Poly1305, block 1 for the tag with 63 zeros behind it, and\n"
+        "block 2 and on for the text. Poly1305 goes over the additional data, zeros up to a multiple of 16, the\n"
+        "64 sealed bytes of the tag, the sealed text, as many zeros as the text has bytes beyond a multiple of "
+        "16,\n"
+        "u64 bytes of additional data, u64 64 + bytes of text. The sealed bytes of the record are the first\n"
+        "sealed byte of the tag, the sealed text and those 16 bytes, of which the first 8 are then mixed into n "
+        "by\n"
+        "exclusive or; the counter goes up by 1. (After 2^32 - 1 records libsodium makes new keys.)\n\n");
 }
 
 static void print_framing(void)
@@ -264,6 +282,36 @@ static void print_message(const struct message_desc *desc)
     print_fields(body, 2);
 }
 
+static void print_predicted(void)
+{
+    printf(
+        "## The encoding `predicted`\n\n"
+        "One frame of Zstandard (RFC 8878). Unpacked it has as many bytes as the pixels, as planes one behind "
+        "the\n"
+        "other, of which there are as many as a pixel has bytes: plane b is for byte b of every pixel, rows from\n"
+        "the top, without gaps. Several layers are one picture of their common height.\n\n"
+        "What a plane has for a byte is that byte less its prediction, modulo 256. The prediction comes of three\n"
+        "bytes of the same plane: left of it (a), above it (b), and left of that (c); what lies outside the\n"
+        "picture is 0:\n\n"
+        "    c >= max(a, b): min(a, b)\n"
+        "    c <= min(a, b): max(a, b)\n"
+        "    else:           a + b - c\n\n"
+        "So a decoder goes through the rows from the top and from left to right, and adds what it finds to the\n"
+        "prediction that it makes of the bytes that it has restored.\n\n");
+}
+
+static void print_h264(void)
+{
+    printf(
+        "## The encoding `h264`\n\n"
+        "The frames of a view that have it are one stream, whatever others come between them: an access unit\n"
+        "each, in the byte stream format of ITU-T H.264 annex B, 4:2:0 with 8 bits, colours by BT.709 in the\n"
+        "limited range. Each gives its picture at once, as none needs a later one. A key frame is an IDR\n"
+        "picture with the parameter sets before it; the stream begins with one, one comes where frames change\n"
+        "their size, and otherwise only on request (`want_key_frame` of frame_ack). What is decoded has an even\n"
+        "width and height: where the frame's is odd, its last column or row is one too many.\n\n");
+}
+
 static bool copy_file(const char *path)
 {
     FILE *file = fopen(path, "r");
@@ -292,6 +340,7 @@ int main(int argument_count, char **arguments)
     print_handshake();
     print_sealed_messages();
     print_sealed_keys();
+    print_sealed_stream();
     print_framing();
     printf("## Enumerations\n\n");
     for (size_t i = 0; i < protocol_enum_count; i++) {
@@ -307,6 +356,8 @@ int main(int argument_count, char **arguments)
     for (size_t i = 0; i < protocol_message_count; i++) {
         print_message(&protocol_messages[i]);
     }
+    print_predicted();
+    print_h264();
     docgen_print_example();
     return ferror(stdout) || fflush(stdout) != 0 ? 1 : 0;
 }

@@ -36,7 +36,7 @@ _farlight()
         --primary) words="raster trace" ;;
         --scale) words="1 2 4 8" ;;
         --still-encoding) words="raw zstd predicted jpeg" ;;
-        --encoding) words="raw zstd jpeg" ;;
+        --encoding) words="raw zstd predicted jpeg" ;;
         --tone-map) words="neutral aces none" ;;
         --format) words="png jpeg exr hdr mp4 mkv y4m" ;;
         --layout) words="heat side" ;;

@@ -76,7 +76,7 @@ static bool complete_layers(struct cli_job *job)
     }
     if (wanted->encoding == PROTOCOL_ENCODING_JPEG) {
         cli_usage(job, "--encoding", "jpeg does not carry the layers of --layers");
-        return fl_error_remedy(&job->error, "choose raw or zstd");
+        return fl_error_remedy(&job->error, "choose raw, zstd or predicted");
     }
     if (bytes * (unsigned)__builtin_popcount(wanted->layers) > FRAME_BYTES_MAX) {
         cli_usage(job, "--layers", "so many layers of %ux%u pixels are more than a frame can have", wanted->width,

@@ -55,7 +55,7 @@ static const struct argp_option options[] = {
     {"primary", KEY_PRIMARY, "NAME", 0,
      "First hits: raster, trace (default: raster, but trace for the tracer reference)", 0},
     {"encoding", KEY_ENCODING, "NAME", 0,
-     "How pixels travel: raw, zstd, jpeg (default: raw on this machine, zstd over a network)", 0},
+     "How pixels travel: raw, zstd, predicted, jpeg (default: raw on this machine, zstd over a network)", 0},
     {"quality", KEY_QUALITY, "N", 0,
      "JPEG quality 1 to 100, zstd level 1 to 19, or rate factor of a video, 1 (best) to 51", 0},
     {NULL, 0, NULL, 0, "Light:", 5},

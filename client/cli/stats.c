@@ -174,7 +174,7 @@ static void print_table(const struct message_stats_reply *reply)
                mb(client->received_bytes), mb(client->bulk_bytes), mb(client->sent_bytes), client->requests,
                client->scenes);
     }
-    for (uint32_t i = 0; i < reply->scenes_count; i++) {
+    for (uint32_t i = 0; i < reply->scenes_count; i++) { /* 0.0: nobody has it now */
         const struct record_scene_stat *scene = &reply->scenes[i];
         printf("scene %" PRIu64 ".%-4u %s, revision %" PRIu64 ", %u nodes, %" PRIu64 " triangles, %" PRIu64
                " spheres, %.3f MB host, %.3f MB device\n",

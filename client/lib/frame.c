@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/frame.h"
+#include "lib/predicted.h"
 #include "lib/stream.h"
 
 #include <stdlib.h>
@@ -63,6 +64,7 @@ static uint64_t encoded_bytes_max(const struct message_frame_begin *begin, size_
     case PROTOCOL_ENCODING_RAW:
         return pixels_bytes;
     case PROTOCOL_ENCODING_ZSTD:
+    case PROTOCOL_ENCODING_PREDICTED:
         return ZSTD_compressBound(pixels_bytes);
     case PROTOCOL_ENCODING_JPEG:
         return tjBufSize((int)begin->width, (int)begin->height, TJSAMP_444) + JPEG_EXTRA_BYTES;
@@ -201,6 +203,19 @@ static bool decode_zstd(const struct fl_assembly *assembly, struct fl_error *err
     return true;
 }
 
+static bool decode_predicted(const struct fl_assembly *assembly, struct fl_error *error)
+{
+    const struct fl_frame *frame = assembly->frame;
+    const struct fl_predicted predicted = {
+        .width = frame->width,
+        .rows = frame->height * (uint32_t)__builtin_popcount(frame->layers),
+        .pixel_bytes = fl_bytes_per_pixel(frame->format),
+        .encoded = assembly->encoded,
+        .encoded_bytes = (size_t)assembly->encoded_bytes,
+    };
+    return fl_predicted_decode(&predicted, frame->pixels, error);
+}
+
 static bool decode_jpeg(const struct fl_assembly *assembly, struct fl_error *error)
 {
     struct fl_frame *frame = assembly->frame;
@@ -233,6 +248,8 @@ static bool decode(const struct fl_assembly *assembly, struct fl_error *error)
     if (frame->encoding == PROTOCOL_ENCODING_JPEG)
         return decode_jpeg(assembly, error);
     if (frame->encoding == PROTOCOL_ENCODING_ZSTD && !decode_zstd(assembly, error))
+        return false;
+    if (frame->encoding == PROTOCOL_ENCODING_PREDICTED && !decode_predicted(assembly, error))
         return false;
     if (XXH3_64bits(frame->pixels, frame->pixels_bytes) != frame->digest)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame.digest",

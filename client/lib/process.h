@@ -35,7 +35,8 @@ void fl_process_kill(struct fl_process *process); /* at once; fl_process_end mus
  * "farlightd was ended by signal 11: ..."; still running: its last line alone. */
 void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes);
 
-/* The line of its talk, counted from 0 among those that begin with `start`: what follows that. False: there is none.
+/* The line of its talk, counted from 0 among those that begin with `start`: what follows that. False: there is
+ * none.
  */
 bool fl_process_find_line(const struct fl_process *process, const char *start, size_t index, char *text,
                           size_t text_bytes);

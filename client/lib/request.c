@@ -3,6 +3,7 @@
 #include "lib/connection.h"
 
 #define ANSWER_NS 30000000000ull
+#define SILENCE_NS 30000000000ull
 
 bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error)
 {
@@ -31,16 +32,32 @@ bool fl_stats(struct fl_connection *connection, const struct message_stats_reply
     return true;
 }
 
-bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error)
+/* Until that time; what comes meanwhile is nobody's any more. */
+static bool listen_until(struct fl_connection *connection, uint64_t end_ns, struct fl_error *error)
 {
-    const uint64_t deadline_ns = fl_now_ns() + timeout_ms * UINT64_C(1000000);
-    struct fl_received dropped; /* nobody waits for it any more */
-    while (fl_connection_receive(connection, &dropped, deadline_ns, error))
+    struct fl_received dropped;
+    while (fl_connection_receive(connection, &dropped, end_ns, error))
         continue;
     if (error->code != FL_ERROR_TIMEOUT)
         return false;
     *error = (struct fl_error){0};
     return true;
+}
+
+bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error)
+{
+    const uint64_t end_ns = fl_now_ns() + timeout_ms * UINT64_C(1000000);
+    const uint64_t idle_ns = connection->limits.idle_seconds * UINT64_C(1000000000);
+    /* Who is silent for too long is disconnected, and who is dead does not say so. */
+    const uint64_t silence_ns = idle_ns > 0 && idle_ns / 3 < SILENCE_NS ? idle_ns / 3 : SILENCE_NS;
+    for (;;) {
+        const uint64_t now_ns = fl_now_ns();
+        if (now_ns + silence_ns >= end_ns)
+            return listen_until(connection, end_ns, error);
+        uint64_t round_trip_ns;
+        if (!listen_until(connection, now_ns + silence_ns, error) || !fl_ping(connection, &round_trip_ns, error))
+            return false;
+    }
 }
 
 bool fl_connection_listens_at(const struct fl_connection *connection, size_t index, char *address,

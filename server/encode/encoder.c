@@ -8,6 +8,7 @@ static const struct encoder_impl *const impls[ENCODING_COUNT] = {
     [ENCODING_RAW] = &encoder_raw_impl,
     [ENCODING_ZSTD] = &encoder_zstd_impl,
     [ENCODING_JPEG] = &encoder_jpeg_impl,
+    [ENCODING_PREDICTED] = &encoder_predicted_impl,
 };
 
 static bool is_known(enum encoding encoding)

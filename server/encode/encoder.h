@@ -32,7 +32,7 @@ struct encoder_impl {
     size_t (*encode)(const struct picture *picture, unsigned quality, uint8_t *out, size_t capacity,
                      struct error *error);
 };
-extern const struct encoder_impl encoder_raw_impl, encoder_zstd_impl, encoder_jpeg_impl;
+extern const struct encoder_impl encoder_raw_impl, encoder_zstd_impl, encoder_jpeg_impl, encoder_predicted_impl;
 
 /* Whether `encoding` can carry pictures of that pixel size, for the check before a job starts. */
 bool encoder_supports(enum encoding encoding, uint32_t bytes_per_pixel);

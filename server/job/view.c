@@ -34,6 +34,12 @@ static bool has_news(const struct job *job, const struct view_wish *wish)
            job->scene->scene->revision != view->shown_revision;
 }
 
+bool view_has_news(const struct job *job)
+{
+    struct view_wish wish = view_wishes_see(job->spec.wishes);
+    return has_news(job, &wish);
+}
+
 static bool may_refine(const struct job *job)
 {
     const struct view *view = &job->view;
@@ -132,7 +138,7 @@ void view_done(struct job *job, struct engine_frame *frame)
     frame->command = camera->command;
     frame->received_ns = camera->received_ns;
     frame->moving = camera->moving;
-    frame->wants_key = view->wish.key_frame;
+    view->owes_key_frame |= view->wish.key_frame;
     view->wish.key_frame = false;
     if (camera->moving && job->spec.adapt) {
         const struct view_effort *effort = &view->wish.effort;
@@ -146,4 +152,8 @@ void view_done(struct job *job, struct engine_frame *frame)
         if (frame->encoding != ENCODING_JPEG)
             frame->quality = 0; /* the other one's: the fastest level */
     }
+    frame->wants_key = view->owes_key_frame;
+    /* One of rest may stand alone, but it helps nobody who has lost the stream. */
+    if (!view->lane || frame->encoding == ENCODING_H264)
+        view->owes_key_frame = false;
 }

@@ -51,6 +51,8 @@ struct frame_renderer *frame_renderer_create(struct frame_scene *shared, struct 
     }
     renderer->device = shared->device;
     renderer->shared = shared;
+    /* Software GL copies at once, and would do so twice. */
+    renderer->reads_behind = !shared->device->facts.software;
     return renderer;
 }
 
@@ -67,6 +69,11 @@ void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice
 {
     renderer->wanted_slice_pixels = slice_pixels;
     renderer->wanted_wave_rays = wave_rays;
+}
+
+void frame_renderer_read_behind(struct frame_renderer *renderer, bool reads_behind)
+{
+    renderer->reads_behind = reads_behind;
 }
 
 void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, const struct tracer_impl *impl)

@@ -120,6 +120,7 @@ void view_switch(struct job *job)
     job->frame_bytes = change->frame_bytes;
     job->engine_credit = change->credit;
     job->frames_gone = 0;
+    job->rendered = false;
     job->cancelled = change->cancelled;
     view->terms = change->terms;
     view->pacing.frame_ns = change->terms.frame_ns;
@@ -226,7 +227,8 @@ void view_frame_made(struct job *job, const struct engine_frame *frame)
 bool view_is_outdated(const struct job *job, const struct engine_frame *frame)
 {
     const struct session_view *view = job->view;
-    return frame->key_frame && view->last_command > frame->command &&
+    /* Those of a stream are needed for the ones behind them. */
+    return frame->encoding != ENCODING_H264 && view->last_command > frame->command &&
            clock_now_ns() - frame->encoded_ns > view->terms.frame_ns + view->made_ns;
 }
 

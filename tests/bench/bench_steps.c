@@ -39,6 +39,7 @@ struct bench {
     struct bench_scene_options scene_options;
     struct bench_scene scene;
     struct gpu_device *device;
+    struct frame_scene *shared;
     struct frame_renderer *renderer;
     uint32_t width, height, samples, seconds;
     const char *tracers, *integrators; /* names with commas; NULL: all, but of tracers not naive */
@@ -116,7 +117,7 @@ static bool begin(struct bench *bench, const struct frame_request *request, uint
 /* What the next step of the frame is. */
 static int next_stage(const struct frame_renderer *renderer)
 {
-    return renderer->phase == PHASE_SHADE && renderer->context.asking > 0 ? SHADOW : (int)renderer->phase;
+    return renderer->phase == PHASE_SHADE && renderer->work->context.asking > 0 ? SHADOW : (int)renderer->phase;
 }
 
 /* *whole: the frame was finished in the time that is given. The steps come back in the order of their times. */
@@ -248,7 +249,8 @@ int main(int argc, char **argv)
     }
     bench.forms = json_array();
     bench.device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);
-    bench.renderer = bench.device ? frame_renderer_create(bench.device, &error) : NULL;
+    bench.shared = bench.device ? frame_scene_create(bench.device, &error) : NULL;
+    bench.renderer = bench.shared ? frame_renderer_create(bench.shared, &error) : NULL;
     bool ok = bench.renderer && bench_scene_init(&bench.scene, bench.device, &bench.scene_options, &error) &&
               measure_all(&bench, &error) && print(&bench);
     if (!ok)
@@ -257,6 +259,7 @@ int main(int argc, char **argv)
     if (bench.renderer)
         bench_scene_finish(&bench.scene);
     frame_renderer_destroy(bench.renderer);
+    frame_scene_destroy(bench.shared);
     if (bench.device)
         gpu_device_destroy(bench.device);
     return ok ? 0 : 1;

@@ -105,10 +105,10 @@ class Layers(Case):
 
     def test_layers_travel_compressed_too(self):
         digests = set()
-        for encoding in ("raw", "zstd"):
+        for encoding in ("raw", "zstd", "predicted"):
             frame, = frames_of(self.render("--layers", ALL, "--encoding", encoding)[1])
             self.assertEqual((frame["encoding"], frame["pixels_bytes"]), (encoding, 48 * 40 * 16 * 7))
-            self.assertEqual(frame["wire_bytes"] < frame["pixels_bytes"], encoding == "zstd")
+            self.assertEqual(frame["wire_bytes"] < frame["pixels_bytes"], encoding != "raw")
             digests.add(frame["digest"])
         self.assertEqual(len(digests), 1)
         with Daemon(listen="tcp:127.0.0.1:0") as daemon:
@@ -131,7 +131,7 @@ class Layers(Case):
         missing = self.folder / "no such model.glb"
         for output, options, says in (
                 ("x.png", [], "write an .exr file, or leave out --layers"), ("x.hdr", [], "write an .exr file"),
-                ("x.jpg", [], "write an .exr file"), ("x.exr", ["--encoding", "jpeg"], "raw or zstd"),
+                ("x.jpg", [], "write an .exr file"), ("x.exr", ["--encoding", "jpeg"], "raw, zstd or predicted"),
                 ("x.exr", ["--size", "8192x8192"], "some of them at a time"),
                 ("x.exr", ["--layers", "beauty,z"], "known: beauty, albedo, normal, depth, position, ao, id"),
                 ("x.exr", ["--layers", ""], "known: beauty")):

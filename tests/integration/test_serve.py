@@ -247,6 +247,14 @@ class Serve(Case):
             result = self.render(self.folder / "a.png", "--scene", "teapot.glb", status=1, address=daemon.address)
             self.assertIn("farlight scenes", result.stderr)
 
+    def test_who_serves_is_not_idle_however_little_happens(self):
+        config = self.folder / "conf"
+        config.write_text("[network]\nidle = 1000\n")
+        self.serve("--", "--config", config)
+        quiet = Viewer(self.socket, "teapot.glb")
+        quiet.until_closed()  # so long that who says nothing is sent away
+        self.assertEqual(self.scenes()[0]["clients"], 1)
+
     def test_two_scenes_of_one_name_are_refused(self):
         with Daemon() as daemon, Serving(self.model, "--server", daemon.address):
             result = self.expect(farlight("serve", self.model, "--server", daemon.address), 1)

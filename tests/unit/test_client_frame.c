@@ -2,6 +2,8 @@
 /* What a hostile or broken daemon can say about a frame. */
 #include "lib/frame.h"
 
+#include "encode/encoder.h"
+
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -103,6 +105,59 @@ static void a_zstd_frame_arrives(void **state)
     assert_true(frame->digest_checked);
     assert_memory_equal(frame->pixels, pixels, sizeof pixels);
     fl_frame_destroy(frame);
+}
+
+static size_t make_predicted(const struct picture *picture, uint8_t **packed)
+{
+    struct error failure = {0};
+    size_t count;
+    assert_true(encoder_encode(ENCODING_PREDICTED, picture, 1, packed, &count, &failure));
+    return count;
+}
+
+static void a_predicted_frame_arrives_in_every_pixel_format(void **state)
+{
+    (void)state;
+    for (enum protocol_pixel_format format = 0; format < PROTOCOL_PIXEL_FORMAT_COUNT; format++) {
+        /* The same bytes, as a picture that has fewer rows the larger its pixels are. */
+        const uint32_t pixel_bytes = fl_bytes_per_pixel(format);
+        const struct picture picture = {WIDTH, HEIGHT * 4 / pixel_bytes, pixel_bytes, pixels};
+        struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_PREDICTED);
+        uint8_t *packed;
+        const size_t count = make_predicted(&picture, &packed);
+        struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_PREDICTED, count);
+        message.height = assembly.expected.height = picture.height;
+        message.format = assembly.expected.format = format;
+        assert_true(begin(&assembly, &message) && give(&assembly, packed, count, 0));
+        struct fl_frame *frame = end(&assembly);
+        assert_non_null(frame);
+        assert_true(frame->digest_checked);
+        assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+        fl_frame_destroy(frame);
+        free(packed);
+    }
+}
+
+static void a_damaged_predicted_frame_is_refused(void **state)
+{
+    (void)state;
+    const struct picture picture = {WIDTH, HEIGHT, 4, pixels}, smaller = {WIDTH, HEIGHT - 1, 4, pixels};
+    uint8_t *packed;
+    size_t count = make_predicted(&picture, &packed);
+    assert_null(receive(PROTOCOL_ENCODING_PREDICTED, packed, count - 1));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    free(packed);
+    count = make_predicted(&smaller, &packed);
+    assert_null(receive(PROTOCOL_ENCODING_PREDICTED, packed, count));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    free(packed);
+    uint8_t other[PIXELS_BYTES];
+    memcpy(other, pixels, sizeof other);
+    other[77] ^= 1;
+    count = make_predicted(&(struct picture){WIDTH, HEIGHT, 4, other}, &packed);
+    assert_null(receive(PROTOCOL_ENCODING_PREDICTED, packed, count));
+    assert_string_equal(error.field, "frame.digest");
+    free(packed);
 }
 
 static unsigned long make_jpeg(unsigned width, unsigned height, uint8_t **packed)
@@ -349,6 +404,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_raw_frame_arrives),
         cmocka_unit_test(a_zstd_frame_arrives),
+        cmocka_unit_test(a_predicted_frame_arrives_in_every_pixel_format),
+        cmocka_unit_test(a_damaged_predicted_frame_is_refused),
         cmocka_unit_test(a_jpeg_frame_arrives_with_an_opaque_alpha),
         cmocka_unit_test(a_jpeg_of_another_size_is_refused),
         cmocka_unit_test(a_damaged_jpeg_is_refused),

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is encoded comes back: exactly from raw and zstd, close enough from JPEG. */
+/* What is encoded comes back: exactly from raw, zstd and predicted, close enough from JPEG. */
 #include "encode/encoder.h"
 
 #include <math.h>
@@ -90,6 +90,86 @@ static void zstd_makes_an_even_picture_small(void **state)
     drop_picture(&picture);
 }
 
+/* As the protocol's document has it, word by word. */
+static uint8_t foretell(const uint8_t *plane, size_t x, size_t y, size_t width)
+{
+    int a = x ? plane[y * width + x - 1] : 0, b = y ? plane[(y - 1) * width + x] : 0;
+    int c = x && y ? plane[(y - 1) * width + x - 1] : 0;
+    int least = a < b ? a : b, greatest = a < b ? b : a;
+    return (uint8_t)(c >= greatest ? least : c <= least ? greatest : a + b - c);
+}
+
+static uint8_t *decode_predicted(const uint8_t *in, size_t in_bytes, const struct picture *picture)
+{
+    size_t width = picture->width, plane_bytes = width * picture->height;
+    size_t bytes = plane_bytes * picture->bytes_per_pixel;
+    uint8_t *planes = malloc(bytes), *pixels = malloc(bytes);
+    assert_true(planes && pixels);
+    assert_int_equal(ZSTD_getFrameContentSize(in, in_bytes), bytes);
+    assert_int_equal(ZSTD_decompress(planes, bytes, in, in_bytes), bytes);
+    for (size_t channel = 0; channel < picture->bytes_per_pixel; channel++) {
+        uint8_t *plane = planes + channel * plane_bytes;
+        for (size_t i = 0; i < plane_bytes; i++) {
+            plane[i] = (uint8_t)(plane[i] + foretell(plane, i % width, i / width, width));
+            pixels[i * picture->bytes_per_pixel + channel] = plane[i];
+        }
+    }
+    free(planes);
+    return pixels;
+}
+
+/* Sizes about those of what is done at once, and pixels that leap as well as even ones. */
+static void predicted_gives_every_bit_back_at_every_level(void **state)
+{
+    (void)state;
+    const uint32_t widths[] = {1, 7, 15, 16, 17, 33, 321}, heights[] = {1, 2, 9};
+    const unsigned qualities[] = {0, 1, 3, 19, 100};
+    uint32_t random = 1;
+    for (unsigned i = 0; i < 7 * 3 * 3 * 2; i++) {
+        struct picture picture = make_picture(widths[i % 7], heights[i / 7 % 3], 4u << i / 21 % 3);
+        size_t bytes, expected = (size_t)picture.width * picture.height * picture.bytes_per_pixel;
+        for (size_t k = 0; i >= 63 && k < expected; k++) {
+            random = random * 1664525 + 1013904223;
+            ((uint8_t *)(uintptr_t)picture.pixels)[k] = (uint8_t)(random >> 24);
+        }
+        uint8_t *out = encode(ENCODING_PREDICTED, &picture, qualities[i % 5], &bytes);
+        uint8_t *back = decode_predicted(out, bytes, &picture);
+        assert_memory_equal(back, picture.pixels, expected);
+        free(back);
+        free(out);
+        drop_picture(&picture);
+    }
+}
+
+/* Of the channels' neighbours only left, above and above left count: each branch of the rule, worked out by hand.
+ */
+static void predicted_leaves_what_the_rule_says(void **state)
+{
+    (void)state;
+    const uint8_t pixels[] = {10, 0, 0, 255, 30, 0, 0, 255, 25,  0, 1, 255,  /* first row: less what is left */
+                              50, 0, 0, 255, 60, 0, 0, 255, 200, 0, 3, 255}; /* c <= min; c >= max; between */
+    const uint8_t left[] = {
+        10, 20, (uint8_t)-5, 40, 10, (uint8_t)(200 - 55), 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 255, 0, 0, 0, 0, 0};
+    struct picture picture = {3, 2, 4, pixels};
+    size_t bytes;
+    uint8_t planes[sizeof pixels], *out = encode(ENCODING_PREDICTED, &picture, 1, &bytes);
+    assert_int_equal(ZSTD_decompress(planes, sizeof planes, out, bytes), sizeof planes);
+    assert_memory_equal(planes, left, sizeof left);
+    free(out);
+}
+
+static void predicted_is_smaller_than_zstd_where_a_picture_is_smooth(void **state)
+{
+    (void)state;
+    struct picture picture = make_picture(321, 200, 4);
+    size_t predicted_bytes, zstd_bytes;
+    free(encode(ENCODING_PREDICTED, &picture, 1, &predicted_bytes));
+    free(encode(ENCODING_ZSTD, &picture, 1, &zstd_bytes));
+    print_message("%zu bytes predicted, %zu not\n", predicted_bytes, zstd_bytes);
+    assert_true(predicted_bytes < zstd_bytes);
+    drop_picture(&picture);
+}
+
 /* Peak signal to noise of the colours, in dB; *subsampling as the JPEG's header has it. */
 static double jpeg_psnr(uint32_t width, uint32_t height, unsigned quality, int *subsampling)
 {
@@ -139,18 +219,19 @@ static void jpeg_comes_close_and_keeps_full_chroma_from_quality_90(void **state)
     }
     int subsampling;
     assert_true(jpeg_psnr(1, 1, 95, &subsampling) > 40);
-    jpeg_psnr(4, 3, 80, &subsampling); /* padded to more than at full chroma */
+    jpeg_psnr(4, 3, 80, &subsampling);                  /* padded to more than at full chroma */
     assert_true(jpeg_psnr(17, 9, 0, &subsampling) > 5); /* out of range: the lowest there is */
 }
 
 static void jpeg_carries_rgba8_only(void **state)
 {
     (void)state;
-    for (int encoding = 0; encoding < ENCODING_COUNT; encoding++) {
-        assert_true(encoder_supports((enum encoding)encoding, 4));
-        assert_int_equal(encoder_supports((enum encoding)encoding, 8), encoding != ENCODING_JPEG);
-        assert_int_equal(encoder_supports((enum encoding)encoding, 16), encoding != ENCODING_JPEG);
-        assert_false(encoder_supports((enum encoding)encoding, 3));
+    const enum encoding encodings[] = {ENCODING_RAW, ENCODING_ZSTD, ENCODING_JPEG, ENCODING_PREDICTED};
+    for (int i = 0; i < 4; i++) {
+        assert_true(encoder_supports(encodings[i], 4));
+        assert_int_equal(encoder_supports(encodings[i], 8), encodings[i] != ENCODING_JPEG);
+        assert_int_equal(encoder_supports(encodings[i], 16), encodings[i] != ENCODING_JPEG);
+        assert_false(encoder_supports(encodings[i], 3));
     }
     assert_false(encoder_supports((enum encoding)99, 4));
     struct picture picture = make_picture(2, 2, 8);
@@ -169,9 +250,12 @@ static void jpeg_carries_rgba8_only(void **state)
 static void impossible_sizes_are_errors_before_any_memory_is_asked_for(void **state)
 {
     (void)state;
-    const struct picture pictures[] = {{UINT32_MAX, UINT32_MAX, 16, NULL}, {0, 4, 4, NULL}, {70000, 1, 4, NULL}};
-    const enum encoding encodings[] = {ENCODING_ZSTD, ENCODING_RAW, ENCODING_JPEG};
-    for (int i = 0; i < 3; i++) {
+    const struct picture pictures[] = {{UINT32_MAX, UINT32_MAX, 16, NULL},
+                                       {0, 4, 4, NULL},
+                                       {70000, 1, 4, NULL},
+                                       {UINT32_MAX, UINT32_MAX, 8, NULL}};
+    const enum encoding encodings[] = {ENCODING_ZSTD, ENCODING_RAW, ENCODING_JPEG, ENCODING_PREDICTED};
+    for (int i = 0; i < 4; i++) {
         struct error error = {0};
         uint8_t *out;
         size_t bytes;
@@ -186,6 +270,9 @@ int main(void)
         cmocka_unit_test(raw_bytes_are_the_pixels),
         cmocka_unit_test(zstd_gives_every_bit_back_at_every_level),
         cmocka_unit_test(zstd_makes_an_even_picture_small),
+        cmocka_unit_test(predicted_gives_every_bit_back_at_every_level),
+        cmocka_unit_test(predicted_leaves_what_the_rule_says),
+        cmocka_unit_test(predicted_is_smaller_than_zstd_where_a_picture_is_smooth),
         cmocka_unit_test(jpeg_comes_close_and_keeps_full_chroma_from_quality_90),
         cmocka_unit_test(jpeg_carries_rgba8_only),
         cmocka_unit_test(impossible_sizes_are_errors_before_any_memory_is_asked_for),
