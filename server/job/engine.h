@@ -104,6 +104,7 @@ enum engine_command_kind {
 };
 
 struct engine_command {
+    struct engine_command *next; /* of who has it: the engine, once it took it, does not look at it */
     enum engine_command_kind kind;
     uint64_t client;
     uint32_t request;
