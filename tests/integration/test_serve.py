@@ -16,7 +16,6 @@ import time
 
 from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, exr_attributes, farlight
 from farlight_test import read_exr, read_png
-from farlight_test import tearDownModule  # noqa: F401, pylint: disable=unused-import
 from test_daemon import (EDIT_BEGIN, EDIT_COMMIT, ERROR, GOODBYE, OK, SCENE_OPEN, SET_NODE, STATS, STATS_REPLY, Peer,
                          error_code, error_text, named, set_node, text)
 
