@@ -30,13 +30,15 @@ void frame_scene_destroy(struct frame_scene *shared)
     frame_work_finish(shared);
     tracer_set_finish(&shared->tracers);
     environment_finish(&shared->environment, shared->device);
+    environment_choice_finish(&shared->environment_choice, shared->device);
     scene_gpu_finish(&shared->copy);
     free(shared);
 }
 
 uint64_t frame_scene_device_bytes(const struct frame_scene *shared)
 {
-    uint64_t sum = scene_gpu_device_bytes(&shared->copy) + tracer_set_device_bytes(&shared->tracers);
+    uint64_t sum = scene_gpu_device_bytes(&shared->copy) + tracer_set_device_bytes(&shared->tracers) +
+                   shared->environment_choice.table.capacity_bytes;
     for (const struct frame_work *work = shared->idle; work; work = work->next)
         sum += frame_work_device_bytes(work);
     return sum;

@@ -31,6 +31,7 @@ struct frame_scene {
     struct scene_gpu copy;
     struct tracer_set tracers;
     struct environment environment;
+    struct environment_choice environment_choice;
     uint64_t showing;        /* counts up when the copy is of something else: a revision, poses */
     uint32_t frames;         /* in progress, of all renderers */
     struct frame_work *idle; /* owned: what frames that have ended leave to those that begin */

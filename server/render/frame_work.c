@@ -38,6 +38,7 @@ static struct frame_work *work_create(struct frame_scene *shared, struct error *
     work->context.device = shared->device;
     work->context.scene = &shared->copy;
     work->context.environment = &shared->environment;
+    work->context.environment_choice = &shared->environment_choice;
     return work;
 }
 

@@ -444,8 +444,8 @@ static void left_scenes_give_way_where_memory_is_short(void **state)
     (void)state;
     /* Room for about 100 nodes. */
     uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
-    struct engine *engine =
-        start((struct engine_options){.scene_linger_ms = LONG_MS, .scene_limits = {.host_bytes = limit_bytes}});
+    struct engine *engine = start((struct engine_options){
+        .scene_linger_ms = LONG_MS, .scene_limits = {.host_bytes = limit_bytes, .nodes = 100}});
     open_as(engine, 1, 1, "a", SHARING_SHARED);
     submit(engine, commit_of_nodes(1, 2, 1, 60));
     expect_done(engine, 1, 2);
@@ -457,6 +457,8 @@ static void left_scenes_give_way_where_memory_is_short(void **state)
     expect_ended(engine);
     assert_int_equal(expect_done(engine, 2, 3), 1);
     leave(engine, 1, "c", SHARING_SHARED);
+    submit(engine, commit_of_nodes(2, 4, 1, 101)); /* more than any scene may have: they need not give way */
+    expect_failed(engine, 2, 4, ERROR_LIMIT, "edits");
     submit(engine, command(ENGINE_SCENES_TRIM, 0, 0)); /* the network is short of it */
     expect_ended(engine);
     attach_fails(engine, 1, 4, "c");

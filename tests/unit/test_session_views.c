@@ -439,6 +439,7 @@ static void a_view_that_adapts_tells_the_engine_what_the_link_carries(void **sta
     open_scene(1, 1);
     struct message message = view_message(100);
     message.render.adapt = 1;
+    message.render.still_encoding = PROTOCOL_ENCODING_RAW;
     message.render.quality = 90;
     message.render.frames_per_second = 1000;
     send_message(2, 0, &message);
@@ -455,6 +456,15 @@ static void a_view_that_adapts_tells_the_engine_what_the_link_carries(void **sta
     assert_true(effort.scale_eighths < 8);
     assert_true(effort.quality < 90);
     assert_true(effort.bytes < FRAME_BYTES);
+    assert_false(effort.sparing);
+    say_frame(2, 2, 2); /* at rest; 100 ms are not too long for it */
+    send_ack(1, true, false);
+    take_frame(2, 2);
+    assert_false(view_wishes_see(start->job.wishes).effort.sparing);
+    say_large_frame(2, 3); /* more than a second */
+    for (unsigned i = 0; !view_wishes_see(start->job.wishes).effort.sparing && i < 2000; i++)
+        usleep(10000);
+    assert_true(view_wishes_see(start->job.wishes).effort.sparing);
     engine_command_destroy(start);
 }
 
