@@ -521,6 +521,7 @@ static void a_frame_in_h264_is_left_to_the_caller(void **state)
     fl_view_destroy(view);
     fl_connection_destroy(scene.connection);
     stop(daemon);
+    assert_int_equal(seen.first.quality, 80); /* where nothing is said: no worse than x264's own default */
 }
 
 /* Half a frame, then nothing. */
