@@ -261,10 +261,16 @@ class Serve(Case):
 
     def test_who_serves_is_not_idle_however_little_happens(self):
         config = self.folder / "conf"
-        config.write_text("[network]\nidle = 1000\n")
-        self.serve("--", "--config", config)
-        quiet = Viewer(self.socket, "teapot.glb")
-        quiet.until_closed()  # so long that who says nothing is sent away
+        config.write_text("[network]\nidle = 5000\n")
+        with Daemon("--config", config) as daemon, Serving(self.model, "--server", daemon.address):
+            Viewer(daemon.path, "teapot.glb").until_closed()  # so long that who says nothing is sent away
+            self.assertEqual(self.scenes(daemon.address)[0]["clients"], 1)
+
+    def test_who_has_started_a_daemon_may_be_silent_there(self):
+        config = self.folder / "conf"
+        config.write_text("[network]\nidle = 300\n")
+        self.serve("--", "--config", config)  # whose import takes longer than that
+        Viewer(self.socket, "teapot.glb").until_closed()
         self.assertEqual(self.scenes()[0]["clients"], 1)
 
     def test_two_scenes_of_one_name_are_refused(self):
