@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "render/compact.h"
+#include "render/frame_request.h"
 #include "render/frame_state.h"
 #include "render/pixel_filter.h"
 #include "render/sequence.h"
@@ -189,6 +190,12 @@ static bool read_band(struct frame_renderer *renderer, struct error *error)
     return good;
 }
 
+static size_t attached_bytes(const struct frame_request *request)
+{
+    size_t count = (size_t)__builtin_popcount(request->attachments);
+    return count * request->width * request->height * picture_pixel_bytes(FRAME_DEPTH32F);
+}
+
 static bool hand_out(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
@@ -201,13 +208,14 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
                     clock_now_ns() - context->times.origin_ns);
     *result = renderer->result;
     result->pixels = renderer->picture.pixels;
-    result->size_bytes = renderer->picture.size_bytes;
+    result->layers = frame_request_layers(request);
+    result->attachments = request->attachments;
+    result->size_bytes = renderer->picture.size_bytes - attached_bytes(request);
     renderer->picture.pixels = NULL;
     result->width = request->width;
     result->height = request->height;
     result->format = request->format;
     result->samples = renderer->picture.samples;
-    result->layers = renderer->picture.layers;
     result->primary_rays = (uint64_t)request->width * request->height * request->samples;
     result->times = context->times;
     renderer->kept_request = *request;

@@ -124,7 +124,7 @@ static void told_nothing(void)
 }
 
 /* A frame of a view, that shows a command and was taken up, read back and encoded at 100, 200 and 300 ns. */
-static void say_frame_of(uint32_t request, uint32_t number, uint64_t command, size_t bytes)
+static struct engine_event *frame_of(uint32_t request, uint32_t number, uint64_t command, size_t bytes)
 {
     struct engine_event *made = calloc(1, sizeof *made);
     struct engine_frame *frame = calloc(1, sizeof *frame);
@@ -149,6 +149,20 @@ static void say_frame_of(uint32_t request, uint32_t number, uint64_t command, si
     frame->key_frame = true;
     frame->quality = 77;
     stage_times_begin(&frame->result.times);
+    return made;
+}
+
+static void say_frame_of(uint32_t request, uint32_t number, uint64_t command, size_t bytes)
+{
+    assert_true(queue_push(engine.events, frame_of(request, number, command, bytes)));
+}
+
+static void say_frame_with(uint32_t request, uint32_t number, size_t depth_bytes, size_t normal_bytes)
+{
+    struct engine_event *made = frame_of(request, number, 0, FRAME_BYTES);
+    made->frame->result.attachments = ATTACHMENT_DEPTH | ATTACHMENT_NORMALS;
+    made->frame->depth_bytes = depth_bytes;
+    made->frame->normal_bytes = normal_bytes;
     assert_true(queue_push(engine.events, made));
 }
 
@@ -678,6 +692,30 @@ static void video_needs_the_word_of_both_sides_and_a_view_of_8_bits(void **state
     engine_command_destroy(command);
 }
 
+static void what_a_view_attaches_is_told_on_and_announced(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = made(MESSAGE_RENDER); /* a batch has layers */
+    message.render.scene = 1;
+    message.render.channel = CHANNEL;
+    message.render.attachments = 1;
+    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.attachments");
+    message = view_message(4);
+    message.render.attachments = 3;
+    send_message(3, 0, &message);
+    struct engine_command *command = told(ENGINE_JOB_START);
+    assert_int_equal(command->job.frame.attachments, ATTACHMENT_DEPTH | ATTACHMENT_NORMALS);
+    engine_command_destroy(command);
+    say_frame_with(3, 1, 30, 20);
+    struct message_frame_begin begin;
+    expect_frame(3, 1, &begin);
+    assert_int_equal(begin.attachments, 3);
+    assert_int_equal(begin.size_bytes, FRAME_BYTES - 50);
+    assert_int_equal(begin.depth_bytes, 30);
+    assert_int_equal(begin.normal_bytes, 20);
+}
+
 static void video_without_the_word_for_it_is_refused(void **state)
 {
     (void)state;
@@ -734,6 +772,7 @@ int main(void)
         BOTH(a_view_may_be_cancelled_while_another_takes_its_place),
         BOTH(a_client_that_vanishes_takes_its_view_along),
         BOTH(a_view_that_cannot_be_is_refused_by_its_field),
+        BOTH(what_a_view_attaches_is_told_on_and_announced),
         BOTH(video_without_the_word_for_it_is_refused),
         cmocka_unit_test_setup_teardown(video_needs_the_word_of_both_sides_and_a_view_of_8_bits, set_up_ungreeted,
                                         tear_down),
