@@ -207,6 +207,11 @@ MODEL_OBJ := $(B)/tests/bench/load_model.o
 RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIVAL_SOURCES)
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
 $(B)/tests/unit/test_load_model $(B)/tests/accuracy/test_abuffer_against_reference: $(MODEL_OBJ)
+# Sessions live in a time of their own.
+SERVING_OBJ := $(call obj,$(addprefix tests/fuzz/,engine_recorder.c serving.c))
+SERVING_WRAP := -Wl,--wrap=clock_now_ns
+$(B)/tests/unit/test_session_faults: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
+$(B)/tests/unit/test_session_faults: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
 # What the daemon encodes is decoded by the library itself.
 $(addprefix $(B)/tests/unit/test_encode_,pool stream): TEST_LIBS += $(call pkg_libs,libavcodec libavutil)
@@ -365,13 +370,15 @@ help:
 FUZZ_SECONDS ?= 20
 FUZZERS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_SEED := $(B)/tests/fuzz/seed
-$(FUZZ_SEED): %: %.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
+$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(B)/server/base/blob.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
 $(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ))
 $(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
 $(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_sealed: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
+$(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
+$(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
 .PHONY: fuzz $(addprefix run-fuzz-,$(FUZZERS))
 ifeq ($(config),fuzz)
 fuzz: $(addprefix run-fuzz-,$(FUZZERS))

@@ -144,6 +144,23 @@ static void print_sealed_keys(void)
         SEALED_PLAIN_MAX_BYTES);
 }
 
+static void print_sealed_stream(void)
+{
+    printf(
+        "What crypto_secretstream_xchacha20poly1305 does, for who has no libsodium (ChaCha20 and Poly1305 of RFC\n"
+        "8439, HChaCha20 as in XChaCha20): k = HChaCha20 of K and bytes 0 to 15 of the header; n = its bytes 16 "
+        "to\n"
+        "23; a counter begins at 1. A push has the nonce u32 counter | n and takes, of ChaCha20 with k and it,\n"
+        "the first 32 bytes of block 0 as the key of Poly1305, block 1 for the tag with 63 zeros behind it, and\n"
+        "block 2 and on for the text. Poly1305 goes over the additional data, zeros up to a multiple of 16, the\n"
+        "64 sealed bytes of the tag, the sealed text, as many zeros as the text has bytes beyond a multiple of "
+        "16,\n"
+        "u64 bytes of additional data, u64 64 + bytes of text. The sealed bytes of the record are the first\n"
+        "sealed byte of the tag, the sealed text and those 16 bytes, of which the first 8 are then mixed into n "
+        "by\n"
+        "exclusive or; the counter goes up by 1. (After 2^32 - 1 records libsodium makes new keys.)\n\n");
+}
+
 static void print_framing(void)
 {
     printf("## Messages in the stream\n\n"
@@ -323,6 +340,7 @@ int main(int argument_count, char **arguments)
     print_handshake();
     print_sealed_messages();
     print_sealed_keys();
+    print_sealed_stream();
     print_framing();
     printf("## Enumerations\n\n");
     for (size_t i = 0; i < protocol_enum_count; i++) {

@@ -156,6 +156,7 @@ static void abandon_frame(struct engine *engine, struct job *job)
     engine->backend->abandon(job->renderer);
     job->rendering = false;
     job->scene->frames--;
+    job->scene->frames_ended++;
 }
 
 /* The output may outlive the job, with frames that are still encoded or not taken. */
@@ -241,19 +242,36 @@ static bool any_frame(const struct engine *engine)
     return any;
 }
 
+/* Something waits for the frames in progress to end. */
+static bool is_waited_for(const struct engine_scene *scene)
+{
+    return scene->waiting_count || (scene->put_off && wants_frame(scene->put_off));
+}
+
+/* A frame of a batch may take minutes, and whoever looks at the scene would see nothing of it meanwhile: as long
+ * as one keeps waiting what waits, frames of views do not make it later. */
+static bool may_begin_meanwhile(const struct engine *engine, const struct job *job)
+{
+    const struct engine_scene *scene = job->scene;
+    bool batch = false;
+    for (size_t i = 0; i < engine->job_count; i++) {
+        const struct job *other = engine->jobs[i];
+        batch |= other->scene == scene && other->rendering && other->spec.kind == JOB_BATCH;
+    }
+    return batch && job->spec.kind == JOB_VIEW && view_has_news(job) && job->refused_after != scene->frames_ended;
+}
+
 /* What waits for the frames in progress to end is not kept waiting by new ones. */
 static bool may_begin(const struct engine *engine, const struct job *job)
 {
     const struct engine_scene *scene = job->scene;
-    if (scene->waiting_count)
+    if (engine->needs_all && engine->needs_all != job && wants_frame(engine->needs_all))
         return false;
     if (engine->needs_all == job)
-        return !any_frame(engine);
-    if (engine->needs_all && wants_frame(engine->needs_all))
-        return false;
-    if (scene->put_off == job)
+        return !scene->waiting_count && !any_frame(engine);
+    if (!scene->waiting_count && scene->put_off == job)
         return !scene->frames;
-    return !scene->put_off || !wants_frame(scene->put_off);
+    return !is_waited_for(scene) || (scene->put_off != job && may_begin_meanwhile(engine, job));
 }
 
 /* When it is ready; in the past: now. UINT64_MAX: not before something happens. */
@@ -316,10 +334,13 @@ static bool frame_begin_shot(struct engine *engine, struct job *job, const struc
     if (!engine_need_device(engine, error) || !job_need_renderer(engine, job, error))
         return false;
     if (!engine->backend->may_begin(job->renderer, scene->scene, motion, &shot->request)) {
-        scene->put_off = job;
+        if (!is_waited_for(scene))
+            scene->put_off = job;
+        job->refused_after = scene->frames_ended;
         return true;
     }
-    scene->put_off = NULL;
+    if (scene->put_off == job)
+        scene->put_off = NULL;
     if (engine->needs_all == job)
         engine->needs_all = NULL;
     if (!engine->backend->begin(job->renderer, scene->scene, motion, &shot->request, error))
@@ -365,6 +386,7 @@ static void frame_done(struct engine *engine, struct job *job, struct engine_fra
     job->rendering = false;
     job->evicted = false;
     job->scene->frames--;
+    job->scene->frames_ended++;
     account(engine, job, &frame->result);
     frame->frame = (uint32_t)job->next_frame;
     frame->request = job->frame;

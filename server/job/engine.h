@@ -34,7 +34,7 @@ struct engine_options {
     uint64_t frame_window_bytes; /* the same in bytes of pixels, if that is fewer, but at least one; 0: default */
     struct scene_limits scene_limits; /* host_bytes is also what the tables of all scenes may take together */
     uint64_t scene_linger_ms;    /* how long a scene that others can come to stays when nobody holds it; 0: not */
-    uint32_t lingering_scenes;   /* that do so, at most: the one that was left first ends first; 0: default */
+    uint32_t lingering_scenes;   /* that do so, at most: who left most loses his oldest; 0: default */
     uint64_t device_bytes_limit; /* 0: 70 % of what the device has, or no limit if it does not tell */
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
 };
@@ -90,7 +90,7 @@ enum engine_command_kind {
     ENGINE_SCENE_LIST,   /* answered by ENGINE_SCENES_LISTED */
     ENGINE_SCENE_DESCRIBE, /* answered by ENGINE_SCENE_DESCRIBED */
     ENGINE_SCENES_TRIM,    /* scenes that nobody holds end now; no answer */
-    ENGINE_COMMIT, /* waits for the frame of the scene that is in progress, what follows for that scene too */
+    ENGINE_COMMIT, /* waits for the frames of the scene that are in progress, what follows for that scene too */
     /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, before which come the frames that were
      * finished and have credit. A view has no last frame: it is done when another one takes its place. */
     ENGINE_JOB_START,
@@ -103,6 +103,7 @@ enum engine_command_kind {
 };
 
 struct engine_command {
+    struct engine_command *next; /* of who has it: the engine, once it took it, does not look at it */
     enum engine_command_kind kind;
     uint64_t client;
     uint32_t request;

@@ -30,8 +30,16 @@ static bool adds_up(const struct job *job)
 static bool has_news(const struct job *job, const struct view_wish *wish)
 {
     const struct view *view = &job->view;
-    return !view->shown || wish->camera.command != view->shown_command || wish->key_frame ||
+    /* A key frame that could not be finished is wished still. */
+    bool key_frame = wish->key_frame || view->wish.key_frame;
+    return !view->shown || wish->camera.command != view->shown_command || key_frame ||
            job->scene->scene->revision != view->shown_revision;
+}
+
+bool view_has_news(const struct job *job)
+{
+    struct view_wish wish = view_wishes_see(job->spec.wishes);
+    return has_news(job, &wish);
 }
 
 static bool may_refine(const struct job *job)

@@ -5,29 +5,66 @@
 
 #include <stdlib.h>
 
-static size_t row_bytes_of(const struct picture *picture, const struct frame_request *request, uint32_t plane)
+static size_t row_bytes(const struct picture *picture, const struct render_context *context, uint32_t plane)
 {
-    enum frame_format format = frame_request_plane_format(request, picture_plane_layer(picture, plane));
-    return picture->width * picture_pixel_bytes(format);
+    enum frame_layer layer = picture_plane_layer(picture, plane);
+    return picture->width * picture_pixel_bytes(frame_request_plane_format(&context->request, layer));
+}
+
+static size_t band_bytes(const struct picture *picture, const struct render_context *context, uint32_t plane,
+                         uint32_t band)
+{
+    return picture_band_row_count(picture, band) * row_bytes(picture, context, plane);
+}
+
+/* Where a band belongs. NULL: no memory. */
+static uint8_t *band_pixels(struct picture *picture, const struct render_context *context, uint32_t plane,
+                            uint32_t band, struct error *error)
+{
+    if (!picture->pixels) {
+        picture->size_bytes = (size_t)frame_request_bytes(&context->request);
+        picture->pixels = malloc(picture->size_bytes);
+    }
+    if (!picture->pixels) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture of %zu bytes", picture->size_bytes);
+        return NULL;
+    }
+    uint8_t *pixels = picture->pixels;
+    for (uint32_t before = 0; before < plane; before++)
+        pixels += picture->height * row_bytes(picture, context, before);
+    return pixels + picture_band_first_row(picture, band) * row_bytes(picture, context, plane);
 }
 
 bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                        struct error *error)
 {
-    const struct frame_request *request = &context->request;
-    if (!picture->pixels) {
-        picture->size_bytes = (size_t)frame_request_bytes(request);
-        picture->pixels = malloc(picture->size_bytes);
-        if (!picture->pixels)
-            return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture of %zu bytes",
-                             picture->size_bytes);
-    }
-    size_t row_bytes = row_bytes_of(picture, request, plane);
-    uint8_t *to = picture->pixels + picture_band_first_row(picture, band) * row_bytes;
-    for (uint32_t before = 0; before < plane; before++)
-        to += row_bytes_of(picture, request, before) * picture->height;
+    uint8_t *pixels = band_pixels(picture, context, plane, band, error);
+    if (!pixels)
+        return false;
     context_span_begin(context, STAGE_READBACK);
-    gpu_buffer_read(context->device, &picture->resolved, 0, to, picture_band_row_count(picture, band) * row_bytes);
+    gpu_buffer_read(context->device, &picture->resolved, 0, pixels, band_bytes(picture, context, plane, band));
     context_span_end(context);
     return gpu_check(context->device, "reading the picture", error);
+}
+
+bool picture_copy_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
+                       uint32_t plane, uint32_t band, struct error *error)
+{
+    context_span_begin(context, STAGE_READBACK);
+    bool begun = gpu_readback_begin(context->device, copy, &picture->resolved,
+                                    band_bytes(picture, context, plane, band), error);
+    context_span_end(context);
+    return begun && gpu_check(context->device, "copying the picture", error);
+}
+
+bool picture_take_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
+                       uint32_t plane, uint32_t band, struct error *error)
+{
+    uint8_t *pixels = band_pixels(picture, context, plane, band, error);
+    if (!pixels)
+        return false;
+    context_span_begin(context, STAGE_READBACK);
+    bool taken = gpu_readback_take(context->device, copy, pixels, error);
+    context_span_end(context);
+    return taken;
 }

@@ -43,11 +43,8 @@ void frames_add(struct job *job, struct engine_frame *frame)
     struct pending_frame *pending = job->cancelled ? NULL : calloc(1, sizeof *pending);
     if (!pending) {
         engine_frame_destroy(frame);
-        if (!job->cancelled) {
-            struct error error = {0};
-            error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a frame");
-            session_fail(job->session, &error);
-        }
+        if (!job->cancelled)
+            session_fail_for_memory(job->session);
         return;
     }
     *pending = (struct pending_frame){
@@ -106,7 +103,7 @@ bool frames_keep_begun(struct job *job)
     begun->next = NULL;
     job->first = begun;
     job->end = &begun->next;
-    return true;
+    return begun->request == job->request;
 }
 
 /* ---- messages ---------------------------------------------------------------------------------------- */

@@ -47,7 +47,7 @@ struct hub {
 
     struct loop_watch *engine_watch;
     /* Commands that the engine had no room for, in order. While one waits, no session reads on. */
-    struct hub_waiting *waiting, **waiting_end;
+    struct engine_command *waiting, **waiting_end;
     struct loop_timer retry_timer;
 };
 
@@ -60,9 +60,8 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
 /* Says goodbye to everybody; `emptied` is called when they are gone, at once if there is nobody. */
 void hub_stop(struct hub *hub);
 
-/* Hands a command to the engine, now or as soon as it has room; takes it over in any case. False: out of
- * memory, the command is destroyed. */
-bool hub_submit(struct hub *hub, struct engine_command *command);
+/* Hands a command to the engine, now or as soon as it has room. */
+void hub_submit(struct hub *hub, struct engine_command *command);
 /* Memory is short: scenes that nobody holds shall end, with what they use. */
 void hub_trim(struct hub *hub);
 /* The same for one of a session's requests: zeroed but for kind, client and request. NULL: out of memory. */

@@ -69,10 +69,19 @@ void session_fail(struct session *session, const struct error *error)
                       whole_characters(copy.text));
 }
 
+void session_fail_for_memory(struct session *session)
+{
+    struct error error = {0};
+    error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
+    session_fail(session, &error);
+}
+
 void session_submit(struct session *session, struct request *request, struct engine_command *command)
 {
-    if (command && hub_submit(session->hub, command))
+    if (command) {
+        hub_submit(session->hub, command);
         return;
+    }
     struct error error = {0};
     error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
     /* The engine knows nothing of it: all is as before. */
@@ -318,11 +327,9 @@ static void on_closed(void *context)
     upload_finish(session);
     scenes_finish(session);
     if (session->introduced) {
-        struct engine_command *command = hub_command(ENGINE_CLIENT_GONE, session->number, 0);
-        if (!command || !hub_submit(hub, command))
-            log_write(LOG_ERROR, "session", "no memory to forget client %" PRIu64 "; its scenes stay",
-                      session->number);
+        hub_submit(hub, session->farewell);
     } else {
+        engine_command_destroy(session->farewell);
         hub->unauthenticated--;
     }
     bool was_owner = session->number == hub->owner;
@@ -362,9 +369,13 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, const s
     session->identity = *identity;
     session->peer = *peer;
     session->principal = principal_of(session);
-    session->connection = connection_create(hub->loop, fd, &hub->options.connection_limits, entry,
-                                            &connection_handler, session, error);
+    session->farewell = hub_command(ENGINE_CLIENT_GONE, number, 0);
+    session->connection = session->farewell ? connection_create(hub->loop, fd, &hub->options.connection_limits,
+                                                                entry, &connection_handler, session, error)
+                                            : NULL;
     if (!session->connection) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
+        engine_command_destroy(session->farewell);
         free(session);
         return NULL;
     }

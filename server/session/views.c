@@ -120,6 +120,7 @@ void view_switch(struct job *job)
     job->frame_bytes = change->frame_bytes;
     job->engine_credit = change->credit;
     job->frames_gone = 0;
+    job->rendered = false;
     job->cancelled = change->cancelled;
     view->terms = change->terms;
     view->pacing.frame_ns = change->terms.frame_ns;
@@ -207,7 +208,8 @@ static void adapt(struct session_view *view, const struct engine_frame *frame)
         view->effort.bytes = advice.bytes;
     } else if (frame->encoding == view->terms.still_encoding) {
         double bytes_per_second = (double)pacing_bytes_per_second(&view->pacing);
-        view->effort.sparing = (double)frame->size_bytes * SECOND_NS > SPARING_NS * bytes_per_second;
+        if (bytes_per_second > 0.0)
+            view->effort.sparing = (double)frame->size_bytes * SECOND_NS > SPARING_NS * bytes_per_second;
     }
     view_wishes_set_effort(view->wishes, &view->effort);
 }
@@ -262,13 +264,12 @@ static void tell_engine(struct job *job)
 {
     struct session *session = job->session;
     struct engine_command *command = hub_command(ENGINE_VIEW_LOOK, session->number, job->request);
-    if (command)
-        command->scene = job->scene;
-    if (command && hub_submit(session->hub, command))
+    if (!command) {
+        session_fail_for_memory(session);
         return;
-    struct error error = {0};
-    error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory for what a view is told");
-    session_fail(session, &error);
+    }
+    command->scene = job->scene;
+    hub_submit(session->hub, command);
 }
 
 void views_look(struct session *session, const struct message_view_camera *message)

@@ -191,8 +191,8 @@ static inline void send_message(uint32_t request, uint32_t channel, const struct
     send_bytes(bytes, writer.used_bytes);
 }
 
-/* The next message but credit and blocked; it stays until the next call. */
-static inline const struct message *receive(void)
+/* The next message but credit and blocked, NULL: none is there; it stays until the next call. */
+static inline const struct message *receive_now(void)
 {
     for (;;) {
         struct frame frame;
@@ -200,6 +200,9 @@ static inline const struct message *receive(void)
         enum framing_result result = framing_parse(&frame, client.in + client.consumed,
                                                    client.in_used - client.consumed, MESSAGE_FROM_SERVER, &error);
         if (result == FRAMING_NEED_MORE) {
+            struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+            if (poll(&fd, 1, 0) != 1)
+                return NULL;
             receive_some();
             continue;
         }
@@ -218,6 +221,18 @@ static inline const struct message *receive(void)
         else
             return &client.message;
     }
+}
+
+/* The same, but waits for it. */
+static inline const struct message *receive(void)
+{
+    const struct message *message;
+    while (!(message = receive_now())) {
+        struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+        if (poll(&fd, 1, 20000) != 1)
+            fail_msg("nothing came for 20 s");
+    }
+    return message;
 }
 
 static inline void expect(enum message_type type, uint32_t request)

@@ -231,6 +231,61 @@ static void refining_gives_way_to_an_edit(void **state)
     stop(engine);
 }
 
+static void who_looks_on_sees_cameras_while_an_edit_waits_for_a_long_frame_of_a_batch(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    submit(engine, gated(render(1, 9, 0, 0)));
+    wait_until(&fake.frames_begun, 1);
+    submit_commit(engine, 1, 3, 1);     /* for the frame of the batch */
+    submit(engine, view(1, 2, wishes)); /* that comes after the edit, and is not begun before it */
+    expect_silence(engine);
+    atomic_store(&fake.gate_open, true);
+    for (int answers = 0; answers < 2;) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        answers += event->kind == ENGINE_DONE;
+        engine_event_destroy(event);
+    }
+    for (uint32_t samples = 1; samples <= 4; samples++) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        assert_int_equal(event->request, 2);
+        engine_event_destroy(event);
+    }
+    /* Now the view is there before. */
+    atomic_store(&fake.gate_open, false);
+    int begun = atomic_load(&fake.frames_begun);
+    submit(engine, gated(render(1, 10, 0, 0)));
+    wait_until(&fake.frames_begun, begun + 1);
+    submit_commit(engine, 1, 4, 1);
+    for (uint64_t number = 1; number <= 5; number++) {
+        look(engine, wishes, number, number < 5);
+        struct engine_frame *frame = take(expect_frame(engine, 1, 2, 3 + (uint32_t)number));
+        assert_int_equal(frame->command, number);
+        assert_int_equal(frame->result.revision, 1);
+        drop(frame);
+    }
+    expect_silence(engine); /* what rests is not refined to be thrown away */
+    atomic_store(&fake.gate_open, true);
+    uint32_t shown = 0;
+    for (bool applied = false; !applied || shown < 4;) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        applied |= event->request == 4;
+        if (event->kind == ENGINE_FRAME && event->request == 2) {
+            assert_true(applied);
+            assert_int_equal(event->frame->result.revision, 2);
+            shown++;
+        }
+        engine_event_destroy(event);
+    }
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
 static void nothing_is_begun_beyond_credit_so_that_nothing_becomes_stale(void **state)
 {
     (void)state;
@@ -564,6 +619,7 @@ int main(void)
         cmocka_unit_test(an_edit_of_the_scene_begins_anew),
         cmocka_unit_test(refining_gives_way_to_a_new_camera),
         cmocka_unit_test(refining_gives_way_to_an_edit),
+        cmocka_unit_test(who_looks_on_sees_cameras_while_an_edit_waits_for_a_long_frame_of_a_batch),
         cmocka_unit_test(nothing_is_begun_beyond_credit_so_that_nothing_becomes_stale),
         cmocka_unit_test(no_more_frames_come_than_were_asked_for_a_second),
         cmocka_unit_test(a_key_frame_comes_also_where_nothing_moves),
