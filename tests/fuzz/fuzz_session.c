@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Whole sessions of up to three clients against the real dispatcher, connections and loop, with the recorder for
- * an engine. The input is a list of steps:
+ * an engine. The input is a list of steps, each of which begins with kind | client << 2 | settle << 4:
  *
- *   kind | client << 2 | settle << 4   kind 0: bytes, 1: message, 2: time, 3: circumstance
- *   bytes         u16 count, that many bytes as they are
- *   message       u8 which of the client's messages, u8 request, u8 channel, u16 count, that many bytes of
- * payload: with a header that fits, so that an input's changes reach what is behind the framing time          u8:
- * so many times 10 ms pass circumstance  u8: 0 .. 15 the recorder's mood, 16 the client connects or goes, 17 it
- * says hello, 18 it reads no more, or again */
+ * - kind 0, bytes: u16 count, that many bytes as they are.
+ * - kind 1, message: u8 which of the client's messages, u8 request, u8 channel, u16 count, that many bytes of
+ *   payload. It gets a header that fits, so that an input's changes reach what is behind the framing.
+ * - kind 2, time: u8, the square of which passes in ms.
+ * - kind 3, circumstance: u8. 0 .. 15: the recorder's mood; 16: the client connects or goes; 17: it says hello;
+ * 18: it reads no more, or again; 19: the daemon stops; 20: the client may only look. */
 #include "protocol/describe.h"
 #include "tests/fuzz/engine_recorder.h"
 #include "tests/fuzz/fuzz.h"
@@ -82,7 +82,16 @@ static void change(unsigned client, unsigned what)
         serving_greet(client);
     } else if (what == 18) {
         serving_clients[client].stalled = !serving_clients[client].stalled;
+    } else if (what == 19 && !serving_hub.stopping) {
+        hub_stop(&serving_hub);
+    } else if (what == 20) {
+        serving_restrict(client);
     }
+}
+
+static void pass_time(unsigned amount)
+{
+    serving_wait(amount * amount * UINT64_C(1000000));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -100,7 +109,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             send_message(client, &input);
             break;
         case 2:
-            serving_wait(take(&input) * UINT64_C(10000000));
+            pass_time(take(&input));
             break;
         case 3:
             change(client, take(&input));

@@ -214,15 +214,20 @@ static bool write_noise(const char *folder)
 /* ---- sessions: as fuzz_session.c has its steps ---- */
 
 #define STEP_MESSAGE 1
+#define STEP_TIME 2
 #define STEP_CIRCUMSTANCE 3
 #define STEP_SETTLE 16
 #define CONNECT 16
 #define HELLO 17
+#define STOP 19
+#define ONLY_LOOKS 20
+#define FRAME_MS_ROOT 12
 
 struct session_seed {
     uint8_t bytes[16384];
     struct writer writer;
     unsigned client, settle;
+    bool takes_time; /* with a pause behind each message */
 };
 
 static unsigned number_of(uint16_t type)
@@ -262,6 +267,19 @@ static void put_message(void *context, uint32_t request, uint32_t channel, const
     }
     writer_put_u16(&seed->writer, (uint16_t)of_payload.used_bytes);
     writer_put_bytes(&seed->writer, payload, of_payload.used_bytes);
+    if (seed->takes_time) {
+        put_step(seed, STEP_TIME);
+        writer_put_u8(&seed->writer, FRAME_MS_ROOT);
+    }
+}
+
+/* Stays, with its scene. */
+static void put_message_but_the_last(void *context, uint32_t request, uint32_t channel,
+                                     const struct message *message)
+{
+    if (message->type != MESSAGE_SCENE_CLOSE && message->type != MESSAGE_GOODBYE) {
+        put_message(context, request, channel, message);
+    }
 }
 
 static void come(struct session_seed *seed, unsigned client)
@@ -271,23 +289,20 @@ static void come(struct session_seed *seed, unsigned client)
     put_circumstance(seed, HELLO);
 }
 
-static bool write_session(const char *folder, int number, unsigned settle, unsigned mood,
+static bool write_session(const char *folder, int number, unsigned settle, unsigned circumstance,
                           void session(recorded_say_fn *say, void *context))
 {
     static struct session_seed seed;
-    seed = (struct session_seed){.settle = settle};
+    seed = (struct session_seed){.settle = settle, .takes_time = settle && circumstance == 0};
     writer_init(&seed.writer, seed.bytes, sizeof seed.bytes);
-    come(&seed, 0);
-    if (mood) {
-        put_circumstance(&seed, mood);
-    }
     if (session == recorded_onlooker) {
         come(&seed, 1);
-        recorded_session(put_message, &seed);
-        put_circumstance(&seed, 0);
-        seed.client = 0;
+        recorded_session(put_message_but_the_last, &seed);
     }
+    come(&seed, 0);
+    put_circumstance(&seed, circumstance);
     session(put_message, &seed);
+    put_circumstance(&seed, STOP);
     return write_file(folder, "session", "session", number, seed.bytes, seed.writer.used_bytes);
 }
 
@@ -295,11 +310,12 @@ static bool write_sessions(const char *folder)
 {
     bool ok = true;
     int number = 0;
+    static const unsigned circumstances[] = {0, 1, 2, 4, 8, ONLY_LOOKS};
     for (unsigned settle = 0; settle <= STEP_SETTLE; settle += STEP_SETTLE) {
-        for (unsigned mood = 0; mood <= 8; mood = mood ? 2 * mood : 1) {
-            ok = ok && write_session(folder, number++, settle, mood, recorded_session) &&
-                 write_session(folder, number++, settle, mood, recorded_onlooker) &&
-                 write_session(folder, number++, settle, mood, recorded_blunders);
+        for (size_t i = 0; i < sizeof circumstances / sizeof circumstances[0]; i++) {
+            ok = ok && write_session(folder, number++, settle, circumstances[i], recorded_session) &&
+                 write_session(folder, number++, settle, circumstances[i], recorded_onlooker) &&
+                 write_session(folder, number++, settle, circumstances[i], recorded_blunders);
         }
     }
     return ok;

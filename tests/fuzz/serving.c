@@ -5,6 +5,7 @@
 #include "base/log.h"
 #include "base/sys.h"
 #include "protocol/handshake.h"
+#include "session/session.h"
 #include "tests/fuzz/engine_recorder.h"
 #include "tests/fuzz/fuzz.h"
 
@@ -136,8 +137,15 @@ bool serving_connect(unsigned number)
         return false;
     }
     uint8_t *in = client->in;
-    *client = (struct serving_client){.fd = pair[1], .in = in};
+    *client = (struct serving_client){.fd = pair[1], .number = serving_hub.last_number, .in = in};
     return true;
+}
+
+void serving_restrict(unsigned number)
+{
+    struct session *session = hashmap_get(&serving_hub.sessions, serving_clients[number].number);
+    if (session)
+        session->identity.read_only = true;
 }
 
 bool serving_send(unsigned number, const uint8_t *bytes, size_t count)
@@ -257,8 +265,10 @@ void serving_end(void)
     serving_settle();
     serving_wait(10000000); /* commands that waited for room are tried again */
     serving_check_empty();
-    serving_check_next();
-    serving_check_empty();
+    if (!serving_hub.stopping) {
+        serving_check_next();
+        serving_check_empty();
+    }
     hub_finish(&serving_hub);
     loop_destroy(loop);
     recorder_end();

@@ -16,6 +16,7 @@
 
 struct serving_client {
     int fd;                /* -1: not connected */
+    uint64_t number;       /* the hub's for it */
     bool greeted, stalled; /* a stalled one does not read */
     uint8_t *in;
     size_t in_used;
@@ -31,6 +32,8 @@ extern struct serving_client serving_clients[SERVING_CLIENTS];
 void serving_begin(void);
 /* False: the hub did not let it in. */
 bool serving_connect(unsigned client);
+/* From now on it may only look. */
+void serving_restrict(unsigned client);
 /* The daemon reads as it comes. False: it has closed the connection. */
 bool serving_send(unsigned client, const uint8_t *bytes, size_t count);
 void serving_greet(unsigned client);
