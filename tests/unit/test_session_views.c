@@ -417,11 +417,10 @@ static void who_has_no_credit_left_is_told_that_nothing_comes(void **state)
     engine_command_destroy(start);
 }
 
-/* Frame 1 is on its way and not acknowledged; the link was slow before, and there may be one of its kind at once.
- */
-static void a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera(void **state)
+/* Frame 1 is on its way and not acknowledged, and the link was slow before, so that frame 2 has waited for it when
+ * a newer camera has long come. */
+static struct engine_command *let_a_frame_wait(enum encoding encoding)
 {
-    (void)state;
     open_scene(1, 1);
     struct message message = view_message(100);
     message.render.frames_per_second = 100000;
@@ -436,13 +435,34 @@ static void a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera(void *
     take_frame(2, 1);
     /* The next one is begun when that one is expected to have come, and waits for it. */
     told_credit(2, 3);
-    say_frame(2, 2, 0);
+    struct engine_event *late = frame_of(2, 2, 0, FRAME_BYTES);
+    late->frame->encoding = encoding;
+    assert_true(queue_push(engine.events, late));
     send_camera(8, true);
     told_and_forgotten(ENGINE_VIEW_LOOK);
     usleep(20000);
     send_ack(1, true, false);
+    return start;
+}
+
+static void a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera(void **state)
+{
+    (void)state;
+    struct engine_command *start = let_a_frame_wait(ENCODING_JPEG);
     told_credit(2, 4); /* instead of frame 2 */
     say_frame(2, 3, 8);
+    take_frame(2, 3);
+    engine_command_destroy(start);
+}
+
+/* Those behind it tell what is different from it, key frame or not. */
+static void a_frame_of_a_stream_comes_however_long_it_waits(void **state)
+{
+    (void)state;
+    struct engine_command *start = let_a_frame_wait(ENCODING_H264);
+    take_frame(2, 2);
+    say_frame(2, 3, 8);
+    send_ack(2, true, false);
     take_frame(2, 3);
     engine_command_destroy(start);
 }
@@ -981,6 +1001,7 @@ int main(void)
         BOTH(a_key_frame_is_wished_of_the_engine),
         BOTH(who_has_no_credit_left_is_told_that_nothing_comes),
         BOTH(a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera),
+        BOTH(a_frame_of_a_stream_comes_however_long_it_waits),
         BOTH(a_view_that_adapts_tells_the_engine_what_the_link_carries),
         BOTH(a_view_takes_the_place_of_another_on_its_channel),
         BOTH(a_frame_under_way_comes_whole_before_the_answer),
