@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* From the device to memory that the frame's taker owns. */
-#include "render/frame_request.h"
 #include "render/picture.h"
+
+#include "base/clock.h"
+#include "render/frame_request.h"
 
 #include <stdlib.h>
 
@@ -51,10 +53,10 @@ bool picture_copy_band(struct picture *picture, struct render_context *context, 
                        uint32_t plane, uint32_t band, struct error *error)
 {
     context_span_begin(context, STAGE_READBACK);
-    bool begun = gpu_readback_begin(context->device, copy, &picture->resolved,
-                                    band_bytes(picture, context, plane, band), error);
+    bool begun = gpu_readback_copy(context->device, copy, &picture->resolved,
+                                   band_bytes(picture, context, plane, band), error);
     context_span_end(context);
-    return begun && gpu_check(context->device, "copying the picture", error);
+    return begun && gpu_readback_fence(copy, error) && gpu_check(context->device, "copying the picture", error);
 }
 
 bool picture_take_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
@@ -63,8 +65,9 @@ bool picture_take_band(struct picture *picture, struct render_context *context, 
     uint8_t *pixels = band_pixels(picture, context, plane, band, error);
     if (!pixels)
         return false;
-    context_span_begin(context, STAGE_READBACK);
+    /* Not as a span of the device, behind which others' work may be queued already. */
+    uint64_t start_ns = clock_now_ns();
     bool taken = gpu_readback_take(context->device, copy, pixels, error);
-    context_span_end(context);
+    context_add_cpu_time(context, STAGE_READBACK, start_ns);
     return taken;
 }

@@ -270,6 +270,8 @@ static void a_changed_view_takes_frames_of_both_sizes_and_counts_on(void **state
         for (unsigned frames = i >= 20 ? 2 : 1; frames > 0; frames--) {
             struct fl_frame *frame = next_frame(view);
             assert_int_equal(frame->frame, number++);
+            assert_int_equal(frame->change,
+                             frames == 2 ? i : i + 1); /* the first of two is still the old view's */
             fl_frame_destroy(frame);
         }
     }
@@ -520,6 +522,7 @@ static void a_frame_in_h264_is_left_to_the_caller(void **state)
     fl_view_destroy(view);
     fl_connection_destroy(scene.connection);
     stop(daemon);
+    assert_int_equal(seen.first.quality, 80); /* where nothing is said: no worse than x264's own default */
 }
 
 /* Half a frame, then nothing. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What fuzzers have found worth keeping, once through each of them: tests/fuzz/corpus/NAME/ through fuzz_NAME.c, which is
- * built for this with another name for its one function. */
+/* What fuzzers have found worth keeping, once through each of them: tests/fuzz/corpus/NAME/ through fuzz_NAME.c,
+ * which is built for this with another name for its one function. */
 #include <dirent.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,7 +12,8 @@
 #include <cmocka.h>
 
 typedef int fuzz_one_fn(const uint8_t *data, size_t size);
-fuzz_one_fn fuzz_one_codec, fuzz_one_framing, fuzz_one_handshake, fuzz_one_scene, fuzz_one_sealed, fuzz_one_session;
+fuzz_one_fn fuzz_one_codec, fuzz_one_framing, fuzz_one_handshake, fuzz_one_scene, fuzz_one_sealed,
+    fuzz_one_session;
 
 /* In a block of its own size, so that a sanitizer sees a read beyond it. */
 static uint8_t *read_file(const char *path, size_t *size_bytes)
