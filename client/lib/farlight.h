@@ -283,7 +283,7 @@ struct fl_job_options {
     float exposure_stops;
     enum protocol_pixel_format format;
     enum protocol_encoding encoding;
-    unsigned quality; /* 0: JPEG 90, zstd 1 */
+    unsigned quality; /* 0: JPEG 90, H.264 80, else level 1 */
     enum protocol_camera_path camera_path;
     uint32_t camera_node;
     float orbit_turn, orbit_seconds; /* radians, seconds */

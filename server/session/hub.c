@@ -170,6 +170,9 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
         .started_ns = clock_now_ns(),
         .retry_timer = {.call = retry, .context = hub},
     };
+    hub->owner_limits = options->connection_limits;
+    if (options->owner_may_be_idle)
+        hub->owner_limits.idle_ms = 0;
     hub->waiting_end = &hub->waiting;
     hub->blobs = blob_store_create(options->limits.blob_bytes, options->limits.blob_cache_bytes);
     if (!hub->blobs)

@@ -22,6 +22,7 @@ struct session;
 struct hub_options {
     struct session_limits limits;
     struct connection_limits connection_limits;
+    bool owner_may_be_idle; /* the client of daemon_serve_fd() is not sent away for its silence */
     struct readers readers; /* of the Unix socket */
     struct engine_port engine;
     struct timeline *timeline;   /* hears of every frame that was sent; may be NULL */
@@ -40,7 +41,8 @@ struct hub {
     uint64_t frame_bytes;     /* what the frames of all jobs may take */
     uint64_t last_number, started_ns;
     bool stopping;
-    uint64_t owner; /* number of the client for whom all this is there; 0: nobody */
+    uint64_t owner;                        /* number of the client for whom all this is there; 0: nobody */
+    struct connection_limits owner_limits; /* of that one */
     loop_call_fn *owner_gone,
         *emptied; /* called when that one is gone, and when the last session is; may be NULL */
     void *call_context;
