@@ -243,16 +243,12 @@ static void who_looks_on_sees_cameras_while_an_edit_waits_for_a_long_frame_of_a_
     submit(engine, view(1, 2, wishes)); /* that comes after the edit, and is not begun before it */
     expect_silence(engine);
     atomic_store(&fake.gate_open, true);
-    for (int answers = 0; answers < 2;) {
+    /* The view's frames may come before the batch's own has been encoded. */
+    for (int answers = 0, samples = 0; answers < 2 || samples < 4;) {
         struct engine_event *event = event_within(engine, 10000);
         assert_non_null(event);
         answers += event->kind == ENGINE_DONE;
-        engine_event_destroy(event);
-    }
-    for (uint32_t samples = 1; samples <= 4; samples++) {
-        struct engine_event *event = event_within(engine, 10000);
-        assert_non_null(event);
-        assert_int_equal(event->request, 2);
+        samples += event->kind == ENGINE_FRAME && event->request == 2;
         engine_event_destroy(event);
     }
     /* Now the view is there before. */
