@@ -44,6 +44,8 @@ endif
 
 # Linked libraries, by program.
 SERVER_PKGS := epoxy egl libzstd libsodium libxxhash libturbojpeg inih cglm
+# The daemon loads this one when it needs it, so that only its headers are needed here.
+SERVER_LOADED_PKGS := libavcodec libavutil
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
 IMPORT_PKGS := OpenImageIO tinygltf tinyobjloader libsodium libseccomp
 EXPORT_PKGS := OpenImageIO libjxl libseccomp
@@ -124,7 +126,7 @@ $(B)/client/output/%.opp $(B)/client/output/%.o: INCLUDES = -Iclient $(EXPORT_CF
 $(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
 $(B)/client/viewer/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS) $(VIEWER_CFLAGS)
 $(B)/tests/%.o: INCLUDES = -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS) $(TEST_CFLAGS)
-SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS)))$(SERVER_CFLAGS)
+SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS) $(SERVER_LOADED_PKGS)))$(SERVER_CFLAGS)
 CLIENT_CFLAGS = $(eval CLIENT_CFLAGS := $(call pkg_cflags,$(CLIENT_PKGS)))$(CLIENT_CFLAGS)
 TEST_CFLAGS = $(eval TEST_CFLAGS := $(call pkg_cflags,$(TEST_PKGS)))$(TEST_CFLAGS)
 # Others' C++ headers are system headers: our warnings are for our own files.
@@ -206,6 +208,8 @@ RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIV
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
 $(B)/tests/unit/test_load_model $(B)/tests/accuracy/test_abuffer_against_reference: $(MODEL_OBJ)
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
+# What the daemon encodes is decoded by the library itself.
+$(addprefix $(B)/tests/unit/test_encode_,pool stream): TEST_LIBS += $(call pkg_libs,libavcodec libavutil)
 $(B)/tests/unit/test_viewer_camera: $(call obj,$(addprefix client/viewer/,camera.c input.c settings.c tour.c))
 $(B)/tests/unit/test_viewer_figures: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c))
 $(B)/tests/unit/test_viewer_replay: $(B)/client/viewer/replay.o

@@ -144,6 +144,23 @@ static void print_sealed_keys(void)
         SEALED_PLAIN_MAX_BYTES);
 }
 
+static void print_sealed_stream(void)
+{
+    printf(
+        "What crypto_secretstream_xchacha20poly1305 does, for who has no libsodium (ChaCha20 and Poly1305 of RFC\n"
+        "8439, HChaCha20 as in XChaCha20): k = HChaCha20 of K and bytes 0 to 15 of the header; n = its bytes 16 "
+        "to\n"
+        "23; a counter begins at 1. A push has the nonce u32 counter | n and takes, of ChaCha20 with k and it,\n"
+        "the first 32 bytes of block 0 as the key of Poly1305, block 1 for the tag with 63 zeros behind it, and\n"
+        "block 2 and on for the text. Poly1305 goes over the additional data, zeros up to a multiple of 16, the\n"
+        "64 sealed bytes of the tag, the sealed text, as many zeros as the text has bytes beyond a multiple of "
+        "16,\n"
+        "u64 bytes of additional data, u64 64 + bytes of text. The sealed bytes of the record are the first\n"
+        "sealed byte of the tag, the sealed text and those 16 bytes, of which the first 8 are then mixed into n "
+        "by\n"
+        "exclusive or; the counter goes up by 1. (After 2^32 - 1 records libsodium makes new keys.)\n\n");
+}
+
 static void print_framing(void)
 {
     printf("## Messages in the stream\n\n"
@@ -283,6 +300,18 @@ static void print_predicted(void)
         "prediction that it makes of the bytes that it has restored.\n\n");
 }
 
+static void print_h264(void)
+{
+    printf(
+        "## The encoding `h264`\n\n"
+        "The frames of a view that have it are one stream, whatever others come between them: an access unit\n"
+        "each, in the byte stream format of ITU-T H.264 annex B, 4:2:0 with 8 bits, colours by BT.709 in the\n"
+        "limited range. Each gives its picture at once, as none needs a later one. A key frame is an IDR\n"
+        "picture with the parameter sets before it; the stream begins with one, one comes where frames change\n"
+        "their size, and otherwise only on request (`want_key_frame` of frame_ack). What is decoded has an even\n"
+        "width and height: where the frame's is odd, its last column or row is one too many.\n\n");
+}
+
 static bool copy_file(const char *path)
 {
     FILE *file = fopen(path, "r");
@@ -311,6 +340,7 @@ int main(int argument_count, char **arguments)
     print_handshake();
     print_sealed_messages();
     print_sealed_keys();
+    print_sealed_stream();
     print_framing();
     printf("## Enumerations\n\n");
     for (size_t i = 0; i < protocol_enum_count; i++) {
@@ -327,6 +357,7 @@ int main(int argument_count, char **arguments)
         print_message(&protocol_messages[i]);
     }
     print_predicted();
+    print_h264();
     docgen_print_example();
     return ferror(stdout) || fflush(stdout) != 0 ? 1 : 0;
 }

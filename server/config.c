@@ -89,7 +89,7 @@ static const struct option options[] = {
     {"limits", "scene_linger", OPTION_U32, AT(scene_linger_s), "120", 0, 86400, "s",
      "How long a kept or shared scene stays when its last client is gone, to be come back to; 0: not at all"},
     {"limits", "scenes_lingering", OPTION_U32, AT(lingering_scenes), "16", 1, 65536, "",
-     "Scenes that stay so, of all clients; of more the one that was left first ends"},
+     "Scenes that stay so, of all clients; of more, who left most loses his oldest"},
     {"limits", "jobs", OPTION_U32, AT(limits.jobs_per_client), "4", 1, 65536, "", "Running jobs of one client"},
     {"limits", "blobs", OPTION_U32, AT(limits.blobs_per_client), "262144", 1, 16777216, "",
      "Blobs that one connection may name"},

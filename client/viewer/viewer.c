@@ -176,16 +176,17 @@ static bool open_viewer(struct viewer *viewer, struct fl_error *error)
                                             .note = options->note};
     if (options->replay != NULL && !replay_load(&viewer->replay, options->replay, error))
         return false;
-    viewer->session = session_create(&session, error); /* it opens while the window does */
-    if (viewer->session == NULL || options->headless)
-        return viewer->session != NULL;
-    viewer->window = window_create(options->scene_name != NULL ? options->scene_name
-                                   : options->model != NULL    ? options->model
-                                                               : options->environment,
-                                   viewer->width, viewer->height, error);
-    if (viewer->window != NULL)
+    if (!options->headless) {
+        viewer->window = window_create(options->scene_name != NULL ? options->scene_name : options->model,
+                                       viewer->width, viewer->height, error);
+        if (viewer->window == NULL)
+            return false;
         window_size(viewer->window, &viewer->width, &viewer->height, &viewer->scale);
-    return viewer->window != NULL;
+    }
+    /* Not before the window is there: SDL starts programs of the desktop's, whose pipes must not come into the
+     * hands of a daemon that is started meanwhile. */
+    viewer->session = session_create(&session, error);
+    return viewer->session != NULL;
 }
 
 static void close_viewer(struct viewer *viewer)

@@ -25,9 +25,7 @@ static void fill_names(struct viewer *viewer, struct hud_state *state)
     const struct viewer_options *options = viewer->options;
     struct fl_scene *scene = session_scene(viewer->session);
     const struct tour *tour = &viewer->tour;
-    state->scene = options->scene_name != NULL ? options->scene_name
-                   : options->model != NULL    ? file_name(options->model)
-                                               : file_name(options->environment);
+    state->scene = options->scene_name != NULL ? options->scene_name : file_name(options->model);
     state->server = options->server != NULL ? options->server : "";
     state->camera = state->clip = "";
     if (scene != NULL && tour->camera != TOUR_NONE)
@@ -116,12 +114,14 @@ void viewer_print_state(struct viewer *viewer, const char *name)
     viewer_hud(viewer, &state);
     metrics_summarise(&viewer->metrics, state.now_ns, &summary);
     json_t *line = json_pack(
-        "{s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, s:o, s:o, "
+        "{s:s, s:s, s:s, s:s, s:s, s:s, s:f, s:i, s:i, s:b, s:i, s:i, s:I, s:i, s:I, s:s, s:s, s:f, s:b, s:o, "
+        "s:o, "
         "s:f, "
         "s:f, s:f}",
         "state", name, "status", statuses[state.status], "tracer", protocol_tracer_text(viewer->frame.tracer),
         "integrator", protocol_integrator_text(viewer->frame.integrator), "tone_map",
-        protocol_tone_map_text(viewer->settings.tone_map), "exposure_stops", (double)viewer->frame.exposure_stops,
+        protocol_tone_map_text(viewer->settings.tone_map), "encoding",
+        protocol_encoding_text(viewer->frame.encoding), "exposure_stops", (double)viewer->frame.exposure_stops,
         "samples", (int)state.samples, "samples_wanted", (int)state.samples_wanted, "moving", (int)state.moving,
         "width", (int)state.picture_width, "height", (int)state.picture_height, "frames",
         (json_int_t)viewer->frames, "times_live", (int)viewer->times_live, "revision", (json_int_t)state.revision,

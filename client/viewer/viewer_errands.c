@@ -95,7 +95,7 @@ static void fill_reference(const struct viewer *viewer, struct fl_job_options *j
     job->tone_map = viewer->settings.tone_map;
     job->exposure_stops += (float)viewer->settings.exposure_thirds / 3;
     job->accumulate = true; /* with the random numbers of a view */
-    job->encoding = session_is_local(viewer->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_ZSTD;
+    job->encoding = session_is_local(viewer->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
     fill_key(&viewer->camera, key);
     use_key(job, key);
 }

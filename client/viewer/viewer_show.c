@@ -28,7 +28,7 @@ static void choose_encodings(const struct viewer *viewer, struct fl_view_options
                              : session_can_h264(viewer->session) ? PROTOCOL_ENCODING_H264
                                                                  : PROTOCOL_ENCODING_JPEG;
     if (!options->has_still_encoding)
-        view->still_encoding = is_local ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_ZSTD;
+        view->still_encoding = is_local ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
     view->adapt = options->always_adapt || (!is_local && !options->never_adapt);
 }
 

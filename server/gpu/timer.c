@@ -94,13 +94,27 @@ void gpu_timer_end(struct gpu_timer *timer)
     span->cpu_duration_ns = clock_now_ns() - span->cpu_start_ns;
 }
 
+static bool is_available(unsigned query)
+{
+    GLint available = 0;
+    glGetQueryObjectiv(query, GL_QUERY_RESULT_AVAILABLE, &available);
+    return available;
+}
+
+/* The device is through with all spans, though it may have other work behind them. */
+static bool all_available(const struct gpu_timer *timer)
+{
+    for (size_t i = timer->span_count; i-- > 0;)
+        if (timer->spans[i].queries[1])
+            return is_available(timer->spans[i].queries[1]);
+    return false;
+}
+
 /* False: the query has no result, as after the loss of the context. */
 static bool query_time(unsigned query, uint64_t *time_ns)
 {
-    GLint available = 0;
     GLuint64 value = 0;
-    glGetQueryObjectiv(query, GL_QUERY_RESULT_AVAILABLE, &available);
-    if (!available)
+    if (!is_available(query))
         return false;
     glGetQueryObjectui64v(query, GL_QUERY_RESULT, &value);
     *time_ns = value;
@@ -111,7 +125,8 @@ void gpu_timer_collect(struct gpu_timer *timer, struct stage_times *times)
 {
     if (timer->open)
         gpu_timer_end(timer);
-    glFinish();
+    if (!all_available(timer))
+        glFinish();
     /* What the GPU's clock shows now, so that its times can be told in ours. */
     GLint64 gpu_now_ns = 0;
     glGetInteger64v(GL_TIMESTAMP, &gpu_now_ns);

@@ -14,8 +14,8 @@ void gpu_timer_destroy(struct gpu_timer *timer);               /* accepts NULL *
  * measured with the CPU clock, and both reach the stage times. */
 void gpu_timer_begin(struct gpu_timer *timer, enum stage_id stage, uint32_t wave);
 void gpu_timer_end(struct gpu_timer *timer);
-/* Waits for the GPU, adds every span since the last collect to `times` (may be NULL). A query without a
- * result is left out, never reported as 0. */
+/* Waits until the GPU is through with the spans, adds every span since the last collect to `times` (may be NULL).
+ * A query without a result is left out, never reported as 0. */
 void gpu_timer_collect(struct gpu_timer *timer, struct stage_times *times);
 
 #endif

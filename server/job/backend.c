@@ -13,5 +13,6 @@ const struct engine_backend engine_backend_gpu = {
     .may_begin = frame_may_begin,
     .begin = frame_begin,
     .step = frame_step,
+    .step_waits = frame_step_waits,
     .abandon = frame_abandon,
 };

@@ -21,6 +21,7 @@ struct engine_backend {
     bool (*begin)(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
                   const struct frame_request *request, struct error *error);
     enum frame_progress (*step)(struct frame_renderer *renderer, struct frame_result *result, struct error *error);
+    bool (*step_waits)(const struct frame_renderer *renderer);
     void (*abandon)(struct frame_renderer *renderer);
 };
 extern const struct engine_backend engine_backend_gpu;

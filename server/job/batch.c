@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "encode/stream.h"
 #include "job/shot.h"
 #include "render/frame_request.h"
 
@@ -16,6 +17,13 @@
 static uint32_t bytes_per_pixel(enum frame_format format)
 {
     return format == FRAME_RGBA8 ? 4 : format == FRAME_RGBA16F ? 8 : 16;
+}
+
+static bool can_encode(const struct engine_job *spec, enum encoding encoding)
+{
+    uint32_t pixel_bytes = bytes_per_pixel(spec->frame.format);
+    return encoder_supports(encoding, pixel_bytes) ||
+           (spec->kind == JOB_VIEW && encoder_stream_supports(encoding, pixel_bytes));
 }
 
 static bool spec_check(const struct engine_job *spec, const struct scene *scene, struct error *error)
@@ -30,12 +38,12 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
                          "a picture has at least one pixel");
     if (!spec->frame.samples)
         return error_set(error, ERROR_INVALID, "render.samples", "a pixel has at least one sample");
-    if (!encoder_supports(spec->encoding, bytes_per_pixel(spec->frame.format))) {
+    if (!can_encode(spec, spec->encoding)) {
         error_set(error, ERROR_UNSUPPORTED, "render.encoding", "encoding %u cannot carry pixels of %u bytes",
                   (unsigned)spec->encoding, bytes_per_pixel(spec->frame.format));
         return error_remedy(error, "use the pixel format rgba8, or the encoding raw, zstd or predicted");
     }
-    if (spec->kind == JOB_VIEW && !encoder_supports(spec->still_encoding, bytes_per_pixel(spec->frame.format)))
+    if (spec->kind == JOB_VIEW && !can_encode(spec, spec->still_encoding))
         return error_set(error, ERROR_UNSUPPORTED, "render.still_encoding",
                          "encoding %u cannot carry pixels of %u bytes", (unsigned)spec->still_encoding,
                          bytes_per_pixel(spec->frame.format));
@@ -94,11 +102,14 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
         .window = window_of(engine, &command->job.frame),
         .credit = command->job.kind == JOB_VIEW ? UINT64_MAX : command->job.credit,
     });
+    bool streams = command->job.encoding == ENCODING_H264 || command->job.still_encoding == ENCODING_H264;
+    struct encode_lane *lane = streams ? encode_lane_create(command->job.frames_per_second) : NULL;
     struct job *before = replaced_by(engine, command);
     struct engine_event *end_before = before ? event_create(ENGINE_DONE, before->client, before->request) : NULL;
-    if (!job || !output || (before && !end_before) || !jobs_reserve(engine)) {
+    if (!job || !output || (streams && !lane) || (before && !end_before) || !jobs_reserve(engine)) {
         free(job);
         job_output_unref(output);
+        encode_lane_unref(lane);
         engine_event_destroy(end_before);
         return error_set(error, ERROR_OUT_OF_MEMORY, "render", "no memory for a job");
     }
@@ -113,6 +124,7 @@ bool job_start(struct engine *engine, struct engine_reference *reference, struct
     job->output = output;
     job->next_frame = job->spec.first_frame;
     job->view.credit = job->spec.credit;
+    job->view.lane = lane;
     engine->jobs[engine->job_count++] = job;
     if (before) {
         struct engine_scene *scene_before = before->scene;
@@ -144,6 +156,7 @@ static void abandon_frame(struct engine *engine, struct job *job)
     engine->backend->abandon(job->renderer);
     job->rendering = false;
     job->scene->frames--;
+    job->scene->frames_ended++;
 }
 
 /* The output may outlive the job, with frames that are still encoded or not taken. */
@@ -162,6 +175,7 @@ static void job_remove(struct engine *engine, struct job *job)
         i++;
     memmove(&engine->jobs[i], &engine->jobs[i + 1], (--engine->job_count - i) * sizeof(struct job *));
     job_output_unref(job->output);
+    encode_lane_unref(job->view.lane);
     free(job->spec.keys);
     free(job->spec.clips);
     view_wishes_unref(job->spec.wishes);
@@ -228,19 +242,36 @@ static bool any_frame(const struct engine *engine)
     return any;
 }
 
+/* Something waits for the frames in progress to end. */
+static bool is_waited_for(const struct engine_scene *scene)
+{
+    return scene->waiting_count || (scene->put_off && wants_frame(scene->put_off));
+}
+
+/* A frame of a batch may take minutes, and whoever looks at the scene would see nothing of it meanwhile: as long
+ * as one keeps waiting what waits, frames of views do not make it later. */
+static bool may_begin_meanwhile(const struct engine *engine, const struct job *job)
+{
+    const struct engine_scene *scene = job->scene;
+    bool batch = false;
+    for (size_t i = 0; i < engine->job_count; i++) {
+        const struct job *other = engine->jobs[i];
+        batch |= other->scene == scene && other->rendering && other->spec.kind == JOB_BATCH;
+    }
+    return batch && job->spec.kind == JOB_VIEW && view_has_news(job) && job->refused_after != scene->frames_ended;
+}
+
 /* What waits for the frames in progress to end is not kept waiting by new ones. */
 static bool may_begin(const struct engine *engine, const struct job *job)
 {
     const struct engine_scene *scene = job->scene;
-    if (scene->waiting_count)
+    if (engine->needs_all && engine->needs_all != job && wants_frame(engine->needs_all))
         return false;
     if (engine->needs_all == job)
-        return !any_frame(engine);
-    if (engine->needs_all && wants_frame(engine->needs_all))
-        return false;
-    if (scene->put_off == job)
+        return !scene->waiting_count && !any_frame(engine);
+    if (!scene->waiting_count && scene->put_off == job)
         return !scene->frames;
-    return !scene->put_off || !wants_frame(scene->put_off);
+    return !is_waited_for(scene) || (scene->put_off != job && may_begin_meanwhile(engine, job));
 }
 
 /* When it is ready; in the past: now. UINT64_MAX: not before something happens. */
@@ -303,10 +334,13 @@ static bool frame_begin_shot(struct engine *engine, struct job *job, const struc
     if (!engine_need_device(engine, error) || !job_need_renderer(engine, job, error))
         return false;
     if (!engine->backend->may_begin(job->renderer, scene->scene, motion, &shot->request)) {
-        scene->put_off = job;
+        if (!is_waited_for(scene))
+            scene->put_off = job;
+        job->refused_after = scene->frames_ended;
         return true;
     }
-    scene->put_off = NULL;
+    if (scene->put_off == job)
+        scene->put_off = NULL;
     if (engine->needs_all == job)
         engine->needs_all = NULL;
     if (!engine->backend->begin(job->renderer, scene->scene, motion, &shot->request, error))
@@ -352,6 +386,7 @@ static void frame_done(struct engine *engine, struct job *job, struct engine_fra
     job->rendering = false;
     job->evicted = false;
     job->scene->frames--;
+    job->scene->frames_ended++;
     account(engine, job, &frame->result);
     frame->frame = (uint32_t)job->next_frame;
     frame->request = job->frame;
@@ -365,7 +400,7 @@ static void frame_done(struct engine *engine, struct job *job, struct engine_fra
         view_done(job, frame);
     job->next_frame += job->spec.frame_step;
     uint64_t position = job_output_reserve(job->output);
-    if (!encode_pool_submit(engine->pool, job->output, position, frame)) {
+    if (!encode_pool_submit(engine->pool, job->output, job->view.lane, position, frame)) {
         struct error error = {0};
         error_set(&error, ERROR_OUT_OF_MEMORY, "render", "a frame could not be passed on to be encoded");
         struct engine_event *event = event_create(ENGINE_FAILED, job->client, job->request);

@@ -54,8 +54,8 @@ static void commit(struct engine *engine, const struct engine_reference *referen
     struct error error = {0};
     uint64_t start_ns = clock_now_ns();
     bool applied = commit_within_limits(engine, scene->scene, command, &error);
-    if (!applied && error.kind == ERROR_LIMIT && engine_trim_scenes(engine)) {
-        /* Scenes that nobody holds give way. */
+    if (!applied && error.kind == ERROR_LIMIT && error.retryable && engine_trim_scenes(engine)) {
+        /* Scenes that nobody holds give way to others. */
         error = (struct error){0};
         applied = commit_within_limits(engine, scene->scene, command, &error);
     }

@@ -98,6 +98,7 @@ static void lose_scene(struct engine *engine, struct engine_scene *scene)
 {
     scene_drop_shared(engine, scene);
     scene->frames = 0;
+    scene->frames_ended++;
     scene->put_off = NULL;
 }
 

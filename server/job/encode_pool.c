@@ -4,8 +4,10 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/parallel.h"
+#include "encode/stream.h"
 
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <xxhash.h>
 
@@ -15,8 +17,10 @@
 
 struct encode_task {
     struct job_output *output;
+    struct encode_lane *lane; /* NULL: it goes its own way */
     uint64_t position;
     struct engine_frame *frame;
+    struct encode_task *next; /* of those that wait in the lane */
 };
 
 struct encode_pool {
@@ -26,15 +30,112 @@ struct encode_pool {
     pthread_t threads[THREADS_MAX];
 };
 
-static void task_destroy(void *item)
+/* ---- lanes -------------------------------------------------------------------------------------- */
+
+struct encode_lane {
+    atomic_uint references;
+    float frames_per_second;
+    struct encoder_stream *stream; /* that of the task in hand; NULL until the first */
+    pthread_mutex_t lock;          /* of what follows */
+    bool busy;                     /* a task of it is queued or in hand */
+    struct encode_task *first, **end;
+};
+
+struct encode_lane *encode_lane_create(float frames_per_second)
 {
-    struct encode_task *task = item;
-    engine_frame_destroy(task->frame);
-    job_output_unref(task->output);
-    free(task);
+    struct encode_lane *lane = calloc(1, sizeof *lane);
+    if (!lane)
+        return NULL;
+    atomic_init(&lane->references, 1);
+    lane->frames_per_second = frames_per_second;
+    lane->end = &lane->first;
+    pthread_mutex_init(&lane->lock, NULL);
+    return lane;
 }
 
-static bool encode(struct encode_pool *pool, struct engine_frame *frame, struct error *error)
+void encode_lane_unref(struct encode_lane *lane)
+{
+    if (!lane || atomic_fetch_sub(&lane->references, 1) != 1)
+        return;
+    encoder_stream_destroy(lane->stream);
+    pthread_mutex_destroy(&lane->lock);
+    free(lane);
+}
+
+/* False: the task waits for those before it; lane_next() will give it out. */
+static bool lane_enter(struct encode_lane *lane, struct encode_task *task)
+{
+    pthread_mutex_lock(&lane->lock);
+    bool free_now = !lane->busy;
+    lane->busy = true;
+    if (!free_now) {
+        *lane->end = task;
+        lane->end = &task->next;
+    }
+    pthread_mutex_unlock(&lane->lock);
+    return free_now;
+}
+
+/* When the task in hand is done with. */
+static struct encode_task *lane_next(struct encode_lane *lane)
+{
+    pthread_mutex_lock(&lane->lock);
+    struct encode_task *task = lane->first;
+    if (task)
+        lane->first = task->next;
+    if (!lane->first)
+        lane->end = &lane->first;
+    lane->busy = task != NULL;
+    pthread_mutex_unlock(&lane->lock);
+    return task;
+}
+
+/* ---- tasks -------------------------------------------------------------------------------------- */
+
+/* The task that waited for it is the caller's; NULL: none. */
+static struct encode_task *task_end(struct encode_task *task)
+{
+    struct encode_task *next = task->lane ? lane_next(task->lane) : NULL;
+    engine_frame_destroy(task->frame);
+    job_output_unref(task->output);
+    encode_lane_unref(task->lane);
+    free(task);
+    return next;
+}
+
+static void task_destroy(void *item)
+{
+    for (struct encode_task *task = item; task;)
+        task = task_end(task);
+}
+
+static bool encode_in_stream(struct encode_lane *lane, const struct picture *picture, struct engine_frame *frame,
+                             struct error *error)
+{
+    struct encoded_picture encoded;
+    const struct encoder_wish wish = {
+        .quality = frame->quality, .bytes = frame->wanted_bytes, .key_frame = frame->wants_key};
+    if (!lane->stream)
+        lane->stream = encoder_stream_create(frame->encoding, lane->frames_per_second, error);
+    if (!lane->stream || !encoder_stream_encode(lane->stream, picture, &wish, &encoded, error))
+        return false;
+    frame->bytes = encoded.bytes;
+    frame->size_bytes = encoded.size_bytes;
+    frame->key_frame = encoded.key_frame;
+    return true;
+}
+
+static bool encode_pixels(struct encode_lane *lane, const struct picture *picture, struct engine_frame *frame,
+                          struct error *error)
+{
+    if (lane)
+        return encode_in_stream(lane, picture, frame, error);
+    frame->key_frame = true;
+    return encoder_encode(frame->encoding, picture, frame->quality, &frame->bytes, &frame->size_bytes, error);
+}
+
+static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct engine_frame *frame,
+                   struct error *error)
 {
     struct frame_result *result = &frame->result;
     /* Layers lie one behind the other: one picture of their common height. */
@@ -47,10 +148,9 @@ static bool encode(struct encode_pool *pool, struct engine_frame *frame, struct 
     };
     uint64_t start_ns = clock_now_ns();
     frame->digest = XXH3_64bits(result->pixels, result->size_bytes);
-    if (!encoder_encode(frame->encoding, &picture, frame->quality, &frame->bytes, &frame->size_bytes, error))
+    if (!encode_pixels(lane, &picture, frame, error))
         return false;
-    frame->key_frame = true;
-    if (frame->encoding != ENCODING_JPEG)
+    if (frame->encoding != ENCODING_JPEG && frame->encoding != ENCODING_H264)
         frame->quality = 0; /* a level, which costs no picture */
     free(result->pixels);
     result->pixels = NULL;
@@ -65,7 +165,7 @@ static void run_task(struct encode_pool *pool, struct encode_task *task)
     if (job_output_is_closed(task->output))
         return;
     struct error error = {0};
-    bool encoded = encode(pool, task->frame, &error);
+    bool encoded = encode(pool, task->lane, task->frame, &error);
     struct engine_event *event = event_create(encoded ? ENGINE_FRAME : ENGINE_FAILED, 0, 0);
     if (!event) {
         log_write(LOG_ERROR, "encode", "no memory for an event; a job ends without an answer");
@@ -85,9 +185,11 @@ static void *run_thread(void *context)
 {
     struct encode_pool *pool = context;
     for (struct encode_task *task; (task = queue_pop(pool->tasks, UINT64_MAX));) {
-        run_task(pool, task);
-        task_destroy(task);
-        pool->options.on_done(pool->options.context);
+        while (task) {
+            run_task(pool, task);
+            task = task_end(task);
+            pool->options.on_done(pool->options.context);
+        }
     }
     return NULL;
 }
@@ -133,15 +235,21 @@ void encode_pool_destroy(struct encode_pool *pool)
     free(pool);
 }
 
-bool encode_pool_submit(struct encode_pool *pool, struct job_output *output, uint64_t position,
-                        struct engine_frame *frame)
+bool encode_pool_submit(struct encode_pool *pool, struct job_output *output, struct encode_lane *lane,
+                        uint64_t position, struct engine_frame *frame)
 {
     struct encode_task *task = calloc(1, sizeof *task);
     if (!task) {
         engine_frame_destroy(frame);
         return false;
     }
-    *task = (struct encode_task){job_output_ref(output), position, frame};
+    *task = (struct encode_task){.output = job_output_ref(output), .position = position, .frame = frame};
+    if (lane && frame->encoding == ENCODING_H264) {
+        atomic_fetch_add(&lane->references, 1);
+        task->lane = lane;
+        if (!lane_enter(lane, task))
+            return true;
+    }
     if (queue_push(pool->tasks, task))
         return true;
     task_destroy(task);

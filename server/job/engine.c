@@ -72,23 +72,31 @@ static void run_all_waiting(struct engine *engine)
     }
 }
 
-/* Whose turn it is; NULL: nobody is ready. */
+static bool waits_for_device(const struct engine *engine, const struct job *job)
+{
+    return job->rendering && engine->backend->step_waits(job->renderer);
+}
+
+/* Whose turn it is; NULL: nobody is ready. Who would only wait for the device lets others go first: it is at work
+ * on that while they give it more. */
 static struct job *next_job(struct engine *engine)
 {
-    const struct job *before = engine->turn_of;
+    struct job *before = engine->turn_of, *waiting = NULL;
     if (before && before->rendering && before->spec.kind == JOB_VIEW && job_is_ready(engine, before) &&
-        schedule_turn_lasts(&engine->scheduler))
-        return engine->turn_of;
+        schedule_turn_lasts(&engine->scheduler) && !waits_for_device(engine, before))
+        return before;
     for (size_t i = 0; i < engine->job_count; i++) {
         struct job *job = engine->jobs[i];
+        bool ready = job_is_ready(engine, job), waits = ready && waits_for_device(engine, job);
+        waiting = waits && !waiting ? job : waiting;
         engine->entries[i] = (struct schedule_entry){
             .client = &job->reference->client->schedule,
             .job = &job->schedule,
-            .ready = job_is_ready(engine, job),
+            .ready = ready && !waits,
         };
     }
     size_t picked = schedule_pick(&engine->scheduler, engine->entries, engine->job_count);
-    engine->turn_of = picked == SCHEDULE_NONE ? NULL : engine->jobs[picked];
+    engine->turn_of = picked == SCHEDULE_NONE ? waiting : engine->jobs[picked];
     return engine->turn_of;
 }
 

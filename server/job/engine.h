@@ -34,7 +34,7 @@ struct engine_options {
     uint64_t frame_window_bytes; /* the same in bytes of pixels, if that is fewer, but at least one; 0: default */
     struct scene_limits scene_limits; /* host_bytes is also what the tables of all scenes may take together */
     uint64_t scene_linger_ms;    /* how long a scene that others can come to stays when nobody holds it; 0: not */
-    uint32_t lingering_scenes;   /* that do so, at most: the one that was left first ends first; 0: default */
+    uint32_t lingering_scenes;   /* that do so, at most: who left most loses his oldest; 0: default */
     uint64_t device_bytes_limit; /* 0: 70 % of what the device has, or no limit if it does not tell */
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
 };

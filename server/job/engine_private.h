@@ -48,7 +48,8 @@ struct engine_scene {
     struct scene *scene;
     struct frame_scene *shared; /* NULL until the first frame, and after the device was lost */
     uint32_t frames;            /* in progress, of all jobs */
-    /* Its frame may not begin beside those, and no other begins before it; NULL: there is none. */
+    uint64_t frames_ended;      /* and one */
+    /* Its frame may not begin beside those, and others do not keep it waiting; NULL: there is none. */
     struct job *put_off;
     struct engine_command **waiting; /* owned: commands for when no frame is in progress, in order */
     size_t waiting_count;
@@ -72,6 +73,9 @@ struct view {
     /* Of the frame in progress. */
     struct view_wish wish;
     bool refining; /* it shows nothing that was not shown */
+    /* If some of its frames are a stream; NULL: none are. */
+    struct encode_lane *lane;
+    bool owes_key_frame; /* it was wished and has not come */
 };
 
 struct job {
@@ -85,6 +89,7 @@ struct job {
     uint64_t next_frame; /* number in the range; beyond its end: all rendered */
     struct schedule_share schedule;
     struct animation_bounds bounds;
+    uint64_t refused_after; /* frames_ended of its scene when its frame could not begin beside others */
     /* of the frame in progress */
     bool rendering;
     bool evicted; /* others gave way once already for its memory */
@@ -192,6 +197,8 @@ void job_credit(struct job *job, uint64_t credit); /* absolute */
 void view_follow(struct job *job, const struct job *before);
 /* When its next frame may begin; in the past: now. UINT64_MAX: not before something happens. */
 uint64_t view_due_ns(const struct job *job);
+/* Whether there is something to show that no frame has shown. */
+bool view_has_news(const struct job *job);
 /* What its next frame shows. */
 bool view_take_up(struct job *job, struct shot *shot, struct error *error);
 /* Whether the frame in progress is not worth its end any more. */

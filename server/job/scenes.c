@@ -138,12 +138,36 @@ static uint64_t lingers_until_ns(const struct engine *engine, const struct engin
     return scene->left_ns + engine->options.scene_linger_ms * UINT64_C(1000000);
 }
 
-/* Ends those whose time has passed. Of the rest: how many, which was left first, and when the next one ends. */
-static size_t end_overdue(struct engine *engine, struct engine_scene **oldest, uint64_t *wait_ns)
+static size_t count_left_by(const struct engine *engine, uint64_t principal)
+{
+    size_t count = 0;
+    for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        count += !scene->references && scene->principal == principal;
+    return count;
+}
+
+/* Of those who leave too many scenes, who leaves most loses his oldest. */
+static bool goes_before(const struct engine *engine, const struct engine_scene *a, const struct engine_scene *b)
+{
+    size_t a_count = count_left_by(engine, a->principal), b_count = count_left_by(engine, b->principal);
+    return a_count != b_count ? a_count > b_count : a->left_ns < b->left_ns;
+}
+
+static struct engine_scene *first_to_go(const struct engine *engine)
+{
+    struct engine_scene *first = NULL;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        if (!scene->references && (!first || goes_before(engine, scene, first)))
+            first = scene;
+    }
+    return first;
+}
+
+/* Ends those whose time has passed. Of the rest: how many, and when the next one ends. */
+static size_t end_overdue(struct engine *engine, uint64_t *wait_ns)
 {
     uint64_t now_ns = clock_now_ns();
     size_t count = 0;
-    *oldest = NULL;
     *wait_ns = UINT64_MAX;
     for (struct engine_scene *scene = engine->scenes, *next; scene; scene = next) {
         next = scene->next;
@@ -156,18 +180,15 @@ static size_t end_overdue(struct engine *engine, struct engine_scene **oldest, u
         }
         count++;
         *wait_ns = until_ns - now_ns < *wait_ns ? until_ns - now_ns : *wait_ns;
-        if (!*oldest || scene->left_ns < (*oldest)->left_ns)
-            *oldest = scene;
     }
     return count;
 }
 
 uint64_t engine_reap_scenes(struct engine *engine)
 {
-    struct engine_scene *oldest;
     uint64_t wait_ns;
-    while (end_overdue(engine, &oldest, &wait_ns) > engine->options.lingering_scenes)
-        scene_end(engine, oldest);
+    while (end_overdue(engine, &wait_ns) > engine->options.lingering_scenes)
+        scene_end(engine, first_to_go(engine));
     return wait_ns;
 }
 
@@ -198,6 +219,18 @@ static struct engine_scene *find_by_name(const struct engine *engine, const stru
     return found;
 }
 
+/* Of one name: two of the same user, or two that are shared with all. What others keep is nothing to anybody. */
+static struct engine_scene *find_namesake(const struct engine *engine, const struct engine_command *command)
+{
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        bool is_own = scene->principal == command->principal && scene->sharing != SHARING_PRIVATE;
+        bool are_shared = scene->sharing == SHARING_SHARED && command->sharing == SHARING_SHARED;
+        if ((is_own || are_shared) && strcmp(scene->scene->name, command->name) == 0)
+            return scene;
+    }
+    return NULL;
+}
+
 /* One's own scene that nobody holds any more gives its name to a new one. */
 static bool name_is_free(struct engine *engine, const struct engine_command *command, struct error *error)
 {
@@ -205,11 +238,10 @@ static bool name_is_free(struct engine *engine, const struct engine_command *com
         return true;
     if (!command->name[0])
         return error_set(error, ERROR_INVALID, "scene_open.name", "a scene that others can come to needs a name");
-    struct engine_scene *other = find_by_name(engine, command);
-    if (other && !other->references && other->principal == command->principal) {
+    struct engine_scene *other;
+    while ((other = find_namesake(engine, command)) && !other->references &&
+           other->principal == command->principal)
         scene_end(engine, other);
-        other = find_by_name(engine, command);
-    }
     if (!other)
         return true;
     error_set(error, ERROR_INVALID, "scene_open.name", "there is a scene \"%s\" already", command->name);
@@ -227,6 +259,7 @@ static bool scene_add(struct engine *engine, const struct engine_command *comman
         free(scene);
         return false;
     }
+    scene->frames_ended = 1;
     scene->sharing = command->sharing;
     scene->principal = command->principal;
     struct engine_scene **place = &engine->scenes;

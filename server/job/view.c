@@ -30,8 +30,16 @@ static bool adds_up(const struct job *job)
 static bool has_news(const struct job *job, const struct view_wish *wish)
 {
     const struct view *view = &job->view;
-    return !view->shown || wish->camera.command != view->shown_command || wish->key_frame ||
+    /* A key frame that could not be finished is wished still. */
+    bool key_frame = wish->key_frame || view->wish.key_frame;
+    return !view->shown || wish->camera.command != view->shown_command || key_frame ||
            job->scene->scene->revision != view->shown_revision;
+}
+
+bool view_has_news(const struct job *job)
+{
+    struct view_wish wish = view_wishes_see(job->spec.wishes);
+    return has_news(job, &wish);
 }
 
 static bool may_refine(const struct job *job)
@@ -132,7 +140,7 @@ void view_done(struct job *job, struct engine_frame *frame)
     frame->command = camera->command;
     frame->received_ns = camera->received_ns;
     frame->moving = camera->moving;
-    frame->wants_key = view->wish.key_frame;
+    view->owes_key_frame |= view->wish.key_frame;
     view->wish.key_frame = false;
     if (camera->moving && job->spec.adapt) {
         const struct view_effort *effort = &view->wish.effort;
@@ -146,4 +154,8 @@ void view_done(struct job *job, struct engine_frame *frame)
         if (frame->encoding != ENCODING_JPEG)
             frame->quality = 0; /* the other one's: the fastest level */
     }
+    frame->wants_key = view->owes_key_frame;
+    /* One of rest may stand alone, but it helps nobody who has lost the stream. */
+    if (!view->lane || frame->encoding == ENCODING_H264)
+        view->owes_key_frame = false;
 }

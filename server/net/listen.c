@@ -15,6 +15,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* A client's host that answers nothing for two minutes is gone. */
+#define PROBE_AFTER_S 60
+#define PROBE_EVERY_S 15
+#define PROBES 4
 #define BACKLOG                                                                                                   \
     SOMAXCONN /* a farm comes all at once; a client that does not wait gets an error when it is full              \
                */
@@ -149,6 +153,11 @@ int listener_accept(const struct listener *listener, struct address *peer, bool 
     if (!address_is_unix(peer)) {
         int on = 1; /* answers are small and wanted at once; frames are large anyway */
         setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+        /* Who waits for frames may be silent for ever, and be gone without a word. */
+        setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
+        setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &(int){PROBE_AFTER_S}, sizeof(int));
+        setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &(int){PROBE_EVERY_S}, sizeof(int));
+        setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &(int){PROBES}, sizeof(int));
     }
     return fd;
 }

@@ -7,6 +7,7 @@
 #include "gpu/program.h"
 #include "gpu/timer.h"
 #include "render/environment.h"
+#include "render/environment_choice.h"
 #include "render/features.h"
 #include "render/frame.h"
 #include "shared/frame.h"
@@ -24,8 +25,9 @@ struct slice {
 
 struct render_context {
     struct gpu_device *device;
-    struct scene_gpu *scene; /* shared with other frames, as are the next two */
+    struct scene_gpu *scene; /* shared with other frames, as are the next three */
     struct environment *environment;
+    struct environment_choice *environment_choice; /* which the integrator path keeps up */
     struct tracer *tracer;
     struct comparison *comparison; /* of the frame in hand; NULL: nothing is compared */
     struct gpu_timer *timer;

@@ -175,18 +175,53 @@ static bool shade_wave(struct frame_renderer *renderer, struct error *error)
     return false;
 }
 
+static bool all_resolved(const struct frame_renderer *renderer)
+{
+    return renderer->plane == renderer->picture.plane_count;
+}
+
+/* The band before is taken while this one is copied. */
+static bool pass_on(struct frame_renderer *renderer, bool has_band, uint32_t plane, uint32_t band,
+                    struct error *error)
+{
+    struct picture *picture = &renderer->picture;
+    struct render_context *context = &renderer->work->context;
+    struct gpu_readback *before = &renderer->work->copies[renderer->copied % 2];
+    struct gpu_readback *next = &renderer->work->copies[(renderer->copied + 1) % 2];
+    if (has_band && !picture_copy_band(picture, context, next, band, error))
+        return false;
+    if (renderer->copying &&
+        !picture_take_band(picture, context, before, renderer->copied_plane, renderer->copied_band, error))
+        return false;
+    renderer->copying = has_band;
+    renderer->copied++;
+    renderer->copied_plane = plane;
+    renderer->copied_band = band;
+    return true;
+}
+
 /* One band of one plane; the last one is followed by none. */
 static bool read_band(struct frame_renderer *renderer, struct error *error)
 {
     struct picture *picture = &renderer->picture;
-    renderer->work->context.wave_number = 0;
-    bool good = picture_resolve_band(picture, &renderer->work->context, renderer->plane, renderer->band, error) &&
-                picture_read_band(picture, &renderer->work->context, renderer->plane, renderer->band, error);
+    struct render_context *context = &renderer->work->context;
+    const uint32_t plane = renderer->plane, band = renderer->band;
+    context->wave_number = 0;
+    if (all_resolved(renderer))
+        return pass_on(renderer, false, 0, 0, error);
     if (++renderer->band == picture->band_count) {
         renderer->band = 0;
         renderer->plane++;
     }
-    return good;
+    return picture_resolve_band(picture, context, plane, band, error) &&
+           (renderer->reads_behind ? pass_on(renderer, true, plane, band, error)
+                                   : picture_read_band(picture, context, plane, band, error));
+}
+
+bool frame_step_waits(const struct frame_renderer *renderer)
+{
+    return renderer->phase == PHASE_RESOLVE && renderer->copying && all_resolved(renderer) &&
+           !gpu_readback_is_done(&renderer->work->copies[renderer->copied % 2]);
 }
 
 static bool hand_out(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
@@ -253,7 +288,7 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
         frame_abandon(renderer);
         return FRAME_FAILED;
     }
-    if (renderer->phase != PHASE_RESOLVE || renderer->plane < renderer->picture.plane_count)
+    if (renderer->phase != PHASE_RESOLVE || !all_resolved(renderer) || renderer->copying)
         return FRAME_MORE;
     if (hand_out(renderer, result, error))
         return FRAME_DONE;

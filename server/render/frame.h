@@ -139,11 +139,16 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
 enum frame_progress { FRAME_FAILED, FRAME_MORE, FRAME_DONE };
 enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_result *result, struct error *error);
 void frame_abandon(struct frame_renderer *renderer);
+/* Whether the next step would do nothing but wait for the device: others may have their turn first. */
+bool frame_step_waits(const struct frame_renderer *renderer);
 
 uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer); /* without what is shared */
 /* How many pixels a slice has and how many rays a wave may have; 0: chosen for the device. A wave that becomes
  * larger than that splits its slice, which costs time and never changes the picture. From the next frame on. */
 void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice_pixels, uint32_t wave_rays);
+/* For tests: whether pictures are copied from the device while it has other work, as is chosen for the device.
+ * From the next frame on. */
+void frame_renderer_read_behind(struct frame_renderer *renderer, bool reads_behind);
 /* For tests: from the next frame on `impl` stands for that number of tracer_impl_by_number(); NULL: none does. */
 void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, const struct tracer_impl *impl);
 

@@ -114,6 +114,8 @@ void frame_end(struct frame_renderer *renderer)
     if (renderer->phase != PHASE_IDLE)
         renderer->shared->frames--;
     renderer->phase = PHASE_IDLE;
+    for (int i = 0; i < 2 && renderer->work; i++)
+        gpu_readback_drop(&renderer->work->copies[i]);
     frame_work_give(renderer->shared, renderer->work);
     renderer->work = NULL;
 }
@@ -230,7 +232,8 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     if (!reserve_frame(renderer, error) || !gpu_check(renderer->device, "beginning a frame", error))
         return false;
     renderer->result.revision = renderer->shared->copy.revision;
-    renderer->sample = renderer->plane = renderer->band = 0;
+    renderer->sample = renderer->plane = renderer->band = renderer->copied = 0;
+    renderer->copying = false;
     return true;
 }
 

@@ -30,13 +30,15 @@ void frame_scene_destroy(struct frame_scene *shared)
     frame_work_finish(shared);
     tracer_set_finish(&shared->tracers);
     environment_finish(&shared->environment, shared->device);
+    environment_choice_finish(&shared->environment_choice, shared->device);
     scene_gpu_finish(&shared->copy);
     free(shared);
 }
 
 uint64_t frame_scene_device_bytes(const struct frame_scene *shared)
 {
-    uint64_t sum = scene_gpu_device_bytes(&shared->copy) + tracer_set_device_bytes(&shared->tracers);
+    uint64_t sum = scene_gpu_device_bytes(&shared->copy) + tracer_set_device_bytes(&shared->tracers) +
+                   shared->environment_choice.table.capacity_bytes;
     for (const struct frame_work *work = shared->idle; work; work = work->next)
         sum += frame_work_device_bytes(work);
     return sum;
@@ -51,6 +53,8 @@ struct frame_renderer *frame_renderer_create(struct frame_scene *shared, struct 
     }
     renderer->device = shared->device;
     renderer->shared = shared;
+    /* Software GL copies at once, and would do so twice. */
+    renderer->reads_behind = !shared->device->facts.software;
     return renderer;
 }
 
@@ -67,6 +71,11 @@ void frame_renderer_set_capacity(struct frame_renderer *renderer, uint32_t slice
 {
     renderer->wanted_slice_pixels = slice_pixels;
     renderer->wanted_wave_rays = wave_rays;
+}
+
+void frame_renderer_read_behind(struct frame_renderer *renderer, bool reads_behind)
+{
+    renderer->reads_behind = reads_behind;
 }
 
 void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, const struct tracer_impl *impl)

@@ -31,6 +31,7 @@ struct frame_scene {
     struct scene_gpu copy;
     struct tracer_set tracers;
     struct environment environment;
+    struct environment_choice environment_choice;
     uint64_t showing;        /* counts up when the copy is of something else: a revision, poses */
     uint32_t frames;         /* in progress, of all renderers */
     struct frame_work *idle; /* owned: what frames that have ended leave to those that begin */
@@ -45,6 +46,8 @@ struct frame_work {
     struct primary primary;
     struct layers layers;
     struct comparison *comparison; /* NULL: the last frame asked for none */
+    /* Bands of the picture on their way to the host, by turns: while one is taken, the next is copied. */
+    struct gpu_readback copies[2];
 };
 
 struct frame_renderer {
@@ -54,6 +57,7 @@ struct frame_renderer {
     const struct tracer_impl *stand_in;
     unsigned stand_in_number;
     uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */
+    bool reads_behind;                              /* bands are copied while the device has other work */
     /* the frame in hand */
     enum frame_phase phase;
     struct frame_work *work;        /* owned until it ends */
@@ -62,6 +66,8 @@ struct frame_renderer {
     uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
     uint32_t sample;         /* samples of this frame that are done */
     uint32_t plane, band;    /* of the picture that is handed out next */
+    bool copying;            /* copies[copied % 2] is on its way, of these: */
+    uint32_t copied, copied_plane, copied_band;
     struct slices slices;
     /* the last frame that was finished, whose sum the picture holds */
     struct frame_request kept_request;

@@ -18,6 +18,8 @@ static void work_destroy(struct frame_work *work, struct gpu_device *device)
     comparison_destroy(work->comparison);
     primary_finish(&work->primary, device);
     layers_finish(&work->layers, device);
+    for (int i = 0; i < 2; i++)
+        gpu_readback_finish(device, &work->copies[i]);
     context_finish(&work->context);
     gpu_timer_destroy(work->context.timer);
     free(work);
@@ -36,6 +38,7 @@ static struct frame_work *work_create(struct frame_scene *shared, struct error *
     work->context.device = shared->device;
     work->context.scene = &shared->copy;
     work->context.environment = &shared->environment;
+    work->context.environment_choice = &shared->environment_choice;
     return work;
 }
 
@@ -98,7 +101,8 @@ void frame_work_finish(struct frame_scene *shared)
 uint64_t frame_work_device_bytes(const struct frame_work *work)
 {
     uint64_t sum = context_device_bytes(&work->context) + work->primary.visible.size_bytes +
-                   work->primary.depth.size_bytes + layers_device_bytes(&work->layers);
+                   work->primary.depth.size_bytes + layers_device_bytes(&work->layers) +
+                   work->copies[0].capacity_bytes + work->copies[1].capacity_bytes;
     if (work->integrator)
         sum += work->integrator->impl->device_bytes(work->integrator);
     if (work->comparison)

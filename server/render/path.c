@@ -7,12 +7,6 @@
 #include "shared/bindings.h"
 
 #include <epoxy/gl.h>
-#include <stdlib.h>
-
-struct path_tracing {
-    struct wave_passes passes;
-    struct environment_choice choice;
-};
 
 static bool asks_lights(const struct render_context *context)
 {
@@ -32,7 +26,7 @@ static uint32_t shadow_rays_a_hit(const struct render_context *context)
 static bool shade(struct wave_passes *passes, struct render_context *context, uint32_t first, uint32_t count,
                   struct error *error)
 {
-    struct environment_choice *choice = &((struct path_tracing *)passes)->choice;
+    struct environment_choice *choice = context->environment_choice;
     struct gpu_define defines[5] = {0};
     size_t n = 0;
     (void)first; /* 0: there is room for all shadow rays at once */
@@ -71,42 +65,21 @@ static struct integrator *create(struct gpu_device *device, struct error *error)
         .straight_waves = STRAIGHT_WAVES,
         .left_scene = "SHARES",
     };
-    struct path_tracing *tracing = calloc(1, sizeof(*tracing));
-    if (!tracing) {
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the integrator");
-        return NULL;
-    }
-    wave_passes_init(&tracing->passes, &kind, device);
-    return &tracing->passes.base;
-}
-
-static void destroy(struct integrator *integrator)
-{
-    struct path_tracing *tracing = (struct path_tracing *)integrator;
-    if (!tracing)
-        return;
-    environment_choice_finish(&tracing->choice, integrator->device);
-    wave_passes_destroy(integrator);
+    return wave_passes_create(&kind, device, error);
 }
 
 static bool reserve(struct integrator *integrator, struct render_context *context, struct error *error)
 {
-    return environment_choice_update(&((struct path_tracing *)integrator)->choice, context->device,
-                                     context->environment, &context->scene->scene->environment, error) &&
+    return environment_choice_update(context->environment_choice, context->device, context->environment,
+                                     &context->scene->scene->environment, error) &&
            wave_passes_reserve(integrator, context, error);
-}
-
-static uint64_t device_bytes(const struct integrator *integrator)
-{
-    return wave_passes_device_bytes(integrator) +
-           ((const struct path_tracing *)integrator)->choice.table.capacity_bytes;
 }
 
 const struct integrator_impl integrator_path_impl = {
     .name = "path",
     .create = create,
-    .destroy = destroy,
+    .destroy = wave_passes_destroy,
     .reserve = reserve,
-    .device_bytes = device_bytes,
+    .device_bytes = wave_passes_device_bytes,
     .shade = wave_passes_shade,
 };

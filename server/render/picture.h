@@ -3,6 +3,7 @@
 #ifndef FARLIGHT_RENDER_PICTURE_H
 #define FARLIGHT_RENDER_PICTURE_H
 
+#include "gpu/readback.h"
 #include "render/context.h"
 
 /* No storage block holds the largest picture everywhere, so it lies in bands of whole tile rows. */
@@ -35,6 +36,11 @@ bool picture_resolve_band(struct picture *picture, struct render_context *contex
                           struct error *error);
 bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                        struct error *error);
+/* Or in two steps, between which the device may have other work: `resolved` is free again after the first. */
+bool picture_copy_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
+                       uint32_t band, struct error *error);
+bool picture_take_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
+                       uint32_t plane, uint32_t band, struct error *error);
 enum frame_layer picture_plane_layer(const struct picture *picture, uint32_t plane);
 struct gpu_buffer *picture_band(const struct picture *picture, uint32_t plane, uint32_t band);
 uint64_t picture_device_bytes(const struct picture *picture);

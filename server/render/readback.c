@@ -4,21 +4,62 @@
 
 #include <stdlib.h>
 
+static size_t row_bytes(const struct picture *picture, const struct render_context *context)
+{
+    return picture->width * picture_pixel_bytes(context->request.format);
+}
+
+static size_t band_bytes(const struct picture *picture, const struct render_context *context, uint32_t band)
+{
+    return picture_band_row_count(picture, band) * row_bytes(picture, context);
+}
+
+/* Where a band belongs. NULL: no memory. */
+static uint8_t *band_pixels(struct picture *picture, const struct render_context *context, uint32_t plane,
+                            uint32_t band, struct error *error)
+{
+    if (!picture->pixels) {
+        picture->size_bytes = row_bytes(picture, context) * picture->height * picture->plane_count;
+        picture->pixels = malloc(picture->size_bytes);
+    }
+    if (!picture->pixels) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture of %zu bytes", picture->size_bytes);
+        return NULL;
+    }
+    size_t first_row = (size_t)plane * picture->height + picture_band_first_row(picture, band);
+    return picture->pixels + first_row * row_bytes(picture, context);
+}
+
 bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                        struct error *error)
 {
-    size_t row_bytes = picture->width * picture_pixel_bytes(context->request.format);
-    if (!picture->pixels) {
-        picture->size_bytes = row_bytes * picture->height * picture->plane_count;
-        picture->pixels = malloc(picture->size_bytes);
-        if (!picture->pixels)
-            return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture of %zu bytes",
-                             picture->size_bytes);
-    }
-    size_t first_row = (size_t)plane * picture->height + picture_band_first_row(picture, band);
+    uint8_t *pixels = band_pixels(picture, context, plane, band, error);
+    if (!pixels)
+        return false;
     context_span_begin(context, STAGE_READBACK);
-    gpu_buffer_read(context->device, &picture->resolved, 0, picture->pixels + first_row * row_bytes,
-                    picture_band_row_count(picture, band) * row_bytes);
+    gpu_buffer_read(context->device, &picture->resolved, 0, pixels, band_bytes(picture, context, band));
     context_span_end(context);
     return gpu_check(context->device, "reading the picture", error);
+}
+
+bool picture_copy_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
+                       uint32_t band, struct error *error)
+{
+    context_span_begin(context, STAGE_READBACK);
+    bool begun =
+        gpu_readback_begin(context->device, copy, &picture->resolved, band_bytes(picture, context, band), error);
+    context_span_end(context);
+    return begun && gpu_check(context->device, "copying the picture", error);
+}
+
+bool picture_take_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
+                       uint32_t plane, uint32_t band, struct error *error)
+{
+    uint8_t *pixels = band_pixels(picture, context, plane, band, error);
+    if (!pixels)
+        return false;
+    context_span_begin(context, STAGE_READBACK);
+    bool taken = gpu_readback_take(context->device, copy, pixels, error);
+    context_span_end(context);
+    return taken;
 }

@@ -17,11 +17,6 @@
 #define WAVE_STATE_SHADOW_RAYS pad0
 #define DEFINES_MAX 12
 
-void wave_passes_init(struct wave_passes *passes, const struct wave_passes_kind *kind, struct gpu_device *device)
-{
-    *passes = (struct wave_passes){.base = {kind->impl, device}, .kind = kind};
-}
-
 struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struct gpu_device *device,
                                       struct error *error)
 {
@@ -30,7 +25,7 @@ struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struc
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the integrator");
         return NULL;
     }
-    wave_passes_init(passes, kind, device);
+    *passes = (struct wave_passes){.base = {kind->impl, device}, .kind = kind};
     return &passes->base;
 }
 

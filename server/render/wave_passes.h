@@ -34,8 +34,7 @@ struct wave_passes {
 /* Rays that go straight on through blended surfaces do not count as bounces; so many waves are left to them. */
 #define STRAIGHT_WAVES 16
 
-/* What integrators of this kind have in their tables; the integrator begins with a struct wave_passes. */
-void wave_passes_init(struct wave_passes *passes, const struct wave_passes_kind *kind, struct gpu_device *device);
+/* What integrators of this kind have in their tables; the integrator is a struct wave_passes. */
 struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struct gpu_device *device,
                                       struct error *error);
 void wave_passes_destroy(struct integrator *integrator); /* and frees it; accepts NULL */

@@ -133,6 +133,8 @@ static bool limits_check(const struct draft *draft, const struct size *size)
         error_set(draft->error, ERROR_LIMIT, "edits",
                   "the scene's tables would take %.1f MiB of the host's memory; other scenes leave %.1f MiB",
                   (double)size->table_bytes / 0x1p20, (double)limits->table_bytes / 0x1p20);
+        if (draft->error)
+            draft->error->retryable = true; /* when others have ended */
         return error_remedy(draft->error,
                             "remove objects, close scenes, or raise the limit of scene memory in the "
                             "daemon's configuration");

@@ -106,7 +106,7 @@ bool frames_keep_begun(struct job *job)
     begun->next = NULL;
     job->first = begun;
     job->end = &begun->next;
-    return true;
+    return begun->request == job->request;
 }
 
 /* ---- messages ---------------------------------------------------------------------------------------- */

@@ -135,8 +135,30 @@ static bool check_camera(const struct message_render *render, struct error *erro
     return true;
 }
 
+static bool check_encoding(const struct session *session, const struct message_render *render,
+                           enum protocol_encoding encoding, const char *field, struct error *error)
+{
+    bool is_stream = encoding == PROTOCOL_ENCODING_H264;
+    if (is_stream && render->kind != PROTOCOL_JOB_KIND_VIEW) {
+        error_set(error, ERROR_UNSUPPORTED, field, "frames of a batch stand alone, and h264 is a stream");
+        return error_remedy(error, "choose raw, zstd, predicted or jpeg");
+    }
+    if (is_stream && !session->can_h264) {
+        error_set(error, ERROR_UNSUPPORTED, field, "h264 is not among the capabilities of this connection");
+        return error_remedy(error,
+                            "a client that decodes it says so in its handshake, and a daemon that encodes it "
+                            "in the reply; choose jpeg otherwise");
+    }
+    uint32_t pixel_bytes = bytes_per_pixel(render->format);
+    if (is_stream ? pixel_bytes == 4 : encoder_supports((enum encoding)encoding, pixel_bytes))
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, field, "%s does not carry %s", protocol_encoding_text(encoding),
+              protocol_pixel_format_text(render->format));
+    return error_remedy(error, "raw, zstd and predicted carry every format");
+}
+
 /* What is different with views. */
-static bool check_kind(const struct message_render *render, struct error *error)
+static bool check_kind(const struct session *session, const struct message_render *render, struct error *error)
 {
     if (render->attachments)
         return error_set(error, ERROR_UNSUPPORTED, "render.attachments", "this daemon attaches nothing to frames");
@@ -146,11 +168,7 @@ static bool check_kind(const struct message_render *render, struct error *error)
                              render->last_frame, render->first_frame);
         return true;
     }
-    if (encoder_supports((enum encoding)render->still_encoding, bytes_per_pixel(render->format)))
-        return true;
-    error_set(error, ERROR_UNSUPPORTED, "render.still_encoding", "%s does not carry %s",
-              protocol_encoding_text(render->still_encoding), protocol_pixel_format_text(render->format));
-    return error_remedy(error, "raw, zstd and predicted carry every format");
+    return check_encoding(session, render, render->still_encoding, "render.still_encoding", error);
 }
 
 bool job_check(const struct session *session, const struct message_render *render, struct error *error)
@@ -160,13 +178,10 @@ bool job_check(const struct session *session, const struct message_render *rende
         return error_set(error, ERROR_UNKNOWN_ID, "render.scene", "there is no scene %u", render->scene);
     if (jobs_find(session, render->channel) && !job_replaced_by(session, render))
         return error_set(error, ERROR_INVALID, "render.channel", "a running job has channel %u", render->channel);
-    if (!check_kind(render, error) || !check_layers(render, error))
+    if (!check_kind(session, render, error) || !check_layers(render, error))
         return false;
-    if (!encoder_supports((enum encoding)render->encoding, bytes_per_pixel(render->format))) {
-        error_set(error, ERROR_UNSUPPORTED, "render.encoding", "%s does not carry %s",
-                  protocol_encoding_text(render->encoding), protocol_pixel_format_text(render->format));
-        return error_remedy(error, "raw, zstd and predicted carry every format");
-    }
+    if (!check_encoding(session, render, render->encoding, "render.encoding", error))
+        return false;
     bool has_level = render->encoding == PROTOCOL_ENCODING_ZSTD || render->encoding == PROTOCOL_ENCODING_PREDICTED;
     if (has_level && render->quality > ZSTD_LEVEL_MAX)
         return error_set(error, ERROR_INVALID, "render.quality", "%s has levels up to %u, not %u",

@@ -286,6 +286,13 @@ void job_frame_sent(struct job *job, uint32_t request_id)
     finish_if_complete(job->session, job);
 }
 
+bool job_is_cancelled(const struct request *target)
+{
+    const struct job *job = target->object;
+    const struct view_change *change = view_find_change(job, target->id);
+    return change ? change->cancelled : job->cancelled && target->id == job->request;
+}
+
 void job_cancel(struct session *session, struct request *target, struct request *cancel)
 {
     struct job *job = target->object;

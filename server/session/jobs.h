@@ -36,6 +36,7 @@ void jobs_start(struct session *session, struct request *request, const struct m
 void jobs_credit(struct session *session, const struct message_credit *credit);
 /* `cancel` is answered by the engine's answer to it, after the job's own request. */
 void job_cancel(struct session *session, struct request *target, struct request *cancel);
+bool job_is_cancelled(const struct request *target);
 /* The engine's events for a job's request. */
 void job_done(struct session *session, struct request *request);
 void job_failed(struct session *session, struct request *request, const struct error *error);

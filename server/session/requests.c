@@ -121,7 +121,7 @@ void request_cancel(struct session *session, struct request *cancel, uint32_t ta
 {
     struct request *target = request_find(session, target_id);
     if (!target || target == cancel || target->cancelled_by ||
-        (target->kind == REQUEST_JOB && ((const struct job *)target->object)->cancelled)) {
+        (target->kind == REQUEST_JOB && job_is_cancelled(target))) {
         /* Answered already, or about to be, which is what the client wanted. */
         request_answer_ok(session, cancel, 0);
         return;

@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "encode/stream.h"
 #include "session/dispatch.h"
 #include "session/edits.h"
 #include "session/frames.h"
@@ -254,6 +255,10 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
         snprintf(reply->text, sizeof reply->text, "no random numbers");
     if (session->identity.read_only)
         reply->capabilities |= HANDSHAKE_CAN_READ_ONLY;
+    session->can_h264 = (hello->capabilities & HANDSHAKE_CAN_H264) && reply->text[0] == '\0' &&
+                        encoder_stream_supports(ENCODING_H264, 4);
+    if (session->can_h264)
+        reply->capabilities |= HANDSHAKE_CAN_H264;
     fill_limits(&reply->limits, &hub->options);
     snprintf(session->name, sizeof session->name, "%s", hello->name);
     return reply->text[0] == '\0';

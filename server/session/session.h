@@ -33,6 +33,7 @@ struct session {
     blob_principal principal;
     char name[HANDSHAKE_NAME_MAX_BYTES + 1];
     bool introduced; /* the hello is done: the engine may know it */
+    bool can_h264;   /* the client decodes it, and an encoder is here */
 
     struct requests requests;
     struct hashmap scenes; /* struct session_scene *, by id; see scenes.h */

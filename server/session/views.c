@@ -120,6 +120,7 @@ void view_switch(struct job *job)
     job->frame_bytes = change->frame_bytes;
     job->engine_credit = change->credit;
     job->frames_gone = 0;
+    job->rendered = false;
     job->cancelled = change->cancelled;
     view->terms = change->terms;
     view->pacing.frame_ns = change->terms.frame_ns;
@@ -207,7 +208,8 @@ static void adapt(struct session_view *view, const struct engine_frame *frame)
         view->effort.bytes = advice.bytes;
     } else if (frame->encoding == view->terms.still_encoding) {
         double bytes_per_second = (double)pacing_bytes_per_second(&view->pacing);
-        view->effort.sparing = (double)frame->size_bytes * SECOND_NS > SPARING_NS * bytes_per_second;
+        if (bytes_per_second > 0.0)
+            view->effort.sparing = (double)frame->size_bytes * SECOND_NS > SPARING_NS * bytes_per_second;
     }
     view_wishes_set_effort(view->wishes, &view->effort);
 }
@@ -226,7 +228,8 @@ void view_frame_made(struct job *job, const struct engine_frame *frame)
 bool view_is_outdated(const struct job *job, const struct engine_frame *frame)
 {
     const struct session_view *view = job->view;
-    return frame->key_frame && view->last_command > frame->command &&
+    /* Those of a stream are needed for the ones behind them. */
+    return frame->encoding != ENCODING_H264 && view->last_command > frame->command &&
            clock_now_ns() - frame->encoded_ns > view->terms.frame_ns + view->made_ns;
 }
 

@@ -299,6 +299,56 @@ static void samples_are_not_added_to_those_from_before_others_moved_something(vo
     frame_renderer_destroy(second);
 }
 
+/* Whichever way a picture is read back; of several bands and planes, in turns, and after one that was dropped. */
+static void pictures_that_are_copied_behind_are_the_same(void **state)
+{
+    struct fixture *fixture = *state;
+    struct error error = {0};
+    struct frame_result at_once[3], behind[3];
+    struct frame_renderer *other = another_renderer(fixture);
+    static const struct {
+        uint32_t width, height, layers;
+        enum frame_format format;
+    } forms[3] = {
+        {700, 900, 0, FRAME_RGBA8},
+        {50, 40, 0, FRAME_RGBA16F},
+        {600, 500, 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH | 1u << LAYER_ID, FRAME_RGBA32F},
+    };
+    build_scene(fixture);
+    for (int i = 0; i < 3; i++) {
+        struct frame_request request = fixture->request;
+        request.width = forms[i].width;
+        request.height = forms[i].height;
+        request.layers = forms[i].layers;
+        request.format = forms[i].format;
+        request.depth = 1;
+        frame_renderer_read_behind(fixture->renderer, false);
+        begin(fixture, fixture->renderer, &request);
+        at_once[i] = finish(fixture->renderer);
+        frame_renderer_read_behind(fixture->renderer, true);
+        begin(fixture, fixture->renderer, &request);
+        struct frame_result dropped = {0};
+        while (!frame_step_waits(fixture->renderer) && dropped.pixels == NULL)
+            if (frame_step(fixture->renderer, &dropped, &error) == FRAME_FAILED)
+                fail_msg("frame_step: %s", error.text);
+        frame_abandon(fixture->renderer); /* while a copy is on its way, if the device is slow enough to show it */
+        frame_result_finish(&dropped);
+        frame_renderer_read_behind(other, true);
+        begin(fixture, fixture->renderer, &request);
+        begin(fixture, other, &fixture->request);
+        struct frame_result small = finish(other);
+        behind[i] = finish(fixture->renderer);
+        frame_result_finish(&small);
+        assert_false(frame_step_waits(fixture->renderer));
+        assert_int_equal(behind[i].size_bytes, at_once[i].size_bytes);
+        assert_memory_equal(behind[i].pixels, at_once[i].pixels, at_once[i].size_bytes);
+        assert_true(stage_times_sum_ns(&behind[i].times, STAGE_READBACK, STAGE_CPU) > 0);
+        frame_result_finish(&at_once[i]);
+        frame_result_finish(&behind[i]);
+    }
+    frame_renderer_destroy(other);
+}
+
 static void who_has_no_frame_in_progress_holds_a_picture_only(void **state)
 {
     enum { WATCHERS = 8 };
@@ -341,6 +391,7 @@ int main(void)
         TEST(another_revision_waits_for_the_frames_of_the_one_before),
         TEST(tracers_in_use_stay),
         TEST(a_renderer_that_goes_in_the_middle_lets_go),
+        TEST(pictures_that_are_copied_behind_are_the_same),
         TEST(who_has_no_frame_in_progress_holds_a_picture_only),
         TEST(samples_are_not_added_to_those_from_before_others_moved_something),
     };

@@ -6,7 +6,9 @@ What clients of the command line do not do, edits and the news of them, is done 
 import json
 import os
 import pathlib
+import re
 import signal
+import socket
 import struct
 import subprocess
 import threading
@@ -198,6 +200,16 @@ class Serve(Case):
         words = subprocess.run(["sh", "-c", "printf '%s\\n' " + serving.lines[1].split("farlight ", 1)[1]],
                                stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
         self.assertEqual(words, ["view", "--scene", "it's $HOME", "--server", self.address])
+
+    def test_from_everywhere_who_has_the_key_comes_in(self):
+        key = self.folder / "key"
+        self.expect(farlight("key", key), 0)
+        serving = self.serve("--listen", "tcp:0.0.0.0:0", "--key", key, addresses=2)
+        view, address = serving.lines[2].split(" --server ")
+        self.assertEqual(view, "  farlight view --scene teapot.glb")
+        host, port, used = re.fullmatch(r"tcp:(.+):(\d+) --key (.+)", address).groups()
+        self.assertEqual((host, used), (socket.gethostname(), str(key)))
+        self.render(self.folder / "a.png", "--scene", "teapot.glb", "--key", key, address=f"tcp:127.0.0.1:{port}")
 
     # ---- who may change it --------------------------------------------------------------------------
 

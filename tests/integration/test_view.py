@@ -283,12 +283,14 @@ class OnADaemon(Viewer):
         self.assertLess(difference(self.folder / "before.png", self.folder / "after.png"), 2)
 
     def test_over_tcp_pictures_travel_encoded_and_rest_without_loss(self):
-        events = [rest(), *drag(160, 90, 40, 10), rest(8), *HIDE, {"screenshot": "tcp.png"}, {"state": "tcp"}]
+        events = [rest(), {"key": "d", "hold": 1.5}, {"state": "moving"}, {"key": "home"}, rest(8), {"state": "resting"},
+                  *HIDE, {"screenshot": "tcp.png"}]
         with Daemon(listen="tcp:127.0.0.1:0") as daemon:
             address = next(line for line in daemon.ready if "tcp:" in line).split()[-1]
-            self.replay(events, "--server", address)
-        states = self.replay([*events[:-2], {"screenshot": "private.png"}, {"state": "private"}])
-        self.assertEqual(states["private"]["samples"], 8)
+            states = self.replay(events, "--server", address)
+        self.assertEqual((states["moving"]["encoding"], states["moving"]["moving"]), ("h264", True))
+        self.assertEqual((states["resting"]["encoding"], states["resting"]["moving"]), ("predicted", False))
+        self.replay([rest(8), *HIDE, {"screenshot": "private.png"}])
         self.assertEqual(difference(self.folder / "tcp.png", self.folder / "private.png"), 0)
 
     def test_a_cut_connection_comes_back_to_the_scene_that_the_daemon_kept(self):

@@ -37,7 +37,7 @@ RESTRICTED = [
     (re.compile(r"^embree"), {"server/trace"}),
     (re.compile(r"^(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h"),
      {"server/base", "server/net", "client/lib", "client/import", "client/output", "client/cli"}),
-    (re.compile(r"^lib(av|sw)"), {"client/video", "client/viewer"}),
+    (re.compile(r"^lib(av|sw)"), {"client/video", "client/viewer", "server/encode"}),
     (re.compile(r"^SDL2?/"), {"client/viewer"}),
     (re.compile(r"^OpenImageIO/"), {"client/import", "client/output"}),
     (re.compile(r"^(tiny_gltf|tiny_obj_loader)"), {"client/import"}),

@@ -22,9 +22,11 @@
 /* ---- a renderer that renders nothing ------------------------------------------------------------ */
 
 /* Steps that a frame takes are its samples, and each takes ao_rays microseconds. A frame of depth 7 goes on until
- * the gate is opened, to all or to its seed; one of depth 8 changes what the frames of a scene share. */
+ * the gate is opened, to all or to its seed; one of depth 8 changes what the frames of a scene share; steps of one
+ * of depth 9 wait for the device until others have had one. */
 #define GATED_DEPTH 7
 #define CHANGING_DEPTH 8
+#define WAITING_DEPTH 9
 #define STEPS_MAX 4096
 
 /* Bytes on the device that it says it has. */
@@ -43,6 +45,7 @@ struct frame_renderer {
     struct frame_request request;
     uint64_t motion_digest;
     uint32_t pose_count, steps_left;
+    int last_step;
     bool busy;
     struct frame_request kept_request; /* of the last frame, with the samples that it came to */
     uint32_t kept_samples;
@@ -199,16 +202,17 @@ static inline bool fake_begin(struct frame_renderer *renderer, const struct scen
     renderer->scene = scene;
     renderer->request = *request;
     renderer->steps_left = request->samples;
+    renderer->last_step = -1;
     stage_times_begin(&renderer->times);
     atomic_fetch_add(&fake.frames_begun, 1);
     return true;
 }
 
-static inline void fake_work(const struct frame_renderer *renderer)
+static inline void fake_work(struct frame_renderer *renderer)
 {
     if (atomic_load(&fake.step_us))
         usleep(atomic_load(&fake.step_us));
-    int step = atomic_fetch_add(&fake.step_count, 1);
+    int step = renderer->last_step = atomic_fetch_add(&fake.step_count, 1);
     uint64_t start_ns = clock_now_ns(), now_ns = start_ns;
     while (now_ns - start_ns < renderer->request.ao_rays * UINT64_C(1000))
         now_ns = clock_now_ns();
@@ -266,6 +270,11 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
     return FRAME_DONE;
 }
 
+static inline bool fake_step_waits(const struct frame_renderer *renderer)
+{
+    return renderer->request.depth == WAITING_DEPTH && atomic_load(&fake.step_count) == renderer->last_step + 1;
+}
+
 static inline void fake_abandon(struct frame_renderer *renderer)
 {
     fake_end_frame(renderer);
@@ -285,6 +294,7 @@ static const struct engine_backend fake_backend = {
     .may_begin = fake_may_begin,
     .begin = fake_begin,
     .step = fake_step,
+    .step_waits = fake_step_waits,
     .abandon = fake_abandon,
 };
 

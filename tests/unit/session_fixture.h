@@ -191,8 +191,8 @@ static inline void send_message(uint32_t request, uint32_t channel, const struct
     send_bytes(bytes, writer.used_bytes);
 }
 
-/* The next message but credit and blocked; it stays until the next call. */
-static inline const struct message *receive(void)
+/* The next message but credit and blocked, NULL: none is there; it stays until the next call. */
+static inline const struct message *receive_now(void)
 {
     for (;;) {
         struct frame frame;
@@ -200,6 +200,9 @@ static inline const struct message *receive(void)
         enum framing_result result = framing_parse(&frame, client.in + client.consumed,
                                                    client.in_used - client.consumed, MESSAGE_FROM_SERVER, &error);
         if (result == FRAMING_NEED_MORE) {
+            struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+            if (poll(&fd, 1, 0) != 1)
+                return NULL;
             receive_some();
             continue;
         }
@@ -218,6 +221,18 @@ static inline const struct message *receive(void)
         else
             return &client.message;
     }
+}
+
+/* The same, but waits for it. */
+static inline const struct message *receive(void)
+{
+    const struct message *message;
+    while (!(message = receive_now())) {
+        struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+        if (poll(&fd, 1, 20000) != 1)
+            fail_msg("nothing came for 20 s");
+    }
+    return message;
 }
 
 static inline void expect(enum message_type type, uint32_t request)
@@ -262,9 +277,11 @@ static inline void expect_alive(uint32_t request)
     assert_int_equal(client.message.pong.sent_ns, 1234567);
 }
 
-static inline void greet(void)
+/* The capabilities that both have. */
+static inline uint64_t greet_with(uint64_t capabilities)
 {
-    struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "test"};
+    struct handshake_hello hello = {
+        .version_min = 1, .version_max = 1, .capabilities = capabilities, .name = "test"};
     uint8_t bytes[HANDSHAKE_HELLO_MAX_BYTES];
     send_bytes(bytes, handshake_hello_encode(bytes, &hello));
     struct handshake_reply reply;
@@ -274,6 +291,12 @@ static inline void greet(void)
         receive_some();
     assert_int_equal(reply.version, 1);
     assert_int_equal(reply.limits.requests_in_flight, 64);
+    return reply.capabilities;
+}
+
+static inline void greet(void)
+{
+    assert_int_equal(greet_with(0) & HANDSHAKE_CAN_H264, 0);
 }
 
 static inline void start(const struct connection_limits *connection_limits)
@@ -333,6 +356,15 @@ static inline int set_up(void **state)
     real = sys;
     start(&patient);
     greet();
+    return 0;
+}
+
+/* The test greets. */
+static inline int set_up_ungreeted(void **state)
+{
+    (void)state;
+    real = sys;
+    start(&patient);
     return 0;
 }
 

@@ -168,6 +168,35 @@ static void the_weight_of_a_job_is_its_clients_share(void **state)
     run_beside_each_other(4);
 }
 
+static void who_would_wait_for_the_device_lets_others_go_first(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    for (uint64_t client = 1; client <= 2; client++) {
+        open_scene(engine, client, 1);
+        struct engine_command *made = gated(render(client, 5, 0, 0));
+        made->job.frame.samples = 30;
+        made->job.frame.seed = client;
+        made->job.frame.ao_rays = 200;
+        made->job.weight = client == 1 ? 16 : 1;
+        if (client == 1)
+            made->job.frame.depth = WAITING_DEPTH;
+        submit(engine, made);
+    }
+    atomic_store(&fake.gate_open, true);
+    for (int i = 0; i < 4; i++)
+        engine_event_destroy(event_within(engine, 10000));
+    /* Alone it goes on all the same; together it would have sixteen of seventeen steps. */
+    int last = 0, begun = 0;
+    for (int i = 0; i < atomic_load(&fake.step_count); i++)
+        last = fake.step_seeds[i] == 2 ? i : last;
+    while (fake.step_seeds[begun] == 1)
+        begun++;
+    for (int i = begun + 1; i < last; i++)
+        assert_false(fake.step_seeds[i] == 1 && fake.step_seeds[i - 1] == 1);
+    stop(engine);
+}
+
 /* ---- edits -------------------------------------------------------------------------------------- */
 
 static void edits_wait_for_the_frame_in_hand_and_others_do_not(void **state)
@@ -412,6 +441,7 @@ int main(void)
         cmocka_unit_test(frames_that_nobody_takes_stop_the_rendering),
         cmocka_unit_test(clients_have_the_same_share_of_time_however_long_their_slices_are),
         cmocka_unit_test(the_weight_of_a_job_is_its_clients_share),
+        cmocka_unit_test(who_would_wait_for_the_device_lets_others_go_first),
         cmocka_unit_test(edits_wait_for_the_frame_in_hand_and_others_do_not),
         cmocka_unit_test(what_waits_for_a_frame_keeps_its_order_and_can_be_cancelled),
         cmocka_unit_test(a_refused_commit_names_its_field),

@@ -152,9 +152,12 @@ static void a_name_names_one_scene_for_each(void **state)
     open_as(engine, 3, 1, "a", SHARING_SHARED);
     submit_open(engine, 4, 1, "a", SHARING_SHARED);
     expect_failed(engine, 4, 1, ERROR_INVALID, "scene_open.name");
-    submit_open(engine, 4, 1, "a", SHARING_KEPT);
-    expect_failed(engine, 4, 1, ERROR_INVALID, "scene_open.name");
     open_as(engine, 4, 1, "a", SHARING_PRIVATE); /* for people only */
+    /* Nobody can take a name from what others keep. */
+    open_as(engine, 5, 1, "a", SHARING_KEPT);
+    submit_commit(engine, 5, 2, 1);
+    expect_done(engine, 5, 2);
+    assert_int_equal(attach(engine, 5, 3, "a"), 1);
     /* One's own goes before what is shared. */
     submit_commit(engine, 2, 2, 1);
     expect_done(engine, 2, 2);
@@ -383,6 +386,31 @@ static void of_too_many_the_one_that_was_left_first_ends(void **state)
     stop(engine);
 }
 
+static void who_leaves_many_scenes_loses_his_own(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){.scene_linger_ms = LONG_MS, .lingering_scenes = 3});
+    leave(engine, 1, "first", SHARING_SHARED);
+    static const char *const names[] = {"a", "b", "c", "d"};
+    for (uint32_t i = 0; i < 4; i++) {
+        open_as(engine, 2, 1 + i, names[i], SHARING_SHARED);
+        submit_commit(engine, 2, 10 + i, 1 + i);
+        expect_done(engine, 2, 10 + i);
+    }
+    for (uint32_t i = 0; i < 4; i++) {
+        close_scene(engine, 2, 20 + i, 1 + i);
+        expect_done(engine, 2, 20 + i);
+        if (i >= 2)
+            expect_ended(engine);
+    }
+    attach_fails(engine, 3, 1, "a");
+    attach_fails(engine, 3, 2, "b");
+    attach(engine, 3, 3, "first");
+    attach(engine, 3, 4, "c");
+    attach(engine, 3, 5, "d");
+    stop(engine);
+}
+
 static void a_left_scene_gives_its_name_to_a_new_one_of_the_same_user(void **state)
 {
     (void)state;
@@ -416,8 +444,8 @@ static void left_scenes_give_way_where_memory_is_short(void **state)
     (void)state;
     /* Room for about 100 nodes. */
     uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
-    struct engine *engine =
-        start((struct engine_options){.scene_linger_ms = LONG_MS, .scene_limits = {.host_bytes = limit_bytes}});
+    struct engine *engine = start((struct engine_options){
+        .scene_linger_ms = LONG_MS, .scene_limits = {.host_bytes = limit_bytes, .nodes = 100}});
     open_as(engine, 1, 1, "a", SHARING_SHARED);
     submit(engine, commit_of_nodes(1, 2, 1, 60));
     expect_done(engine, 1, 2);
@@ -429,6 +457,8 @@ static void left_scenes_give_way_where_memory_is_short(void **state)
     expect_ended(engine);
     assert_int_equal(expect_done(engine, 2, 3), 1);
     leave(engine, 1, "c", SHARING_SHARED);
+    submit(engine, commit_of_nodes(2, 4, 1, 101)); /* more than any scene may have: they need not give way */
+    expect_failed(engine, 2, 4, ERROR_LIMIT, "edits");
     submit(engine, command(ENGINE_SCENES_TRIM, 0, 0)); /* the network is short of it */
     expect_ended(engine);
     attach_fails(engine, 1, 4, "c");
@@ -627,6 +657,7 @@ int main(void)
         cmocka_unit_test(its_time_is_limited_and_begins_when_the_last_one_goes),
         cmocka_unit_test(nothing_lingers_where_that_is_not_wanted),
         cmocka_unit_test(of_too_many_the_one_that_was_left_first_ends),
+        cmocka_unit_test(who_leaves_many_scenes_loses_his_own),
         cmocka_unit_test(a_left_scene_gives_its_name_to_a_new_one_of_the_same_user),
         cmocka_unit_test(left_scenes_give_way_where_memory_is_short),
         cmocka_unit_test(a_list_has_what_its_reader_may_come_to),

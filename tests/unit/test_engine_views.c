@@ -4,6 +4,7 @@
 #include "engine_fake.h"
 
 #include "base/clock.h"
+#include "encode/stream.h"
 #include "job/engine_private.h"
 
 #define MS UINT64_C(1000000)
@@ -230,6 +231,61 @@ static void refining_gives_way_to_an_edit(void **state)
     stop(engine);
 }
 
+static void who_looks_on_sees_cameras_while_an_edit_waits_for_a_long_frame_of_a_batch(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    submit(engine, gated(render(1, 9, 0, 0)));
+    wait_until(&fake.frames_begun, 1);
+    submit_commit(engine, 1, 3, 1);     /* for the frame of the batch */
+    submit(engine, view(1, 2, wishes)); /* that comes after the edit, and is not begun before it */
+    expect_silence(engine);
+    atomic_store(&fake.gate_open, true);
+    for (int answers = 0; answers < 2;) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        answers += event->kind == ENGINE_DONE;
+        engine_event_destroy(event);
+    }
+    for (uint32_t samples = 1; samples <= 4; samples++) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        assert_int_equal(event->request, 2);
+        engine_event_destroy(event);
+    }
+    /* Now the view is there before. */
+    atomic_store(&fake.gate_open, false);
+    int begun = atomic_load(&fake.frames_begun);
+    submit(engine, gated(render(1, 10, 0, 0)));
+    wait_until(&fake.frames_begun, begun + 1);
+    submit_commit(engine, 1, 4, 1);
+    for (uint64_t number = 1; number <= 5; number++) {
+        look(engine, wishes, number, number < 5);
+        struct engine_frame *frame = take(expect_frame(engine, 1, 2, 3 + (uint32_t)number));
+        assert_int_equal(frame->command, number);
+        assert_int_equal(frame->result.revision, 1);
+        drop(frame);
+    }
+    expect_silence(engine); /* what rests is not refined to be thrown away */
+    atomic_store(&fake.gate_open, true);
+    uint32_t shown = 0;
+    for (bool applied = false; !applied || shown < 4;) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        applied |= event->request == 4;
+        if (event->kind == ENGINE_FRAME && event->request == 2) {
+            assert_true(applied);
+            assert_int_equal(event->frame->result.revision, 2);
+            shown++;
+        }
+        engine_event_destroy(event);
+    }
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
 static void nothing_is_begun_beyond_credit_so_that_nothing_becomes_stale(void **state)
 {
     (void)state;
@@ -290,6 +346,60 @@ static void a_key_frame_comes_also_where_nothing_moves(void **state)
     assert_true(frame->wants_key);
     drop(frame);
     expect_silence(engine);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
+/* Takes the frame that shows the next camera. */
+static struct engine_frame *take_next(struct engine *engine, struct view_wishes *wishes, uint64_t number,
+                                      bool moving)
+{
+    look(engine, wishes, number, moving);
+    struct engine_frame *frame = take(event_within(engine, 10000));
+    assert_int_equal(frame->command, number);
+    return frame;
+}
+
+static void expect_encoded(struct engine_frame *frame, enum encoding encoding, bool key_frame)
+{
+    assert_int_equal(frame->encoding, encoding);
+    assert_int_equal(frame->key_frame, key_frame);
+    drop(frame);
+}
+
+static void a_stream_goes_on_over_frames_of_rest_and_begins_again_where_it_is_wished(void **state)
+{
+    (void)state;
+    if (!encoder_stream_supports(ENCODING_H264, 4)) {
+        print_message("skipped: no encoder of H.264 is here\n");
+        return;
+    }
+    struct engine *engine = start((struct engine_options){.encode_threads = 4});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    struct engine_command *made = with_samples(view(1, 2, wishes), 1, 1);
+    made->job.encoding = ENCODING_H264;
+    submit(engine, made);
+    expect_encoded(take(expect_frame(engine, 1, 2, 0)), ENCODING_RAW, true);
+    expect_encoded(take_next(engine, wishes, 1, true), ENCODING_H264, true);
+    expect_encoded(take_next(engine, wishes, 2, true), ENCODING_H264, false);
+    expect_encoded(take_next(engine, wishes, 3, false), ENCODING_RAW, true);
+    expect_encoded(take_next(engine, wishes, 4, true), ENCODING_H264, false);
+    /* One of rest comes at once, and the stream begins again with the next motion. */
+    look(engine, wishes, 5, false);
+    expect_encoded(take(event_within(engine, 10000)), ENCODING_RAW, true);
+    assert_true(view_wishes_want_key_frame(wishes));
+    submit(engine, command(ENGINE_VIEW_LOOK, 1, 0));
+    expect_encoded(take(event_within(engine, 10000)), ENCODING_RAW, true);
+    expect_encoded(take_next(engine, wishes, 6, true), ENCODING_H264, true);
+    expect_encoded(take_next(engine, wishes, 7, true), ENCODING_H264, false);
+    /* So it does with a view that takes the place of this one. */
+    made = with_samples(view(1, 3, wishes), 1, 1);
+    made->job.encoding = made->job.still_encoding = ENCODING_H264;
+    submit(engine, made);
+    expect_done(engine, 1, 2);
+    expect_encoded(take(event_within(engine, 10000)), ENCODING_H264, true);
+    expect_encoded(take_next(engine, wishes, 8, false), ENCODING_H264, false);
     view_wishes_unref(wishes);
     stop(engine);
 }
@@ -509,9 +619,11 @@ int main(void)
         cmocka_unit_test(an_edit_of_the_scene_begins_anew),
         cmocka_unit_test(refining_gives_way_to_a_new_camera),
         cmocka_unit_test(refining_gives_way_to_an_edit),
+        cmocka_unit_test(who_looks_on_sees_cameras_while_an_edit_waits_for_a_long_frame_of_a_batch),
         cmocka_unit_test(nothing_is_begun_beyond_credit_so_that_nothing_becomes_stale),
         cmocka_unit_test(no_more_frames_come_than_were_asked_for_a_second),
         cmocka_unit_test(a_key_frame_comes_also_where_nothing_moves),
+        cmocka_unit_test(a_stream_goes_on_over_frames_of_rest_and_begins_again_where_it_is_wished),
         cmocka_unit_test(a_view_takes_the_place_of_another_and_goes_on_from_it),
         cmocka_unit_test(a_frame_in_progress_ends_with_the_view_that_is_replaced),
         cmocka_unit_test(a_cancelled_view_ends_whatever_it_does),

@@ -157,6 +157,26 @@ static void a_unix_listener_makes_its_folder_and_lets_only_the_group_in(void **s
     assert_int_equal(stat(socket_path, &status), -1);
 }
 
+static void a_host_that_is_gone_is_noticed(void **state)
+{
+    (void)state;
+    struct listener listener;
+    struct address address, peer;
+    struct error error = {0};
+    bool retry_later;
+    assert_true(address_parse(&address, "tcp:127.0.0.1:0", &error));
+    assert_true(listener_open(&listener, &address, false, &error));
+    int fd = socket(AF_INET, SOCK_STREAM, 0), on = 0;
+    assert_int_equal(connect(fd, (struct sockaddr *)&listener.address.storage, listener.address.storage_bytes), 0);
+    int accepted = listener_accept(&listener, &peer, &retry_later);
+    assert_true(accepted >= 0);
+    assert_int_equal(getsockopt(accepted, SOL_SOCKET, SO_KEEPALIVE, &on, &(socklen_t){sizeof on}), 0);
+    assert_int_equal(on, 1);
+    close(accepted);
+    close(fd);
+    listener_close(&listener);
+}
+
 static void a_live_daemon_is_left_alone_and_a_stale_socket_replaced(void **state)
 {
     (void)state;
@@ -651,6 +671,7 @@ int main(void)
         cmocka_unit_test(only_loopback_is_loopback),
         cmocka_unit_test_setup_teardown(a_unix_listener_makes_its_folder_and_lets_only_the_group_in, make_folder,
                                         remove_folder),
+        cmocka_unit_test(a_host_that_is_gone_is_noticed),
         cmocka_unit_test_setup_teardown(a_live_daemon_is_left_alone_and_a_stale_socket_replaced, make_folder,
                                         remove_folder),
         cmocka_unit_test_setup_teardown(a_file_that_is_no_socket_is_not_touched, make_folder, remove_folder),

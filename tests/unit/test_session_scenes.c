@@ -390,6 +390,54 @@ static void an_edit_by_one_appears_to_the_other(void **state)
     cut(other, NULL);
 }
 
+/* Messages of a view until a frame of that revision has come whole; it is acknowledged. */
+static void expect_view_of(struct client *client, uint32_t request, uint64_t revision)
+{
+    uint64_t shown = 0;
+    do {
+        receive(client);
+        if (client->message.type == MESSAGE_SCENE_CHANGED)
+            continue;
+        assert_int_equal(client->header.request, request);
+        if (client->message.type == MESSAGE_FRAME_BEGIN) {
+            assert_true(client->message.frame_begin.revision >= shown);
+            shown = client->message.frame_begin.revision;
+        } else if (client->message.type == MESSAGE_ERROR) {
+            fail_msg("%s: %s", client->message.error.field, client->message.error.text);
+        } else if (client->message.type == MESSAGE_FRAME_END) {
+            struct message ack = made(MESSAGE_FRAME_ACK);
+            ack.frame_ack.channel = request;
+            ack.frame_ack.frame = client->message.frame_end.frame;
+            ack.frame_ack.whole = 1;
+            send_message(client, 0, 0, &ack);
+        }
+    } while (client->message.type != MESSAGE_FRAME_END || shown < revision);
+    assert_int_equal(shown, revision);
+}
+
+static void a_view_at_rest_shows_what_another_client_changes(void **state)
+{
+    (void)state;
+    struct client *one = come(false), *other = come(true);
+    open_scene_as(one, 1, "model", PROTOCOL_SHARING_SHARED);
+    commit_sphere(one, 1);
+    attach(other, 7, "model");
+    struct message message = made(MESSAGE_RENDER);
+    message.render.kind = PROTOCOL_JOB_KIND_VIEW;
+    message.render.scene = 7;
+    message.render.channel = 20;
+    message.render.credit = 1000;
+    message.render.frames_per_second = 1000;
+    send_message(other, 20, 0, &message);
+    expect_view_of(other, 20, 1);
+    assert_int_equal(commit_node(one, 21, 1, 5), 2);
+    expect_view_of(other, 20, 2);
+    assert_int_equal(commit_node(one, 22, 1, 6), 3);
+    expect_view_of(other, 20, 3);
+    cut(one, NULL);
+    cut(other, NULL);
+}
+
 static void many_changes_are_told_as_one_to_who_does_not_listen(void **state)
 {
     (void)state;
@@ -604,6 +652,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(an_edit_by_one_appears_to_the_other, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(a_view_at_rest_shows_what_another_client_changes, set_up, tear_down),
         cmocka_unit_test_setup_teardown(many_changes_are_told_as_one_to_who_does_not_listen, set_up, tear_down),
         cmocka_unit_test_setup_teardown(what_a_scene_holds_is_told, set_up, tear_down),
         cmocka_unit_test_setup_teardown(scenes_that_cannot_be_come_to_are_refused_by_their_field, set_up,

@@ -3,6 +3,8 @@
  * test has it say. */
 #include "session_fixture.h"
 
+#include "encode/stream.h"
+
 #include "base/clock.h"
 #include "base/queue.h"
 #include "job/view_wishes.h"
@@ -219,6 +221,15 @@ static void send_credit(uint64_t total)
     send_message(0, 0, &message);
 }
 
+static void send_ack_on(uint32_t channel, uint32_t frame)
+{
+    struct message message = made(MESSAGE_FRAME_ACK);
+    message.frame_ack.channel = channel;
+    message.frame_ack.frame = frame;
+    message.frame_ack.whole = 1;
+    send_message(0, 0, &message);
+}
+
 static void send_ack(uint32_t frame, bool whole, bool want_key_frame)
 {
     struct message message = made(MESSAGE_FRAME_ACK);
@@ -428,6 +439,7 @@ static void a_view_that_adapts_tells_the_engine_what_the_link_carries(void **sta
     open_scene(1, 1);
     struct message message = view_message(100);
     message.render.adapt = 1;
+    message.render.still_encoding = PROTOCOL_ENCODING_RAW;
     message.render.quality = 90;
     message.render.frames_per_second = 1000;
     send_message(2, 0, &message);
@@ -444,6 +456,15 @@ static void a_view_that_adapts_tells_the_engine_what_the_link_carries(void **sta
     assert_true(effort.scale_eighths < 8);
     assert_true(effort.quality < 90);
     assert_true(effort.bytes < FRAME_BYTES);
+    assert_false(effort.sparing);
+    say_frame(2, 2, 2); /* at rest; 100 ms are not too long for it */
+    send_ack(1, true, false);
+    take_frame(2, 2);
+    assert_false(view_wishes_see(start->job.wishes).effort.sparing);
+    say_large_frame(2, 3); /* more than a second */
+    for (unsigned i = 0; !view_wishes_see(start->job.wishes).effort.sparing && i < 2000; i++)
+        usleep(10000);
+    assert_true(view_wishes_see(start->job.wishes).effort.sparing);
     engine_command_destroy(start);
 }
 
@@ -647,6 +668,48 @@ static void a_view_that_cannot_be_is_refused_by_its_field(void **state)
     expect_refused(5, &message, PROTOCOL_ERROR_CODE_INVALID, "render.channel");
 }
 
+static void video_needs_the_word_of_both_sides_and_a_view_of_8_bits(void **state)
+{
+    (void)state;
+    struct message message;
+    uint64_t both = greet_with(HANDSHAKE_CAN_H264 | (UINT64_C(1) << 63)); /* one that nobody knows yet */
+    if (!encoder_stream_supports(ENCODING_H264, 4)) {
+        print_message("skipped: no encoder of H.264 is here\n");
+        return;
+    }
+    assert_int_equal(both, HANDSHAKE_CAN_H264);
+    open_scene(1, 1);
+    message = view_message(1);
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
+    message.render.encoding = PROTOCOL_ENCODING_H264;
+    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.encoding");
+    message = made(MESSAGE_RENDER);
+    message.render.scene = 1;
+    message.render.channel = CHANNEL;
+    message.render.encoding = PROTOCOL_ENCODING_H264;
+    expect_refused(3, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.encoding");
+    assert_true(strlen(client.message.error.remedy) > 0);
+    message = view_message(1);
+    message.render.encoding = message.render.still_encoding = PROTOCOL_ENCODING_H264;
+    send_message(4, 0, &message);
+    struct engine_command *command = told(ENGINE_JOB_START);
+    assert_int_equal(command->job.encoding, ENCODING_H264);
+    engine_command_destroy(command);
+}
+
+static void video_without_the_word_for_it_is_refused(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = view_message(1);
+    message.render.encoding = PROTOCOL_ENCODING_H264;
+    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.encoding");
+    assert_true(strlen(client.message.error.remedy) > 0);
+    message = view_message(1);
+    message.render.still_encoding = PROTOCOL_ENCODING_H264;
+    expect_refused(3, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.still_encoding");
+}
+
 /* What frames of 512 x 512 may take: 7 of them, the limit is 10 MiB. */
 static void views_have_room_for_their_frames_or_are_refused(void **state)
 {
@@ -670,6 +733,205 @@ static void views_have_room_for_their_frames_or_are_refused(void **state)
     expect_told_start(5, JOB_VIEW);
 }
 
+/* ---- anything at any time ---------------------------------------------------------------------------- */
+
+#define REQUESTS 300
+#define VIEWS 2
+
+/* An engine that does what engine.h says, at times that chance decides, and what its client has heard. */
+static struct {
+    uint64_t chance;
+    struct {
+        struct view_wishes *wishes; /* not owned; NULL: there is no view */
+        uint32_t request, next_frame;
+        uint64_t credit, made;
+    } views[VIEWS];
+    bool asked[REQUESTS], answered[REQUESTS];
+    uint32_t under_way[VIEWS]; /* request whose frame is coming on a channel; 0: none */
+    uint64_t frame_bytes[VIEWS], credit[VIEWS], frames[VIEWS];
+} play;
+
+static unsigned roll(unsigned sides)
+{
+    /* Numerical Recipes' 64-bit congruential generator; its upper bits are good enough for dice. */
+    play.chance = play.chance * UINT64_C(3202034522624059733) + UINT64_C(4354685564936845319);
+    return (unsigned)(play.chance >> 33) % sides;
+}
+
+static void start_or_refuse(struct engine_command *command)
+{
+    unsigned place = VIEWS, empty = VIEWS;
+    for (unsigned i = 0; i < VIEWS; i++) {
+        if (play.views[i].wishes == command->job.wishes)
+            place = i;
+        else if (!play.views[i].wishes)
+            empty = i;
+    }
+    if (!roll(4)) {
+        say(ENGINE_FAILED, command->request, ERROR_UNSUPPORTED);
+        return;
+    }
+    if (place < VIEWS)
+        say(ENGINE_DONE, play.views[place].request, ERROR_NONE);
+    else
+        place = empty;
+    assert_true(place < VIEWS);
+    play.views[place].wishes = command->job.wishes;
+    play.views[place].request = command->request;
+    play.views[place].credit = command->job.credit;
+    play.views[place].made = 0;
+}
+
+static void end_view(uint32_t request, enum error_kind why)
+{
+    for (unsigned i = 0; i < VIEWS; i++) {
+        if (play.views[i].wishes && play.views[i].request == request) {
+            say(ENGINE_FAILED, request, why);
+            play.views[i].wishes = NULL;
+        }
+    }
+}
+
+static void play_engine(void)
+{
+    for (struct engine_command *command; roll(8) && (command = queue_try_pop(engine.commands));) {
+        if (command->kind == ENGINE_JOB_START) {
+            start_or_refuse(command);
+        } else if (command->kind == ENGINE_JOB_CANCEL) {
+            end_view(command->target_request, ERROR_CANCELLED);
+            say(ENGINE_DONE, command->request, ERROR_NONE);
+        }
+        for (unsigned i = 0; i < VIEWS && command->kind == ENGINE_JOB_CREDIT; i++) {
+            if (play.views[i].wishes && play.views[i].request == command->target_request)
+                play.views[i].credit = command->credit;
+        }
+        engine_command_destroy(command);
+    }
+    for (unsigned i = 0; i < VIEWS; i++) {
+        if (!play.views[i].wishes)
+            continue;
+        if (!roll(40)) {
+            end_view(play.views[i].request, ERROR_OUT_OF_MEMORY);
+        } else if (play.views[i].made < play.views[i].credit && roll(2)) {
+            play.views[i].made++;
+            say_frame_of(play.views[i].request, play.views[i].next_frame++, 0, roll(3) ? 1000 : 1000000);
+        }
+    }
+}
+
+/* Takes all that has come: one answer to each request, whole frames, nothing after an answer. */
+static void play_client(void)
+{
+    for (const struct message *message; (message = receive_now());) {
+        const uint32_t request = client.header.request, view = client.header.channel - CHANNEL;
+        switch (message->type) {
+        case MESSAGE_OK:
+        case MESSAGE_ERROR:
+            assert_true(request < REQUESTS && play.asked[request]);
+            assert_false(play.answered[request]);
+            play.answered[request] = true;
+            break;
+        case MESSAGE_FRAME_BEGIN:
+            assert_true(view < VIEWS && request < REQUESTS && !play.answered[request]);
+            /* One that is not finished is of a request that was answered: it is void. */
+            assert_true(!play.under_way[view] || play.answered[play.under_way[view]]);
+            play.under_way[view] = request;
+            play.frame_bytes[view] = message->frame_begin.size_bytes;
+            assert_true(++play.frames[view] <= play.credit[view]);
+            break;
+        case MESSAGE_FRAME_DATA:
+            assert_true(view < VIEWS && play.under_way[view] == request && !play.answered[request]);
+            play.frame_bytes[view] -= message->frame_data.data_bytes;
+            break;
+        case MESSAGE_FRAME_END:
+            assert_true(view < VIEWS && play.under_way[view] == request && !play.answered[request]);
+            assert_int_equal(play.frame_bytes[view], 0);
+            play.under_way[view] = 0;
+            send_ack_on(client.header.channel, message->frame_end.frame);
+            break;
+        default:
+            fail_msg("%s came", message_type_text(message->type));
+        }
+    }
+}
+
+static void ask(uint32_t request)
+{
+    unsigned view = roll(VIEWS);
+    struct message message = view_message(0);
+    play.asked[request] = true;
+    if (roll(3)) {
+        message.render.channel = CHANNEL + view;
+        message.render.credit = roll(4);
+        play.credit[view] += message.render.credit; /* at most: it may be refused, or no more than there was */
+    } else {
+        message = made(MESSAGE_CANCEL);
+        message.cancel.target_request = request > 6 ? request - 1 - roll(5) : 1;
+    }
+    send_message(request, 0, &message);
+    message = made(MESSAGE_CREDIT);
+    message.credit.channel = CHANNEL + view;
+    message.credit.total = play.credit[view] += roll(3);
+    if (roll(2))
+        send_message(0, 0, &message);
+}
+
+static bool all_answered(void)
+{
+    for (uint32_t request = 2; request < REQUESTS; request++) {
+        if (play.asked[request] && !play.answered[request])
+            return false;
+    }
+    return true;
+}
+
+static void play_from(uint64_t chance)
+{
+    memset(&play, 0, sizeof play);
+    play.chance = chance;
+    uint32_t request = 2;
+    for (; request < REQUESTS / 2; request++) {
+        ask(request);
+        for (unsigned i = roll(4); i; i--) {
+            play_engine();
+            play_client();
+        }
+        /* Not more than may be in flight. */
+        for (unsigned i = 0; i < 2000 && request % 40 == 0; i++) {
+            play_engine();
+            play_client();
+        }
+    }
+    /* Each view that is left is cancelled. */
+    for (uint32_t target = 2; target < REQUESTS / 2; target++) {
+        if (!play.asked[target] || play.answered[target])
+            continue;
+        struct message message = made(MESSAGE_CANCEL);
+        message.cancel.target_request = target;
+        play.asked[request] = true;
+        send_message(request++, 0, &message);
+    }
+    uint64_t give_up_ns = clock_now_ns() + UINT64_C(20000000000);
+    while (!all_answered() && clock_now_ns() < give_up_ns) {
+        play_engine();
+        play_client();
+        usleep(100);
+    }
+    for (uint32_t i = 2; i < request; i++) {
+        if (!play.answered[i])
+            fail_msg("request %u has no answer; chance began with %d", i, (int)chance);
+    }
+    assert_int_equal(served.hub.frame_bytes, 0);
+}
+
+static void whatever_happens_each_request_has_one_answer(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    for (uint64_t chance = 1; chance <= 10; chance++)
+        play_from(chance);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -690,7 +952,11 @@ int main(void)
         BOTH(a_view_may_be_cancelled_while_another_takes_its_place),
         BOTH(a_client_that_vanishes_takes_its_view_along),
         BOTH(a_view_that_cannot_be_is_refused_by_its_field),
+        BOTH(video_without_the_word_for_it_is_refused),
+        cmocka_unit_test_setup_teardown(video_needs_the_word_of_both_sides_and_a_view_of_8_bits, set_up_ungreeted,
+                                        tear_down),
         BOTH(views_have_room_for_their_frames_or_are_refused),
+        BOTH(whatever_happens_each_request_has_one_answer),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,277 @@
+/* SPDX-License-Identifier: MIT */
+/* H.264 through libavcodec: an access unit a picture, in Annex B form, parameter sets before each key frame.
+ *
+ * What a person moves is to be seen at once: no picture waits for a later one (no B-frames, no lookahead, threads
+ * share a picture instead of taking turns), and none takes longer on the link than its share of time: with a
+ * buffer of one picture, the rate control of the encoder keeps each to the bytes that it may have. Key frames come
+ * on request alone. */
+#include "encode/stream.h"
+
+#include "base/parallel.h"
+#include "encode/libav.h"
+#include "encode/ycbcr.h"
+
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define EDGE_MAX 8192u
+#define RATE_DENOMINATOR 1000 /* of pictures per second */
+/* A picture is divided among threads in parts that are worth it. */
+#define PIXELS_PER_THREAD (512u * 512u)
+#define THREADS_MAX 4u
+#define KEY_FRAMES_NEVER (1 << 30) /* x264's word for it */
+/* "No limit" must be one for x264, which cannot be given one later else: what an uncompressed picture takes. */
+#define BYTES_PER_PIXEL_UNLIMITED 3u
+#define BYTES_MIN 1000u /* of a picture: x264 counts in kilobits */
+#define BITS_MAX ((int64_t)1 << 30)
+
+/* Those that the library may have, the best first: the hardware's, where there is some. */
+enum codec { CODEC_NVENC, CODEC_X264, CODEC_COUNT };
+static const char *const codec_names[CODEC_COUNT] = {"h264_nvenc", "libx264"};
+/* One that does not open, or fails, is not tried again: there is no such device. */
+static atomic_bool codec_fails[CODEC_COUNT];
+
+struct encoder_stream {
+    const struct libav *av;
+    int rate_numerator;
+    /* Of the size and the encoder that are open; NULL: none. */
+    enum codec which;
+    AVCodecContext *codec;
+    AVFrame *frame;
+    AVPacket *packet;
+    uint8_t *scratch;
+    uint32_t width, height;
+    int64_t next_picture;
+};
+
+/* ---- settings ----------------------------------------------------------------------------------- */
+
+/* The constant rate factor that looks like a JPEG of that quality: 23, x264's default, at 75, and a step of 6,
+ * which halves the rate, for 18. */
+static double rate_factor(unsigned quality)
+{
+    unsigned clamped = quality < 1 ? 1 : quality > 100 ? 100 : quality;
+    return 48 - clamped / 3.0;
+}
+
+/* The encoder looks at them before each picture. */
+static void set_rate(struct encoder_stream *stream, const struct encoder_wish *wish)
+{
+    AVCodecContext *codec = stream->codec;
+    uint64_t most = (uint64_t)stream->width * stream->height * BYTES_PER_PIXEL_UNLIMITED;
+    uint64_t bytes = wish->bytes && wish->bytes < most ? wish->bytes : most;
+    double bits = 8.0 * (double)(bytes < BYTES_MIN ? BYTES_MIN : bytes);
+    double bits_per_second = bits * stream->rate_numerator / RATE_DENOMINATOR;
+    codec->rc_buffer_size = (int)fmin(bits, (double)BITS_MAX);
+    codec->rc_max_rate = (int64_t)fmin(bits_per_second, (double)BITS_MAX);
+    if (stream->which == CODEC_NVENC)
+        codec->bit_rate = codec->rc_max_rate;
+    else
+        stream->av->av_opt_set_double(codec->priv_data, "crf", rate_factor(wish->quality), 0);
+}
+
+static void describe_pictures(struct encoder_stream *stream)
+{
+    AVCodecContext *codec = stream->codec;
+    codec->width = (int)((stream->width + 1) & ~1u);
+    codec->height = (int)((stream->height + 1) & ~1u);
+    codec->pix_fmt = AV_PIX_FMT_YUV420P;
+    codec->sample_aspect_ratio = (AVRational){1, 1};
+    codec->time_base = (AVRational){RATE_DENOMINATOR, stream->rate_numerator};
+    codec->framerate = (AVRational){stream->rate_numerator, RATE_DENOMINATOR};
+    codec->color_primaries = AVCOL_PRI_BT709;
+    codec->color_trc = AVCOL_TRC_IEC61966_2_1;
+    codec->colorspace = AVCOL_SPC_BT709;
+    codec->color_range = AVCOL_RANGE_MPEG;
+    codec->chroma_sample_location = AVCHROMA_LOC_LEFT;
+}
+
+static void set_latency(struct encoder_stream *stream, AVDictionary **options)
+{
+    const struct libav *av = stream->av;
+    AVCodecContext *codec = stream->codec;
+    unsigned wanted = stream->width * stream->height / PIXELS_PER_THREAD, processors = parallel_processors();
+    unsigned most = processors < THREADS_MAX ? processors : THREADS_MAX;
+    codec->thread_count = (int)(wanted < 1 ? 1 : wanted < most ? wanted : most);
+    codec->thread_type = FF_THREAD_SLICE;
+    codec->gop_size = KEY_FRAMES_NEVER;
+    codec->max_b_frames = 0;
+    av->av_dict_set(options, "forced-idr", "1", 0);
+    if (stream->which == CODEC_NVENC) {
+        av->av_dict_set(options, "preset", "p1", 0);
+        av->av_dict_set(options, "tune", "ull", 0);
+        av->av_dict_set(options, "rc", "vbr", 0);
+        av->av_dict_set(options, "delay", "0", 0);
+        av->av_dict_set(options, "zerolatency", "1", 0);
+    } else {
+        av->av_dict_set(options, "preset", "superfast", 0);
+        av->av_dict_set(options, "tune", "zerolatency", 0);
+        av->av_dict_set(options, "sc_threshold", "0", 0); /* no key frames of its own */
+    }
+}
+
+/* ---- one size, one encoder ----------------------------------------------------------------------- */
+
+static void stream_close(struct encoder_stream *stream)
+{
+    stream->av->av_packet_free(&stream->packet);
+    stream->av->av_frame_free(&stream->frame);
+    stream->av->avcodec_free_context(&stream->codec);
+    free(stream->scratch);
+    stream->scratch = NULL;
+}
+
+static bool open_codec(struct encoder_stream *stream, const AVCodec *codec, const struct encoder_wish *wish)
+{
+    AVDictionary *options = NULL;
+    stream->codec = stream->av->avcodec_alloc_context3(codec);
+    if (!stream->codec)
+        return false;
+    describe_pictures(stream);
+    set_latency(stream, &options);
+    set_rate(stream, wish);
+    bool good = stream->av->avcodec_open2(stream->codec, codec, &options) == 0;
+    stream->av->av_dict_free(&options);
+    return good;
+}
+
+static bool open_frame(struct encoder_stream *stream)
+{
+    AVFrame *frame = stream->frame = stream->av->av_frame_alloc();
+    stream->packet = stream->av->av_packet_alloc();
+    stream->scratch = malloc(ycbcr_scratch_bytes(stream->width));
+    if (!frame || !stream->packet || !stream->scratch)
+        return false;
+    frame->format = stream->codec->pix_fmt;
+    frame->width = stream->codec->width;
+    frame->height = stream->codec->height;
+    return stream->av->av_frame_get_buffer(frame, 0) == 0;
+}
+
+static bool stream_open(struct encoder_stream *stream, const struct picture *picture,
+                        const struct encoder_wish *wish)
+{
+    stream->width = picture->width;
+    stream->height = picture->height;
+    stream->next_picture = 0;
+    for (enum codec which = 0; which < CODEC_COUNT; which++) {
+        const AVCodec *codec = stream->av->avcodec_find_encoder_by_name(codec_names[which]);
+        if (!codec || atomic_load(&codec_fails[which]))
+            continue;
+        stream->which = which;
+        if (open_codec(stream, codec, wish) && open_frame(stream))
+            return true;
+        stream_close(stream);
+        /* The last one has no other to make way for, and fails for lack of memory only. */
+        atomic_store(&codec_fails[which], which + 1 < CODEC_COUNT);
+    }
+    return false;
+}
+
+/* ---- pictures ------------------------------------------------------------------------------------ */
+
+static bool fill_frame(struct encoder_stream *stream, const struct picture *picture)
+{
+    AVFrame *frame = stream->frame;
+    if (stream->av->av_frame_make_writable(frame) < 0) /* an encoder may still look at the one before */
+        return false;
+    const struct ycbcr_planes planes = {
+        .y = frame->data[0],
+        .cb = frame->data[1],
+        .cr = frame->data[2],
+        .y_stride_bytes = (size_t)frame->linesize[0],
+        .c_stride_bytes = (size_t)frame->linesize[1],
+        .width = (uint32_t)frame->width,
+        .height = (uint32_t)frame->height,
+    };
+    ycbcr_convert(picture, &planes, stream->scratch);
+    return true;
+}
+
+/* One picture in, one packet out. */
+static bool encode_picture(struct encoder_stream *stream, const struct picture *picture,
+                           const struct encoder_wish *wish, struct encoded_picture *out)
+{
+    if (!fill_frame(stream, picture))
+        return false;
+    set_rate(stream, wish);
+    stream->frame->pts = stream->next_picture++;
+    stream->frame->pict_type = wish->key_frame ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
+    if (stream->av->avcodec_send_frame(stream->codec, stream->frame) < 0 ||
+        stream->av->avcodec_receive_packet(stream->codec, stream->packet) < 0)
+        return false;
+    const AVPacket *packet = stream->packet;
+    out->size_bytes = (size_t)packet->size;
+    out->key_frame = packet->flags & AV_PKT_FLAG_KEY;
+    out->bytes = malloc(out->size_bytes);
+    if (out->bytes)
+        memcpy(out->bytes, packet->data, out->size_bytes);
+    stream->av->av_packet_unref(stream->packet);
+    return out->bytes != NULL;
+}
+
+bool encoder_stream_encode(struct encoder_stream *stream, const struct picture *picture,
+                           const struct encoder_wish *wish, struct encoded_picture *out, struct error *error)
+{
+    *out = (struct encoded_picture){0};
+    bool is_open = stream->codec && stream->width == picture->width && stream->height == picture->height;
+    if (picture->bytes_per_pixel != 4 || !picture->width || !picture->height || picture->width > EDGE_MAX ||
+        picture->height > EDGE_MAX)
+        return error_set(error, ERROR_UNSUPPORTED, "encoding", "h264 cannot carry %ux%u pixels of %u bytes",
+                         picture->width, picture->height, picture->bytes_per_pixel);
+    for (;;) {
+        if (!is_open) {
+            stream_close(stream);
+            if (!stream_open(stream, picture, wish))
+                return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no encoder of H.264 opens for %ux%u",
+                                 picture->width, picture->height);
+        }
+        if (encode_picture(stream, picture, wish, out))
+            return true;
+        enum codec which = stream->which;
+        stream_close(stream);
+        if (which + 1 == CODEC_COUNT)
+            return error_set(error, ERROR_INTERNAL, "encoding", "%s gave no picture", codec_names[which]);
+        atomic_store(&codec_fails[which], true);
+        is_open = false;
+    }
+}
+
+bool encoder_stream_supports(enum encoding encoding, uint32_t bytes_per_pixel)
+{
+    if (encoding != ENCODING_H264 || bytes_per_pixel != 4)
+        return false;
+    const struct libav *av = libav_load();
+    for (enum codec which = 0; av && which < CODEC_COUNT; which++) {
+        if (av->avcodec_find_encoder_by_name(codec_names[which]) && !atomic_load(&codec_fails[which]))
+            return true;
+    }
+    return false;
+}
+
+struct encoder_stream *encoder_stream_create(enum encoding encoding, float frames_per_second, struct error *error)
+{
+    if (!encoder_stream_supports(encoding, 4)) {
+        error_set(error, ERROR_UNSUPPORTED, "encoding", "libavcodec has no encoder of H.264");
+        return NULL;
+    }
+    struct encoder_stream *stream = calloc(1, sizeof *stream);
+    if (!stream) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no memory for a stream");
+        return NULL;
+    }
+    stream->av = libav_load();
+    double numerator = round((double)frames_per_second * RATE_DENOMINATOR);
+    stream->rate_numerator = (int)fmin(fmax(numerator, 1), INT32_MAX);
+    return stream;
+}
+
+void encoder_stream_destroy(struct encoder_stream *stream)
+{
+    if (!stream)
+        return;
+    stream_close(stream);
+    free(stream);
+}

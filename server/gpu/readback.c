@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: MIT */
+#include "gpu/readback.h"
+
+#include "gpu/registry.h"
+
+#include <epoxy/gl.h>
+#include <string.h>
+
+#define MAP_FLAGS (GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT)
+/* Between two looks at whether the device still lives. */
+#define WAIT_NS 1000000000u
+
+void gpu_readback_drop(struct gpu_readback *readback)
+{
+    if (readback->fence)
+        glDeleteSync(readback->fence);
+    readback->fence = NULL;
+}
+
+void gpu_readback_finish(struct gpu_device *device, struct gpu_readback *readback)
+{
+    gpu_readback_drop(readback);
+    /* Unmaps it, too. */
+    gpu_object_destroy(device->registry, GPU_BUFFER, readback->name);
+    gpu_memory_give(device, readback->capacity_bytes);
+    *readback = (struct gpu_readback){0};
+}
+
+static bool reserve(struct gpu_device *device, struct gpu_readback *readback, size_t size_bytes,
+                    struct error *error)
+{
+    if (size_bytes <= readback->capacity_bytes)
+        return true;
+    gpu_readback_finish(device, readback);
+    if (!gpu_memory_take(device, size_bytes, "a copy on its way to the host", error))
+        return false;
+    readback->capacity_bytes = size_bytes;
+    readback->name = gpu_object_create(device->registry, GPU_BUFFER);
+    if (readback->name) {
+        glNamedBufferStorage(readback->name, (GLsizeiptr)size_bytes, NULL, MAP_FLAGS | GL_CLIENT_STORAGE_BIT);
+        readback->mapped = glMapNamedBufferRange(readback->name, 0, (GLsizeiptr)size_bytes, MAP_FLAGS);
+    }
+    if (readback->mapped)
+        return true;
+    gpu_readback_finish(device, readback);
+    gpu_note_loss(device, error);
+    return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a copy of %zu bytes",
+                     size_bytes);
+}
+
+bool gpu_readback_begin(struct gpu_device *device, struct gpu_readback *readback, const struct gpu_buffer *from,
+                        size_t size_bytes, struct error *error)
+{
+    gpu_readback_drop(readback);
+    if (!reserve(device, readback, size_bytes, error))
+        return false;
+    readback->size_bytes = size_bytes;
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    glCopyNamedBufferSubData(from->name, readback->name, 0, 0, (GLsizeiptr)size_bytes);
+    readback->fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    glFlush();
+    return readback->fence || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a fence");
+}
+
+bool gpu_readback_is_done(const struct gpu_readback *readback)
+{
+    return !readback->fence || glClientWaitSync(readback->fence, 0, 0) != GL_TIMEOUT_EXPIRED;
+}
+
+bool gpu_readback_take(struct gpu_device *device, struct gpu_readback *readback, void *data, struct error *error)
+{
+    GLenum status = GL_TIMEOUT_EXPIRED;
+    while (readback->fence && status == GL_TIMEOUT_EXPIRED && gpu_check(device, "reading back", error))
+        status = glClientWaitSync(readback->fence, 0, WAIT_NS);
+    gpu_readback_drop(readback);
+    if (status != GL_ALREADY_SIGNALED && status != GL_CONDITION_SATISFIED) {
+        gpu_note_loss(device, error);
+        return error_set(error, ERROR_INTERNAL, NULL, "a copy from the device did not arrive");
+    }
+    memcpy(data, readback->mapped, readback->size_bytes);
+    return true;
+}

@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: MIT */
+/* Many threads encode, and still a stream is one: each picture by what is different from the one before. */
+#include "job/encode_pool.h"
+
+#include "h264_player.h"
+
+#define WIDTH 64u
+#define HEIGHT 48u
+#define FRAMES 40u
+
+static void on_done(void *context)
+{
+    (void)context;
+}
+
+/* Of one grey that tells its number; the pool's. */
+static struct engine_frame *new_frame(enum encoding encoding, uint32_t number)
+{
+    struct engine_frame *frame = calloc(1, sizeof *frame);
+    assert_non_null(frame);
+    frame->frame = number;
+    frame->encoding = encoding;
+    frame->quality = 90;
+    frame->result = (struct frame_result){.width = WIDTH, .height = HEIGHT, .layers = 1};
+    frame->result.size_bytes = (size_t)4 * WIDTH * HEIGHT;
+    frame->result.pixels = malloc(frame->result.size_bytes);
+    assert_non_null(frame->result.pixels);
+    memset(frame->result.pixels, (int)(40 + 4 * number), frame->result.size_bytes);
+    return frame;
+}
+
+struct fixture {
+    struct queue *events;
+    struct stage_totals totals;
+    struct encode_pool *pool;
+    struct job_output *output;
+    struct encode_lane *lane;
+};
+
+static void begin(struct fixture *fixture, unsigned threads)
+{
+    struct error error = {0};
+    *fixture = (struct fixture){.events = queue_create(2 * FRAMES, false), .lane = encode_lane_create(30)};
+    fixture->pool = encode_pool_create(
+        &(struct encode_pool_options){.threads = threads, .totals = &fixture->totals, .on_done = on_done}, &error);
+    fixture->output = job_output_create(
+        &(struct job_output_options){.events = fixture->events, .window = 2 * FRAMES, .credit = UINT64_MAX});
+    assert_true(fixture->events && fixture->pool && fixture->output && fixture->lane);
+}
+
+static void submit(struct fixture *fixture, enum encoding encoding, uint32_t number)
+{
+    uint64_t position = job_output_reserve(fixture->output);
+    assert_true(
+        encode_pool_submit(fixture->pool, fixture->output, fixture->lane, position, new_frame(encoding, number)));
+}
+
+static void drop_event(void *item)
+{
+    engine_event_destroy(item);
+}
+
+static void end(struct fixture *fixture)
+{
+    encode_pool_destroy(fixture->pool);
+    encode_lane_unref(fixture->lane);
+    job_output_unref(fixture->output);
+    queue_destroy(fixture->events, drop_event);
+}
+
+static struct engine_event *next(struct fixture *fixture)
+{
+    struct engine_event *event = queue_pop(fixture->events, 10000000000);
+    assert_non_null(event);
+    if (event->kind != ENGINE_FRAME)
+        fail_msg("%s", event->error.text);
+    return event;
+}
+
+static void a_stream_is_encoded_in_order_by_however_many_threads(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct player player = player_begin();
+    begin(&fixture, 8);
+    for (uint32_t i = 0; i < FRAMES; i++)
+        submit(&fixture, ENCODING_H264, i);
+    for (uint32_t i = 0; i < FRAMES; i++) {
+        struct engine_event *event = next(&fixture);
+        const struct engine_frame *frame = event->frame;
+        assert_int_equal(frame->frame, i);
+        assert_int_equal(frame->key_frame, i == 0);
+        assert_int_equal(frame->quality, 90);
+        assert_true(play(&player, frame->bytes, frame->size_bytes));
+        double shown = (player.frame->data[0][0] - 16) * 255 / 219.0;
+        if (fabs(shown - (40 + 4.0 * i)) > 1.9) /* half of what is between two, less rounding */
+            fail_msg("frame %u shows %.1f", i, shown);
+        engine_event_destroy(event);
+    }
+    player_end(&player);
+    end(&fixture);
+}
+
+static void frames_that_stand_alone_do_not_wait_for_the_stream(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    begin(&fixture, 2);
+    for (uint32_t i = 0; i < FRAMES; i++)
+        submit(&fixture, i % 2 ? ENCODING_PREDICTED : ENCODING_H264, i);
+    for (uint32_t i = 0; i < FRAMES; i++) {
+        struct engine_event *event = next(&fixture);
+        assert_int_equal(event->frame->frame, i);
+        assert_int_equal(event->frame->key_frame, i == 0 || i % 2);
+        assert_int_equal(event->frame->quality, i % 2 ? 0 : 90);
+        engine_event_destroy(event);
+    }
+    end(&fixture);
+}
+
+/* What is left over, under the address sanitizer. */
+static void a_pool_that_ends_drops_what_waits_in_a_lane(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    begin(&fixture, 1);
+    for (uint32_t i = 0; i < FRAMES; i++)
+        submit(&fixture, ENCODING_H264, i);
+    end(&fixture);
+}
+
+static void frames_of_a_closed_output_are_not_encoded(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    begin(&fixture, 2);
+    job_output_close(fixture.output, NULL);
+    for (uint32_t i = 0; i < FRAMES; i++)
+        submit(&fixture, ENCODING_H264, i);
+    end(&fixture);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_stream_is_encoded_in_order_by_however_many_threads),
+        cmocka_unit_test(frames_that_stand_alone_do_not_wait_for_the_stream),
+        cmocka_unit_test(a_pool_that_ends_drops_what_waits_in_a_lane),
+        cmocka_unit_test(frames_of_a_closed_output_are_not_encoded),
+    };
+    return h264_is_missing() ? 0 : cmocka_run_group_tests(tests, NULL, NULL);
+}
