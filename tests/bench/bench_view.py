@@ -8,14 +8,14 @@
              medians of its parts
   processor  ms of a processor that the daemon's network thread takes a frame
   viewers    count, frames of each in seconds, and slowest, the share of the mean that who got least has
-  links      encoding, frames_per_s, render_per_s (what its rendering alone allows), mbit_per_s, delay_ms of the first and of the
+  links      kbit_per_s, encoding, frames_per_s, render_per_s (what its rendering alone allows), mbit_per_s, delay_ms of the first and of the
              last third (from the camera sent to the frame decoded, beyond its stages), scale (of the width, the mean); or
-             `why` there is no such link here
+             `why` there is no such link here. Nothing is wanted of the narrower one: it is full also where rendering is slow
   load       processes that wanted to run, a minute's mean, before and after
   wanted     rows as in bench_reach.py
 
 Stages are those that the frame names, by the daemon's clock: the renderer's, encode and send, and decoding; not queue, which
-is waiting. The slower half of a machine that others use as well is in all of it: shares are of one run.
+is waiting. What others do on the machine meanwhile is in all times; shares are of one run.
 """
 import json
 import os
@@ -33,6 +33,7 @@ P50_MS_MOST, P99_MS_MOST = 2, 6
 PROCESSOR_MS_MOST = 0.3
 SLOWEST_LEAST = 0.5
 LINK_KBIT_PER_S, LINK_DELAY_MS, LINK_BUFFER_KIB = 10000, 50, 128
+NARROW_KBIT_PER_S = 1000
 LINK_FRAMES_PER_S = 20
 LINK_ASKED_PER_S = 30
 DELAY_GROWS_MOST = 1.1
@@ -160,12 +161,12 @@ def measure_viewers(bench, daemon, model):
     return {"count": count, "seconds": seconds, "frames": served, "slowest": min(served) / statistics.fmean(served)}
 
 
-def over_a_link(bench, model, seconds, encoding):
-    """None: there can be no such link here; why is said on standard error. Nothing but the link's own ends is reached."""
+def over_a_link(bench, model, kbit_per_s, seconds, encoding):
+    """What bench_view told, and None; or None, and why there can be no such link here."""
     with tempfile.TemporaryDirectory(prefix="farlight-bench-") as folder:
         key, address = pathlib.Path(folder) / "key", "tcp:10.77.0.1:7100"
         command(bench.program("farlight"), "key", key)
-        arguments = [bench.program("tests/bench/shaped_link"), LINK_KBIT_PER_S, LINK_DELAY_MS, LINK_BUFFER_KIB,
+        arguments = [bench.program("tests/bench/shaped_link"), kbit_per_s, LINK_DELAY_MS, LINK_BUFFER_KIB,
                      bench.program("farlightd"), "--listen", address, "--key-file", key, "--",
                      bench.program("tests/bench/bench_view"), address, *model, "--key", key, "--seconds", seconds,
                      "--encoding", encoding, "--adapt", "--rate", LINK_ASKED_PER_S, "--looks", 60]
@@ -177,18 +178,18 @@ def over_a_link(bench, model, seconds, encoding):
     return json.loads(result.stdout), None
 
 
-def measure_link(bench, model, encoding):
+def measure_link(bench, model, kbit_per_s, encoding):
     seconds = 2 if bench.tiny else bench.link_seconds
-    say(f"  a link, {encoding}, {seconds} s")
-    told, why = over_a_link(bench, model, seconds, encoding)
+    say(f"  a link of {kbit_per_s / 1000:.0f} Mbit/s, {encoding}, {seconds} s")
+    told, why = over_a_link(bench, model, kbit_per_s, seconds, encoding)
     if told is None:
-        return {"encoding": encoding, "why": why}
+        return {"kbit_per_s": kbit_per_s, "encoding": encoding, "why": why}
     frames = frames_of(told)
     rate = rate_of(frames)
     span_s = (frames[-1]["whole"] - frames[0]["whole"]) / 1e9
     third = max(1, len(frames) // 3)
     delays = [figure([beyond_stages_ms(frame) for frame in part]) for part in (frames[:third], frames[-third:])]
-    return {"encoding": encoding, "seconds": seconds, "frames": len(frames), "frames_per_s": rate["frames_per_s"],
+    return {"kbit_per_s": kbit_per_s, "encoding": encoding, "seconds": seconds, "frames": len(frames), "frames_per_s": rate["frames_per_s"],
             "render_per_s": 1e3 / rate["ms"]["render"], "mbit_per_s": sum(f["bytes"] for f in frames[1:]) * 8e-6 / span_s,
             "delay_ms": delays, "scale": statistics.fmean(frame["width"] for frame in frames) / 1280}
 
@@ -215,7 +216,7 @@ def wanted(data):
     rows.append(row(f"{viewers['count']} viewers, frames of the slowest / mean", SLOWEST_LEAST, single(viewers["slowest"]),
                     f"{sum(viewers['frames'])} frames in {viewers['seconds']} s"))
     for link in data["links"]:
-        if "why" in link:
+        if "why" in link or link["kbit_per_s"] != LINK_KBIT_PER_S:
             continue
         reach = min(LINK_FRAMES_PER_S, link["render_per_s"])
         rows.append(row(f"10 Mbit/s, 50 ms, {link['encoding']}: frames a second / the lesser of 20 and what rendering allows",
@@ -236,17 +237,19 @@ def measure(bench):
                 "latencies": [measure_latency(bench, daemon, small, "alone", 1),
                               measure_latency(bench, daemon, small, "beside a batch", 2, "--batch", "--weight", 1)],
                 "processor": measure_processor(bench, daemon, small), "viewers": measure_viewers(bench, daemon, small)}
-    data["links"] = [measure_link(bench, small, encoding) for encoding in encodings if encoding != "raw"]
+    data["links"] = [measure_link(bench, small, kbit_per_s, encoding) for encoding in encodings if encoding != "raw"
+                     for kbit_per_s in (LINK_KBIT_PER_S, NARROW_KBIT_PER_S)[:1 if bench.tiny else None]]
     data["load"] = [before, os.getloadavg()[0]]
     data["wanted"] = wanted(data)
     return data
 
 
 def show_link(link):
+    name = f"{link['kbit_per_s'] / 1000:.0f} Mbit/s, {link['encoding']}"
     if "why" in link:
-        return (link["encoding"], link["why"], *[""] * 6)
+        return (f"{name}: {link['why']}", *[""] * 7)
     delays = (significant(delay["median"]) for delay in link["delay_ms"])
-    return (link["encoding"], link["frames"], significant(link["frames_per_s"]), significant(link["render_per_s"]),
+    return (name, link["frames"], significant(link["frames_per_s"]), significant(link["render_per_s"]),
             significant(link["mbit_per_s"]), f"{link['scale']:.2f}", *delays)
 
 
@@ -267,7 +270,7 @@ def show(data):
         f"The daemon's network thread takes {with_spread(data['processor'])} ms of a processor a frame.",
         f"{viewers['count']} viewers of one scene, 320x240: {min(viewers['frames'])} to {max(viewers['frames'])} frames each in "
         f"{viewers['seconds']} s; the slowest has {viewers['slowest']:.2f} of the mean.",
-        f"{LINK_KBIT_PER_S / 1000:.0f} Mbit/s, {LINK_DELAY_MS} ms each way, a buffer of {LINK_BUFFER_KIB} KiB; 1280x720, "
+        f"Links of {LINK_DELAY_MS} ms each way, a buffer of {LINK_BUFFER_KIB} KiB; 1280x720, "
         f"{LINK_ASKED_PER_S} a second asked for, quality and size adapt\n\n" +
         table([("", "frames", "frames/s", "render", "Mbit/s", "of the", "delay, first", "last"),
                ("", "", "", "alone", "", "width", "ms", "ms")], [show_link(link) for link in data["links"]])))
