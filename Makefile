@@ -207,6 +207,19 @@ MODEL_OBJ := $(B)/tests/bench/load_model.o
 RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIVAL_SOURCES)
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
 $(B)/tests/unit/test_load_model $(B)/tests/accuracy/test_abuffer_against_reference: $(MODEL_OBJ)
+# Sessions live in a time of their own.
+SERVING_OBJ := $(call obj,$(addprefix tests/fuzz/,engine_recorder.c serving.c))
+SERVING_WRAP := -Wl,--wrap=clock_now_ns
+# Each fuzzer under a name of its own.
+KEPT_OBJ := $(patsubst tests/fuzz/fuzz_%.c,$(B)/tests/fuzz/kept_%.o,$(wildcard tests/fuzz/fuzz_*.c))
+$(B)/tests/fuzz/kept_%.o: CPPFLAGS_ALL += -DLLVMFuzzerTestOneInput=fuzz_one_$*
+$(B)/tests/fuzz/kept_%.o: tests/fuzz/fuzz_%.c
+	@mkdir -p $(@D)
+	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+$(B)/tests/unit/test_fuzz_corpus: $(KEPT_OBJ) $(SERVING_OBJ)
+$(B)/tests/unit/test_fuzz_corpus: TEST_LIBS += $(SERVING_WRAP)
+$(B)/tests/unit/test_session_faults: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
+$(B)/tests/unit/test_session_faults: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
 # What the daemon encodes is decoded by the library itself.
 $(addprefix $(B)/tests/unit/test_encode_,pool stream): TEST_LIBS += $(call pkg_libs,libavcodec libavutil)
@@ -357,7 +370,7 @@ help:
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz EMBREE=0]'
-	@echo 'make fuzz       run every fuzzer   [config=fuzz FUZZ_SECONDS=20]'
+	@echo 'make fuzz       run every fuzzer for a while   [SECONDS=20]'
 	@echo 'make lint       include rules, shaders, headers alone, format, clang with warnings as errors'
 	@echo 'make format     clang-format over our sources'
 	@echo 'make install    [PREFIX=/usr/local DESTDIR=]'
@@ -366,30 +379,46 @@ help:
 .SECONDARY:
 
 # ---- fuzz ----
-# make config=fuzz fuzz FUZZ_SECONDS=20: every fuzzer in turn, from valid inputs made of the table. What they find
-# stays in build/fuzz/found; their corpus lives in build/fuzz/corpus and grows from run to run.
+# make fuzz SECONDS=20: every fuzzer in turn, from valid inputs made of the table and from those that are kept. What they
+# find stays in build/fuzz/found; their corpus lives in build/fuzz/corpus and grows from run to run. make fuzz-keep takes
+# what of it reaches more than others into tests/fuzz/corpus, which the unit tests run.
 FUZZ_SECONDS ?= 20
+ifeq ($(origin SECONDS),command line)
+FUZZ_SECONDS := $(SECONDS)
+endif
 FUZZERS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_SEED := $(B)/tests/fuzz/seed
-$(FUZZ_SEED): %: %.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
+KEPT_BYTES := 1600
+$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(B)/server/base/blob.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
 $(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ))
 $(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
 $(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_sealed: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
-.PHONY: fuzz $(addprefix run-fuzz-,$(FUZZERS))
+$(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
+$(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
+.PHONY: fuzz fuzz-keep $(addprefix run-fuzz-,$(FUZZERS)) $(addprefix keep-fuzz-,$(FUZZERS))
 ifeq ($(config),fuzz)
 fuzz: $(addprefix run-fuzz-,$(FUZZERS))
+fuzz-keep: $(addprefix keep-fuzz-,$(FUZZERS))
 else
-fuzz:
-	$(MAKE) config=fuzz fuzz
+fuzz fuzz-keep:
+	$(MAKE) config=fuzz $@
 endif
 $(addprefix run-fuzz-,$(FUZZERS)): run-fuzz-%: $(B)/tests/fuzz/fuzz_% $(FUZZ_SEED)
 	@mkdir -p $(B)/corpus/$* $(B)/found
 	$(FUZZ_SEED) $(B)/seed
 	$< -max_total_time=$(FUZZ_SECONDS) -max_len=8192 -timeout=5 -rss_limit_mb=1024 -use_value_profile=1 \
 		-print_final_stats=1 -dict=$(B)/seed/protocol.dict -artifact_prefix=$(B)/found/$*- $(B)/corpus/$* $(B)/seed/$* \
+		$(wildcard tests/fuzz/corpus/$*) \
 		>$(B)/found/$*.log 2>&1 || { tail -n 60 $(B)/found/$*.log; exit 1; }
 	@grep -E '^stat::(number|average|new)|DONE' $(B)/found/$*.log
+# Small ones, so that all of it stays small.
+$(addprefix keep-fuzz-,$(FUZZERS)): keep-fuzz-%: $(B)/tests/fuzz/fuzz_% $(FUZZ_SEED)
+	@mkdir -p $(B)/corpus/$* $(B)/kept/$* tests/fuzz/corpus/$*
+	@rm -f $(B)/kept/$*/*
+	$(FUZZ_SEED) $(B)/seed
+	$< -merge=1 -use_counters=0 -max_len=$(KEPT_BYTES) $(B)/kept/$* tests/fuzz/corpus/$* $(B)/seed/$* $(B)/corpus/$* >$(B)/found/$*-keep.log 2>&1
+	@rm -f tests/fuzz/corpus/$*/* && cp $(B)/kept/$*/* tests/fuzz/corpus/$*
 # ---- fuzz ----

@@ -150,9 +150,8 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, bo
         return false;
     options.engine = engine_port(engine);
     options.timeline = timeline;
+    options.owner_may_be_idle = true;
     options.keys = keys;
-    if (!listens)
-        options.connection_limits.idle_ms = 0; /* whoever started us for himself may take his time */
     bool ok = daemon_start(daemon, &options, error) && (fd < 0 || daemon_serve_fd(daemon, fd, error));
     if (ok) {
         daemon_print_ready(daemon, stdout);

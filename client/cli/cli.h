@@ -194,7 +194,7 @@ struct cli_job {
 extern const struct argp cli_job_argp;
 /* Likewise, without what says where the picture goes, which tracer makes it and how its first hits are found. */
 const struct argp *cli_picture_argp(void);
-/* Likewise for a window, without what is of files; samples and integrator have other defaults there. */
+/* Likewise for a window, without what is of files; samples, integrator and encoding have other defaults there. */
 const struct argp *cli_view_argp(void);
 /* Defaults, then FARLIGHT_*; before the command line is read. */
 bool cli_job_begin(struct cli_job *job);

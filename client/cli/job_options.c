@@ -368,9 +368,9 @@ const struct argp *cli_picture_argp(void)
 
 const struct argp *cli_view_argp(void)
 {
-    static const int left_out[] = {KEY_OUTPUT,  KEY_FORMAT,     KEY_HALF,      KEY_FLOAT,
-                                   KEY_SAMPLES, KEY_INTEGRATOR, KEY_TIMINGS,   KEY_TRACE_FILE,
-                                   KEY_LAYERS,  KEY_CLIP_ONCE,  KEY_CLIP_START};
+    static const int left_out[] = {KEY_OUTPUT,  KEY_FORMAT,     KEY_HALF,       KEY_FLOAT,
+                                   KEY_SAMPLES, KEY_INTEGRATOR, KEY_TIMINGS,    KEY_TRACE_FILE,
+                                   KEY_LAYERS,  KEY_CLIP_ONCE,  KEY_CLIP_START, KEY_ENCODING};
     static struct argp_option kept[sizeof options / sizeof options[0]];
     static const struct argp argp = {.options = kept, .parser = parse};
     keep(kept, left_out, sizeof left_out / sizeof left_out[0]);

@@ -106,8 +106,7 @@ FL_API const char *fl_connection_address(const struct fl_connection *connection)
 FL_API bool fl_connection_listens_at(const struct fl_connection *connection, size_t index, char *address,
                                      size_t address_bytes);
 /* Serves the connection for so long, as every call does while it waits: changes of scenes are heard of, the
- * daemon's pings answered; and says enough for the daemon not to end it. False: it was interrupted, or the daemon
- * is gone. */
+ * daemon's pings answered; and says enough for the daemon not to end it. False: it was interrupted, or the daemon is gone. */
 FL_API bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error);
 
 FL_API bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error);
@@ -284,7 +283,7 @@ struct fl_job_options {
     float exposure_stops;
     enum protocol_pixel_format format;
     enum protocol_encoding encoding;
-    unsigned quality; /* 0: JPEG and H.264 90, zstd 1 */
+    unsigned quality; /* 0: JPEG 90, H.264 80, else level 1 */
     enum protocol_camera_path camera_path;
     uint32_t camera_node;
     float orbit_turn, orbit_seconds; /* radians, seconds */

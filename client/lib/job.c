@@ -23,9 +23,9 @@ struct fl_job {
 
 void fl_job_fill_render(struct message_render *render, const struct fl_job_options *options)
 {
-    const bool is_lossy =
-        options->encoding == PROTOCOL_ENCODING_JPEG || options->encoding == PROTOCOL_ENCODING_H264;
-    const unsigned default_quality = is_lossy ? 90 : 1; /* of the others it is a level: the fastest */
+    const unsigned default_quality = options->encoding == PROTOCOL_ENCODING_JPEG   ? 90
+                                     : options->encoding == PROTOCOL_ENCODING_H264 ? 80
+                                                                                   : 1;
     render->width = options->width > 0 ? options->width : 1280;
     render->height = options->height > 0 ? options->height : 720;
     render->samples = options->samples > 0 ? options->samples : 1;

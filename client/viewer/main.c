@@ -23,6 +23,7 @@ enum key {
     KEY_SAMPLES,
     KEY_INTEGRATOR,
     KEY_PASS,
+    KEY_ENCODING,
     KEY_STILL_ENCODING,
     KEY_SCALE,
     KEY_ADAPT,
@@ -40,9 +41,13 @@ static const struct argp_option options[] = {
      "whitted (default), distributed (with a lens or a shutter), raycast, ao, path", -2},
     {"fps", KEY_RATE, "N", 0, "Frames per second, at most (default 60)", -2},
     {"scale", KEY_SCALE, "N", 0, "Render one pixel for so many of the window, each way: 1 (default), 2, 4, 8", -2},
+    {"encoding", KEY_ENCODING, "NAME", 0,
+     "How pixels travel while something moves: raw, h264, jpeg, predicted, zstd (default: raw on this machine, "
+     "else "
+     "h264)",
+     -2},
     {"still-encoding", KEY_STILL_ENCODING, "NAME", 0,
-     "How pixels travel while nothing moves (default: raw on this machine, else lossless); --encoding is that of "
-     "motion (default: raw on this machine, else h264)",
+     "The same while nothing moves: raw, predicted, zstd, jpeg (default: raw on this machine, else predicted)",
      -2},
     {"adapt", KEY_ADAPT, NULL, 0, "Quality and size follow the link while it moves (default over a network)", -2},
     {"no-adapt", KEY_NO_ADAPT, NULL, 0, "They stay; only fewer frames come", -2},
@@ -87,12 +92,20 @@ static error_t set_scale(struct command_line *line, const char *value)
 
 static error_t set_encoding(struct command_line *line, const char *value)
 {
+    line->job.has_encoding = true;
+    if (protocol_encoding_parse(value, &line->job.options.encoding))
+        return 0;
+    return cli_usage(&line->job, "--encoding", "'%s' is not raw, h264, jpeg, predicted or zstd", value);
+}
+
+static error_t set_still_encoding(struct command_line *line, const char *value)
+{
     struct viewer_options *viewer = &line->viewer;
     viewer->has_still_encoding = true;
     if (protocol_encoding_parse(value, &viewer->view.still_encoding) &&
         viewer->view.still_encoding != PROTOCOL_ENCODING_H264)
         return 0;
-    return cli_usage(&line->job, "--still-encoding", "'%s' is not raw, zstd, predicted or jpeg", value);
+    return cli_usage(&line->job, "--still-encoding", "'%s' is not raw, predicted, zstd or jpeg", value);
 }
 
 static error_t set_integrator(struct command_line *line, const char *value)
@@ -157,8 +170,10 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return set_integrator(line, value);
     case KEY_SCALE:
         return set_scale(line, value);
-    case KEY_STILL_ENCODING:
+    case KEY_ENCODING:
         return set_encoding(line, value);
+    case KEY_STILL_ENCODING:
+        return set_still_encoding(line, value);
     default:
         return ARGP_ERR_UNKNOWN;
     }

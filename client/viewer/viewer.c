@@ -14,7 +14,7 @@
 #define NOTICE_NS 4000000000ull
 #define GLIDE_NS 350000000ull
 #define BUSY_WAIT_MS 2u /* while somebody is at it; frames end the wait, input does not */
-#define IDLE_WAIT_MS 15u
+#define IDLE_WAIT_MS 8u
 #define BUSY_NS 1000000000ull
 #define REDRAW_NS 250000000ull /* figures go on while no frame comes */
 

@@ -7,6 +7,7 @@
 #define LOOK_PAUSE_NS 4000000ull   /* between cameras: no screen shows more */
 #define REST_PAUSE_NS 120000000ull /* without movement: that was all of it */
 #define EDGE_LEAST 16u
+#define FRAMES_AT_ONCE 4u /* then people have their turn */
 
 /* Even edges: the colours of a video come in pairs. */
 void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *height)
@@ -133,9 +134,10 @@ void viewer_receive(struct viewer *viewer, unsigned timeout_ms)
 {
     struct fl_error refusal = {0};
     struct fl_frame *frame = session_next(viewer->session, timeout_ms, &refusal);
-    for (; frame != NULL; frame = session_next(viewer->session, 0, &refusal)) {
+    for (unsigned count = 1; frame != NULL; count++) {
         take(viewer, frame);
         fl_frame_destroy(frame);
+        frame = count < FRAMES_AT_ONCE ? session_next(viewer->session, 0, &refusal) : NULL;
     }
     if (refusal.code != FL_ERROR_NONE)
         refuse(viewer, &refusal);

@@ -48,8 +48,8 @@ static bool reserve(struct gpu_device *device, struct gpu_readback *readback, si
                      size_bytes);
 }
 
-bool gpu_readback_begin(struct gpu_device *device, struct gpu_readback *readback, const struct gpu_buffer *from,
-                        size_t size_bytes, struct error *error)
+bool gpu_readback_copy(struct gpu_device *device, struct gpu_readback *readback, const struct gpu_buffer *from,
+                       size_t size_bytes, struct error *error)
 {
     gpu_readback_drop(readback);
     if (!reserve(device, readback, size_bytes, error))
@@ -57,6 +57,11 @@ bool gpu_readback_begin(struct gpu_device *device, struct gpu_readback *readback
     readback->size_bytes = size_bytes;
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     glCopyNamedBufferSubData(from->name, readback->name, 0, 0, (GLsizeiptr)size_bytes);
+    return true;
+}
+
+bool gpu_readback_fence(struct gpu_readback *readback, struct error *error)
+{
     readback->fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
     glFlush();
     return readback->fence || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a fence");

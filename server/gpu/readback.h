@@ -15,8 +15,10 @@ struct gpu_readback {
 
 /* Begins to copy the first bytes of a buffer, as they are after what was queued so far. Drops a copy that was not
  * taken. */
-bool gpu_readback_begin(struct gpu_device *device, struct gpu_readback *readback, const struct gpu_buffer *from,
-                        size_t size_bytes, struct error *error);
+bool gpu_readback_copy(struct gpu_device *device, struct gpu_readback *readback, const struct gpu_buffer *from,
+                       size_t size_bytes, struct error *error);
+/* To be called once behind it, and behind what is to be over when the copy is. */
+bool gpu_readback_fence(struct gpu_readback *readback, struct error *error);
 /* Whether gpu_readback_take() would not have to wait. */
 bool gpu_readback_is_done(const struct gpu_readback *readback);
 /* Waits for the copy, and puts it there. */

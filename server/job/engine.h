@@ -91,7 +91,7 @@ enum engine_command_kind {
     ENGINE_SCENE_LIST,   /* answered by ENGINE_SCENES_LISTED */
     ENGINE_SCENE_DESCRIBE, /* answered by ENGINE_SCENE_DESCRIBED */
     ENGINE_SCENES_TRIM,    /* scenes that nobody holds end now; no answer */
-    ENGINE_COMMIT, /* waits for the frame of the scene that is in progress, what follows for that scene too */
+    ENGINE_COMMIT, /* waits for the frames of the scene that are in progress, what follows for that scene too */
     /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, before which come the frames that were
      * finished and have credit. A view has no last frame: it is done when another one takes its place. */
     ENGINE_JOB_START,
@@ -104,6 +104,7 @@ enum engine_command_kind {
 };
 
 struct engine_command {
+    struct engine_command *next; /* of who has it: the engine, once it took it, does not look at it */
     enum engine_command_kind kind;
     uint64_t client;
     uint32_t request;

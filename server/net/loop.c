@@ -193,21 +193,28 @@ static int timeout_ms(const struct loop *loop)
     return wait_ms > 60000 ? 60000 : (int)wait_ms;
 }
 
+bool loop_turn(struct loop *loop, struct error *error)
+{
+    struct epoll_event events[EVENTS_A_TURN];
+    int count = sys.epoll_wait(loop->epoll_fd, events, EVENTS_A_TURN, timeout_ms(loop));
+    if (count < 0 && errno != EINTR)
+        return error_set(error, ERROR_INTERNAL, "loop", "epoll_wait: %s", strerror(errno));
+    for (int i = 0; i < count; i++) {
+        struct loop_watch *watch = events[i].data.ptr;
+        if (!watch->removed)
+            watch->ready(watch->context, events[i].events);
+    }
+    run_deferred(loop);
+    free_removed(loop);
+    run_timers(loop);
+    return true;
+}
+
 bool loop_run(struct loop *loop, struct error *error)
 {
     while (!loop->stopped) {
-        struct epoll_event events[EVENTS_A_TURN];
-        int count = sys.epoll_wait(loop->epoll_fd, events, EVENTS_A_TURN, timeout_ms(loop));
-        if (count < 0 && errno != EINTR)
-            return error_set(error, ERROR_INTERNAL, "loop", "epoll_wait: %s", strerror(errno));
-        for (int i = 0; i < count; i++) {
-            struct loop_watch *watch = events[i].data.ptr;
-            if (!watch->removed)
-                watch->ready(watch->context, events[i].events);
-        }
-        run_deferred(loop);
-        free_removed(loop);
-        run_timers(loop);
+        if (!loop_turn(loop, error))
+            return false;
     }
     return true;
 }

@@ -51,6 +51,8 @@ void loop_timer_stop(struct loop *loop, struct loop_timer *timer);
 void loop_defer(struct loop *loop, struct loop_deferred *deferred);
 
 bool loop_run(struct loop *loop, struct error *error); /* until loop_stop() */
+/* Once around: waits until something is ready or due, and calls for it. */
+bool loop_turn(struct loop *loop, struct error *error);
 void loop_stop(struct loop *loop);
 void loop_run_deferred(struct loop *loop); /* all of it now, for an orderly end outside loop_run() */
 

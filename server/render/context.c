@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/context.h"
 
+#include "base/clock.h"
 #include "shared/bindings.h"
 #include "shared/hit.h"
 #include "shared/path.h"
@@ -51,6 +52,18 @@ void context_collect(struct render_context *context)
     for (uint32_t i = 0; i < spans->count; i++)
         add_span(&context->times, spans->origin_ns, &spans->spans[i]);
     context->span_count = 0;
+}
+
+void context_add_cpu_time(struct render_context *context, enum stage_id stage, uint64_t start_ns)
+{
+    const struct stage_span span = {
+        .stage = stage,
+        .clock = STAGE_CPU,
+        .wave = context->wave_number,
+        .start_ns = start_ns - context->times.origin_ns,
+        .duration_ns = clock_now_ns() - start_ns,
+    };
+    add_span(&context->times, context->times.origin_ns, &span);
 }
 
 const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error)

@@ -64,6 +64,8 @@ struct render_context {
 void context_span_begin(struct render_context *context, enum stage_id stage);
 void context_span_end(struct render_context *context);
 void context_collect(struct render_context *context);
+/* What the host has done for a stage since then. */
+void context_add_cpu_time(struct render_context *context, enum stage_id stage, uint64_t start_ns);
 /* A compute program of shaders/render with no defines, in use. */
 const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error);
 /* The scene, the lights and the frame's uniforms at their places. */

@@ -2,6 +2,8 @@
 /* From the device to memory that the frame's taker owns. */
 #include "render/picture.h"
 
+#include "base/clock.h"
+
 #include <stdlib.h>
 
 static size_t row_bytes(const struct picture *picture, const struct render_context *context)
@@ -47,9 +49,9 @@ bool picture_copy_band(struct picture *picture, struct render_context *context, 
 {
     context_span_begin(context, STAGE_READBACK);
     bool begun =
-        gpu_readback_begin(context->device, copy, &picture->resolved, band_bytes(picture, context, band), error);
+        gpu_readback_copy(context->device, copy, &picture->resolved, band_bytes(picture, context, band), error);
     context_span_end(context);
-    return begun && gpu_check(context->device, "copying the picture", error);
+    return begun && gpu_readback_fence(copy, error) && gpu_check(context->device, "copying the picture", error);
 }
 
 bool picture_take_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
@@ -58,8 +60,9 @@ bool picture_take_band(struct picture *picture, struct render_context *context, 
     uint8_t *pixels = band_pixels(picture, context, plane, band, error);
     if (!pixels)
         return false;
-    context_span_begin(context, STAGE_READBACK);
+    /* Not as a span of the device, behind which others' work may be queued already. */
+    uint64_t start_ns = clock_now_ns();
     bool taken = gpu_readback_take(context->device, copy, pixels, error);
-    context_span_end(context);
+    context_add_cpu_time(context, STAGE_READBACK, start_ns);
     return taken;
 }

@@ -43,11 +43,8 @@ void frames_add(struct job *job, struct engine_frame *frame)
     struct pending_frame *pending = job->cancelled ? NULL : calloc(1, sizeof *pending);
     if (!pending) {
         engine_frame_destroy(frame);
-        if (!job->cancelled) {
-            struct error error = {0};
-            error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a frame");
-            session_fail(job->session, &error);
-        }
+        if (!job->cancelled)
+            session_fail_for_memory(job->session);
         return;
     }
     *pending = (struct pending_frame){

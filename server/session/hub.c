@@ -12,11 +12,6 @@
 /* Events of the engine that are taken before clients get their turn again. */
 #define EVENTS_A_TURN 64
 
-struct hub_waiting {
-    struct hub_waiting *next;
-    struct engine_command *command;
-};
-
 /* ---- commands ---------------------------------------------------------------------------------------- */
 
 struct engine_command *hub_command(enum engine_command_kind kind, uint64_t client, uint32_t request)
@@ -44,24 +39,18 @@ static void hold_sessions(struct hub *hub, bool held)
         session_hold(session, held);
 }
 
-bool hub_submit(struct hub *hub, struct engine_command *command)
+void hub_submit(struct hub *hub, struct engine_command *command)
 {
     if (!hub->waiting && try_submit(hub, command))
-        return true;
-    struct hub_waiting *waiting = calloc(1, sizeof *waiting);
-    if (!waiting) {
-        engine_command_destroy(command);
-        return false;
-    }
-    waiting->command = command;
+        return;
     if (!hub->waiting) {
         log_write(LOG_DEBUG, "session", "the engine's queue is full; clients wait");
         hold_sessions(hub, true);
         loop_timer_start(hub->loop, &hub->retry_timer, RETRY_NS);
     }
-    *hub->waiting_end = waiting;
-    hub->waiting_end = &waiting->next;
-    return true;
+    command->next = NULL;
+    *hub->waiting_end = command;
+    hub->waiting_end = &command->next;
 }
 
 void hub_trim(struct hub *hub)
@@ -74,10 +63,11 @@ void hub_trim(struct hub *hub)
 static void retry(void *context)
 {
     struct hub *hub = context;
-    while (hub->waiting && try_submit(hub, hub->waiting->command)) {
-        struct hub_waiting *done = hub->waiting;
-        hub->waiting = done->next;
-        free(done);
+    while (hub->waiting) {
+        struct engine_command *next = hub->waiting->next; /* the engine may destroy what it takes */
+        if (!try_submit(hub, hub->waiting))
+            break;
+        hub->waiting = next;
     }
     if (hub->waiting) {
         loop_timer_start(hub->loop, &hub->retry_timer, RETRY_NS);
@@ -180,6 +170,9 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
         .started_ns = clock_now_ns(),
         .retry_timer = {.call = retry, .context = hub},
     };
+    hub->owner_limits = options->connection_limits;
+    if (options->owner_may_be_idle)
+        hub->owner_limits.idle_ms = 0;
     hub->waiting_end = &hub->waiting;
     hub->blobs = blob_store_create(options->limits.blob_bytes, options->limits.blob_cache_bytes);
     if (!hub->blobs)
@@ -197,10 +190,9 @@ void hub_finish(struct hub *hub)
     loop_watch_remove(hub->engine_watch);
     loop_timer_stop(hub->loop, &hub->retry_timer);
     while (hub->waiting) {
-        struct hub_waiting *waiting = hub->waiting;
-        hub->waiting = waiting->next;
-        engine_command_destroy(waiting->command);
-        free(waiting);
+        struct engine_command *command = hub->waiting;
+        hub->waiting = command->next;
+        engine_command_destroy(command);
     }
     blob_store_destroy(hub->blobs);
     hashmap_finish(&hub->sessions);

@@ -22,6 +22,7 @@ struct session;
 struct hub_options {
     struct session_limits limits;
     struct connection_limits connection_limits;
+    bool owner_may_be_idle; /* the client of daemon_serve_fd() is not sent away for its silence */
     struct readers readers; /* of the Unix socket */
     struct engine_port engine;
     struct timeline *timeline;   /* hears of every frame that was sent; may be NULL */
@@ -40,14 +41,15 @@ struct hub {
     uint64_t frame_bytes;     /* what the frames of all jobs may take */
     uint64_t last_number, started_ns;
     bool stopping;
-    uint64_t owner; /* number of the client for whom all this is there; 0: nobody */
+    uint64_t owner;                        /* number of the client for whom all this is there; 0: nobody */
+    struct connection_limits owner_limits; /* of that one */
     loop_call_fn *owner_gone,
         *emptied; /* called when that one is gone, and when the last session is; may be NULL */
     void *call_context;
 
     struct loop_watch *engine_watch;
     /* Commands that the engine had no room for, in order. While one waits, no session reads on. */
-    struct hub_waiting *waiting, **waiting_end;
+    struct engine_command *waiting, **waiting_end;
     struct loop_timer retry_timer;
 };
 
@@ -60,9 +62,8 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
 /* Says goodbye to everybody; `emptied` is called when they are gone, at once if there is nobody. */
 void hub_stop(struct hub *hub);
 
-/* Hands a command to the engine, now or as soon as it has room; takes it over in any case. False: out of
- * memory, the command is destroyed. */
-bool hub_submit(struct hub *hub, struct engine_command *command);
+/* Hands a command to the engine, now or as soon as it has room. */
+void hub_submit(struct hub *hub, struct engine_command *command);
 /* Memory is short: scenes that nobody holds shall end, with what they use. */
 void hub_trim(struct hub *hub);
 /* The same for one of a session's requests: zeroed but for kind, client and request. NULL: out of memory. */

@@ -153,13 +153,15 @@ static void tell_engine_credit(struct job *job)
     if (allowed <= job->engine_credit || job->rendered || job->cancelled)
         return;
     struct engine_command *command = hub_command(ENGINE_JOB_CREDIT, session->number, job->request);
-    if (!command)
-        return; /* the next credit says it as well, as it is absolute */
+    if (!command) {
+        session_fail_for_memory(session); /* the job might wait for ever */
+        return;
+    }
     command->target_request = job->request;
     command->scene = job->scene;
     command->credit = allowed;
-    if (hub_submit(session->hub, command))
-        job->engine_credit = allowed;
+    hub_submit(session->hub, command);
+    job->engine_credit = allowed;
 }
 
 void job_pace(struct job *job)

@@ -12,6 +12,13 @@
 /* The part of the link that frames are made to fit: what is left drains queues of others, and our own. */
 #define LINK_SHARE 0.9
 #define LEARN_SHARE 0.25
+/* How much of what was learned about rendering stays with each frame. */
+#define RENDER_FADES 0.9
+/* Frames have shown how much of rendering depends on their size when their areas deviate by this part of the mean.
+ */
+#define AREA_DEVIATION 0.25
+/* A frame may take so much longer than what no size can spare. */
+#define OF_FIXED 1.5
 /* So often in a row the next better step must fit, with this room to spare. */
 #define BETTER_TIMES 8
 #define BETTER_ROOM 1.25
@@ -155,11 +162,39 @@ static void learn(double *known, double seen)
     *known = *known > 0.0 ? *known + LEARN_SHARE * (seen - *known) : seen;
 }
 
+/* A straight line through the times by area, as soon as there are times of different areas. */
+static void learn_render(struct pacing *pacing, double area, double render_ns)
+{
+    pacing->render_frames = pacing->render_frames * RENDER_FADES + 1.0;
+    pacing->render_areas = pacing->render_areas * RENDER_FADES + area;
+    pacing->render_ns = pacing->render_ns * RENDER_FADES + render_ns;
+    pacing->render_areas_areas = pacing->render_areas_areas * RENDER_FADES + area * area;
+    pacing->render_areas_ns = pacing->render_areas_ns * RENDER_FADES + area * render_ns;
+    double mean_area = pacing->render_areas / pacing->render_frames;
+    double mean_ns = pacing->render_ns / pacing->render_frames;
+    double variance = pacing->render_areas_areas / pacing->render_frames - mean_area * mean_area;
+    double least = AREA_DEVIATION * mean_area;
+    if (variance > least * least) {
+        double slope = (pacing->render_areas_ns / pacing->render_frames - mean_area * mean_ns) / variance;
+        pacing->render_fixed_ns = fmax(mean_ns - slope * mean_area, 0.0);
+    }
+    pacing->render_fixed_ns = fmin(pacing->render_fixed_ns, mean_ns);
+}
+
+static double render_ns_of(const struct pacing *pacing, unsigned scale_eighths)
+{
+    if (!(pacing->render_frames > 0.0))
+        return 0.0;
+    double mean_ns = pacing->render_ns / pacing->render_frames;
+    double mean_area = pacing->render_areas / pacing->render_frames;
+    return pacing->render_fixed_ns + (mean_ns - pacing->render_fixed_ns) / mean_area * area_of(scale_eighths);
+}
+
 void pacing_learn(struct pacing *pacing, unsigned scale_eighths, unsigned quality, uint64_t render_ns,
                   uint64_t bytes)
 {
     double area = area_of(scale_eighths);
-    learn(&pacing->render_ns_full, (double)render_ns / area);
+    learn_render(pacing, area, (double)render_ns);
     if (quality)
         learn(&pacing->bytes_full, (double)bytes / area / bytes_of_quality(quality));
 }
@@ -185,12 +220,13 @@ static double bytes_a_frame(const struct pacing *pacing)
 static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned quality_wanted, double room)
 {
     double bytes_max = bytes_a_frame(pacing) / room;
+    /* Where even the smallest picture would be late, it would not be worth its size. */
+    double render_max_ns = fmax((double)pacing->frame_ns, OF_FIXED * pacing->render_fixed_ns);
     unsigned least = quality_wanted < PACING_QUALITY_LEAST ? quality_wanted : PACING_QUALITY_LEAST;
     struct pacing_advice advice = {.scale_eighths = scales_eighths[SCALES - 1], .quality = least};
     for (size_t i = 0; i < SCALES; i++) {
         unsigned scale = scales_eighths[i];
-        bool rendered_in_time =
-            pacing->render_ns_full * area_of(scale) * room <= (double)pacing->frame_ns || i == SCALES - 1;
+        bool rendered_in_time = render_ns_of(pacing, scale) * room <= render_max_ns || i == SCALES - 1;
         if (!rendered_in_time || (bytes_of(pacing, scale, least) > bytes_max && i < SCALES - 1))
             continue;
         advice.scale_eighths = scale;

@@ -36,9 +36,13 @@ struct pacing {
     double carried_bytes, carried_ns;
     uint64_t last_bytes; /* of the frame that was sent last */
     /* What a picture of full size costs, learned from those of any size. */
-    double render_ns_full, bytes_full; /* the latter at PACING_QUALITY_REFERENCE; 0: not known */
-    unsigned scale_eighths, quality;   /* last advice */
-    unsigned better_count;             /* times in a row that a better one would have been possible */
+    double bytes_full; /* at PACING_QUALITY_REFERENCE; 0: not known */
+    /* Rendering takes a part that does not depend on the picture's size, and one that grows with its area, of
+     * which the full picture has 1. Sums over the frames so far, older ones fading. */
+    double render_frames, render_areas, render_ns, render_areas_areas, render_areas_ns;
+    double render_fixed_ns;          /* as far as frames of several sizes have shown it */
+    unsigned scale_eighths, quality; /* last advice */
+    unsigned better_count;           /* times in a row that a better one would have been possible */
 };
 
 struct pacing_advice {

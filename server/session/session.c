@@ -69,10 +69,19 @@ void session_fail(struct session *session, const struct error *error)
                       whole_characters(copy.text));
 }
 
+void session_fail_for_memory(struct session *session)
+{
+    struct error error = {0};
+    error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
+    session_fail(session, &error);
+}
+
 void session_submit(struct session *session, struct request *request, struct engine_command *command)
 {
-    if (command && hub_submit(session->hub, command))
+    if (command) {
+        hub_submit(session->hub, command);
         return;
+    }
     struct error error = {0};
     error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
     /* The engine knows nothing of it: all is as before. */
@@ -175,13 +184,22 @@ void session_engine_event(struct session *session, struct engine_event *event)
 
 /* ---- the connection's calls -------------------------------------------------------------------------- */
 
-static void fill_limits(struct handshake_limits *told, const struct hub_options *options)
+static const struct connection_limits *connection_limits_of(const struct session *session)
 {
+    const struct hub *hub = session->hub;
+    bool is_owner = session->number == hub->owner;
+    return is_owner ? &hub->owner_limits : &hub->options.connection_limits;
+}
+
+static void fill_limits(struct handshake_limits *told, const struct session *session)
+{
+    const struct hub_options *options = &session->hub->options;
+    const struct connection_limits *connection_limits = connection_limits_of(session);
     const struct session_limits *limits = &options->limits;
     *told = (struct handshake_limits){
-        .queued_output_bytes = options->connection_limits.queued_hard_bytes,
+        .queued_output_bytes = connection_limits->queued_hard_bytes,
         .scene_memory_bytes = options->scene_memory_bytes,
-        .handshake_ms = options->connection_limits.handshake_ms,
+        .handshake_ms = connection_limits->handshake_ms,
         .control_payload_max_bytes = CODEC_CONTROL_PAYLOAD_MAX_BYTES,
         .bulk_chunk_max_bytes = (uint32_t)FRAME_PIECE_BYTES,
         .requests_in_flight = limits->requests_in_flight,
@@ -192,7 +210,7 @@ static void fill_limits(struct handshake_limits *told, const struct hub_options 
         .width_max = limits->width_pixels,
         .height_max = limits->height_pixels,
         .samples_max = limits->samples,
-        .idle_seconds = options->connection_limits.idle_ms / 1000,
+        .idle_seconds = connection_limits->idle_ms / 1000,
     };
 }
 
@@ -259,7 +277,7 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
                         encoder_stream_supports(ENCODING_H264, 4);
     if (session->can_h264)
         reply->capabilities |= HANDSHAKE_CAN_H264;
-    fill_limits(&reply->limits, &hub->options);
+    fill_limits(&reply->limits, session);
     snprintf(session->name, sizeof session->name, "%s", hello->name);
     return reply->text[0] == '\0';
 }
@@ -318,11 +336,9 @@ static void on_closed(void *context)
     upload_finish(session);
     scenes_finish(session);
     if (session->introduced) {
-        struct engine_command *command = hub_command(ENGINE_CLIENT_GONE, session->number, 0);
-        if (!command || !hub_submit(hub, command))
-            log_write(LOG_ERROR, "session", "no memory to forget client %" PRIu64 "; its scenes stay",
-                      session->number);
+        hub_submit(hub, session->farewell);
     } else {
+        engine_command_destroy(session->farewell);
         hub->unauthenticated--;
     }
     bool was_owner = session->number == hub->owner;
@@ -362,9 +378,13 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, const s
     session->identity = *identity;
     session->peer = *peer;
     session->principal = principal_of(session);
-    session->connection = connection_create(hub->loop, fd, &hub->options.connection_limits, entry,
-                                            &connection_handler, session, error);
+    session->farewell = hub_command(ENGINE_CLIENT_GONE, number, 0);
+    session->connection = session->farewell ? connection_create(hub->loop, fd, connection_limits_of(session),
+                                                                entry, &connection_handler, session, error)
+                                            : NULL;
     if (!session->connection) {
+        error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");
+        engine_command_destroy(session->farewell);
         free(session);
         return NULL;
     }

@@ -32,8 +32,9 @@ struct session {
     struct address peer;
     blob_principal principal;
     char name[HANDSHAKE_NAME_MAX_BYTES + 1];
-    bool introduced; /* the hello is done: the engine may know it */
-    bool can_h264;   /* the client decodes it, and an encoder is here */
+    bool introduced;                 /* the hello is done: the engine may know it */
+    bool can_h264;                   /* the client decodes it, and an encoder is here */
+    struct engine_command *farewell; /* for when it is gone, which must not fail for lack of memory */
 
     struct requests requests;
     struct hashmap scenes; /* struct session_scene *, by id; see scenes.h */
@@ -58,6 +59,7 @@ bool session_send(struct session *session, uint32_t request, uint32_t channel, c
 void session_send_error(struct session *session, uint32_t request, const struct error *error);
 /* ERROR on request 0, goodbye, end. */
 void session_fail(struct session *session, const struct error *error);
+void session_fail_for_memory(struct session *session);
 /* Hands a request's command to the engine; NULL (out of memory) is answered as well. */
 void session_submit(struct session *session, struct request *request, struct engine_command *command);
 #endif

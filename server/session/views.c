@@ -264,13 +264,12 @@ static void tell_engine(struct job *job)
 {
     struct session *session = job->session;
     struct engine_command *command = hub_command(ENGINE_VIEW_LOOK, session->number, job->request);
-    if (command)
-        command->scene = job->scene;
-    if (command && hub_submit(session->hub, command))
+    if (!command) {
+        session_fail_for_memory(session);
         return;
-    struct error error = {0};
-    error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory for what a view is told");
-    session_fail(session, &error);
+    }
+    command->scene = job->scene;
+    hub_submit(session->hub, command);
 }
 
 void views_look(struct session *session, const struct message_view_camera *message)

@@ -17,6 +17,7 @@ struct abuffer_found {
 #endif
 #else
     int sample_index; // -1: none
+    bool is_within;   // where its texel is, and no more than SLACK beside it
 #endif
 };
 
@@ -62,7 +63,7 @@ void offer_sample(trace_ray r, inout abuffer_found found, int sample_index, floa
 
 abuffer_found found_of(trace_ray r, candidate best)
 {
-    return abuffer_found(best.distance, -1);
+    return abuffer_found(best.distance, -1, false);
 }
 
 #endif

@@ -60,9 +60,13 @@ bool search_image(trace_ray r, inout voxel_walk w, inout abuffer_found found, in
             float s_plane, side;
             bool crosses = cross_plane(o, d, w.s_least, texel, p, s_plane, side);
             vec2 from_middle = abs(o.xy + s_plane * d.xy - vec2(texel) - 0.5);
-            if (is_one && !is_behind && crosses && from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK &&
-                s_plane < w.s_limit && (!only_leaning || leans(p))) {
+            bool is_met = crosses && from_middle.x <= 0.5 + w.beyond && from_middle.y <= 0.5 + w.beyond;
+            if (is_one && !is_behind && is_met && s_plane > w.s_behind && s_plane < w.s_limit &&
+                (!only_leaning || leans(p))) {
                 offer_at(r, w, found, i, s_plane, side);
+#ifndef ANY_HIT
+                found.is_within = from_middle.x <= 0.5 + SLACK && from_middle.y <= 0.5 + SLACK;
+#endif
                 any_crossed = true;
             }
         } while (c.next < c.end && !is_behind);

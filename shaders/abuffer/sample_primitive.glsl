@@ -11,17 +11,23 @@ layout(binding = UNIT_TRACER_4) uniform usamplerBuffer abuffer_drawn;
 
 uniform int abuffer_drawn_count;
 
-candidate candidate_of_sample(int sample_index, float distance_)
+// Which of the drawn instances a primitive with this id is of: the last whose first id is not greater.
+int drawn_of(uint id)
 {
-    uint id = texelFetch(abuffer_ids, sample_index).x;
-    int first = 0, end = abuffer_drawn_count - 1; // the last whose first id is not greater
+    int first = 0, end = abuffer_drawn_count - 1;
     while (first < end) {
         int middle = (first + end + 1) >> 1;
         bool is_beyond = texelFetch(abuffer_drawn, middle).x > id;
         first = is_beyond ? first : middle;
         end = is_beyond ? middle - 1 : end;
     }
-    uvec4 drawn = texelFetch(abuffer_drawn, first);
+    return first;
+}
+
+candidate candidate_of_sample(int sample_index, float distance_)
+{
+    uint id = texelFetch(abuffer_ids, sample_index).x;
+    uvec4 drawn = texelFetch(abuffer_drawn, drawn_of(id));
     return candidate(distance_, id - drawn.y, drawn.z, vec2(0.0));
 }
 

@@ -5,7 +5,9 @@
 // The host (trace/abuffer_trace.c) sets, besides the defines of trace.comp, those that the files included here name.
 //
 // Defines: ABUFFER_STEPS the search is by so many steps a subvoxel (abuffer/steps.glsl), else by 2D DDA
-// (abuffer/planes.glsl); ABUFFER_EMPTY there is nothing to be found.
+// (abuffer/planes.glsl), and what it finds is held against triangles (abuffer/exact.glsl); ABUFFER_EMPTY there is nothing
+// to be found.
+#include "abuffer/exact.glsl"
 #include "abuffer/steps.glsl"
 
 void walk_ray(trace_ray r, inout abuffer_found found)
@@ -16,11 +18,7 @@ void walk_ray(trace_ray r, inout abuffer_found found)
 #ifdef ABUFFER_STEPS
     walk_steps(r, w, found);
 #else
-    while (w.s < w.s_end) {
-        found_voxel here = next_voxel(w);
-        if (here.what != 0u)
-            search_planes(r, w, found, here);
-    }
+    walk_planes(r, w, found);
 #endif
 #endif
 }

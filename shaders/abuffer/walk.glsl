@@ -20,6 +20,8 @@ struct voxel_walk {
     int octant_shift;
     float s, s_end;
     float s_least, s_limit; // between which a crossing counts
+    float s_behind;         // and behind which, where the ray goes on from one that was none
+    float beyond;           // how far beyond its texel a sample's plane is met, in cells
 };
 
 // A voxel to be searched, and a part of the ray in it.
@@ -27,6 +29,12 @@ struct found_voxel {
     uint what; // ABUFFER_VOXEL_*; 0: there is none
     float s_in, s_out;
 };
+
+// The subvoxel at w.s.
+void enter(inout voxel_walk w)
+{
+    w.subvoxel = clamp(ivec3(w.o + w.s * w.d), ivec3(0), ivec3((abuffer_grid << 4) - 1));
+}
 
 void begin_walk(trace_ray r, float end, out voxel_walk w)
 {
@@ -45,11 +53,13 @@ void begin_walk(trace_ray r, float end, out voxel_walk w)
     w.inverse = 1.0 / w.d;
     w.s_least = r.t_min * w.ray.scale - w.ray.begin;
     w.s_limit = min(end * w.ray.scale, 1e30) - w.ray.begin;
+    w.s_behind = w.s_least;
+    w.beyond = SLACK;
     w.s = w.s_least;
     w.s_end = w.s_limit;
     clip(w.s, w.s_end, w.o, w.inverse, vec3(0.0), vec3(along));
     w.s_end = w.ray.scale > 0.0 ? w.s_end : -1e30;
-    w.subvoxel = clamp(ivec3(w.o + w.s * w.d), ivec3(0), ivec3(int(along) - 1));
+    enter(w);
 }
 
 int block_at(uvec3 voxel)

@@ -7,10 +7,16 @@
 #include "common/intersect.glsl"
 #include "common/surface.glsl"
 
+// Of the vertices, from the ray's origin, where the ray's line crosses their plane; their sum is not made 1.
+vec3 edge_weights(vec3 direction, vec3 v0, vec3 v1, vec3 v2)
+{
+    return vec3(dot(cross(v2 - v1, v2 + v1), direction), dot(cross(v0 - v2, v0 + v2), direction),
+                dot(cross(v1 - v0, v1 + v0), direction));
+}
+
 vec3 clamped_weights(vec3 direction, vec3 v0, vec3 v1, vec3 v2)
 {
-    vec3 w = vec3(dot(cross(v2 - v1, v2 + v1), direction), dot(cross(v0 - v2, v0 + v2), direction),
-                  dot(cross(v1 - v0, v1 + v0), direction));
+    vec3 w = edge_weights(direction, v0, v1, v2);
     float sum = w.x + w.y + w.z;
     if (sum == 0.0)
         return vec3(1.0 / 3.0);

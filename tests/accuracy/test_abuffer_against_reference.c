@@ -219,10 +219,12 @@ static void occlusion_of_models_is_like_the_references(void **state)
 
 /* ---- rays ---- */
 
-/* What is asked of each search: share of rays that agree on hit or miss, median of distances in cells. */
+/* What is asked: share of rays that agree on hit or miss, median of distances in cells, and below what 99 in 100
+ * of them are. By planes of samples that is where a surface bends within a texel; dda holds what it finds against
+ * triangles, and is off by what floats round but for the rays that meet none, fewer than one in 100. */
 static const struct {
-    double agreed_min, cells_max;
-} rays_asked = {0.995, 0.1};
+    double agreed_min, cells_max, most_cells_max[SEARCH_COUNT];
+} rays_asked = {0.995, 0.1, {[DDA] = 0.01, [LINEAR3] = 0.1, [LINEAR1] = 0.1}};
 
 /* The reference's own waves, its secondary rays answered by `abuffer` too. */
 static void expect_rays_agree(struct fixture *fixture, const char *name, int search, float cell_metres,
@@ -234,22 +236,24 @@ static void expect_rays_agree(struct fixture *fixture, const char *name, int sea
     fixture->request.compare_with = ABUFFER;
     struct frame_result result = fixture_render(fixture);
     uint64_t rays = 0, disagreed = 0, compared = 0;
-    double worst_median = 0;
+    double worst_median = 0, worst_most = 0;
     for (uint32_t i = 0; i < result.comparison_count; i++) {
         const struct wave_comparison *wave = &result.comparisons[i];
         static const char *const kinds[] = {"primary", "secondary", "shadow"};
         double agreed = 1 - (double)(wave->only_first + wave->only_second) / (double)(wave->rays ? wave->rays : 1);
         double median_cells = (double)wave->distance_median * diagonal / (double)cell_metres;
+        double most_cells = (double)wave->distance_p99 * diagonal / (double)cell_metres;
         printf("%s, %s, wave %u, %s: %llu rays, %.3f %% agree on hit or miss, median distance %.4f cells, 99 %% "
                "below %.3f\n",
                name, searches[search].name, wave->wave, kinds[wave->kind], (unsigned long long)wave->rays,
-               100 * agreed, median_cells, (double)wave->distance_p99 * diagonal / (double)cell_metres);
+               100 * agreed, median_cells, most_cells);
         if (wave->kind != RAY_SECONDARY)
             continue;
         rays += wave->rays;
         disagreed += wave->only_first + wave->only_second;
         if (wave->both_hit > 100) {
             worst_median = fmax(worst_median, median_cells);
+            worst_most = fmax(worst_most, most_cells);
             compared++;
         }
     }
@@ -262,6 +266,8 @@ static void expect_rays_agree(struct fixture *fixture, const char *name, int sea
                  (unsigned long long)rays);
     if (!(worst_median <= rays_asked.cells_max))
         fail_msg("%s, %s: the median distance is %.3f cells off", name, searches[search].name, worst_median);
+    if (!(worst_most <= rays_asked.most_cells_max[search]))
+        fail_msg("%s, %s: one in 100 distances is %.3f cells off", name, searches[search].name, worst_most);
     fixture->request.compare = false;
 }
 

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Writes what the fuzzers start from: seed FOLDER makes FOLDER/protocol.dict out of the table, and valid inputs in
- * FOLDER/codec, FOLDER/framing, FOLDER/handshake and FOLDER/sealed, noise in FOLDER/scene. */
+ * FOLDER/codec, FOLDER/framing, FOLDER/handshake and FOLDER/sealed, noise in FOLDER/scene, sessions in
+ * FOLDER/session. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 
 #include "protocol/handshake.h"
+#include "tests/fuzz/recorded_session.h"
 #include "tests/fuzz/sealed_random.h"
 #include "tests/unit/protocol_cases.h"
 
@@ -209,6 +211,116 @@ static bool write_noise(const char *folder)
     return true;
 }
 
+/* ---- sessions: as fuzz_session.c has its steps ---- */
+
+#define STEP_MESSAGE 1
+#define STEP_TIME 2
+#define STEP_CIRCUMSTANCE 3
+#define STEP_SETTLE 16
+#define CONNECT 16
+#define HELLO 17
+#define STOP 19
+#define ONLY_LOOKS 20
+#define FRAME_MS_ROOT 12
+
+struct session_seed {
+    uint8_t bytes[16384];
+    struct writer writer;
+    unsigned client, settle;
+    bool takes_time; /* with a pause behind each message */
+};
+
+static unsigned number_of(uint16_t type)
+{
+    unsigned number = 0;
+    for (size_t i = 0; protocol_messages[i].info.type != type; i++) {
+        number += (protocol_messages[i].info.from & MESSAGE_FROM_CLIENT) != 0;
+    }
+    return number;
+}
+
+static void put_step(struct session_seed *seed, unsigned kind)
+{
+    writer_put_u8(&seed->writer, (uint8_t)(kind | seed->client << 2 | seed->settle));
+}
+
+static void put_circumstance(struct session_seed *seed, unsigned what)
+{
+    put_step(seed, STEP_CIRCUMSTANCE);
+    writer_put_u8(&seed->writer, (uint8_t)what);
+}
+
+static void put_message(void *context, uint32_t request, uint32_t channel, const struct message *message)
+{
+    struct session_seed *seed = context;
+    put_step(seed, STEP_MESSAGE);
+    writer_put_u8(&seed->writer, (uint8_t)number_of((uint16_t)message->type));
+    writer_put_u8(&seed->writer, (uint8_t)request);
+    writer_put_u8(&seed->writer, (uint8_t)channel);
+    /* By way of its own buffer: bulk data are aligned from the start of the payload. */
+    static uint8_t payload[8192];
+    struct writer of_payload;
+    writer_init(&of_payload, payload, sizeof payload);
+    if (!message_encode(&of_payload, message)) {
+        fprintf(stderr, "%s: %s\n", of_payload.error.field, of_payload.error.text);
+        exit(1);
+    }
+    writer_put_u16(&seed->writer, (uint16_t)of_payload.used_bytes);
+    writer_put_bytes(&seed->writer, payload, of_payload.used_bytes);
+    if (seed->takes_time) {
+        put_step(seed, STEP_TIME);
+        writer_put_u8(&seed->writer, FRAME_MS_ROOT);
+    }
+}
+
+/* Stays, with its scene. */
+static void put_message_but_the_last(void *context, uint32_t request, uint32_t channel,
+                                     const struct message *message)
+{
+    if (message->type != MESSAGE_SCENE_CLOSE && message->type != MESSAGE_GOODBYE) {
+        put_message(context, request, channel, message);
+    }
+}
+
+static void come(struct session_seed *seed, unsigned client)
+{
+    seed->client = client;
+    put_circumstance(seed, CONNECT);
+    put_circumstance(seed, HELLO);
+}
+
+static bool write_session(const char *folder, int number, unsigned settle, unsigned circumstance,
+                          void session(recorded_say_fn *say, void *context))
+{
+    static struct session_seed seed;
+    seed = (struct session_seed){.settle = settle, .takes_time = settle && circumstance == 0};
+    writer_init(&seed.writer, seed.bytes, sizeof seed.bytes);
+    if (session == recorded_onlooker) {
+        come(&seed, 1);
+        recorded_session(put_message_but_the_last, &seed);
+    }
+    come(&seed, 0);
+    put_circumstance(&seed, circumstance);
+    session(put_message, &seed);
+    put_circumstance(&seed, STOP);
+    return write_file(folder, "session", "session", number, seed.bytes, seed.writer.used_bytes);
+}
+
+static bool write_sessions(const char *folder)
+{
+    bool ok = true;
+    int number = 0;
+    static const unsigned circumstances[] = {0, 1, 2, 4, 8, ONLY_LOOKS};
+    for (unsigned settle = 0; settle <= STEP_SETTLE; settle += STEP_SETTLE) {
+        for (size_t i = 0; i < sizeof circumstances / sizeof circumstances[0]; i++) {
+            ok = ok && write_session(folder, number++, settle, circumstances[i], recorded_session) &&
+                 write_session(folder, number++, settle, circumstances[i], recorded_onlooker) &&
+                 write_session(folder, number++, settle, circumstances[i], recorded_blunders);
+        }
+    }
+    return ok;
+}
+
 int main(int argument_count, char **arguments)
 {
     if (argument_count != 2) {
@@ -216,6 +328,7 @@ int main(int argument_count, char **arguments)
         return 2;
     }
     bool ok = make_folder(arguments[1]) && write_dictionary(arguments[1]) && write_messages(arguments[1]) &&
-              write_handshakes(arguments[1]) && write_sealed(arguments[1]) && write_noise(arguments[1]);
+              write_handshakes(arguments[1]) && write_sealed(arguments[1]) && write_noise(arguments[1]) &&
+              write_sessions(arguments[1]);
     return ok ? 0 : 1;
 }

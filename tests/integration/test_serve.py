@@ -16,7 +16,6 @@ import time
 
 from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, exr_attributes, farlight
 from farlight_test import read_exr, read_png
-from farlight_test import tearDownModule  # noqa: F401, pylint: disable=unused-import
 from test_daemon import (EDIT_BEGIN, EDIT_COMMIT, ERROR, GOODBYE, OK, SCENE_OPEN, SET_NODE, STATS, STATS_REPLY, Peer,
                          error_code, error_text, named, set_node, text)
 
@@ -261,10 +260,16 @@ class Serve(Case):
 
     def test_who_serves_is_not_idle_however_little_happens(self):
         config = self.folder / "conf"
-        config.write_text("[network]\nidle = 1000\n")
-        self.serve("--", "--config", config)
-        quiet = Viewer(self.socket, "teapot.glb")
-        quiet.until_closed()  # so long that who says nothing is sent away
+        config.write_text("[network]\nidle = 5000\n")
+        with Daemon("--config", config) as daemon, Serving(self.model, "--server", daemon.address):
+            Viewer(daemon.path, "teapot.glb").until_closed()  # so long that who says nothing is sent away
+            self.assertEqual(self.scenes(daemon.address)[0]["clients"], 1)
+
+    def test_who_has_started_a_daemon_may_be_silent_there(self):
+        config = self.folder / "conf"
+        config.write_text("[network]\nidle = 300\n")
+        self.serve("--", "--config", config)  # whose import takes longer than that
+        Viewer(self.socket, "teapot.glb").until_closed()
         self.assertEqual(self.scenes()[0]["clients"], 1)
 
     def test_two_scenes_of_one_name_are_refused(self):

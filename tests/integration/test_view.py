@@ -179,7 +179,8 @@ class WithoutAWindow(Viewer):
         scene = bundled_scenes() / "teapot.glb"
         for arguments, part in (([], "MODEL"), ([scene, "--headless"], "--replay"), ([scene, "--scene", "a"], "--scene"),
                                 (["--scene", "a"], "--server"), ([scene, "--scale", "3"], "--scale"),
-                                ([scene, "--integrator", "x"], "--integrator"), ([scene, "--samples", "0"], "--samples"),
+                                ([scene, "--integrator", "x"], "--integrator"), ([scene, "--encoding", "x"], "--encoding"),
+                                ([scene, "--still-encoding", "h264"], "--still-encoding"), ([scene, "--samples", "0"], "--samples"),
                                 ([scene, scene], "one model")):
             result = self.expect(farlight("view", *arguments, env={**os.environ, "DISPLAY": ""}), 2)
             self.assertIn(part, result.stderr)

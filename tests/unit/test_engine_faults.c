@@ -161,13 +161,10 @@ static void a_frame_for_which_there_is_no_memory_waits_until_others_have_ended(v
     assert_int_equal(atomic_load(&fake.frames_begun), 2);
     atomic_store(&fake.fail_steps, 1); /* once more alone: what the first one has is idle by then */
     atomic_store(&fake.gate_open, true);
-    take_frame(engine, 1, 11, 0);
-    expect_done(engine, 1, 11);
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 6; i++) { /* a frame and an answer each */
         struct engine_event *event = event_within(engine, 10000);
         assert_non_null(event);
         assert_true(event->kind == ENGINE_FRAME || event->kind == ENGINE_DONE);
-        assert_true(event->client == 2 || event->client == 3);
         engine_event_destroy(event);
     }
     assert_int_equal(atomic_load(&fake.frames_begun), 5);

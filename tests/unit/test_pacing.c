@@ -307,6 +307,38 @@ static void makes_frames_fit_the_link(void **state)
     assert_int_equal(advice.quality, 90);
 }
 
+/* As follow(), but rendering takes `fixed_ns` whatever the size, and `area_ns` for all of the picture; either is
+ * up to a fifth more or less. */
+static struct pacing_advice follow_renderer(struct pacing *pacing, uint64_t fixed_ns, uint64_t area_ns,
+                                            unsigned frames)
+{
+    struct pacing_advice advice = {0};
+    static uint32_t chance;
+    for (unsigned i = 0; i < frames; i++) {
+        advice = pacing_advise(pacing, 90);
+        double area = advice.scale_eighths * advice.scale_eighths / 64.0;
+        chance = chance * 1664525u + 1013904223u;
+        double more = 0.8 + 0.4 * (chance >> 8) / (1 << 24);
+        pacing_learn(pacing, advice.scale_eighths, advice.quality,
+                     (uint64_t)(more * ((double)fixed_ns + (double)area_ns * area)), 1000);
+    }
+    return advice;
+}
+
+static void does_not_shrink_what_takes_long_at_any_size(void **state)
+{
+    (void)state;
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    /* 33 ms a frame: 60 ms at the least, 70 in full; hardly worth the picture. */
+    assert_int_equal(follow_renderer(&pacing, 60 * MS, 10 * MS, 100).scale_eighths, PACING_SCALE_FULL);
+    /* Size is what it costs: the same renderer with a slow light transport. */
+    struct pacing_advice advice = follow_renderer(&pacing, 2 * MS, 200 * MS, 100);
+    assert_in_range(advice.scale_eighths, 2, 3); /* 14.5 and 30 ms */
+    /* And back. */
+    assert_int_equal(follow_renderer(&pacing, 2 * MS, 10 * MS, 300).scale_eighths, PACING_SCALE_FULL);
+}
+
 static void does_not_flicker(void **state)
 {
     (void)state;
@@ -364,6 +396,7 @@ int main(void)
         cmocka_unit_test(asks_for_everything_where_all_is_fast),
         cmocka_unit_test(makes_frames_smaller_that_take_long_to_render),
         cmocka_unit_test(makes_frames_fit_the_link),
+        cmocka_unit_test(does_not_shrink_what_takes_long_at_any_size),
         cmocka_unit_test(does_not_flicker),
         cmocka_unit_test(the_wait_for_the_next_frame_is_what_has_to_drain),
     };

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: MIT
+// From the plane that a ray crosses to the surface: the triangle that the sample is of, or one beside it.
+//
+// A sample's plane goes on as far as its texel does, its triangle may not. What follows beyond the edge is mostly seen by
+// the texels around the crossing; where it is not, as triangles are smaller than texels, the plane stands for it.
+#include "abuffer/planes.glsl"
+
+#if !defined ANY_HIT && !defined ABUFFER_STEPS
+
+// How far beyond its texel a sample's plane is looked at, in cells. Where surfaces bend by more than SLACK, rays would
+// pass between planes; what is found is held against triangles, so it may be looked for farther away.
+const float BEYOND = 0.25;
+// In cells: what is behind a crossing by no more is the same one.
+const float AGAIN = 1e-3;
+// Cells of depth in which samples of texels side by side are of one surface, in the image that it leans to.
+const float BESIDE = 3.0;
+// How far behind the plane's crossing, in cells, that of a triangle beside it may be.
+const float BESIDE_BEHIND = 4.0;
+
+// The line of a ray, and a triangle of the same instance.
+struct line_crossing {
+    vec3 v0, v1, v2; // from the ray's origin
+    vec3 weights;    // of the vertices where the line crosses the triangle's plane
+    float distance;  // there
+    bool from_behind;
+};
+
+line_crossing cross_triangle(vec3 o, vec3 d, uint primitive)
+{
+    line_crossing c;
+    uvec4 triangle = texelFetch(triangles, int(primitive));
+    c.v0 = texelFetch(positions, int(triangle.x)).xyz - o;
+    c.v1 = texelFetch(positions, int(triangle.y)).xyz - o;
+    c.v2 = texelFetch(positions, int(triangle.z)).xyz - o;
+    vec3 w = edge_weights(d, c.v0, c.v1, c.v2);
+    float sum = w.x + w.y + w.z;
+    c.weights = sum != 0.0 ? w / sum : vec3(-1.0);
+    vec3 normal = cross(c.v1 - c.v0, c.v2 - c.v0);
+    float slope = dot(normal, d);
+    c.distance = slope != 0.0 ? dot(normal, c.v0) / slope : -1.0;
+    c.from_behind = slope > 0.0;
+    return c;
+}
+
+bool has_corner(line_crossing c, vec3 v)
+{
+    return c.v0 == v || c.v1 == v || c.v2 == v;
+}
+
+// The edge beyond which the line passes the one is an edge of the other, too.
+bool is_beyond_edge_of(line_crossing c, line_crossing other)
+{
+    bvec3 has = bvec3(has_corner(other, c.v0), has_corner(other, c.v1), has_corner(other, c.v2));
+    return c.weights.x < 0.0 && has.y && has.z || c.weights.y < 0.0 && has.z && has.x || c.weights.z < 0.0 && has.x && has.y;
+}
+
+// Samples around a place of an image, in four columns, one behind the other, from the nearest on.
+struct samples_beside {
+    int axis;
+    vec3 p;
+    int columns; // that were begun
+    column_scan column;
+    uint first_id, end_id; // of the instance
+    uvec3 seen;            // ids: that of the sample which was found, the last one and that before
+};
+
+// The texel that the place is in, the nearer one beside it, the other, that between them.
+ivec2 texel_beside(vec2 p, int k)
+{
+    vec2 from_middle = fract(p) - 0.5;
+    bool u_first = abs(from_middle.x) > abs(from_middle.y);
+    bool along_u = k == 3 || k == (u_first ? 1 : 2), along_v = k == 3 || k == (u_first ? 2 : 1);
+    return texel_of(p + vec2(along_u ? sign(from_middle.x) : 0.0, along_v ? sign(from_middle.y) : 0.0));
+}
+
+// The next sample that may be of the same surface, of a triangle that is not seen yet; false: there is none.
+bool next_beside(inout samples_beside b, out int index, out uint id)
+{
+    bool is_new;
+    do {
+        if (b.column.next >= b.column.end) {
+            b.column = scan_of(column_at(b.axis, texel_beside(b.p.xy, b.columns)));
+            b.columns++;
+        }
+        uvec2 words;
+        bool is_one = scan(b.column, b.p.z - BESIDE, index, words);
+        bool is_behind = is_one && depth_of(words) > b.p.z + BESIDE;
+        b.column.next = is_behind ? b.column.end : b.column.next;
+        id = texelFetch(abuffer_ids, index).x;
+        is_new = is_one && !is_behind && id >= b.first_id && id < b.end_id && all(notEqual(uvec3(id), b.seen));
+    } while (!is_new && (b.columns < 4 || b.column.next < b.column.end));
+    b.seen.yz = is_new ? uvec2(id, b.seen.y) : b.seen.yz;
+    return is_new;
+}
+
+// The sample that was found, to that of the triangle which the ray meets there, before `limit`. False: it meets none.
+//
+// It passes where it is beyond an edge behind which the surface turns back, or where it met the next triangle before it
+// began. Where nothing beside it tells so, the plane of a sample stands for its texel.
+bool settle(trace_ray r, voxel_walk w, float limit, inout abuffer_found found)
+{
+    int index = found.sample_index;
+    uint id = texelFetch(abuffer_ids, index).x;
+    int k = drawn_of(id);
+    uvec4 drawn = texelFetch(abuffer_drawn, k);
+    // It has no edges.
+    if ((drawn.w & DRAWN_SPHERES) != 0u)
+        return found.is_within;
+    samples_beside b;
+    b.first_id = drawn.x;
+    b.end_id = k + 1 < abuffer_drawn_count ? texelFetch(abuffer_drawn, k + 1).x : 0xffffffffu;
+    b.seen = uvec3(id);
+    vec3 lean = abs(sample_of(words_at(index), 2).normal);
+    b.axis = lean.x >= lean.y && lean.x >= lean.z ? 0 : lean.y >= lean.z ? 1 : 2;
+    b.p = in_image(w.ray.o + (found.end * w.ray.scale - w.ray.begin) * w.ray.d, b.axis);
+    b.columns = 0;
+    b.column = column_scan(0, 0, 0);
+    vec4 rows[3] = instance_at(drawn.z).object_from_world;
+    vec3 o = affine_point(rows, r.origin), d = affine_vector(rows, r.direction);
+    float end = found.end + BESIDE_BEHIND / w.ray.scale;
+    end = end < limit ? end : limit;
+    line_crossing own;
+    bool is_own = true, passes = false, is_hit, goes_on;
+    do {
+        line_crossing c = cross_triangle(o, d, id - drawn.y);
+        if (is_own)
+            own = c;
+        bool is_inside = least(c.weights) >= 0.0, is_ahead = c.distance > r.t_min;
+        bool same_way = c.from_behind == own.from_behind;
+        is_hit = is_inside && is_ahead && c.distance < end;
+        passes = passes || (same_way ? is_inside && !is_ahead : is_beyond_edge_of(own, c));
+        if (is_hit) {
+            found.end = c.distance;
+            found.sample_index = index;
+        }
+        goes_on = !is_hit && !(is_own && is_inside) && next_beside(b, index, id);
+        is_own = false;
+    } while (goes_on);
+    return is_hit || !passes && found.is_within;
+}
+
+#endif
+
+#ifndef ABUFFER_STEPS
+
+const int PASSES_MAX = 8; // then what is found is taken as it is
+
+// What of the ray's way is left.
+void search_voxels(trace_ray r, inout voxel_walk w, inout abuffer_found found)
+{
+    while (w.s < w.s_end) {
+        found_voxel here = next_voxel(w);
+        if (here.what != 0u)
+            search_planes(r, w, found, here);
+    }
+}
+
+#ifdef ANY_HIT
+
+void walk_planes(trace_ray r, inout voxel_walk w, inout abuffer_found found)
+{
+    search_voxels(r, w, found);
+}
+
+#else
+
+void walk_planes(trace_ray r, inout voxel_walk w, inout abuffer_found found)
+{
+    float s_end = w.s_end, s_limit = w.s_limit, limit = found.end;
+    bool goes_on;
+    int passes = 0;
+    w.beyond = BEYOND;
+    do {
+        search_voxels(r, w, found);
+        float s = w.s_limit;
+        goes_on = found.sample_index >= 0 && !settle(r, w, limit, found) && ++passes < PASSES_MAX;
+        if (goes_on) {
+            // A plane that goes on beyond its texel may have hidden that of the next texel, at the same place.
+            w.s_behind = found.is_within ? s + AGAIN : w.s_behind;
+            w.beyond = found.is_within ? BEYOND : SLACK;
+            w.s = s > w.s_least ? s : w.s_least;
+            w.s_end = s_end;
+            w.s_limit = s_limit;
+            enter(w);
+            found = abuffer_found(limit, -1, false);
+        }
+    } while (goes_on);
+}
+
+#endif
+
+#endif
