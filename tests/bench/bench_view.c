@@ -3,7 +3,8 @@
  *
  * Each viewer has a connection of its own; the first one loads the model, the others come to that scene. After a
  * second of motion it is measured. Prints JSON: "threads_ns", what each thread of the process --pid took of a
- * processor meanwhile, by its name; "batch_frames", of the job beside; and "frames", an array for each of
+ * processor meanwhile, by its name; "batch_frames", of the job beside; "late_ns", by how much each sleep of this
+ * process ended late, which is what the machine does to whoever waits; and "frames", an array for each of
  * "columns". Times are nanoseconds of the host's monotonic clock, which the daemon must share where they are its
  * own: received, applied, rendered; encode_begin is since applied. */
 #include "lib/farlight.h"
@@ -220,7 +221,8 @@ static bool serve_batch(struct fl_job *batch, json_int_t *frames, struct fl_erro
     return error->code == FL_ERROR_NONE;
 }
 
-static void wait_for_more(int batch_fd)
+/* Adds to `late` if nothing came. */
+static void wait_for_more(int batch_fd, json_t *late)
 {
     struct pollfd watched[VIEWERS_MAX + 1];
     uint64_t due_ns = UINT64_MAX;
@@ -233,11 +235,12 @@ static void wait_for_more(int batch_fd)
     const uint64_t now = now_ns(), wait_ns = due_ns > now ? due_ns - now : 0;
     const struct timespec wait = {.tv_sec = wait_ns < SECOND_NS ? 0 : 1,
                                   .tv_nsec = wait_ns < SECOND_NS ? (long)wait_ns : 0};
-    ppoll(watched, options.viewers + 1, &wait, NULL);
+    if (ppoll(watched, options.viewers + 1, &wait, NULL) == 0 && wait_ns > 0)
+        json_array_append_new(late, json_integer((json_int_t)(now_ns() - due_ns)));
 }
 
 static bool move_for(uint64_t duration_ns, struct fl_connection *beside, struct fl_job *batch, json_t *rows,
-                     json_int_t *batch_frames, struct fl_error *error)
+                     json_t *late, json_int_t *batch_frames, struct fl_error *error)
 {
     const uint64_t end_ns = now_ns() + duration_ns;
     *batch_frames = 0;
@@ -247,7 +250,7 @@ static bool move_for(uint64_t duration_ns, struct fl_connection *beside, struct 
                 return false;
         if (!serve_batch(batch, batch_frames, error))
             return false;
-        wait_for_more(beside ? fl_connection_fd(beside) : -1);
+        wait_for_more(beside ? fl_connection_fd(beside) : -1, late);
     }
     return true;
 }
@@ -339,7 +342,7 @@ static bool measure(json_t *result, struct fl_error *error)
 {
     struct viewer beside = {0};
     struct fl_job *batch = NULL;
-    json_t *threads = json_object(), *rows = json_array();
+    json_t *threads = json_object(), *rows = json_array(), *late = json_array();
     json_int_t batch_frames = 0;
     bool ok = true;
     for (uint32_t i = 0; ok && i < options.viewers; i++)
@@ -347,9 +350,10 @@ static bool measure(json_t *result, struct fl_error *error)
     for (uint32_t i = 0; ok && i < options.viewers; i++)
         ok = begin_view(&viewers[i], error);
     ok = ok && (!options.batch || (batch = begin_batch(&beside, error)) != NULL) &&
-         move_for(WARM_UP_NS, beside.connection, batch, NULL, &batch_frames, error);
+         move_for(WARM_UP_NS, beside.connection, batch, NULL, late, &batch_frames, error);
+    json_array_clear(late);
     add_threads(threads, -1);
-    ok = ok && move_for((uint64_t)(options.seconds * (double)SECOND_NS), beside.connection, batch, rows,
+    ok = ok && move_for((uint64_t)(options.seconds * (double)SECOND_NS), beside.connection, batch, rows, late,
                         &batch_frames, error);
     add_threads(threads, 1);
     fl_render_destroy(batch);
@@ -358,6 +362,7 @@ static bool measure(json_t *result, struct fl_error *error)
         go(&viewers[i]);
     json_object_set_new(result, "threads_ns", threads);
     json_object_set_new(result, "batch_frames", json_integer(batch_frames));
+    json_object_set_new(result, "late_ns", late);
     json_object_set_new(result, "frames", rows);
     return ok;
 }

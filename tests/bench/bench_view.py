@@ -4,13 +4,15 @@
   rates      scene, encoding; figures over the runs: frames_per_s, ms of the stages render, encode and send, and share, of
              the frames that the slowest stage alone would allow
   latencies  where ("alone", "beside a batch"), stages (how many times a frame's stages it is held against), frames, and
-             p50_ms and p99_ms: from the camera sent to the frame decoded, beyond the stages of that frame; and `way`, the
+             p50_ms and p99_ms: from the camera sent to the frame decoded, beyond the stages of that frame; `late_p99_ms`,
+             by how much a sleep of the client ends late, which is what the machine does to each that waits; and `way`, the
              medians of its parts
   processor  ms of a processor that the daemon's network thread takes a frame
   viewers    count, frames of each in seconds, and slowest, the share of the mean that who got least has
-  links      kbit_per_s, encoding, frames_per_s, render_per_s (what its rendering alone allows), mbit_per_s, delay_ms of the first and of the
-             last third (from the camera sent to the frame decoded, beyond its stages), scale (of the width, the mean); or
-             `why` there is no such link here. Nothing is wanted of the narrower one: it is full also where rendering is slow
+  links      kbit_per_s, encoding, frames_per_s, render_per_s (what its rendering alone allows), mbit_per_s, delay_ms of the
+             first and of the last third (from the camera sent to the frame decoded, beyond its stages), scale (of the
+             width, the mean); or `why` there is no such link here. Nothing is wanted of the narrower one: it is full also
+             where rendering is slow
   load       processes that wanted to run, a minute's mean, before and after
   wanted     rows as in bench_reach.py
 
@@ -129,13 +131,15 @@ def measure_rates(bench, daemon, scenes, encodings):
 
 def measure_latency(bench, daemon, model, where, times, *options):
     say(f"  latency, {where}")
-    runs, way = {"p50_ms": [], "p99_ms": []}, []
+    runs, way = {"p50_ms": [], "p99_ms": [], "late_p99_ms": []}, []
     count = 0
     for _ in range(bench.times(3)):
-        frames = frames_of(watch(bench, daemon, model, *SMALL, "--seconds", 1 if bench.tiny else 20, *options))
+        told = watch(bench, daemon, model, *SMALL, "--seconds", 1 if bench.tiny else 20, *options)
+        frames = frames_of(told)
         beyond = [beyond_stages_ms(frame, times) for frame in frames]
         runs["p50_ms"].append(percentile(beyond, 0.5))
         runs["p99_ms"].append(percentile(beyond, 0.99))
+        runs["late_p99_ms"].append(percentile([ns / 1e6 for ns in told["late_ns"]] or [0], 0.99))
         way += [way_ms(frame) for frame in frames]
         count += len(frames)
     return {"where": where, "stages": times, "frames": count, **{key: figure(values) for key, values in runs.items()},
@@ -170,7 +174,8 @@ def over_a_link(bench, model, kbit_per_s, seconds, encoding):
                      bench.program("farlightd"), "--listen", address, "--key-file", key, "--",
                      bench.program("tests/bench/bench_view"), address, *model, "--key", key, "--seconds", seconds,
                      "--encoding", encoding, "--adapt", "--rate", LINK_ASKED_PER_S, "--looks", 60]
-        result = subprocess.run(list(map(str, arguments)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        result = subprocess.run(list(map(str, arguments)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                check=False)
     if result.returncode == NO_LINK:
         return None, result.stderr.strip()
     if result.returncode != 0:
@@ -189,8 +194,9 @@ def measure_link(bench, model, kbit_per_s, encoding):
     span_s = (frames[-1]["whole"] - frames[0]["whole"]) / 1e9
     third = max(1, len(frames) // 3)
     delays = [figure([beyond_stages_ms(frame) for frame in part]) for part in (frames[:third], frames[-third:])]
-    return {"kbit_per_s": kbit_per_s, "encoding": encoding, "seconds": seconds, "frames": len(frames), "frames_per_s": rate["frames_per_s"],
-            "render_per_s": 1e3 / rate["ms"]["render"], "mbit_per_s": sum(f["bytes"] for f in frames[1:]) * 8e-6 / span_s,
+    return {"kbit_per_s": kbit_per_s, "encoding": encoding, "seconds": seconds, "frames": len(frames),
+            "frames_per_s": rate["frames_per_s"], "render_per_s": 1e3 / rate["ms"]["render"],
+            "mbit_per_s": sum(f["bytes"] for f in frames[1:]) * 8e-6 / span_s,
             "delay_ms": delays, "scale": statistics.fmean(frame["width"] for frame in frames) / 1280}
 
 
@@ -208,8 +214,9 @@ def wanted(data):
     for latency in data["latencies"]:
         stages = "its stages" if latency["stages"] == 1 else "twice its stages"
         for key, most in (("p50_ms", P50_MS_MOST), ("p99_ms", P99_MS_MOST)):
+            late = significant(latency["late_p99_ms"]["median"])
             rows.append(row(f"camera to decoded frame {latency['where']}, {key[1:3]} %, ms beyond {stages}", most, latency[key],
-                            f"{latency['frames']} frames", at_most=True))
+                            f"{latency['frames']} frames; a sleep ends late by {late}, 99 %", at_most=True))
     rows.append(row("the daemon's own processor time a frame, ms", PROCESSOR_MS_MOST, data["processor"],
                     "its network thread", at_most=True))
     viewers = data["viewers"]
@@ -257,7 +264,7 @@ def show(data):
     rates = [(f"{r['scene']}, {r['encoding']}", with_spread(r["frames_per_s"]),
               *(significant(r["ms"][stage]["median"]) for stage in ("render", "encode", "send")), with_spread(r["share"]))
              for r in data["rates"]]
-    latencies = [(l["where"], l["frames"], with_spread(l["p50_ms"]), with_spread(l["p99_ms"]),
+    latencies = [(l["where"], l["frames"], with_spread(l["p50_ms"]), with_spread(l["p99_ms"]), with_spread(l["late_p99_ms"]),
                   *(f"{l['way'][name]:.2f}" for name in WAY)) for l in data["latencies"]]
     viewers = data["viewers"]
     return "\n\n".join((
@@ -265,11 +272,11 @@ def show(data):
         table([("1280x720", "frames/s", "render", "encode", "send", "of the slowest"), ("", "", "ms", "ms", "ms", "stage's")],
               rates),
         "From the camera sent to the frame decoded, 320x240, JPEG, ms beyond the frame's stages (beside a batch of another\n"
-        "client of equal weight: beyond twice those); and the medians of what it is made of\n\n" +
-        table([("", "frames", "50 %", "99 %", *WAY)], latencies),
+        "client of equal weight: beyond twice those); by how much a sleep ends late here, 99 %; and the medians of what it is\nmade of\n\n" +
+        table([("", "frames", "50 %", "99 %", "a sleep", *WAY)], latencies),
         f"The daemon's network thread takes {with_spread(data['processor'])} ms of a processor a frame.",
-        f"{viewers['count']} viewers of one scene, 320x240: {min(viewers['frames'])} to {max(viewers['frames'])} frames each in "
-        f"{viewers['seconds']} s; the slowest has {viewers['slowest']:.2f} of the mean.",
+        f"{viewers['count']} viewers of one scene, 320x240: {min(viewers['frames'])} to {max(viewers['frames'])} frames each "
+        f"in {viewers['seconds']} s; the slowest has {viewers['slowest']:.2f} of the mean.",
         f"Links of {LINK_DELAY_MS} ms each way, a buffer of {LINK_BUFFER_KIB} KiB; 1280x720, "
         f"{LINK_ASKED_PER_S} a second asked for, quality and size adapt\n\n" +
         table([("", "frames", "frames/s", "render", "Mbit/s", "of the", "delay, first", "last"),
