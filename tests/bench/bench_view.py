@@ -272,7 +272,8 @@ def show(data):
         table([("1280x720", "frames/s", "render", "encode", "send", "of the slowest"), ("", "", "ms", "ms", "ms", "stage's")],
               rates),
         "From the camera sent to the frame decoded, 320x240, JPEG, ms beyond the frame's stages (beside a batch of another\n"
-        "client of equal weight: beyond twice those); by how much a sleep ends late here, 99 %; and the medians of what it is\nmade of\n\n" +
+        "client of equal weight: beyond twice those); by how much a sleep ends late here, 99 %; and the medians of what\n"
+        "it is made of\n\n" +
         table([("", "frames", "50 %", "99 %", "a sleep", *WAY)], latencies),
         f"The daemon's network thread takes {with_spread(data['processor'])} ms of a processor a frame.",
         f"{viewers['count']} viewers of one scene, 320x240: {min(viewers['frames'])} to {max(viewers['frames'])} frames each "
