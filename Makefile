@@ -216,8 +216,10 @@ $(B)/tests/fuzz/kept_%.o: CPPFLAGS_ALL += -DLLVMFuzzerTestOneInput=fuzz_one_$*
 $(B)/tests/fuzz/kept_%.o: tests/fuzz/fuzz_%.c
 	@mkdir -p $(@D)
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
-$(B)/tests/unit/test_fuzz_corpus: $(KEPT_OBJ) $(SERVING_OBJ)
-$(B)/tests/unit/test_fuzz_corpus: TEST_LIBS += $(SERVING_WRAP)
+# The importer without its main() and its sandbox.
+READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o sandbox.o send.o),$(IMPORT_OBJ))
+$(B)/tests/unit/test_fuzz_corpus: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ)
+$(B)/tests/unit/test_fuzz_corpus: TEST_LIBS += $(SERVING_WRAP) $(IMPORT_LIBS) -lstdc++
 $(B)/tests/unit/test_session_faults: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
 $(B)/tests/unit/test_session_faults: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
@@ -389,15 +391,20 @@ endif
 FUZZERS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_SEED := $(B)/tests/fuzz/seed
 KEPT_BYTES := 1600
+KEPT_BYTES_OF_ALL := 65536
 $(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(B)/server/base/blob.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
-	$(call say,LINK)$(CC) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
+	$(call say,LINK)$(CXX) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
 $(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ))
 $(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
 $(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_sealed: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
 $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
 $(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
+$(addprefix $(B)/tests/fuzz/fuzz_,gltf nff obj): $(READERS_OBJ)
+$(addprefix $(B)/tests/fuzz/fuzz_,gltf nff obj): FUZZ_LIBS = $(IMPORT_LIBS)
+# OpenImageIO loses memory with broken images; the importer lives for one model only.
+run-fuzz-gltf run-fuzz-obj: FUZZ_FLAGS = -detect_leaks=0
 .PHONY: fuzz fuzz-keep $(addprefix run-fuzz-,$(FUZZERS)) $(addprefix keep-fuzz-,$(FUZZERS))
 ifeq ($(config),fuzz)
 fuzz: $(addprefix run-fuzz-,$(FUZZERS))
@@ -411,14 +418,16 @@ $(addprefix run-fuzz-,$(FUZZERS)): run-fuzz-%: $(B)/tests/fuzz/fuzz_% $(FUZZ_SEE
 	$(FUZZ_SEED) $(B)/seed
 	$< -max_total_time=$(FUZZ_SECONDS) -max_len=8192 -timeout=5 -rss_limit_mb=1024 -use_value_profile=1 \
 		-print_final_stats=1 -dict=$(B)/seed/protocol.dict -artifact_prefix=$(B)/found/$*- $(B)/corpus/$* $(B)/seed/$* \
-		$(wildcard tests/fuzz/corpus/$*) \
+		$(wildcard tests/fuzz/corpus/$*) $(FUZZ_FLAGS) \
 		>$(B)/found/$*.log 2>&1 || { tail -n 60 $(B)/found/$*.log; exit 1; }
 	@grep -E '^stat::(number|average|new)|DONE' $(B)/found/$*.log
-# Small ones, so that all of it stays small.
+# Small ones, and of each fuzzer no more than so much, as they come (their names are hashes), so that it stays small.
 $(addprefix keep-fuzz-,$(FUZZERS)): keep-fuzz-%: $(B)/tests/fuzz/fuzz_% $(FUZZ_SEED)
 	@mkdir -p $(B)/corpus/$* $(B)/kept/$* tests/fuzz/corpus/$*
 	@rm -f $(B)/kept/$*/*
 	$(FUZZ_SEED) $(B)/seed
 	$< -merge=1 -use_counters=0 -max_len=$(KEPT_BYTES) $(B)/kept/$* tests/fuzz/corpus/$* $(B)/seed/$* $(B)/corpus/$* >$(B)/found/$*-keep.log 2>&1
-	@rm -f tests/fuzz/corpus/$*/* && cp $(B)/kept/$*/* tests/fuzz/corpus/$*
+	@rm -f tests/fuzz/corpus/$*/*
+	@bytes=0; for file in $(B)/kept/$*/*; do bytes=$$((bytes + $$(stat -c %s $$file))); \
+		if [ $$bytes -gt $(KEPT_BYTES_OF_ALL) ]; then break; fi; cp $$file tests/fuzz/corpus/$*; done
 # ---- fuzz ----

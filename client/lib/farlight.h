@@ -106,7 +106,8 @@ FL_API const char *fl_connection_address(const struct fl_connection *connection)
 FL_API bool fl_connection_listens_at(const struct fl_connection *connection, size_t index, char *address,
                                      size_t address_bytes);
 /* Serves the connection for so long, as every call does while it waits: changes of scenes are heard of, the
- * daemon's pings answered; and says enough for the daemon not to end it. False: it was interrupted, or the daemon is gone. */
+ * daemon's pings answered; and says enough for the daemon not to end it. False: it was interrupted, or the daemon
+ * is gone. */
 FL_API bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error);
 
 FL_API bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error);
@@ -342,7 +343,7 @@ struct fl_frame {
     float shutter_s;       /* how long the shutter was open, seconds */
     unsigned layers;       /* set of layers that `pixels` has, in the order of their numbers */
     uint64_t primary_rays, shadow_rays, secondary_rays, splits, uploaded_bytes, structure_bytes;
-    uint64_t wire_bytes;            /* of the encoded pixels */
+    uint64_t wire_bytes;            /* of the encoded pixels and what is attached */
     uint64_t receive_ns, decode_ns; /* first byte to last; decoding and checking */
     uint64_t wait_ns;               /* how long fl_render_next waited for it */
     size_t stage_count;

@@ -12,6 +12,7 @@
 /* What a JPEG may take besides the worst case of its pixels: tables and markers. */
 #define JPEG_EXTRA_BYTES 65536u
 #define H264_EXTRA_BYTES 65536u /* likewise */
+#define ATTACHMENT_PIXEL_BYTES 4u
 
 uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format)
 {
@@ -75,6 +76,25 @@ static uint64_t encoded_bytes_max(const struct message_frame_begin *begin, size_
     }
 }
 
+/* Sizes of what is attached fit to what there is; `most` is what one can take. */
+static bool check_attachments(const struct fl_assembly *assembly, const struct message_frame_begin *begin,
+                              struct fl_error *error)
+{
+    const uint64_t most = ZSTD_compressBound((size_t)begin->width * begin->height * ATTACHMENT_PIXEL_BYTES);
+    const bool has_depth = (begin->attachments & FL_ATTACH_DEPTH) != 0;
+    const bool has_normals = (begin->attachments & FL_ATTACH_NORMALS) != 0;
+    if (begin->attachments != assembly->expected.attachments)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.attachments",
+                            "the attachments %#x came in place of %#x", begin->attachments,
+                            assembly->expected.attachments);
+    if (has_depth != (begin->depth_bytes > 0) || begin->depth_bytes > most)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.depth_bytes", "%llu bytes cannot be depths",
+                            (unsigned long long)begin->depth_bytes);
+    return (has_normals == (begin->normal_bytes > 0) && begin->normal_bytes <= most) ||
+           fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.normal_bytes", "%llu bytes cannot be normals",
+                        (unsigned long long)begin->normal_bytes);
+}
+
 static bool is_expected_size(const struct fl_frame_expected *expected, const struct message_frame_begin *begin)
 {
     if (expected->is_view)
@@ -109,7 +129,7 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.size_bytes",
                             "%llu bytes cannot be a picture of %ux%u", (unsigned long long)begin->size_bytes,
                             begin->width, begin->height);
-    return true;
+    return check_attachments(assembly, begin, error);
 }
 
 static struct fl_frame *new_frame(const struct message_frame_begin *begin)
@@ -143,7 +163,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->moving = begin->moving != 0;
     frame->key_frame = begin->key_frame != 0;
     frame->frame_quality = begin->quality;
-    frame->wire_bytes = begin->size_bytes;
+    frame->wire_bytes = begin->size_bytes + begin->depth_bytes + begin->normal_bytes;
     if (begin->encoding == PROTOCOL_ENCODING_H264)
         return frame;
     frame->pixels_bytes = pixels_bytes_of(begin);
@@ -160,14 +180,16 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
 {
     if (!check_begin(assembly, begin, number, error))
         return false;
+    const bool in_place = begin->encoding == PROTOCOL_ENCODING_RAW && begin->attachments == 0;
     assembly->frame = new_frame(begin);
     if (assembly->frame != NULL)
-        assembly->encoded =
-            begin->encoding == PROTOCOL_ENCODING_RAW ? assembly->frame->pixels : malloc((size_t)begin->size_bytes);
+        assembly->encoded = in_place ? assembly->frame->pixels : malloc((size_t)assembly->frame->wire_bytes);
     if (assembly->frame == NULL || assembly->encoded == NULL)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "no memory for a picture of %ux%u", begin->width,
                             begin->height);
-    assembly->encoded_bytes = begin->size_bytes;
+    assembly->encoded_bytes = assembly->frame->wire_bytes;
+    assembly->depth_bytes = begin->depth_bytes;
+    assembly->normal_bytes = begin->normal_bytes;
     assembly->received_bytes = 0;
     assembly->frame->begun_ns = now_ns;
     return true;
@@ -189,11 +211,17 @@ bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_d
     return true;
 }
 
+/* Of the encoded bytes, those of the pixels. */
+static size_t picture_bytes(const struct fl_assembly *assembly)
+{
+    return (size_t)(assembly->encoded_bytes - assembly->depth_bytes - assembly->normal_bytes);
+}
+
 static bool decode_zstd(const struct fl_assembly *assembly, struct fl_error *error)
 {
     struct fl_frame *frame = assembly->frame;
     const size_t made =
-        ZSTD_decompress(frame->pixels, frame->pixels_bytes, assembly->encoded, (size_t)assembly->encoded_bytes);
+        ZSTD_decompress(frame->pixels, frame->pixels_bytes, assembly->encoded, picture_bytes(assembly));
     if (ZSTD_isError(made))
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "not to be decompressed: %s",
                             ZSTD_getErrorName(made));
@@ -211,9 +239,41 @@ static bool decode_predicted(const struct fl_assembly *assembly, struct fl_error
         .rows = frame->height * (uint32_t)__builtin_popcount(frame->layers),
         .pixel_bytes = fl_bytes_per_pixel(frame->format),
         .encoded = assembly->encoded,
-        .encoded_bytes = (size_t)assembly->encoded_bytes,
+        .encoded_bytes = picture_bytes(assembly),
     };
     return fl_predicted_decode(&predicted, frame->pixels, error);
+}
+
+/* malloc'ed; NULL on failure. */
+static void *decode_attachment(const struct fl_assembly *assembly, uint64_t offset_bytes, uint64_t bytes,
+                               struct fl_error *error)
+{
+    const struct fl_frame *frame = assembly->frame;
+    const struct fl_predicted predicted = {
+        .width = frame->width,
+        .rows = frame->height,
+        .pixel_bytes = ATTACHMENT_PIXEL_BYTES,
+        .encoded = assembly->encoded + offset_bytes,
+        .encoded_bytes = (size_t)bytes,
+    };
+    uint8_t *made = malloc((size_t)frame->width * frame->height * ATTACHMENT_PIXEL_BYTES);
+    if (made == NULL)
+        fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    if (made != NULL && fl_predicted_decode(&predicted, made, error))
+        return made;
+    free(made);
+    return NULL;
+}
+
+static bool decode_attachments(const struct fl_assembly *assembly, struct fl_error *error)
+{
+    struct fl_frame *frame = assembly->frame;
+    const uint64_t pixels_end = picture_bytes(assembly), depth_end = pixels_end + assembly->depth_bytes;
+    if (assembly->depth_bytes > 0)
+        frame->depth = decode_attachment(assembly, pixels_end, assembly->depth_bytes, error);
+    if (assembly->normal_bytes > 0 && error->code == FL_ERROR_NONE)
+        frame->normals = decode_attachment(assembly, depth_end, assembly->normal_bytes, error);
+    return error->code == FL_ERROR_NONE;
 }
 
 static bool decode_jpeg(const struct fl_assembly *assembly, struct fl_error *error)
@@ -223,7 +283,7 @@ static bool decode_jpeg(const struct fl_assembly *assembly, struct fl_error *err
     if (decoder == NULL)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     int width = 0, height = 0, subsampling = 0, colours = 0;
-    const unsigned long bytes = (unsigned long)assembly->encoded_bytes;
+    const unsigned long bytes = (unsigned long)picture_bytes(assembly);
     bool good =
         tjDecompressHeader3(decoder, assembly->encoded, bytes, &width, &height, &subsampling, &colours) == 0;
     if (good && (width != (int)frame->width || height != (int)frame->height)) {
@@ -240,13 +300,15 @@ static bool decode_jpeg(const struct fl_assembly *assembly, struct fl_error *err
     return good;
 }
 
-static bool decode(const struct fl_assembly *assembly, struct fl_error *error)
+static bool decode_pixels(const struct fl_assembly *assembly, struct fl_error *error)
 {
     struct fl_frame *frame = assembly->frame;
     if (frame->encoding == PROTOCOL_ENCODING_H264) /* the caller decodes it */
         return true;
     if (frame->encoding == PROTOCOL_ENCODING_JPEG)
         return decode_jpeg(assembly, error);
+    if (frame->encoding == PROTOCOL_ENCODING_RAW && assembly->encoded != frame->pixels)
+        memcpy(frame->pixels, assembly->encoded, frame->pixels_bytes);
     if (frame->encoding == PROTOCOL_ENCODING_ZSTD && !decode_zstd(assembly, error))
         return false;
     if (frame->encoding == PROTOCOL_ENCODING_PREDICTED && !decode_predicted(assembly, error))
@@ -298,14 +360,14 @@ struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct mess
     }
     const uint64_t decode_begin_ns = fl_now_ns();
     *error = (struct fl_error){0};
-    if (!take_costs(frame, end, error) || !decode(assembly, error))
+    if (!take_costs(frame, end, error) || !decode_pixels(assembly, error) || !decode_attachments(assembly, error))
         return NULL;
     frame->whole_ns = fl_now_ns();
     frame->receive_ns = now_ns - frame->begun_ns;
     frame->decode_ns = frame->whole_ns - decode_begin_ns;
     if (frame->encoding == PROTOCOL_ENCODING_H264) {
         frame->encoded = assembly->encoded;
-        frame->encoded_bytes = (size_t)assembly->encoded_bytes;
+        frame->encoded_bytes = picture_bytes(assembly);
     } else if (assembly->encoded != frame->pixels) {
         free(assembly->encoded);
     }

@@ -11,6 +11,7 @@ struct fl_frame_expected {
     enum protocol_pixel_format format;
     enum protocol_encoding encoding;
     unsigned layers; /* set of them, at least one; see struct fl_frame */
+    unsigned attachments;
     /* Of a view: frames may be smaller and leave out numbers, and those at rest have another encoding. */
     bool is_view;
     enum protocol_encoding still_encoding;
@@ -19,8 +20,9 @@ struct fl_frame_expected {
 struct fl_assembly {
     struct fl_frame_expected expected;
     struct fl_frame *frame; /* begun; NULL: none */
-    uint8_t *encoded;       /* where its bytes go: the pixels themselves when raw */
+    uint8_t *encoded;       /* where its bytes go: the pixels themselves when raw and alone */
     uint64_t encoded_bytes, received_bytes;
+    uint64_t depth_bytes, normal_bytes; /* the last ones of encoded_bytes, in that order */
 };
 
 /* Each returns false on what is not allowed; the assembly must then be finished. `number` is the frame's; of a

@@ -86,6 +86,7 @@ static bool ask(struct fl_view *view, const struct fl_view_options *options, str
                                                  .encoding = render->encoding,
                                                  .still_encoding = render->still_encoding,
                                                  .layers = FL_LAYERS_PICTURE,
+                                                 .attachments = render->attachments,
                                                  .is_view = true};
     if (!fl_connection_send(view->connection, asked->request, 0, &message, error))
         return false;

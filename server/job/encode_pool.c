@@ -9,11 +9,13 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
 #include <xxhash.h>
 
 #define THREADS_MAX 64
 #define THREADS_AUTO_MAX 4
 #define QUEUE_CAPACITY 256
+#define ATTACHMENT_PIXEL_BYTES 4
 
 struct encode_task {
     struct job_output *output;
@@ -134,6 +136,28 @@ static bool encode_pixels(struct encode_lane *lane, const struct picture *pictur
     return encoder_encode(frame->encoding, picture, frame->quality, &frame->bytes, &frame->size_bytes, error);
 }
 
+/* Behind what is there. */
+static bool append_attachment(struct engine_frame *frame, enum frame_attachment which, size_t *added_bytes,
+                              struct error *error)
+{
+    const struct frame_result *result = &frame->result;
+    if (!(result->attachments & which))
+        return true;
+    const struct picture picture = {result->width, result->height, ATTACHMENT_PIXEL_BYTES,
+                                    frame_result_attachment(result, which)};
+    uint8_t *encoded;
+    if (!encoder_encode(ENCODING_PREDICTED, &picture, 1, &encoded, added_bytes, error))
+        return false;
+    uint8_t *bytes = realloc(frame->bytes, frame->size_bytes + *added_bytes);
+    if (bytes) {
+        memcpy(bytes + frame->size_bytes, encoded, *added_bytes);
+        frame->bytes = bytes;
+        frame->size_bytes += *added_bytes;
+    }
+    free(encoded);
+    return bytes || error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no memory for what is attached to a frame");
+}
+
 static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct engine_frame *frame,
                    struct error *error)
 {
@@ -148,7 +172,9 @@ static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct en
     };
     uint64_t start_ns = clock_now_ns();
     frame->digest = XXH3_64bits(result->pixels, result->size_bytes);
-    if (!encode_pixels(lane, &picture, frame, error))
+    if (!encode_pixels(lane, &picture, frame, error) ||
+        !append_attachment(frame, ATTACHMENT_DEPTH, &frame->depth_bytes, error) ||
+        !append_attachment(frame, ATTACHMENT_NORMALS, &frame->normal_bytes, error))
         return false;
     if (frame->encoding != ENCODING_JPEG && frame->encoding != ENCODING_H264)
         frame->quality = 0; /* a level, which costs no picture */

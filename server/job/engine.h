@@ -81,7 +81,6 @@ struct engine_job {
     enum encoding still_encoding;
     unsigned weight; /* how much of the device's time it gets beside other clients' jobs, and their own; 0: 1 */
     bool adapt;      /* view: quality and size follow the link */
-    unsigned attachments; /* view: bits of the protocol */
 };
 
 enum engine_command_kind {
@@ -191,12 +190,13 @@ struct engine_frame {
     size_t size_bytes;
     uint64_t digest; /* XXH3-64 of the pixels before encoding */
     float time_s, shutter_s;
-    uint64_t encoded_ns;    /* clock_now_ns() when it was ready to be sent */
-    unsigned quality;       /* it was encoded with; 0: lossless */
-    unsigned scale_eighths; /* of the width and height that the job asks for; 0: all of it */
-    uint64_t wanted_bytes;  /* that it may have, for an encoder that can be told; 0: not known */
-    bool wants_key;         /* it is to be encoded so that it can be decoded without those before .. */
-    bool key_frame;         /* .. and so it was */
+    uint64_t encoded_ns;              /* clock_now_ns() when it was ready to be sent */
+    unsigned quality;                 /* it was encoded with; 0: lossless */
+    unsigned scale_eighths;           /* of the width and height that the job asks for; 0: all of it */
+    uint64_t wanted_bytes;            /* that it may have, for an encoder that can be told; 0: not known */
+    bool wants_key;                   /* it is to be encoded so that it can be decoded without those before .. */
+    bool key_frame;                   /* .. and so it was */
+    size_t depth_bytes, normal_bytes; /* of attachments, encoded: the last ones of size_bytes, in that order */
     /* Of a view: what it shows last of what its client wished; all 0 before the first wish. */
     uint64_t command, received_ns;
     bool moving;

@@ -98,6 +98,15 @@ size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *e
     return best;
 }
 
+static uint64_t without_outliers(struct schedule_client *client, uint64_t slice_ns)
+{
+    if (!client->mean_ns)
+        client->mean_ns = slice_ns;
+    uint64_t most_ns = SCHEDULE_OUTLIER * client->mean_ns;
+    client->mean_ns = client->mean_ns - client->mean_ns / 16 + slice_ns / 16;
+    return at_most(slice_ns, most_ns > SCHEDULE_OUTLIER_MIN_NS ? most_ns : SCHEDULE_OUTLIER_MIN_NS);
+}
+
 static void charge(struct schedule_share *share, uint64_t virtual_ns, uint64_t turn)
 {
     share->virtual_ns += virtual_ns;
@@ -108,7 +117,7 @@ void schedule_charge(struct scheduler *scheduler, struct schedule_client *client
                      uint64_t slice_ns, uint32_t weight)
 {
     /* What took no time that the clock shows counts a little all the same, or it would have every turn. */
-    uint64_t virtual_ns = slice_ns / weight + 1;
+    uint64_t virtual_ns = without_outliers(client, slice_ns) / weight + 1;
     uint64_t turn = ++scheduler->turns;
     scheduler->turn_ns += slice_ns;
     charge(&client->share, virtual_ns, turn);

@@ -39,6 +39,7 @@ struct schedule_group {
 
 struct schedule_client {
     struct schedule_share share;
+    uint64_t mean_ns; /* of its slices, the last ones most */
     struct schedule_group jobs;
 };
 
@@ -56,6 +57,11 @@ struct schedule_entry {
 
 #define SCHEDULE_TURN_NS 10000000u    /* about a slice on software GL */
 #define SCHEDULE_TURN_EACH_NS 500000u /* longer for each client that is ready */
+/* A slice that is so many times as long as the client's others, and at least so long, is charged as one of that
+ * length: the machine had other work meanwhile, or something was done once for all. What comes again is in the
+ * mean. */
+#define SCHEDULE_OUTLIER 8
+#define SCHEDULE_OUTLIER_MIN_NS 2000000u
 #define SCHEDULE_WAIT_MAX_NS UINT64_C(2000000000)
 #define SCHEDULE_NONE SIZE_MAX
 

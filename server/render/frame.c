@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "render/compact.h"
+#include "render/frame_request.h"
 #include "render/frame_state.h"
 #include "render/pixel_filter.h"
 #include "render/sequence.h"
@@ -188,7 +189,7 @@ static bool pass_on(struct frame_renderer *renderer, bool has_band, uint32_t pla
     struct render_context *context = &renderer->work->context;
     struct gpu_readback *before = &renderer->work->copies[renderer->copied % 2];
     struct gpu_readback *next = &renderer->work->copies[(renderer->copied + 1) % 2];
-    if (has_band && !picture_copy_band(picture, context, next, band, error))
+    if (has_band && !picture_copy_band(picture, context, next, plane, band, error))
         return false;
     if (renderer->copying &&
         !picture_take_band(picture, context, before, renderer->copied_plane, renderer->copied_band, error))
@@ -224,6 +225,12 @@ bool frame_step_waits(const struct frame_renderer *renderer)
            !gpu_readback_is_done(&renderer->work->copies[renderer->copied % 2]);
 }
 
+static size_t attached_bytes(const struct frame_request *request)
+{
+    size_t count = (size_t)__builtin_popcount(request->attachments);
+    return count * request->width * request->height * picture_pixel_bytes(FRAME_DEPTH32F);
+}
+
 static bool hand_out(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
@@ -236,13 +243,14 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
                     clock_now_ns() - context->times.origin_ns);
     *result = renderer->result;
     result->pixels = renderer->picture.pixels;
-    result->size_bytes = renderer->picture.size_bytes;
+    result->layers = frame_request_layers(request);
+    result->attachments = request->attachments;
+    result->size_bytes = renderer->picture.size_bytes - attached_bytes(request);
     renderer->picture.pixels = NULL;
     result->width = request->width;
     result->height = request->height;
     result->format = request->format;
     result->samples = renderer->picture.samples;
-    result->layers = renderer->picture.layers;
     result->primary_rays = (uint64_t)request->width * request->height * request->samples;
     result->times = context->times;
     renderer->kept_request = *request;

@@ -14,7 +14,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum frame_format { FRAME_RGBA8, FRAME_RGBA16F, FRAME_RGBA32F }; /* protocol's numbers, here to enum frame_layer */
+/* Protocol's numbers, here to enum frame_layer. The last two are of attachments alone. */
+enum frame_format { FRAME_RGBA8, FRAME_RGBA16F, FRAME_RGBA32F, FRAME_DEPTH32F, FRAME_NORMAL8 };
 enum frame_tone_map { TONE_NEUTRAL, TONE_ACES, TONE_NONE };
 enum frame_primary { PRIMARY_RASTER, PRIMARY_TRACE };
 enum frame_integrator {
@@ -34,6 +35,10 @@ enum frame_layer { /* bits of frame_request.layers are 1 << these */
                    LAYER_AO,
                    LAYER_ID,
                    LAYER_COUNT
+};
+enum frame_attachment { /* protocol's bits */
+                        ATTACHMENT_DEPTH = 1,
+                        ATTACHMENT_NORMALS = 2
 };
 enum frame_filter { FILTER_BLACKMAN_HARRIS, FILTER_GAUSSIAN, FILTER_TENT, FILTER_BOX }; /* of pixels */
 
@@ -65,6 +70,7 @@ struct frame_request {
     uint32_t ao_rays;     /* a sample; 0: 8 */
     float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
     uint32_t layers;      /* bits; 0: the picture alone. More than it need FRAME_RGBA32F */
+    uint32_t attachments; /* bits; beside the picture alone, in any format of it */
     /* The frame goes on where the one before it ended, if that showed the same and was to be gone on from: scene,
      * motion and request alike but for `samples` and what is done with the sum (format, tone map, exposure); it
      * adds its samples to those. n frames of k samples hold what one of n x k does, to the bit. */
@@ -85,6 +91,7 @@ struct frame_request {
  *   RGBA8           the same divided by alpha, tone-mapped, sRGB
  *   layers          those beside the beauty are what protocol/messages.def says of them (LAYER), and know of no
  *                   exposure
+ *   attachments     those layers in 4 bytes a pixel, see frame_result_attachment()
  *   alpha           1 where there is a surface (what blended surfaces leave open goes on to what lies behind) and
  *                   where the environment is seen; 0 where there is neither
  * What integrators do with `depth`: whitted, distributed and path bounce so often after the first hit (path: and
@@ -94,8 +101,10 @@ struct frame_request {
  * revision and device gives the same bytes. Cut into other slices a frame may differ in rays within rounding of an
  * edge: how many rays `bvh` walks together follows the coherence of the slice's wave. */
 struct frame_result {
-    uint8_t *pixels; /* owned; free(). Layer after layer, each of width x height pixels */
+    /* Owned; free(). Layer after layer, each of width x height pixels; behind size_bytes lie the attachments. */
+    uint8_t *pixels;
     uint32_t layers; /* bits, at least one */
+    uint32_t attachments;
     size_t size_bytes;
     uint32_t width, height;
     uint32_t samples; /* held per pixel, with those of the frames before that it goes on from */
@@ -109,6 +118,10 @@ struct frame_result {
     uint32_t comparison_count;
 };
 void frame_result_finish(struct frame_result *result);
+/* Of width x height: DEPTH f32, metres along the view to the first surface that the pixel's first sample met, 0
+ * where there is none; NORMALS 4 u8, (n / 2 + 1/2) * 255 of the mean of the samples in world space, then 255, all
+ * 0 where there is none. Valid as long as the pixels; `which` is one of the result's attachments. */
+const uint8_t *frame_result_attachment(const struct frame_result *result, enum frame_attachment which);
 
 /* What a scene has on the device, whoever looks at it: its copy, its light, and each tracer that was asked for. */
 struct frame_scene;

@@ -11,6 +11,14 @@ void frame_result_finish(struct frame_result *result)
     *result = (struct frame_result){0};
 }
 
+const uint8_t *frame_result_attachment(const struct frame_result *result, enum frame_attachment which)
+{
+    size_t bytes = (size_t)result->width * result->height * picture_pixel_bytes(FRAME_DEPTH32F);
+    /* As planes they come in the order of their layers. */
+    bool is_second = which == ATTACHMENT_DEPTH && result->attachments & ATTACHMENT_NORMALS;
+    return result->pixels + result->size_bytes + (is_second ? bytes : 0);
+}
+
 struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *error)
 {
     struct frame_scene *shared = calloc(1, sizeof(*shared));

@@ -58,10 +58,29 @@ uint32_t frame_request_layers(const struct frame_request *request)
     return request->layers ? request->layers : 1u << LAYER_BEAUTY;
 }
 
+uint32_t frame_request_planes(const struct frame_request *request)
+{
+    return frame_request_layers(request) | (request->attachments & ATTACHMENT_DEPTH ? 1u << LAYER_DEPTH : 0) |
+           (request->attachments & ATTACHMENT_NORMALS ? 1u << LAYER_NORMAL : 0);
+}
+
+enum frame_format frame_request_plane_format(const struct frame_request *request, enum frame_layer layer)
+{
+    if (request->attachments & ATTACHMENT_DEPTH && layer == LAYER_DEPTH)
+        return FRAME_DEPTH32F;
+    if (request->attachments & ATTACHMENT_NORMALS && layer == LAYER_NORMAL)
+        return FRAME_NORMAL8;
+    return request->format;
+}
+
 uint64_t frame_request_bytes(const struct frame_request *request)
 {
-    return (uint64_t)request->width * request->height * picture_pixel_bytes(request->format) *
-           (uint64_t)__builtin_popcount(frame_request_layers(request));
+    uint64_t pixel_bytes = 0;
+    for (uint32_t left = frame_request_planes(request); left; left &= left - 1) {
+        enum frame_layer layer = (enum frame_layer)__builtin_ctz(left);
+        pixel_bytes += picture_pixel_bytes(frame_request_plane_format(request, layer));
+    }
+    return (uint64_t)request->width * request->height * pixel_bytes;
 }
 
 static bool check_layers(const struct frame_request *request, struct error *error)
@@ -71,6 +90,11 @@ static bool check_layers(const struct frame_request *request, struct error *erro
                          31 - __builtin_clz(request->layers));
     if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != FRAME_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "layers", "layers beside the beauty need the format rgba32f");
+    if (request->attachments & ~(uint32_t)(ATTACHMENT_DEPTH | ATTACHMENT_NORMALS))
+        return error_set(error, ERROR_UNSUPPORTED, "attachments", "there is no such set of attachments: %#x",
+                         request->attachments);
+    if (request->attachments && frame_request_layers(request) != 1u << LAYER_BEAUTY)
+        return error_set(error, ERROR_UNSUPPORTED, "attachments", "they go with the beauty alone");
     return true;
 }
 
@@ -85,7 +109,7 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (request->filter > FILTER_BOX)
         return error_set(error, ERROR_UNSUPPORTED, "pixel_filter", "there is no pixel filter number %u",
                          (unsigned)request->filter);
-    if (picture_pixel_bytes(request->format) == 0)
+    if (request->format > FRAME_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
     return check_integrator(request, error) && check_layers(request, error) && check_camera(request, error);
@@ -115,5 +139,5 @@ bool frame_request_adds_to(const struct frame_request *a, const struct frame_req
     return a->accumulate && b->accumulate && a->width == b->width && a->height == b->height &&
            a->depth == b->depth && a->seed == b->seed && same_light(a, b) && a->aperture == b->aperture &&
            a->focus == b->focus && a->filter == b->filter && same_camera(&a->camera, &b->camera) &&
-           same_tracer(a, b) && frame_request_layers(a) == frame_request_layers(b);
+           same_tracer(a, b) && frame_request_planes(a) == frame_request_planes(b);
 }

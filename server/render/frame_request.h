@@ -10,7 +10,11 @@
 bool frame_request_check(const struct frame_request *request, struct error *error);
 /* As bits, with that of the beauty where the request names none. */
 uint32_t frame_request_layers(const struct frame_request *request);
-/* Of the frame's pixels, all layers. */
+/* All that there is a plane for in the picture: layers and those that attachments are made of. */
+uint32_t frame_request_planes(const struct frame_request *request);
+/* Of a plane's pixels on the host, that of the beauty where the request attaches what it is. */
+enum frame_format frame_request_plane_format(const struct frame_request *request, enum frame_layer layer);
+/* Of the frame's pixels, all planes. */
 uint64_t frame_request_bytes(const struct frame_request *request);
 /* Whether their samples may be added up: they are alike but for their number and for what becomes of the sum. */
 bool frame_request_adds_to(const struct frame_request *a, const struct frame_request *b);

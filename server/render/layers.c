@@ -23,7 +23,7 @@ bool layers_reserve(struct layers *layers, struct render_context *context, uint3
                     struct error *error)
 {
     struct gpu_device *device = context->device;
-    layers->wanted = frame_request_layers(&context->request) & ~LAYER_BIT_BEAUTY;
+    layers->wanted = frame_request_planes(&context->request) & ~LAYER_BIT_BEAUTY;
     if (!layers->wanted) {
         layers_finish(layers, device);
         return true;

@@ -94,7 +94,7 @@ bool picture_begin(struct picture *picture, struct render_context *context, uint
                    struct error *error)
 {
     const struct frame_request *request = &context->request;
-    uint32_t layers = frame_request_layers(request);
+    uint32_t layers = frame_request_planes(request);
     picture_drop_pixels(picture);
     if (!picture->bands || picture->width != request->width || picture->height != request->height ||
         picture->layers != layers) {

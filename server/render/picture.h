@@ -38,7 +38,7 @@ bool picture_read_band(struct picture *picture, struct render_context *context, 
                        struct error *error);
 /* Or in two steps, between which the device may have other work: `resolved` is free again after the first. */
 bool picture_copy_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
-                       uint32_t band, struct error *error);
+                       uint32_t plane, uint32_t band, struct error *error);
 bool picture_take_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
                        uint32_t plane, uint32_t band, struct error *error);
 enum frame_layer picture_plane_layer(const struct picture *picture, uint32_t plane);

@@ -3,17 +3,20 @@
 #include "render/picture.h"
 
 #include "base/clock.h"
+#include "render/frame_request.h"
 
 #include <stdlib.h>
 
-static size_t row_bytes(const struct picture *picture, const struct render_context *context)
+static size_t row_bytes(const struct picture *picture, const struct render_context *context, uint32_t plane)
 {
-    return picture->width * picture_pixel_bytes(context->request.format);
+    enum frame_layer layer = picture_plane_layer(picture, plane);
+    return picture->width * picture_pixel_bytes(frame_request_plane_format(&context->request, layer));
 }
 
-static size_t band_bytes(const struct picture *picture, const struct render_context *context, uint32_t band)
+static size_t band_bytes(const struct picture *picture, const struct render_context *context, uint32_t plane,
+                         uint32_t band)
 {
-    return picture_band_row_count(picture, band) * row_bytes(picture, context);
+    return picture_band_row_count(picture, band) * row_bytes(picture, context, plane);
 }
 
 /* Where a band belongs. NULL: no memory. */
@@ -21,15 +24,17 @@ static uint8_t *band_pixels(struct picture *picture, const struct render_context
                             uint32_t band, struct error *error)
 {
     if (!picture->pixels) {
-        picture->size_bytes = row_bytes(picture, context) * picture->height * picture->plane_count;
+        picture->size_bytes = (size_t)frame_request_bytes(&context->request);
         picture->pixels = malloc(picture->size_bytes);
     }
     if (!picture->pixels) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a picture of %zu bytes", picture->size_bytes);
         return NULL;
     }
-    size_t first_row = (size_t)plane * picture->height + picture_band_first_row(picture, band);
-    return picture->pixels + first_row * row_bytes(picture, context);
+    uint8_t *pixels = picture->pixels;
+    for (uint32_t before = 0; before < plane; before++)
+        pixels += picture->height * row_bytes(picture, context, before);
+    return pixels + picture_band_first_row(picture, band) * row_bytes(picture, context, plane);
 }
 
 bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
@@ -39,17 +44,17 @@ bool picture_read_band(struct picture *picture, struct render_context *context, 
     if (!pixels)
         return false;
     context_span_begin(context, STAGE_READBACK);
-    gpu_buffer_read(context->device, &picture->resolved, 0, pixels, band_bytes(picture, context, band));
+    gpu_buffer_read(context->device, &picture->resolved, 0, pixels, band_bytes(picture, context, plane, band));
     context_span_end(context);
     return gpu_check(context->device, "reading the picture", error);
 }
 
 bool picture_copy_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
-                       uint32_t band, struct error *error)
+                       uint32_t plane, uint32_t band, struct error *error)
 {
     context_span_begin(context, STAGE_READBACK);
-    bool begun =
-        gpu_readback_copy(context->device, copy, &picture->resolved, band_bytes(picture, context, band), error);
+    bool begun = gpu_readback_copy(context->device, copy, &picture->resolved,
+                                   band_bytes(picture, context, plane, band), error);
     context_span_end(context);
     return begun && gpu_readback_fence(copy, error) && gpu_check(context->device, "copying the picture", error);
 }

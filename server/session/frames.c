@@ -140,7 +140,10 @@ static void fill_begin(struct message_frame_begin *begin, const struct engine_fr
     begin->height = frame->request.height;
     begin->samples = frame->result.samples;
     begin->revision = frame->result.revision;
-    begin->size_bytes = frame->size_bytes;
+    begin->size_bytes = frame->size_bytes - frame->depth_bytes - frame->normal_bytes;
+    begin->attachments = frame->result.attachments;
+    begin->depth_bytes = frame->depth_bytes;
+    begin->normal_bytes = frame->normal_bytes;
     begin->format = (enum protocol_pixel_format)frame->request.format;
     begin->encoding = (enum protocol_encoding)frame->encoding;
     begin->tracer = (enum protocol_tracer)frame->request.tracer;

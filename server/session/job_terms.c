@@ -15,6 +15,7 @@
 /* Of the 4 GiB that a frame_begin may announce; the rest is left to what zstd adds to noise. */
 #define FRAME_BYTES_MAX (UINT64_C(4080) << 20)
 #define BEAUTY_ALONE (1u << PROTOCOL_LAYER_BEAUTY)
+#define ATTACHMENT_PIXEL_BYTES 4
 #define WEIGHT_OF_VIEW 4 /* somebody waits for each of its frames */
 #define WEIGHT_OF_BATCH 1
 
@@ -37,8 +38,9 @@ static uint32_t bytes_per_pixel(enum protocol_pixel_format format)
 static uint64_t frame_bytes_of(const struct message_render *render)
 {
     uint32_t layers = render->layers ? render->layers : BEAUTY_ALONE;
-    return (uint64_t)render->width * render->height * bytes_per_pixel(render->format) *
-           (uint64_t)__builtin_popcount(layers);
+    uint32_t pixel_bytes = bytes_per_pixel(render->format) * (uint32_t)__builtin_popcount(layers) +
+                           ATTACHMENT_PIXEL_BYTES * (uint32_t)__builtin_popcount(render->attachments);
+    return (uint64_t)render->width * render->height * pixel_bytes;
 }
 
 static bool check_layers(const struct message_render *render, struct error *error)
@@ -160,9 +162,11 @@ static bool check_encoding(const struct session *session, const struct message_r
 /* What is different with views. */
 static bool check_kind(const struct session *session, const struct message_render *render, struct error *error)
 {
-    if (render->attachments)
-        return error_set(error, ERROR_UNSUPPORTED, "render.attachments", "this daemon attaches nothing to frames");
     if (render->kind == PROTOCOL_JOB_KIND_BATCH) {
+        if (render->attachments) {
+            error_set(error, ERROR_UNSUPPORTED, "render.attachments", "frames of a batch have none");
+            return error_remedy(error, "a batch has layers");
+        }
         if (render->last_frame < render->first_frame)
             return error_set(error, ERROR_INVALID, "render.last_frame", "%u is before the first frame %u",
                              render->last_frame, render->first_frame);
@@ -266,6 +270,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                 .ao_rays = render->ao_rays,
                 .layer_opacity = render->layer_opacity,
                 .layers = render->layers,
+                .attachments = render->attachments,
                 .accumulate = render->accumulate != 0,
                 .compare = render->compare != 0,
                 .compare_with = render->compare_with,
@@ -284,7 +289,6 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                   : is_view      ? WEIGHT_OF_VIEW
                                  : WEIGHT_OF_BATCH,
         .adapt = render->adapt != 0,
-        .attachments = render->attachments,
     };
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // From sums of samples to pixels of the output's format, rows from the top. Linear formats are premultiplied by
-// alpha, RGBA8 is straight, tone-mapped and sRGB.
+// alpha, RGBA8 is straight, tone-mapped and sRGB. Attachments: depth as it is, normals as unit vectors in 8 bits.
 
 #include "shared/path.h"
 #include "common/camera.glsl"
@@ -12,6 +12,8 @@ layout(local_size_x = 64) in;
 #define FORMAT_RGBA8 0u
 #define FORMAT_RGBA16F 1u
 #define FORMAT_RGBA32F 2u
+#define FORMAT_DEPTH32F 3u
+#define FORMAT_NORMAL8 4u
 
 uniform uint pixel_count; // of the band
 uniform uint format_number;
@@ -38,6 +40,12 @@ void main()
         colour = min(colour, vec4(HALF_MAX));
         resolved[2u * k] = packHalf2x16(colour.rg);
         resolved[2u * k + 1u] = packHalf2x16(colour.ba);
+    } else if (format_number == FORMAT_DEPTH32F) {
+        resolved[k] = floatBitsToUint(sum.r);
+    } else if (format_number == FORMAT_NORMAL8) {
+        float extent = length(sum.xyz); // 0 also where normals cancel each other out
+        vec3 normal = extent > 0.0 ? sum.xyz / extent : vec3(0.0);
+        resolved[k] = sum.a > 0.0 ? packUnorm4x8(vec4(normal * 0.5 + 0.5, 1.0)) : 0u;
     } else {
         for (int i = 0; i < 4; i++)
             resolved[4u * k + uint(i)] = floatBitsToUint(colour[i]);

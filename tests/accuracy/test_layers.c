@@ -306,6 +306,66 @@ static void openness_is_that_of_the_integrator_ao(void **state)
     frame_result_finish(&result);
 }
 
+static void expect_attached(const struct frame_result *result, const struct frame_result *layers)
+{
+    const size_t count = (size_t)result->width * result->height;
+    bool has_depth = result->attachments & ATTACHMENT_DEPTH,
+         has_normals = result->attachments & ATTACHMENT_NORMALS;
+    const uint8_t *depths = has_depth ? frame_result_attachment(result, ATTACHMENT_DEPTH) : NULL;
+    const uint8_t *normals = has_normals ? frame_result_attachment(result, ATTACHMENT_NORMALS) : NULL;
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t x = i % result->width, y = i / result->width;
+        const float *n = pixel_of(layers, LAYER_NORMAL, x, y);
+        if (has_depth)
+            assert_memory_equal(depths + (size_t)4 * i, pixel_of(layers, LAYER_DEPTH, x, y), 4);
+        double length = sqrt(dot(n, n));
+        for (int k = 0; k < 3 && has_normals; k++) /* to the nearest step */
+            assert_near(normals[4 * i + (uint32_t)k], n[3] > 0 ? ((double)n[k] / length / 2 + 0.5) * 255 : 0,
+                        0.51);
+        if (has_normals)
+            assert_int_equal(normals[4 * i + 3], n[3] > 0 ? 255 : 0);
+    }
+}
+
+static void attachments_are_those_layers_beside_a_picture_that_stays_as_it_is(void **state)
+{
+    struct fixture *fixture = *state;
+    add_glass(fixture);
+    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
+    fixture->request.tracer = BVH;
+    fixture->request.tracer_options.bvh_rays_together = 1;
+    fixture->request.samples = 3;
+    struct frame_result layers = render(fixture, BIT(LAYER_NORMAL) | BIT(LAYER_DEPTH));
+    fixture->request.layers = 0;
+    for (int format = FRAME_RGBA8; format <= FRAME_RGBA32F; format++) {
+        fixture->request.format = (enum frame_format)format;
+        fixture->request.attachments = 0;
+        struct frame_result alone = fixture_render(fixture);
+        for (uint32_t attachments = 1; attachments <= 3; attachments++) {
+            fixture->request.attachments = attachments;
+            struct frame_result result = fixture_render(fixture);
+            assert_int_equal(result.attachments, attachments);
+            assert_int_equal(result.layers, BIT(LAYER_BEAUTY));
+            assert_int_equal(result.size_bytes, alone.size_bytes);
+            assert_memory_equal(result.pixels, alone.pixels, alone.size_bytes);
+            expect_attached(&result, &layers);
+            frame_result_finish(&result);
+        }
+        frame_result_finish(&alone);
+    }
+    /* The first sample's depth stays where others are added. */
+    fixture->request.accumulate = true;
+    fixture->request.samples = 1;
+    for (int pass = 0; pass < 3; pass++) {
+        struct frame_result result = fixture_render(fixture);
+        assert_int_equal(result.samples, pass + 1);
+        if (pass == 2)
+            expect_attached(&result, &layers);
+        frame_result_finish(&result);
+    }
+    frame_result_finish(&layers);
+}
+
 /* Whatever the slices, and how often they are done again: the picture is what it is alone, and so are the layers.
  */
 static void neither_the_picture_nor_the_layers_depend_on_each_other(void **state)
@@ -427,6 +487,7 @@ int main(void)
         TEST(glass_and_what_is_blended_is_what_is_seen),
         TEST(identifiers_are_the_clients),
         TEST(openness_is_that_of_the_integrator_ao),
+        TEST(attachments_are_those_layers_beside_a_picture_that_stays_as_it_is),
         TEST(neither_the_picture_nor_the_layers_depend_on_each_other),
         TEST(frames_that_go_on_hold_what_one_of_all_samples_does),
         TEST(places_agree_with_depths_through_a_lens),

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Writes what the fuzzers start from: seed FOLDER makes FOLDER/protocol.dict out of the table, and valid inputs in
  * FOLDER/codec, FOLDER/framing, FOLDER/handshake and FOLDER/sealed, noise in FOLDER/scene, sessions in
- * FOLDER/session. */
+ * FOLDER/session, models in FOLDER/gltf, FOLDER/obj and FOLDER/nff. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
@@ -321,6 +321,48 @@ static bool write_sessions(const char *folder)
     return ok;
 }
 
+/* ---- models ---- */
+
+/* A triangle, moved; its buffer is the three corners and their indices. */
+#define GLTF_BUFFER "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA="
+static const char gltf_model[] =
+    "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0,1]}],"
+    "\"extensionsUsed\":[\"KHR_lights_punctual\",\"KHR_materials_transmission\"],"
+    "\"extensions\":{\"KHR_lights_punctual\":{\"lights\":[{\"type\":\"spot\",\"spot\":{\"outerConeAngle\":1}}]}},"
+    "\"nodes\":[{\"mesh\":0,\"skin\":0,\"rotation\":[0,0,0,1],\"scale\":[1,2,1],\"children\":[2]},"
+    "{\"extensions\":{\"KHR_lights_punctual\":{\"light\":0}}},{\"camera\":0}],"
+    "\"cameras\":[{\"type\":\"perspective\",\"perspective\":{\"yfov\":1,\"znear\":0.1}}],"
+    "\"skins\":[{\"joints\":[1,2]}],\"textures\":[{\"source\":0,\"sampler\":0}],\"samplers\":[{\"wrapS\":33648}],"
+    "\"images\":[{\"uri\":\"missing.png\"}],"
+    "\"materials\":[{\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,0,0,1],"
+    "\"baseColorTexture\":{\"index\":0}},\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":1}"
+    "}}],"
+    "\"meshes\":[{\"weights\":[0.5],\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1,\"material\":0,"
+    "\"targets\":[{\"POSITION\":0}]}]}],"
+    "\"animations\":[{\"channels\":[{\"sampler\":0,\"target\":{\"node\":0,\"path\":\"translation\"}}],"
+    "\"samplers\":[{\"input\":2,\"output\":0,\"interpolation\":\"STEP\"}]}],"
+    "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},"
+    "{\"bufferView\":1,\"componentType\":5123,\"count\":3,\"type\":\"SCALAR\"},"
+    "{\"componentType\":5126,\"count\":3,\"type\":\"SCALAR\",\"sparse\":{\"count\":2,\"indices\":{\"bufferView\":"
+    "1,"
+    "\"byteOffset\":2,\"componentType\":5123},\"values\":{\"bufferView\":0,\"byteOffset\":12}}}],"
+    "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,\"byteOffset\":36,\"byteLength\":6}],"
+    "\"buffers\":[{\"byteLength\":44,\"uri\":\"data:application/octet-stream;base64," GLTF_BUFFER "\"}]}";
+static const char obj_model[] =
+    "mtllib a b.mtl\no thing\nv 0 0 0 1 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 1\n"
+    "vn 0 0 1\nusemtl red\ns 1\nf 1/1/1 2/2/1 \\\n3//1 -1\ng other\nl 1 2\np 3\nf 1 2 3\n";
+static const char nff_model[] =
+    "v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 45\nhither 0.1\nresolution 8 8\nb 0.1 0.2 0.3\nl 1 2 3 1 1 1\n"
+    "f 1 0.5 0.2 0.8 0.2 20 0.1 1.5\ns 0 0 0 1\nc 0 0 0 1 0 2 0 0.5\np 4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+    "pp 3\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n";
+
+static bool write_models(const char *folder)
+{
+    return write_file(folder, "gltf", "model", 0, gltf_model, sizeof gltf_model - 1) &&
+           write_file(folder, "obj", "model", 0, obj_model, sizeof obj_model - 1) &&
+           write_file(folder, "nff", "model", 0, nff_model, sizeof nff_model - 1);
+}
+
 int main(int argument_count, char **arguments)
 {
     if (argument_count != 2) {
@@ -329,6 +371,6 @@ int main(int argument_count, char **arguments)
     }
     bool ok = make_folder(arguments[1]) && write_dictionary(arguments[1]) && write_messages(arguments[1]) &&
               write_handshakes(arguments[1]) && write_sealed(arguments[1]) && write_noise(arguments[1]) &&
-              write_sessions(arguments[1]);
+              write_sessions(arguments[1]) && write_models(arguments[1]);
     return ok ? 0 : 1;
 }

@@ -93,6 +93,23 @@ class WithoutAWindow(Viewer):
         # Rounding in the order of the passes: a step of 8 bits here and there.
         self.assertLess(difference(self.folder / "view.png", self.folder / "render.png"), 0.05)
 
+    def test_motion_may_travel_as_video_and_rest_without_loss(self):
+        """It moves for a second or so, a little at a time: what is shown then has been a stream, afterwards not."""
+        moves = [{"mouse": "move", "x": 220 + step / 10, "y": 110, "after": 0.03} for step in range(40)]
+        let_go = {"mouse": "up", "button": "left", "x": 224, "y": 110}
+        states = {}
+        for motion, still in (("h264", "predicted"), ("raw", "raw")):
+            states[motion] = self.replay([rest(8), *HIDE, drag(160, 90, 0, 0)[0], *moves, {"state": "moving"},
+                                          {"screenshot": f"moving-{motion}.png"}, let_go, rest(8), {"state": "rested"},
+                                          {"screenshot": f"rested-{motion}.png"}],
+                                         "--encoding", motion, "--still-encoding", still, "--no-adapt")
+        self.assertEqual([states["h264"][when]["encoding"] for when in ("moving", "rested")], ["h264", "predicted"])
+        self.assertEqual(states["h264"]["rested"]["eye"], states["raw"]["rested"]["eye"])
+        moving, rested, exact = (self.folder / name for name in ("moving-h264.png", "rested-h264.png", "rested-raw.png"))
+        self.assertEqual(difference(rested, exact), 0)
+        # Some of the last steps behind, and what is lost in motion.
+        self.assertTrue(0 < difference(moving, rested) < 5)
+
     def test_a_double_click_focuses_on_what_is_there(self):
         click = [{"mouse": "down", "button": "left", "x": 250, "y": 100, "clicks": clicks} for clicks in (1, 2)]
         states = self.replay([rest(), {"state": "before"}, click[0], {**click[0], "mouse": "up"}, click[1],

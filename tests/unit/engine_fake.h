@@ -248,14 +248,18 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
     renderer->kept_samples = renderer->request.samples + (goes_on ? renderer->kept_samples : 0);
     renderer->kept_request = renderer->request;
     renderer->kept_revision = renderer->scene->revision;
+    const struct frame_request *request = &renderer->request;
+    size_t all_bytes = (size_t)frame_request_bytes(request);
+    size_t attached = (size_t)__builtin_popcount(request->attachments);
     *result = (struct frame_result){
         .width = renderer->request.width,
         .height = renderer->request.height,
-        .size_bytes = (size_t)frame_request_bytes(&renderer->request),
+        .size_bytes = all_bytes - 4 * attached * request->width * request->height,
         .format = renderer->request.format,
         .revision = renderer->scene->revision,
         .samples = renderer->kept_samples,
-        .layers = frame_request_layers(&renderer->request),
+        .layers = frame_request_layers(request),
+        .attachments = request->attachments,
         .primary_rays = 10,
         .shadow_rays = 5,
         .secondary_rays = 1,
@@ -263,9 +267,9 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         .structure_bytes = renderer->pose_count,
         .times = renderer->times,
     };
-    result->pixels = malloc(result->size_bytes);
+    result->pixels = malloc(all_bytes);
     assert_non_null(result->pixels);
-    memset(result->pixels, atomic_fetch_add(&fake.frames_done, 1), result->size_bytes);
+    memset(result->pixels, atomic_fetch_add(&fake.frames_done, 1), all_bytes);
     fake_end_frame(renderer);
     return FRAME_DONE;
 }

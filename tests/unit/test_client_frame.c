@@ -160,6 +160,97 @@ static void a_damaged_predicted_frame_is_refused(void **state)
     free(packed);
 }
 
+/* A frame with what is attached: *bytes is malloc'ed. */
+static struct message_frame_begin make_attached(enum protocol_encoding encoding, unsigned attachments,
+                                                const uint8_t *depth, const uint8_t *normals, uint8_t **bytes)
+{
+    const enum encoding numbers[] = {ENCODING_RAW, ENCODING_ZSTD, ENCODING_JPEG, ENCODING_RAW, ENCODING_PREDICTED};
+    const struct picture parts[3] = {
+        {WIDTH, HEIGHT, 4, pixels}, {WIDTH, HEIGHT, 4, depth}, {WIDTH, HEIGHT, 4, normals}};
+    size_t counts[3] = {0}, used = 0;
+    *bytes = malloc(4 * PIXELS_BYTES);
+    assert_non_null(*bytes);
+    for (unsigned i = 0; i < 3; i++) {
+        uint8_t *encoded = NULL;
+        struct error failure = {0};
+        if (i > 0 && (attachments & i) == 0)
+            continue;
+        assert_true(encoder_encode(i == 0 ? numbers[encoding] : ENCODING_PREDICTED, &parts[i], 1, &encoded,
+                                   &counts[i], &failure));
+        memcpy(*bytes + used, encoded, counts[i]);
+        used += counts[i];
+        free(encoded);
+    }
+    struct message_frame_begin message = some_begin(encoding, counts[0]);
+    message.attachments = attachments;
+    message.depth_bytes = counts[1];
+    message.normal_bytes = counts[2];
+    return message;
+}
+
+static void what_is_attached_arrives_beside_any_encoding(void **state)
+{
+    (void)state;
+    float depth[WIDTH * HEIGHT];
+    uint8_t normals[PIXELS_BYTES];
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++)
+        depth[i] = 1.5f + (float)(i % WIDTH) / 7;
+    for (size_t i = 0; i < sizeof normals; i++)
+        normals[i] = (uint8_t)(i * 3);
+    for (unsigned i = 0; i < 4 * PROTOCOL_ENCODING_COUNT; i++) {
+        const enum protocol_encoding encoding = (enum protocol_encoding)(i / 4);
+        struct fl_assembly assembly = some_assembly(encoding);
+        assembly.expected.attachments = i % 4;
+        uint8_t *bytes;
+        const struct message_frame_begin message =
+            make_attached(encoding, i % 4, (const uint8_t *)depth, normals, &bytes);
+        const size_t count = (size_t)(message.size_bytes + message.depth_bytes + message.normal_bytes);
+        assert_true(begin(&assembly, &message) && give(&assembly, bytes, count, 0));
+        struct fl_frame *frame = end(&assembly);
+        assert_non_null(frame);
+        assert_int_equal(frame->wire_bytes, count);
+        assert_int_equal(frame->depth != NULL, (i & FL_ATTACH_DEPTH) != 0);
+        assert_int_equal(frame->normals != NULL, (i & FL_ATTACH_NORMALS) != 0);
+        if (frame->depth != NULL)
+            assert_memory_equal(frame->depth, depth, sizeof depth);
+        if (frame->normals != NULL)
+            assert_memory_equal(frame->normals, normals, sizeof normals);
+        if (encoding == PROTOCOL_ENCODING_H264)
+            assert_true(frame->encoded_bytes == sizeof pixels && frame->pixels == NULL);
+        else if (encoding != PROTOCOL_ENCODING_JPEG)
+            assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+        fl_frame_destroy(frame);
+        fl_assembly_finish(&assembly);
+        free(bytes);
+    }
+}
+
+static void attachments_that_cannot_be_are_refused(void **state)
+{
+    (void)state;
+    for (unsigned i = 0; i < 6; i++) {
+        struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+        assembly.expected.attachments = FL_ATTACH_DEPTH;
+        uint8_t *bytes;
+        struct message_frame_begin message =
+            make_attached(PROTOCOL_ENCODING_RAW, FL_ATTACH_DEPTH, pixels, pixels, &bytes);
+        message.attachments = i == 0 ? 0 : i == 1 ? 3 : message.attachments;
+        message.depth_bytes = i == 2 ? 0 : i == 3 ? 4 * PIXELS_BYTES : message.depth_bytes;
+        message.normal_bytes = i == 4 ? 10 : 0;
+        if (i == 5) { /* damaged on the way */
+            bytes[PIXELS_BYTES + 4] ^= 0xff;
+            assert_true(begin(&assembly, &message));
+            assert_true(give(&assembly, bytes, PIXELS_BYTES + (size_t)message.depth_bytes, 0));
+            assert_null(end(&assembly));
+        } else if (begin(&assembly, &message)) {
+            fail_msg("change %u was not noticed", i);
+        }
+        assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+        fl_assembly_finish(&assembly);
+        free(bytes);
+    }
+}
+
 static unsigned long make_jpeg(unsigned width, unsigned height, uint8_t **packed)
 {
     unsigned long count = 0;
@@ -406,6 +497,8 @@ int main(void)
         cmocka_unit_test(a_zstd_frame_arrives),
         cmocka_unit_test(a_predicted_frame_arrives_in_every_pixel_format),
         cmocka_unit_test(a_damaged_predicted_frame_is_refused),
+        cmocka_unit_test(what_is_attached_arrives_beside_any_encoding),
+        cmocka_unit_test(attachments_that_cannot_be_are_refused),
         cmocka_unit_test(a_jpeg_frame_arrives_with_an_opaque_alpha),
         cmocka_unit_test(a_jpeg_of_another_size_is_refused),
         cmocka_unit_test(a_damaged_jpeg_is_refused),

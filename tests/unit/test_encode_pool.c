@@ -118,6 +118,38 @@ static void frames_that_stand_alone_do_not_wait_for_the_stream(void **state)
     end(&fixture);
 }
 
+static void what_is_attached_lies_behind_the_picture(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    begin(&fixture, 2);
+    for (uint32_t attachments = 0; attachments <= 3; attachments++) {
+        struct engine_frame *made = new_frame(attachments % 2 ? ENCODING_H264 : ENCODING_RAW, attachments);
+        const size_t plane_bytes = (size_t)4 * WIDTH * HEIGHT;
+        made->result.attachments = attachments;
+        made->result.pixels = realloc(made->result.pixels, 3 * plane_bytes);
+        assert_non_null(made->result.pixels);
+        memset(made->result.pixels + plane_bytes, 3, 2 * plane_bytes);
+        uint64_t position = job_output_reserve(fixture.output);
+        assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
+        struct engine_event *event = next(&fixture);
+        const struct engine_frame *frame = event->frame;
+        assert_int_equal(frame->depth_bytes > 0, (attachments & ATTACHMENT_DEPTH) != 0);
+        assert_int_equal(frame->normal_bytes > 0, (attachments & ATTACHMENT_NORMALS) != 0);
+        assert_true(frame->depth_bytes < 200 && frame->normal_bytes < 200); /* planes that are the same all over */
+        size_t picture_bytes = frame->size_bytes - frame->depth_bytes - frame->normal_bytes;
+        if (frame->encoding == ENCODING_RAW)
+            assert_int_equal(picture_bytes, plane_bytes);
+        const uint8_t *behind = frame->bytes + picture_bytes, magic[] = {0x28, 0xb5, 0x2f, 0xfd}; /* Zstandard's */
+        if (frame->depth_bytes)
+            assert_memory_equal(behind, magic, sizeof magic);
+        if (frame->normal_bytes)
+            assert_memory_equal(behind + frame->depth_bytes, magic, sizeof magic);
+        engine_event_destroy(event);
+    }
+    end(&fixture);
+}
+
 /* What is left over, under the address sanitizer. */
 static void a_pool_that_ends_drops_what_waits_in_a_lane(void **state)
 {
@@ -145,6 +177,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_stream_is_encoded_in_order_by_however_many_threads),
         cmocka_unit_test(frames_that_stand_alone_do_not_wait_for_the_stream),
+        cmocka_unit_test(what_is_attached_lies_behind_the_picture),
         cmocka_unit_test(a_pool_that_ends_drops_what_waits_in_a_lane),
         cmocka_unit_test(frames_of_a_closed_output_are_not_encoded),
     };

@@ -12,8 +12,8 @@
 #include <cmocka.h>
 
 typedef int fuzz_one_fn(const uint8_t *data, size_t size);
-fuzz_one_fn fuzz_one_codec, fuzz_one_framing, fuzz_one_handshake, fuzz_one_scene, fuzz_one_sealed,
-    fuzz_one_session;
+fuzz_one_fn fuzz_one_gltf, fuzz_one_nff, fuzz_one_obj, fuzz_one_codec, fuzz_one_framing, fuzz_one_handshake,
+    fuzz_one_scene, fuzz_one_sealed, fuzz_one_session;
 
 /* In a block of its own size, so that a sanitizer sees a read beyond it. */
 static uint8_t *read_file(const char *path, size_t *size_bytes)
@@ -64,6 +64,24 @@ static void framing(void **state)
     run("framing", fuzz_one_framing);
 }
 
+static void obj(void **state)
+{
+    (void)state;
+    run("obj", fuzz_one_obj);
+}
+
+static void nff(void **state)
+{
+    (void)state;
+    run("nff", fuzz_one_nff);
+}
+
+static void gltf(void **state)
+{
+    (void)state;
+    run("gltf", fuzz_one_gltf);
+}
+
 static void handshake(void **state)
 {
     (void)state;
@@ -91,7 +109,8 @@ static void session(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(codec), cmocka_unit_test(framing), cmocka_unit_test(handshake),
+        cmocka_unit_test(codec), cmocka_unit_test(gltf),    cmocka_unit_test(nff),
+        cmocka_unit_test(obj),   cmocka_unit_test(framing), cmocka_unit_test(handshake),
         cmocka_unit_test(scene), cmocka_unit_test(session), cmocka_unit_test(sealed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -313,6 +313,23 @@ static void who_had_a_very_long_slice_does_not_pay_for_it_for_ever(void **state)
     assert_true(simulation.longest_wait_ns[first] >= SCHEDULE_WAIT_MAX_NS);
 }
 
+static void a_slice_that_the_machine_interrupts_costs_no_turns(void **state)
+{
+    (void)state;
+    struct simulation simulation = {0};
+    for (size_t i = 0; i < JOBS_MAX; i++)
+        add(&simulation, i, 1, MS / 4);
+    serve_for(&simulation, 200 * MS);
+    simulation.slice_ns[7] = 40 * MS;
+    while (serve(&simulation) != 7)
+        continue;
+    simulation.slice_ns[7] = MS / 4;
+    memset(simulation.longest_wait_ns, 0, sizeof simulation.longest_wait_ns);
+    memset(simulation.waited_ns, 0, sizeof simulation.waited_ns);
+    serve_for(&simulation, 1000 * MS);
+    assert_true(simulation.longest_wait_ns[7] <= JOBS_MAX * (SCHEDULE_OUTLIER_MIN_NS + MS / 4));
+}
+
 static void short_frames_come_as_often_as_they_are_due_beside_many_long_ones(void **state)
 {
     (void)state;
@@ -345,6 +362,7 @@ int main(void)
         cmocka_unit_test(a_frame_that_is_looked_at_is_finished_before_another_is_begun),
         cmocka_unit_test(a_long_frame_does_not_keep_the_turn_for_ever),
         cmocka_unit_test(who_had_a_very_long_slice_does_not_pay_for_it_for_ever),
+        cmocka_unit_test(a_slice_that_the_machine_interrupts_costs_no_turns),
         cmocka_unit_test(short_frames_come_as_often_as_they_are_due_beside_many_long_ones),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -124,7 +124,7 @@ static void told_nothing(void)
 }
 
 /* A frame of a view, that shows a command and was taken up, read back and encoded at 100, 200 and 300 ns. */
-static void say_frame_of(uint32_t request, uint32_t number, uint64_t command, size_t bytes)
+static struct engine_event *frame_of(uint32_t request, uint32_t number, uint64_t command, size_t bytes)
 {
     struct engine_event *made = calloc(1, sizeof *made);
     struct engine_frame *frame = calloc(1, sizeof *frame);
@@ -149,6 +149,20 @@ static void say_frame_of(uint32_t request, uint32_t number, uint64_t command, si
     frame->key_frame = true;
     frame->quality = 77;
     stage_times_begin(&frame->result.times);
+    return made;
+}
+
+static void say_frame_of(uint32_t request, uint32_t number, uint64_t command, size_t bytes)
+{
+    assert_true(queue_push(engine.events, frame_of(request, number, command, bytes)));
+}
+
+static void say_frame_with(uint32_t request, uint32_t number, size_t depth_bytes, size_t normal_bytes)
+{
+    struct engine_event *made = frame_of(request, number, 0, FRAME_BYTES);
+    made->frame->result.attachments = ATTACHMENT_DEPTH | ATTACHMENT_NORMALS;
+    made->frame->depth_bytes = depth_bytes;
+    made->frame->normal_bytes = normal_bytes;
     assert_true(queue_push(engine.events, made));
 }
 
@@ -403,11 +417,10 @@ static void who_has_no_credit_left_is_told_that_nothing_comes(void **state)
     engine_command_destroy(start);
 }
 
-/* Frame 1 is on its way and not acknowledged; the link was slow before, and there may be one of its kind at once.
- */
-static void a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera(void **state)
+/* Frame 1 is on its way and not acknowledged, and the link was slow before, so that frame 2 has waited for it when
+ * a newer camera has long come. */
+static struct engine_command *let_a_frame_wait(enum encoding encoding)
 {
-    (void)state;
     open_scene(1, 1);
     struct message message = view_message(100);
     message.render.frames_per_second = 100000;
@@ -422,13 +435,34 @@ static void a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera(void *
     take_frame(2, 1);
     /* The next one is begun when that one is expected to have come, and waits for it. */
     told_credit(2, 3);
-    say_frame(2, 2, 0);
+    struct engine_event *late = frame_of(2, 2, 0, FRAME_BYTES);
+    late->frame->encoding = encoding;
+    assert_true(queue_push(engine.events, late));
     send_camera(8, true);
     told_and_forgotten(ENGINE_VIEW_LOOK);
     usleep(20000);
     send_ack(1, true, false);
+    return start;
+}
+
+static void a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera(void **state)
+{
+    (void)state;
+    struct engine_command *start = let_a_frame_wait(ENCODING_JPEG);
     told_credit(2, 4); /* instead of frame 2 */
     say_frame(2, 3, 8);
+    take_frame(2, 3);
+    engine_command_destroy(start);
+}
+
+/* Those behind it tell what is different from it, key frame or not. */
+static void a_frame_of_a_stream_comes_however_long_it_waits(void **state)
+{
+    (void)state;
+    struct engine_command *start = let_a_frame_wait(ENCODING_H264);
+    take_frame(2, 2);
+    say_frame(2, 3, 8);
+    send_ack(2, true, false);
     take_frame(2, 3);
     engine_command_destroy(start);
 }
@@ -697,6 +731,30 @@ static void video_needs_the_word_of_both_sides_and_a_view_of_8_bits(void **state
     engine_command_destroy(command);
 }
 
+static void what_a_view_attaches_is_told_on_and_announced(void **state)
+{
+    (void)state;
+    open_scene(1, 1);
+    struct message message = made(MESSAGE_RENDER); /* a batch has layers */
+    message.render.scene = 1;
+    message.render.channel = CHANNEL;
+    message.render.attachments = 1;
+    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.attachments");
+    message = view_message(4);
+    message.render.attachments = 3;
+    send_message(3, 0, &message);
+    struct engine_command *command = told(ENGINE_JOB_START);
+    assert_int_equal(command->job.frame.attachments, ATTACHMENT_DEPTH | ATTACHMENT_NORMALS);
+    engine_command_destroy(command);
+    say_frame_with(3, 1, 30, 20);
+    struct message_frame_begin begin;
+    expect_frame(3, 1, &begin);
+    assert_int_equal(begin.attachments, 3);
+    assert_int_equal(begin.size_bytes, FRAME_BYTES - 50);
+    assert_int_equal(begin.depth_bytes, 30);
+    assert_int_equal(begin.normal_bytes, 20);
+}
+
 static void video_without_the_word_for_it_is_refused(void **state)
 {
     (void)state;
@@ -943,6 +1001,7 @@ int main(void)
         BOTH(a_key_frame_is_wished_of_the_engine),
         BOTH(who_has_no_credit_left_is_told_that_nothing_comes),
         BOTH(a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera),
+        BOTH(a_frame_of_a_stream_comes_however_long_it_waits),
         BOTH(a_view_that_adapts_tells_the_engine_what_the_link_carries),
         BOTH(a_view_takes_the_place_of_another_on_its_channel),
         BOTH(a_frame_under_way_comes_whole_before_the_answer),
@@ -952,6 +1011,7 @@ int main(void)
         BOTH(a_view_may_be_cancelled_while_another_takes_its_place),
         BOTH(a_client_that_vanishes_takes_its_view_along),
         BOTH(a_view_that_cannot_be_is_refused_by_its_field),
+        BOTH(what_a_view_attaches_is_told_on_and_announced),
         BOTH(video_without_the_word_for_it_is_refused),
         cmocka_unit_test_setup_teardown(video_needs_the_word_of_both_sides_and_a_view_of_8_bits, set_up_ungreeted,
                                         tear_down),
