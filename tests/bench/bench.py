@@ -3,7 +3,7 @@
 """`make bench`: where the time goes, in tables and as JSON. Usage: bench.py BUILD_FOLDER [PART ..] [--out FOLDER]
 
 Parts: start, oneshot, frames, animation, tracers, forms, family, pixels, rays, parallel, instances, refit, flake, distributed,
-steps, link, ldc, abuffer, reach; all of them where none is named. Each figure is the median of several runs after a
+steps, link, view, ldc, abuffer, reach; all of them where none is named. Each figure is the median of several runs after a
 warm-up, with the median absolute deviation beside it; what is compared takes turns, run by run. Scenes of FARLIGHT_SCENES
 (default: ../shared/scenes beside the checkout) are left out, and named, where missing.
 
@@ -13,7 +13,7 @@ embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are obje
 and runs; keys end with their unit. tracers, reach, family, pixels and rays have `results`, one for each call of
 bench_tracers: title, triangles, spheres, instances, width, height, rays_per_pixel, `structures` (tracer, form, build,
 memory_bytes) and `waves` (kind, order, any, rays, `measures`: tracer, form, way, time, rays_per_s, agreement).
-`distributed` is described in bench_frames.py, `steps` in bench_steps.py, `link` in bench_link.py, `ldc` in bench_ldc.py,
+`distributed` is described in bench_frames.py, `steps` in bench_steps.py, `link` in bench_link.py, `view` in bench_view.py, `ldc` in bench_ldc.py,
 `abuffer` in bench_abuffer.py. `wanted` has the lines that are to be reached: line, wanted, measured, met, within_spread
 (missed by no more than twice its deviation), where.
 
@@ -38,6 +38,7 @@ import bench_link
 import bench_rays
 import bench_reach
 import bench_steps
+import bench_view
 from bench_common import Bench, Failure, command, environment, say
 
 # name: (title, measure, show)
@@ -59,6 +60,7 @@ PARTS = {
                     bench_frames.show_distributed),
     "steps": ("Steps of a frame", bench_steps.measure, bench_steps.show),
     "link": ("A sealed connection beside an open one", bench_link.measure, bench_link.show),
+    "view": ("Views whose camera moves", bench_view.measure, bench_view.show),
     "ldc": ("Layered depth cubes", bench_ldc.measure, bench_ldc_show.show),
     "abuffer": ("Voxels and A-buffers", bench_abuffer.measure, bench_abuffer_show.show),
     "reach": ("bvh beside Embree", bench_rays.measure_reach, bench_rays.show_reach),
@@ -127,9 +129,9 @@ def measure(bench, names, document, out):
         print(part_section(name, document["parts"][name]), flush=True)
 
 
-def run(build, names, out, runs=None, tiny=False):
+def run(build, names, out, runs=None, tiny=False, link_seconds=60):
     """Measures, writes, prints. Returns what went wrong, as texts."""
-    bench = Bench(build, runs, tiny)
+    bench = Bench(build, runs, tiny, link_seconds)
     folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-bench-"))
     try:
         command(bench.program("tests/tools/make_scenes"), folder, *([] if tiny else ["150"]))
@@ -155,6 +157,7 @@ def main():
     parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out"), help="where the tables go (out)")
     parser.add_argument("--runs", type=int, help="how many runs a figure has (3 to 9)")
+    parser.add_argument("--link-seconds", type=int, default=60, help="how long the part view looks over a slow link (60)")
     parser.add_argument("--tiny", action="store_true", help="the smallest scenes only: shows that it works, measures nothing")
     arguments = parser.parse_args()
     unknown = [name for name in arguments.parts if name not in PARTS]
@@ -162,7 +165,10 @@ def main():
         parser.error(f"no part is called {', '.join(unknown)}; there are {', '.join(PARTS)}")
     if arguments.runs is not None and not 1 <= arguments.runs <= 64:
         parser.error("between 1 and 64 runs")
-    faults = run(arguments.build, arguments.parts or list(PARTS), arguments.out, arguments.runs, arguments.tiny)
+    if not 2 <= arguments.link_seconds <= 3600:
+        parser.error("between 2 and 3600 seconds")
+    faults = run(arguments.build, arguments.parts or list(PARTS), arguments.out, arguments.runs, arguments.tiny,
+                 arguments.link_seconds)
     for fault in faults:
         print(f"bench: {fault}", file=sys.stderr)
     print(f"{arguments.out / 'bench.txt'}\n{arguments.out / 'bench.json'}")

@@ -19,11 +19,12 @@ class Failure(Exception):
 class Bench:
     """One run of the benchmark: where the programs lie, how often, and what went wrong on the way."""
 
-    def __init__(self, build, runs=None, tiny=False):
+    def __init__(self, build, runs=None, tiny=False, link_seconds=60):
         self.build = pathlib.Path(build).resolve()
         self.shared = pathlib.Path(os.environ.get("FARLIGHT_SCENES", ROOT.parent / "shared" / "scenes"))
         self.runs = runs
         self.tiny = tiny  # the smallest scene and one run: for the test of the benchmark itself
+        self.link_seconds = link_seconds  # of a view over a slow link
         self.scenes = None  # folder of the bundled scenes
         self.faults = []
         os.environ.setdefault("FARLIGHT_LIBEXEC", str(self.build))  # for clients among the programs below it
@@ -118,7 +119,7 @@ def with_spread(value):
     """'12.3 ±2%' of a figure."""
     if value is None:
         return "-"
-    share = 100 * value["deviation"] / value["median"] if value["median"] else 0
+    share = 100 * value["deviation"] / abs(value["median"]) if value["median"] else 0
     return f"{significant(value['median'])} ±{share:.0f}%"
 
 

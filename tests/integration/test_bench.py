@@ -20,9 +20,10 @@ import bench_ldc  # noqa: E402  pylint: disable=wrong-import-position
 import bench_plot  # noqa: E402  pylint: disable=wrong-import-position
 import bench_rays  # noqa: E402  pylint: disable=wrong-import-position
 import bench_reach  # noqa: E402  pylint: disable=wrong-import-position
+import bench_view  # noqa: E402  pylint: disable=wrong-import-position
 
 TRACED = ("tracers", "family", "pixels", "rays", "flake", "reach")  # results of bench_tracers
-PARTS = ("frames", "distributed", "steps", "link", "tracers", "family", "pixels", "rays", "parallel", "instances",
+PARTS = ("frames", "distributed", "steps", "link", "view", "tracers", "family", "pixels", "rays", "parallel", "instances",
          "refit", "flake", "ldc", "abuffer", "reach")
 
 
@@ -171,6 +172,26 @@ class Benchmark(unittest.TestCase):
         data = self.document["parts"]["link"]
         for end in ("daemon", "client"):
             self.assertGreater(data["sealed"][end]["median"], data["open"][end]["median"])
+
+    def test_views_are_measured_from_the_camera_to_the_decoded_frame(self):
+        data = self.document["parts"]["view"]
+        self.assertLessEqual({"raw", "jpeg"}, {rate["encoding"] for rate in data["rates"]})
+        for rate in data["rates"]:
+            self.assertGreater(rate["share"]["median"], 0)
+            self.assertLess(rate["share"]["median"], 1.1)  # stages of several frames overlap, those of one kind do not
+        alone, beside = data["latencies"]
+        self.assertEqual((alone["stages"], beside["stages"]), (1, 2))
+        self.assertGreater(alone["p99_ms"]["median"], 0)  # a frame cannot come before what it is made of
+        self.assertLess(0, data["processor"]["median"])
+        self.assertEqual(len(data["viewers"]["frames"]), data["viewers"]["count"])
+        self.assertGreater(min(data["viewers"]["frames"]), 0)
+        for link in data["links"]:
+            if "why" not in link:
+                self.assertGreater(link["delay_ms"][0]["least"], 2 * bench_view.LINK_DELAY_MS)
+                self.assertLess(link["mbit_per_s"], bench_view.LINK_KBIT_PER_S / 1000)
+        text = (self.out / "bench.txt").read_text()
+        for row in data["wanted"]:
+            self.assertIn(row["line"], text)
 
     def test_steps_are_told_by_stage(self):
         forms = self.document["parts"]["steps"]["results"][0]["forms"]
