@@ -29,6 +29,8 @@ struct fl_view {
     uint32_t next_frame; /* the least number that the next one may have */
     uint32_t last_frame; /* the last one that came whole .. */
     bool has_frame;      /* .. if there is one */
+    bool owes_ack;       /* of that frame, and .. */
+    bool owes_credit;    /* .. there was no room to send it */
     struct asked asked[ASKED_MAX];
     size_t asked_count;
     uint64_t changes;
@@ -193,11 +195,25 @@ static bool acknowledge(struct fl_view *view, uint32_t frame, bool whole, struct
 {
     struct message message;
     fill_ack(&message, view, frame, whole);
-    /* A daemon that takes nothing learns nothing. */
-    if (!fl_stream_has_room(&view->connection->stream))
+    /* Beside an upload there may be none. A later one of the first kind would tell nothing. */
+    const bool has_room = fl_stream_has_room(&view->connection->stream);
+    view->owes_ack = whole ? !has_room : view->owes_ack;
+    if (!has_room)
         return true;
     return fl_stream_push(&view->connection->stream, 0, 0, &message, error) &&
            fl_stream_write(&view->connection->stream, error);
+}
+
+/* What found no room before: the daemon may send nothing until it comes. */
+static bool send_owed(struct fl_view *view, struct fl_error *error)
+{
+    struct fl_error ignored;
+    if (!fl_stream_has_room(&view->connection->stream))
+        return true;
+    if (view->owes_ack && !acknowledge(view, view->last_frame, true, error))
+        return fl_connection_break(view->connection, error);
+    view->owes_credit = view->owes_credit && !tell_credit(view, &ignored);
+    return true;
 }
 
 static bool take_end(struct fl_view *view, uint64_t change, const struct message *message, struct fl_error *error)
@@ -286,7 +302,7 @@ struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct 
     *error = (struct fl_error){0};
     while (view->done.count == 0) {
         struct fl_received ignored; /* a late answer to something given up */
-        if (!check(view, error))
+        if (!check(view, error) || !send_owed(view, error))
             return NULL;
         if (view->failure.code != FL_ERROR_NONE) {
             *error = view->failure;
@@ -304,7 +320,7 @@ struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct 
     /* That the connection is lost is told by the next call. */
     struct fl_error ignored;
     view->credit++;
-    tell_credit(view, &ignored);
+    view->owes_credit = !tell_credit(view, &ignored);
     return frame;
 }
 

@@ -3,6 +3,7 @@
  * credit, a view that another takes the place of, a job beside it, and what a hostile daemon may try. */
 #include "played_daemon.h"
 
+#include <semaphore.h>
 #include <xxhash.h>
 
 #define EDGE 16u
@@ -558,6 +559,52 @@ static void a_connection_that_is_lost_within_a_frame_is_told_and_nothing_waits_f
     assert_int_equal(seen.acks, 0);
 }
 
+/* Reads nothing from its first frame on until it is told to, and sends the next one once both the acknowledgement
+ * and the credit for it have come. */
+static sem_t may_read;
+
+static void play_busy(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    uint32_t number = 0;
+    struct message_frame_begin frame = some_frame(number++, 0);
+    greet(daemon);
+    if (!look(daemon, &header, &message))
+        return;
+    const uint32_t request = header.request;
+    tell_frame(daemon, request, &frame);
+    sem_wait(&may_read);
+    while (look(daemon, &header, &message)) {
+        if (number > 1 || seen.acks == 0 || seen.credit <= IN_FLIGHT)
+            continue;
+        frame = some_frame(number++, 0);
+        tell_frame(daemon, request, &frame);
+    }
+}
+
+static void what_had_no_room_beside_much_else_is_acknowledged_later(void **state)
+{
+    (void)state;
+    sem_init(&may_read, 0, 0);
+    struct daemon *daemon = start(play_busy);
+    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+    struct fl_view *view = start_view(&scene);
+    /* Sending ends where there is no room for a message of any size. */
+    while (fl_view_look(view, &some_camera, NULL, &error))
+        continue;
+    check_error(FL_ERROR_TIMEOUT, "nothing more");
+    fl_frame_destroy(next_frame(view));
+    sem_post(&may_read);
+    fl_frame_destroy(next_frame(view));
+    fl_view_destroy(view);
+    fl_connection_destroy(scene.connection);
+    stop(daemon);
+    sem_destroy(&may_read);
+    assert_int_equal(seen.acks, 2);
+    assert_int_equal(seen.credit, IN_FLIGHT + 2);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -570,6 +617,7 @@ int main(void)
         cmocka_unit_test_setup(frames_that_nothing_allows_break_the_connection, begin),
         cmocka_unit_test_setup(more_frames_than_credit_break_the_connection, begin),
         cmocka_unit_test_setup(a_frame_in_h264_is_left_to_the_caller, begin),
+        cmocka_unit_test_setup(what_had_no_room_beside_much_else_is_acknowledged_later, begin),
         cmocka_unit_test_setup(a_connection_that_is_lost_within_a_frame_is_told_and_nothing_waits_for_ever, begin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
