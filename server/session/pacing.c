@@ -7,6 +7,9 @@
 #define WINDOW_NS UINT64_C(10000000000)
 /* How much of what was learned about the link stays with each frame: eight frames count most. */
 #define CARRIED_FADES 0.875
+/* A client says when frames have come, however late; this long is for ever, and still a time that can be added to
+ * one. */
+#define WAIT_MAX_NS 0x1p61
 /* A local socket takes no time that could be measured; this keeps the rate finite. */
 #define CARRIED_LEAST_NS 1000.0
 /* The part of the link that frames are made to fit: what is left drains queues of others, and our own. */
@@ -62,7 +65,8 @@ uint64_t pacing_wait_ns(const struct pacing *pacing, unsigned coming)
     if (!(over_bytes > 0.0))
         return 0;
     /* However large it is, it may go when nothing else is under way. */
-    return (uint64_t)ceil(fmin(over_bytes, before_bytes) / pacing->carried_bytes * pacing->carried_ns);
+    double wait_ns = ceil(fmin(over_bytes, before_bytes) / pacing->carried_bytes * pacing->carried_ns);
+    return (uint64_t)fmin(wait_ns, WAIT_MAX_NS);
 }
 
 bool pacing_may_send(const struct pacing *pacing)

@@ -382,6 +382,18 @@ static void the_wait_for_the_next_frame_is_what_has_to_drain(void **state)
     assert_false(pacing_may_send(&pacing));
 }
 
+static void a_wait_beyond_all_measure_is_still_one(void **state)
+{
+    (void)state;
+    const uint64_t month_ns = 30 * 86400 * S;
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    pacing_sent(&pacing, 0, 1, 0);
+    pacing_acknowledged(&pacing, 0, true, month_ns); /* one byte in a month */
+    pacing_sent(&pacing, 1, UINT32_MAX, month_ns);
+    assert_in_range(pacing_wait_ns(&pacing, 1), month_ns, UINT64_MAX / 4);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -399,6 +411,7 @@ int main(void)
         cmocka_unit_test(does_not_shrink_what_takes_long_at_any_size),
         cmocka_unit_test(does_not_flicker),
         cmocka_unit_test(the_wait_for_the_next_frame_is_what_has_to_drain),
+        cmocka_unit_test(a_wait_beyond_all_measure_is_still_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
