@@ -105,9 +105,7 @@ static size_t unauthenticated_from(const struct hub *hub, const struct address *
     void *value;
     while (hashmap_next(&hub->sessions, &cursor, NULL, &value)) {
         const struct session *session = value;
-        enum connection_state state = session->connection->state;
-        count += (state == CONNECTION_HELLO || state == CONNECTION_WRONG_KEY) &&
-                 address_same_host(&session->peer, peer);
+        count += !session->introduced && address_same_host(&session->peer, peer);
     }
     return count;
 }

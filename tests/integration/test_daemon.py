@@ -338,6 +338,22 @@ class Listening(Case):
         self.assertNotEqual(refused.returncode, 0)
         self.assertIn("--insecure", refused.stderr)
 
+    def test_those_who_hear_why_they_are_refused_count_as_not_introduced(self):
+        """Or one host could have all the places for those who come."""
+        patient = dict(os.environ, FARLIGHT_NETWORK_HANDSHAKE="600000")  # so that this is not why a connection ends
+        with Daemon(listen="tcp:127.0.0.1:0", environment=patient) as daemon:
+            port = int(daemon.ready[-1].rsplit(":", 1)[1])
+            refused = [socket.create_connection(("127.0.0.1", port)) for _ in range(8)]
+            for one in refused:
+                one.settimeout(60)
+                one.sendall(hello(900, 901))
+                self.assertTrue(one.recv(1))  # and does not go away
+            with socket.create_connection(("127.0.0.1", port)) as late:
+                late.settimeout(10)
+                self.assertEqual(late.recv(1), b"")
+            for one in refused:
+                one.close()
+
     def test_bad_options_and_configurations_are_named(self):
         self.assertEqual(farlight_test.run("farlightd", "--no-such-option").returncode, 2)
         self.assertNotEqual(farlight_test.run("farlightd", "--listen", "carrier-pigeon:x").returncode, 0)

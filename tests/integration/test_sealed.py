@@ -230,7 +230,8 @@ class WrongKeys(Case):
     def test_those_who_wait_for_their_refusal_count_as_not_introduced(self):
         for name in ("key", "reader"):
             self.expect(farlight("key", self.folder / name), 0)
-        slowly = dict(os.environ, FARLIGHT_NETWORK_WRONG_KEY="5000", FARLIGHT_LIMITS_WRONG_KEYS="16")
+        slowly = dict(os.environ, FARLIGHT_NETWORK_WRONG_KEY="5000", FARLIGHT_LIMITS_WRONG_KEYS="16",
+                      FARLIGHT_NETWORK_HANDSHAKE="600000")  # so that this is not why the ninth one is closed
         with SealedDaemon(self.folder, environment=slowly) as daemon:
             tries = [try_key(daemon, bytes([i]) * 32) for i in range(8)]
             with daemon.connect() as ninth:
