@@ -168,6 +168,13 @@ static void *run_thread(void *context)
     return NULL;
 }
 
+void engine_set_limits(struct engine *engine, const struct engine_limits *limits)
+{
+    engine->options.limits = *limits;
+    if (!engine->options.limits.lingering_scenes)
+        engine->options.limits.lingering_scenes = ENGINE_LINGERING_SCENES;
+}
+
 /* ---- start and stop ----------------------------------------------------------------------------- */
 
 static void on_encoded(void *context)
@@ -221,8 +228,7 @@ struct engine *engine_create(const struct engine_options *options, struct error 
         engine->options.queue_capacity = QUEUE_CAPACITY_DEFAULT;
     if (!engine->options.frames_in_flight)
         engine->options.frames_in_flight = FRAMES_IN_FLIGHT_DEFAULT;
-    if (!engine->options.lingering_scenes)
-        engine->options.lingering_scenes = ENGINE_LINGERING_SCENES;
+    engine_set_limits(engine, &options->limits);
     if (!engine->options.frame_window_bytes)
         engine->options.frame_window_bytes = ENGINE_FRAME_WINDOW_BYTES;
     pthread_mutex_init(&engine->start_lock, NULL);

@@ -138,6 +138,7 @@ struct engine {
 void engine_post(struct engine *engine, struct engine_event *event); /* NULL: logged as lost */
 void engine_post_done(struct engine *engine, uint64_t client, uint32_t request, uint64_t revision);
 void engine_post_failed(struct engine *engine, uint64_t client, uint32_t request, const struct error *error);
+void engine_set_limits(struct engine *engine, const struct engine_limits *limits);
 void engine_nudge(struct engine *engine); /* any thread: there may be something to do */
 
 /* The failure of what somebody ended; NULL: out of memory. */

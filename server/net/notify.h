@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_NET_NOTIFY_H
 #define FARLIGHT_NET_NOTIFY_H
 
-/* "READY=1", "STOPPING=1". Does nothing where nobody asked to be told. */
+/* "READY=1", "STOPPING=1", "RELOADING=1", one assignment a line. Does nothing where nobody asked to be told. */
 void notify_manager(const char *state);
 
 #endif

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 #include "session/daemon.h"
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "net/notify.h"
 #include "session/session.h"
 
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
@@ -18,17 +20,18 @@
 /* Out of descriptors: a listener stays readable all the time, so it is not watched for this long. */
 #define ACCEPT_PAUSE_NS UINT64_C(100000000)
 
-static void stop_signals(sigset_t *set)
+static void own_signals(sigset_t *set)
 {
     sigemptyset(set);
     sigaddset(set, SIGTERM);
     sigaddset(set, SIGINT);
+    sigaddset(set, SIGHUP);
 }
 
 void daemon_block_signals(void)
 {
     sigset_t set;
-    stop_signals(&set);
+    own_signals(&set);
     sigprocmask(SIG_BLOCK, &set, NULL);
     signal(SIGPIPE, SIG_IGN);
 }
@@ -138,6 +141,17 @@ static void stop(struct daemon *daemon)
     hub_stop(&daemon->hub);
 }
 
+/* systemd's notify-reload wants the time along, to tell this answer from one to a signal before. */
+static void reload(struct daemon *daemon)
+{
+    char state[64];
+    snprintf(state, sizeof state, "RELOADING=1\nMONOTONIC_USEC=%" PRIu64, clock_now_ns() / 1000);
+    notify_manager(state);
+    if (daemon->reload)
+        daemon->reload(daemon->reload_context);
+    notify_manager("READY=1");
+}
+
 static void on_signal(void *context, uint32_t epoll_events)
 {
     (void)epoll_events;
@@ -145,6 +159,11 @@ static void on_signal(void *context, uint32_t epoll_events)
     struct signalfd_siginfo info;
     if (read(daemon->signal_fd, &info, sizeof info) != (ssize_t)sizeof info)
         return;
+    if (info.ssi_signo == SIGHUP) {
+        if (!daemon->hub.stopping)
+            reload(daemon);
+        return;
+    }
     log_write(LOG_INFO, "session", "stopping: %s", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
     stop(daemon);
 }
@@ -168,7 +187,7 @@ static void on_owner_gone(void *context)
 static bool watch_signals(struct daemon *daemon, struct error *error)
 {
     sigset_t set;
-    stop_signals(&set);
+    own_signals(&set);
     daemon->signal_fd = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
     if (daemon->signal_fd < 0)
         return error_set(error, ERROR_INTERNAL, NULL, "signalfd: %s", strerror(errno));

@@ -21,10 +21,13 @@ struct daemon {
     int signal_fd;
     struct loop_watch *signal_watch;
     struct loop_timer accept_timer; /* after which listeners are looked at again */
+    /* Reads the configuration again and hands it to hub_reload(), at SIGHUP; NULL: that changes nothing. */
+    loop_call_fn *reload;
+    void *reload_context;
 };
 
-/* SIGTERM and SIGINT are blocked in the calling thread, to be taken by the loop; before any thread starts, so that
- * all inherit it. SIGPIPE is ignored. */
+/* SIGTERM, SIGINT and SIGHUP are blocked in the calling thread, to be taken by the loop; before any thread starts,
+ * so that all inherit it. SIGPIPE is ignored. */
 void daemon_block_signals(void);
 /* Zeroes it. */
 void daemon_init(struct daemon *daemon);
@@ -35,7 +38,7 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error);
 /* "READY ADDRESS", one line an address, with the port that was chosen; "READY" alone where it listens nowhere. */
 void daemon_print_ready(const struct daemon *daemon, FILE *stream);
-/* Until a signal comes, or the client of daemon_serve_fd() is gone. Says goodbye to all. */
+/* Until SIGTERM or SIGINT comes, or the client of daemon_serve_fd() is gone. Says goodbye to all. */
 bool daemon_run(struct daemon *daemon, struct error *error);
 void daemon_finish(struct daemon *daemon); /* whatever was begun; before the engine is destroyed */
 

@@ -115,17 +115,12 @@ static size_t unauthenticated_from(const struct hub *hub, const struct address *
 bool hub_add_client(struct hub *hub, int fd, const struct address *own, const struct address *peer,
                     struct error *error)
 {
-    const struct auth_keys *keys = &hub->options.keys;
-    const struct connection_entry entry = {
-        .keys = keys->keys,
-        .key_count = keys->count,
-        .sealed_only = !hub->options.insecure && auth_is_beyond_loopback(own, peer),
-    };
+    bool sealed_only = !hub->options.insecure && auth_is_beyond_loopback(own, peer);
     const struct session_limits *limits = &hub->options.limits;
     struct auth_identity identity;
     if (hub->stopping)
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");
-    if (!auth_identify(&identity, fd, peer, hub->options.insecure || keys->count, error))
+    if (!auth_identify(&identity, fd, peer, hub->options.insecure || hub->options.keys.count, error))
         return false;
     bool is_owner = hub->last_number + 1 == hub->owner; /* who does as he likes */
     if (!is_owner && identity.has_user && readers_have(&hub->options.readers, identity.user))
@@ -136,7 +131,7 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
     if (!address_is_unix(peer) && unauthenticated_from(hub, peer) >= limits->unauthenticated_per_address)
         return error_set(error, ERROR_LIMIT, NULL, "%u connections of this host have not introduced themselves",
                          limits->unauthenticated_per_address);
-    struct session *session = session_create(hub, hub->last_number + 1, fd, &entry, peer, &identity, error);
+    struct session *session = session_create(hub, hub->last_number + 1, fd, sealed_only, peer, &identity, error);
     if (!session)
         return false;
     if (!hashmap_put(&hub->sessions, ++hub->last_number, session)) {
@@ -158,6 +153,22 @@ void hub_stop(struct hub *hub)
         session_stop(session);
     if (!hub->sessions.count && hub->emptied)
         hub->emptied(hub->call_context);
+}
+
+bool hub_reload(struct hub *hub, const struct hub_options *options, struct error *error)
+{
+    struct engine_command *command = hub_command(ENGINE_LIMITS, 0, 0);
+    if (!command)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
+    command->limits = options->engine_limits;
+    hub_submit(hub, command);
+    hub->options.limits = options->limits;
+    hub->options.connection_limits = options->connection_limits;
+    hub->options.engine_limits = options->engine_limits;
+    hub->options.readers = options->readers;
+    hub->options.keys = options->keys;
+    blob_store_limit(hub->blobs, options->limits.blob_bytes, options->limits.blob_cache_bytes);
+    return true;
 }
 
 /* ---- life -------------------------------------------------------------------------------------------- */

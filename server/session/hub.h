@@ -24,10 +24,10 @@ struct hub_options {
     struct connection_limits connection_limits;
     struct readers readers; /* of the Unix socket */
     struct engine_port engine;
-    struct timeline *timeline;   /* hears of every frame that was sent; may be NULL */
-    uint64_t scene_memory_bytes; /* of one scene, as the engine has it; told to clients */
-    struct auth_keys keys;       /* with which clients come in sealed, from everywhere */
-    bool insecure;               /* peers beyond loopback are let in without one as well */
+    struct timeline *timeline;          /* hears of every frame that was sent; may be NULL */
+    struct engine_limits engine_limits; /* as the engine has them; partly told to clients */
+    struct auth_keys keys;              /* with which clients come in sealed, from everywhere */
+    bool insecure;                      /* peers beyond loopback are let in without one as well */
 };
 
 struct hub {
@@ -59,6 +59,10 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
                     struct error *error);
 /* Says goodbye to everybody; `emptied` is called when they are gone, at once if there is nobody. */
 void hub_stop(struct hub *hub);
+
+/* Takes over limits, readers and keys, for what is asked for and who comes from now on; the rest stays as it is.
+ * False: out of memory, nothing is changed. */
+bool hub_reload(struct hub *hub, const struct hub_options *options, struct error *error);
 
 /* Hands a command to the engine, now or as soon as it has room. */
 void hub_submit(struct hub *hub, struct engine_command *command);

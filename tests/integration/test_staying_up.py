@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""A daemon that is meant to run for months: told to read its configuration again, and under a service manager."""
+import os
+import pathlib
+import signal
+import socket
+import struct
+import time
+
+import farlight_test
+from farlight_test import Case, Daemon
+from test_daemon import ERROR, LIMIT, OK, SCENE_OPEN, Peer, error_code, text
+
+READ_AGAIN, STAYS = "read again", "stays as it was"
+
+
+class Manager:
+    """A service manager as far as the daemon sees one: it listens to what it is told."""
+
+    def __init__(self, folder):
+        self.path = str(folder / "notify")
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.settimeout(farlight_test.TIMEOUT_S)
+        self.socket.bind(self.path)
+        self.told = []
+
+    def environment(self, **more):
+        return {**os.environ, "NOTIFY_SOCKET": self.path, **more}
+
+    def hear(self):
+        """The next datagram, as a dictionary."""
+        lines = self.socket.recv(4096).decode().splitlines()
+        self.told.append(dict(line.split("=", 1) for line in lines))
+        return self.told[-1]
+
+    def wait_for(self, name):
+        while name not in (one := self.hear()):
+            pass
+        return one
+
+    def close(self):
+        self.socket.close()
+
+
+class Reading(Case):
+    """SIGHUP."""
+
+    def setUp(self):
+        super().setUp()
+        self.config = self.folder / "farlightd.conf"
+        self.manager = Manager(self.folder)
+        self.addCleanup(self.manager.close)
+        self.answers = 0
+
+    def daemon(self, *arguments, **options):
+        return Daemon("--config", self.config, *arguments, environment=self.manager.environment(), **options)
+
+    def reload(self, daemon, words):
+        """Sends the signal, and waits until the daemon has said all that it says."""
+        self.answers += 1
+        before = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
+        daemon.process.send_signal(signal.SIGHUP)
+        told = self.manager.wait_for("RELOADING")
+        self.assertGreaterEqual(int(told["MONOTONIC_USEC"]), before)
+        self.assertEqual(self.manager.hear(), {"READY": "1"})
+        log = daemon.messages()
+        self.assertEqual(log.count(READ_AGAIN) + log.count(STAYS), self.answers, log)
+        self.assertIn(words, log.splitlines()[-1])
+        return log
+
+    def scenes_that_open(self, peer, first, count):
+        """How many of them, of one client, before the limit."""
+        for scene in range(first, first + count):
+            peer.send(SCENE_OPEN, scene, struct.pack("<I", scene), text("x"))
+            kind, payload = peer.answer(scene)
+            if kind == ERROR:
+                self.assertEqual(error_code(payload), LIMIT)
+                return scene - first
+            self.assertEqual(kind, OK)
+        return count
+
+    def test_limits_are_read_again_for_those_who_come_and_those_who_are_there(self):
+        self.config.write_text("[limits]\nscenes = 2\n")
+        with self.daemon() as daemon:
+            before = Peer(daemon)
+            self.assertEqual(self.scenes_that_open(before, 1, 9), 2)
+            self.config.write_text("[limits]\nscenes = 4\n")
+            self.reload(daemon, READ_AGAIN)
+            self.assertEqual(self.scenes_that_open(before, 10, 9), 2)
+            after = Peer(daemon)
+            self.assertEqual(self.scenes_that_open(after, 1, 9), 4)
+            before.close()
+            after.close()
+
+    def test_a_broken_file_changes_nothing_and_is_named_with_its_line(self):
+        self.config.write_text("[limits]\nscenes = 2\n")
+        with self.daemon() as daemon:
+            self.config.write_text("[limits]\nscenes = 4\nrequests = lots\n")
+            log = self.reload(daemon, STAYS)
+            self.assertIn(f"{self.config}:3", log)
+            peer = Peer(daemon)
+            self.assertEqual(self.scenes_that_open(peer, 1, 9), 2)
+            peer.close()
+            self.config.unlink()
+            self.reload(daemon, STAYS)
+            self.config.write_text("[limits]\nscenes = 5\n")
+            self.reload(daemon, READ_AGAIN)
+            peer = Peer(daemon)
+            self.assertEqual(self.scenes_that_open(peer, 1, 9), 5)
+            peer.close()
+
+    def test_what_needs_a_restart_is_named_and_stays(self):
+        self.config.write_text("")
+        with self.daemon() as daemon:
+            self.config.write_text(f"[engine]\nqueue = 64\n[server]\ntrace_file = {self.folder}/trace\n")
+            log = self.reload(daemon, READ_AGAIN)
+            for name in ("engine.queue", "server.trace_file"):
+                line = next(line for line in log.splitlines() if name in line)
+                self.assertIn("restart", line)
+            self.assertFalse((self.folder / "trace").exists())
+            Peer(daemon).close()
+
+    def test_the_command_line_still_goes_first(self):
+        self.config.write_text("[server]\nlog_level = info\n")
+        with self.daemon("--log-level", "debug") as daemon:
+            self.config.write_text("[server]\nlog_level = error\n")
+            log = self.reload(daemon, READ_AGAIN)
+            self.assertNotIn("server.log_level", log)
+            Peer(daemon).close()
+
+    def test_keys_are_read_again(self):
+        keys = [self.folder / name for name in ("key", "other")]
+        for key in keys:
+            self.expect(farlight_test.farlight("key", key), 0)
+        self.config.write_text(f"[server]\nkey_file = {keys[0]}\n[network]\nwrong_key = 0\n")
+        with self.daemon(listen="tcp:127.0.0.1:0") as daemon:
+            address = daemon.ready[0].split()[1]
+
+            def comes_in(key):
+                return farlight_test.farlight("stats", "--server", address, "--key", key).returncode == 0
+
+            self.assertTrue(comes_in(keys[0]))
+            self.assertFalse(comes_in(keys[1]))
+            self.config.write_text(self.config.read_text().replace(str(keys[0]), str(keys[1])))
+            self.reload(daemon, READ_AGAIN)
+            self.assertFalse(comes_in(keys[0]))
+            self.assertTrue(comes_in(keys[1]))
+            keys[1].chmod(0o644)
+            log = self.reload(daemon, STAYS)
+            self.assertIn(str(keys[1]), log.splitlines()[-1])
+            keys[1].chmod(0o600)
+            self.assertTrue(comes_in(keys[1]))
+
+
+if __name__ == "__main__":
+    farlight_test.unittest.main()
