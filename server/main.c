@@ -174,6 +174,15 @@ static void reload(void *context)
     log_write(LOG_INFO, "config", "the configuration was read again");
 }
 
+/* Whoever starts us with sockets knows where they are to be. */
+static bool begin_to_listen(struct daemon *daemon, const struct config *config, bool beyond_loopback,
+                            struct error *error)
+{
+    size_t activated;
+    return daemon_listen_activated(daemon, beyond_loopback, &activated, error) &&
+           (activated || daemon_listen(daemon, config->listen, beyond_loopback, error));
+}
+
 /* `fd` < 0: there is no client yet. */
 static bool serve(struct daemon *daemon, const struct config *config, int fd, bool listens,
                   struct timeline *timeline, struct error *error)
@@ -181,7 +190,7 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, bo
     struct engine_options engine_options;
     struct hub_options options;
     if (!config_engine(config, &engine_options, error) || !read_hub_options(config, listens, &options, error) ||
-        (listens && !daemon_listen(daemon, config->listen, config->insecure || options.keys.count, error)))
+        (listens && !begin_to_listen(daemon, config, config->insecure || options.keys.count, error)))
         return false;
     struct engine *engine = engine_create(&engine_options, error);
     if (!engine)

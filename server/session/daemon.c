@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "net/activation.h"
 #include "net/notify.h"
 #include "session/session.h"
 
@@ -61,6 +62,22 @@ bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loo
         ok = !address[0] || listen_at(daemon, address, beyond_loopback, error);
     free(copy);
     return ok && (daemon->listener_count || error_set(error, ERROR_INVALID, "server.listen", "no address"));
+}
+
+bool daemon_listen_activated(struct daemon *daemon, bool beyond_loopback, size_t *count, struct error *error)
+{
+    char names[DAEMON_LISTENERS_MAX][ACTIVATION_NAME_BYTES];
+    for (size_t i = 0; i < DAEMON_LISTENERS_MAX; i++)
+        activation_name(i, names[i]);
+    *count = activation_take();
+    if (*count > DAEMON_LISTENERS_MAX)
+        return error_set(error, ERROR_LIMIT, "LISTEN_FDS", "at most %d sockets", DAEMON_LISTENERS_MAX);
+    for (size_t i = 0; i < *count; i++) {
+        if (!listener_adopt(&daemon->listeners[i], ACTIVATION_FD_FIRST + (int)i, names[i], beyond_loopback, error))
+            return false;
+        daemon->listener_count++;
+    }
+    return true;
 }
 
 /* ---- clients ----------------------------------------------------------------------------------------- */

@@ -33,6 +33,9 @@ void daemon_block_signals(void);
 void daemon_init(struct daemon *daemon);
 /* Reserves addresses, separated by blanks (at least one); clients wait until daemon_start(). */
 bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loopback, struct error *error);
+/* The same with the sockets that the service manager has handed over; *count: how many these were, 0 if we were
+ * started otherwise. */
+bool daemon_listen_activated(struct daemon *daemon, bool beyond_loopback, size_t *count, struct error *error);
 bool daemon_start(struct daemon *daemon, const struct hub_options *options, struct error *error);
 /* Serves the client at a connected socket, and ends with it. It may listen besides. */
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error);

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
 """A daemon that is meant to run for months: told to read its configuration again, and under a service manager."""
 import os
-import pathlib
 import signal
 import socket
 import struct
+import sys
 import time
 
 import farlight_test
 from farlight_test import Case, Daemon
-from test_daemon import ERROR, LIMIT, OK, SCENE_OPEN, Peer, error_code, text
+from test_daemon import ERROR, LIMIT, OK, SCENE_OPEN, Peer, error_code, hello, text
 
 READ_AGAIN, STAYS = "read again", "stays as it was"
 
@@ -40,6 +40,82 @@ class Manager:
 
     def close(self):
         self.socket.close()
+
+
+# Becomes the daemon with the descriptors that are named first, as a service manager hands them over.
+LAUNCHER = """
+import os, sys
+fds = [int(word) for word in sys.argv[1].split(",")]
+for place, fd in enumerate(fds):
+    os.dup2(fd, 100 + place)
+for place in range(len(fds)):
+    os.dup2(100 + place, 3 + place)
+os.environ["LISTEN_PID"] = str(os.getpid() + (sys.argv[2] == "another"))
+os.execv(sys.argv[3], sys.argv[3:])
+"""
+
+
+class Activation(Case):
+    """Sockets that were there before the daemon."""
+
+    def setUp(self):
+        super().setUp()
+        self.elsewhere = self.folder / "elsewhere"
+        self.path = self.folder / "activated"
+        self.unix = socket.socket(socket.AF_UNIX)
+        self.unix.bind(str(self.path))
+        self.tcp = socket.socket()
+        self.tcp.bind(("127.0.0.1", 0))
+        for one in (self.unix, self.tcp):
+            self.addCleanup(one.close)
+
+    def daemon(self, *sockets, whose="own", **more):
+        fds = [one.fileno() for one in sockets]
+        environment = {**os.environ, "LISTEN_FDS": str(len(fds)), "LISTEN_FDNAMES": "first:second", **more}
+        return Daemon(listen=f"unix:{self.elsewhere}", environment=environment, pass_fds=fds,
+                      launcher=[sys.executable, "-c", LAUNCHER, ",".join(map(str, fds)), whose])
+
+    def test_sockets_are_taken_in_place_of_addresses_and_outlive_the_daemon(self):
+        self.unix.listen()
+        self.tcp.listen()
+        address = f"tcp:127.0.0.1:{self.tcp.getsockname()[1]}"
+        for _ in range(2):
+            # Who comes while nobody is there waits.
+            early = socket.socket(socket.AF_UNIX)
+            self.addCleanup(early.close)
+            early.settimeout(farlight_test.TIMEOUT_S)
+            early.connect(str(self.path))
+            early.sendall(hello())
+            with self.daemon(self.unix, self.tcp) as daemon:
+                self.assertEqual(daemon.ready, [f"READY unix:{self.path}"])
+                self.assertEqual(early.recv(4), b"FARL")
+                self.expect(farlight_test.farlight("stats", "--server", address), 0)
+                self.assertFalse(self.elsewhere.exists())
+                self.assertEqual(daemon.stop(), 0)
+            self.assertTrue(self.path.exists())
+
+    def test_those_of_another_process_are_left_alone(self):
+        self.unix.listen()
+        with self.daemon(self.unix, whose="another") as daemon:
+            self.assertEqual(daemon.ready, [f"READY unix:{self.elsewhere}"])
+            Peer(daemon).close()
+
+    def test_what_does_not_listen_is_refused_by_its_name(self):
+        self.tcp.listen()
+        with self.assertRaises(AssertionError) as failure:
+            self.daemon(self.tcp, self.unix).__enter__()
+        self.assertIn("ended with 1", str(failure.exception))
+        self.assertIn("second", str(failure.exception))
+        self.assertIn("Accept=no", str(failure.exception))
+
+    def test_beyond_loopback_the_same_rules_hold(self):
+        everywhere = socket.socket()
+        self.addCleanup(everywhere.close)
+        everywhere.bind(("0.0.0.0", 0))
+        everywhere.listen()
+        with self.assertRaises(AssertionError) as failure:
+            self.daemon(everywhere).__enter__()
+        self.assertIn("--insecure", str(failure.exception))
 
 
 class Reading(Case):
