@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* farlightd: options, and the wiring of the engine to the network.
  * Exit status: 0 when it was stopped (by SIGTERM or SIGINT, after a goodbye to its clients) or its one client is
- * gone; 1 when it cannot start or go on; 2 for wrong usage. */
+ * gone; 1 when it cannot start or go on; 2 for wrong usage; 75 when its GPU is lost for good, which may be
+ * different in a new process. */
 #include "base/log.h"
 #include "base/timeline.h"
 #include "config.h"
@@ -12,6 +13,7 @@
 #include <argp.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sysexits.h>
 
 /* glibc looks for it by name, which -fvisibility=hidden would hide. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlightd " FARLIGHT_VERSION;
@@ -202,7 +204,9 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, bo
         daemon_print_ready(daemon, stdout);
         ok = daemon_run(daemon, error);
     }
+    bool device_gone = daemon->device_gone;
     daemon_finish(daemon);
+    daemon->device_gone = device_gone;
     engine_destroy(engine);
     return ok;
 }
@@ -232,7 +236,8 @@ int main(int argc, char **argv)
         timeline = timeline_create(config.trace_file, config.trace_file_bytes, &error);
     bool ok =
         (timeline || !config.trace_file[0]) && serve(&daemon, &config, arguments.fd, listens, timeline, &error);
+    bool device_gone = daemon.device_gone;
     daemon_finish(&daemon); /* what was begun before it failed */
     timeline_destroy(timeline);
-    return ok ? EXIT_SUCCESS : fail(&error);
+    return !ok ? fail(&error) : device_gone ? EX_TEMPFAIL : EXIT_SUCCESS;
 }

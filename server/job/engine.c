@@ -44,6 +44,11 @@ void engine_post_failed(struct engine *engine, uint64_t client, uint32_t request
     engine_post(engine, event);
 }
 
+void engine_post_device_gone(struct engine *engine)
+{
+    engine_post(engine, event_create(ENGINE_DEVICE_GONE, 0, 0));
+}
+
 struct engine_event *engine_cancelled(uint64_t client, uint32_t request, const char *why)
 {
     struct engine_event *event = event_create(ENGINE_FAILED, client, request);
@@ -132,10 +137,14 @@ static void run(struct engine *engine)
         take_commands(engine, queue_try_pop(engine->commands));
         jobs_reap(engine);
         uint64_t reap_ns = engine_reap_scenes(engine);
+        atomic_fetch_add(&engine->turns, 1);
         if (serve(engine))
             continue;
         uint64_t idle_ns = jobs_idle_ns(engine);
-        take_commands(engine, queue_pop(engine->commands, idle_ns < reap_ns ? idle_ns : reap_ns));
+        atomic_store(&engine->waits, true);
+        struct engine_command *first = queue_pop(engine->commands, idle_ns < reap_ns ? idle_ns : reap_ns);
+        atomic_store(&engine->waits, false);
+        take_commands(engine, first);
     }
 }
 
@@ -314,4 +323,11 @@ void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_
 {
     stage_totals_add(&engine->totals, STAGE_QUEUE, STAGE_CPU, queue_ns);
     stage_totals_add(&engine->totals, STAGE_SEND, STAGE_CPU, send_ns);
+}
+
+bool engine_is_alive(const struct engine *engine, uint64_t *turns)
+{
+    uint64_t before = *turns;
+    *turns = atomic_load(&engine->turns);
+    return atomic_load(&engine->waits) || *turns != before;
 }

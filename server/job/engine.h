@@ -186,7 +186,9 @@ enum engine_event_kind {
     ENGINE_SCENE_DESCRIBED,
     ENGINE_SCENE_CHANGED, /* by another client; `scene` is the client's number for it */
     ENGINE_SCENE_ENDED,   /* one that nobody held: blobs may be unused now. Client 0 */
-    ENGINE_CLIENT_FORGOTTEN
+    ENGINE_CLIENT_FORGOTTEN,
+    /* The device is lost for good: it was too often, or cannot be made anew. All jobs have failed. Client 0 */
+    ENGINE_DEVICE_GONE
 };
 
 struct engine_frame {
@@ -234,6 +236,9 @@ const struct gpu_device_info *engine_device(const struct engine *engine);
 bool engine_submit(struct engine *engine, struct engine_command *command, struct error *error);
 int engine_event_fd(const struct engine *engine);              /* readable while events wait */
 struct engine_event *engine_next_event(struct engine *engine); /* NULL: none waits */
+/* Whether the thread that owns GL has gone on since it was asked last, or has nothing to do. *turns is the
+ * asker's, 0 at first. */
+bool engine_is_alive(const struct engine *engine, uint64_t *turns);
 /* Adds send and queue time of a frame to the totals, once the network side knows them. */
 void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_ns);
 

@@ -21,6 +21,9 @@
 /* Out of descriptors: a listener stays readable all the time, so it is not watched for this long. */
 #define ACCEPT_PAUSE_NS UINT64_C(100000000)
 
+/* In the time in which the service manager wants to hear something. */
+#define WATCHDOG_LOOKS 4
+
 static void own_signals(sigset_t *set)
 {
     sigemptyset(set);
@@ -199,6 +202,28 @@ static void on_owner_gone(void *context)
         stop(daemon);
 }
 
+/* One who tries again may find that it works: another process has another context. */
+static void on_device_gone(void *context)
+{
+    struct daemon *daemon = context;
+    if (daemon->hub.stopping)
+        return;
+    log_write(LOG_ERROR, "session", "stopping: the GPU is lost for good");
+    daemon->device_gone = true;
+    stop(daemon);
+}
+
+/* A driver that hangs cannot be healed from within, so the manager hears nothing more; nor where this thread
+ * hangs. A ping that is left out because of one long slice is made up for by the next. */
+static void on_watchdog_timer(void *context)
+{
+    struct daemon *daemon = context;
+    const struct engine_port *engine = &daemon->hub.options.engine;
+    if (engine->is_alive(engine->context, &daemon->engine_turns))
+        notify_manager("WATCHDOG=1");
+    loop_timer_start(daemon->loop, &daemon->watchdog_timer, daemon->watchdog_ns / WATCHDOG_LOOKS);
+}
+
 /* ---- life -------------------------------------------------------------------------------------------- */
 
 static bool watch_signals(struct daemon *daemon, struct error *error)
@@ -224,8 +249,13 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
     daemon->loop = loop;
     daemon->hub.owner_gone = on_owner_gone;
     daemon->hub.emptied = on_emptied;
+    daemon->hub.device_gone = on_device_gone;
     daemon->hub.call_context = daemon;
     daemon->accept_timer = (struct loop_timer){.call = on_accept_timer, .context = daemon};
+    daemon->watchdog_timer = (struct loop_timer){.call = on_watchdog_timer, .context = daemon};
+    daemon->watchdog_ns = notify_watchdog_ns();
+    if (daemon->watchdog_ns)
+        on_watchdog_timer(daemon);
     if (!watch_signals(daemon, error))
         return false;
     for (size_t i = 0; i < daemon->listener_count; i++) {
@@ -289,6 +319,7 @@ void daemon_finish(struct daemon *daemon)
         close_sessions(daemon);
         loop_watch_remove(daemon->signal_watch);
         loop_timer_stop(daemon->loop, &daemon->accept_timer);
+        loop_timer_stop(daemon->loop, &daemon->watchdog_timer);
         hub_finish(&daemon->hub);
         loop_destroy(daemon->loop);
     }

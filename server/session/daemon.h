@@ -20,7 +20,11 @@ struct daemon {
     size_t listener_count;
     int signal_fd;
     struct loop_watch *signal_watch;
-    struct loop_timer accept_timer; /* after which listeners are looked at again */
+    struct loop_timer accept_timer;   /* after which listeners are looked at again */
+    struct loop_timer watchdog_timer; /* after which the service manager is told that all goes on */
+    uint64_t watchdog_ns;             /* it wants to hear that so often; 0: it does not */
+    uint64_t engine_turns;            /* for engine_is_alive() */
+    bool device_gone;                 /* the engine's is lost for good: that is why it ends */
     /* Reads the configuration again and hands it to hub_reload(), at SIGHUP; NULL: that changes nothing. */
     loop_call_fn *reload;
     void *reload_context;
@@ -41,7 +45,8 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error);
 /* "READY ADDRESS", one line an address, with the port that was chosen; "READY" alone where it listens nowhere. */
 void daemon_print_ready(const struct daemon *daemon, FILE *stream);
-/* Until SIGTERM or SIGINT comes, or the client of daemon_serve_fd() is gone. Says goodbye to all. */
+/* Until SIGTERM or SIGINT comes, the device is lost for good (then `device_gone` is set), or the client of
+ * daemon_serve_fd() is gone. Says goodbye to all. */
 bool daemon_run(struct daemon *daemon, struct error *error);
 void daemon_finish(struct daemon *daemon); /* whatever was begun; before the engine is destroyed */
 

@@ -91,6 +91,8 @@ static void on_engine(void *context, uint32_t epoll_events)
         struct session *session = hashmap_get(&hub->sessions, event->client);
         if (event->kind == ENGINE_CLIENT_FORGOTTEN || event->kind == ENGINE_SCENE_ENDED)
             blob_store_trim(hub->blobs);
+        else if (event->kind == ENGINE_DEVICE_GONE && hub->device_gone)
+            hub->device_gone(hub->call_context);
         else if (session)
             session_engine_event(session, event);
         engine_event_destroy(event);

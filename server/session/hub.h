@@ -42,7 +42,8 @@ struct hub {
     bool stopping;
     uint64_t owner; /* number of the client for whom all this is there; 0: nobody */
     loop_call_fn *owner_gone,
-        *emptied; /* called when that one is gone, and when the last session is; may be NULL */
+        *emptied,     /* called when that one is gone, and when the last session is; may be NULL */
+        *device_gone; /* the engine's device is lost for good; may be NULL */
     void *call_context;
 
     struct loop_watch *engine_watch;

@@ -178,6 +178,7 @@ void session_engine_event(struct session *session, struct engine_event *event)
     case ENGINE_SCENE_CHANGED:
     case ENGINE_SCENE_ENDED:
     case ENGINE_CLIENT_FORGOTTEN:
+    case ENGINE_DEVICE_GONE:
         return;
     }
 }

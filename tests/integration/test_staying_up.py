@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A daemon that is meant to run for months: told to read its configuration again, and under a service manager."""
+import ctypes
 import os
+import pathlib
 import signal
 import socket
 import struct
@@ -9,7 +11,7 @@ import time
 
 import farlight_test
 from farlight_test import Case, Daemon
-from test_daemon import ERROR, LIMIT, OK, SCENE_OPEN, Peer, error_code, hello, text
+from test_daemon import ERROR, LIMIT, OK, PING, PONG, SCENE_OPEN, STATS, Peer, error_code, hello, text
 
 READ_AGAIN, STAYS = "read again", "stays as it was"
 
@@ -226,6 +228,97 @@ class Reading(Case):
             self.assertIn(str(keys[1]), log.splitlines()[-1])
             keys[1].chmod(0o600)
             self.assertTrue(comes_in(keys[1]))
+
+
+PTRACE_ATTACH, PTRACE_DETACH, WALL = 16, 17, 0x40000000
+INTERVAL_S = 1.0
+
+
+class Frozen:
+    """One thread of another process that does not run, as one that waits for a driver that hangs."""
+
+    def __init__(self, process, name):
+        folder = pathlib.Path(f"/proc/{process}/task")
+        self.thread = next(int(one.name) for one in folder.iterdir() if (one / "comm").read_text().strip() == name)
+        self.trace = ctypes.CDLL(None, use_errno=True).ptrace
+        self.trace.argtypes = [ctypes.c_long] * 2 + [ctypes.c_void_p] * 2
+
+    def __enter__(self):
+        if self.trace(PTRACE_ATTACH, self.thread, None, None) < 0:
+            raise farlight_test.unittest.SkipTest(f"ptrace: {os.strerror(ctypes.get_errno())}")
+        os.waitpid(self.thread, WALL)
+        return self
+
+    def __exit__(self, *_):
+        self.trace(PTRACE_DETACH, self.thread, None, None)
+
+
+class Watchdog(Case):
+    def setUp(self):
+        super().setUp()
+        self.manager = Manager(self.folder)
+        self.addCleanup(self.manager.close)
+
+    def environment(self, **more):
+        return self.manager.environment(WATCHDOG_USEC=str(int(INTERVAL_S * 1e6)), **more)
+
+    def pings(self, seconds):
+        """How many come within that time."""
+        count, end = 0, time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            self.manager.socket.settimeout(left)
+            try:
+                count += "WATCHDOG" in self.manager.hear()
+            except TimeoutError:
+                break
+        self.manager.socket.settimeout(farlight_test.TIMEOUT_S)
+        return count
+
+    def test_it_pings_while_idle_and_while_it_works_but_not_while_the_gpu_hangs(self):
+        with Daemon(environment=self.environment()) as daemon:
+            self.assertGreaterEqual(self.pings(INTERVAL_S * 1.5), 1, "idle")
+            child = farlight_test.subprocess.Popen(
+                [farlight_test.BIN / "farlight", "animate", farlight_test.bundled_scenes() / "teapot.glb", "--server",
+                 daemon.address, "--frames", "1-1", "--samples", "65536", "-o", self.folder / "%04d.png"],
+                stdout=farlight_test.subprocess.DEVNULL, stderr=farlight_test.subprocess.DEVNULL)
+            try:
+                self.wait_for_a_job(daemon)
+                self.assertGreaterEqual(self.pings(INTERVAL_S * 3), 1, "at work")
+                with Frozen(daemon.process.pid, "gl"):
+                    self.pings(INTERVAL_S / 2)  # one may be on its way, for what went on before
+                    self.assertEqual(self.pings(INTERVAL_S * 1.5), 0, "hung")
+                    # The network's thread lives, and tells who asks; the manager is who ends it.
+                    peer = Peer(daemon)
+                    peer.send(PING, 1, struct.pack("<Q", 1))
+                    self.assertEqual(peer.answer(1)[0], PONG)
+                    peer.close()
+                self.assertGreaterEqual(self.pings(INTERVAL_S * 3), 1, "again")
+            finally:
+                child.kill()
+                child.wait()
+
+    def wait_for_a_job(self, daemon):
+        """It is one long frame, so from then on the thread has always something to do."""
+        peer = Peer(daemon)
+        for request in range(1, 10000):
+            peer.send(STATS, request)
+            _, payload = peer.answer(request)
+            if struct.unpack_from("<I", payload, 2 + 8 * 8 + 4)[0] > 0:  # as in test_daemon.py
+                peer.close()
+                return
+            time.sleep(0.02)
+        self.fail("no job comes")
+
+    def test_one_for_another_process_is_left_alone(self):
+        with Daemon(environment=self.environment(WATCHDOG_PID="1")):
+            self.assertEqual(self.pings(INTERVAL_S), 0)
+            self.assertEqual(self.manager.told[:1], [{"READY": "1"}])
+
+    def test_the_manager_hears_of_the_start_and_of_the_end(self):
+        with Daemon(environment=self.manager.environment()) as daemon:
+            self.assertEqual(self.manager.hear(), {"READY": "1"})
+            daemon.stop()
+            self.assertEqual(self.manager.hear(), {"STOPPING": "1"})
 
 
 if __name__ == "__main__":
