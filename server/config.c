@@ -19,8 +19,12 @@
 
 enum option_type { OPTION_TEXT, OPTION_BOOL, OPTION_LEVEL, OPTION_U32, OPTION_BYTES };
 
+/* When a value is taken: at the start, or again when the daemon is told to read its configuration. */
+enum option_time { START, ANYTIME };
+
 struct option {
     const char *section, *key;
+    enum option_time time;
     enum option_type type;
     size_t offset;
     const char *default_text;
@@ -33,98 +37,98 @@ struct option {
 
 /* clang-format off */
 static const struct option options[] = {
-    {"server", "listen", OPTION_TEXT, AT(listen), "unix:/run/farlight/farlight.sock", 0, 0, "",
+    {"server", "listen", START, OPTION_TEXT, AT(listen), "unix:/run/farlight/farlight.sock", 0, 0, "",
      "Addresses to listen at, separated by blanks: unix:/PATH, tcp:HOST:PORT"},
-    {"server", "readers", OPTION_TEXT, AT(readers), "", 0, 0, "",
+    {"server", "readers", ANYTIME, OPTION_TEXT, AT(readers), "", 0, 0, "",
      "Users who may only look, over the Unix socket: names or numbers, separated by blanks. They attach to shared "
      "scenes and render them, and change nothing"},
-    {"server", "insecure", OPTION_BOOL, AT(insecure), "no", 0, 1, "",
+    {"server", "insecure", START, OPTION_BOOL, AT(insecure), "no", 0, 1, "",
      "Let TCP listen beyond loopback without a key: nothing is encrypted and nobody is asked who he is"},
-    {"server", "key_file", OPTION_TEXT, AT(key_file), "", 0, 0, "",
+    {"server", "key_file", ANYTIME, OPTION_TEXT, AT(key_file), "", 0, 0, "",
      "File of a key, as 'farlight key' makes one: whoever has it may come in from everywhere, on a sealed connection"},
-    {"server", "reader_key_file", OPTION_TEXT, AT(reader_key_file), "", 0, 0, "",
+    {"server", "reader_key_file", ANYTIME, OPTION_TEXT, AT(reader_key_file), "", 0, 0, "",
      "The same for clients who may look, but change nothing"},
-    {"server", "log_level", OPTION_LEVEL, AT(log_level), "info", 0, 0, "", "error, warning, info or debug"},
-    {"server", "trace_file", OPTION_TEXT, AT(trace_file), "", 0, 0, "",
+    {"server", "log_level", ANYTIME, OPTION_LEVEL, AT(log_level), "info", 0, 0, "", "error, warning, info or debug"},
+    {"server", "trace_file", START, OPTION_TEXT, AT(trace_file), "", 0, 0, "",
      "File that gets the stages of all frames as trace events, for ui.perfetto.dev or chrome://tracing"},
 
-    {"engine", "device", OPTION_TEXT, AT(device), "auto", 0, 0, "",
+    {"engine", "device", START, OPTION_TEXT, AT(device), "auto", 0, 0, "",
      "GPU: a number of --list-devices, software, or auto for the first hardware, else software"},
-    {"engine", "encode_threads", OPTION_U32, AT(encode_threads), "0", 0, 64, "",
+    {"engine", "encode_threads", START, OPTION_U32, AT(encode_threads), "0", 0, 64, "",
      "Threads that encode frames; 0: one per core, at most 4"},
-    {"engine", "frames_in_flight", OPTION_U32, AT(frames_in_flight), "3", 1, 16, "",
+    {"engine", "frames_in_flight", START, OPTION_U32, AT(frames_in_flight), "3", 1, 16, "",
      "Frames of one job between the renderer and the network"},
-    {"engine", "queue", OPTION_U32, AT(engine_queue), "1024", 16, 65536, "",
+    {"engine", "queue", START, OPTION_U32, AT(engine_queue), "1024", 16, 65536, "",
      "Commands, and events, that may wait between the network and the renderer"},
 
-    {"memory", "scene", OPTION_BYTES, AT(scene_bytes), "25%", MIB, 16 * TIB, "bytes",
+    {"memory", "scene", ANYTIME, OPTION_BYTES, AT(scene_bytes), "25%", MIB, 16 * TIB, "bytes",
      "Host memory of one scene, and of all together without their blobs; a percentage is of the host's memory"},
-    {"memory", "blobs", OPTION_BYTES, AT(limits.blob_bytes), "25%", MIB, 16 * TIB, "bytes",
+    {"memory", "blobs", ANYTIME, OPTION_BYTES, AT(limits.blob_bytes), "25%", MIB, 16 * TIB, "bytes",
      "Host memory of all blobs together: vertices, texels and the like"},
-    {"memory", "blob_cache", OPTION_BYTES, AT(limits.blob_cache_bytes), "10%", 0, 16 * TIB, "bytes",
+    {"memory", "blob_cache", ANYTIME, OPTION_BYTES, AT(limits.blob_cache_bytes), "10%", 0, 16 * TIB, "bytes",
      "The part of it that is kept for a user's next connection when nobody uses it any more"},
-    {"memory", "transactions", OPTION_BYTES, AT(limits.transaction_bytes), "10%", MIB, 16 * TIB, "bytes",
+    {"memory", "transactions", ANYTIME, OPTION_BYTES, AT(limits.transaction_bytes), "10%", MIB, 16 * TIB, "bytes",
      "Host memory of one client's edits that wait to be committed"},
-    {"memory", "frames", OPTION_BYTES, AT(limits.frame_bytes), "50%", MIB, 16 * TIB, "bytes",
+    {"memory", "frames", ANYTIME, OPTION_BYTES, AT(limits.frame_bytes), "50%", MIB, 16 * TIB, "bytes",
      "Host memory that the frames of all jobs may take; a job that may need more has to wait for others to end"},
-    {"memory", "device", OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
+    {"memory", "device", START, OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
      "Device memory; 0: 70 % of what the device tells it has, of the host's for software GL"},
-    {"memory", "ldc", OPTION_BYTES, AT(limits.ldc_bytes), "0", 0, 16 * TIB, "bytes",
+    {"memory", "ldc", ANYTIME, OPTION_BYTES, AT(limits.ldc_bytes), "0", 0, 16 * TIB, "bytes",
      "The part of it that the samples of one layered depth cube may take, in whole MiB; of more the nearest layers "
      "are kept, and the frame says so. 0: no limit of its own"},
-    {"memory", "abuffer", OPTION_BYTES, AT(limits.abuffer_bytes), "0", 0, 16 * TIB, "bytes",
+    {"memory", "abuffer", ANYTIME, OPTION_BYTES, AT(limits.abuffer_bytes), "0", 0, 16 * TIB, "bytes",
      "The part of it that the lists of the tracer abuffer may take, in whole MiB; a scene that needs more is refused. "
      "0: no limit of its own"},
 
-    {"limits", "clients", OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
-    {"limits", "unauthenticated", OPTION_U32, AT(limits.unauthenticated), "64", 1, 65536, "",
+    {"limits", "clients", ANYTIME, OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
+    {"limits", "unauthenticated", ANYTIME, OPTION_U32, AT(limits.unauthenticated), "64", 1, 65536, "",
      "Connections that have not introduced themselves yet"},
-    {"limits", "unauthenticated_per_address", OPTION_U32, AT(limits.unauthenticated_per_address), "8", 1, 65536, "",
+    {"limits", "unauthenticated_per_address", ANYTIME, OPTION_U32, AT(limits.unauthenticated_per_address), "8", 1, 65536, "",
      "The same, from one TCP address"},
-    {"limits", "wrong_keys", OPTION_U32, AT(limits.wrong_keys_a_minute), "5", 1, ATTEMPTS_LIMIT_MAX, "",
+    {"limits", "wrong_keys", ANYTIME, OPTION_U32, AT(limits.wrong_keys_a_minute), "5", 1, ATTEMPTS_LIMIT_MAX, "",
      "Wrong keys from one TCP address within a minute; then no key is heard from there until it is over"},
-    {"limits", "requests", OPTION_U32, AT(limits.requests_in_flight), "64", 1, 65536, "",
+    {"limits", "requests", ANYTIME, OPTION_U32, AT(limits.requests_in_flight), "64", 1, 65536, "",
      "Requests of one client in flight"},
-    {"limits", "scenes", OPTION_U32, AT(limits.scenes_per_client), "8", 1, 65536, "", "Open scenes of one client"},
-    {"limits", "scene_linger", OPTION_U32, AT(scene_linger_s), "120", 0, 86400, "s",
+    {"limits", "scenes", ANYTIME, OPTION_U32, AT(limits.scenes_per_client), "8", 1, 65536, "", "Open scenes of one client"},
+    {"limits", "scene_linger", ANYTIME, OPTION_U32, AT(scene_linger_s), "120", 0, 86400, "s",
      "How long a kept or shared scene stays when its last client is gone, to be come back to; 0: not at all"},
-    {"limits", "scenes_lingering", OPTION_U32, AT(lingering_scenes), "16", 1, 65536, "",
+    {"limits", "scenes_lingering", ANYTIME, OPTION_U32, AT(lingering_scenes), "16", 1, 65536, "",
      "Scenes that stay so, of all clients; of more, who left most loses his oldest"},
-    {"limits", "jobs", OPTION_U32, AT(limits.jobs_per_client), "4", 1, 65536, "", "Running jobs of one client"},
-    {"limits", "blobs", OPTION_U32, AT(limits.blobs_per_client), "262144", 1, 16777216, "",
+    {"limits", "jobs", ANYTIME, OPTION_U32, AT(limits.jobs_per_client), "4", 1, 65536, "", "Running jobs of one client"},
+    {"limits", "blobs", ANYTIME, OPTION_U32, AT(limits.blobs_per_client), "262144", 1, 16777216, "",
      "Blobs that one connection may name"},
-    {"limits", "transaction_edits", OPTION_U32, AT(limits.transaction_edits), "1048576", 1, 16777216, "",
+    {"limits", "transaction_edits", ANYTIME, OPTION_U32, AT(limits.transaction_edits), "1048576", 1, 16777216, "",
      "Edits of one client that wait to be committed"},
-    {"limits", "nodes", OPTION_U32, AT(limits.nodes), "4194304", 1, 16777216, "", "Nodes of one scene"},
-    {"limits", "texture_edge", OPTION_U32, AT(limits.texture_edge_texels), "16384", 1, 16384, "texels",
+    {"limits", "nodes", ANYTIME, OPTION_U32, AT(limits.nodes), "4194304", 1, 16777216, "", "Nodes of one scene"},
+    {"limits", "texture_edge", ANYTIME, OPTION_U32, AT(limits.texture_edge_texels), "16384", 1, 16384, "texels",
      "Width and height of a texture"},
-    {"limits", "width", OPTION_U32, AT(limits.width_pixels), "8192", 1, 8192, "pixels", "Width of a frame"},
-    {"limits", "height", OPTION_U32, AT(limits.height_pixels), "8192", 1, 8192, "pixels", "Height of a frame"},
-    {"limits", "samples", OPTION_U32, AT(limits.samples), "65536", 1, 65536, "", "Samples per pixel"},
-    {"limits", "ldc_layers", OPTION_U32, AT(limits.ldc_layers), "255", 1, 255, "",
+    {"limits", "width", ANYTIME, OPTION_U32, AT(limits.width_pixels), "8192", 1, 8192, "pixels", "Width of a frame"},
+    {"limits", "height", ANYTIME, OPTION_U32, AT(limits.height_pixels), "8192", 1, 8192, "pixels", "Height of a frame"},
+    {"limits", "samples", ANYTIME, OPTION_U32, AT(limits.samples), "65536", 1, 65536, "", "Samples per pixel"},
+    {"limits", "ldc_layers", ANYTIME, OPTION_U32, AT(limits.ldc_layers), "255", 1, 255, "",
      "Layers of a layered depth cube; of more the nearest are kept, and the frame says so"},
-    {"limits", "upload_window", OPTION_BYTES, AT(limits.upload_window_bytes), "16M", MIB, GIB, "bytes",
+    {"limits", "upload_window", ANYTIME, OPTION_BYTES, AT(limits.upload_window_bytes), "16M", MIB, GIB, "bytes",
      "Blob data that a client may send ahead"},
-    {"limits", "frame_window", OPTION_BYTES, AT(limits.frame_window_bytes), "64M", MIB, 16 * GIB, "bytes",
+    {"limits", "frame_window", ANYTIME, OPTION_BYTES, AT(limits.frame_window_bytes), "64M", MIB, 16 * GIB, "bytes",
      "Rendered frames of one job that may wait to be sent, if that is more than one"},
-    {"limits", "trace_file", OPTION_BYTES, AT(trace_file_bytes), "256M", KIB, TIB, "bytes",
+    {"limits", "trace_file", START, OPTION_BYTES, AT(trace_file_bytes), "256M", KIB, TIB, "bytes",
      "Size of the trace file; then nothing more is written to it"},
 
-    {"network", "handshake", OPTION_U32, AT(connection.handshake_ms), "5000", 10, 600000, "ms",
+    {"network", "handshake", ANYTIME, OPTION_U32, AT(connection.handshake_ms), "5000", 10, 600000, "ms",
      "Time for a client to introduce itself"},
-    {"network", "wrong_key", OPTION_U32, AT(connection.wrong_key_ms), "1000", 0, 60000, "ms",
+    {"network", "wrong_key", ANYTIME, OPTION_U32, AT(connection.wrong_key_ms), "1000", 0, 60000, "ms",
      "Time until a client with a wrong key is told so"},
-    {"network", "progress_grace", OPTION_U32, AT(connection.progress_grace_ms), "5000", 10, 600000, "ms",
+    {"network", "progress_grace", ANYTIME, OPTION_U32, AT(connection.progress_grace_ms), "5000", 10, 600000, "ms",
      "Time that any message may take to come"},
-    {"network", "progress", OPTION_U32, AT(connection.progress_bytes_per_s), "1024", 1, 1048576, "bytes/s",
+    {"network", "progress", ANYTIME, OPTION_U32, AT(connection.progress_bytes_per_s), "1024", 1, 1048576, "bytes/s",
      "Least rate of a message that takes longer"},
-    {"network", "idle", OPTION_U32, AT(connection.idle_ms), "120000", 0, 86400000, "ms",
+    {"network", "idle", ANYTIME, OPTION_U32, AT(connection.idle_ms), "120000", 0, 86400000, "ms",
      "Silence after which a client that waits for nothing is disconnected; 0: never"},
-    {"network", "queued_soft", OPTION_BYTES, AT(connection.queued_soft_bytes), "16M", MIB, 16 * GIB, "bytes",
+    {"network", "queued_soft", ANYTIME, OPTION_BYTES, AT(connection.queued_soft_bytes), "16M", MIB, 16 * GIB, "bytes",
      "Output waiting for a client from which on nothing more is read from it, .."},
-    {"network", "queued_soft_time", OPTION_U32, AT(connection.queued_soft_ms), "10000", 10, 600000, "ms",
+    {"network", "queued_soft_time", ANYTIME, OPTION_U32, AT(connection.queued_soft_ms), "10000", 10, 600000, "ms",
      ".. and after so long it is disconnected"},
-    {"network", "queued_hard", OPTION_BYTES, AT(connection.queued_hard_bytes), "64M", MIB, 16 * GIB, "bytes",
+    {"network", "queued_hard", ANYTIME, OPTION_BYTES, AT(connection.queued_hard_bytes), "64M", MIB, 16 * GIB, "bytes",
      "Output waiting for a client at which it is disconnected at once"},
 };
 /* clang-format on */
@@ -256,6 +260,34 @@ bool config_flag(struct config *config, const char *name, const char *value, con
     return !value || set_named(config, name, value, flag, error);
 }
 
+static size_t slot_bytes(const struct option *option)
+{
+    return option->type == OPTION_TEXT    ? CONFIG_TEXT_BYTES
+           : option->type == OPTION_BOOL  ? sizeof(bool)
+           : option->type == OPTION_BYTES ? sizeof(uint64_t)
+                                          : sizeof(uint32_t);
+}
+
+static bool is_same(const struct config *a, const struct config *b, const struct option *option)
+{
+    const char *one = (const char *)a + option->offset, *other = (const char *)b + option->offset;
+    if (option->type == OPTION_TEXT)
+        return strcmp(one, other) == 0;
+    return memcmp(one, other, slot_bytes(option)) == 0;
+}
+
+void config_keep_start(struct config *next, const struct config *config)
+{
+    for (size_t i = 0; i < OPTION_COUNT; i++) {
+        const struct option *option = &options[i];
+        if (option->time == ANYTIME || is_same(config, next, option))
+            continue;
+        log_write(LOG_WARNING, "config", "%s.%s is taken at the start only: restart the daemon to change it",
+                  option->section, option->key);
+        memcpy(slot(next, option), (const char *)config + option->offset, slot_bytes(option));
+    }
+}
+
 /* ---- sources ----------------------------------------------------------------------------------------- */
 
 struct reader {
@@ -305,6 +337,15 @@ bool config_read_environment(struct config *config, struct error *error)
     return true;
 }
 
+static struct engine_limits engine_limits(const struct config *config)
+{
+    return (struct engine_limits){
+        .scene = {.host_bytes = config->scene_bytes, .nodes = config->limits.nodes},
+        .scene_linger_ms = config->scene_linger_s * UINT64_C(1000),
+        .lingering_scenes = config->lingering_scenes,
+    };
+}
+
 bool config_engine(const struct config *config, struct engine_options *engine, struct error *error)
 {
     *engine = (struct engine_options){
@@ -312,9 +353,7 @@ bool config_engine(const struct config *config, struct engine_options *engine, s
         .encode_threads = config->encode_threads,
         .queue_capacity = config->engine_queue,
         .frames_in_flight = config->frames_in_flight,
-        .scene_limits = {.host_bytes = config->scene_bytes, .nodes = config->limits.nodes},
-        .scene_linger_ms = config->scene_linger_s * UINT64_C(1000),
-        .lingering_scenes = config->lingering_scenes,
+        .limits = engine_limits(config),
         .device_bytes_limit = config->device_bytes,
     };
 #ifdef FARLIGHT_DEBUG
@@ -340,11 +379,12 @@ bool config_hub(const struct config *config, struct hub_options *hub, struct err
     *hub = (struct hub_options){
         .limits = config->limits,
         .connection_limits = config->connection,
-        .scene_memory_bytes = config->scene_bytes,
+        .engine_limits = engine_limits(config),
         .insecure = config->insecure,
     };
     hub->limits.frames_in_flight = config->frames_in_flight;
-    return readers_parse(&hub->readers, config->readers, "server.readers", error);
+    return readers_parse(&hub->readers, config->readers, "server.readers", error) &&
+           auth_read_keys(&hub->keys, config->key_file, config->reader_key_file, error);
 }
 
 /* ---- dump -------------------------------------------------------------------------------------------- */
@@ -375,19 +415,7 @@ static bool is_default(const struct config *config, const struct option *option)
 {
     struct config defaults;
     config_defaults(&defaults);
-    const char *value = (const char *)config + option->offset, *other = (const char *)&defaults + option->offset;
-    switch (option->type) {
-    case OPTION_TEXT:
-        return strcmp(value, other) == 0;
-    case OPTION_BOOL:
-        return memcmp(value, other, sizeof(bool)) == 0;
-    case OPTION_LEVEL:
-    case OPTION_U32:
-        return memcmp(value, other, sizeof(uint32_t)) == 0;
-    case OPTION_BYTES:
-        return memcmp(value, other, sizeof(uint64_t)) == 0;
-    }
-    return false;
+    return is_same(config, &defaults, option);
 }
 
 bool config_dump(const struct config *config, FILE *stream)
@@ -398,6 +426,8 @@ bool config_dump(const struct config *config, FILE *stream)
         if (i == 0 || strcmp(option->section, options[i - 1].section) != 0)
             fprintf(stream, "\n[%s]\n", option->section);
         fprintf(stream, "# %s.", option->doc);
+        if (option->time == START)
+            fprintf(stream, " Taken at the start only.");
         if (option->type == OPTION_U32 || option->type == OPTION_BYTES)
             fprintf(stream, " %" PRIu64 " .. %" PRIu64 "%s%s.", option->min, option->max,
                     option->unit[0] ? " " : "", option->unit);

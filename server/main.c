@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* farlightd: options, and the wiring of the engine to the network.
  * Exit status: 0 when it was stopped (by SIGTERM or SIGINT, after a goodbye to its clients) or its one client is
- * gone; 1 when it cannot start or go on; 2 for wrong usage. */
+ * gone; 1 when it cannot start or go on; 2 for wrong usage; 75 when its GPU is lost for good, which may be
+ * different in a new process. */
 #include "base/log.h"
 #include "base/timeline.h"
 #include "config.h"
@@ -12,6 +13,7 @@
 #include <argp.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sysexits.h>
 
 /* glibc looks for it by name, which -fvisibility=hidden would hide. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlightd " FARLIGHT_VERSION;
@@ -134,16 +136,63 @@ static bool read_config(struct config *config, const struct arguments *arguments
            config_flag(config, "server.log_level", arguments->log_level, "--log-level", error);
 }
 
+/* How the configuration came about, to be read again. */
+struct source {
+    const struct arguments *arguments;
+    struct config *config;
+    struct daemon *daemon;
+    bool listens;
+};
+
+/* Whoever started us for himself may take his time. */
+static bool read_hub_options(const struct config *config, bool listens, struct hub_options *options,
+                             struct error *error)
+{
+    if (!config_hub(config, options, error))
+        return false;
+    if (!listens)
+        options->connection_limits.idle_ms = 0;
+    return true;
+}
+
+/* All of it or, where something is wrong, nothing. */
+static void reload(void *context)
+{
+    struct source *source = context;
+    struct config next;
+    struct hub_options options;
+    struct error error = {0};
+    bool read = read_config(&next, source->arguments, &error);
+    if (read)
+        config_keep_start(&next, source->config);
+    if (!read || !read_hub_options(&next, source->listens, &options, &error) ||
+        !hub_reload(&source->daemon->hub, &options, &error)) {
+        log_write(LOG_ERROR, "config", "the configuration stays as it was: %s%s%s", error.field,
+                  error.field[0] ? ": " : "", error.text);
+        return;
+    }
+    *source->config = next;
+    log_set_level((enum log_level)source->config->log_level);
+    log_write(LOG_INFO, "config", "the configuration was read again");
+}
+
+/* Whoever starts us with sockets knows where they are to be. */
+static bool begin_to_listen(struct daemon *daemon, const struct config *config, bool beyond_loopback,
+                            struct error *error)
+{
+    size_t activated;
+    return daemon_listen_activated(daemon, beyond_loopback, &activated, error) &&
+           (activated || daemon_listen(daemon, config->listen, beyond_loopback, error));
+}
+
 /* `fd` < 0: there is no client yet. */
 static bool serve(struct daemon *daemon, const struct config *config, int fd, bool listens,
                   struct timeline *timeline, struct error *error)
 {
     struct engine_options engine_options;
     struct hub_options options;
-    struct auth_keys keys;
-    if (!auth_read_keys(&keys, config->key_file, config->reader_key_file, error) ||
-        (listens && !daemon_listen(daemon, config->listen, config->insecure || keys.count, error)) ||
-        !config_engine(config, &engine_options, error) || !config_hub(config, &options, error))
+    if (!config_engine(config, &engine_options, error) || !read_hub_options(config, listens, &options, error) ||
+        (listens && !begin_to_listen(daemon, config, config->insecure || options.keys.count, error)))
         return false;
     struct engine *engine = engine_create(&engine_options, error);
     if (!engine)
@@ -151,13 +200,14 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, bo
     options.engine = engine_port(engine);
     options.timeline = timeline;
     options.owner_may_be_idle = true;
-    options.keys = keys;
     bool ok = daemon_start(daemon, &options, error) && (fd < 0 || daemon_serve_fd(daemon, fd, error));
     if (ok) {
         daemon_print_ready(daemon, stdout);
         ok = daemon_run(daemon, error);
     }
+    bool device_gone = daemon->device_gone;
     daemon_finish(daemon);
+    daemon->device_gone = device_gone;
     engine_destroy(engine);
     return ok;
 }
@@ -179,12 +229,16 @@ int main(int argc, char **argv)
     bool listens = arguments.fd < 0 || arguments.listen[0];
     struct daemon daemon;
     daemon_init(&daemon);
+    struct source source = {.arguments = &arguments, .config = &config, .daemon = &daemon, .listens = listens};
+    daemon.reload = reload;
+    daemon.reload_context = &source;
     struct timeline *timeline = NULL;
     if (config.trace_file[0])
         timeline = timeline_create(config.trace_file, config.trace_file_bytes, &error);
     bool ok =
         (timeline || !config.trace_file[0]) && serve(&daemon, &config, arguments.fd, listens, timeline, &error);
+    bool device_gone = daemon.device_gone;
     daemon_finish(&daemon); /* what was begun before it failed */
     timeline_destroy(timeline);
-    return ok ? EXIT_SUCCESS : fail(&error);
+    return !ok ? fail(&error) : device_gone ? EX_TEMPFAIL : EXIT_SUCCESS;
 }

@@ -300,16 +300,28 @@ uint64_t jobs_idle_ns(const struct engine *engine)
     return first_ns == UINT64_MAX ? UINT64_MAX : first_ns > now_ns ? first_ns - now_ns : 0;
 }
 
+/* Frames in progress are rendered again, from the scenes that are held in memory. */
+static void device_lost(struct engine *engine, struct job *job)
+{
+    struct error error = {0};
+    engine_drop_device(engine);
+    if (!engine_job_may_go_on(job, &error))
+        job_finish(job, &error);
+    error = (struct error){0};
+    if (engine_need_device(engine, &error))
+        return;
+    for (size_t i = 0; i < engine->job_count; i++)
+        if (engine->jobs[i]->next_frame <= engine->jobs[i]->spec.last_frame)
+            job_finish(engine->jobs[i], &error);
+    engine_post_device_gone(engine);
+}
+
 /* Whether the frame is worth another try; if not, the job has failed. */
 static void frame_failed(struct engine *engine, struct job *job, const struct error *error)
 {
     abandon_frame(engine, job);
     if (error->kind == ERROR_DEVICE_LOST && engine->device) {
-        /* The frame is rendered again, from the scene that is held in memory. */
-        engine_drop_device(engine);
-        struct error rebuild_error = {0};
-        if (!engine_need_device(engine, &rebuild_error))
-            job_finish(job, &rebuild_error);
+        device_lost(engine, job);
         return;
     }
     if (error->kind == ERROR_OUT_OF_MEMORY && !job->evicted && engine_evict_idle(engine, job)) {

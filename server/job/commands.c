@@ -39,7 +39,7 @@ static void done(struct engine *engine, const struct engine_command *command, ui
 static bool commit_within_limits(struct engine *engine, struct scene *scene, struct engine_command *command,
                                  struct error *error)
 {
-    uint64_t limit_bytes = engine->options.scene_limits.host_bytes;
+    uint64_t limit_bytes = engine->options.limits.scene.host_bytes;
     uint64_t others_bytes = engine->table_bytes - scene->table_bytes;
     if (limit_bytes)
         scene->limits.table_bytes = others_bytes < limit_bytes ? limit_bytes - others_bytes : 1;
@@ -296,6 +296,9 @@ void engine_handle(struct engine *engine, struct engine_command *command)
         break; /* the view sees for itself whenever the thread is awake */
     case ENGINE_STATS:
         report_stats(engine, command);
+        break;
+    case ENGINE_LIMITS:
+        engine_set_limits(engine, &command->limits);
         break;
     case ENGINE_CLIENT_GONE:
         client_gone(engine, command);

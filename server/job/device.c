@@ -113,13 +113,32 @@ void engine_drop_device(struct engine *engine)
     engine->device = NULL;
 }
 
+/* Of a ring of times, whether the one that is the next to be overwritten is recent. */
+static bool too_often(const uint64_t times_ns[DEVICE_REBUILDS_MAX], unsigned count, uint64_t now_ns)
+{
+    return count >= DEVICE_REBUILDS_MAX &&
+           now_ns - times_ns[count % DEVICE_REBUILDS_MAX] < DEVICE_REBUILDS_WINDOW_NS;
+}
+
+bool engine_job_may_go_on(struct job *job, struct error *error)
+{
+    uint64_t now_ns = clock_now_ns();
+    job->losses_ns[job->losses++ % DEVICE_REBUILDS_MAX] = now_ns;
+    if (!too_often(job->losses_ns, job->losses, now_ns))
+        return true;
+    error_set(error, ERROR_DEVICE_LOST, "render",
+              "the GPU was lost %d times within 5 minutes over frames of this job, which is put aside",
+              DEVICE_REBUILDS_MAX);
+    return error_remedy(error, "try a smaller picture or scene, or another device");
+}
+
 bool engine_need_device(struct engine *engine, struct error *error)
 {
     if (engine->device)
         return true;
     uint64_t now_ns = clock_now_ns();
     uint64_t *oldest_ns = &engine->rebuilds_ns[engine->rebuilds % DEVICE_REBUILDS_MAX];
-    if (engine->rebuilds >= DEVICE_REBUILDS_MAX && now_ns - *oldest_ns < DEVICE_REBUILDS_WINDOW_NS) {
+    if (too_often(engine->rebuilds_ns, engine->rebuilds, now_ns)) {
         error_set(error, ERROR_DEVICE_LOST, "device", "the GPU was lost %d times within 5 minutes",
                   DEVICE_REBUILDS_MAX);
         error->retryable = true;

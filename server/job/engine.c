@@ -44,6 +44,11 @@ void engine_post_failed(struct engine *engine, uint64_t client, uint32_t request
     engine_post(engine, event);
 }
 
+void engine_post_device_gone(struct engine *engine)
+{
+    engine_post(engine, event_create(ENGINE_DEVICE_GONE, 0, 0));
+}
+
 struct engine_event *engine_cancelled(uint64_t client, uint32_t request, const char *why)
 {
     struct engine_event *event = event_create(ENGINE_FAILED, client, request);
@@ -132,10 +137,14 @@ static void run(struct engine *engine)
         take_commands(engine, queue_try_pop(engine->commands));
         jobs_reap(engine);
         uint64_t reap_ns = engine_reap_scenes(engine);
+        atomic_fetch_add(&engine->turns, 1);
         if (serve(engine))
             continue;
         uint64_t idle_ns = jobs_idle_ns(engine);
-        take_commands(engine, queue_pop(engine->commands, idle_ns < reap_ns ? idle_ns : reap_ns));
+        atomic_store(&engine->waits, true);
+        struct engine_command *first = queue_pop(engine->commands, idle_ns < reap_ns ? idle_ns : reap_ns);
+        atomic_store(&engine->waits, false);
+        take_commands(engine, first);
     }
 }
 
@@ -166,6 +175,13 @@ static void *run_thread(void *context)
     engine_trim_scenes(engine);
     engine_drop_device(engine);
     return NULL;
+}
+
+void engine_set_limits(struct engine *engine, const struct engine_limits *limits)
+{
+    engine->options.limits = *limits;
+    if (!engine->options.limits.lingering_scenes)
+        engine->options.limits.lingering_scenes = ENGINE_LINGERING_SCENES;
 }
 
 /* ---- start and stop ----------------------------------------------------------------------------- */
@@ -221,8 +237,7 @@ struct engine *engine_create(const struct engine_options *options, struct error 
         engine->options.queue_capacity = QUEUE_CAPACITY_DEFAULT;
     if (!engine->options.frames_in_flight)
         engine->options.frames_in_flight = FRAMES_IN_FLIGHT_DEFAULT;
-    if (!engine->options.lingering_scenes)
-        engine->options.lingering_scenes = ENGINE_LINGERING_SCENES;
+    engine_set_limits(engine, &options->limits);
     if (!engine->options.frame_window_bytes)
         engine->options.frame_window_bytes = ENGINE_FRAME_WINDOW_BYTES;
     pthread_mutex_init(&engine->start_lock, NULL);
@@ -308,4 +323,11 @@ void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_
 {
     stage_totals_add(&engine->totals, STAGE_QUEUE, STAGE_CPU, queue_ns);
     stage_totals_add(&engine->totals, STAGE_SEND, STAGE_CPU, send_ns);
+}
+
+bool engine_is_alive(const struct engine *engine, uint64_t *turns)
+{
+    uint64_t before = *turns;
+    *turns = atomic_load(&engine->turns);
+    return atomic_load(&engine->waits) || *turns != before;
 }

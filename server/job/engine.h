@@ -26,16 +26,21 @@ struct view_wishes;
 #define ENGINE_LINGERING_SCENES 16u                     /* default of lingering_scenes */
 #define ENGINE_FRAME_WINDOW_BYTES ((uint64_t)512 << 20) /* default of frame_window_bytes */
 
+/* Those that may change while the engine runs. */
+struct engine_limits {
+    struct scene_limits scene; /* host_bytes is also what the tables of all scenes may take together */
+    uint64_t scene_linger_ms;  /* how long a scene that others can come to stays when nobody holds it; 0: not */
+    uint32_t lingering_scenes; /* that do so, at most: who left most loses his oldest; 0: default */
+};
+
 struct engine_options {
     struct gpu_options gpu;
     unsigned encode_threads;     /* 0: one per core, at most 4 */
     size_t queue_capacity;       /* commands and events; 0: 1024 */
     uint32_t frames_in_flight;   /* per job, rendered but not taken; 0: 3 */
     uint64_t frame_window_bytes; /* the same in bytes of pixels, if that is fewer, but at least one; 0: default */
-    struct scene_limits scene_limits; /* host_bytes is also what the tables of all scenes may take together */
-    uint64_t scene_linger_ms;    /* how long a scene that others can come to stays when nobody holds it; 0: not */
-    uint32_t lingering_scenes;   /* that do so, at most: who left most loses his oldest; 0: default */
-    uint64_t device_bytes_limit; /* 0: 70 % of what the device has, or no limit if it does not tell */
+    struct engine_limits limits;
+    uint64_t device_bytes_limit;          /* 0: 70 % of what the device has, or no limit if it does not tell */
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
 };
 
@@ -98,6 +103,7 @@ enum engine_command_kind {
     ENGINE_JOB_CANCEL, /* answered by ENGINE_DONE; the job's own request fails with ERROR_CANCELLED just before */
     ENGINE_VIEW_LOOK,  /* a view's wishes have changed; no answer */
     ENGINE_STATS,
+    ENGINE_LIMITS,      /* others from now on; a scene that is open keeps its number of nodes. No answer */
     ENGINE_CLIENT_GONE, /* forgets its scenes and jobs; no answer, and no event for that client comes after
                            ENGINE_CLIENT_FORGOTTEN */
 };
@@ -116,6 +122,7 @@ struct engine_command {
     struct engine_job job;
     uint32_t target_request; /* job_cancel, job_credit: the job's request */
     uint64_t credit;
+    struct engine_limits limits; /* limits */
 };
 void engine_command_destroy(struct engine_command *command); /* frees it with all it holds; accepts NULL */
 
@@ -178,7 +185,9 @@ enum engine_event_kind {
     ENGINE_SCENE_DESCRIBED,
     ENGINE_SCENE_CHANGED, /* by another client; `scene` is the client's number for it */
     ENGINE_SCENE_ENDED,   /* one that nobody held: blobs may be unused now. Client 0 */
-    ENGINE_CLIENT_FORGOTTEN
+    ENGINE_CLIENT_FORGOTTEN,
+    /* The device is lost for good: it was too often, or cannot be made anew. All jobs have failed. Client 0 */
+    ENGINE_DEVICE_GONE
 };
 
 struct engine_frame {
@@ -227,6 +236,9 @@ const struct gpu_device_info *engine_device(const struct engine *engine);
 bool engine_submit(struct engine *engine, struct engine_command *command, struct error *error);
 int engine_event_fd(const struct engine *engine);              /* readable while events wait */
 struct engine_event *engine_next_event(struct engine *engine); /* NULL: none waits */
+/* Whether the thread that owns GL has gone on since it was asked last, or has nothing to do. *turns is the
+ * asker's, 0 at first. */
+bool engine_is_alive(const struct engine *engine, uint64_t *turns);
 /* Adds send and queue time of a frame to the totals, once the network side knows them. */
 void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_ns);
 

@@ -89,6 +89,8 @@ struct job {
     uint64_t next_frame; /* number in the range; beyond its end: all rendered */
     struct schedule_share schedule;
     struct animation_bounds bounds;
+    uint64_t losses_ns[DEVICE_REBUILDS_MAX]; /* when the device was lost over its frames, a ring */
+    unsigned losses;
     uint64_t refused_after; /* frames_ended of its scene when its frame could not begin beside others */
     /* of the frame in progress */
     bool rendering;
@@ -105,6 +107,8 @@ struct engine {
     struct gpu_device_info device_info; /* constant after the start; any thread */
     struct queue *commands, *events;    /* any thread */
     atomic_bool stop, nudged;           /* any thread */
+    atomic_uint_fast64_t turns;         /* of the thread; any thread */
+    atomic_bool waits;                  /* it has nothing to do; any thread */
     struct stage_totals totals;         /* any thread */
     struct encode_pool *pool;
     pthread_t thread;
@@ -138,6 +142,8 @@ struct engine {
 void engine_post(struct engine *engine, struct engine_event *event); /* NULL: logged as lost */
 void engine_post_done(struct engine *engine, uint64_t client, uint32_t request, uint64_t revision);
 void engine_post_failed(struct engine *engine, uint64_t client, uint32_t request, const struct error *error);
+void engine_post_device_gone(struct engine *engine);
+void engine_set_limits(struct engine *engine, const struct engine_limits *limits);
 void engine_nudge(struct engine *engine); /* any thread: there may be something to do */
 
 /* The failure of what somebody ended; NULL: out of memory. */
@@ -210,6 +216,9 @@ void view_done(struct job *job, struct engine_frame *frame);
 bool engine_open_device(struct engine *engine, struct error *error);
 /* The device, made anew where it was lost and that is still allowed. */
 bool engine_need_device(struct engine *engine, struct error *error);
+/* Notes that the device was lost over a frame of the job. False: that happens too often, it may not go on; *error
+ * says so. */
+bool engine_job_may_go_on(struct job *job, struct error *error);
 /* Lets go of everything on the device and of the device. */
 void engine_drop_device(struct engine *engine);
 /* Lets go of what is kept on the device and no frame in progress needs, nor the next one of `keep`. False: nothing

@@ -133,9 +133,9 @@ static void scene_end(struct engine *engine, struct engine_scene *scene)
 /* Until when one that nobody holds may stay; 0: no longer than now. One that holds nothing is not worth it. */
 static uint64_t lingers_until_ns(const struct engine *engine, const struct engine_scene *scene)
 {
-    if (scene->sharing == SHARING_PRIVATE || !scene->scene->revision || !engine->options.scene_linger_ms)
+    if (scene->sharing == SHARING_PRIVATE || !scene->scene->revision || !engine->options.limits.scene_linger_ms)
         return 0;
-    return scene->left_ns + engine->options.scene_linger_ms * UINT64_C(1000000);
+    return scene->left_ns + engine->options.limits.scene_linger_ms * UINT64_C(1000000);
 }
 
 static size_t count_left_by(const struct engine *engine, uint64_t principal)
@@ -187,7 +187,7 @@ static size_t end_overdue(struct engine *engine, uint64_t *wait_ns)
 uint64_t engine_reap_scenes(struct engine *engine)
 {
     uint64_t wait_ns;
-    while (end_overdue(engine, &wait_ns) > engine->options.lingering_scenes)
+    while (end_overdue(engine, &wait_ns) > engine->options.limits.lingering_scenes)
         scene_end(engine, first_to_go(engine));
     return wait_ns;
 }
@@ -252,7 +252,7 @@ static bool scene_add(struct engine *engine, const struct engine_command *comman
 {
     struct engine_scene *scene = calloc(1, sizeof *scene);
     if (scene)
-        scene->scene = scene_create(command->name, &engine->options.scene_limits);
+        scene->scene = scene_create(command->name, &engine->options.limits.scene);
     if (!scene || !scene->scene || !reference_add(engine, scene, command)) {
         if (scene)
             scene_destroy(scene->scene);

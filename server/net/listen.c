@@ -5,6 +5,7 @@
 #include "base/sys.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <libgen.h>
 #include <limits.h>
 #include <netinet/in.h>
@@ -125,6 +126,34 @@ bool listener_open(struct listener *listener, const struct address *address, boo
         return false;
     }
     return true;
+}
+
+static bool is_listening_stream(int fd)
+{
+    int type = 0, listens = 0;
+    socklen_t bytes = sizeof type, listens_bytes = sizeof listens;
+    return getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &bytes) == 0 && type == SOCK_STREAM &&
+           getsockopt(fd, SOL_SOCKET, SO_ACCEPTCONN, &listens, &listens_bytes) == 0 && listens;
+}
+
+bool listener_adopt(struct listener *listener, int fd, const char *name, bool beyond_loopback, struct error *error)
+{
+    *listener = (struct listener){.fd = fd};
+    struct address *address = &listener->address;
+    address->storage_bytes = sizeof address->storage;
+    if (!is_listening_stream(fd) ||
+        getsockname(fd, (struct sockaddr *)&address->storage, &address->storage_bytes) < 0) {
+        error_set(error, ERROR_INVALID, name,
+                  "what the service manager hands over is no stream socket that listens");
+        return error_remedy(error, "use ListenStream= and Accept=no in the socket unit");
+    }
+    sa_family_t family = address->storage.ss_family;
+    if (family != AF_UNIX && family != AF_INET && family != AF_INET6)
+        return error_set(error, ERROR_UNSUPPORTED, name, "sockets of family %u are not known", (unsigned)family);
+    int flags = fcntl(fd, F_GETFL);
+    if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0)
+        return error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
+    return address_is_unix(address) || check_tcp(address, beyond_loopback, error);
 }
 
 void listener_close(struct listener *listener)

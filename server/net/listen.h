@@ -19,6 +19,10 @@ struct listener {
  * `beyond_loopback` says that there is a key for those who come from there, or that none is wanted. */
 bool listener_open(struct listener *listener, const struct address *address, bool beyond_loopback,
                    struct error *error);
+/* One that listens already, handed over by the service manager, whose file stays there; `name` is for people. The
+ * descriptor is the listener's if it succeeds. */
+bool listener_adopt(struct listener *listener, int fd, const char *name, bool beyond_loopback,
+                    struct error *error);
 void listener_close(struct listener *listener); /* removes the socket file */
 
 /* The next client, non-blocking; -1 if none waits. *peer: where it comes from. *retry_later: the process is out of

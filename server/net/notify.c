@@ -31,3 +31,13 @@ void notify_manager(const char *state)
     if (fd >= 0)
         close(fd);
 }
+
+uint64_t notify_watchdog_ns(void)
+{
+    const char *usec = getenv("WATCHDOG_USEC"), *pid = getenv("WATCHDOG_PID");
+    /* Without a process it is meant for whoever reads it. */
+    if (!usec || (pid && strtoull(pid, NULL, 10) != (unsigned long long)getpid()))
+        return 0;
+    unsigned long long interval_us = strtoull(usec, NULL, 10);
+    return interval_us < UINT64_MAX / 1000 ? interval_us * 1000 : 0;
+}

@@ -3,7 +3,12 @@
 #ifndef FARLIGHT_NET_NOTIFY_H
 #define FARLIGHT_NET_NOTIFY_H
 
-/* "READY=1", "STOPPING=1". Does nothing where nobody asked to be told. */
+#include <stdint.h>
+
+/* "READY=1", "STOPPING=1", "RELOADING=1", one assignment a line. Does nothing where nobody asked to be told. */
 void notify_manager(const char *state);
+
+/* How often the service manager wants to hear "WATCHDOG=1" from this process at least, in ns; 0: it does not. */
+uint64_t notify_watchdog_ns(void);
 
 #endif

@@ -157,6 +157,13 @@ void blob_store_trim(struct blob_store *store)
     trim_to(store, store->cache_limit_bytes);
 }
 
+void blob_store_limit(struct blob_store *store, uint64_t limit_bytes, uint64_t cache_limit_bytes)
+{
+    store->limit_bytes = limit_bytes;
+    store->cache_limit_bytes = cache_limit_bytes;
+    blob_store_trim(store);
+}
+
 static bool fits(const struct blob_store *store, uint64_t size_bytes)
 {
     uint64_t used_bytes = blob_store_bytes(store) + (uint64_t)store->count * BLOB_STORE_OVERHEAD_BYTES;

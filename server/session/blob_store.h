@@ -21,6 +21,8 @@ struct blob_store;
 
 struct blob_store *blob_store_create(uint64_t limit_bytes, uint64_t cache_limit_bytes); /* NULL: out of memory */
 void blob_store_destroy(struct blob_store *store);                                      /* accepts NULL */
+/* Other limits from now on. What is held beyond them stays until its uses end. */
+void blob_store_limit(struct blob_store *store, uint64_t limit_bytes, uint64_t cache_limit_bytes);
 
 /* A new reference, or NULL: not there. */
 struct blob *blob_store_find(struct blob_store *store, blob_principal principal,

@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 #include "session/daemon.h"
 
+#include "base/clock.h"
 #include "base/log.h"
+#include "net/activation.h"
 #include "net/notify.h"
 #include "session/session.h"
 
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
@@ -18,17 +21,21 @@
 /* Out of descriptors: a listener stays readable all the time, so it is not watched for this long. */
 #define ACCEPT_PAUSE_NS UINT64_C(100000000)
 
-static void stop_signals(sigset_t *set)
+/* In the time in which the service manager wants to hear something. */
+#define WATCHDOG_LOOKS 4
+
+static void own_signals(sigset_t *set)
 {
     sigemptyset(set);
     sigaddset(set, SIGTERM);
     sigaddset(set, SIGINT);
+    sigaddset(set, SIGHUP);
 }
 
 void daemon_block_signals(void)
 {
     sigset_t set;
-    stop_signals(&set);
+    own_signals(&set);
     sigprocmask(SIG_BLOCK, &set, NULL);
     signal(SIGPIPE, SIG_IGN);
 }
@@ -58,6 +65,22 @@ bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loo
         ok = !address[0] || listen_at(daemon, address, beyond_loopback, error);
     free(copy);
     return ok && (daemon->listener_count || error_set(error, ERROR_INVALID, "server.listen", "no address"));
+}
+
+bool daemon_listen_activated(struct daemon *daemon, bool beyond_loopback, size_t *count, struct error *error)
+{
+    char names[DAEMON_LISTENERS_MAX][ACTIVATION_NAME_BYTES];
+    for (size_t i = 0; i < DAEMON_LISTENERS_MAX; i++)
+        activation_name(i, names[i]);
+    *count = activation_take();
+    if (*count > DAEMON_LISTENERS_MAX)
+        return error_set(error, ERROR_LIMIT, "LISTEN_FDS", "at most %d sockets", DAEMON_LISTENERS_MAX);
+    for (size_t i = 0; i < *count; i++) {
+        if (!listener_adopt(&daemon->listeners[i], ACTIVATION_FD_FIRST + (int)i, names[i], beyond_loopback, error))
+            return false;
+        daemon->listener_count++;
+    }
+    return true;
 }
 
 /* ---- clients ----------------------------------------------------------------------------------------- */
@@ -138,6 +161,17 @@ static void stop(struct daemon *daemon)
     hub_stop(&daemon->hub);
 }
 
+/* systemd's notify-reload wants the time along, to tell this answer from one to a signal before. */
+static void reload(struct daemon *daemon)
+{
+    char state[64];
+    snprintf(state, sizeof state, "RELOADING=1\nMONOTONIC_USEC=%" PRIu64, clock_now_ns() / 1000);
+    notify_manager(state);
+    if (daemon->reload)
+        daemon->reload(daemon->reload_context);
+    notify_manager("READY=1");
+}
+
 static void on_signal(void *context, uint32_t epoll_events)
 {
     (void)epoll_events;
@@ -145,6 +179,11 @@ static void on_signal(void *context, uint32_t epoll_events)
     struct signalfd_siginfo info;
     if (read(daemon->signal_fd, &info, sizeof info) != (ssize_t)sizeof info)
         return;
+    if (info.ssi_signo == SIGHUP) {
+        if (!daemon->hub.stopping)
+            reload(daemon);
+        return;
+    }
     log_write(LOG_INFO, "session", "stopping: %s", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
     stop(daemon);
 }
@@ -163,12 +202,34 @@ static void on_owner_gone(void *context)
         stop(daemon);
 }
 
+/* One who tries again may find that it works: another process has another context. */
+static void on_device_gone(void *context)
+{
+    struct daemon *daemon = context;
+    if (daemon->hub.stopping)
+        return;
+    log_write(LOG_ERROR, "session", "stopping: the GPU is lost for good");
+    daemon->device_gone = true;
+    stop(daemon);
+}
+
+/* A driver that hangs cannot be healed from within, so the manager hears nothing more; nor where this thread
+ * hangs. A ping that is left out because of one long slice is made up for by the next. */
+static void on_watchdog_timer(void *context)
+{
+    struct daemon *daemon = context;
+    const struct engine_port *engine = &daemon->hub.options.engine;
+    if (engine->is_alive(engine->context, &daemon->engine_turns))
+        notify_manager("WATCHDOG=1");
+    loop_timer_start(daemon->loop, &daemon->watchdog_timer, daemon->watchdog_ns / WATCHDOG_LOOKS);
+}
+
 /* ---- life -------------------------------------------------------------------------------------------- */
 
 static bool watch_signals(struct daemon *daemon, struct error *error)
 {
     sigset_t set;
-    stop_signals(&set);
+    own_signals(&set);
     daemon->signal_fd = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
     if (daemon->signal_fd < 0)
         return error_set(error, ERROR_INTERNAL, NULL, "signalfd: %s", strerror(errno));
@@ -188,8 +249,13 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
     daemon->loop = loop;
     daemon->hub.owner_gone = on_owner_gone;
     daemon->hub.emptied = on_emptied;
+    daemon->hub.device_gone = on_device_gone;
     daemon->hub.call_context = daemon;
     daemon->accept_timer = (struct loop_timer){.call = on_accept_timer, .context = daemon};
+    daemon->watchdog_timer = (struct loop_timer){.call = on_watchdog_timer, .context = daemon};
+    daemon->watchdog_ns = notify_watchdog_ns();
+    if (daemon->watchdog_ns)
+        on_watchdog_timer(daemon);
     if (!watch_signals(daemon, error))
         return false;
     for (size_t i = 0; i < daemon->listener_count; i++) {
@@ -253,6 +319,7 @@ void daemon_finish(struct daemon *daemon)
         close_sessions(daemon);
         loop_watch_remove(daemon->signal_watch);
         loop_timer_stop(daemon->loop, &daemon->accept_timer);
+        loop_timer_stop(daemon->loop, &daemon->watchdog_timer);
         hub_finish(&daemon->hub);
         loop_destroy(daemon->loop);
     }

@@ -20,22 +20,33 @@ struct daemon {
     size_t listener_count;
     int signal_fd;
     struct loop_watch *signal_watch;
-    struct loop_timer accept_timer; /* after which listeners are looked at again */
+    struct loop_timer accept_timer;   /* after which listeners are looked at again */
+    struct loop_timer watchdog_timer; /* after which the service manager is told that all goes on */
+    uint64_t watchdog_ns;             /* it wants to hear that so often; 0: it does not */
+    uint64_t engine_turns;            /* for engine_is_alive() */
+    bool device_gone;                 /* the engine's is lost for good: that is why it ends */
+    /* Reads the configuration again and hands it to hub_reload(), at SIGHUP; NULL: that changes nothing. */
+    loop_call_fn *reload;
+    void *reload_context;
 };
 
-/* SIGTERM and SIGINT are blocked in the calling thread, to be taken by the loop; before any thread starts, so that
- * all inherit it. SIGPIPE is ignored. */
+/* SIGTERM, SIGINT and SIGHUP are blocked in the calling thread, to be taken by the loop; before any thread starts,
+ * so that all inherit it. SIGPIPE is ignored. */
 void daemon_block_signals(void);
 /* Zeroes it. */
 void daemon_init(struct daemon *daemon);
 /* Reserves addresses, separated by blanks (at least one); clients wait until daemon_start(). */
 bool daemon_listen(struct daemon *daemon, const char *addresses, bool beyond_loopback, struct error *error);
+/* The same with the sockets that the service manager has handed over; *count: how many these were, 0 if we were
+ * started otherwise. */
+bool daemon_listen_activated(struct daemon *daemon, bool beyond_loopback, size_t *count, struct error *error);
 bool daemon_start(struct daemon *daemon, const struct hub_options *options, struct error *error);
 /* Serves the client at a connected socket, and ends with it. It may listen besides. */
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error);
 /* "READY ADDRESS", one line an address, with the port that was chosen; "READY" alone where it listens nowhere. */
 void daemon_print_ready(const struct daemon *daemon, FILE *stream);
-/* Until a signal comes, or the client of daemon_serve_fd() is gone. Says goodbye to all. */
+/* Until SIGTERM or SIGINT comes, the device is lost for good (then `device_gone` is set), or the client of
+ * daemon_serve_fd() is gone. Says goodbye to all. */
 bool daemon_run(struct daemon *daemon, struct error *error);
 void daemon_finish(struct daemon *daemon); /* whatever was begun; before the engine is destroyed */
 

@@ -26,6 +26,11 @@ static void report_sent(void *context, uint64_t queue_ns, uint64_t send_ns)
     engine_report_sent(context, queue_ns, send_ns);
 }
 
+static bool is_alive(void *context, uint64_t *turns)
+{
+    return engine_is_alive(context, turns);
+}
+
 struct engine_port engine_port(struct engine *engine)
 {
     return (struct engine_port){
@@ -35,5 +40,6 @@ struct engine_port engine_port(struct engine *engine)
         .event_fd = event_fd,
         .next_event = next_event,
         .report_sent = report_sent,
+        .is_alive = is_alive,
     };
 }

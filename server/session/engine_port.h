@@ -12,6 +12,7 @@ struct engine_port {
     int (*event_fd)(void *context);
     struct engine_event *(*next_event)(void *context);
     void (*report_sent)(void *context, uint64_t queue_ns, uint64_t send_ns);
+    bool (*is_alive)(void *context, uint64_t *turns);
 };
 
 struct engine_port engine_port(struct engine *engine);

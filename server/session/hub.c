@@ -91,6 +91,8 @@ static void on_engine(void *context, uint32_t epoll_events)
         struct session *session = hashmap_get(&hub->sessions, event->client);
         if (event->kind == ENGINE_CLIENT_FORGOTTEN || event->kind == ENGINE_SCENE_ENDED)
             blob_store_trim(hub->blobs);
+        else if (event->kind == ENGINE_DEVICE_GONE && hub->device_gone)
+            hub->device_gone(hub->call_context);
         else if (session)
             session_engine_event(session, event);
         engine_event_destroy(event);
@@ -113,17 +115,12 @@ static size_t unauthenticated_from(const struct hub *hub, const struct address *
 bool hub_add_client(struct hub *hub, int fd, const struct address *own, const struct address *peer,
                     struct error *error)
 {
-    const struct auth_keys *keys = &hub->options.keys;
-    const struct connection_entry entry = {
-        .keys = keys->keys,
-        .key_count = keys->count,
-        .sealed_only = !hub->options.insecure && auth_is_beyond_loopback(own, peer),
-    };
+    bool sealed_only = !hub->options.insecure && auth_is_beyond_loopback(own, peer);
     const struct session_limits *limits = &hub->options.limits;
     struct auth_identity identity;
     if (hub->stopping)
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");
-    if (!auth_identify(&identity, fd, peer, hub->options.insecure || keys->count, error))
+    if (!auth_identify(&identity, fd, peer, hub->options.insecure || hub->options.keys.count, error))
         return false;
     bool is_owner = hub->last_number + 1 == hub->owner; /* who does as he likes */
     if (!is_owner && identity.has_user && readers_have(&hub->options.readers, identity.user))
@@ -134,7 +131,7 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
     if (!address_is_unix(peer) && unauthenticated_from(hub, peer) >= limits->unauthenticated_per_address)
         return error_set(error, ERROR_LIMIT, NULL, "%u connections of this host have not introduced themselves",
                          limits->unauthenticated_per_address);
-    struct session *session = session_create(hub, hub->last_number + 1, fd, &entry, peer, &identity, error);
+    struct session *session = session_create(hub, hub->last_number + 1, fd, sealed_only, peer, &identity, error);
     if (!session)
         return false;
     if (!hashmap_put(&hub->sessions, ++hub->last_number, session)) {
@@ -158,6 +155,30 @@ void hub_stop(struct hub *hub)
         hub->emptied(hub->call_context);
 }
 
+static void set_connection_limits(struct hub *hub, const struct connection_limits *limits)
+{
+    hub->options.connection_limits = *limits;
+    hub->owner_limits = *limits;
+    if (hub->options.owner_may_be_idle)
+        hub->owner_limits.idle_ms = 0;
+}
+
+bool hub_reload(struct hub *hub, const struct hub_options *options, struct error *error)
+{
+    struct engine_command *command = hub_command(ENGINE_LIMITS, 0, 0);
+    if (!command)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
+    command->limits = options->engine_limits;
+    hub_submit(hub, command);
+    hub->options.limits = options->limits;
+    set_connection_limits(hub, &options->connection_limits);
+    hub->options.engine_limits = options->engine_limits;
+    hub->options.readers = options->readers;
+    hub->options.keys = options->keys;
+    blob_store_limit(hub->blobs, options->limits.blob_bytes, options->limits.blob_cache_bytes);
+    return true;
+}
+
 /* ---- life -------------------------------------------------------------------------------------------- */
 
 bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *options, struct error *error)
@@ -168,9 +189,7 @@ bool hub_init(struct hub *hub, struct loop *loop, const struct hub_options *opti
         .started_ns = clock_now_ns(),
         .retry_timer = {.call = retry, .context = hub},
     };
-    hub->owner_limits = options->connection_limits;
-    if (options->owner_may_be_idle)
-        hub->owner_limits.idle_ms = 0;
+    set_connection_limits(hub, &options->connection_limits);
     hub->waiting_end = &hub->waiting;
     hub->blobs = blob_store_create(options->limits.blob_bytes, options->limits.blob_cache_bytes);
     if (!hub->blobs)

@@ -25,10 +25,10 @@ struct hub_options {
     bool owner_may_be_idle; /* the client of daemon_serve_fd() is not sent away for its silence */
     struct readers readers; /* of the Unix socket */
     struct engine_port engine;
-    struct timeline *timeline;   /* hears of every frame that was sent; may be NULL */
-    uint64_t scene_memory_bytes; /* of one scene, as the engine has it; told to clients */
-    struct auth_keys keys;       /* with which clients come in sealed, from everywhere */
-    bool insecure;               /* peers beyond loopback are let in without one as well */
+    struct timeline *timeline;          /* hears of every frame that was sent; may be NULL */
+    struct engine_limits engine_limits; /* as the engine has them; partly told to clients */
+    struct auth_keys keys;              /* with which clients come in sealed, from everywhere */
+    bool insecure;                      /* peers beyond loopback are let in without one as well */
 };
 
 struct hub {
@@ -44,7 +44,8 @@ struct hub {
     uint64_t owner;                        /* number of the client for whom all this is there; 0: nobody */
     struct connection_limits owner_limits; /* of that one */
     loop_call_fn *owner_gone,
-        *emptied; /* called when that one is gone, and when the last session is; may be NULL */
+        *emptied,     /* called when that one is gone, and when the last session is; may be NULL */
+        *device_gone; /* the engine's device is lost for good; may be NULL */
     void *call_context;
 
     struct loop_watch *engine_watch;
@@ -61,6 +62,10 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
                     struct error *error);
 /* Says goodbye to everybody; `emptied` is called when they are gone, at once if there is nobody. */
 void hub_stop(struct hub *hub);
+
+/* Takes over limits, readers and keys, for what is asked for and who comes from now on; the rest stays as it is.
+ * False: out of memory, nothing is changed. */
+bool hub_reload(struct hub *hub, const struct hub_options *options, struct error *error);
 
 /* Hands a command to the engine, now or as soon as it has room. */
 void hub_submit(struct hub *hub, struct engine_command *command);

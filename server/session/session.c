@@ -178,6 +178,7 @@ void session_engine_event(struct session *session, struct engine_event *event)
     case ENGINE_SCENE_CHANGED:
     case ENGINE_SCENE_ENDED:
     case ENGINE_CLIENT_FORGOTTEN:
+    case ENGINE_DEVICE_GONE:
         return;
     }
 }
@@ -198,7 +199,7 @@ static void fill_limits(struct handshake_limits *told, const struct session *ses
     const struct session_limits *limits = &options->limits;
     *told = (struct handshake_limits){
         .queued_output_bytes = connection_limits->queued_hard_bytes,
-        .scene_memory_bytes = options->scene_memory_bytes,
+        .scene_memory_bytes = options->engine_limits.scene.host_bytes,
         .handshake_ms = connection_limits->handshake_ms,
         .control_payload_max_bytes = CODEC_CONTROL_PAYLOAD_MAX_BYTES,
         .bulk_chunk_max_bytes = (uint32_t)FRAME_PIECE_BYTES,
@@ -250,7 +251,7 @@ static void on_key_failed(void *context)
 static void on_key_proved(void *context, size_t index)
 {
     struct session *session = context;
-    auth_identify_by_key(&session->identity, &session->hub->options.keys, index);
+    auth_identify_by_key(&session->identity, &session->keys, index);
     session->principal = principal_of(session);
 }
 
@@ -364,7 +365,7 @@ static const struct connection_handler connection_handler = {
 
 /* ---- life -------------------------------------------------------------------------------------------- */
 
-struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct connection_entry *entry,
+struct session *session_create(struct hub *hub, uint64_t number, int fd, bool sealed_only,
                                const struct address *peer, const struct auth_identity *identity,
                                struct error *error)
 {
@@ -377,10 +378,16 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, const s
     session->number = number;
     session->identity = *identity;
     session->peer = *peer;
+    session->keys = hub->options.keys;
     session->principal = principal_of(session);
     session->farewell = hub_command(ENGINE_CLIENT_GONE, number, 0);
+    const struct connection_entry entry = {
+        .keys = session->keys.keys,
+        .key_count = session->keys.count,
+        .sealed_only = sealed_only,
+    };
     session->connection = session->farewell ? connection_create(hub->loop, fd, connection_limits_of(session),
-                                                                entry, &connection_handler, session, error)
+                                                                &entry, &connection_handler, session, error)
                                             : NULL;
     if (!session->connection) {
         error_set(error, ERROR_OUT_OF_MEMORY, "session", "no memory");

@@ -29,6 +29,7 @@ struct session {
     uint64_t number;
     struct connection *connection;
     struct auth_identity identity;
+    struct auth_keys keys; /* as they were when it came: others may be read while it proves that it has one */
     struct address peer;
     blob_principal principal;
     char name[HANDSHAKE_NAME_MAX_BYTES + 1];
@@ -46,7 +47,8 @@ struct session {
     uint32_t job_count;
 };
 
-struct session *session_create(struct hub *hub, uint64_t number, int fd, const struct connection_entry *entry,
+/* `sealed_only`: it may not come in without a key. */
+struct session *session_create(struct hub *hub, uint64_t number, int fd, bool sealed_only,
                                const struct address *peer, const struct auth_identity *identity,
                                struct error *error);
 void session_stop(struct session *session); /* the daemon stops: goodbye */

@@ -105,7 +105,7 @@ static void fill(struct message_stats_reply *reply, const struct hub *hub, const
     reply->frames = stats->frames;
     reply->rays = stats->rays;
     reply->host_bytes = stats->host_bytes;
-    reply->host_limit_bytes = hub->options.scene_memory_bytes;
+    reply->host_limit_bytes = hub->options.engine_limits.scene.host_bytes;
     reply->device_bytes = stats->device_bytes;
     reply->device_limit_bytes = stats->device_limit_bytes;
     reply->blob_bytes = blob_store_bytes(hub->blobs);

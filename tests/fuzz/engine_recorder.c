@@ -429,6 +429,7 @@ static void carry_out(struct engine_command *command)
         list(command);
         return;
     case ENGINE_SCENES_TRIM: /* what nobody holds has ended already */
+    case ENGINE_LIMITS:
         return;
     case ENGINE_JOB_CANCEL:
         cancel(command);

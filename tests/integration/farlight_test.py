@@ -47,24 +47,28 @@ def farlight(*arguments, **options):
 class Daemon:
     """A farlightd on a socket of its own; a context manager."""
 
-    def __init__(self, *arguments, listen=None, environment=None):
+    def __init__(self, *arguments, listen=None, environment=None, launcher=(), pass_fds=()):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-daemon-"))
         self.address = listen or f"unix:{self.folder}/farlight.sock"
         self.arguments = list(map(str, arguments))
         self.environment = environment  # None: as it is here
+        self.launcher = list(launcher)  # a command that becomes the daemon whose command line follows it
+        self.pass_fds = pass_fds
         self.process = None
         self.ready = []
 
     def __enter__(self):
         self.log = open(self.folder / "log", "w+")
-        self.process = subprocess.Popen([BIN / "farlightd", "--listen", self.address, *self.arguments],
-                                        stdout=subprocess.PIPE, stderr=self.log, text=True, env=self.environment)
+        self.process = subprocess.Popen([*self.launcher, BIN / "farlightd", "--listen", self.address, *self.arguments],
+                                        stdout=subprocess.PIPE, stderr=self.log, text=True, env=self.environment,
+                                        pass_fds=self.pass_fds)
         for line in self.process.stdout:
             self.ready.append(line.strip())
             if line.startswith("READY"):
                 return self
-        status = self.process.wait()
-        raise AssertionError(f"farlightd ended with {status}: {self.messages()}")
+        failure = AssertionError(f"farlightd ended with {self.process.wait()}: {self.messages()}")
+        self.__exit__()
+        raise failure
 
     def messages(self):
         self.log.flush()

@@ -306,8 +306,9 @@ class Schema(Shots):
                      "search", "brdf", "primary", "encoding"):
             with self.subTest(name=name):
                 result = self.expect(self.try_shot({"model": "teapot.glb", name: "nonsense"}), 2)
-                known = re.search(r"known: ([^)]*)\)", result.stderr).group(1)
-                self.assertEqual(sorted(known.split(", ")), sorted(properties[name]["enum"]))
+                known = re.search(r"known: ([^)]*)\)", result.stderr).group(1).split(", ")
+                for_views_alone = {"h264"}
+                self.assertEqual(sorted(set(known) - for_views_alone), sorted(properties[name]["enum"]))
         result = self.expect(self.try_shot({"model": "teapot.glb", "layers": ["nonsense"]}), 2)
         known = re.search(r"known: ([^)]*)\)", result.stderr).group(1)
         self.assertEqual(sorted(known.split(", ")), sorted(properties["layers"]["items"]["enum"]))

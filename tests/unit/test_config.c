@@ -9,6 +9,8 @@
 
 #include "config.h"
 
+#include "base/log.h"
+
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -188,12 +190,33 @@ static void scenes_linger_as_long_as_the_file_says(void **state)
     struct error error = {0};
     config_defaults(&config);
     assert_true(config_engine(&config, &options, &error));
-    assert_int_equal(options.scene_linger_ms, 120000);
-    assert_int_equal(options.lingering_scenes, 16);
+    assert_int_equal(options.limits.scene_linger_ms, 120000);
+    assert_int_equal(options.limits.lingering_scenes, 16);
     assert_true(read_text(&config, "[limits]\nscene_linger = 0\nscenes_lingering = 3\n", &error));
     assert_true(config_engine(&config, &options, &error));
-    assert_int_equal(options.scene_linger_ms, 0);
-    assert_int_equal(options.lingering_scenes, 3);
+    assert_int_equal(options.limits.scene_linger_ms, 0);
+    assert_int_equal(options.limits.lingering_scenes, 3);
+}
+
+static void what_is_taken_at_the_start_stays_and_the_rest_is_read_again(void **state)
+{
+    (void)state;
+    struct config config, next;
+    struct error error = {0};
+    config_defaults(&config);
+    config_defaults(&next);
+    assert_true(read_text(&next,
+                          "[server]\nlisten = tcp:127.0.0.1:1\nlog_level = error\n[engine]\nqueue = 99\n[memory]\n"
+                          "scene = 2M\ndevice = 3M\n[limits]\nrequests = 3\n[network]\nidle = 7\n",
+                          &error));
+    config_keep_start(&next, &config);
+    assert_string_equal(next.listen, config.listen);
+    assert_int_equal(next.engine_queue, config.engine_queue);
+    assert_int_equal(next.device_bytes, config.device_bytes);
+    assert_int_equal(next.log_level, LOG_ERROR);
+    assert_int_equal(next.scene_bytes, 2 << 20);
+    assert_int_equal(next.limits.requests_in_flight, 3);
+    assert_int_equal(next.connection.idle_ms, 7);
 }
 
 static void the_file_in_conf_is_what_is_dumped(void **state)
@@ -230,6 +253,7 @@ int main(void)
         cmocka_unit_test(what_is_dumped_reads_back_the_same),
         cmocka_unit_test(readers_are_names_and_numbers_of_users),
         cmocka_unit_test(scenes_linger_as_long_as_the_file_says),
+        cmocka_unit_test(what_is_taken_at_the_start_stays_and_the_rest_is_read_again),
         cmocka_unit_test(the_file_in_conf_is_what_is_dumped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

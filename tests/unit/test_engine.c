@@ -395,7 +395,7 @@ static void the_tables_of_all_scenes_together_have_a_limit(void **state)
     (void)state;
     /* Room for about 100 nodes. */
     uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
-    struct engine *engine = start((struct engine_options){.scene_limits = {.host_bytes = limit_bytes}});
+    struct engine *engine = start((struct engine_options){.limits.scene = {.host_bytes = limit_bytes}});
     for (uint32_t scene = 1; scene <= 2; scene++)
         open_scene(engine, 1, scene);
     open_scene(engine, 2, 1);

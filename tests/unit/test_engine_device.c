@@ -5,10 +5,12 @@
 #include <poll.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
+#include <epoxy/gl.h>
 
 #define FRAMES 4
 #define TRACER_BVH 0
@@ -416,12 +418,71 @@ static void views_beside_each_other_come_to_the_pictures_of_single_frames(void *
     engine_event_destroy(event);
 }
 
+/* ---- a context that is lost --------------------------------------------------------------------- */
+
+static atomic_int resets; /* that the driver will tell of, one a context */
+
+static GLenum status_of_a_lost_context(void)
+{
+    int left = atomic_load(&resets);
+    return left > 0 && atomic_compare_exchange_strong(&resets, &left, left - 1) ? GL_GUILTY_CONTEXT_RESET
+                                                                                : GL_NO_ERROR;
+}
+
+/* The engine's thread sees it, as it reads the pointer after it has taken a command. */
+static void lose_contexts(int count)
+{
+    atomic_store(&resets, count);
+    epoxy_glGetGraphicsResetStatus = status_of_a_lost_context;
+}
+
+static void frames_go_on_after_a_lost_context_and_are_the_same(void **state)
+{
+    (void)state;
+    if (!engine)
+        skip();
+    uint64_t before[2][FRAMES], after[2][FRAMES];
+    make_scene(7, 0.7f);
+    submit_job(7, 3, TRACER_BVH);
+    struct engine_event *event;
+    for (int i = 0; i < FRAMES; i++) {
+        event = next_event();
+        before[0][i] = event->frame->digest;
+        engine_event_destroy(event);
+    }
+    expect_done();
+    lose_contexts(1);
+    submit_job(7, 4, TRACER_BVH);
+    for (int i = 0; i < FRAMES; i++) {
+        event = next_event();
+        after[0][i] = event->frame->digest;
+        engine_event_destroy(event);
+    }
+    expect_done();
+    assert_int_equal(atomic_load(&resets), 0); /* it was told */
+    assert_memory_equal(before[0], after[0], sizeof before[0]);
+    /* Pictures that are refined, too: what was held is made again. */
+    struct view_frame alone[VIEWS][FRAMES], healed[VIEWS][FRAMES];
+    submit_view(7, 5, 0);
+    collect_views(alone, 5, 1);
+    lose_contexts(1);
+    submit_view(7, 6, 0);
+    collect_views(healed, 6, 1);
+    assert_int_equal(atomic_load(&resets), 0);
+    assert_true(alone[0][0].digest == healed[0][0].digest);
+    submit((struct engine_command){.kind = ENGINE_CLIENT_GONE, .client = 7});
+    event = next_event();
+    assert_int_equal(event->kind, ENGINE_CLIENT_FORGOTTEN);
+    engine_event_destroy(event);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(clients_that_take_turns_get_the_frames_they_would_get_alone),
         cmocka_unit_test(jobs_switch_tracers_on_one_scene_while_both_run),
         cmocka_unit_test(views_of_one_scene_at_once_show_what_each_shows_alone),
+        cmocka_unit_test(frames_go_on_after_a_lost_context_and_are_the_same),
         cmocka_unit_test(views_beside_each_other_come_to_the_pictures_of_single_frames),
     };
     return cmocka_run_group_tests(tests, start, stop);

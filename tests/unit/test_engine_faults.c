@@ -63,21 +63,67 @@ static void a_lost_device_is_made_anew_and_the_frame_rendered_again(void **state
     stop(engine);
 }
 
-static void a_device_that_is_lost_again_and_again_ends_the_job(void **state)
+static void a_job_over_which_the_device_is_lost_each_time_is_put_aside_and_others_go_on(void **state)
 {
     (void)state;
     struct engine *engine = start((struct engine_options){0});
     open_scene(engine, 1, 1);
     atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
-    atomic_store(&fake.fail_steps, 1000);
+    atomic_store(&fake.fail_steps, 3);
     submit(engine, render(1, 2, 0, 2));
     struct engine_event *event = expect_event(engine, ENGINE_FAILED, 1, 2);
     assert_int_equal(event->error.kind, ERROR_DEVICE_LOST);
-    assert_true(event->error.retryable);
+    assert_false(event->error.retryable);
     engine_event_destroy(event);
+    submit(engine, render(1, 3, 0, 0));
+    take_frame(engine, 1, 3, 0);
+    expect_done(engine, 1, 3);
     assert_int_equal(atomic_load(&fake.devices_made), 4);
-    submit(engine, command(ENGINE_STATS, 1, 3)); /* the engine itself lives */
-    engine_event_destroy(expect_event(engine, ENGINE_STATS_READY, 1, 3));
+    stop(engine);
+}
+
+static void a_device_that_is_lost_for_good_fails_all_jobs_and_is_told(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    open_scene(engine, 1, 1);
+    submit(engine, gated(render(1, 2, 0, 2)));
+    submit(engine, gated(render(1, 3, 0, 2)));
+    wait_until(&fake.frames_begun, 2);
+    atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
+    atomic_store(&fake.fail_steps, 1000);
+    for (int i = 0; i < 2; i++) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        assert_int_equal(event->kind, ENGINE_FAILED);
+        assert_int_equal(event->error.kind, ERROR_DEVICE_LOST);
+        engine_event_destroy(event);
+    }
+    engine_event_destroy(expect_event(engine, ENGINE_DEVICE_GONE, 0, 0));
+    assert_int_equal(atomic_load(&fake.devices_made), 4);
+    submit(engine, command(ENGINE_STATS, 1, 4)); /* the engine itself lives, for goodbyes */
+    engine_event_destroy(expect_event(engine, ENGINE_STATS_READY, 1, 4));
+    stop(engine);
+}
+
+static void whether_the_engine_goes_on_can_be_seen(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    uint64_t turns = 0;
+    open_scene(engine, 1, 1);
+    while (!engine_is_alive(engine, &turns) || !engine_is_alive(engine, &turns))
+        usleep(1000); /* it has nothing to do, from some time on */
+    atomic_store(&fake.step_us, 300000);
+    submit(engine, render(1, 2, 0, 0));
+    wait_until(&fake.frames_begun, 1);
+    usleep(50000);
+    engine_is_alive(engine, &turns);
+    usleep(50000);
+    assert_false(engine_is_alive(engine, &turns)); /* within a step of 0.3 s */
+    take_frame(engine, 1, 2, 0);
+    expect_done(engine, 1, 2);
+    assert_true(engine_is_alive(engine, &turns));
     stop(engine);
 }
 
@@ -282,7 +328,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(jobs_that_cannot_be_are_refused_with_their_field),
         cmocka_unit_test(a_lost_device_is_made_anew_and_the_frame_rendered_again),
-        cmocka_unit_test(a_device_that_is_lost_again_and_again_ends_the_job),
+        cmocka_unit_test(a_job_over_which_the_device_is_lost_each_time_is_put_aside_and_others_go_on),
+        cmocka_unit_test(a_device_that_is_lost_for_good_fails_all_jobs_and_is_told),
+        cmocka_unit_test(whether_the_engine_goes_on_can_be_seen),
         cmocka_unit_test(edits_that_waited_for_a_lost_frame_are_applied),
         cmocka_unit_test(idle_scenes_give_way_when_device_memory_runs_out),
         cmocka_unit_test(a_frame_for_which_there_is_no_memory_waits_until_others_have_ended),

@@ -312,7 +312,7 @@ static void leave(struct engine *engine, uint64_t client, const char *name, enum
 static void a_scene_that_nobody_holds_can_be_come_back_to(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.scene_linger_ms = LONG_MS});
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
     leave(engine, 1, "kept", SHARING_KEPT);
     leave(engine, 1, "shared", SHARING_SHARED);
     leave(engine, 1, "private", SHARING_PRIVATE);
@@ -332,7 +332,7 @@ static void a_scene_that_nobody_holds_can_be_come_back_to(void **state)
 static void its_time_is_limited_and_begins_when_the_last_one_goes(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.scene_linger_ms = SHORT_MS});
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = SHORT_MS});
     open_as(engine, 1, 1, "a", SHARING_SHARED);
     submit_commit(engine, 1, 2, 1);
     expect_done(engine, 1, 2);
@@ -348,7 +348,7 @@ static void its_time_is_limited_and_begins_when_the_last_one_goes(void **state)
 static void nothing_lingers_where_that_is_not_wanted(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.scene_linger_ms = 0});
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = 0});
     open_as(engine, 1, 1, "a", SHARING_SHARED);
     submit_commit(engine, 1, 2, 1);
     expect_done(engine, 1, 2);
@@ -357,7 +357,7 @@ static void nothing_lingers_where_that_is_not_wanted(void **state)
     engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 1, 0));
     stop(engine);
     /* Nor does one that holds nothing. */
-    engine = start((struct engine_options){.scene_linger_ms = LONG_MS});
+    engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
     open_as(engine, 1, 1, "a", SHARING_KEPT);
     close_scene(engine, 1, 2, 1);
     expect_done(engine, 1, 2);
@@ -369,7 +369,7 @@ static void nothing_lingers_where_that_is_not_wanted(void **state)
 static void of_too_many_the_one_that_was_left_first_ends(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.scene_linger_ms = LONG_MS, .lingering_scenes = 2});
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS, .limits.lingering_scenes = 2});
     leave(engine, 1, "a", SHARING_KEPT);
     leave(engine, 2, "b", SHARING_SHARED);
     attach(engine, 1, 1, "a"); /* "b" has been left for longer now */
@@ -389,7 +389,7 @@ static void of_too_many_the_one_that_was_left_first_ends(void **state)
 static void who_leaves_many_scenes_loses_his_own(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.scene_linger_ms = LONG_MS, .lingering_scenes = 3});
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS, .limits.lingering_scenes = 3});
     leave(engine, 1, "first", SHARING_SHARED);
     static const char *const names[] = {"a", "b", "c", "d"};
     for (uint32_t i = 0; i < 4; i++) {
@@ -414,7 +414,7 @@ static void who_leaves_many_scenes_loses_his_own(void **state)
 static void a_left_scene_gives_its_name_to_a_new_one_of_the_same_user(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.scene_linger_ms = LONG_MS});
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
     leave(engine, 1, "a", SHARING_SHARED);
     submit_open(engine, 2, 1, "a", SHARING_SHARED);
     expect_failed(engine, 2, 1, ERROR_INVALID, "scene_open.name");
@@ -445,7 +445,7 @@ static void left_scenes_give_way_where_memory_is_short(void **state)
     /* Room for about 100 nodes. */
     uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
     struct engine *engine = start((struct engine_options){
-        .scene_linger_ms = LONG_MS, .scene_limits = {.host_bytes = limit_bytes, .nodes = 100}});
+        .limits.scene_linger_ms = LONG_MS, .limits.scene = {.host_bytes = limit_bytes, .nodes = 100}});
     open_as(engine, 1, 1, "a", SHARING_SHARED);
     submit(engine, commit_of_nodes(1, 2, 1, 60));
     expect_done(engine, 1, 2);
@@ -470,7 +470,7 @@ static void left_scenes_give_way_where_memory_is_short(void **state)
 static void a_list_has_what_its_reader_may_come_to(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.scene_linger_ms = LONG_MS});
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
     open_as(engine, 1, 1, "m", SHARING_SHARED);
     open_as(engine, 1, 2, "k", SHARING_KEPT);
     open_as(engine, 1, 3, "p", SHARING_PRIVATE);
@@ -503,7 +503,7 @@ static void a_list_has_what_its_reader_may_come_to(void **state)
 static void stats_have_each_scene_once(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.scene_linger_ms = LONG_MS});
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
     open_as(engine, 1, 5, "a", SHARING_SHARED);
     attach(engine, 2, 6, "a");
     leave(engine, 3, "b", SHARING_SHARED);
@@ -627,7 +627,7 @@ static void of_many_cameras_the_first_are_told(void **state)
 static void what_a_left_scene_uses_stays(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.scene_linger_ms = LONG_MS});
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
     open_as(engine, 1, 1, "a", SHARING_SHARED);
     struct draft_list list = {0};
     static const float sphere[4] = {0, 0, 0, 1};

@@ -606,6 +606,30 @@ static void a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free(void **st
     view_wishes_unref(wishes);
 }
 
+static void a_view_goes_on_after_the_device_was_lost(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){0});
+    struct view_wishes *wishes = view_wishes_create();
+    open_scene(engine, 1, 1);
+    atomic_store(&fake.fail_kind, ERROR_DEVICE_LOST);
+    atomic_store(&fake.fail_steps, 1);
+    submit(engine, with_samples(view(1, 2, wishes), 4, 2));
+    for (uint32_t number = 0; number < 2; number++) {
+        struct engine_frame *frame = take(expect_frame(engine, 1, 2, number));
+        assert_int_equal(frame->result.samples, 2 * (number + 1));
+        drop(frame);
+    }
+    atomic_store(&fake.fail_steps, 1);
+    look(engine, wishes, 1, true);
+    struct engine_frame *frame = take(expect_frame(engine, 1, 2, 2));
+    assert_int_equal(frame->command, 1);
+    drop(frame);
+    assert_int_equal(atomic_load(&fake.devices_made), 3);
+    view_wishes_unref(wishes);
+    stop(engine);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -614,6 +638,7 @@ int main(void)
         cmocka_unit_test(a_picture_that_rests_is_refined_until_it_has_its_samples),
         cmocka_unit_test(an_edit_of_the_scene_begins_anew),
         cmocka_unit_test(refining_gives_way_to_a_new_camera),
+        cmocka_unit_test(a_view_goes_on_after_the_device_was_lost),
         cmocka_unit_test(refining_gives_way_to_an_edit),
         cmocka_unit_test(who_looks_on_sees_cameras_while_an_edit_waits_for_a_long_frame_of_a_batch),
         cmocka_unit_test(nothing_is_begun_beyond_credit_so_that_nothing_becomes_stale),

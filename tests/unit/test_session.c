@@ -120,6 +120,7 @@ static bool submit(void *context, struct engine_command *command, struct error *
         event(ENGINE_DONE, command, command->request);
         break;
     case ENGINE_VIEW_LOOK:
+    case ENGINE_LIMITS:
         break;
     case ENGINE_STATS:
         event(ENGINE_STATS_READY, command, command->request);

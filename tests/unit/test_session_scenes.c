@@ -63,7 +63,7 @@ static void start_daemon(const struct hub_options *wanted)
                                                            .queued_soft_ms = 10000,
                                                            .queued_soft_bytes = 16 << 20,
                                                            .queued_hard_bytes = 64 << 20};
-    served.engine = start((struct engine_options){.scene_linger_ms = 600000});
+    served.engine = start((struct engine_options){.limits.scene_linger_ms = 600000});
     options.engine = engine_port(served.engine);
     strcpy(served.folder, "/tmp/farlight-test-XXXXXX");
     assert_non_null(mkdtemp(served.folder));
