@@ -141,19 +141,7 @@ struct source {
     const struct arguments *arguments;
     struct config *config;
     struct daemon *daemon;
-    bool listens;
 };
-
-/* Whoever started us for himself may take his time. */
-static bool read_hub_options(const struct config *config, bool listens, struct hub_options *options,
-                             struct error *error)
-{
-    if (!config_hub(config, options, error))
-        return false;
-    if (!listens)
-        options->connection_limits.idle_ms = 0;
-    return true;
-}
 
 /* All of it or, where something is wrong, nothing. */
 static void reload(void *context)
@@ -165,8 +153,7 @@ static void reload(void *context)
     bool read = read_config(&next, source->arguments, &error);
     if (read)
         config_keep_start(&next, source->config);
-    if (!read || !read_hub_options(&next, source->listens, &options, &error) ||
-        !hub_reload(&source->daemon->hub, &options, &error)) {
+    if (!read || !config_hub(&next, &options, &error) || !hub_reload(&source->daemon->hub, &options, &error)) {
         log_write(LOG_ERROR, "config", "the configuration stays as it was: %s%s%s", error.field,
                   error.field[0] ? ": " : "", error.text);
         return;
@@ -191,7 +178,7 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, bo
 {
     struct engine_options engine_options;
     struct hub_options options;
-    if (!config_engine(config, &engine_options, error) || !read_hub_options(config, listens, &options, error) ||
+    if (!config_engine(config, &engine_options, error) || !config_hub(config, &options, error) ||
         (listens && !begin_to_listen(daemon, config, config->insecure || options.keys.count, error)))
         return false;
     struct engine *engine = engine_create(&engine_options, error);
@@ -229,7 +216,7 @@ int main(int argc, char **argv)
     bool listens = arguments.fd < 0 || arguments.listen[0];
     struct daemon daemon;
     daemon_init(&daemon);
-    struct source source = {.arguments = &arguments, .config = &config, .daemon = &daemon, .listens = listens};
+    struct source source = {.arguments = &arguments, .config = &config, .daemon = &daemon};
     daemon.reload = reload;
     daemon.reload_context = &source;
     struct timeline *timeline = NULL;
