@@ -805,7 +805,8 @@ static struct {
         uint64_t credit, made;
     } views[VIEWS];
     bool asked[REQUESTS], answered[REQUESTS];
-    uint32_t under_way[VIEWS]; /* request whose frame is coming on a channel; 0: none */
+    unsigned view_of[REQUESTS]; /* where it asks for a view */
+    uint32_t under_way[VIEWS];  /* request whose frame is coming on a channel; 0: none */
     uint64_t frame_bytes[VIEWS], credit[VIEWS], frames[VIEWS];
 } play;
 
@@ -888,6 +889,9 @@ static void play_client(void)
             assert_true(request < REQUESTS && play.asked[request]);
             assert_false(play.answered[request]);
             play.answered[request] = true;
+            /* What comes next on its channel may be another view, with all the credit that was ever told there. */
+            if (message->type == MESSAGE_ERROR)
+                play.frames[play.view_of[request]] = 0;
             break;
         case MESSAGE_FRAME_BEGIN:
             assert_true(view < VIEWS && request < REQUESTS && !play.answered[request]);
@@ -918,6 +922,7 @@ static void ask(uint32_t request)
     unsigned view = roll(VIEWS);
     struct message message = view_message(0);
     play.asked[request] = true;
+    play.view_of[request] = view;
     if (roll(3)) {
         message.render.channel = CHANNEL + view;
         message.render.credit = roll(4);
