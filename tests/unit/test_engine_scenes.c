@@ -369,7 +369,8 @@ static void nothing_lingers_where_that_is_not_wanted(void **state)
 static void of_too_many_the_one_that_was_left_first_ends(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS, .limits.lingering_scenes = 2});
+    struct engine *engine =
+        start((struct engine_options){.limits.scene_linger_ms = LONG_MS, .limits.lingering_scenes = 2});
     leave(engine, 1, "a", SHARING_KEPT);
     leave(engine, 2, "b", SHARING_SHARED);
     attach(engine, 1, 1, "a"); /* "b" has been left for longer now */
@@ -389,7 +390,8 @@ static void of_too_many_the_one_that_was_left_first_ends(void **state)
 static void who_leaves_many_scenes_loses_his_own(void **state)
 {
     (void)state;
-    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS, .limits.lingering_scenes = 3});
+    struct engine *engine =
+        start((struct engine_options){.limits.scene_linger_ms = LONG_MS, .limits.lingering_scenes = 3});
     leave(engine, 1, "first", SHARING_SHARED);
     static const char *const names[] = {"a", "b", "c", "d"};
     for (uint32_t i = 0; i < 4; i++) {
