@@ -56,20 +56,29 @@ static double text_width(const struct layout *layout, enum hud_font font, const 
     return layout->measure(layout->user, font, layout->line, text);
 }
 
-__attribute__((format(printf, 6, 7))) static void text(struct layout *layout, double x, double y,
-                                                       enum hud_font font, struct hud_colour colour,
-                                                       const char *format, ...)
+__attribute__((format(printf, 6, 0))) static struct hud_mark *add_text(struct layout *layout, double x, double y,
+                                                                       enum hud_font font,
+                                                                       struct hud_colour colour,
+                                                                       const char *format, va_list arguments)
 {
     struct hud_mark *mark = add(layout);
-    va_list arguments;
-    va_start(arguments, format);
     vsnprintf(mark->text, sizeof mark->text, format, arguments);
-    va_end(arguments);
     mark->x = x;
     mark->y = y;
     mark->height = layout->line;
     mark->font = font;
     mark->colour = colour;
+    return mark;
+}
+
+__attribute__((format(printf, 6, 7))) static void text(struct layout *layout, double x, double y,
+                                                       enum hud_font font, struct hud_colour colour,
+                                                       const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    add_text(layout, x, y, font, colour, format, arguments);
+    va_end(arguments);
 }
 
 /* The same, ending at x. */
@@ -77,17 +86,10 @@ __attribute__((format(printf, 6, 7))) static void text_to(struct layout *layout,
                                                           enum hud_font font, struct hud_colour colour,
                                                           const char *format, ...)
 {
-    struct hud_mark *mark = add(layout);
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(mark->text, sizeof mark->text, format, arguments);
+    add_text(layout, x, y, font, colour, format, arguments)->is_right = true;
     va_end(arguments);
-    mark->x = x;
-    mark->y = y;
-    mark->height = layout->line;
-    mark->font = font;
-    mark->colour = colour;
-    mark->is_right = true;
 }
 
 /* ---- what is shown, at the top left ---- */
