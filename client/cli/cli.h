@@ -238,6 +238,18 @@ void cli_loading_close(struct cli_loading *loading);
 /* Sets the job's camera where the command line leaves it to the model. */
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error);
 
+/* ---- daemon.c: of commands that only ask a daemon ---- */
+
+struct cli_daemon {
+    const char *server, *key_file; /* as typed */
+};
+/* --server and --key: a child parser; its input is a struct cli_daemon. */
+extern const struct argp cli_daemon_argp;
+/* Interruptible from then on. Where nothing was typed FARLIGHT_SERVER counts; where that names none either, a
+ * private daemon is started, or (`must_be_named`) it is FL_ERROR_ARGUMENT. */
+struct fl_connection *cli_daemon_connect(const struct cli_daemon *daemon, const char *name, bool must_be_named,
+                                         struct fl_error *error);
+
 /* ---- wave_table.c: what came of comparing the waves of a frame ---- */
 
 /* Tables and what their columns mean, on standard output. */

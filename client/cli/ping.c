@@ -5,32 +5,23 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
-
-#define KEY_KEY 0x400
 
 struct ping_options {
-    const char *server, *key_file;
+    struct cli_daemon daemon;
     uint64_t count;
     struct cli_job job; /* holds the error of what was typed */
 };
 
-static const struct argp_option options[] = {
-    {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
-    {"key", KEY_KEY, "FILE", 0,
-     "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)", 0},
-    {"count", 'c', "N", 0, "How many times (default 5)", 0},
-    {0}};
+static const struct argp_option options[] = {{"count", 'c', "N", 0, "How many times (default 5)", 0}, {0}};
+
+static const struct argp_child children[] = {{&cli_daemon_argp, 0, NULL, 0}, {0}};
 
 static error_t parse(int key, char *value, struct argp_state *state)
 {
     struct ping_options *wanted = state->input;
     switch (key) {
-    case 's':
-        wanted->server = value;
-        return 0;
-    case KEY_KEY:
-        wanted->key_file = value;
+    case ARGP_KEY_INIT:
+        state->child_inputs[0] = &wanted->daemon;
         return 0;
     case 'c':
         if (fl_text_integer(value, 1, 1000000, &wanted->count, &wanted->job.error))
@@ -64,21 +55,12 @@ static bool ping(struct fl_connection *connection, const struct ping_options *wa
 int cli_ping(int argc, char **argv)
 {
     static const struct argp argp = {
-        .options = options, .parser = parse, .doc = "Measure the way to a daemon and back."};
-    struct ping_options wanted = {.server = getenv("FARLIGHT_SERVER"), .count = 5};
+        .options = options, .parser = parse, .children = children, .doc = "Measure the way to a daemon and back."};
+    struct ping_options wanted = {.count = 5};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
-    if (wanted.server != NULL && wanted.server[0] == '\0')
-        wanted.server = NULL; /* an empty FARLIGHT_SERVER names none */
     struct fl_error error = {0};
-    if (!cli_interrupt_begin(&error))
-        return cli_report(&error);
-    struct fl_connection *connection =
-        fl_connect(&(struct fl_connect_options){.server = wanted.server,
-                                                .key_file = cli_key_file(wanted.server, wanted.key_file),
-                                                .name = "farlight ping",
-                                                .interrupt_fd = cli_interrupt_fd()},
-                   &error);
+    struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight ping", false, &error);
     const bool done = connection != NULL && ping(connection, &wanted, &error);
     fl_connection_destroy(connection);
     return done ? CLI_DONE : cli_report(&error);

@@ -7,29 +7,23 @@
 #include <stdlib.h>
 
 #define KEY_JSON 0x400
-#define KEY_KEY 0x401
 
 struct scenes_options {
-    const char *server, *key_file;
+    struct cli_daemon daemon;
     bool json;
     struct cli_job job; /* holds the error of what was typed */
 };
 
-static const struct argp_option options[] = {
-    {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
-    {"key", KEY_KEY, "FILE", 0, "Key of a daemon that is reached over TCP (default: FARLIGHT_KEY)", 0},
-    {"json", KEY_JSON, NULL, 0, "One JSON object a line", 0},
-    {0}};
+static const struct argp_option options[] = {{"json", KEY_JSON, NULL, 0, "One JSON object a line", 0}, {0}};
+
+static const struct argp_child children[] = {{&cli_daemon_argp, 0, NULL, 0}, {0}};
 
 static error_t parse(int key, char *value, struct argp_state *state)
 {
     struct scenes_options *wanted = state->input;
     switch (key) {
-    case 's':
-        wanted->server = value;
-        return 0;
-    case KEY_KEY:
-        wanted->key_file = value;
+    case ARGP_KEY_INIT:
+        state->child_inputs[0] = &wanted->daemon;
         return 0;
     case KEY_JSON:
         wanted->json = true;
@@ -68,24 +62,14 @@ int cli_scenes(int argc, char **argv)
 {
     static const struct argp argp = {.options = options,
                                      .parser = parse,
+                                     .children = children,
                                      .doc = "List the scenes of a daemon that others may come to: those that are "
                                             "shared, and those that are kept for whoever asks."};
-    struct scenes_options wanted = {.server = getenv("FARLIGHT_SERVER")};
+    struct scenes_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
-    if (wanted.server == NULL || wanted.server[0] == '\0') {
-        cli_usage(&wanted.job, "--server", "no daemon is named");
-        fl_error_remedy(&wanted.job.error, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]");
-        return cli_report(&wanted.job.error);
-    }
     struct fl_error error = {0};
-    if (!cli_interrupt_begin(&error))
-        return cli_report(&error);
-    const struct fl_connect_options connect = {.server = wanted.server,
-                                               .key_file = cli_key_file(wanted.server, wanted.key_file),
-                                               .name = "farlight scenes",
-                                               .interrupt_fd = cli_interrupt_fd()};
-    struct fl_connection *connection = fl_connect(&connect, &error);
+    struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight scenes", true, &error);
     struct fl_scene_entry *scenes = NULL;
     size_t count = 0;
     const bool done = connection != NULL && fl_scene_list(connection, &scenes, &count, &error);

@@ -7,30 +7,23 @@
 #include <stdlib.h>
 
 #define KEY_JSON 0x400
-#define KEY_KEY 0x401
 
 struct stats_options {
-    const char *server, *key_file;
+    struct cli_daemon daemon;
     bool json;
     struct cli_job job; /* holds the error of what was typed */
 };
 
-static const struct argp_option options[] = {
-    {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
-    {"key", KEY_KEY, "FILE", 0,
-     "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)", 0},
-    {"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0},
-    {0}};
+static const struct argp_option options[] = {{"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0}, {0}};
+
+static const struct argp_child children[] = {{&cli_daemon_argp, 0, NULL, 0}, {0}};
 
 static error_t parse(int key, char *value, struct argp_state *state)
 {
     struct stats_options *wanted = state->input;
     switch (key) {
-    case 's':
-        wanted->server = value;
-        return 0;
-    case KEY_KEY:
-        wanted->key_file = value;
+    case ARGP_KEY_INIT:
+        state->child_inputs[0] = &wanted->daemon;
         return 0;
     case KEY_JSON:
         wanted->json = true;
@@ -188,24 +181,13 @@ int cli_stats(int argc, char **argv)
 {
     static const struct argp argp = {.options = options,
                                      .parser = parse,
+                                     .children = children,
                                      .doc = "Show a daemon's device, clients, scenes, memory and stage times."};
-    struct stats_options wanted = {.server = getenv("FARLIGHT_SERVER")};
+    struct stats_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
-    if (wanted.server == NULL || wanted.server[0] == '\0') {
-        cli_usage(&wanted.job, "--server", "no daemon is named");
-        fl_error_remedy(&wanted.job.error, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]");
-        return cli_report(&wanted.job.error);
-    }
     struct fl_error error = {0};
-    if (!cli_interrupt_begin(&error))
-        return cli_report(&error);
-    struct fl_connection *connection =
-        fl_connect(&(struct fl_connect_options){.server = wanted.server,
-                                                .key_file = cli_key_file(wanted.server, wanted.key_file),
-                                                .name = "farlight stats",
-                                                .interrupt_fd = cli_interrupt_fd()},
-                   &error);
+    struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight stats", true, &error);
     const struct message_stats_reply *reply = NULL;
     const bool done = connection != NULL && fl_stats(connection, &reply, &error);
     if (done && wanted.json)

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/* Which daemon is asked, and the way to it. */
+#include "cli/cli.h"
+
+#include <stdlib.h>
+
+#define KEY_KEY 0x400
+
+static const struct argp_option options[] = {
+    {"server", 's', "ADDRESS", 0, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET] (default: FARLIGHT_SERVER)", 0},
+    {"key", KEY_KEY, "FILE", 0,
+     "Key that the daemon has as well: the connection is sealed (default for tcp: FARLIGHT_KEY)", 0},
+    {0}};
+
+static error_t parse(int key, char *value, struct argp_state *state)
+{
+    struct cli_daemon *daemon = state->input;
+    if (key != 's' && key != KEY_KEY)
+        return ARGP_ERR_UNKNOWN;
+    *(key == 's' ? &daemon->server : &daemon->key_file) = value;
+    return 0;
+}
+
+const struct argp cli_daemon_argp = {.options = options, .parser = parse};
+
+struct fl_connection *cli_daemon_connect(const struct cli_daemon *daemon, const char *name, bool must_be_named,
+                                         struct fl_error *error)
+{
+    const char *server = daemon->server != NULL ? daemon->server : getenv("FARLIGHT_SERVER");
+    if (server != NULL && server[0] == '\0')
+        server = NULL; /* an empty FARLIGHT_SERVER names none */
+    if (server == NULL && must_be_named) {
+        fl_error_set(error, FL_ERROR_ARGUMENT, "--server", "no daemon is named");
+        fl_error_remedy(error, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]");
+        return NULL;
+    }
+    if (!cli_interrupt_begin(error))
+        return NULL;
+    return fl_connect(&(struct fl_connect_options){.server = server,
+                                                   .key_file = cli_key_file(server, daemon->key_file),
+                                                   .name = name,
+                                                   .interrupt_fd = cli_interrupt_fd()},
+                      error);
+}
