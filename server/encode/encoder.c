@@ -23,6 +23,11 @@ bool encoder_supports(enum encoding encoding, uint32_t bytes_per_pixel)
     return is_known(encoding) && is_pixel_size && impls[encoding]->bound(&probe) != 0;
 }
 
+bool encoder_loses(enum encoding encoding)
+{
+    return encoding == ENCODING_JPEG || encoding == ENCODING_H264;
+}
+
 bool encoder_encode(enum encoding encoding, const struct picture *picture, unsigned quality, uint8_t **out,
                     size_t *out_bytes, struct error *error)
 {

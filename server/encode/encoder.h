@@ -36,6 +36,8 @@ extern const struct encoder_impl encoder_raw_impl, encoder_zstd_impl, encoder_jp
 
 /* Whether `encoding` can carry pictures of that pixel size, for the check before a job starts. */
 bool encoder_supports(enum encoding encoding, uint32_t bytes_per_pixel);
+/* What comes back is not exactly what was given, and how near it is goes by a quality. */
+bool encoder_loses(enum encoding encoding);
 /* *out is malloc'ed; quality as in the protocol's render message. */
 bool encoder_encode(enum encoding encoding, const struct picture *picture, unsigned quality, uint8_t **out,
                     size_t *out_bytes, struct error *error);

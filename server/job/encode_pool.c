@@ -176,7 +176,7 @@ static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct en
         !append_attachment(frame, ATTACHMENT_DEPTH, &frame->depth_bytes, error) ||
         !append_attachment(frame, ATTACHMENT_NORMALS, &frame->normal_bytes, error))
         return false;
-    if (frame->encoding != ENCODING_JPEG && frame->encoding != ENCODING_H264)
+    if (!encoder_loses(frame->encoding))
         frame->quality = 0; /* a level, which costs no picture */
     free(result->pixels);
     result->pixels = NULL;

@@ -151,7 +151,7 @@ void view_done(struct job *job, struct engine_frame *frame)
     bool spares = job->spec.adapt && view->wish.effort.sparing && view->held_samples < job->spec.frame.samples;
     if (!camera->moving && !spares && job->spec.still_encoding != job->spec.encoding) {
         frame->encoding = job->spec.still_encoding;
-        if (frame->encoding != ENCODING_JPEG)
+        if (!encoder_loses(frame->encoding))
             frame->quality = 0; /* the other one's: the fastest level */
     }
     frame->wants_key = view->owes_key_frame;

@@ -172,7 +172,13 @@ static bool check_kind(const struct session *session, const struct message_rende
                              render->last_frame, render->first_frame);
         return true;
     }
-    return check_encoding(session, render, render->still_encoding, "render.still_encoding", error);
+    if (!check_encoding(session, render, render->still_encoding, "render.still_encoding", error))
+        return false;
+    if (!encoder_loses((enum encoding)render->still_encoding) || encoder_loses((enum encoding)render->encoding))
+        return true;
+    error_set(error, ERROR_UNSUPPORTED, "render.still_encoding", "%s goes by a quality, and that of %s is none",
+              protocol_encoding_text(render->still_encoding), protocol_encoding_text(render->encoding));
+    return error_remedy(error, "let what moves lose as much, or what rests nothing");
 }
 
 bool job_check(const struct session *session, const struct message_render *render, struct error *error)

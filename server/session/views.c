@@ -28,12 +28,11 @@ static void on_silence_timer(void *context);
 
 struct view_terms view_terms_of(const struct message_render *render)
 {
-    bool has_quality = render->encoding == PROTOCOL_ENCODING_JPEG || render->encoding == PROTOCOL_ENCODING_H264;
     return (struct view_terms){
         .frame_ns = (uint64_t)(SECOND_NS / (double)render->frames_per_second),
         .samples = render->samples,
         .still_encoding = (enum encoding)render->still_encoding,
-        .quality = has_quality ? render->quality : 0,
+        .quality = encoder_loses((enum encoding)render->encoding) ? render->quality : 0,
         .adapt = render->adapt != 0,
     };
 }

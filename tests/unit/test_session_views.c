@@ -693,6 +693,10 @@ static void a_view_that_cannot_be_is_refused_by_its_field(void **state)
     message.render.encoding = PROTOCOL_ENCODING_RAW;
     message.render.still_encoding = PROTOCOL_ENCODING_JPEG;
     expect_refused(3, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.still_encoding");
+    message = view_message(1);
+    message.render.encoding = PROTOCOL_ENCODING_RAW; /* whose quality is none */
+    message.render.still_encoding = PROTOCOL_ENCODING_JPEG;
+    expect_refused(6, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.still_encoding");
     message = made(MESSAGE_RENDER); /* a batch has its channel to itself */
     message.render.scene = 1;
     message.render.channel = CHANNEL;
