@@ -124,8 +124,9 @@ def main():
         module_main(sys.argv[2])
         return 0
     build = pathlib.Path(sys.argv[1])
-    # Mesa's driver keeps memory until the process ends; that is not ours to free.
-    os.environ.setdefault("LSAN_OPTIONS", "suppressions=tests/tools/lsan.supp:print_suppressions=0")
+    # Mesa's driver keeps memory until the process ends; that is not ours to free. In full: tests run in folders of their own.
+    suppressions = pathlib.Path(__file__).resolve().with_name("lsan.supp")
+    os.environ.setdefault("LSAN_OPTIONS", f"suppressions={suppressions}:print_suppressions=0")
     os.environ.setdefault("UBSAN_OPTIONS", "print_stacktrace=1")
     os.environ["FARLIGHT_BIN"] = str(build.resolve())
     passed, failed, skipped = run_all(build, sys.argv[2:])
