@@ -93,7 +93,8 @@ static const struct option options[] = {
     {"limits", "scene_linger", ANYTIME, OPTION_U32, AT(scene_linger_s), "120", 0, 86400, "s",
      "How long a kept or shared scene stays when its last client is gone, to be come back to; 0: not at all"},
     {"limits", "scenes_lingering", ANYTIME, OPTION_U32, AT(lingering_scenes), "16", 1, 65536, "",
-     "Scenes that stay so, of all clients; of more, who left most loses his oldest"},
+     "Scenes that stay so, of all clients; of more, who left most loses his oldest. They give way where memory "
+     "for all is full, his own first who needs it"},
     {"limits", "jobs", ANYTIME, OPTION_U32, AT(limits.jobs_per_client), "4", 1, 65536, "", "Running jobs of one client"},
     {"limits", "blobs", ANYTIME, OPTION_U32, AT(limits.blobs_per_client), "262144", 1, 16777216, "",
      "Blobs that one connection may name"},

@@ -35,14 +35,16 @@ static void done(struct engine *engine, const struct engine_command *command, ui
 
 /* ---- what frames in progress keep waiting ------------------------------------------------------- */
 
-/* Blobs are limited where they are held, as scenes share them; tables here, all scenes together. */
+/* Blobs are limited where they are held, as scenes share them; tables here, all scenes together. Those that nobody
+ * holds give way, but not in vain: what they leave is known before. */
 static bool commit_within_limits(struct engine *engine, struct scene *scene, struct engine_command *command,
                                  struct error *error)
 {
     uint64_t limit_bytes = engine->options.limits.scene.host_bytes;
     uint64_t others_bytes = engine->table_bytes - scene->table_bytes;
+    uint64_t held_bytes = others_bytes - engine_left_table_bytes(engine);
     if (limit_bytes)
-        scene->limits.table_bytes = others_bytes < limit_bytes ? limit_bytes - others_bytes : 1;
+        scene->limits.table_bytes = held_bytes < limit_bytes ? limit_bytes - held_bytes : 1;
     bool applied = scene_commit(scene, command->edits, command->edit_count, error);
     engine->table_bytes = others_bytes + scene->table_bytes;
     return applied;
@@ -53,16 +55,13 @@ static void commit(struct engine *engine, const struct engine_reference *referen
     struct engine_scene *scene = reference->scene;
     struct error error = {0};
     uint64_t start_ns = clock_now_ns();
-    bool applied = commit_within_limits(engine, scene->scene, command, &error);
-    if (!applied && error.kind == ERROR_LIMIT && error.retryable && engine_trim_scenes(engine)) {
-        /* Scenes that nobody holds give way to others. */
-        error = (struct error){0};
-        applied = commit_within_limits(engine, scene->scene, command, &error);
-    }
-    if (!applied) {
+    uint64_t before_bytes = scene->scene->table_bytes;
+    if (!commit_within_limits(engine, scene->scene, command, &error)) {
         fail(engine, command, &error);
         return;
     }
+    if (scene->scene->table_bytes > before_bytes)
+        engine_trim_tables(engine, reference->client->principal);
     if (!scene->apply_ns)
         scene->apply_start_ns = start_ns;
     scene->apply_ns += clock_now_ns() - start_ns;
@@ -284,7 +283,7 @@ void engine_handle(struct engine *engine, struct engine_command *command)
         engine_scene_list(engine, command);
         break;
     case ENGINE_SCENES_TRIM:
-        engine_trim_scenes(engine);
+        engine_trim_blobs(engine, command->principal, command->trim_bytes);
         break;
     case ENGINE_JOB_CREDIT:
         give_credit(engine, command);

@@ -172,7 +172,7 @@ static void *run_thread(void *context)
         engine_forget_client(engine, client);
         cursor = 0; /* the map has changed */
     }
-    engine_trim_scenes(engine);
+    engine_end_left_scenes(engine);
     engine_drop_device(engine);
     return NULL;
 }

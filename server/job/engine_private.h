@@ -23,7 +23,7 @@
 #define DEVICE_REBUILDS_WINDOW_NS (300 * 1000000000ull)
 
 struct engine_client {
-    uint64_t client;
+    uint64_t client, principal;
     struct hashmap references; /* struct engine_reference *, by the client's number */
     struct schedule_client schedule;
 };
@@ -171,8 +171,14 @@ void engine_scene_changed(struct engine *engine, const struct engine_reference *
 /* Lets go of scenes that nobody holds, once they have lingered. The time until the next one ends, UINT64_MAX: none
  * does. */
 uint64_t engine_reap_scenes(struct engine *engine);
-/* The same without lingering; false: there was none. */
-bool engine_trim_scenes(struct engine *engine);
+/* Lets go of all that nobody holds, without lingering. */
+void engine_end_left_scenes(struct engine *engine);
+/* What tables of scenes take that nobody holds. */
+uint64_t engine_left_table_bytes(const struct engine *engine);
+/* Scenes that nobody holds give way to who asks, until the tables of all are within their limit, or so many bytes
+ * of blobs are used no more; nothing ends if all of them would not do. His own go first, whoever left most next. */
+void engine_trim_tables(struct engine *engine, uint64_t principal);
+void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes);
 
 /* describe.c: what is in scenes, and which there are. */
 void engine_count_contents(struct engine_scene *scene);

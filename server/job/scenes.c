@@ -9,17 +9,18 @@
 
 /* ---- clients ------------------------------------------------------------------------------------ */
 
-static struct engine_client *need_client(struct engine *engine, uint64_t number)
+static struct engine_client *need_client(struct engine *engine, const struct engine_command *command)
 {
-    struct engine_client *client = hashmap_get(&engine->clients, number);
+    struct engine_client *client = hashmap_get(&engine->clients, command->client);
     if (client)
         return client;
     client = calloc(1, sizeof *client);
-    if (!client || !hashmap_put(&engine->clients, number, client)) {
+    if (!client || !hashmap_put(&engine->clients, command->client, client)) {
         free(client);
         return NULL;
     }
-    client->client = number;
+    client->client = command->client;
+    client->principal = command->principal;
     return client;
 }
 
@@ -33,7 +34,7 @@ struct engine_reference *engine_find_reference(struct engine *engine, uint64_t c
 
 static bool reference_add(struct engine *engine, struct engine_scene *scene, const struct engine_command *command)
 {
-    struct engine_client *client = need_client(engine, command->client);
+    struct engine_client *client = need_client(engine, command);
     struct engine_reference *reference = client ? calloc(1, sizeof *reference) : NULL;
     if (!reference || !hashmap_put(&client->references, command->scene, reference)) {
         free(reference);
@@ -192,17 +193,59 @@ uint64_t engine_reap_scenes(struct engine *engine)
     return wait_ns;
 }
 
-bool engine_trim_scenes(struct engine *engine)
+void engine_end_left_scenes(struct engine *engine)
 {
-    bool found = false;
-    for (struct engine_scene *scene = engine->scenes, *next; scene; scene = next) {
-        next = scene->next;
-        if (scene->references)
-            continue;
+    for (struct engine_scene *scene; (scene = first_to_go(engine));)
         scene_end(engine, scene);
-        found = true;
+}
+
+/* For somebody who needs room: of his own the one that he left first; without any, as where too many linger. */
+static struct engine_scene *first_to_give_way(const struct engine *engine, uint64_t principal)
+{
+    struct engine_scene *own = NULL;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        if (!scene->references && scene->principal == principal && (!own || scene->left_ns < own->left_ns))
+            own = scene;
     }
-    return found;
+    return own ? own : first_to_go(engine);
+}
+
+uint64_t engine_left_table_bytes(const struct engine *engine)
+{
+    uint64_t bytes = 0;
+    for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        bytes += scene->references ? 0 : scene->scene->table_bytes;
+    return bytes;
+}
+
+void engine_trim_tables(struct engine *engine, uint64_t principal)
+{
+    uint64_t limit_bytes = engine->options.limits.scene.host_bytes;
+    struct engine_scene *scene;
+    if (!limit_bytes || engine->table_bytes - engine_left_table_bytes(engine) > limit_bytes)
+        return;
+    while (engine->table_bytes > limit_bytes && (scene = first_to_give_way(engine, principal)))
+        scene_end(engine, scene);
+}
+
+/* At most: others may use them as well. */
+static uint64_t blob_bytes_of(const struct engine_scene *scene)
+{
+    return scene->scene->host_bytes - scene->scene->table_bytes;
+}
+
+void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes)
+{
+    uint64_t left_bytes = 0;
+    for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        left_bytes += scene->references ? 0 : blob_bytes_of(scene);
+    struct engine_scene *scene;
+    if (left_bytes < bytes)
+        return;
+    for (uint64_t freed_bytes = 0; freed_bytes < bytes && (scene = first_to_give_way(engine, principal));) {
+        freed_bytes += blob_bytes_of(scene);
+        scene_end(engine, scene);
+    }
 }
 
 /* ---- coming to a scene -------------------------------------------------------------------------- */

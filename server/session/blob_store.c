@@ -164,10 +164,22 @@ void blob_store_limit(struct blob_store *store, uint64_t limit_bytes, uint64_t c
     blob_store_trim(store);
 }
 
+static uint64_t used_bytes(const struct blob_store *store)
+{
+    return blob_store_bytes(store) + (uint64_t)store->count * BLOB_STORE_OVERHEAD_BYTES;
+}
+
 static bool fits(const struct blob_store *store, uint64_t size_bytes)
 {
-    uint64_t used_bytes = blob_store_bytes(store) + (uint64_t)store->count * BLOB_STORE_OVERHEAD_BYTES;
-    return used_bytes <= store->limit_bytes && size_bytes <= store->limit_bytes - used_bytes;
+    uint64_t used = used_bytes(store);
+    return used <= store->limit_bytes && size_bytes <= store->limit_bytes - used;
+}
+
+uint64_t blob_store_lacking(const struct blob_store *store, uint64_t size_bytes)
+{
+    if (size_bytes > store->limit_bytes || fits(store, size_bytes))
+        return 0;
+    return used_bytes(store) - (store->limit_bytes - size_bytes);
 }
 
 bool blob_store_reserve(struct blob_store *store, uint64_t size_bytes, struct error *error)

@@ -33,6 +33,8 @@ struct blob *blob_store_add(struct blob_store *store, blob_principal principal, 
 
 /* Room for bytes of a blob that are about to arrive; ERROR_LIMIT if there is none even without the cache. */
 bool blob_store_reserve(struct blob_store *store, uint64_t size_bytes, struct error *error);
+/* What would have to go for that many bytes to be reserved; 0: nothing, or there will never be room. */
+uint64_t blob_store_lacking(const struct blob_store *store, uint64_t size_bytes);
 void blob_store_release(struct blob_store *store, uint64_t size_bytes); /* it is added now, or will not come */
 
 void blob_store_trim(struct blob_store *store); /* to be called when uses may have ended */

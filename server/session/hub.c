@@ -53,11 +53,14 @@ void hub_submit(struct hub *hub, struct engine_command *command)
     hub->waiting_end = &command->next;
 }
 
-void hub_trim(struct hub *hub)
+void hub_trim(struct hub *hub, blob_principal principal, uint64_t bytes)
 {
     struct engine_command *command = hub_command(ENGINE_SCENES_TRIM, 0, 0);
-    if (command)
-        hub_submit(hub, command);
+    if (!command)
+        return;
+    command->principal = principal;
+    command->trim_bytes = bytes;
+    hub_submit(hub, command);
 }
 
 static void retry(void *context)

@@ -69,8 +69,8 @@ bool hub_reload(struct hub *hub, const struct hub_options *options, struct error
 
 /* Hands a command to the engine, now or as soon as it has room. */
 void hub_submit(struct hub *hub, struct engine_command *command);
-/* Memory is short: scenes that nobody holds shall end, with what they use. */
-void hub_trim(struct hub *hub);
+/* The principal lacks so many bytes for blobs: scenes that nobody holds shall end, its own first. */
+void hub_trim(struct hub *hub, blob_principal principal, uint64_t bytes);
 /* The same for one of a session's requests: zeroed but for kind, client and request. NULL: out of memory. */
 struct engine_command *hub_command(enum engine_command_kind kind, uint64_t client, uint32_t request);
 

@@ -295,8 +295,8 @@ void upload_data(struct session *session, const struct framing_header *header,
         request_answer_ok(session, request, 0);
         return;
     }
-    if (error.kind == ERROR_LIMIT)
-        hub_trim(session->hub);
+    if (offer && error.kind == ERROR_LIMIT)
+        hub_trim(session->hub, session->principal, blob_store_lacking(session->hub->blobs, offer->size_bytes));
     requests_bury(session, request->id);
     request_answer_error(session, request, &error);
 }

@@ -461,9 +461,96 @@ static void left_scenes_give_way_where_memory_is_short(void **state)
     leave(engine, 1, "c", SHARING_SHARED);
     submit(engine, commit_of_nodes(2, 4, 1, 101)); /* more than any scene may have: they need not give way */
     expect_failed(engine, 2, 4, ERROR_LIMIT, "edits");
-    submit(engine, command(ENGINE_SCENES_TRIM, 0, 0)); /* the network is short of it */
+    attach(engine, 1, 4, "c");
+    stop(engine);
+}
+
+/* `nodes` in one commit. */
+static void leave_nodes(struct engine *engine, uint64_t client, const char *name, uint32_t nodes)
+{
+    open_as(engine, client, 1, name, SHARING_SHARED);
+    submit(engine, commit_of_nodes(client, 2, 1, nodes));
+    expect_done(engine, client, 2);
+    client_goes(engine, client);
+}
+
+static void who_needs_room_loses_his_own_left_scenes_before_others_lose_theirs(void **state)
+{
+    (void)state;
+    uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
+    struct engine *engine = start((struct engine_options){
+        .limits.scene_linger_ms = LONG_MS, .limits.scene = {.host_bytes = limit_bytes, .nodes = 100}});
+    leave_nodes(engine, 1, "theirs", 30); /* the oldest */
+    leave_nodes(engine, 2, "mine", 30);
+    open_as(engine, 2, 3, "new", SHARING_PRIVATE);
+    submit(engine, commit_of_nodes(2, 4, 3, 60));
     expect_ended(engine);
-    attach_fails(engine, 1, 4, "c");
+    expect_done(engine, 2, 4);
+    attach_fails(engine, 2, 5, "mine");
+    attach(engine, 3, 1, "theirs"); /* it is held now */
+    open_as(engine, 2, 6, "newer", SHARING_PRIVATE);
+    submit(engine, commit_of_nodes(2, 7, 6, 30));
+    expect_failed(engine, 2, 7, ERROR_LIMIT, "edits");
+    client_goes(engine, 3);
+    submit(engine, commit_of_nodes(2, 8, 6, 60)); /* it would end in vain */
+    expect_failed(engine, 2, 8, ERROR_LIMIT, "edits");
+    attach(engine, 3, 1, "theirs");
+    client_goes(engine, 3);
+    submit(engine, commit_of_nodes(2, 9, 6, 30)); /* the limit of all is reached */
+    expect_ended(engine);
+    expect_done(engine, 2, 9);
+    attach_fails(engine, 3, 1, "theirs");
+    stop(engine);
+}
+
+static void submit_trim(struct engine *engine, uint64_t client, uint64_t bytes)
+{
+    struct engine_command *made = command(ENGINE_SCENES_TRIM, 0, 0);
+    made->principal = principal_of(client);
+    made->trim_bytes = bytes;
+    submit(engine, made);
+}
+
+#define SPHERES 4u
+#define SPHERES_BYTES (SPHERES * 16u)
+
+/* With one blob. */
+static void leave_spheres(struct engine *engine, uint64_t client, const char *name)
+{
+    static const float numbers[SPHERES * 4] = {0, 0, 0, 1, 1, 0, 0, 1, 2, 0, 0, 1, 3, 0, 0, 1};
+    struct draft_list list = {0};
+    add_spheres(&list, 1, numbers, SPHERES);
+    open_as(engine, client, 1, name, SHARING_SHARED);
+    struct engine_command *made = command(ENGINE_COMMIT, client, 2);
+    made->scene = 1;
+    made->edits = malloc(sizeof *made->edits);
+    assert_non_null(made->edits);
+    *made->edits = list.edits[0];
+    made->edit_count = 1;
+    submit(engine, made);
+    expect_done(engine, client, 2);
+    client_goes(engine, client);
+}
+
+static void left_scenes_give_way_to_as_many_bytes_of_blobs_as_are_lacking(void **state)
+{
+    (void)state;
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
+    leave_spheres(engine, 1, "theirs");
+    leave_spheres(engine, 2, "mine");
+    leave_spheres(engine, 2, "mine, too");
+    submit_trim(engine, 2, 3 * SPHERES_BYTES + 1); /* nobody can help */
+    submit_trim(engine, 2, 0);
+    attach(engine, 3, 1, "mine");
+    client_goes(engine, 3);
+    submit_trim(engine, 2, SPHERES_BYTES);
+    expect_ended(engine);
+    attach_fails(engine, 3, 1, "mine, too"); /* "mine" was left later */
+    submit_trim(engine, 2, SPHERES_BYTES + 1);
+    expect_ended(engine);
+    expect_ended(engine);
+    attach_fails(engine, 3, 2, "mine");
+    attach_fails(engine, 3, 3, "theirs");
     stop(engine);
 }
 
@@ -637,7 +724,7 @@ static void what_a_left_scene_uses_stays(void **state)
     submit_edits(engine, 2, &list);
     client_goes(engine, 1);
     assert_int_equal(atomic_load(&blob->references), 2);
-    submit(engine, command(ENGINE_SCENES_TRIM, 0, 0));
+    submit_trim(engine, 1, sizeof sphere);
     expect_ended(engine);
     assert_int_equal(atomic_load(&blob->references), 1);
     blob_unref(blob);
@@ -662,6 +749,8 @@ int main(void)
         cmocka_unit_test(who_leaves_many_scenes_loses_his_own),
         cmocka_unit_test(a_left_scene_gives_its_name_to_a_new_one_of_the_same_user),
         cmocka_unit_test(left_scenes_give_way_where_memory_is_short),
+        cmocka_unit_test(who_needs_room_loses_his_own_left_scenes_before_others_lose_theirs),
+        cmocka_unit_test(left_scenes_give_way_to_as_many_bytes_of_blobs_as_are_lacking),
         cmocka_unit_test(a_list_has_what_its_reader_may_come_to),
         cmocka_unit_test(stats_have_each_scene_once),
         cmocka_unit_test(a_description_names_cameras_and_clips),
