@@ -255,7 +255,7 @@ static void report_stats(struct engine *engine, const struct engine_command *com
 {
     struct engine_event *event = event_create(ENGINE_STATS_READY, command->client, command->request);
     if (event)
-        event->stats = engine_stats_collect(engine);
+        event->stats = engine_stats_collect(engine, command->principal);
     if (event && !event->stats) {
         event->kind = ENGINE_FAILED;
         error_set(&event->error, ERROR_OUT_OF_MEMORY, "stats", "no memory for an answer");

@@ -116,7 +116,7 @@ struct engine_command {
     uint32_t scene;
     char name[SCENE_NAME_MAX + 1]; /* scene_open, scene_attach */
     enum engine_sharing sharing;   /* scene_open */
-    uint64_t principal;            /* scene_open, _attach, _list, _trim: who asks, as what is kept is his */
+    uint64_t principal;            /* scene_open, _attach, _list, _trim, stats: who asks, as what is kept is his */
     uint64_t trim_bytes;           /* scenes_trim */
     struct scene_edit *edits;      /* commit; malloc'ed array */
     size_t edit_count;
@@ -128,6 +128,7 @@ struct engine_command {
 void engine_command_destroy(struct engine_command *command); /* frees it with all it holds; accepts NULL */
 
 struct engine_scene_stat {
+    bool is_known; /* to who asked: his own, or one that he can come to */
     uint64_t client;
     uint32_t scene;
     char name[SCENE_NAME_MAX + 1];

@@ -242,6 +242,6 @@ uint64_t scene_device_bytes(const struct engine *engine, const struct engine_sce
 uint64_t engine_device_bytes(const struct engine *engine);
 
 /* stats.c */
-struct engine_stats *engine_stats_collect(const struct engine *engine); /* NULL: out of memory */
+struct engine_stats *engine_stats_collect(const struct engine *engine, uint64_t principal); /* NULL: out of memory */
 
 #endif

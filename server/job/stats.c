@@ -4,12 +4,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void describe_scene(const struct engine *engine, struct engine_scene *from, struct engine_scene_stat *stat)
+static void describe_scene(const struct engine *engine, struct engine_scene *from, uint64_t principal,
+                           struct engine_scene_stat *stat)
 {
     const struct scene *scene = from->scene;
     engine_count_contents(from);
     const struct engine_reference *first = from->references;
     *stat = (struct engine_scene_stat){
+        .is_known = from->principal == principal || engine_scene_is_open_to(from, principal),
         .client = first ? first->client->client : 0,
         .scene = first ? first->id : 0,
         .revision = scene->revision,
@@ -23,7 +25,7 @@ static void describe_scene(const struct engine *engine, struct engine_scene *fro
     memcpy(stat->name, scene->name, sizeof stat->name);
 }
 
-static bool describe_scenes(const struct engine *engine, struct engine_stats *stats)
+static bool describe_scenes(const struct engine *engine, uint64_t principal, struct engine_stats *stats)
 {
     size_t count = 0;
     for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
@@ -34,13 +36,13 @@ static bool describe_scenes(const struct engine *engine, struct engine_stats *st
     if (!stats->scenes)
         return false;
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
-        describe_scene(engine, scene, &stats->scenes[stats->scene_count]);
+        describe_scene(engine, scene, principal, &stats->scenes[stats->scene_count]);
         stats->host_bytes += stats->scenes[stats->scene_count++].host_bytes;
     }
     return true;
 }
 
-struct engine_stats *engine_stats_collect(const struct engine *engine)
+struct engine_stats *engine_stats_collect(const struct engine *engine, uint64_t principal)
 {
     struct engine_stats *stats = calloc(1, sizeof *stats);
     if (!stats)
@@ -60,7 +62,7 @@ struct engine_stats *engine_stats_collect(const struct engine *engine)
             stats->stages[stage][clock].greatest_ns = atomic_load(&total->greatest_ns);
         }
     }
-    if (describe_scenes(engine, stats))
+    if (describe_scenes(engine, principal, stats))
         return stats;
     free(stats);
     return NULL;

@@ -53,7 +53,10 @@ static void on_stats(struct session *session, struct request *request, const str
                      const struct message *message)
 {
     (void)header, (void)message;
-    session_submit(session, request, hub_command(ENGINE_STATS, session->number, request->id));
+    struct engine_command *command = hub_command(ENGINE_STATS, session->number, request->id);
+    if (command)
+        command->principal = session->principal;
+    session_submit(session, request, command);
 }
 
 /* ---- scenes ------------------------------------------------------------------------------------------ */

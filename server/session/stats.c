@@ -43,15 +43,17 @@ static void fill_client(struct record_client_stat *stat, char name[NAME_BYTES], 
     };
 }
 
-static uint32_t fill_clients(struct stats_storage *storage, const struct hub *hub)
+/* Who may only look hears of nobody else. */
+static uint32_t fill_clients(struct stats_storage *storage, const struct session *asker)
 {
+    const struct hub *hub = asker->hub;
     uint64_t now_ns = clock_now_ns();
     uint32_t count = 0;
     size_t cursor = 0;
     void *value;
     while (count < CLIENTS_MAX && hashmap_next(&hub->sessions, &cursor, NULL, &value)) {
         const struct session *session = value;
-        if (!session->introduced)
+        if (!session->introduced || (asker->identity.read_only && session != asker))
             continue;
         fill_client(&storage->clients[count], storage->client_names[count], session, now_ns);
         count++;
@@ -59,12 +61,16 @@ static uint32_t fill_clients(struct stats_storage *storage, const struct hub *hu
     return count;
 }
 
-static uint32_t fill_scenes(struct stats_storage *storage, const struct engine_stats *stats)
+/* What others keep to themselves has no name for anybody else, and is nothing to who may only look. */
+static uint32_t fill_scenes(struct stats_storage *storage, const struct session *asker,
+                            const struct engine_stats *stats)
 {
-    uint32_t count = stats->scene_count < SCENES_MAX ? stats->scene_count : SCENES_MAX;
-    for (uint32_t i = 0; i < count; i++) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < stats->scene_count && count < SCENES_MAX; i++) {
         const struct engine_scene_stat *from = &stats->scenes[i];
-        storage->scenes[i] = (struct record_scene_stat){
+        if (asker->identity.read_only && !from->is_known)
+            continue;
+        storage->scenes[count++] = (struct record_scene_stat){
             .client = from->client,
             .scene = from->scene,
             .revision = from->revision,
@@ -74,7 +80,7 @@ static uint32_t fill_scenes(struct stats_storage *storage, const struct engine_s
             .spheres = from->spheres,
             .host_bytes = from->host_bytes,
             .device_bytes = from->device_bytes,
-            .name = from->name,
+            .name = from->is_known ? from->name : "",
         };
     }
     return count;
@@ -130,9 +136,9 @@ void stats_answer(struct session *session, struct request *request, const struct
     struct message_stats_reply *reply = &message.stats_reply;
     fill(reply, session->hub, stats);
     reply->clients = storage->clients;
-    reply->clients_count = fill_clients(storage, session->hub);
+    reply->clients_count = fill_clients(storage, session);
     reply->scenes = storage->scenes;
-    reply->scenes_count = fill_scenes(storage, stats);
+    reply->scenes_count = fill_scenes(storage, session, stats);
     reply->stages = storage->stages;
     reply->stages_count = fill_stages(storage, stats);
     /* A very busy daemon has more to tell than one message holds: the totals matter more than the last scenes. */

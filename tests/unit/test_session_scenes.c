@@ -609,6 +609,60 @@ static void scenes_that_nobody_holds_give_way_to_blobs(void **state)
     cut(witness, NULL);
 }
 
+/* ---- what stats tell whom ---------------------------------------------------------------------------- */
+
+static const struct message_stats_reply *stats_of(struct client *client)
+{
+    struct message message = made(MESSAGE_STATS);
+    send_message(client, 778, 0, &message);
+    expect(client, MESSAGE_STATS_REPLY, 778);
+    return &client->message.stats_reply;
+}
+
+static void open_one_of_each(struct client *client)
+{
+    open_scene_as(client, 1, "private", PROTOCOL_SHARING_PRIVATE);
+    open_scene_as(client, 2, "kept", PROTOCOL_SHARING_KEPT);
+    open_scene_as(client, 3, "shared", PROTOCOL_SHARING_SHARED);
+}
+
+static void expect_scene_names(struct client *client, uint32_t count, const char *const names[])
+{
+    const struct message_stats_reply *stats = stats_of(client);
+    assert_int_equal(stats->scenes_count, count);
+    for (uint32_t i = 0; i < count; i++)
+        assert_string_equal(stats->scenes[i].name, names[i]);
+}
+
+static void what_others_keep_to_themselves_has_no_name_in_stats(void **state)
+{
+    (void)state;
+    struct client *owner = come(true), *other = come(true);
+    open_one_of_each(owner);
+    expect_scene_names(owner, 3, (const char *const[]){"private", "kept", "shared"});
+    expect_scene_names(other, 3, (const char *const[]){"", "", "shared"});
+    const struct message_stats_reply *stats = stats_of(other);
+    assert_int_equal(stats->clients_count, 2);
+    for (uint32_t i = 0; i < 2; i++)
+        assert_int_equal(strncmp(stats->clients[i].name, "test (", 6), 0);
+    cut(other, NULL);
+    cut(owner, NULL);
+}
+
+static void a_reader_hears_of_no_other_client(void **state)
+{
+    (void)state;
+    struct client *owner = come(true), *reader = come(false);
+    open_one_of_each(owner);
+    expect_scene_names(reader, 1, (const char *const[]){"shared"});
+    const struct message_stats_reply *stats = stats_of(reader);
+    assert_int_equal(stats->clients_count, 1);
+    assert_int_equal(stats->clients[0].client, 2);
+    assert_int_equal(stats_of(owner)->clients_count, 2);
+    cut(reader, NULL);
+    cut(owner, NULL);
+}
+
 /* ---- readers ----------------------------------------------------------------------------------------- */
 
 static void a_reader_looks_and_changes_nothing(void **state)
@@ -662,6 +716,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(a_stranger_leaves_a_shared_scene_that_stays_whole, set_up, tear_down),
         cmocka_unit_test_setup_teardown(scenes_that_nobody_holds_give_way_to_blobs, set_up_with_few_blobs,
                                         tear_down),
+        cmocka_unit_test_setup_teardown(what_others_keep_to_themselves_has_no_name_in_stats, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(a_reader_hears_of_no_other_client, set_up_for_readers, tear_down),
         cmocka_unit_test_setup_teardown(a_reader_looks_and_changes_nothing, set_up_for_readers, tear_down),
     };
     daemon_block_signals();
