@@ -459,17 +459,25 @@ static inline void open_scene(struct engine *engine, uint64_t client, uint32_t s
     assert_int_equal(expect_done(engine, client, 1000 + scene), 0);
 }
 
-/* A transaction that makes one group node. */
-static inline void submit_commit(struct engine *engine, uint64_t client, uint32_t request, uint32_t scene)
+/* A transaction that makes group nodes 1 .. count. */
+static inline struct engine_command *commit_of_nodes(uint64_t client, uint32_t request, uint32_t scene,
+                                                     uint32_t count)
 {
     struct engine_command *made = command(ENGINE_COMMIT, client, request);
     made->scene = scene;
-    made->edits = calloc(1, sizeof *made->edits);
+    made->edits = calloc(count, sizeof *made->edits);
     assert_non_null(made->edits);
-    made->edit_count = 1;
-    made->edits[0].set.node.base.id = 1;
-    made->edits[0].set.node.parent_from_node[0] = 1;
-    submit(engine, made);
+    made->edit_count = count;
+    for (uint32_t i = 0; i < count; i++) {
+        made->edits[i].set.node.base.id = i + 1;
+        made->edits[i].set.node.parent_from_node[0] = 1;
+    }
+    return made;
+}
+
+static inline void submit_commit(struct engine *engine, uint64_t client, uint32_t request, uint32_t scene)
+{
+    submit(engine, commit_of_nodes(client, request, scene, 1));
 }
 
 static inline struct engine_command *render(uint64_t client, uint32_t request, uint32_t first, uint32_t last)

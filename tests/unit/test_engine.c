@@ -376,20 +376,6 @@ static void a_frame_that_fails_comes_after_those_before_it(void **state)
     stop(engine);
 }
 
-static struct engine_command *commit_of_nodes(uint64_t client, uint32_t request, uint32_t scene, uint32_t count)
-{
-    struct engine_command *made = command(ENGINE_COMMIT, client, request);
-    made->scene = scene;
-    made->edits = calloc(count, sizeof *made->edits);
-    assert_non_null(made->edits);
-    made->edit_count = count;
-    for (uint32_t i = 0; i < count; i++) {
-        made->edits[i].set.node.base.id = i + 1;
-        made->edits[i].set.node.parent_from_node[0] = 1;
-    }
-    return made;
-}
-
 static void the_tables_of_all_scenes_together_have_a_limit(void **state)
 {
     (void)state;

@@ -427,20 +427,6 @@ static void a_left_scene_gives_its_name_to_a_new_one_of_the_same_user(void **sta
     stop(engine);
 }
 
-static struct engine_command *commit_of_nodes(uint64_t client, uint32_t request, uint32_t scene, uint32_t count)
-{
-    struct engine_command *made = command(ENGINE_COMMIT, client, request);
-    made->scene = scene;
-    made->edits = calloc(count, sizeof *made->edits);
-    assert_non_null(made->edits);
-    made->edit_count = count;
-    for (uint32_t i = 0; i < count; i++) {
-        made->edits[i].set.node.base.id = i + 1;
-        made->edits[i].set.node.parent_from_node[0] = 1;
-    }
-    return made;
-}
-
 static void left_scenes_give_way_where_memory_is_short(void **state)
 {
     (void)state;
