@@ -5,17 +5,13 @@
  *
  * Models are those of the folder FARLIGHT_SCENES. Each test prints what it measured. FARLIGHT_TEST_PICTURES=folder
  * keeps the pictures. */
-#include "ldc_scenes.h"
+#include "against_reference.h"
 
 #include "tests/bench/load_model.h"
-#include "trace/tracer.h"
 
 #include <unistd.h>
 
-#define BVH 0
-#define REFERENCE 2
 #define ABUFFER 4
-#define SIDE 192u
 #define AO_RAYS 128u
 
 enum { DDA, LINEAR3, LINEAR1, SEARCH_COUNT };
@@ -28,23 +24,7 @@ static const struct search {
     [LINEAR1] = {"linear1", {.abuffer_search = ABUFFER_SEARCH_LINEAR1}},
 };
 
-static unsigned exact_tracer; /* the reference, or bvh where a build leaves it out: their hits are the same */
-
 /* ---- pictures ---- */
-
-static double psnr(const struct frame_result *a, const struct frame_result *b)
-{
-    double sum = 0, count = 0;
-    assert_int_equal(a->size_bytes, b->size_bytes);
-    for (size_t i = 0; i < a->size_bytes; i++) {
-        if (i % 4 == 3)
-            continue;
-        double difference = (double)a->pixels[i] - (double)b->pixels[i];
-        sum += difference * difference;
-        count++;
-    }
-    return sum > 0 ? 10 * log10(255.0 * 255.0 * count / sum) : INFINITY;
-}
 
 static struct frame_result render(struct fixture *fixture, unsigned tracer, const struct tracer_options *options,
                                   const char *name)
@@ -61,7 +41,7 @@ static struct frame_result render(struct fixture *fixture, unsigned tracer, cons
 static void expect_like_the_reference(struct fixture *fixture, const char *name,
                                       const double psnr_min[SEARCH_COUNT])
 {
-    struct frame_result expected = render(fixture, exact_tracer, &searches[0].options, name);
+    struct frame_result expected = render(fixture, exact_tracer(), &searches[0].options, name);
     for (int i = 0; i < SEARCH_COUNT; i++) {
         struct frame_result got = render(fixture, ABUFFER, &searches[i].options, name);
         double reached = psnr(&got, &expected);
@@ -79,12 +59,8 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
 static void expect_scene_like_the_reference(struct fixture *fixture, void (*add)(struct fixture *fixture),
                                             const char *name, const double psnr_min[SEARCH_COUNT])
 {
-    struct frame_request *request = &fixture->request;
     add(fixture);
-    request->width = request->height = SIDE;
-    request->format = FRAME_RGBA8;
-    request->depth = 3;
-    fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
+    request_picture(fixture, 3);
     expect_like_the_reference(fixture, name, psnr_min);
 }
 
@@ -172,19 +148,14 @@ static void occlusion_of_open_shapes_is_like_the_references(void **state)
 /* A camera that sees all of it, from a little above. */
 static void look_at_all(struct fixture *fixture)
 {
-    struct scene_gpu gpu;
-    struct scene_changes changes;
-    struct error error = {0};
+    struct extent extent = scene_extent(fixture);
     float target[3], eye[3];
-    scene_gpu_init(&gpu, fixture->device);
-    assert_true(scene_gpu_update(&gpu, fixture->scene, NULL, &changes, NULL, &error));
     for (int k = 0; k < 3; k++) {
         static const float from[3] = {0.3f, 0.35f, 0.9f};
-        target[k] = 0.5f * (gpu.lower_world[k] + gpu.upper_world[k]);
-        eye[k] = target[k] + 1.1f * gpu.diagonal * from[k];
+        target[k] = 0.5f * (extent.lower_world[k] + extent.upper_world[k]);
+        eye[k] = target[k] + 1.1f * extent.diagonal * from[k];
     }
     assert_true(frame_camera_look_at(&fixture->request.camera, eye, target, (const float[]){0, 1, 0}, 0.8f));
-    scene_gpu_finish(&gpu);
 }
 
 static void occlusion_of_models_is_like_the_references(void **state)
@@ -219,102 +190,34 @@ static void occlusion_of_models_is_like_the_references(void **state)
 
 /* ---- rays ---- */
 
-/* What is asked: share of rays that agree on hit or miss, median of distances in cells, and below what 99 in 100
- * of them are. By planes of samples that is where a surface bends within a texel; dda holds what it finds against
- * triangles, and is off by what floats round but for the rays that meet none, fewer than one in 100. */
-static const struct {
-    double agreed_min, cells_max, most_cells_max[SEARCH_COUNT];
-} rays_asked = {0.995, 0.1, {[DDA] = 0.01, [LINEAR3] = 0.1, [LINEAR1] = 0.1}};
+/* By planes of samples, one in 100 distances is off where a surface bends within a texel; dda holds what it finds
+ * against triangles, and is off by what floats round but for the rays that meet none, fewer than one in 100. */
+static const struct agreement rays_asked[SEARCH_COUNT] = {
+    [DDA] = {.agreed = 0.995, .median_cells = 0.1, .most_cells = 0.01},
+    [LINEAR3] = {.agreed = 0.995, .median_cells = 0.1, .most_cells = 0.1},
+    [LINEAR1] = {.agreed = 0.995, .median_cells = 0.1, .most_cells = 0.1},
+};
 
-/* The reference's own waves, its secondary rays answered by `abuffer` too. */
-static void expect_rays_agree(struct fixture *fixture, const char *name, int search, float cell_metres,
-                              double diagonal)
+static void expect_rays_agree(struct fixture *fixture, const char *name, float cell_metres)
 {
-    fixture->request.tracer = exact_tracer;
-    fixture->request.tracer_options = searches[search].options;
-    fixture->request.compare = true;
-    fixture->request.compare_with = ABUFFER;
-    struct frame_result result = fixture_render(fixture);
-    uint64_t rays = 0, disagreed = 0, compared = 0;
-    double worst_median = 0, worst_most = 0;
-    for (uint32_t i = 0; i < result.comparison_count; i++) {
-        const struct wave_comparison *wave = &result.comparisons[i];
-        static const char *const kinds[] = {"primary", "secondary", "shadow"};
-        double agreed = 1 - (double)(wave->only_first + wave->only_second) / (double)(wave->rays ? wave->rays : 1);
-        double median_cells = (double)wave->distance_median * diagonal / (double)cell_metres;
-        double most_cells = (double)wave->distance_p99 * diagonal / (double)cell_metres;
-        printf("%s, %s, wave %u, %s: %llu rays, %.3f %% agree on hit or miss, median distance %.4f cells, 99 %% "
-               "below %.3f\n",
-               name, searches[search].name, wave->wave, kinds[wave->kind], (unsigned long long)wave->rays,
-               100 * agreed, median_cells, most_cells);
-        if (wave->kind != RAY_SECONDARY)
-            continue;
-        rays += wave->rays;
-        disagreed += wave->only_first + wave->only_second;
-        if (wave->both_hit > 100) {
-            worst_median = fmax(worst_median, median_cells);
-            worst_most = fmax(worst_most, most_cells);
-            compared++;
-        }
+    for (int i = 0; i < SEARCH_COUNT; i++) {
+        char searched[96];
+        snprintf(searched, sizeof(searched), "%s, %s", name, searches[i].name);
+        fixture->request.tracer_options = searches[i].options;
+        struct agreement found = compare_rays(fixture, ABUFFER, searched, cell_metres);
+        expect_agreement(searched, &found, &rays_asked[i]);
     }
-    frame_result_finish(&result);
-    assert_in_range(rays, SIDE * SIDE / 20, UINT64_MAX); /* else nothing would have been shown */
-    assert_true(compared > 0);
-    double agreed = 1 - (double)disagreed / (double)rays;
-    if (!(agreed >= rays_asked.agreed_min))
-        fail_msg("%s, %s: %.3f %% of %llu rays agree on hit or miss", name, searches[search].name, 100 * agreed,
-                 (unsigned long long)rays);
-    if (!(worst_median <= rays_asked.cells_max))
-        fail_msg("%s, %s: the median distance is %.3f cells off", name, searches[search].name, worst_median);
-    if (!(worst_most <= rays_asked.most_cells_max[search]))
-        fail_msg("%s, %s: one in 100 distances is %.3f cells off", name, searches[search].name, worst_most);
-    fixture->request.compare = false;
+}
+
+static void request_whitted(struct fixture *fixture)
+{
+    request_picture(fixture, 3);
+    fixture->request.tracer_options = searches[DDA].options;
 }
 
 static void secondary_rays_agree_with_the_reference(void **state)
 {
-    struct fixture *fixture = *state;
-    static const struct {
-        const char *name;
-        enum shape shape;
-        uint32_t steps;
-    } rows[] = {
-        {"a sphere", SHAPE_SPHERE, 128}, {"a torus", SHAPE_TORUS, 128}, {"a bumpy sphere", SHAPE_BUMPY, 224}};
-    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
-        for (int inside = 0; inside < 2; inside++) {
-            char name[64];
-            fixture_clear(state);
-            struct scene_material *material = fixture_material(fixture);
-            uint32_t id = material->base.id;
-            material->roughness = 0.05f;
-            material->metallic = inside ? 0.0f : 1.0f;
-            material->transmission = inside ? 1.0f : 0.0f;
-            material->ior = 1.5f;
-            /* Two of them, so that there is something to be mirrored. */
-            add_shape(fixture, rows[i].shape, rows[i].steps, id, 1, 0.4f, -0.9f, 0, 0);
-            add_shape(fixture, rows[i].shape, rows[i].steps, id, 1, 1.1f, 0.95f, 0.2f, 0.4f);
-            fixture_light(fixture, LIGHT_POINT, 2.5f, 4, 3, 300);
-            fixture_look(fixture, 1.5f, 2.2f, 4.5f, 0.7f);
-            snprintf(name, sizeof(name), "%s%s", rows[i].name, inside ? " of glass" : "");
-            fixture->request.width = fixture->request.height = 16; /* for the size of a cell */
-            fixture->request.format = FRAME_RGBA8;
-            fixture->request.depth = 3;
-            struct frame_result result = render(fixture, ABUFFER, &searches[DDA].options, name);
-            fixture->request.width = fixture->request.height = SIDE;
-            float cell_metres = result.cubes[TRACER_CUBE_STATIC].cell_metres;
-            frame_result_finish(&result);
-            /* Errors come in scene diagonals; the lamp belongs to the scene. */
-            struct scene_gpu gpu;
-            struct scene_changes changes;
-            struct error error = {0};
-            scene_gpu_init(&gpu, fixture->device);
-            assert_true(scene_gpu_update(&gpu, fixture->scene, NULL, &changes, NULL, &error));
-            double diagonal = (double)gpu.diagonal;
-            scene_gpu_finish(&gpu);
-            for (int search = 0; search < SEARCH_COUNT; search++)
-                expect_rays_agree(fixture, name, search, cell_metres, diagonal);
-        }
-    }
+    with_pairs_of_shapes(state, ABUFFER, request_whitted, expect_rays_agree);
 }
 
 int main(void)
@@ -331,6 +234,5 @@ int main(void)
         cmocka_unit_test_setup(occlusion_of_open_shapes_is_like_the_references, fixture_clear),
         cmocka_unit_test_setup(occlusion_of_models_is_like_the_references, fixture_clear),
     };
-    exact_tracer = tracer_impl_by_number(REFERENCE) ? REFERENCE : BVH;
     return cmocka_run_group_tests_name("abuffer against the reference", tests, fixture_setup, fixture_teardown);
 }
