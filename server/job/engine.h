@@ -94,7 +94,7 @@ enum engine_command_kind {
     ENGINE_SCENE_CLOSE,  /* the jobs that the client has on it fail with ERROR_CANCELLED just before the answer */
     ENGINE_SCENE_LIST,   /* answered by ENGINE_SCENES_LISTED */
     ENGINE_SCENE_DESCRIBE, /* answered by ENGINE_SCENE_DESCRIBED */
-    ENGINE_SCENES_TRIM,    /* scenes that nobody holds end, until blobs of trim_bytes are used no more; no answer */
+    ENGINE_SCENES_TRIM, /* scenes that nobody holds end, until blobs of trim_bytes are used no more; no answer */
     ENGINE_COMMIT, /* waits for the frames of the scene that are in progress, what follows for that scene too */
     /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, before which come the frames that were
      * finished and have credit. A view has no last frame: it is done when another one takes its place. */

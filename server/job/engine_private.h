@@ -176,7 +176,8 @@ void engine_end_left_scenes(struct engine *engine);
 /* What tables of scenes take that nobody holds. */
 uint64_t engine_left_table_bytes(const struct engine *engine);
 /* Scenes that nobody holds give way to who asks, until the tables of all are within their limit, or so many bytes
- * of blobs are used no more; nothing ends if all of them would not do. His own go first, whoever left most next. */
+ * of blobs are used no more; nothing ends if all of them would not do. His own go first, then those of
+ * whoever left most. */
 void engine_trim_tables(struct engine *engine, uint64_t principal);
 void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes);
 
@@ -242,6 +243,7 @@ uint64_t scene_device_bytes(const struct engine *engine, const struct engine_sce
 uint64_t engine_device_bytes(const struct engine *engine);
 
 /* stats.c */
-struct engine_stats *engine_stats_collect(const struct engine *engine, uint64_t principal); /* NULL: out of memory */
+/* NULL: out of memory. */
+struct engine_stats *engine_stats_collect(const struct engine *engine, uint64_t principal);
 
 #endif
