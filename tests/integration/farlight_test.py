@@ -47,7 +47,8 @@ def farlight(*arguments, **options):
 class Daemon:
     """A farlightd on a socket of its own; a context manager."""
 
-    def __init__(self, *arguments, listen=None, environment=None, launcher=(), pass_fds=()):
+    def __init__(self, *arguments, listen=None, environment=None, launcher=(), pass_fds=(), program="farlightd"):
+        self.program = program
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="farlight-daemon-"))
         self.address = listen or f"unix:{self.folder}/farlight.sock"
         self.arguments = list(map(str, arguments))
@@ -59,7 +60,7 @@ class Daemon:
 
     def __enter__(self):
         self.log = open(self.folder / "log", "w+")
-        self.process = subprocess.Popen([*self.launcher, BIN / "farlightd", "--listen", self.address, *self.arguments],
+        self.process = subprocess.Popen([*self.launcher, BIN / self.program, "--listen", self.address, *self.arguments],
                                         stdout=subprocess.PIPE, stderr=self.log, text=True, env=self.environment,
                                         pass_fds=self.pass_fds)
         for line in self.process.stdout:

@@ -10,8 +10,12 @@ import sys
 import time
 
 import farlight_test
+import sealed_link
+import tiny_client
 from farlight_test import Case, Daemon
-from test_daemon import ERROR, LIMIT, OK, PING, PONG, SCENE_OPEN, STATS, Peer, error_code, hello, text
+from test_daemon import ERROR, GOODBYE, LIMIT, OK, PING, PONG, SCENE_OPEN, STATS, Peer, error_code, hello, message, text
+
+DEVICE_LOST, SHUTTING_DOWN = 11, 14  # error_code
 
 READ_AGAIN, STAYS = "read again", "stays as it was"
 
@@ -228,6 +232,143 @@ class Reading(Case):
             self.assertIn(str(keys[1]), log.splitlines()[-1])
             keys[1].chmod(0o600)
             self.assertTrue(comes_in(keys[1]))
+
+
+    def test_who_is_introducing_himself_meanwhile_does_so_with_the_key_that_there_was(self):
+        """A handshake that has begun is ended with the keys with which it began; who comes after it needs the new one."""
+        keys = [self.folder / name for name in ("key", "other")]
+        for key in keys:
+            self.expect(farlight_test.farlight("key", key), 0)
+        old, new = (key.read_bytes() for key in keys)
+        self.config.write_text(f"[server]\nkey_file = {keys[0]}\n[network]\nwrong_key = 0\n")
+        with self.daemon(listen="tcp:127.0.0.1:0") as daemon:
+            under_way = [self.begin_sealed(daemon, key) for key in (old, new)]
+            self.config.write_text(self.config.read_text().replace(str(keys[0]), str(keys[1])))
+            self.reload(daemon, READ_AGAIN)
+            self.end_sealed(*under_way[0])
+            with self.assertRaises(sealed_link.Refused):
+                self.end_sealed(*under_way[1])
+            self.end_sealed(*self.begin_sealed(daemon, new))
+            with self.assertRaises(sealed_link.Refused):
+                self.end_sealed(*self.begin_sealed(daemon, old))
+
+    def begin_sealed(self, daemon, key):
+        """Up to where the daemon waits for the proof."""
+        connection = socket.create_connection(("127.0.0.1", int(daemon.ready[0].rpartition(":")[2])))
+        self.addCleanup(connection.close)
+        connection.settimeout(farlight_test.TIMEOUT_S)
+        client = sealed_link.Client(key)
+        connection.sendall(client.message_1)
+        return connection, client, connection.recv(72, socket.MSG_WAITALL)
+
+    def end_sealed(self, connection, client, message_2):
+        """Comes in, and is answered."""
+        connection.sendall(client.proving(message_2))
+        client.finish(connection.recv(64, socket.MSG_WAITALL))
+        connection.sendall(client.seal(hello() + message(PING, 1, struct.pack("<Q", 1))))
+        plain = b""
+        while struct.pack("<HHI", PONG, 0, 1) not in plain:
+            head = connection.recv(4, socket.MSG_WAITALL)
+            self.assertEqual(len(head), 4, "closed")
+            plain += client.open(head + connection.recv(struct.unpack("<I", head)[0], socket.MSG_WAITALL))[0]
+
+
+class Losing(Daemon):
+    """A daemon whose GPU is lost as often as it is told to."""
+
+    def __init__(self, folder, *arguments):
+        self.losses = folder / "losses"
+        self.losses.write_bytes(b"")
+        super().__init__(*arguments, environment={**os.environ, "FARLIGHT_TEST_LOSSES": str(self.losses)},
+                         program="tests/tools/farlightd_losing")
+
+    def lose(self, times):
+        self.losses.write_bytes(b"x" * times)
+
+    def left(self):
+        """How many of them are still to come."""
+        return self.losses.stat().st_size
+
+
+LEFT, RIGHT = (((x, 1, 5), (0, 0, 0), (0, 1, 0), 0.8) for x in (-2, 2))
+SAMPLES = 4  # of a picture that rests
+
+
+class LostGpu(Case):
+    def client(self, daemon, name=""):
+        client = tiny_client.Client(daemon.path)
+        self.addCleanup(client.socket.close)
+        blobs, edits = tiny_client.triangle()
+        client.open_scene(1, name, tiny_client.SHARED if name else tiny_client.PRIVATE)
+        client.upload(blobs)
+        client.commit(1, edits)
+        return client
+
+    @staticmethod
+    def rests(client, command, camera):
+        """Digest of the picture that a view comes to, once it is told to look from there; numbers of its frames."""
+        client.look(2, command, camera)
+        numbers = []
+        while True:
+            frame = client.next_frame()
+            numbers.append(frame.number)
+            client.raise_credit(2, frame.number + 3)
+            if (frame.command, frame.samples) == (command, SAMPLES):
+                return frame.digest, numbers
+
+    def test_a_view_goes_on_and_shows_the_same_pictures(self):
+        with Losing(self.folder) as daemon:
+            client = self.client(daemon)
+            view = client.render(1, 2, (64, 48), LEFT, kind=tiny_client.VIEW, samples=SAMPLES, credit=2)
+            left, numbers = self.rests(client, 1, LEFT)
+            right, more = self.rests(client, 2, RIGHT)
+            numbers += more
+            self.assertNotEqual(left, right)
+            for command, camera, digest in ((3, LEFT, left), (4, RIGHT, right)):
+                daemon.lose(1)
+                again, more = self.rests(client, command, camera)
+                numbers += more
+                self.assertEqual(daemon.left(), 0)
+                self.assertEqual(again, digest)
+            self.assertEqual(numbers, list(range(len(numbers))))  # none is lost, none comes twice
+            self.assertEqual(client.cancel(view).code, tiny_client.CANCELLED)
+            self.assertEqual(client.say_goodbye(), b"")
+            self.assertEqual(daemon.messages().count("the GPU was lost; making it anew"), 2)
+            self.assertEqual(daemon.stop(), 0)
+
+    def test_who_loses_it_again_and_again_is_put_aside_and_others_go_on(self):
+        with Losing(self.folder) as daemon:
+            client, other = self.client(daemon), self.client(daemon)
+            daemon.lose(3)
+            with self.assertRaises(tiny_client.Failed) as failure:
+                client.wait(client.render(1, 2, (32, 24), LEFT))
+            self.assertEqual(failure.exception.code, DEVICE_LOST)
+            self.assertIn("put aside", str(failure.exception))
+            self.assertEqual(daemon.left(), 0, daemon.messages())
+            other.wait(other.render(1, 2, (32, 24), LEFT))
+            self.assertEqual(len(other.frames), 1)
+            self.assertEqual(daemon.stop(), 0)
+
+    def test_a_gpu_that_is_lost_for_good_ends_the_daemon_with_75(self):
+        """What the service manager is told to start it again at."""
+        with Losing(self.folder) as daemon:
+            client, bystander = self.client(daemon, "triangle"), Peer(daemon)
+            daemon.lose(1000)
+            with self.assertRaises(tiny_client.Failed) as failure:
+                for channel in range(2, 9):
+                    client.wait(client.render(1, channel, (32, 24), LEFT))
+            self.assertEqual(failure.exception.code, DEVICE_LOST)
+            with self.assertRaises((EOFError, tiny_client.Failed)):
+                for channel in range(9, 20):
+                    try:
+                        client.wait(client.render(1, channel, (32, 24), LEFT))
+                    except tiny_client.Failed as again:
+                        self.assertIn(again.code, (DEVICE_LOST, SHUTTING_DOWN))
+            self.assertIn(GOODBYE, [kind for kind, _, _ in bystander.until_closed()])
+            self.assertEqual(daemon.process.wait(farlight_test.TIMEOUT_S), os.EX_TEMPFAIL)
+            self.assertIn("lost for good", daemon.messages())
+        unit = (farlight_test.ROOT / "conf/farlightd.service").read_text()
+        self.assertIn(f"RestartForceExitStatus={os.EX_TEMPFAIL}\n", unit)
 
 
 PTRACE_ATTACH, PTRACE_DETACH, WALL = 16, 17, 0x40000000
