@@ -107,6 +107,7 @@ static void print_json(const struct message_stats_reply *reply)
     set(object, "host_limit_bytes", reply->host_limit_bytes);
     set(object, "device_bytes", reply->device_bytes);
     set(object, "device_limit_bytes", reply->device_limit_bytes);
+    set(object, "device_objects", reply->device_objects);
     set(object, "blobs", reply->blobs);
     set(object, "blob_bytes", reply->blob_bytes);
     json_object_set_new(object, "clients", clients_array(reply));
@@ -157,7 +158,8 @@ static void print_table(const struct message_stats_reply *reply)
     printf("work         %" PRIu64 " frames, %" PRIu64 " rays, %u jobs now\n", reply->frames, reply->rays,
            reply->jobs);
     printf("host memory  %.3f MB of %.0f MB\n", mb(reply->host_bytes), mb(reply->host_limit_bytes));
-    printf("device mem.  %.3f MB of %.0f MB\n", mb(reply->device_bytes), mb(reply->device_limit_bytes));
+    printf("device mem.  %.3f MB of %.0f MB, %u objects\n", mb(reply->device_bytes), mb(reply->device_limit_bytes),
+           reply->device_objects);
     printf("blobs        %u, %.3f MB\n", reply->blobs, mb(reply->blob_bytes));
     for (uint32_t i = 0; i < reply->clients_count; i++) {
         const struct record_client_stat *client = &reply->clients[i];

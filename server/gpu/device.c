@@ -246,6 +246,14 @@ void gpu_device_destroy(struct gpu_device *device)
     free(device);
 }
 
+size_t gpu_device_objects(const struct gpu_device *device)
+{
+    size_t count = 0;
+    for (int kind = 0; device->registry && kind < GPU_OBJECT_KIND_COUNT; kind++)
+        count += gpu_registry_count(device->registry, (enum gpu_object_kind)kind);
+    return count;
+}
+
 static const char *gl_error_name(GLenum code)
 {
     switch (code) {

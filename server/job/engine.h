@@ -138,7 +138,7 @@ struct engine_scene_stat {
 struct engine_stats {
     struct gpu_device_info device;
     uint64_t device_bytes, device_limit_bytes, host_bytes, frames, rays;
-    uint32_t jobs;
+    uint32_t jobs, device_objects;
     struct engine_scene_stat *scenes; /* owned */
     uint32_t scene_count;
     struct {

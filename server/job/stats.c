@@ -50,6 +50,7 @@ struct engine_stats *engine_stats_collect(const struct engine *engine, uint64_t 
     stats->device = engine->device_info;
     stats->device_bytes = engine_device_bytes(engine);
     stats->device_limit_bytes = engine->device_bytes_limit;
+    stats->device_objects = engine->device ? (uint32_t)gpu_device_objects(engine->device) : 0;
     stats->frames = engine->frames;
     stats->rays = engine->rays;
     for (size_t i = 0; i < engine->job_count; i++)

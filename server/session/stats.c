@@ -117,6 +117,7 @@ static void fill(struct message_stats_reply *reply, const struct hub *hub, const
     reply->blob_bytes = blob_store_bytes(hub->blobs);
     reply->blobs = (uint32_t)blob_store_count(hub->blobs);
     reply->jobs = stats->jobs;
+    reply->device_objects = stats->device_objects;
     reply->version = FARLIGHT_VERSION;
     reply->device = stats->device.name;
     reply->driver = stats->device.version;
