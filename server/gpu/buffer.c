@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "gpu/buffer.h"
 
+#include "base/progress.h"
 #include "gpu/registry.h"
 
 #include <epoxy/gl.h>
@@ -109,6 +110,7 @@ void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size
     (void)device;
     if (size_bytes)
         glNamedBufferSubData(buffer->name, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes, data);
+    progress_tell();
 }
 
 void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
@@ -130,7 +132,8 @@ void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint
 
 void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer)
 {
-    if (buffer->name)
+    /* One that was bound and never held anything has only its texture. */
+    if (buffer->name || buffer->texture)
         release(device, buffer);
     *buffer = (struct gpu_buffer){0};
 }

@@ -318,12 +318,15 @@ static void an_empty_buffer_is_bound_as_zeros(void **state)
     (void)state;
     struct gpu_buffer empty = {0};
     GLint name = 0;
+    size_t before = gpu_device_objects(device);
     gpu_buffer_bind_storage(&empty, 3);
     glGetIntegeri_v(GL_SHADER_STORAGE_BUFFER_BINDING, 3, &name);
     assert_int_equal(name, device->empty_buffer);
     gpu_buffer_bind_texels(device, &empty, 0, GL_RGBA32F);
     assert_true(gpu_check(device, "empty buffers", NULL));
+    assert_int_equal(gpu_device_objects(device), before + 1); /* a texture over the zeros */
     gpu_buffer_finish(device, &empty);
+    assert_int_equal(gpu_device_objects(device), before);
 }
 
 static void destroying_a_device_takes_every_object_with_it(void **state)
