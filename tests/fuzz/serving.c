@@ -44,8 +44,18 @@ static int epoll_without_waiting(int fd, struct epoll_event *events, int max_eve
 
 /* ---- what clients receive --------------------------------------------------------------------------- */
 
+/* The answer to bytes that begin as a sealed connection does: there is no key here. */
+static bool is_refused_sealing(const struct serving_client *client)
+{
+    static const uint8_t begun[] = {'S', 'E', 'A', 'L', 2};
+    return client->in_used >= SEALED_REFUSAL_BYTES && memcmp(client->in, begun, sizeof begun) == 0 &&
+           client->in[sizeof begun] != 0;
+}
+
 static size_t take_reply(struct serving_client *client)
 {
+    if (is_refused_sealing(client))
+        return SEALED_REFUSAL_BYTES;
     struct handshake_reply reply;
     struct decode_error error;
     size_t consumed = 0;
