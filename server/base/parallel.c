@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "base/parallel.h"
 
+#include "base/progress.h"
+
 #include <pthread.h>
 #include <stdatomic.h>
 #include <unistd.h>
@@ -22,6 +24,7 @@ static void *work_off(void *argument)
         if (i >= parallel->count)
             return NULL;
         parallel->work(parallel->context, i);
+        progress_tell();
     }
 }
 

@@ -2,6 +2,7 @@
 #include "gpu/program.h"
 
 #include "base/log.h"
+#include "base/progress.h"
 #include "gpu/program_cache.h"
 #include "gpu/program_source.h"
 #include "gpu/registry.h"
@@ -102,6 +103,7 @@ static bool link_program(GLuint program, struct stage *stages, unsigned stage_co
     GLint linked = GL_FALSE;
     glLinkProgram(program);
     glGetProgramiv(program, GL_LINK_STATUS, &linked);
+    progress_tell();
     for (unsigned i = 0; i < stage_count; i++)
         glDetachShader(program, stages[i].shader);
     if (linked)

@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/progress.h"
 
 #include <signal.h>
 #include <stdlib.h>
@@ -328,6 +329,6 @@ void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_
 bool engine_is_alive(const struct engine *engine, uint64_t *turns)
 {
     uint64_t before = *turns;
-    *turns = atomic_load(&engine->turns);
+    *turns = atomic_load(&engine->turns) + progress_told();
     return atomic_load(&engine->waits) || *turns != before;
 }

@@ -238,8 +238,8 @@ const struct gpu_device_info *engine_device(const struct engine *engine);
 bool engine_submit(struct engine *engine, struct engine_command *command, struct error *error);
 int engine_event_fd(const struct engine *engine);              /* readable while events wait */
 struct engine_event *engine_next_event(struct engine *engine); /* NULL: none waits */
-/* Whether the thread that owns GL has gone on since it was asked last, or has nothing to do. *turns is the
- * asker's, 0 at first. */
+/* Whether the thread that owns GL has gone on since it was asked last, be it with a part of what takes long (see
+ * base/progress.h), or has nothing to do. *turns is the asker's, 0 at first. */
 bool engine_is_alive(const struct engine *engine, uint64_t *turns);
 /* Adds send and queue time of a frame to the totals, once the network side knows them. */
 void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_ns);

@@ -2,6 +2,7 @@
 #include "trace/bvh_build.h"
 
 #include "base/parallel.h"
+#include "base/progress.h"
 #include "trace/bvh_build_split.h"
 
 #include <assert.h>
@@ -138,6 +139,8 @@ static void build_range(struct builder *builder, struct range range)
     unsigned depth = 0;
     for (;;) {
         struct range left, right;
+        if (range.end - range.begin >= TASK_PRIMITIVES)
+            progress_tell();
         if (split_range(builder, &range, &left, &right)) {
             bool left_is_larger = left.end - left.begin > right.end - right.begin;
             struct range *larger = left_is_larger ? &left : &right;

@@ -2,6 +2,7 @@
 #include "trace/bvh_build.h"
 
 #include "base/parallel.h"
+#include "base/progress.h"
 
 #include <stdlib.h>
 
@@ -164,6 +165,7 @@ bool bvh_bake(struct bvh_baked *baked, const struct bvh_binary *tree, const floa
     bool ok = bake_alloc(&bake, baked);
     if (ok)
         choose_elements(&bake, areas);
+    progress_tell();
     ok = ok && place_all(&bake, octants, threads);
     free(bake.element);
     free(bake.below);

@@ -7,6 +7,7 @@
 
 #include "base/hashmap.h"
 #include "base/parallel.h"
+#include "base/progress.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -86,10 +87,19 @@ static bool take_shape(struct reference_entry *entry, RTCDevice device, const st
     return opacity_surface_init_spheres(&entry->surface, geometry->spheres);
 }
 
+/* Embree's builder is at it. */
+static bool on_progress(void *context, double share)
+{
+    (void)context, (void)share;
+    progress_tell();
+    return true;
+}
+
 static RTCScene new_scene(RTCDevice device)
 {
     RTCScene scene = rtcNewScene(device);
     if (scene) {
+        rtcSetSceneProgressMonitorFunction(scene, on_progress, NULL);
         rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
         rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
     }

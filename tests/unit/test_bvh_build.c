@@ -2,6 +2,8 @@
 #include "trace/bvh_build.h"
 #include "trace/bvh_build_top.h"
 
+#include "base/progress.h"
+
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -527,6 +529,22 @@ static void the_tree_does_not_depend_on_the_threads(void **state)
     input_finish(&input);
 }
 
+/* Whoever watches the thread that waits for it sees that it goes on: the longest part without a sign is that of
+ * the first split, through all primitives once. */
+static void a_large_tree_gives_signs_of_its_progress(void **state)
+{
+    (void)state;
+    struct input input = triangles(BVH_THREADED_PRIMITIVES + 10000, 10, 0.05f, 9);
+    struct bvh_settings settings = packed;
+    for (settings.threads = 1; settings.threads < 3; settings.threads++) {
+        uint64_t before = progress_told();
+        struct bvh_tree tree = build(&input, &settings);
+        assert_in_range(progress_told() - before, 10, UINT32_MAX);
+        bvh_tree_finish(&tree);
+    }
+    input_finish(&input);
+}
+
 /* The leaf that octant `octant` meets first: its lowest corner on `axis`. */
 static double first_leaf_corner(const struct view *view, uint32_t octant, int axis)
 {
@@ -860,6 +878,7 @@ int main(void)
         cmocka_unit_test(fine_detail_in_a_great_extent_is_told_by_the_cost_of_its_grid),
         cmocka_unit_test(a_tree_that_degenerates_to_a_list_is_built),
         cmocka_unit_test(the_tree_does_not_depend_on_the_threads),
+        cmocka_unit_test(a_large_tree_gives_signs_of_its_progress),
         cmocka_unit_test(each_octant_meets_the_near_side_first),
         cmocka_unit_test(elements_that_do_not_pay_are_thrown_back),
         cmocka_unit_test(each_form_takes_the_bytes_it_promises),

@@ -2,6 +2,8 @@
 /* The engine when something is wrong: jobs that cannot be, lost devices, too little memory, full queues. */
 #include "engine_fake.h"
 
+#include "base/progress.h"
+
 /* ---- jobs that cannot be ------------------------------------------------------------------------ */
 
 static void jobs_that_cannot_be_are_refused_with_their_field(void **state)
@@ -121,6 +123,9 @@ static void whether_the_engine_goes_on_can_be_seen(void **state)
     engine_is_alive(engine, &turns);
     usleep(50000);
     assert_false(engine_is_alive(engine, &turns)); /* within a step of 0.3 s */
+    progress_tell();
+    assert_true(engine_is_alive(engine, &turns)); /* the step is one of many parts */
+    assert_false(engine_is_alive(engine, &turns));
     take_frame(engine, 1, 2, 0);
     expect_done(engine, 1, 2);
     assert_true(engine_is_alive(engine, &turns));

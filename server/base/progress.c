@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT */
+#include "base/progress.h"
+
+#include <stdatomic.h>
+
+static atomic_uint_fast64_t told;
+
+void progress_tell(void)
+{
+    atomic_fetch_add_explicit(&told, 1, memory_order_relaxed);
+}
+
+uint64_t progress_told(void)
+{
+    return atomic_load_explicit(&told, memory_order_relaxed);
+}
