@@ -350,13 +350,43 @@ static const struct connection_limits patient = {
     .queued_hard_bytes = 64 << 20,
 };
 
+static inline int set_up_with(bool sealed, bool calls_cut_short)
+{
+    real = sys;
+    if (calls_cut_short) {
+        sys.read = short_read;
+        sys.sendmsg = short_sendmsg;
+        sys.epoll_wait = interrupted_wait;
+    }
+    start(&patient);
+    if (sealed)
+        seal_with(&session_key);
+    greet();
+    return 0;
+}
+
 static inline int set_up(void **state)
 {
     (void)state;
-    real = sys;
-    start(&patient);
-    greet();
-    return 0;
+    return set_up_with(false, false);
+}
+
+static inline int set_up_with_faults(void **state)
+{
+    (void)state;
+    return set_up_with(false, true);
+}
+
+static inline int set_up_sealed(void **state)
+{
+    (void)state;
+    return set_up_with(true, false);
+}
+
+static inline int set_up_sealed_with_faults(void **state)
+{
+    (void)state;
+    return set_up_with(true, true);
 }
 
 /* The test greets. */
@@ -365,41 +395,6 @@ static inline int set_up_ungreeted(void **state)
     (void)state;
     real = sys;
     start(&patient);
-    return 0;
-}
-
-static inline int set_up_with_faults(void **state)
-{
-    (void)state;
-    real = sys;
-    sys.read = short_read;
-    sys.sendmsg = short_sendmsg;
-    sys.epoll_wait = interrupted_wait;
-    start(&patient);
-    greet();
-    return 0;
-}
-
-static inline int set_up_sealed(void **state)
-{
-    (void)state;
-    real = sys;
-    start(&patient);
-    seal_with(&session_key);
-    greet();
-    return 0;
-}
-
-static inline int set_up_sealed_with_faults(void **state)
-{
-    (void)state;
-    real = sys;
-    sys.read = short_read;
-    sys.sendmsg = short_sendmsg;
-    sys.epoll_wait = interrupted_wait;
-    start(&patient);
-    seal_with(&session_key);
-    greet();
     return 0;
 }
 

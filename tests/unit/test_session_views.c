@@ -319,6 +319,14 @@ static struct engine_command *start_acknowledged_view(uint32_t request, uint32_t
     return start;
 }
 
+/* View 2, which has shown a frame, with credit for whatever is to come. */
+static void start_view_with_credit(void)
+{
+    struct engine_command *start = start_acknowledged_view(2, 100);
+    told_credit(2, 4);
+    engine_command_destroy(start);
+}
+
 static void frames_are_begun_ahead_of_those_sent_and_not_beyond_credit(void **state)
 {
     (void)state;
@@ -548,8 +556,7 @@ static void a_view_takes_the_place_of_another_on_its_channel(void **state)
 static void a_frame_under_way_comes_whole_before_the_answer(void **state)
 {
     (void)state;
-    struct engine_command *start = start_acknowledged_view(2, 100);
-    told_credit(2, 4);
+    start_view_with_credit();
     engine_command_destroy(replace_view(3, 17));
     /* Large enough that the socket does not take it at once: it is under way when it is replaced. */
     say_large_frame(2, 1);
@@ -566,14 +573,12 @@ static void a_frame_under_way_comes_whole_before_the_answer(void **state)
     expect(MESSAGE_FRAME_END, 2);
     expect(MESSAGE_OK, 2);
     take_frame(3, 3);
-    engine_command_destroy(start);
 }
 
 static void a_view_that_cannot_be_leaves_the_one_that_is(void **state)
 {
     (void)state;
-    struct engine_command *start = start_acknowledged_view(2, 100);
-    told_credit(2, 4);
+    start_view_with_credit();
     struct message message = view_message(0);
     message.render.width = 4096; /* more than the limit: the session says so itself */
     send_message(3, 0, &message);
@@ -588,14 +593,12 @@ static void a_view_that_cannot_be_leaves_the_one_that_is(void **state)
     expect(MESSAGE_OK, 2);
     say_frame(5, 2, 0);
     take_frame(5, 2);
-    engine_command_destroy(start);
 }
 
 static void a_view_that_fails_leaves_its_channel_to_the_next(void **state)
 {
     (void)state;
-    struct engine_command *start = start_acknowledged_view(2, 100);
-    told_credit(2, 4);
+    start_view_with_credit();
     engine_command_destroy(replace_view(3, 17));
     say(ENGINE_FAILED, 2, ERROR_OUT_OF_MEMORY);
     expect_error(2, PROTOCOL_ERROR_CODE_OUT_OF_MEMORY);
@@ -611,14 +614,12 @@ static void a_view_that_fails_leaves_its_channel_to_the_next(void **state)
     message.render.channel = CHANNEL;
     send_message(4, 0, &message);
     expect_told_start(4, JOB_BATCH);
-    engine_command_destroy(start);
 }
 
 static void a_cancelled_view_is_answered_and_nothing_follows(void **state)
 {
     (void)state;
-    struct engine_command *start = start_acknowledged_view(2, 100);
-    told_credit(2, 4);
+    start_view_with_credit();
     struct message message = made(MESSAGE_CANCEL);
     message.cancel.target_request = 2;
     send_message(3, 0, &message);
@@ -633,14 +634,12 @@ static void a_cancelled_view_is_answered_and_nothing_follows(void **state)
     send_camera(1, false);
     expect_alive(9);
     told_nothing();
-    engine_command_destroy(start);
 }
 
 static void a_view_may_be_cancelled_while_another_takes_its_place(void **state)
 {
     (void)state;
-    struct engine_command *start = start_acknowledged_view(2, 100);
-    told_credit(2, 4);
+    start_view_with_credit();
     engine_command_destroy(replace_view(3, 17));
     struct message message = made(MESSAGE_CANCEL);
     message.cancel.target_request = 3;
@@ -653,14 +652,12 @@ static void a_view_may_be_cancelled_while_another_takes_its_place(void **state)
     expect(MESSAGE_OK, 2);
     expect_error(3, PROTOCOL_ERROR_CODE_CANCELLED);
     expect(MESSAGE_OK, 4);
-    engine_command_destroy(start);
 }
 
 static void a_client_that_vanishes_takes_its_view_along(void **state)
 {
     (void)state;
-    struct engine_command *start = start_acknowledged_view(2, 100);
-    told_credit(2, 4);
+    start_view_with_credit();
     engine_command_destroy(replace_view(3, 17));
     say_large_frame(2, 1);
     expect(MESSAGE_FRAME_BEGIN, 2);
@@ -668,7 +665,6 @@ static void a_client_that_vanishes_takes_its_view_along(void **state)
     for (unsigned i = 0; !atomic_load(&engine.gone) && i < 2000; i++)
         usleep(10000);
     assert_int_equal(atomic_load(&engine.gone), 1);
-    engine_command_destroy(start);
 }
 
 /* ---- what cannot be ---------------------------------------------------------------------------------- */
