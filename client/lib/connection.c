@@ -69,9 +69,42 @@ static bool fail_ended(struct fl_connection *connection, struct fl_error *error)
     return fl_connection_break(connection, error);
 }
 
+bool fl_connection_push_late(struct fl_connection *connection, struct fl_error *error)
+{
+    while (connection->late != NULL && fl_stream_has_room(&connection->stream)) {
+        struct fl_late *first = connection->late;
+        const bool pushed = fl_stream_push(&connection->stream, first->request, 0, &first->message, error);
+        connection->late = first->next;
+        free(first);
+        if (!pushed)
+            return fl_connection_break(connection, error);
+    }
+    return true;
+}
+
+void fl_connection_send_late(struct fl_connection *connection, uint32_t request, const struct message *message)
+{
+    struct fl_error error = {0};
+    if (connection->broken.code != FL_ERROR_NONE)
+        return;
+    struct fl_late *late = malloc(sizeof *late);
+    if (late == NULL) {
+        fl_error_set(&error, FL_ERROR_MEMORY, "", "out of memory");
+        fl_connection_break(connection, &error);
+        return;
+    }
+    *late = (struct fl_late){.request = request, .message = *message};
+    *(connection->late != NULL ? connection->late_end : &connection->late) = late;
+    connection->late_end = &late->next;
+    if (fl_connection_push_late(connection, &error) && !fl_stream_transfer(&connection->stream, &error))
+        fl_connection_break(connection, &error);
+}
+
 /* One round of poll and transfer. */
 static bool serve(struct fl_connection *connection, uint64_t deadline_ns, struct fl_error *error)
 {
+    if (!fl_connection_push_late(connection, error))
+        return false;
     struct pollfd polled = {.fd = connection->stream.fd, .events = fl_stream_events(&connection->stream)};
     if (!fl_wait(&polled, 1, connection->interrupt_fd, deadline_ns, error) ||
         !fl_stream_transfer(&connection->stream, error))
@@ -83,6 +116,11 @@ bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint
                         const struct message *message, struct fl_error *error)
 {
     if (!fl_connection_check(connection, error))
+        return false;
+    /* Who sends and asks for nothing gets on as well once the daemon reads again. */
+    if (!fl_stream_has_room(&connection->stream) && !fl_stream_transfer(&connection->stream, error))
+        return fl_connection_break(connection, error);
+    if (!fl_connection_push_late(connection, error))
         return false;
     if (!fl_stream_has_room(&connection->stream))
         return fl_error_set(error, FL_ERROR_TIMEOUT, "", "the daemon takes nothing more");
@@ -369,6 +407,10 @@ void fl_connection_destroy(struct fl_connection *connection)
         struct fl_error ignored;
         connection->stream.is_last = true;
         fl_connection_send(connection, 0, 0, &goodbye, &ignored);
+    }
+    for (struct fl_late *late = connection->late, *next; late != NULL; late = next) {
+        next = late->next;
+        free(late);
     }
     fl_stream_finish(&connection->stream);
     fl_process_end(&connection->process, connection->broken.code == FL_ERROR_NONE ? 3000 : 500);

@@ -10,6 +10,13 @@
 /* The channel of blob data; jobs have those above. */
 #define FL_UPLOAD_CHANNEL 1u
 
+/* A message without texts or arrays that had no room. */
+struct fl_late {
+    struct fl_late *next;
+    uint32_t request;
+    struct message message;
+};
+
 struct fl_connection {
     struct fl_stream stream;
     struct fl_process process; /* the private daemon or ssh */
@@ -21,6 +28,7 @@ struct fl_connection {
     struct fl_job *job;               /* the one that runs */
     struct fl_view *view;             /* likewise */
     struct fl_scene *scenes;          /* all that are there */
+    struct fl_late *late, **late_end; /* owned: go before everything else as soon as there is room */
     bool read_only;                   /* the daemon lets it change nothing */
     bool can_h264;                    /* this client and the daemon */
     struct fl_error broken;           /* why nothing works any more; code NONE: it does */
@@ -46,6 +54,11 @@ uint32_t fl_connection_next_request(struct fl_connection *connection);
 /* Sends one message and waits until the kernel has it. */
 bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint32_t channel,
                         const struct message *message, struct fl_error *error);
+/* For what gives something back, which nobody can try again: sent now, or as soon as there is room. The message has
+ * no texts and no arrays. Where there is no memory for that, the connection is broken, as its end gives all back. */
+void fl_connection_send_late(struct fl_connection *connection, uint32_t request, const struct message *message);
+/* Hands what was late to the stream as far as there is room. False: the connection is broken. */
+bool fl_connection_push_late(struct fl_connection *connection, struct fl_error *error);
 /* Deals with what concerns the connection itself (ping, credit for uploads, blocked, scene_changed, goodbye, an
  * error of request 0), its job or its view: 1: it was that; 0: it is for the caller; -1: the connection is broken,
  * *error says why. */

@@ -238,8 +238,8 @@ bool fl_render_cancel(struct fl_job *job, struct fl_error *error)
     const uint64_t deadline_ns = fl_now_ns() + CANCEL_NS;
     struct fl_received received;
     job->answered = true; /* whatever still comes is dropped by request */
-    return fl_connection_send(connection, request, 0, &cancel, error) &&
-           fl_connection_answer(connection, request, MESSAGE_OK, &received, deadline_ns, error);
+    fl_connection_send_late(connection, request, &cancel);
+    return fl_connection_answer(connection, request, MESSAGE_OK, &received, deadline_ns, error);
 }
 
 void fl_render_destroy(struct fl_job *job)

@@ -62,6 +62,8 @@ static bool pass_on(struct load *load, const struct frame *frame, struct message
 /* As many as the daemon's side has room for. */
 static bool drain_importer(struct load *load, struct fl_error *error)
 {
+    if (!fl_connection_push_late(load->connection, error))
+        return false;
     while (fl_stream_has_room(&load->connection->stream)) {
         struct frame frame;
         struct message message;
@@ -304,15 +306,14 @@ static void take_clips_away(const struct fl_scene *scene)
     struct message begin = {.type = MESSAGE_EDIT_BEGIN}, remove = {.type = MESSAGE_REMOVE},
                    commit = {.type = MESSAGE_EDIT_COMMIT};
     const uint32_t request = fl_connection_next_request(scene->connection);
-    struct fl_error ignored;
     begin.edit_begin.scene = scene->scene;
-    fl_connection_send(scene->connection, request, 0, &begin, &ignored);
+    fl_connection_send_late(scene->connection, request, &begin);
     for (size_t i = 0; i < scene->clip_count; i++) {
         remove.remove.kind = PROTOCOL_OBJECT_KIND_CLIP;
         remove.remove.object = scene->clips[i];
-        fl_connection_send(scene->connection, request, 0, &remove, &ignored);
+        fl_connection_send_late(scene->connection, request, &remove);
     }
-    fl_connection_send(scene->connection, request, 0, &commit, &ignored);
+    fl_connection_send_late(scene->connection, request, &commit);
 }
 
 /* Answers are not waited for: they are dropped when they come. */
@@ -321,11 +322,10 @@ void fl_scene_destroy(struct fl_scene *scene)
     if (scene == NULL)
         return;
     struct message close = {.type = MESSAGE_SCENE_CLOSE};
-    struct fl_error ignored;
     if (scene->clip_count > 0)
         take_clips_away(scene);
     close.scene_close.scene = scene->scene;
-    fl_connection_send(scene->connection, fl_connection_next_request(scene->connection), 0, &close, &ignored);
+    fl_connection_send_late(scene->connection, fl_connection_next_request(scene->connection), &close);
     struct fl_scene **place = &scene->connection->scenes;
     while (*place != scene)
         place = &(*place)->next;

@@ -330,11 +330,10 @@ void fl_view_destroy(struct fl_view *view)
     if (view == NULL)
         return;
     struct fl_connection *connection = view->connection;
-    struct fl_error ignored;
-    for (size_t i = 0; i < view->asked_count && connection->broken.code == FL_ERROR_NONE; i++) {
+    for (size_t i = 0; i < view->asked_count; i++) {
         struct message cancel = {.type = MESSAGE_CANCEL};
         cancel.cancel.target_request = view->asked[i].request;
-        fl_connection_send(connection, fl_connection_next_request(connection), 0, &cancel, &ignored);
+        fl_connection_send_late(connection, fl_connection_next_request(connection), &cancel);
     }
     fl_assembly_finish(&view->assembly);
     fl_frame_queue_finish(&view->done);

@@ -18,7 +18,7 @@ static struct {
     uint64_t credit, last_command;
     uint32_t last_acked;
     struct message_render first, last;
-    bool was_moving;
+    bool was_moving, closed_after_cancel;
 } seen;
 
 static int begin(void **state)
@@ -605,6 +605,52 @@ static void what_had_no_room_beside_much_else_is_acknowledged_later(void **state
     assert_int_equal(seen.credit, IN_FLIGHT + 2);
 }
 
+/* Reads nothing until it is told to; then it answers what it has no frames for. */
+static void play_busy_until_the_end(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    greet(daemon);
+    sem_wait(&may_read);
+    while (look(daemon, &header, &message)) {
+        seen.closed_after_cancel |= message.type == MESSAGE_SCENE_CLOSE && seen.cancels == 1;
+        if (message.type == MESSAGE_CANCEL || message.type == MESSAGE_SCENE_CLOSE)
+            tell_ok(daemon, header.request);
+        if (message.type != MESSAGE_PING)
+            continue;
+        const struct message pong = {.type = MESSAGE_PONG};
+        tell(daemon, header.request, &pong);
+    }
+}
+
+static void what_ends_beside_much_else_is_given_back_later(void **state)
+{
+    (void)state;
+    sem_init(&may_read, 0, 0);
+    struct daemon *daemon = start(play_busy_until_the_end);
+    struct fl_connection *connection = connect_to(daemon);
+    struct fl_scene *scene = fl_scene_create(connection, &error);
+    assert_non_null(scene);
+    struct fl_view *view = start_view(scene);
+    while (fl_view_look(view, &some_camera, NULL, &error))
+        continue;
+    check_error(FL_ERROR_TIMEOUT, "nothing more");
+    fl_view_destroy(view);
+    fl_scene_destroy(scene);
+    uint64_t ping_ns;
+    assert_false(fl_ping(connection, &ping_ns, &error)); /* still nothing has room */
+    check_error(FL_ERROR_TIMEOUT, "nothing more");
+    sem_post(&may_read);
+    /* What asks next goes behind. */
+    while (!fl_ping(connection, &ping_ns, &error))
+        check_error(FL_ERROR_TIMEOUT, "nothing more");
+    fl_connection_destroy(connection);
+    stop(daemon);
+    sem_destroy(&may_read);
+    assert_int_equal(seen.cancels, 1);
+    assert_true(seen.closed_after_cancel);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -618,6 +664,7 @@ int main(void)
         cmocka_unit_test_setup(more_frames_than_credit_break_the_connection, begin),
         cmocka_unit_test_setup(a_frame_in_h264_is_left_to_the_caller, begin),
         cmocka_unit_test_setup(what_had_no_room_beside_much_else_is_acknowledged_later, begin),
+        cmocka_unit_test_setup(what_ends_beside_much_else_is_given_back_later, begin),
         cmocka_unit_test_setup(a_connection_that_is_lost_within_a_frame_is_told_and_nothing_waits_for_ever, begin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
