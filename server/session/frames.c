@@ -18,6 +18,7 @@ struct pending_frame {
     struct job *job;  /* NULL: dropped */
     uint32_t request; /* the job's, or that of a view whose place it has taken */
     struct engine_frame *frame;
+    struct hub *counted_by; /* its bytes, beside those of jobs; NULL: they are the job's */
     bool begun;
     bool queued; /* all of it is with the connection */
     size_t queued_bytes;
@@ -34,6 +35,8 @@ static void engine_frame_destroy(struct engine_frame *frame)
 static void release(struct out_chunk *chunk)
 {
     struct pending_frame *pending = (struct pending_frame *)(void *)chunk;
+    if (pending->counted_by)
+        pending->counted_by->frame_bytes -= pending->chunk.size_bytes;
     engine_frame_destroy(pending->frame);
     free(pending);
 }
@@ -86,6 +89,11 @@ unsigned frames_of_before(const struct job *job)
     return job->first && job->first->request != job->request;
 }
 
+uint64_t frames_bytes_of_before(const struct job *job)
+{
+    return job->first && job->first->counted_by ? job->first->chunk.size_bytes : 0;
+}
+
 unsigned frames_on_the_wire(const struct job *job)
 {
     return job->first && job->first->begun_ns;
@@ -103,6 +111,10 @@ bool frames_keep_begun(struct job *job)
     begun->next = NULL;
     job->first = begun;
     job->end = &begun->next;
+    if (!begun->counted_by) {
+        begun->counted_by = job->session->hub;
+        begun->counted_by->frame_bytes += begun->chunk.size_bytes;
+    }
     return begun->request == job->request;
 }
 

@@ -22,10 +22,12 @@ void frames_add(struct job *job, struct engine_frame *frame);
 /* Drops what of the job has not been begun on the wire, and forgets the rest. The request of a view whose place it
  * has taken, if one of those frames was that view's; 0: none was. */
 uint32_t frames_drop(struct session *session, struct job *job);
-/* Drops what has not been begun. True: one of the job's request has, and will be finished. */
+/* Drops what has not been begun, as another view takes the job's place. True: one of the job's request has, and will
+ * be finished; from now on until its bytes are let go it counts beside what the job may take. */
 bool frames_keep_begun(struct job *job);
 /* Its frames under way that are those of a view whose place it has taken: 0 or 1. */
 unsigned frames_of_before(const struct job *job);
+uint64_t frames_bytes_of_before(const struct job *job);
 /* Its frames whose first byte has gone, but not the last: 0 or 1. */
 unsigned frames_on_the_wire(const struct job *job);
 /* Queues pieces as long as the connection wants bulk; jobs take turns. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "session/job_terms.h"
 
+#include "session/frames.h"
 #include "session/jobs.h"
 #include "session/session.h"
 #include "session/tracer_settings.h"
@@ -110,7 +111,8 @@ static bool check_room(const struct session *session, const struct message_rende
     const struct hub *hub = session->hub;
     const struct job *before = job_replaced_by(session, render);
     uint64_t bytes = job_bytes(session, render), limit_bytes = hub->options.limits.frame_bytes;
-    uint64_t others_bytes = hub->frame_bytes - (before ? before->frame_bytes : 0);
+    uint64_t own_bytes = before ? before->frame_bytes + frames_bytes_of_before(before) : 0;
+    uint64_t others_bytes = hub->frame_bytes - own_bytes;
     if (!others_bytes || (others_bytes <= limit_bytes && bytes <= limit_bytes - others_bytes))
         return true;
     error_set(error, ERROR_BUSY, "render",

@@ -12,6 +12,8 @@
 #define CHANNEL 5u
 #define FRAME_BYTES ((size_t)300001)        /* two pieces, the last of odd size */
 #define LARGE_FRAME_BYTES ((size_t)5 << 20) /* more than sockets and queues hold */
+/* Frames of a view of that size may take 5.4 MiB, of the 10 MiB that all may. */
+#define LESS_THAN_ALL_EDGE 448
 
 /* ---- an engine --------------------------------------------------------------------------------------- */
 
@@ -572,7 +574,55 @@ static void a_frame_under_way_comes_whole_before_the_answer(void **state)
     }
     expect(MESSAGE_FRAME_END, 2);
     expect(MESSAGE_OK, 2);
+    send_ack(1, true, false); /* else the next one waits where the link was found to be slow */
     take_frame(3, 3);
+}
+
+/* Adds the bytes of a frame that come before the answer with that error. */
+static void expect_error_within_frame(uint32_t request, enum protocol_error_code code, uint64_t *bytes)
+{
+    while (receive()->type == MESSAGE_FRAME_DATA)
+        *bytes += client.message.frame_data.data_bytes;
+    assert_int_equal(client.message.type, MESSAGE_ERROR);
+    assert_int_equal(client.header.request, request);
+    assert_int_equal(client.message.error.code, code);
+}
+
+static void a_frame_under_way_of_a_view_that_was_replaced_still_takes_room(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_acknowledged_view(2, 100);
+    told_credit(2, 4);
+    engine_command_destroy(replace_view(3, 17));
+    struct message message = made(MESSAGE_STATS);
+    send_message(4, 0, &message);
+    told_and_forgotten(ENGINE_STATS);
+    say_large_frame(2, 1);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    say(ENGINE_DONE, 2, ERROR_NONE);
+    say(ENGINE_FAILED, 4, ERROR_OUT_OF_MEMORY); /* so that it is known when the one before is done */
+    uint64_t bytes = 0;
+    expect_error_within_frame(4, PROTOCOL_ERROR_CODE_OUT_OF_MEMORY, &bytes);
+    message = view_message(1); /* room for its frames is there but for that one */
+    message.render.channel = CHANNEL + 1;
+    message.render.width = message.render.height = LESS_THAN_ALL_EDGE;
+    send_message(5, 0, &message);
+    expect_error_within_frame(5, PROTOCOL_ERROR_CODE_BUSY, &bytes);
+    while (bytes < LARGE_FRAME_BYTES) {
+        expect(MESSAGE_FRAME_DATA, 2);
+        bytes += client.message.frame_data.data_bytes;
+    }
+    expect(MESSAGE_FRAME_END, 2);
+    expect(MESSAGE_OK, 2);
+    send_message(6, 0, &message);
+    struct engine_command *command;
+    while ((command = queue_pop(engine.commands, UINT64_C(20000000000))) && command->kind == ENGINE_JOB_CREDIT)
+        engine_command_destroy(command);
+    assert_non_null(command);
+    assert_int_equal(command->kind, ENGINE_JOB_START);
+    assert_int_equal(command->request, 6);
+    engine_command_destroy(command);
+    engine_command_destroy(start);
 }
 
 static void a_view_that_cannot_be_leaves_the_one_that_is(void **state)
@@ -1010,6 +1060,7 @@ int main(void)
         BOTH(a_view_that_adapts_tells_the_engine_what_the_link_carries),
         BOTH(a_view_takes_the_place_of_another_on_its_channel),
         BOTH(a_frame_under_way_comes_whole_before_the_answer),
+        BOTH(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room),
         BOTH(a_view_that_cannot_be_leaves_the_one_that_is),
         BOTH(a_view_that_fails_leaves_its_channel_to_the_next),
         BOTH(a_cancelled_view_is_answered_and_nothing_follows),
