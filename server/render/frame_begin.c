@@ -204,6 +204,16 @@ static void fill_filter(struct render_context *context)
     context->has_filter = true;
 }
 
+/* Once it is known what the frame goes on from. */
+static void limit_samples(const struct frame_renderer *renderer, struct frame_request *request)
+{
+    uint32_t before = renderer->samples_before, most = request->samples_most;
+    if (!request->accumulate || !most || !before)
+        return;
+    uint32_t lacking = most > before ? most - before : 0;
+    request->samples = request->samples < lacking ? request->samples : lacking;
+}
+
 static bool begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
                   const struct frame_request *request, struct error *error)
 {
@@ -220,6 +230,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     stage_times_begin(&context->times);
     if (!update_scene(renderer, scene, motion, error) || !begin_comparison(renderer, error))
         return false;
+    limit_samples(renderer, &context->request);
     camera_fill_uniforms(&context->uniforms, request, &renderer->shared->copy);
     environment_fill_uniforms(context->environment, &context->uniforms, &renderer->shared->copy);
     context->uniforms.depth = request->depth;
@@ -234,7 +245,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     renderer->result.revision = renderer->shared->copy.revision;
     renderer->sample = renderer->plane = renderer->band = renderer->copied = 0;
     renderer->copying = false;
-    return true;
+    return context->request.samples || context_upload_uniforms(context, error);
 }
 
 bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
@@ -247,7 +258,8 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
         frame_end(renderer);
         return false;
     }
-    renderer->phase = PHASE_SAMPLE;
+    /* A picture that has all its samples is only handed out again. */
+    renderer->phase = renderer->work->context.request.samples ? PHASE_SAMPLE : PHASE_RESOLVE;
     renderer->shared->frames++;
     return true;
 }

@@ -290,6 +290,31 @@ static void frames_of_few_samples_add_up_to_one_of_many(void **state)
     }
 }
 
+static void a_picture_that_has_all_its_samples_is_handed_out_again(void **state)
+{
+    struct fixture *fixture = *state;
+    a_mixture(fixture);
+    fixture->request.accumulate = true;
+    fixture->request.samples = 3;
+    fixture->request.samples_most = 5;
+    static const uint32_t held[] = {3, 5, 5};
+    static const uint64_t traced[] = {3, 2, 0};
+    struct frame_result results[3];
+    for (int i = 0; i < 3; i++) {
+        results[i] = fixture_render(fixture);
+        assert_int_equal(results[i].samples, held[i]);
+        assert_int_equal(results[i].primary_rays, traced[i] * WIDTH * HEIGHT);
+    }
+    assert_same_floats(&results[1], &results[2]);
+    fixture->request.samples_most = 4; /* more are there than are wanted now */
+    struct frame_result fewer = fixture_render(fixture);
+    assert_int_equal(fewer.samples, 5);
+    assert_same_floats(&results[1], &fewer);
+    for (int i = 0; i < 3; i++)
+        frame_result_finish(&results[i]);
+    frame_result_finish(&fewer);
+}
+
 /* What the next frame holds after `change`d has been undone again: it begins from new each time. */
 static void expect_from_new(struct fixture *fixture, uint32_t samples, const char *what)
 {
@@ -377,6 +402,7 @@ int main(void)
         TEST(a_picture_is_the_same_to_the_bit_however_its_samples_are_grouped),
         TEST(a_slice_of_less_than_a_pixels_samples_is_the_same_picture_too),
         TEST(frames_of_few_samples_add_up_to_one_of_many),
+        TEST(a_picture_that_has_all_its_samples_is_handed_out_again),
         TEST(what_shows_something_else_begins_from_new),
         TEST(an_abandoned_frame_is_not_gone_on_from),
         TEST(impossible_lenses_and_filters_are_refused_with_the_field),

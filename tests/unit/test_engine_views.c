@@ -338,6 +338,23 @@ static void a_key_frame_comes_also_where_nothing_moves(void **state)
     expect_silence(watching->engine);
 }
 
+static void a_complete_picture_comes_again_as_a_key_frame_and_not_with_more_samples(void **state)
+{
+    struct watching *watching = *state;
+    submit(watching->engine, with_samples(view(2, watching->wishes), 7, 3));
+    for (uint32_t number = 0; number < 3; number++)
+        drop(take(expect_frame(watching->engine, 1, 2, number)));
+    for (uint32_t number = 3; number < 5; number++) {
+        assert_true(view_wishes_want_key_frame(watching->wishes));
+        submit(watching->engine, command(ENGINE_VIEW_LOOK, 1, 0));
+        struct engine_frame *frame = take(expect_frame(watching->engine, 1, 2, number));
+        assert_true(frame->wants_key);
+        assert_int_equal(frame->result.samples, 7);
+        drop(frame);
+        expect_silence(watching->engine);
+    }
+}
+
 /* Takes the frame that shows the next camera. */
 static struct engine_frame *take_next(struct watching *watching, uint64_t number, bool moving)
 {
@@ -593,6 +610,7 @@ int main(void)
         WATCHING(nothing_is_begun_beyond_credit_so_that_nothing_becomes_stale),
         WATCHING(no_more_frames_come_than_were_asked_for_a_second),
         WATCHING(a_key_frame_comes_also_where_nothing_moves),
+        WATCHING(a_complete_picture_comes_again_as_a_key_frame_and_not_with_more_samples),
         cmocka_unit_test_setup_teardown(a_stream_goes_on_over_frames_of_rest_and_begins_again_where_it_is_wished,
                                         begin_with_encoders, end),
         WATCHING(a_view_takes_the_place_of_another_and_goes_on_from_it),
