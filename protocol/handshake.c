@@ -7,7 +7,7 @@
 #include "protocol/reader.h"
 #include "protocol/writer.h"
 
-#define LIMITS_BYTES 64u      /* of our struct handshake_limits on the wire */
+#define LIMITS_BYTES 192u     /* of our struct handshake_limits on the wire */
 #define LIMITS_MAX_BYTES 256u /* of a newer peer's */
 
 static const uint8_t magic[4] = {'F', 'A', 'R', 'L'};
@@ -59,7 +59,30 @@ size_t handshake_hello_encode(uint8_t out[HANDSHAKE_HELLO_MAX_BYTES], const stru
     U32(width_max)                                                                                                \
     U32(height_max)                                                                                               \
     U32(samples_max)                                                                                              \
-    U32(idle_seconds)
+    U32(idle_seconds)                                                                                             \
+    U64(queued_soft_bytes)                                                                                        \
+    U64(device_memory_bytes)                                                                                      \
+    U64(blob_memory_bytes)                                                                                        \
+    U64(transaction_memory_bytes)                                                                                 \
+    U64(frame_memory_bytes)                                                                                       \
+    U64(ldc_memory_bytes)                                                                                         \
+    U64(abuffer_memory_bytes)                                                                                     \
+    U64(upload_window_bytes)                                                                                      \
+    U64(frame_window_bytes)                                                                                       \
+    U32(queued_soft_ms)                                                                                           \
+    U32(progress_grace_ms)                                                                                        \
+    U32(progress_bytes_per_s)                                                                                     \
+    U32(clients_max)                                                                                              \
+    U32(unauthenticated_max)                                                                                      \
+    U32(unauthenticated_per_address)                                                                              \
+    U32(wrong_key_ms)                                                                                             \
+    U32(wrong_keys_per_minute)                                                                                    \
+    U32(depth_max)                                                                                                \
+    U32(blobs_per_client)                                                                                         \
+    U32(transaction_edits)                                                                                        \
+    U32(scene_linger_seconds)                                                                                     \
+    U32(scenes_lingering)                                                                                         \
+    U32(ldc_layers_max)
 
 size_t handshake_reply_encode(uint8_t out[HANDSHAKE_REPLY_MAX_BYTES], const struct handshake_reply *reply)
 {

@@ -65,6 +65,30 @@ struct handshake_limits {
     uint32_t height_max;
     uint32_t samples_max;
     uint32_t idle_seconds;
+
+    uint64_t queued_soft_bytes;
+    uint64_t device_memory_bytes;
+    uint64_t blob_memory_bytes;
+    uint64_t transaction_memory_bytes;
+    uint64_t frame_memory_bytes;
+    uint64_t ldc_memory_bytes;
+    uint64_t abuffer_memory_bytes;
+    uint64_t upload_window_bytes;
+    uint64_t frame_window_bytes;
+    uint32_t queued_soft_ms;
+    uint32_t progress_grace_ms;
+    uint32_t progress_bytes_per_s;
+    uint32_t clients_max;
+    uint32_t unauthenticated_max;
+    uint32_t unauthenticated_per_address;
+    uint32_t wrong_key_ms;
+    uint32_t wrong_keys_per_minute;
+    uint32_t depth_max; /* of the node hierarchy */
+    uint32_t blobs_per_client;
+    uint32_t transaction_edits;
+    uint32_t scene_linger_seconds;
+    uint32_t scenes_lingering;
+    uint32_t ldc_layers_max;
 };
 
 struct handshake_reply {

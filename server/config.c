@@ -101,6 +101,8 @@ static const struct option options[] = {
     {"limits", "transaction_edits", ANYTIME, OPTION_U32, AT(limits.transaction_edits), "1048576", 1, 16777216, "",
      "Edits of one client that wait to be committed"},
     {"limits", "nodes", ANYTIME, OPTION_U32, AT(limits.nodes), "4194304", 1, 16777216, "", "Nodes of one scene"},
+    {"limits", "depth", ANYTIME, OPTION_U32, AT(limits.depth), "256", 1, SCENE_DEPTH_MAX, "",
+     "Levels of a scene's node hierarchy"},
     {"limits", "texture_edge", ANYTIME, OPTION_U32, AT(limits.texture_edge_texels), "16384", 1, 16384, "texels",
      "Width and height of a texture"},
     {"limits", "width", ANYTIME, OPTION_U32, AT(limits.width_pixels), "8192", 1, 8192, "pixels", "Width of a frame"},
@@ -341,7 +343,7 @@ bool config_read_environment(struct config *config, struct error *error)
 static struct engine_limits engine_limits(const struct config *config)
 {
     return (struct engine_limits){
-        .scene = {.host_bytes = config->scene_bytes, .nodes = config->limits.nodes},
+        .scene = {.host_bytes = config->scene_bytes, .nodes = config->limits.nodes, .depth = config->limits.depth},
         .scene_linger_ms = config->scene_linger_s * UINT64_C(1000),
         .lingering_scenes = config->lingering_scenes,
     };

@@ -185,6 +185,7 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, bo
     if (!engine)
         return false;
     options.engine = engine_port(engine);
+    options.device_bytes = engine_device_limit_bytes(engine);
     options.timeline = timeline;
     options.owner_may_be_idle = true;
     bool ok = daemon_start(daemon, &options, error) && (fd < 0 || daemon_serve_fd(daemon, fd, error));

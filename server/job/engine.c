@@ -296,6 +296,11 @@ const struct gpu_device_info *engine_device(const struct engine *engine)
     return &engine->device_info;
 }
 
+uint64_t engine_device_limit_bytes(const struct engine *engine)
+{
+    return engine->device_bytes_limit;
+}
+
 bool engine_submit(struct engine *engine, struct engine_command *command, struct error *error)
 {
     if (queue_try_push(engine->commands, command))

@@ -234,6 +234,8 @@ struct engine *engine_create(const struct engine_options *options, struct error 
 /* Stops after the slice in hand; what waits is dropped. Accepts NULL. */
 void engine_destroy(struct engine *engine);
 const struct gpu_device_info *engine_device(const struct engine *engine);
+/* Device memory that may be used, 0: no limit. For whoever has just created the engine. */
+uint64_t engine_device_limit_bytes(const struct engine *engine);
 /* False with ERROR_BUSY (retryable) when the queue is full; the command then still belongs to the caller. */
 bool engine_submit(struct engine *engine, struct engine_command *command, struct error *error);
 int engine_event_fd(const struct engine *engine);              /* readable while events wait */

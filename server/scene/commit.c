@@ -119,15 +119,13 @@ static bool limits_check(const struct draft *draft, const struct size *size)
     if (size->nodes > nodes_max && size->nodes > scene->objects[SCENE_NODE].count) {
         error_set(draft->error, ERROR_LIMIT, "edits", "the scene would have %llu nodes; %llu are allowed",
                   (unsigned long long)size->nodes, (unsigned long long)nodes_max);
-        return error_remedy(draft->error,
-                            "remove nodes, or raise the limit of nodes in the daemon's configuration");
+        return error_remedy(draft->error, "remove nodes, or raise limits.nodes in the daemon's configuration");
     }
     if (limits->host_bytes && size->host_bytes > limits->host_bytes && size->host_bytes > scene->host_bytes) {
         error_set(draft->error, ERROR_LIMIT, "edits",
                   "the scene would take %.1f MiB of the host's memory; %.1f MiB are allowed",
                   (double)size->host_bytes / 0x1p20, (double)limits->host_bytes / 0x1p20);
-        return error_remedy(draft->error,
-                            "remove objects, or raise the limit of scene memory in the daemon's configuration");
+        return error_remedy(draft->error, "remove objects, or raise memory.scene in the daemon's configuration");
     }
     if (limits->table_bytes && size->table_bytes > limits->table_bytes && size->table_bytes > scene->table_bytes) {
         error_set(draft->error, ERROR_LIMIT, "edits",
@@ -135,9 +133,8 @@ static bool limits_check(const struct draft *draft, const struct size *size)
                   (double)size->table_bytes / 0x1p20, (double)limits->table_bytes / 0x1p20);
         if (draft->error)
             draft->error->retryable = true; /* when others have ended */
-        return error_remedy(draft->error,
-                            "remove objects, close scenes, or raise the limit of scene memory in the "
-                            "daemon's configuration");
+        return error_remedy(draft->error, "remove objects, close scenes, or raise memory.scene in the daemon's "
+                                          "configuration");
     }
     return true;
 }

@@ -13,7 +13,7 @@
 #include <stdint.h>
 
 #define SCENE_NAME_MAX 128
-#define SCENE_DEPTH_MAX 256 /* of the node hierarchy */
+#define SCENE_DEPTH_MAX 256 /* of the node hierarchy, whatever the limits */
 #define MESH_INFLUENCES_MAX 16
 #define MESH_TARGETS_MAX 1024
 #define SKIN_JOINTS_MAX 65536
@@ -255,6 +255,7 @@ struct scene_limits {
     uint64_t host_bytes;  /* blobs and tables of this scene; 0: no limit */
     uint64_t table_bytes; /* its tables alone, which no other scene shares; 0: no limit */
     uint32_t nodes;       /* 0: 4 Mi */
+    uint32_t depth;       /* of the node hierarchy, a root has 1; 0, or more than that: SCENE_DEPTH_MAX */
 };
 
 struct scene {

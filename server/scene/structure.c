@@ -2,6 +2,7 @@
 /* Checks of the node hierarchy as it would be after a transaction. */
 #include "scene/draft.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 
 /* State of a node in the walk; above these, its depth plus FIRST_DEPTH. */
@@ -13,6 +14,7 @@ struct walk {
     uint16_t *state;
     uint32_t chain[SCENE_DEPTH_MAX]; /* nodes from where the walk began, upwards */
     size_t length;
+    uint32_t depth_max;
 };
 
 static struct scene_edit *node_edit(const struct draft *draft, uint32_t id)
@@ -61,7 +63,7 @@ static bool collect(struct walk *walk)
 
 /* An error about the chain in hand. The hierarchy was sound before, so an edit in it or above is at fault: the one
  * nearest to where the walk began is named. */
-static bool chain_error(struct walk *walk, const char *what)
+static bool chain_error(struct walk *walk, enum error_kind kind, const char *what)
 {
     uint32_t position = walk->chain[0];
     for (size_t steps = 0; steps <= 2 * SCENE_DEPTH_MAX && position != HIERARCHY_NONE; steps++) {
@@ -69,12 +71,22 @@ static bool chain_error(struct walk *walk, const char *what)
         const struct scene_edit *edit = node_edit(walk->draft, node->base.id);
         if (edit) {
             struct edit_place place = draft_place(walk->draft, edit);
-            return edit_error(&place, ERROR_INVALID, ".parent", "with node %u as its parent, %s", node->parent,
-                              what);
+            return edit_error(&place, kind, ".parent", "with node %u as its parent, %s", node->parent, what);
         }
         position = walk->hierarchy.parents[position];
     }
     return error_set(walk->draft->error, ERROR_INTERNAL, "edits", "%s", what);
+}
+
+static bool too_deep(struct walk *walk)
+{
+    char what[64];
+    snprintf(what, sizeof what, "the hierarchy is more than %u levels deep", walk->depth_max);
+    chain_error(walk, ERROR_LIMIT, what);
+    return error_remedy(walk->draft->error, walk->depth_max == SCENE_DEPTH_MAX
+                                                ? "join groups that only have a transform"
+                                                : "join groups that only have a transform, or raise limits.depth "
+                                                  "in the daemon's configuration");
 }
 
 static bool missing_parent(struct walk *walk, const struct scene_node *node)
@@ -109,13 +121,13 @@ static bool resolve(struct walk *walk, uint32_t start)
     walk->length = 0;
     while (above != HIERARCHY_NONE && walk->state[above] == UNKNOWN) {
         if (walk->length == SCENE_DEPTH_MAX)
-            return chain_error(walk, "the hierarchy is more than 256 levels deep");
+            return too_deep(walk);
         walk->state[above] = ON_CHAIN;
         walk->chain[walk->length++] = above;
         above = hierarchy->parents[above];
     }
     if (above != HIERARCHY_NONE && walk->state[above] == ON_CHAIN)
-        return chain_error(walk, "it would be above itself");
+        return chain_error(walk, ERROR_INVALID, "it would be above itself");
     uint16_t state = above == HIERARCHY_NONE ? ABOVE_ROOTS : walk->state[above];
     for (size_t i = walk->length; i-- > 0;) {
         uint32_t position = walk->chain[i];
@@ -131,8 +143,8 @@ static bool resolve(struct walk *walk, uint32_t start)
         } else if (state != FALLEN) {
             state++;
         }
-        if (state >= FIRST_DEPTH + SCENE_DEPTH_MAX)
-            return chain_error(walk, "the hierarchy is more than 256 levels deep");
+        if (state >= FIRST_DEPTH + walk->depth_max)
+            return too_deep(walk);
         walk->state[position] = state;
     }
     return true;
@@ -152,7 +164,9 @@ bool structure_check(struct draft *draft)
 {
     if (!is_restructured(draft))
         return true;
-    struct walk walk = {.draft = draft};
+    uint32_t depth_max = draft->scene->limits.depth;
+    bool is_limited = depth_max && depth_max < SCENE_DEPTH_MAX;
+    struct walk walk = {.draft = draft, .depth_max = is_limited ? depth_max : SCENE_DEPTH_MAX};
     bool sound = collect(&walk);
     if (!sound)
         error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory to look at the hierarchy");

@@ -139,16 +139,19 @@ static void from_material(const struct message_set_material *message, struct sce
     }
 }
 
+static const char texture_remedy[] = "make it smaller, or raise limits.texture_edge in the daemon's configuration";
+
 static bool from_texture(const struct session *session, const struct message_set_texture *message,
                          struct scene_edit *edit, struct error *error)
 {
     struct scene_texture *texture = &edit->set.texture;
     begin_set(edit, SCENE_TEXTURE, &texture->base, message->texture, message->name);
     uint32_t limit_texels = session->hub->options.limits.texture_edge_texels;
-    if (message->width > limit_texels || message->height > limit_texels)
-        return error_set(error, ERROR_LIMIT, "set_texture",
-                         "texture %u has %u x %u texels, the limit is %u a side", message->texture, message->width,
-                         message->height, limit_texels);
+    if (message->width > limit_texels || message->height > limit_texels) {
+        error_set(error, ERROR_LIMIT, "set_texture", "texture %u has %u x %u texels, the limit is %u a side",
+                  message->texture, message->width, message->height, limit_texels);
+        return error_remedy(error, texture_remedy);
+    }
     texture->width = message->width;
     texture->height = message->height;
     texture->format = (enum scene_texture_format)message->format;
@@ -186,9 +189,11 @@ static bool from_environment(const struct session *session, const struct message
     struct scene_environment *environment = &edit->set.environment;
     edit->kind = EDIT_SET_ENVIRONMENT;
     uint32_t limit_texels = session->hub->options.limits.texture_edge_texels;
-    if (message->width > limit_texels || message->height > limit_texels)
-        return error_set(error, ERROR_LIMIT, "set_environment", "%u x %u texels, the limit is %u a side",
-                         message->width, message->height, limit_texels);
+    if (message->width > limit_texels || message->height > limit_texels) {
+        error_set(error, ERROR_LIMIT, "set_environment", "%u x %u texels, the limit is %u a side", message->width,
+                  message->height, limit_texels);
+        return error_remedy(error, texture_remedy);
+    }
     memcpy(environment->colour, message->colour, sizeof environment->colour);
     environment->rotation = message->rotation;
     environment->width = message->width;

@@ -26,7 +26,8 @@ struct hub_options {
     struct readers readers; /* of the Unix socket */
     struct engine_port engine;
     struct timeline *timeline;          /* hears of every frame that was sent; may be NULL */
-    struct engine_limits engine_limits; /* as the engine has them; partly told to clients */
+    struct engine_limits engine_limits; /* as the engine has them; told to clients */
+    uint64_t device_bytes;              /* likewise; 0: no limit */
     struct auth_keys keys;              /* with which clients come in sealed, from everywhere */
     bool insecure;                      /* peers beyond loopback are let in without one as well */
 };

@@ -75,15 +75,16 @@ static bool check_limits(const struct session *session, const struct message_ren
 {
     const struct session_limits *limits = &session->hub->options.limits;
     if (render->width > limits->width_pixels || render->height > limits->height_pixels)
-        error_set(error, ERROR_LIMIT, "render.width", "%u x %u pixels, the limit is %u x %u", render->width,
-                  render->height, limits->width_pixels, limits->height_pixels);
+        error_set(error, ERROR_LIMIT, render->width > limits->width_pixels ? "render.width" : "render.height",
+                  "%u x %u pixels, the limit is %u x %u", render->width, render->height, limits->width_pixels,
+                  limits->height_pixels);
     else if (render->samples > limits->samples)
         error_set(error, ERROR_LIMIT, "render.samples", "%u, the limit is %u", render->samples, limits->samples);
     if (error->kind == ERROR_LIMIT)
         return error_remedy(error, "ask for less, or raise [limits] in the daemon's configuration");
     if (session->job_count >= limits->jobs_per_client && !job_replaced_by(session, render)) {
         error_set(error, ERROR_LIMIT, "render", "%u jobs are running, the limit", session->job_count);
-        error_remedy(error, "wait for one to end, or cancel it");
+        error_remedy(error, "wait for one to end, cancel one, or raise limits.jobs in the daemon's configuration");
         error->retryable = true;
         return false;
     }

@@ -16,6 +16,7 @@ struct session_limits {
     uint32_t blobs_per_client;
     uint32_t transaction_edits; /* of a client, in all transactions that are not answered */
     uint32_t nodes;
+    uint32_t depth; /* of the node hierarchy */
     uint32_t texture_edge_texels;
     uint32_t width_pixels, height_pixels;
     uint32_t samples;

@@ -34,7 +34,8 @@ struct request *request_begin(struct session *session, uint32_t id, enum request
     if (session->requests.in_flight.count >= session->hub->options.limits.requests_in_flight) {
         error_set(&error, ERROR_LIMIT, "request", "%zu requests are in flight, the limit",
                   session->requests.in_flight.count);
-        error_remedy(&error, "wait for the answer to one of them");
+        error_remedy(&error,
+                     "wait for the answer to one of them, or raise limits.requests in the daemon's configuration");
         error.retryable = true;
         session_send_error(session, id, &error);
         return NULL;

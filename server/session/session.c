@@ -192,6 +192,12 @@ static const struct connection_limits *connection_limits_of(const struct session
     return is_owner ? &hub->owner_limits : &hub->options.connection_limits;
 }
 
+/* Of a limit that is there some seconds remain, as 0 means that there is none. */
+static uint32_t seconds_of(uint64_t time_ms)
+{
+    return (uint32_t)(time_ms && time_ms < 1000 ? 1 : time_ms / 1000);
+}
+
 static void fill_limits(struct handshake_limits *told, const struct session *session)
 {
     const struct hub_options *options = &session->hub->options;
@@ -211,7 +217,30 @@ static void fill_limits(struct handshake_limits *told, const struct session *ses
         .width_max = limits->width_pixels,
         .height_max = limits->height_pixels,
         .samples_max = limits->samples,
-        .idle_seconds = connection_limits->idle_ms / 1000,
+        .idle_seconds = seconds_of(connection_limits->idle_ms),
+        .queued_soft_bytes = connection_limits->queued_soft_bytes,
+        .device_memory_bytes = options->device_bytes,
+        .blob_memory_bytes = limits->blob_bytes,
+        .transaction_memory_bytes = limits->transaction_bytes,
+        .frame_memory_bytes = limits->frame_bytes,
+        .ldc_memory_bytes = limits->ldc_bytes,
+        .abuffer_memory_bytes = limits->abuffer_bytes,
+        .upload_window_bytes = limits->upload_window_bytes,
+        .frame_window_bytes = limits->frame_window_bytes,
+        .queued_soft_ms = connection_limits->queued_soft_ms,
+        .progress_grace_ms = connection_limits->progress_grace_ms,
+        .progress_bytes_per_s = connection_limits->progress_bytes_per_s,
+        .clients_max = limits->clients,
+        .unauthenticated_max = limits->unauthenticated,
+        .unauthenticated_per_address = limits->unauthenticated_per_address,
+        .wrong_key_ms = connection_limits->wrong_key_ms,
+        .wrong_keys_per_minute = limits->wrong_keys_a_minute,
+        .depth_max = limits->depth,
+        .blobs_per_client = limits->blobs_per_client,
+        .transaction_edits = limits->transaction_edits,
+        .scene_linger_seconds = seconds_of(options->engine_limits.scene_linger_ms),
+        .scenes_lingering = (uint32_t)options->engine_limits.lingering_scenes,
+        .ldc_layers_max = limits->ldc_layers,
     };
 }
 

@@ -40,6 +40,7 @@ static void the_defaults_are_within_their_own_bounds(void **state)
     assert_int_equal(config.limits.requests_in_flight, 64);
     assert_int_equal(config.limits.unauthenticated_per_address, 8);
     assert_int_equal(config.limits.samples, 65536);
+    assert_int_equal(config.limits.depth, SCENE_DEPTH_MAX);
     assert_int_equal(config.limits.ldc_layers, 255);
     assert_int_equal(config.limits.ldc_bytes, 0);
     assert_int_equal(config.limits.abuffer_bytes, 0);

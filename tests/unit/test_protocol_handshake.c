@@ -39,6 +39,29 @@ static struct handshake_reply some_reply(void)
         .height_max = 12,
         .samples_max = 13,
         .idle_seconds = 14,
+        .queued_soft_bytes = 15,
+        .device_memory_bytes = 16,
+        .blob_memory_bytes = 17,
+        .transaction_memory_bytes = 18,
+        .frame_memory_bytes = 19,
+        .ldc_memory_bytes = 20,
+        .abuffer_memory_bytes = 21,
+        .upload_window_bytes = 22,
+        .frame_window_bytes = 23,
+        .queued_soft_ms = 24,
+        .progress_grace_ms = 25,
+        .progress_bytes_per_s = 26,
+        .clients_max = 27,
+        .unauthenticated_max = 28,
+        .unauthenticated_per_address = 29,
+        .wrong_key_ms = 30,
+        .wrong_keys_per_minute = 31,
+        .depth_max = 32,
+        .blobs_per_client = 33,
+        .transaction_edits = 34,
+        .scene_linger_seconds = 35,
+        .scenes_lingering = 36,
+        .ldc_layers_max = 37,
     };
     for (size_t i = 0; i < HANDSHAKE_NONCE_BYTES; i++) {
         reply.nonce[i] = (uint8_t)(0xb0 + i);
@@ -102,15 +125,23 @@ static void the_reply_has_its_frozen_layout(void **state)
     struct handshake_reply reply = some_reply(), back;
     struct decode_error error;
     size_t consumed, count = handshake_reply_encode(bytes, &reply);
-    static const uint8_t head[] = {'F', 'A', 'R', 'L', 1, 0, 64, 0, 5, 0, 0, 0, 0, 0, 0, 0, 0xb0, 0xb1};
-    static const uint8_t limits[] = {
-        0,  0, 0, 0, 0,  1, 0, 0, 2,  0, 0, 0, 0, 0,   0,   0,   3,   0,   0,   0,   4,   0,   0,  0,  5, 0,
-        0,  0, 6, 0, 0,  0, 7, 0, 0,  0, 8, 0, 0, 0,   9,   0,   0,   0,   10,  0,   0,   0,   11, 0,  0, 0,
-        12, 0, 0, 0, 13, 0, 0, 0, 14, 0, 0, 0, 9, 'f', 'a', 'r', 'l', 'i', 'g', 'h', 't', 'd', 14, 'n'};
-    assert_int_equal(count, 112 + 1 + 9 + 1 + 14 + 7);
+    static const uint8_t head[] = {'F', 'A', 'R', 'L', 1, 0, 192, 0, 5, 0, 0, 0, 0, 0, 0, 0, 0xb0, 0xb1};
+    static const uint8_t limits[] = {0,  0, 0, 0, 0,  1, 0, 0, 2,  0, 0, 0, 0,  0, 0, 0, 3,  0, 0, 0, 4, 0,
+                                     0,  0, 5, 0, 0,  0, 6, 0, 0,  0, 7, 0, 0,  0, 8, 0, 0,  0, 9, 0, 0, 0,
+                                     10, 0, 0, 0, 11, 0, 0, 0, 12, 0, 0, 0, 13, 0, 0, 0, 14, 0, 0, 0};
+    static const uint8_t texts[] = {9, 'f', 'a', 'r', 'l', 'i', 'g', 'h', 't', 'd', 14, 'n'};
+    assert_int_equal(count, 240 + 1 + 9 + 1 + 14 + 7);
     assert_memory_equal(bytes, head, sizeof head);
     assert_int_equal(bytes[32], 0xc0);
     assert_memory_equal(bytes + 48, limits, sizeof limits);
+    /* Those that came later: nine of 8 bytes and fourteen of 4, from 15 on. */
+    for (uint8_t i = 0; i < 9 + 14; i++) {
+        size_t bytes_of_it = i < 9 ? 8 : 4;
+        size_t offset = 48 + sizeof limits + (i < 9 ? 8u * i : 72 + 4u * (i - 9u));
+        uint8_t expected[8] = {(uint8_t)(15 + i)};
+        assert_memory_equal(bytes + offset, expected, bytes_of_it);
+    }
+    assert_memory_equal(bytes + 240, texts, sizeof texts);
     assert_int_equal(parse_reply_copy(&back, bytes, count, &consumed, &error), HANDSHAKE_CONSUMED);
     assert_int_equal(consumed, count);
     assert_int_equal(back.version, 1);
@@ -160,7 +191,7 @@ static void names_of_the_greatest_length_fit_the_stated_maximum(void **state)
     memset(reply.name, 'n', HANDSHAKE_NAME_MAX_BYTES);
     memset(reply.text, 't', HANDSHAKE_TEXT_MAX_BYTES);
     assert_int_equal(handshake_hello_encode(bytes, &hello), 104);
-    assert_int_equal(handshake_reply_encode(bytes, &reply), 440);
+    assert_int_equal(handshake_reply_encode(bytes, &reply), 568);
     hello.name[HANDSHAKE_NAME_MAX_BYTES] = 'n'; /* no NUL any more */
     reply.text[HANDSHAKE_TEXT_MAX_BYTES] = 't';
     assert_int_equal(handshake_hello_encode(bytes, &hello), 0);
@@ -245,18 +276,20 @@ static void limits_of_an_older_and_of_a_newer_daemon_are_understood(void **state
     size_t consumed, count = handshake_reply_encode(bytes, &reply);
     size_t texts = 1 + strlen(reply.name) + 1 + strlen(reply.text);
     for (size_t limits_bytes = 0; limits_bytes <= 256; limits_bytes += 4) {
-        size_t kept = limits_bytes < 64 ? limits_bytes : 64;
+        size_t kept = limits_bytes < 192 ? limits_bytes : 192;
         memset(other, 0, sizeof other);
         memcpy(other, bytes, 48 + kept);
         memset(other + 48 + kept, 0xee, limits_bytes - kept);
         other[6] = (uint8_t)limits_bytes;
         other[7] = (uint8_t)(limits_bytes >> 8);
-        memcpy(other + 48 + limits_bytes, bytes + 112, texts);
+        memcpy(other + 48 + limits_bytes, bytes + 240, texts);
         size_t length = (48 + limits_bytes + texts + 7) & ~(size_t)7;
         assert_int_equal(parse_reply_copy(&back, other, length, &consumed, &error), HANDSHAKE_CONSUMED);
         assert_int_equal(consumed, length);
         assert_string_equal(back.name, reply.name);
         assert_int_equal(back.limits.idle_seconds, limits_bytes >= 64 ? 14 : 0);
+        assert_int_equal(back.limits.queued_soft_bytes, limits_bytes >= 72 ? 15 : 0);
+        assert_int_equal(back.limits.ldc_layers_max, limits_bytes >= 192 ? 37 : 0);
         assert_int_equal(back.limits.handshake_ms, limits_bytes >= 20 ? 3 : 0);
         assert_int_equal(back.limits.scene_memory_bytes, limits_bytes >= 16 ? 2 : 0);
     }

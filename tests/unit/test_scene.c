@@ -324,12 +324,12 @@ static void the_hierarchy_has_a_greatest_depth(void **state)
     struct draft_list list = {0};
     commit_chain(scene, 1, SCENE_DEPTH_MAX);
     add_node(&list, 1000, SCENE_DEPTH_MAX);
-    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1000).parent");
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 1000).parent");
     /* A subtree that is moved down takes its depth along, though its lower nodes are not edited. */
     add_node(&list, 2000, 0);
     expect_commit(scene, &list);
     add_node(&list, 1, 2000);
-    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).parent");
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 1).parent");
     float world[12];
     assert_true(scene_world_from_node(scene, NULL, SCENE_DEPTH_MAX, world));
     scene_destroy(scene);
@@ -390,6 +390,27 @@ static void limits_are_kept_and_told(void **state)
         numbers[4 * i + 3] = 1;
     add_spheres(&list, 1, numbers, 60);
     expect_refusal(scene, &list, ERROR_LIMIT, "edits");
+    scene_destroy(scene);
+}
+
+static void the_depth_may_be_limited_further(void **state)
+{
+    (void)state;
+    struct scene *scene = scene_create("flat", &(struct scene_limits){.depth = 3});
+    struct draft_list list = {0};
+    commit_chain(scene, 1, 3);
+    add_node(&list, 4, 3);
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 4).parent");
+    add_node(&list, 1, 3); /* a circle is one, and not too deep, however little is allowed */
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).parent");
+    add_node(&list, 4, 2);
+    expect_commit(scene, &list);
+    scene_destroy(scene);
+    scene =
+        scene_create("deep", &(struct scene_limits){.depth = SCENE_DEPTH_MAX + 1}); /* more than there can be */
+    commit_chain(scene, 1, SCENE_DEPTH_MAX);
+    add_node(&list, 1000, SCENE_DEPTH_MAX);
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 1000).parent");
     scene_destroy(scene);
 }
 
@@ -500,6 +521,7 @@ int main(void)
         cmocka_unit_test(the_hierarchy_has_a_greatest_depth),
         cmocka_unit_test(a_removed_node_takes_along_what_hangs_below_it),
         cmocka_unit_test(limits_are_kept_and_told),
+        cmocka_unit_test(the_depth_may_be_limited_further),
         cmocka_unit_test(revisions_tell_what_a_transaction_touched),
         cmocka_unit_test(a_mesh_of_871_thousand_triangles_is_checked),
     };

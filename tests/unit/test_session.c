@@ -178,6 +178,8 @@ static void who_does_not_finish_a_message_is_closed(void **state)
     framing_header_encode(header,
                           &(struct framing_header){.type = MESSAGE_PING, .payload_bytes = 10, .request = 1});
     send_bytes(header, sizeof header);
+    expect_error(0, PROTOCOL_ERROR_CODE_TIMEOUT);
+    expect(MESSAGE_GOODBYE, 0);
     expect_closed_within_5_s();
 }
 
@@ -230,6 +232,8 @@ static void who_is_silent_is_closed_but_not_while_he_waits(void **state)
     send_message(4, 0, &message);
     expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
     expect(MESSAGE_OK, 4);
+    expect_error(0, PROTOCOL_ERROR_CODE_TIMEOUT);
+    expect(MESSAGE_GOODBYE, 0);
     expect_closed_within_5_s();
 }
 
