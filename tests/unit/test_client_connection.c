@@ -343,6 +343,22 @@ static void after_a_cancel_the_connection_can_be_used_again(void **state)
     stop(daemon);
 }
 
+/* Of a job of six frames. */
+static void expect_broken_after_a_frame(void (*play)(struct daemon *daemon), const char *part)
+{
+    struct daemon *daemon = start(play);
+    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+    struct fl_job *job = start_job(&scene, 0, 5, 1);
+    struct fl_frame *frame = fl_render_next(job, &error);
+    assert_non_null(frame);
+    fl_frame_destroy(frame);
+    assert_null(fl_render_next(job, &error));
+    check_error(FL_ERROR_PROTOCOL, part);
+    fl_render_destroy(job);
+    fl_connection_destroy(scene.connection);
+    stop(daemon);
+}
+
 static void play_wrong_frame(struct daemon *daemon)
 {
     struct framing_header header;
@@ -359,17 +375,7 @@ static void play_wrong_frame(struct daemon *daemon)
 static void a_frame_that_comes_twice_is_a_broken_protocol(void **state)
 {
     (void)state;
-    struct daemon *daemon = start(play_wrong_frame);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_job *job = start_job(&scene, 0, 5, 1);
-    struct fl_frame *frame = fl_render_next(job, &error);
-    assert_non_null(frame);
-    fl_frame_destroy(frame);
-    assert_null(fl_render_next(job, &error));
-    check_error(FL_ERROR_PROTOCOL, "frame 0 came in place of frame 1");
-    fl_render_destroy(job);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    expect_broken_after_a_frame(play_wrong_frame, "frame 0 came in place of frame 1");
 }
 
 static void play_early_end(struct daemon *daemon)
@@ -388,17 +394,7 @@ static void play_early_end(struct daemon *daemon)
 static void a_job_that_ends_too_early_has_lost_frames(void **state)
 {
     (void)state;
-    struct daemon *daemon = start(play_early_end);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_job *job = start_job(&scene, 0, 5, 1);
-    struct fl_frame *frame = fl_render_next(job, &error);
-    assert_non_null(frame);
-    fl_frame_destroy(frame);
-    assert_null(fl_render_next(job, &error));
-    check_error(FL_ERROR_PROTOCOL, "before its last frame");
-    fl_render_destroy(job);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    expect_broken_after_a_frame(play_early_end, "before its last frame");
 }
 
 static void a_camera_is_found_by_name_before_number(void **state)
