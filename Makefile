@@ -294,7 +294,7 @@ TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb
 PLOT_PACKAGES := gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3
 
-.PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench bench-plot check-headers lint format install uninstall clean help
+.PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench soak bench-plot check-headers lint format install uninstall clean help
 tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(BENCH_VIEW) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -319,6 +319,11 @@ BENCHED = all $(BENCHES) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(B
 bench: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench.py $(B) $(BENCH)
+# Rounds of 10 connects, one upload and 100 frames; after them a daemon must have what it had.
+ROUNDS ?= 1000
+soak: test-packages
+	$(MAKE) -j$(JOBS) all
+	python3 tests/soak/soak.py $(B) $(ROUNDS)
 # Measures what the curves need where out/bench.json does not have it yet.
 bench-plot: plot-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
@@ -379,6 +384,7 @@ help:
 	@echo 'make demo       install what is missing, build, render the bundled scenes into out/'
 	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
+	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz EMBREE=0]'
 	@echo 'make fuzz       run every fuzzer for a while   [SECONDS=20]'

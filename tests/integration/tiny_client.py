@@ -75,11 +75,13 @@ class Frame:
         (self.number, self.width, self.height, self.samples, self.revision, self.size_bytes, self.format, self.encoding,
          self.tracer, self.integrator, self.digest) = struct.unpack_from("<4I2Q4IQ", fixed)
         self.command, = struct.unpack_from("<Q", fixed, 136)
+        self.attached_bytes = sum(struct.unpack_from("<2Q", fixed, 184))  # depth and normals, behind the pixels
 
 
 class Client:
-    def __init__(self, path, name="tiny client"):
-        self.socket = socket.socket(socket.AF_UNIX)
+    def __init__(self, path, name="tiny client", capabilities=0):
+        """`path` of a Unix socket; or host and port of one that listens without keys."""
+        self.socket = socket.socket(socket.AF_UNIX if isinstance(path, str) else socket.AF_INET)
         self.socket.settimeout(240)
         self.socket.connect(path)
         self.waiting, self.last_request = b"", 0
@@ -89,7 +91,7 @@ class Client:
         self.begun = {}  # channel -> frame that is not complete
         self.acknowledged = set()  # channels of views
         self.changes = []  # (scene, revision)
-        self.greet(name)
+        self.greet(name, capabilities)
 
     # ---- bytes
 
@@ -102,9 +104,9 @@ class Client:
         data, self.waiting = self.waiting[:count], self.waiting[count:]
         return data
 
-    def greet(self, name):
+    def greet(self, name, capabilities):
         name = name.encode()
-        hello = b"FARL" + struct.pack("<2HQ16sB", 1, 1, 0, bytes(16), len(name)) + name
+        hello = b"FARL" + struct.pack("<2HQ16sB", 1, 1, capabilities, bytes(16), len(name)) + name
         self.socket.sendall(hello + bytes(-len(hello) % 8))
         reply = self.read(48)
         assert reply[:4] == b"FARL", reply
@@ -167,7 +169,7 @@ class Client:
             self.take_piece(self.begun[channel], fixed, rest, len(body))
         elif kind == FRAME_END:
             frame = self.begun.pop(channel)
-            assert len(frame.pixels) == frame.size_bytes and struct.unpack_from("<I", fixed) == (frame.number,)
+            assert len(frame.pixels) == frame.size_bytes + frame.attached_bytes and struct.unpack_from("<I", fixed) == (frame.number,)
             self.frames.append(frame)
             self.acknowledge(frame, 1)
         elif kind not in (BLOCKED,):

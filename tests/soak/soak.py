@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Uses one daemon for a long time, and sees whether it has the same memory, descriptors, threads and GPU objects then.
+A round is 10 connects, one upload of a scene and 100 frames; 1000 of them take some ten minutes on software GL. All
+samples go to out/soak.json. Exit status: 0 flat, 1 not flat, 2 wrong usage."""
+import argparse
+import json
+import os
+import pathlib
+import sys
+import tempfile
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parent / "integration"), str(HERE)]
+import farlight_test  # pylint: disable=wrong-import-position
+import flat  # pylint: disable=wrong-import-position
+import load  # pylint: disable=wrong-import-position
+
+OUT = HERE.parents[1] / "out/soak.json"
+ROUNDS = 1000
+
+# Nothing lingers for longer than it takes to look.
+CONFIGURATION = """
+[limits]
+scene_linger = {linger}
+[memory]
+blob_cache = {cache}
+[network]
+handshake = 2000
+"""
+
+
+# The allocator gives large blocks back at once, instead of keeping as much as was ever needed: what is left shows better.
+ALLOCATOR = {"MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536", "MALLOC_TOP_PAD_": "0"}
+
+
+class Bar:
+    """On a terminal only."""
+
+    def __init__(self, total, stream=sys.stderr):
+        self.total, self.stream = total, stream if stream.isatty() else None
+
+    def show(self, done, text):
+        if self.stream:
+            filled = 30 * done // self.total
+            self.stream.write(f"\r[{'#' * filled}{'.' * (30 - filled)}] {100 * done // self.total:3} %  {text}\033[K")
+            self.stream.flush()
+
+    def end(self):
+        if self.stream:
+            self.stream.write("\r\033[K")
+
+
+def soak(folder, rounds, mix, linger_s=1):
+    """The samples that were taken, each a cycle of `mix` after the one before, and what was done."""
+    config = pathlib.Path(folder) / "farlightd.conf"
+    config.write_text(CONFIGURATION.format(cache=flat.BLOB_CACHE_BYTES, linger=linger_s))
+    bar = Bar(rounds)
+    with farlight_test.Daemon("--config", config, "--device", "software", "--listen", "tcp:127.0.0.1:0",
+                              environment={**os.environ, **ALLOCATOR}) as daemon:
+        tcp = daemon.process.stdout.readline().rpartition(":")[2]  # the second of two addresses
+        clients = load.Soak(daemon.path, ("127.0.0.1", int(tcp)), mix)
+        samples = [flat.look(daemon)]
+        for first in range(1, rounds + 1, mix.cycle):
+            clients.begin()
+            for number in range(first, min(first + mix.cycle, rounds + 1)):
+                clients.round(number)
+                bar.show(number, f"{clients.connects} connects, {clients.uploads} uploads, {clients.frames} frames, "
+                                 f"{samples[-1]['rss'] >> 20} MiB")
+            clients.end()
+            samples.append(flat.settle(daemon, samples[0]["descriptors"]))
+        bar.end()
+        status = daemon.stop()
+        assert status == 0, f"farlightd ended with {status}: {daemon.messages()}"
+    return samples, clients
+
+
+def parse():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("build", type=pathlib.Path, help="folder of the programs")
+    parser.add_argument("rounds", type=int, nargs="?", default=ROUNDS, help="%(default)s if not given")
+    options = parser.parse_args()
+    least = flat.SAMPLES_MIN * load.Mix.cycle
+    if options.rounds < least:
+        parser.error(f"fewer than {least} rounds tell nothing")
+    return options
+
+
+def main():
+    options = parse()
+    farlight_test.BIN = options.build.resolve()
+    mix = load.Mix()
+    begin = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="farlight-soak-") as folder:
+        samples, clients = soak(folder, options.rounds, mix)
+    verdict = flat.Verdict(samples, mix.cycle)
+    print(f"{clients.connects} connects, {clients.uploads} uploads, {clients.frames} frames in "
+          f"{time.monotonic() - begin:.0f} s, {len(samples)} samples")
+    for name, before, after, what in verdict.rows:
+        print(f"  {name:<14}{before!s:>12}{after!s:>12}  {what}")
+    OUT.parent.mkdir(exist_ok=True)
+    OUT.write_text(json.dumps({"rounds_a_sample": mix.cycle, "samples": samples}, indent=0) + "\n")
+    for complaint in verdict.complaints:
+        print(f"NOT FLAT: {complaint}")
+    return 1 if verdict.complaints else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
