@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The walk through layered depth cubes from surfaces on and through glass: against what is known of balls, boxes,
  * panes and rooms. */
+#include "tests/unit/glass_scene.h"
 #include "tests/unit/ldc_walk_fixture.h"
 
 /* ---- rays that begin on surfaces ---- */
@@ -150,31 +151,6 @@ static void a_wall_beside_the_origin_is_not_passed(void **state)
 }
 
 /* ---- light that passes ---- */
-
-/* Glass whose every crossing leaves half of red, a quarter of green, all of blue. Its index on the device is 1. */
-static struct scene *scene_of_glass(void)
-{
-    struct test_edits edits = {.scene = test_scene_create()};
-    test_material(&edits, 1, 0.5f, 0.25f, 1)->transmission = 1;
-    const float corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    const uint32_t indices[3] = {0, 1, 2};
-    const struct material_range ranges[] = {{0, 1, 1}};
-    struct scene_mesh *mesh = test_mesh(&edits, 10, corners, 3, indices, 1);
-    mesh->ranges = test_ranges(ranges, 1);
-    mesh->range_count = 1;
-    test_node(&edits, 1, 0, NODE_MESH, 10, NULL);
-    test_commit(&edits);
-    return edits.scene;
-}
-
-static bool is_tint(uint32_t visibility, int crossings)
-{
-    const float expected[3] = {powf(0.5f, (float)crossings), powf(0.25f, (float)crossings), 1};
-    for (int k = 0; k < 3; k++)
-        if (fabsf((float)(visibility >> 8 * k & 255) - 255 * expected[k]) > 1)
-            return false;
-    return true;
-}
 
 /* Panes across each axis and askew: neighbouring samples' texels overlap, but a pane tints once. */
 static void a_pane_of_glass_tints_once(void **state)
