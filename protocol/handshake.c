@@ -7,7 +7,6 @@
 #include "protocol/reader.h"
 #include "protocol/writer.h"
 
-#define LIMITS_BYTES 192u     /* of our struct handshake_limits on the wire */
 #define LIMITS_MAX_BYTES 256u /* of a newer peer's */
 
 static const uint8_t magic[4] = {'F', 'A', 'R', 'L'};
@@ -90,7 +89,7 @@ size_t handshake_reply_encode(uint8_t out[HANDSHAKE_REPLY_MAX_BYTES], const stru
     writer_init(&writer, out, HANDSHAKE_REPLY_MAX_BYTES);
     writer_put_bytes(&writer, magic, sizeof magic);
     writer_put_u16(&writer, reply->version);
-    writer_put_u16(&writer, LIMITS_BYTES);
+    writer_put_u16(&writer, HANDSHAKE_LIMITS_BYTES);
     writer_put_u64(&writer, reply->capabilities);
     writer_put_bytes(&writer, reply->nonce, sizeof reply->nonce);
     writer_put_bytes(&writer, reply->session_token, sizeof reply->session_token);

@@ -35,6 +35,7 @@ extern "C" {
 #define HANDSHAKE_TEXT_MAX_BYTES 255u
 #define HANDSHAKE_NONCE_BYTES 16u
 #define HANDSHAKE_TOKEN_BYTES 16u
+#define HANDSHAKE_LIMITS_BYTES 192u /* of our struct handshake_limits on the wire */
 
 /* Bits of `capabilities`. */
 #define HANDSHAKE_CAN_H264 (UINT64_C(1) << 0)      /* client: decodes it; daemon: encodes it */
