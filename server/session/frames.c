@@ -77,8 +77,7 @@ uint32_t frames_drop(struct session *session, struct job *job)
 {
     uint32_t before = job->first && job->first->request != job->request ? job->first->request : 0;
     while (job->first) {
-        if (session->connection)
-            out_queue_drop_bulk(&session->connection->out, job->first->request);
+        out_queue_drop_bulk(&session->connection->out, job->first->request);
         remove_first(job);
     }
     return before;
