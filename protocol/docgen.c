@@ -77,13 +77,15 @@ static void print_limits(void)
 
 static void print_capabilities(void)
 {
-    printf("Capabilities are bits; others than these are 0 from who does not know them:\n\n"
-           "| bit | meaning |\n| ---: | --- |\n"
-           "| %d | of a client: it decodes the encoding h264; of a reply: the daemon encodes it, too |\n"
-           "| %d | of a reply: this client may only look, it changes nothing |\n"
-           "| %d | of a reply of version 0: only sealed connections are let in |\n\n",
-           __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
-           __builtin_ctzll(HANDSHAKE_NEEDS_KEY));
+    printf(
+        "Capabilities are bits; others than these are 0 from who does not know them:\n\n"
+        "| bit | meaning |\n| ---: | --- |\n"
+        "| %d | of a client: it decodes the encoding h264; of a reply: the daemon encodes it, too |\n"
+        "| %d | of a reply: this client may only look, it changes nothing |\n"
+        "| %d | of a reply of version 0: only sealed connections are let in |\n"
+        "| %d | of a client: frames of views may end unfinished, as `frame_end` says; of a reply: they will |\n\n",
+        __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
+        __builtin_ctzll(HANDSHAKE_NEEDS_KEY), __builtin_ctzll(HANDSHAKE_CAN_ABANDON));
 }
 
 static void print_handshake(void)

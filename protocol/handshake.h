@@ -41,6 +41,7 @@ extern "C" {
 #define HANDSHAKE_CAN_H264 (UINT64_C(1) << 0)      /* client: decodes it; daemon: encodes it */
 #define HANDSHAKE_CAN_READ_ONLY (UINT64_C(1) << 1) /* reply: this client may only look: it edits nothing */
 #define HANDSHAKE_NEEDS_KEY (UINT64_C(1) << 2)     /* reply of version 0: only sealed connections are let in */
+#define HANDSHAKE_CAN_ABANDON (UINT64_C(1) << 3)   /* frames of views may end unfinished, as frame_end says */
 
 struct handshake_hello {
     uint16_t version_min;

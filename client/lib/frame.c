@@ -354,7 +354,8 @@ struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct mess
                                  uint64_t now_ns, struct fl_error *error)
 {
     struct fl_frame *frame = assembly->frame;
-    if (frame == NULL || end->frame != frame->frame || assembly->received_bytes != assembly->encoded_bytes) {
+    if (frame == NULL || end->frame != frame->frame || end->abandoned != 0 ||
+        assembly->received_bytes != assembly->encoded_bytes) {
         fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "a frame ended that is not complete");
         return NULL;
     }

@@ -216,14 +216,28 @@ static bool send_owed(struct fl_view *view, struct fl_error *error)
     return true;
 }
 
+/* The rest of it will not come. */
+static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *error)
+{
+    const struct fl_frame *frame = view->assembly.frame;
+    if (frame == NULL || frame->frame != number || frame->moving || frame->encoding == PROTOCOL_ENCODING_H264)
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end.abandoned",
+                            "frame %u ended unfinished, which only a picture at rest may do", number);
+    fl_assembly_finish(&view->assembly);
+    return true;
+}
+
 static bool take_end(struct fl_view *view, uint64_t change, const struct message *message, struct fl_error *error)
 {
     const uint64_t now_ns = fl_now_ns();
     const uint32_t number = message->frame_end.frame;
+    if (view->assembly.frame != NULL)
+        view->next_frame = number < UINT32_MAX ? number + 1 : number;
+    if (message->frame_end.abandoned != 0)
+        return abandon(view, number, error);
     if (view->assembly.frame != NULL) {
         view->last_frame = number;
         view->has_frame = true;
-        view->next_frame = number < UINT32_MAX ? number + 1 : number;
         if (!acknowledge(view, number, true, error))
             return false;
     }

@@ -20,6 +20,9 @@
 #define PROBE_AFTER_S 60
 #define PROBE_EVERY_S 15
 #define PROBES 4
+/* So much of what is to be sent lies in the kernel beyond what is under way: a frame that motion overtakes waits
+ * no longer there than this takes, and a link within a house is kept busy. */
+#define UNSENT_BYTES (32 << 10)
 #define BACKLOG                                                                                                   \
     SOMAXCONN /* a farm comes all at once; a client that does not wait gets an error when it is full              \
                */
@@ -182,6 +185,8 @@ int listener_accept(const struct listener *listener, struct address *peer, bool 
     if (!address_is_unix(peer)) {
         int on = 1; /* answers are small and wanted at once; frames are large anyway */
         setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+        /* What the kernel has cannot be taken back, nor overtaken. */
+        setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &(int){UNSENT_BYTES}, sizeof(int));
         /* Who waits for frames may be silent for ever, and be gone without a word. */
         setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
         setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &(int){PROBE_AFTER_S}, sizeof(int));

@@ -176,14 +176,20 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns
     }
 }
 
+enum drop {
+    DROP_OF_ALL,
+    DROP_OF_REQUEST,
+    DROP_UNBEGUN_OF_REQUEST, /* what was begun is not forgotten */
+};
+
 /* Drops from one list what is bulk (has a body or a completion) and of the request, or of any. */
-static void drop_from(struct out_queue *queue, struct out_list *list, bool any, uint32_t request)
+static void drop_from(struct out_queue *queue, struct out_list *list, enum drop drop, uint32_t request)
 {
     struct out_list kept;
     size_t taken_bytes = list == &queue->sending ? queue->taken_bytes : 0;
     list_init(&kept);
     for (struct out_message *message; (message = list_take(list));) {
-        bool concerned = (message->body || message->sent) && (any || message->request == request);
+        bool concerned = (message->body || message->sent) && (drop == DROP_OF_ALL || message->request == request);
         size_t left_bytes = out_message_bytes(message) - message->sent_bytes;
         bool begun = message->sent_bytes || taken_bytes;
         taken_bytes -= left_bytes < taken_bytes ? left_bytes : taken_bytes;
@@ -196,7 +202,7 @@ static void drop_from(struct out_queue *queue, struct out_list *list, bool any, 
             destroy(message);
             continue;
         }
-        if (concerned)
+        if (concerned && drop != DROP_UNBEGUN_OF_REQUEST)
             message->sent = NULL;
         list_append(&kept, message);
     }
@@ -206,12 +212,20 @@ static void drop_from(struct out_queue *queue, struct out_list *list, bool any, 
 
 void out_queue_drop_bulk(struct out_queue *queue, uint32_t request)
 {
-    drop_from(queue, &queue->sending, false, request);
-    drop_from(queue, &queue->bulk, false, request);
+    drop_from(queue, &queue->sending, DROP_OF_REQUEST, request);
+    drop_from(queue, &queue->bulk, DROP_OF_REQUEST, request);
+}
+
+size_t out_queue_drop_unbegun(struct out_queue *queue, uint32_t request)
+{
+    size_t before_bytes = queue->queued_bytes;
+    drop_from(queue, &queue->sending, DROP_UNBEGUN_OF_REQUEST, request);
+    drop_from(queue, &queue->bulk, DROP_UNBEGUN_OF_REQUEST, request);
+    return before_bytes - queue->queued_bytes;
 }
 
 void out_queue_drop_all_bulk(struct out_queue *queue)
 {
-    drop_from(queue, &queue->sending, true, 0);
-    drop_from(queue, &queue->bulk, true, 0);
+    drop_from(queue, &queue->sending, DROP_OF_ALL, 0);
+    drop_from(queue, &queue->bulk, DROP_OF_ALL, 0);
 }

@@ -68,5 +68,7 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns
  * messages stay. */
 void out_queue_drop_bulk(struct out_queue *queue, uint32_t request);
 void out_queue_drop_all_bulk(struct out_queue *queue);
+/* The same of a request, but one that was begun keeps its `sent`. How many bytes were dropped. */
+size_t out_queue_drop_unbegun(struct out_queue *queue, uint32_t request);
 
 #endif

@@ -10,6 +10,8 @@
  */
 #define TOGETHER_BYTES ((size_t)16 << 10)
 #define PARTS_A_CALL 64
+/* No more than this is sealed before it can be sent: it cannot be taken back, and goes before whatever is to. */
+#define AHEAD_BYTES ((size_t)64 << 10)
 
 /* Copies from small parts, which shrink by what was taken, up to `most` bytes or a large part. */
 static size_t put_together(uint8_t *to, size_t most, struct iovec **parts, const struct iovec *end)
@@ -46,6 +48,25 @@ static size_t seal_parts(struct sealed_link *link, struct iovec *parts, const st
     return sealed_bytes;
 }
 
+/* What of them makes at most that many bytes; how many parts that is. */
+static size_t cut_parts(struct iovec *parts, size_t count, size_t most_bytes)
+{
+    size_t used = 0;
+    for (; used < count && most_bytes; used++) {
+        if (parts[used].iov_len > most_bytes)
+            parts[used].iov_len = most_bytes;
+        most_bytes -= parts[used].iov_len;
+    }
+    return used;
+}
+
+/* Sealed, but not with the kernel. */
+static size_t waiting_bytes(const struct sealed_link *link)
+{
+    size_t bytes;
+    return sealed_link_waiting(link, &bytes) ? bytes : 0;
+}
+
 /* Whether the last record is to be sent: everything before it is sealed, and the client is known. */
 static bool is_to_end(const struct connection *connection)
 {
@@ -56,9 +77,11 @@ static bool is_to_end(const struct connection *connection)
 size_t sealing_gather(struct connection *connection, struct iovec *part)
 {
     struct sealed_link *link = connection->link;
-    while (sealed_link_room(link) > 0) {
+    size_t ahead_bytes;
+    while ((ahead_bytes = waiting_bytes(link)) < AHEAD_BYTES && sealed_link_room(link) > 0) {
         struct iovec parts[PARTS_A_CALL];
-        size_t count = out_queue_gather(&connection->out, parts, PARTS_A_CALL);
+        size_t count =
+            cut_parts(parts, out_queue_gather(&connection->out, parts, PARTS_A_CALL), AHEAD_BYTES - ahead_bytes);
         if (!count)
             break;
         out_queue_take(&connection->out, seal_parts(link, parts, parts + count));

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "session/frames.h"
 
+#include "base/clock.h"
 #include "base/timeline.h"
 #include "session/jobs.h"
 #include "session/session.h"
@@ -230,7 +231,7 @@ static uint32_t fill_cubes(struct record_layered_cube *records, const struct fra
     return count;
 }
 
-static void send_end(struct pending_frame *pending, uint64_t now_ns)
+static void send_end(struct pending_frame *pending, bool abandoned, uint64_t now_ns)
 {
     struct job *job = pending->job;
     struct engine_frame *frame = pending->frame;
@@ -261,6 +262,7 @@ static void send_end(struct pending_frame *pending, uint64_t now_ns)
     message.frame_end.splits = frame->result.splits;
     message.frame_end.uploaded_bytes = frame->result.uploaded_bytes;
     message.frame_end.structure_bytes = frame->result.structure_bytes;
+    message.frame_end.abandoned = abandoned;
     message.frame_end.stages = stages;
     message.frame_end.stages_count = times->count;
     message.frame_end.comparisons = comparisons;
@@ -297,9 +299,36 @@ static void on_last_sent(void *context, uint64_t begun_ns, uint64_t now_ns)
     if (!job)
         return;
     uint32_t request = pending->request;
-    send_end(pending, now_ns);
+    send_end(pending, false, now_ns);
     remove_first(job);
     job_frame_sent(job, request);
+}
+
+static bool may_be_abandoned(const struct job *job, const struct pending_frame *pending)
+{
+    size_t with_kernel_bytes = pending->queued_bytes, waiting_bytes = job->session->connection->out.queued_bytes;
+    with_kernel_bytes -= waiting_bytes < with_kernel_bytes ? waiting_bytes : with_kernel_bytes;
+    return job->session->can_abandon && pending->begun && view_is_overtaken(job, pending->frame) &&
+           view_is_long(job, pending->frame->size_bytes - with_kernel_bytes);
+}
+
+void frames_abandon(struct job *job)
+{
+    struct pending_frame *pending = job->first;
+    if (!pending || !may_be_abandoned(job, pending))
+        return;
+    uint32_t request = pending->request;
+    if (!out_queue_drop_unbegun(&job->session->connection->out, request) && pending->queued)
+        return; /* the last of it is under way */
+    uint64_t now_ns = clock_now_ns();
+    bool announced = pending->begun_ns || pending->chunk.references > 1; /* or a part of that is under way */
+    if (!pending->begun_ns)
+        pending->begun_ns = now_ns;
+    if (announced)
+        send_end(pending, true, now_ns);
+    view_frame_abandoned(job, pending->frame);
+    remove_first(job);
+    job_frame_abandoned(job, request);
 }
 
 static bool queue_begin(struct pending_frame *pending)
@@ -331,7 +360,8 @@ static bool queue_piece(struct pending_frame *pending)
 {
     struct job *job = pending->job;
     size_t left_bytes = pending->frame->size_bytes - pending->queued_bytes;
-    size_t piece_bytes = left_bytes < FRAME_PIECE_BYTES ? left_bytes : FRAME_PIECE_BYTES;
+    size_t most_bytes = job->view && !pending->frame->moving ? FRAME_PIECE_AT_REST_BYTES : FRAME_PIECE_BYTES;
+    size_t piece_bytes = left_bytes < most_bytes ? left_bytes : most_bytes;
     struct out_message *out = out_message_create(FRAME_DATA_HEAD_BYTES);
     if (!out)
         return false;
@@ -386,6 +416,7 @@ static void drop_outdated(struct session *session)
         bool dropped = false;
         while (job->view && job->first && !job->first->begun && view_is_outdated(job, job->first->frame)) {
             remove_first(job);
+            view_frame_dropped(job);
             job->frames_gone++;
             dropped = true;
         }

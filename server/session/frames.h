@@ -14,6 +14,8 @@ struct job;
 struct session;
 
 #define FRAME_PIECE_BYTES ((size_t)256 << 10)
+/* Of a picture at rest: motion that overtakes it waits for one of them. */
+#define FRAME_PIECE_AT_REST_BYTES ((size_t)32 << 10)
 /* Header and fixed part of a frame_data message, up to the bytes themselves. */
 #define FRAME_DATA_HEAD_BYTES 32u
 
@@ -30,6 +32,9 @@ unsigned frames_of_before(const struct job *job);
 uint64_t frames_bytes_of_before(const struct job *job);
 /* Its frames whose first byte has gone, but not the last: 0 or 1. */
 unsigned frames_on_the_wire(const struct job *job);
+/* Of the view's frame that is on the wire, what has not gone will not, if it is one that motion has overtaken and
+ * the client understands that. */
+void frames_abandon(struct job *job);
 /* Queues pieces as long as the connection wants bulk; jobs take turns. */
 void frames_pump(struct session *session);
 void frame_data_head(uint8_t head[FRAME_DATA_HEAD_BYTES], uint32_t request, uint32_t channel,

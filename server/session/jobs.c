@@ -273,11 +273,9 @@ void job_done(struct session *session, struct request *request)
         finish_if_complete(session, job);
 }
 
-void job_frame_sent(struct job *job, uint32_t request_id)
+/* Of the frame under way nothing more will go. */
+static void frame_over(struct job *job, uint32_t request_id)
 {
-    job->frames_sent++;
-    if (job->view)
-        view_frame_sent(job);
     if (request_id != job->request) {
         request_answer_ok(job->session, request_find(job->session, request_id), 0);
         tell_engine_credit(job);
@@ -286,6 +284,19 @@ void job_frame_sent(struct job *job, uint32_t request_id)
     job->frames_gone++;
     tell_engine_credit(job);
     finish_if_complete(job->session, job);
+}
+
+void job_frame_sent(struct job *job, uint32_t request_id)
+{
+    job->frames_sent++;
+    if (job->view)
+        view_frame_sent(job);
+    frame_over(job, request_id);
+}
+
+void job_frame_abandoned(struct job *job, uint32_t request_id)
+{
+    frame_over(job, request_id);
 }
 
 bool job_is_cancelled(const struct request *target)

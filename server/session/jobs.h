@@ -42,6 +42,8 @@ void job_done(struct session *session, struct request *request);
 void job_failed(struct session *session, struct request *request, const struct error *error);
 /* A frame of that request, the job's or that of a view whose place it has taken, is with the kernel. */
 void job_frame_sent(struct job *job, uint32_t request);
+/* The rest of one, of which a part has gone, will not go. */
+void job_frame_abandoned(struct job *job, uint32_t request);
 /* Something has changed that may let frames be begun, or go. */
 void job_pace(struct job *job);
 /* The client is told after a while if nothing comes because of it. */

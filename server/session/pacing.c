@@ -140,6 +140,26 @@ void pacing_acknowledged(struct pacing *pacing, uint32_t frame, bool whole, uint
     remove_oldest(pacing, place + 1); /* bytes come in order: those before it have come too */
 }
 
+bool pacing_is_long(const struct pacing *pacing, uint64_t bytes)
+{
+    /* Of a link that is not known yet: it is. */
+    return (double)bytes * pacing->carried_ns >= (double)pacing->frame_ns * pacing->carried_bytes;
+}
+
+void pacing_abandoned(struct pacing *pacing, uint32_t frame)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < pacing->in_flight_count; i++) {
+        if (pacing->in_flight[i].frame == frame)
+            pacing->in_flight_bytes -= pacing->in_flight[i].bytes;
+        else
+            pacing->in_flight[kept++] = pacing->in_flight[i];
+    }
+    pacing->in_flight_count = kept;
+    /* The next one is not like it. */
+    pacing->last_bytes = kept ? pacing->in_flight[kept - 1].bytes : 0;
+}
+
 void pacing_forget(struct pacing *pacing)
 {
     if (!pacing->acknowledges)

@@ -66,6 +66,11 @@ uint64_t pacing_wait_ns(const struct pacing *pacing, unsigned coming);
 void pacing_sent(struct pacing *pacing, uint32_t frame, uint64_t bytes, uint64_t now_ns);
 /* FRAME_ACK; of a frame that is not in flight: ignored. */
 void pacing_acknowledged(struct pacing *pacing, uint32_t frame, bool whole, uint64_t now_ns);
+/* Whether the rest of a frame keeps the link for longer than the next frame should wait. */
+bool pacing_is_long(const struct pacing *pacing, uint64_t bytes);
+/* The rest of it will not be sent. What has gone of it is ahead of the next frame whenever that one goes, which
+ * therefore need not wait. */
+void pacing_abandoned(struct pacing *pacing, uint32_t frame);
 /* Nothing is in flight any more, as far as is known: credit has come from a client that does not acknowledge. */
 void pacing_forget(struct pacing *pacing);
 

@@ -307,6 +307,9 @@ static bool on_hello(void *context, const struct handshake_hello *hello, struct 
                         encoder_stream_supports(ENCODING_H264, 4);
     if (session->can_h264)
         reply->capabilities |= HANDSHAKE_CAN_H264;
+    session->can_abandon = hello->capabilities & HANDSHAKE_CAN_ABANDON;
+    if (session->can_abandon)
+        reply->capabilities |= HANDSHAKE_CAN_ABANDON;
     fill_limits(&reply->limits, session);
     snprintf(session->name, sizeof session->name, "%s", hello->name);
     return reply->text[0] == '\0';

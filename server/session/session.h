@@ -35,6 +35,7 @@ struct session {
     char name[HANDSHAKE_NAME_MAX_BYTES + 1];
     bool introduced;                 /* the hello is done: the engine may know it */
     bool can_h264;                   /* the client decodes it, and an encoder is here */
+    bool can_abandon;                /* frames of views may end unfinished */
     struct engine_command *farewell; /* for when it is gone, which must not fail for lack of memory */
 
     struct requests requests;

@@ -12,6 +12,8 @@
 /* Frames of a view that are rendered, encoded or sent at once: while one is sent, the next one is encoded and the
  * one after it rendered. */
 #define IN_HAND_MAX 3
+/* Of a client that goes on whenever it has just come to rest, so many pictures in a row are given up. */
+#define GIVEN_UP_MAX IN_HAND_MAX
 /* What is expected to take a while may take less than that: a frame that comes so much too early is hardly older.
  */
 #define EARLY_NS UINT64_C(500000)
@@ -224,12 +226,41 @@ void view_frame_made(struct job *job, const struct engine_frame *frame)
         adapt(view, frame);
 }
 
+/* Its client wishes something else, and no other frame needs it: those of a stream are needed for the ones behind
+ * them. */
+static bool may_be_given_up(const struct session_view *view, const struct engine_frame *frame)
+{
+    return frame->encoding != ENCODING_H264 && view->last_command > frame->command;
+}
+
+bool view_is_overtaken(const struct job *job, const struct engine_frame *frame)
+{
+    const struct session_view *view = job->view;
+    return !frame->moving && view->last_moving && view->given_up < GIVEN_UP_MAX && may_be_given_up(view, frame);
+}
+
 bool view_is_outdated(const struct job *job, const struct engine_frame *frame)
 {
     const struct session_view *view = job->view;
-    /* Those of a stream are needed for the ones behind them. */
-    return frame->encoding != ENCODING_H264 && view->last_command > frame->command &&
-           clock_now_ns() - frame->encoded_ns > view->terms.frame_ns + view->made_ns;
+    return may_be_given_up(view, frame) &&
+           (view_is_overtaken(job, frame) ||
+            clock_now_ns() - frame->encoded_ns > view->terms.frame_ns + view->made_ns);
+}
+
+bool view_is_long(const struct job *job, uint64_t left_bytes)
+{
+    return pacing_is_long(&job->view->pacing, left_bytes);
+}
+
+void view_frame_dropped(struct job *job)
+{
+    job->view->given_up++;
+}
+
+void view_frame_abandoned(struct job *job, const struct engine_frame *frame)
+{
+    job->view->given_up++;
+    pacing_abandoned(&job->view->pacing, frame->frame);
 }
 
 void view_frame_begun(struct job *job, const struct engine_frame *frame, uint64_t begun_ns)
@@ -244,6 +275,7 @@ void view_frame_begun(struct job *job, const struct engine_frame *frame, uint64_
 void view_frame_sent(struct job *job)
 {
     struct session_view *view = job->view;
+    view->given_up = 0;
     if (view->silent)
         pacing_forget(&view->pacing);
     else if (!view->pacing.acknowledges && !view->silence_timer.running)
@@ -285,6 +317,7 @@ void views_look(struct session *session, const struct message_view_camera *messa
         return;
     }
     job->view->last_command = message->command;
+    job->view->last_moving = message->moving != 0;
     struct view_camera camera = {
         .command = message->command,
         .received_ns = session->connection->last_received_ns,
@@ -296,6 +329,7 @@ void views_look(struct session *session, const struct message_view_camera *messa
     memcpy(camera.key.up_world, message->up_world, sizeof camera.key.up_world);
     if (view_wishes_look(job->view->wishes, &camera))
         tell_engine(job);
+    frames_abandon(job);
     job_watch_for_blocks(job);
 }
 

@@ -45,7 +45,8 @@ struct session_view {
     uint64_t made_ns;          /* what the last frame took from being taken up until it was encoded */
     /* What came last of the client, and what it was shown last. */
     uint64_t last_command, shown_command;
-    bool shown_moving;
+    bool last_moving, shown_moving;
+    unsigned given_up; /* frames dropped or abandoned since the last one that went whole */
     uint32_t shown_samples;
 };
 
@@ -76,6 +77,13 @@ bool view_may_send(const struct job *job);
 /* It has waited for the link so long that another one of what its client wishes now is better, and could be had.
  */
 bool view_is_outdated(const struct job *job, const struct engine_frame *frame);
+/* It is a picture at rest, which nothing that follows needs, and motion goes on. */
+bool view_is_overtaken(const struct job *job, const struct engine_frame *frame);
+/* What is left of it keeps the link from the next one for long. */
+bool view_is_long(const struct job *job, uint64_t left_bytes);
+void view_frame_dropped(struct job *job);
+/* The rest of what was begun will not go. */
+void view_frame_abandoned(struct job *job, const struct engine_frame *frame);
 void view_frame_begun(struct job *job, const struct engine_frame *frame, uint64_t begun_ns);
 void view_frame_sent(struct job *job);
 

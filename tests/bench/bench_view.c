@@ -4,9 +4,10 @@
  * Each viewer has a connection of its own; the first one loads the model, the others come to that scene. After a
  * second of motion it is measured. Prints JSON: "threads_ns", what each thread of the process --pid took of a
  * processor meanwhile, by its name; "batch_frames", of the job beside; "late_ns", by how much each sleep of this
- * process ended late, which is what the machine does to whoever waits; and "frames", an array for each of
- * "columns". Times are nanoseconds of the host's monotonic clock, which the daemon must share where they are its
- * own: received, applied, rendered; encode_begin is since applied. */
+ * process ended late, which is what the machine does to whoever waits; "resumed_ns", each time that motion goes on
+ * after a rest, how long until a frame of it is decoded; "rested", how many pictures at rest came; and "frames",
+ * an array for each of "columns". Times are nanoseconds of the host's monotonic clock, which the daemon must share
+ * where they are its own: received, applied, rendered; encode_begin is since applied. */
 #include "lib/farlight.h"
 #include "viewer/camera.h"
 #include "viewer/decode.h"
@@ -42,6 +43,7 @@ static const char usage[] =
     "  --viewers N       default 1\n"
     "  --weight N        of each viewer; default: the daemon's\n"
     "  --adapt           quality and size follow the link\n"
+    "  --rest S          after each second of motion it rests so long, in raw pictures\n"
     "  --batch           another client has a batch job rendered meanwhile\n"
     "  --environment F   of the model\n"
     "  --key FILE        the daemon's key\n"
@@ -50,7 +52,7 @@ static const char usage[] =
 struct options {
     const char *address, *model, *environment, *key;
     uint32_t width, height, encoding, looks, viewers, weight, pid;
-    double seconds, rate;
+    double seconds, rate, rest;
     bool adapt, batch;
 };
 
@@ -60,12 +62,16 @@ struct viewer {
     struct fl_view *view;
     struct viewer_camera camera; /* where it rests */
     uint64_t next_look_ns, last_command, shown_command;
+    uint64_t resumed_command, resumed_ns; /* motion went on with it; 0: a frame has shown it */
+    bool rests;
     uint64_t sent_ns[LOOKS_REMEMBERED]; /* of each command, modulo: more than the library remembers */
     struct decoder *decoder;
     struct pixmap picture;
 };
 
 static struct viewer viewers[VIEWERS_MAX];
+static json_t *resumed; /* see above */
+static json_int_t rested;
 static struct options options = {.width = 1280,
                                  .height = 720,
                                  .encoding = PROTOCOL_ENCODING_JPEG,
@@ -173,6 +179,12 @@ static bool take_frame(struct viewer *viewer, struct fl_frame *frame, json_t *ro
     }
     if (rows && frame->command)
         json_array_append_new(rows, row_of(frame, viewer, whole_ns, decode_ns));
+    if (viewer->resumed_command && frame->command >= viewer->resumed_command) {
+        if (rows)
+            json_array_append_new(resumed, json_integer((json_int_t)(whole_ns - viewer->resumed_ns)));
+        viewer->resumed_command = 0;
+    }
+    rested += rows && !frame->moving;
     fl_frame_destroy(frame);
     return true;
 }
@@ -183,7 +195,16 @@ static bool look(struct viewer *viewer, uint64_t now, struct fl_error *error)
 {
     const double phase = TAU * (double)now / (double)SECOND_NS / SWAY_SECONDS;
     struct viewer_camera camera = viewer->camera;
-    struct fl_view_camera seen = {.moving = true};
+    const bool was_at_rest = viewer->rests;
+    if (options.rest > 0)
+        viewer->rests = fmod((double)now / (double)SECOND_NS, 1 + options.rest) >= 1;
+    if (viewer->rests && was_at_rest)
+        return true;
+    if (was_at_rest) {
+        viewer->resumed_command = viewer->last_command + 1;
+        viewer->resumed_ns = now;
+    }
+    struct fl_view_camera seen = {.moving = !viewer->rests};
     camera_orbit(&camera, SWAY_RADIANS * sin(phase), SWAY_RADIANS / 4 * cos(phase));
     camera_export(&camera, &seen);
     viewer->sent_ns[(viewer->last_command + 1) % LOOKS_REMEMBERED] = now_ns();
@@ -286,15 +307,16 @@ static bool come(struct viewer *viewer, struct fl_error *error)
 /* Until its first picture, from which it takes where it stands. */
 static bool begin_view(struct viewer *viewer, struct fl_error *error)
 {
-    const struct fl_view_options terms = {.job = {.width = options.width,
-                                                  .height = options.height,
-                                                  .samples = 1,
-                                                  .depth = 4,
-                                                  .encoding = (enum protocol_encoding)options.encoding,
-                                                  .frames_per_second = (float)options.rate},
-                                          .still_encoding = (enum protocol_encoding)options.encoding,
-                                          .weight = options.weight,
-                                          .adapt = options.adapt};
+    const struct fl_view_options terms = {
+        .job = {.width = options.width,
+                .height = options.height,
+                .samples = 1,
+                .depth = 4,
+                .encoding = (enum protocol_encoding)options.encoding,
+                .frames_per_second = (float)options.rate},
+        .still_encoding = options.rest > 0 ? PROTOCOL_ENCODING_RAW : (enum protocol_encoding)options.encoding,
+        .weight = options.weight,
+        .adapt = options.adapt};
     struct fl_scene_bounds bounds;
     viewer->view = fl_view_start(viewer->scene, &terms, error);
     struct fl_frame *frame = viewer->view ? fl_view_next(viewer->view, FIRST_MS, error) : NULL;
@@ -345,6 +367,7 @@ static bool measure(json_t *result, struct fl_error *error)
     json_t *threads = json_object(), *rows = json_array(), *late = json_array();
     json_int_t batch_frames = 0;
     bool ok = true;
+    resumed = json_array();
     for (uint32_t i = 0; ok && i < options.viewers; i++)
         ok = come(&viewers[i], error);
     for (uint32_t i = 0; ok && i < options.viewers; i++)
@@ -363,6 +386,8 @@ static bool measure(json_t *result, struct fl_error *error)
     json_object_set_new(result, "threads_ns", threads);
     json_object_set_new(result, "batch_frames", json_integer(batch_frames));
     json_object_set_new(result, "late_ns", late);
+    json_object_set_new(result, "resumed_ns", resumed);
+    json_object_set_new(result, "rested", json_integer(rested));
     json_object_set_new(result, "frames", rows);
     return ok;
 }
@@ -404,6 +429,8 @@ static bool parse_option(int option, const char *text)
         return parse_real(text, &options.seconds);
     case 'r':
         return parse_real(text, &options.rate);
+    case 'R':
+        return parse_real(text, &options.rest);
     case 'l':
         return parse_number(text, 0, 10000, &options.looks);
     case 'n':
@@ -434,7 +461,7 @@ static bool parse(int argc, char **argv)
         {"rate", 1, NULL, 'r'},   {"looks", 1, NULL, 'l'},    {"viewers", 1, NULL, 'n'},
         {"weight", 1, NULL, 'w'}, {"adapt", 0, NULL, 'a'},    {"batch", 0, NULL, 'b'},
         {"key", 1, NULL, 'k'},    {"pid", 1, NULL, 'p'},      {"environment", 1, NULL, 'v'},
-        {NULL, 0, NULL, 0},
+        {"rest", 1, NULL, 'R'},   {NULL, 0, NULL, 0},
     };
     int option;
     while ((option = getopt_long(argc, argv, "", known, NULL)) != -1)

@@ -526,6 +526,63 @@ static void a_frame_in_h264_is_left_to_the_caller(void **state)
     assert_int_equal(seen.first.quality, 80); /* where nothing is said: no worse than x264's own default */
 }
 
+/* The first frame ends unfinished; the next one is whole. */
+static void play_abandoned(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    const struct message_frame_begin next = some_frame(5, 0);
+    greet(daemon);
+    while (look(daemon, &header, &message)) {
+        if (message.type != MESSAGE_RENDER)
+            continue;
+        tell_begin(daemon, header.request, &wrong_frame);
+        struct message part = {.type = MESSAGE_FRAME_DATA};
+        part.frame_data.data = pixels;
+        part.frame_data.data_bytes = (uint32_t)wrong_frame.size_bytes / 2;
+        tell(daemon, header.request, &part);
+        part = (struct message){.type = MESSAGE_FRAME_END};
+        part.frame_end.frame = wrong_frame.frame;
+        part.frame_end.abandoned = 1;
+        tell(daemon, header.request, &part);
+        tell_frame(daemon, header.request, &next);
+    }
+}
+
+static void a_frame_that_is_abandoned_is_not_seen_and_not_acknowledged(void **state)
+{
+    (void)state;
+    wrong_frame = some_frame(4, 0);
+    struct daemon *daemon = start(play_abandoned);
+    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+    struct fl_view *view = start_view(&scene);
+    struct fl_frame *frame = fl_view_next(view, 10000, &error);
+    assert_non_null(frame);
+    assert_int_equal(frame->frame, 5);
+    fl_frame_destroy(frame);
+    fl_view_destroy(view);
+    fl_connection_destroy(scene.connection);
+    stop(daemon);
+    assert_int_equal(seen.acks, 1);
+    assert_int_equal(seen.begun_acks, 2);
+    assert_int_equal(seen.credit, seen.first.credit + 1); /* for the one that was seen */
+}
+
+static void a_frame_of_motion_that_is_abandoned_breaks_the_connection(void **state)
+{
+    (void)state;
+    wrong_frame = some_frame(4, 0);
+    wrong_frame.moving = 1;
+    struct daemon *daemon = start(play_abandoned);
+    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+    struct fl_view *view = start_view(&scene);
+    assert_null(fl_view_next(view, 10000, &error));
+    check_error(FL_ERROR_PROTOCOL, "which only a picture at rest may do");
+    fl_view_destroy(view);
+    fl_connection_destroy(scene.connection);
+    stop(daemon);
+}
+
 /* Half a frame, then nothing. */
 static void play_half(struct daemon *daemon)
 {
@@ -663,6 +720,8 @@ int main(void)
         cmocka_unit_test_setup(frames_that_nothing_allows_break_the_connection, begin),
         cmocka_unit_test_setup(more_frames_than_credit_break_the_connection, begin),
         cmocka_unit_test_setup(a_frame_in_h264_is_left_to_the_caller, begin),
+        cmocka_unit_test_setup(a_frame_that_is_abandoned_is_not_seen_and_not_acknowledged, begin),
+        cmocka_unit_test_setup(a_frame_of_motion_that_is_abandoned_breaks_the_connection, begin),
         cmocka_unit_test_setup(what_had_no_room_beside_much_else_is_acknowledged_later, begin),
         cmocka_unit_test_setup(what_ends_beside_much_else_is_given_back_later, begin),
         cmocka_unit_test_setup(a_connection_that_is_lost_within_a_frame_is_told_and_nothing_waits_for_ever, begin),

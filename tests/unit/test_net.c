@@ -493,6 +493,36 @@ static void what_is_dropped_is_not_sent_but_what_was_begun_is_finished(void **st
     assert_int_equal(released, 1);
 }
 
+static void what_was_begun_is_sent_and_told_when_the_rest_is_dropped(void **state)
+{
+    (void)state;
+    struct out_queue queue;
+    struct out_chunk body = {
+        .references = 1, .data = (const uint8_t *)"abcdef", .size_bytes = 6, .release = on_release};
+    struct iovec parts[16];
+    char text[64];
+    released = sent_calls = 0;
+    out_queue_init(&queue);
+    push(&queue, "B1", 7, &body, true); /* 7 bytes each */
+    push(&queue, "B2", 7, &body, true);
+    push(&queue, "O1", 8, &body, true);
+    out_queue_gather(&queue, parts, 16);
+    out_queue_advance(&queue, 3, 1, 2);
+    push(&queue, "B3", 7, &body, true);
+    assert_int_equal(out_queue_drop_unbegun(&queue, 7), 14);
+    assert_int_equal(out_queue_drop_unbegun(&queue, 7), 0);
+    push(&queue, "C1", 7, NULL, false);
+    drain(&queue, 100, text);
+    assert_string_equal(text, "cd..O1bcd..C1");
+    assert_int_equal(sent_calls, 2); /* B1 and O1 */
+    assert_int_equal(queue.queued_bytes, 0);
+    assert_int_equal(queue.sending_bytes, 0);
+    assert_int_equal(queue.queued_bulk_bytes, 0);
+    out_queue_finish(&queue);
+    out_chunk_unref(&body);
+    assert_int_equal(released, 1);
+}
+
 /* What a sealed connection has copied, but the kernel has not taken yet. */
 static void what_was_taken_is_begun_but_not_sent(void **state)
 {
@@ -682,6 +712,7 @@ int main(void)
         cmocka_unit_test(a_watch_that_was_removed_is_not_called_even_in_the_same_turn),
         cmocka_unit_test(control_goes_first_and_nothing_is_lost_however_little_is_taken),
         cmocka_unit_test(what_is_dropped_is_not_sent_but_what_was_begun_is_finished),
+        cmocka_unit_test(what_was_begun_is_sent_and_told_when_the_rest_is_dropped),
         cmocka_unit_test(what_was_taken_is_begun_but_not_sent),
         cmocka_unit_test(many_short_messages_are_sent_without_looking_at_all_of_them_each_time),
         cmocka_unit_test(a_hash_is_no_key_to_somebody_elses_blob),

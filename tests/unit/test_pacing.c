@@ -382,6 +382,34 @@ static void the_wait_for_the_next_frame_is_what_has_to_drain(void **state)
     assert_false(pacing_may_send(&pacing));
 }
 
+/* 10 Mbit/s, 100 ms there and back, and a picture at rest of a megabyte when motion goes on. */
+static void motion_does_not_wait_for_what_was_abandoned(void **state)
+{
+    (void)state;
+    struct pacing pacing;
+    struct link link = link_of(10, 100 * MS);
+    uint32_t frame = 0;
+    pacing_init(&pacing, FRAME_NS);
+    assert_true(pacing_is_long(&pacing, 1)); /* nothing is known */
+    run(&pacing, &link, 0, 2 * S, 30000, &frame);
+    link_deliver(&link, &pacing, 3 * S);
+    assert_int_equal(pacing.in_flight_count, 0);
+    assert_true(pacing_is_long(&pacing, 60000));
+    assert_false(pacing_is_long(&pacing, 20000));
+    pacing_sent(&pacing, frame, 1000000, 3 * S);
+    assert_in_range(pacing_wait_ns(&pacing, 0), 500 * MS, 1000 * MS);
+    pacing_abandoned(&pacing, frame);
+    assert_true(pacing_may_send(&pacing));
+    assert_int_equal(pacing_wait_ns(&pacing, 1), 0);  /* nor does one behind it, which is no megabyte either */
+    pacing_acknowledged(&pacing, frame, true, 4 * S); /* in vain */
+    assert_in_range(pacing_bytes_per_second(&pacing), 1100000, 1300000);
+    /* Those before it count on. */
+    pacing_sent(&pacing, frame + 1, 150000, 4 * S);
+    pacing_sent(&pacing, frame + 2, 1000000, 4 * S);
+    pacing_abandoned(&pacing, frame + 2);
+    assert_false(pacing_may_send(&pacing));
+}
+
 static void a_wait_beyond_all_measure_is_still_one(void **state)
 {
     (void)state;
@@ -411,6 +439,7 @@ int main(void)
         cmocka_unit_test(does_not_shrink_what_takes_long_at_any_size),
         cmocka_unit_test(does_not_flicker),
         cmocka_unit_test(the_wait_for_the_next_frame_is_what_has_to_drain),
+        cmocka_unit_test(motion_does_not_wait_for_what_was_abandoned),
         cmocka_unit_test(a_wait_beyond_all_measure_is_still_one),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

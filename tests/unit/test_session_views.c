@@ -220,10 +220,10 @@ static struct engine_command *start_view(uint32_t request, uint32_t credit)
     return command;
 }
 
-static void send_camera(uint64_t number, bool moving)
+static void send_camera_on(uint32_t channel, uint64_t number, bool moving)
 {
     struct message message = made(MESSAGE_VIEW_CAMERA);
-    message.view_camera.channel = CHANNEL;
+    message.view_camera.channel = channel;
     message.view_camera.command = number;
     message.view_camera.moving = moving;
     message.view_camera.time_s = 0.25f;
@@ -232,6 +232,11 @@ static void send_camera(uint64_t number, bool moving)
     message.view_camera.up_world[1] = 1;
     message.view_camera.fov_y = 0.5f;
     send_message(0, 0, &message);
+}
+
+static void send_camera(uint64_t number, bool moving)
+{
+    send_camera_on(CHANNEL, number, moving);
 }
 
 static void send_credit(uint64_t total)
@@ -479,6 +484,100 @@ static void a_frame_of_a_stream_comes_however_long_it_waits(void **state)
     say_frame(2, 3, 8);
     send_ack(2, true, false);
     take_frame(2, 3);
+    engine_command_destroy(start);
+}
+
+/* Takes the pieces of the large frame that was begun, and its end; whether that was abandoned. */
+static bool take_rest_of_large_frame(uint32_t request, uint32_t number)
+{
+    size_t came_bytes = 0;
+    while (receive()->type == MESSAGE_FRAME_DATA) {
+        assert_int_equal(client.message.frame_data.offset_bytes, came_bytes);
+        came_bytes += client.message.frame_data.data_bytes;
+    }
+    assert_int_equal(client.message.type, MESSAGE_FRAME_END);
+    assert_int_equal(client.header.request, request);
+    assert_int_equal(client.message.frame_end.frame, number);
+    bool abandoned = client.message.frame_end.abandoned;
+    assert_true(abandoned ? came_bytes < LARGE_FRAME_BYTES : came_bytes == LARGE_FRAME_BYTES);
+    return abandoned;
+}
+
+/* A frame that shows that command is on its way when the camera comes; whether it is abandoned. */
+static bool is_abandoned(uint32_t number, uint64_t command, enum encoding encoding, uint64_t camera, bool moving)
+{
+    struct engine_event *made = frame_of(2, number, command, LARGE_FRAME_BYTES);
+    made->frame->encoding = encoding;
+    assert_true(queue_push(engine.events, made));
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    send_camera(camera, moving);
+    return take_rest_of_large_frame(2, number);
+}
+
+static void a_picture_at_rest_that_motion_overtakes_is_abandoned_and_uses_no_credit(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_view(2, 1);
+    say_large_frame(2, 0);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    send_camera(7, true);
+    told_and_forgotten(ENGINE_VIEW_LOOK);
+    assert_true(take_rest_of_large_frame(2, 0));
+    told_credit(2, 2);
+    say_frame(2, 1, 7);
+    take_frame(2, 1); /* though nothing was acknowledged */
+    engine_command_destroy(start);
+}
+
+/* Nothing is acknowledged, so that all of them take long as far as is known. */
+static void what_others_need_or_still_shows_what_is_wished_is_not_abandoned(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_view(2, 100);
+    assert_false(is_abandoned(0, 0, ENCODING_ZSTD, 2, false)); /* rest after rest */
+    assert_false(is_abandoned(1, 3, ENCODING_JPEG, 5, true));  /* motion */
+    send_camera(6, false);
+    assert_false(is_abandoned(2, 6, ENCODING_H264, 7, true)); /* a stream's */
+    send_camera(8, false);
+    assert_true(is_abandoned(3, 8, ENCODING_JPEG, 9, true));
+    engine_command_destroy(start);
+}
+
+static void who_does_not_say_that_frames_may_be_abandoned_gets_them_whole(void **state)
+{
+    (void)state;
+    assert_int_equal(greet_with(0) & HANDSHAKE_CAN_ABANDON, 0);
+    struct engine_command *start = start_view(2, 100);
+    assert_false(is_abandoned(0, 0, ENCODING_ZSTD, 1, true));
+    engine_command_destroy(start);
+}
+
+/* Who moves on each time just before the picture at rest is there sees one now and then. */
+static void not_every_picture_at_rest_is_abandoned(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_view(2, 100);
+    uint64_t command = 0;
+    uint32_t number = 0;
+    while (number < 20 && is_abandoned(number, command, ENCODING_ZSTD, command + 1, true)) {
+        send_camera(command += 2, false);
+        number++;
+    }
+    assert_in_range(number, 1, 10);
+    engine_command_destroy(start);
+}
+
+static void a_picture_at_rest_that_has_not_begun_is_dropped_when_motion_goes_on(void **state)
+{
+    (void)state;
+    struct engine_command *start = start_view(2, 100);
+    say_large_frame(2, 0);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    say_large_frame(2, 1); /* waits behind it, or comes too late */
+    send_camera(7, true);
+    assert_true(take_rest_of_large_frame(2, 0));
+    say_frame(2, 2, 7);
+    take_frame(2, 2);
     engine_command_destroy(start);
 }
 
@@ -863,6 +962,7 @@ static struct {
     unsigned view_of[REQUESTS]; /* where it asks for a view */
     uint32_t under_way[VIEWS];  /* request whose frame is coming on a channel; 0: none */
     uint64_t frame_bytes[VIEWS], credit[VIEWS], frames[VIEWS];
+    uint64_t camera;
 } play;
 
 static unsigned roll(unsigned sides)
@@ -962,9 +1062,11 @@ static void play_client(void)
             break;
         case MESSAGE_FRAME_END:
             assert_true(view < VIEWS && play.under_way[view] == request && !play.answered[request]);
-            assert_int_equal(play.frame_bytes[view], 0);
+            assert_int_equal(play.frame_bytes[view] > 0, message->frame_end.abandoned);
             play.under_way[view] = 0;
-            send_ack_on(client.header.channel, message->frame_end.frame);
+            play.frames[view] -= message->frame_end.abandoned;
+            if (!message->frame_end.abandoned)
+                send_ack_on(client.header.channel, message->frame_end.frame);
             break;
         default:
             fail_msg("%s came", message_type_text(message->type));
@@ -992,6 +1094,8 @@ static void ask(uint32_t request)
     message.credit.total = play.credit[view] += roll(3);
     if (roll(2))
         send_message(0, 0, &message);
+    if (roll(2))
+        send_camera_on(CHANNEL + view, ++play.camera, roll(2));
 }
 
 static bool all_answered(void)
@@ -1062,6 +1166,12 @@ int main(void)
         BOTH(who_has_no_credit_left_is_told_that_nothing_comes),
         BOTH(a_frame_that_waits_for_the_link_is_dropped_for_a_newer_camera),
         BOTH(a_frame_of_a_stream_comes_however_long_it_waits),
+        BOTH(a_picture_at_rest_that_motion_overtakes_is_abandoned_and_uses_no_credit),
+        BOTH(what_others_need_or_still_shows_what_is_wished_is_not_abandoned),
+        cmocka_unit_test_setup_teardown(who_does_not_say_that_frames_may_be_abandoned_gets_them_whole,
+                                        set_up_ungreeted, tear_down),
+        BOTH(not_every_picture_at_rest_is_abandoned),
+        BOTH(a_picture_at_rest_that_has_not_begun_is_dropped_when_motion_goes_on),
         BOTH(a_view_that_adapts_tells_the_engine_what_the_link_carries),
         BOTH(a_view_takes_the_place_of_another_on_its_channel),
         BOTH(a_frame_under_way_comes_whole_before_the_answer),
