@@ -8,8 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
+
+/* A manager that does not read holds nobody up for longer: clients wait meanwhile. */
+#define WAIT_US 100000
 
 void notify_manager(const char *state)
 {
@@ -25,7 +29,8 @@ void notify_manager(const char *state)
         address.sun_path[0] = '\0'; /* an abstract name: no file, and no NUL at its end */
     int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     socklen_t address_bytes = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + bytes);
-    if (fd < 0 ||
+    const struct timeval wait = {.tv_usec = WAIT_US};
+    if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &wait, sizeof wait) < 0 ||
         sendto(fd, state, strlen(state), MSG_NOSIGNAL, (const struct sockaddr *)&address, address_bytes) < 0)
         log_write(LOG_WARNING, "net", "cannot tell the service manager %s: %s", state, strerror(errno));
     if (fd >= 0)

@@ -450,6 +450,19 @@ class Watchdog(Case):
             time.sleep(0.02)
         self.fail("no job comes")
 
+    def test_a_manager_that_does_not_listen_holds_no_client_up(self):
+        with Daemon(environment=self.manager.environment(WATCHDOG_USEC="400000")) as daemon:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as other:
+                other.setblocking(False)
+                with self.assertRaises(BlockingIOError):
+                    while True:
+                        other.sendto(b"STATUS=x", self.manager.path)
+            time.sleep(0.5)  # pings that there is no room for
+            peer = Peer(daemon)
+            peer.send(PING, 1, struct.pack("<Q", 1))
+            self.assertEqual(peer.answer(1)[0], PONG)
+            peer.close()
+
     def test_one_for_another_process_is_left_alone(self):
         with Daemon(environment=self.environment(WATCHDOG_PID="1")):
             self.assertEqual(self.pings(INTERVAL_S), 0)

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Limits of the configuration, reached by clients of a daemon that has small ones: what is told beforehand, what
  * is told when one is reached, that just within is fine, and that another client does not notice. Limits that
- * belong to one subject are reached in its tests: requests, edits, blobs' memory, silence and slow readers in
- * test_session.c, open scenes in test_session_scenes.c, jobs in test_session_views.c, scenes that stay in
- * test_engine_scenes.c, layers and memory of tracers in test_ldc_limits.c and test_abuffer_limits.c, keys and
- * connections of one address in the integration tests of the daemon. */
+ * belong to one subject are reached in its tests: requests, silence and slow readers in test_session.c, edits and
+ * the memory of blobs in test_session_edits.c, that of frames in test_session_jobs.c, jobs in
+ * test_session_views.c, open scenes in test_session_scenes.c, scenes that stay in test_engine_scenes.c, layers and
+ * memory of tracers in test_ldc_limits.c and test_abuffer_limits.c, keys and connections of one address in the
+ * integration tests. */
 #include "clients_fixture.h"
 
 #include <errno.h>
