@@ -155,6 +155,27 @@ static struct fl_view *start_view(struct fl_scene *scene)
     return view;
 }
 
+/* What a view is seen over: a played daemon, and a connection to it. */
+struct viewing {
+    struct daemon *daemon;
+    struct fl_scene scene;
+};
+
+static struct fl_view *begin_view(struct viewing *viewing, void (*play)(struct daemon *daemon))
+{
+    viewing->daemon = start(play);
+    viewing->scene = (struct fl_scene){.connection = connect_to(viewing->daemon), .scene = 1};
+    return start_view(&viewing->scene);
+}
+
+/* From then on `seen` is all that the daemon saw. */
+static void end_view(struct viewing *viewing, struct fl_view *view)
+{
+    fl_view_destroy(view);
+    fl_connection_destroy(viewing->scene.connection);
+    stop(viewing->daemon);
+}
+
 static struct fl_frame *next_frame(struct fl_view *view)
 {
     struct fl_frame *frame = fl_view_next(view, 10000, &error);
@@ -166,10 +187,9 @@ static struct fl_frame *next_frame(struct fl_view *view)
 static void cameras_are_sent_and_frames_name_them_with_their_times(void **state)
 {
     (void)state;
-    struct daemon *daemon = start(play_view);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
-    assert_null(fl_view_start(&scene, &some_options, &error)); /* one at a time */
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_view);
+    assert_null(fl_view_start(&viewing.scene, &some_options, &error)); /* one at a time */
     fl_frame_destroy(next_frame(view));
     for (uint64_t i = 1; i <= 5; i++) {
         uint64_t command = 0;
@@ -188,9 +208,7 @@ static void cameras_are_sent_and_frames_name_them_with_their_times(void **state)
         assert_memory_equal(frame->pixels, pixels, FRAME_BYTES);
         fl_frame_destroy(frame);
     }
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
     assert_int_equal(seen.first.kind, PROTOCOL_JOB_KIND_VIEW);
     assert_int_equal(seen.first.samples, 64);
     assert_int_equal(seen.first.frames_per_second, 60);
@@ -208,23 +226,20 @@ static void cameras_are_sent_and_frames_name_them_with_their_times(void **state)
 static void frames_are_acknowledged_and_credit_follows_those_that_are_taken(void **state)
 {
     (void)state;
-    struct daemon *daemon = start(play_view);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_view);
     assert_true(fl_view_want_key_frame(view, &error)); /* the first one stands alone anyway */
     fl_frame_destroy(next_frame(view));
     for (unsigned i = 0; i < 2; i++)
         assert_true(fl_view_look(view, &some_camera, NULL, &error));
     fl_frame_destroy(next_frame(view));
     uint64_t ns = 0;
-    assert_true(fl_ping(scene.connection, &ns, &error)); /* the third frame comes meanwhile and is kept */
+    assert_true(fl_ping(viewing.scene.connection, &ns, &error)); /* the third frame comes meanwhile and is kept */
     assert_true(fl_view_want_key_frame(view, &error));
     fl_frame_destroy(next_frame(view));
     assert_null(fl_view_next(view, 0, &error));
     assert_int_equal(error.code, FL_ERROR_NONE);
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
     assert_int_equal(seen.begun_acks, 3);
     assert_int_equal(seen.acks, 3);
     assert_int_equal(seen.last_acked, 2);
@@ -258,9 +273,8 @@ static void play_changes(struct daemon *daemon)
 static void a_changed_view_takes_frames_of_both_sizes_and_counts_on(void **state)
 {
     (void)state;
-    struct daemon *daemon = start(play_changes);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_changes);
     struct fl_view_options options = some_options;
     uint32_t number = 0;
     options.job.tracer = PROTOCOL_TRACER_LDC;
@@ -282,9 +296,7 @@ static void a_changed_view_takes_frames_of_both_sizes_and_counts_on(void **state
     }
     assert_true(fl_view_look(view, &some_camera, NULL, &error));
     fl_frame_destroy(next_frame(view));
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
     assert_int_equal(seen.renders, 61);
     assert_int_equal(seen.last.channel, seen.first.channel);
     assert_int_equal(seen.last.tracer, PROTOCOL_TRACER_LDC);
@@ -294,13 +306,12 @@ static void a_changed_view_takes_frames_of_both_sizes_and_counts_on(void **state
 static void a_job_runs_beside_a_view_and_each_gets_its_own_frames(void **state)
 {
     (void)state;
-    struct daemon *daemon = start(play_view);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_view);
     const struct fl_job_options options = {.width = EDGE, .height = EDGE, .first_frame = 77, .last_frame = 77};
     for (unsigned i = 0; i < 3; i++) {
         bool done = false;
-        struct fl_job *job = fl_render_start(&scene, &options, &error);
+        struct fl_job *job = fl_render_start(&viewing.scene, &options, &error);
         assert_non_null(job);
         struct fl_frame *frame = NULL;
         for (unsigned tries = 0; frame == NULL && tries < 1000; tries++) {
@@ -320,9 +331,7 @@ static void a_job_runs_beside_a_view_and_each_gets_its_own_frames(void **state)
     struct fl_frame *frame = next_frame(view);
     assert_int_equal(frame->frame, 0);
     fl_frame_destroy(frame);
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
 }
 
 /* ---- what a daemon may say ---- */
@@ -359,17 +368,14 @@ static void play_refused_change(struct daemon *daemon)
 static void a_refused_change_is_told_once_and_the_view_goes_on_as_it_was(void **state)
 {
     (void)state;
-    struct daemon *daemon = start(play_refused_change);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_refused_change);
     assert_true(fl_view_change(view, &some_options, &error));
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_REFUSED, "not in this build");
     assert_true(fl_view_look(view, &some_camera, NULL, &error));
     fl_frame_destroy(next_frame(view));
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
     assert_int_equal(seen.cancels, 1);
 }
 
@@ -386,21 +392,18 @@ static void play_refused_view(struct daemon *daemon)
 static void a_refused_view_stays_refused_and_the_connection_can_be_used(void **state)
 {
     (void)state;
-    struct daemon *daemon = start(play_refused_view);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_refused_view);
     for (unsigned i = 0; i < 2; i++) {
         assert_null(fl_view_next(view, 10000, &error));
         check_error(FL_ERROR_REFUSED, "not in this build");
     }
     assert_false(fl_view_look(view, &some_camera, NULL, &error));
     fl_view_destroy(view);
-    view = start_view(&scene);
+    view = start_view(&viewing.scene);
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_REFUSED, "not in this build");
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
     assert_int_equal(seen.cancels, 0);
 }
 
@@ -427,18 +430,15 @@ static void expect_broken(const struct message_frame_begin *frame, unsigned coun
 {
     wrong_frame = *frame;
     wrong_count = count;
-    struct daemon *daemon = start(play_wrong);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_wrong);
     struct fl_frame *whole = NULL;
     while ((whole = fl_view_next(view, 10000, &error)) != NULL)
         fl_frame_destroy(whole);
     check_error(FL_ERROR_PROTOCOL, part);
     assert_false(fl_view_look(view, &some_camera, NULL, &error));
     assert_int_equal(error.code, FL_ERROR_PROTOCOL);
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
 }
 
 static void frames_that_nothing_allows_break_the_connection(void **state)
@@ -481,15 +481,12 @@ static void play_flood(struct daemon *daemon)
 static void more_frames_than_credit_break_the_connection(void **state)
 {
     (void)state;
-    struct daemon *daemon = start(play_flood);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_flood);
     uint64_t ns = 0;
-    assert_false(fl_ping(scene.connection, &ns, &error));
+    assert_false(fl_ping(viewing.scene.connection, &ns, &error));
     check_error(FL_ERROR_PROTOCOL, "more frames came than were asked for");
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
 }
 
 /* An access unit goes to the caller as it came. */
@@ -553,16 +550,13 @@ static void a_frame_that_is_abandoned_is_not_seen_and_not_acknowledged(void **st
 {
     (void)state;
     wrong_frame = some_frame(4, 0);
-    struct daemon *daemon = start(play_abandoned);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_abandoned);
     struct fl_frame *frame = fl_view_next(view, 10000, &error);
     assert_non_null(frame);
     assert_int_equal(frame->frame, 5);
     fl_frame_destroy(frame);
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
     assert_int_equal(seen.acks, 1);
     assert_int_equal(seen.begun_acks, 2);
     assert_int_equal(seen.credit, seen.first.credit + 1); /* for the one that was seen */
@@ -573,14 +567,11 @@ static void a_frame_of_motion_that_is_abandoned_breaks_the_connection(void **sta
     (void)state;
     wrong_frame = some_frame(4, 0);
     wrong_frame.moving = 1;
-    struct daemon *daemon = start(play_abandoned);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_abandoned);
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_PROTOCOL, "which only a picture at rest may do");
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
 }
 
 /* Half a frame, then nothing. */
@@ -601,18 +592,15 @@ static void play_half(struct daemon *daemon)
 static void a_connection_that_is_lost_within_a_frame_is_told_and_nothing_waits_for_ever(void **state)
 {
     (void)state;
-    struct daemon *daemon = start(play_half);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_half);
     assert_null(fl_view_next(view, 20, &error));
     assert_int_equal(error.code, FL_ERROR_NONE);
     assert_true(fl_view_look(view, &some_camera, NULL, &error));
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_CONNECTION, "closed");
     assert_false(fl_view_change(view, &some_options, &error));
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
     assert_int_equal(seen.acks, 0);
 }
 
@@ -644,9 +632,8 @@ static void what_had_no_room_beside_much_else_is_acknowledged_later(void **state
 {
     (void)state;
     sem_init(&may_read, 0, 0);
-    struct daemon *daemon = start(play_busy);
-    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view *view = start_view(&scene);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_busy);
     /* Sending ends where there is no room for a message of any size. */
     while (fl_view_look(view, &some_camera, NULL, &error))
         continue;
@@ -654,9 +641,7 @@ static void what_had_no_room_beside_much_else_is_acknowledged_later(void **state
     fl_frame_destroy(next_frame(view));
     sem_post(&may_read);
     fl_frame_destroy(next_frame(view));
-    fl_view_destroy(view);
-    fl_connection_destroy(scene.connection);
-    stop(daemon);
+    end_view(&viewing, view);
     sem_destroy(&may_read);
     assert_int_equal(seen.acks, 2);
     assert_int_equal(seen.credit, IN_FLIGHT + 2);
