@@ -54,8 +54,9 @@ uint32_t fl_connection_next_request(struct fl_connection *connection);
 /* Sends one message and waits until the kernel has it. */
 bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint32_t channel,
                         const struct message *message, struct fl_error *error);
-/* For what gives something back, which nobody can try again: sent now, or as soon as there is room. The message has
- * no texts and no arrays. Where there is no memory for that, the connection is broken, as its end gives all back. */
+/* For what gives something back, which nobody can try again: sent now, or as soon as there is room. The message
+ * has no texts and no arrays. Where there is no memory for that, the connection is broken, as its end gives all
+ * back. */
 void fl_connection_send_late(struct fl_connection *connection, uint32_t request, const struct message *message);
 /* Hands what was late to the stream as far as there is room. False: the connection is broken. */
 bool fl_connection_push_late(struct fl_connection *connection, struct fl_error *error);

@@ -75,8 +75,8 @@ struct frame_request {
      * motion and request alike but for `samples` and what is done with the sum (format, tone map, exposure); it
      * adds its samples to those. n frames of k samples hold what one of n x k does, to the bit. */
     bool accumulate;
-    /* With `accumulate`: of `samples` only as many are added as make so many in all, none where they are there already;
-     * 0: all are. */
+    /* With `accumulate`: of `samples` only as many are added as make so many in all, none where they are there
+     * already; 0: all are. */
     uint32_t samples_most;
     /* Every wave is traced by a second tracer too, primary rays included (`primary` is taken to be PRIMARY_TRACE),
      * and the result has what came of it. The picture is that of `tracer`. */

@@ -24,8 +24,8 @@ void frames_add(struct job *job, struct engine_frame *frame);
 /* Drops what of the job has not been begun on the wire, and forgets the rest. The request of a view whose place it
  * has taken, if one of those frames was that view's; 0: none was. */
 uint32_t frames_drop(struct session *session, struct job *job);
-/* Drops what has not been begun, as another view takes the job's place. True: one of the job's request has, and will
- * be finished; from now on until its bytes are let go it counts beside what the job may take. */
+/* Drops what has not been begun, as another view takes the job's place. True: one of the job's request has, and
+ * will be finished; from now on until its bytes are let go it counts beside what the job may take. */
 bool frames_keep_begun(struct job *job);
 /* Its frames under way that are those of a view whose place it has taken: 0 or 1. */
 unsigned frames_of_before(const struct job *job);
