@@ -250,7 +250,7 @@ size_t gpu_device_objects(const struct gpu_device *device)
 {
     size_t count = 0;
     for (int kind = 0; device->registry && kind < GPU_OBJECT_KIND_COUNT; kind++)
-        count += gpu_registry_count(device->registry, (enum gpu_object_kind)kind);
+        count += kind == GPU_PROGRAM ? 0 : gpu_registry_count(device->registry, (enum gpu_object_kind)kind);
     return count;
 }
 

@@ -58,7 +58,7 @@ size_t gpu_device_list(struct gpu_device_info *list, size_t max);
  * vertices draws at once). NULL and *error when there is none. */
 struct gpu_device *gpu_device_create(const struct gpu_options *options, struct error *error);
 void gpu_device_destroy(struct gpu_device *device); /* accepts NULL; on the same thread */
-/* How many GL objects live in it. */
+/* How many GL objects live in it, programs aside: each stays once it was needed. */
 size_t gpu_device_objects(const struct gpu_device *device);
 /* ERROR_DEVICE_LOST if the context was lost, ERROR_INTERNAL with the GL error if there is one (a bounded
  * number is read), else true. `what` names the caller. Cheap enough for once a pass. */
