@@ -26,12 +26,13 @@ struct serving {
     const char *words[DAEMON_WORDS_MAX + 1]; /* the daemon's arguments, and a NULL */
     size_t word_count;
     char usual_address[300];
+    char folder[64]; /* made for the socket there; empty: there is none */
 };
 
 static const struct argp_option options[] = {
     {"listen", KEY_LISTEN, "ADDRESS", 0,
      "Where the daemon listens: unix:/PATH or tcp:HOST:PORT; may be repeated (default: a socket in "
-     "$XDG_RUNTIME_DIR)",
+     "$XDG_RUNTIME_DIR, or without that in a folder of its own in /tmp)",
      0},
     {"server", 's', "ADDRESS", 0,
      "Put the scene up on a daemon that runs there: unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]", 0},
@@ -95,14 +96,33 @@ static error_t parse(int key, char *value, struct argp_state *state)
 
 /* ---- the daemon's command line ---- */
 
+/* Where only its owner comes: everybody may write to the folder of temporary files, so that what is listened to
+ * there is in a folder of mode 0700. NULL: there is none; the error is set. */
 static const char *usual_address(struct serving *serving)
 {
     const char *folder = getenv("XDG_RUNTIME_DIR");
-    if (folder == NULL || folder[0] != '/')
-        folder = P_tmpdir;
+    if (folder == NULL || folder[0] != '/') {
+        snprintf(serving->folder, sizeof serving->folder, "%s/farlight-XXXXXX", P_tmpdir);
+        folder = mkdtemp(serving->folder);
+    }
+    if (folder == NULL) {
+        cli_usage(&serving->job, "--listen", "no folder for a socket can be made in %s: %s; set XDG_RUNTIME_DIR",
+                  P_tmpdir, strerror(errno));
+        serving->folder[0] = '\0';
+        return NULL;
+    }
     snprintf(serving->usual_address, sizeof serving->usual_address, "unix:%s/farlight-%ld.sock", folder,
              (long)getpid());
     return serving->usual_address;
+}
+
+/* The daemon takes its socket away, if it can. */
+static void remove_folder(const struct serving *serving)
+{
+    if (serving->folder[0] == '\0')
+        return;
+    unlink(serving->usual_address + strlen("unix:"));
+    rmdir(serving->folder);
 }
 
 /* What was typed for it comes last: the later of two options counts. */
@@ -113,8 +133,8 @@ static bool complete_daemon(struct serving *serving)
     error_t status = 0;
     memcpy(typed, serving->words, typed_count * sizeof *typed);
     serving->word_count = 0;
-    if (serving->listen_count == 0)
-        serving->listens[serving->listen_count++] = usual_address(serving);
+    if (serving->listen_count == 0 && (serving->listens[serving->listen_count++] = usual_address(serving)) == NULL)
+        return false;
     for (size_t i = 0; i < serving->listen_count && status == 0; i++)
         status = add_word(serving, "--listen") != 0 ? EINVAL : add_word(serving, serving->listens[i]);
     if (serving->job.key_file != NULL && status == 0)
@@ -238,6 +258,29 @@ static bool put_up(const struct serving *serving, struct cli_loading *loading, s
     return announce(serving, loading, error);
 }
 
+static int serve(struct serving *serving)
+{
+    struct fl_error error = {0};
+    if (!complete(serving))
+        return cli_report(&serving->job.error);
+    if (!cli_interrupt_begin(&error))
+        return cli_report(&error);
+    struct cli_progress progress;
+    struct cli_loading loading = {.job = &serving->job,
+                                  .progress = &progress,
+                                  .sharing = PROTOCOL_SHARING_SHARED,
+                                  .scene_name = serving->name != NULL ? serving->name : base_name(serving->job.model),
+                                  .daemon_arguments = serving->words};
+    cli_progress_begin(&progress, serving->job.quiet);
+    const bool is_up = put_up(serving, &loading, &error);
+    cli_progress_end(&progress, is_up);
+    const bool done = is_up && stay(loading.connection, &error);
+    if (loading.connection != NULL)
+        fl_connection_set_interrupt(loading.connection, 0); /* it is still told in order */
+    cli_loading_close(&loading);
+    return done ? CLI_DONE : cli_report(&error);
+}
+
 int cli_serve(int argc, char **argv)
 {
     static const struct argp argp = {
@@ -248,23 +291,9 @@ int cli_serve(int argc, char **argv)
                "Without --server a daemon is started for it, which ends with this command. What is behind -- are "
                "options of that daemon, such as --device software."};
     struct serving serving = {0};
-    struct fl_error error = {0};
-    if (argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &serving) != 0 || !complete(&serving))
+    if (argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &serving) != 0)
         return cli_report(&serving.job.error);
-    if (!cli_interrupt_begin(&error))
-        return cli_report(&error);
-    struct cli_progress progress;
-    struct cli_loading loading = {.job = &serving.job,
-                                  .progress = &progress,
-                                  .sharing = PROTOCOL_SHARING_SHARED,
-                                  .scene_name = serving.name != NULL ? serving.name : base_name(serving.job.model),
-                                  .daemon_arguments = serving.words};
-    cli_progress_begin(&progress, serving.job.quiet);
-    const bool is_up = put_up(&serving, &loading, &error);
-    cli_progress_end(&progress, is_up);
-    const bool done = is_up && stay(loading.connection, &error);
-    if (loading.connection != NULL)
-        fl_connection_set_interrupt(loading.connection, 0); /* it is still told in order */
-    cli_loading_close(&loading);
-    return done ? CLI_DONE : cli_report(&error);
+    const int status = serve(&serving);
+    remove_folder(&serving);
+    return status;
 }

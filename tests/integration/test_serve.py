@@ -26,13 +26,14 @@ PRIVATE, KEPT, DENIED = 0, 1, 13
 class Serving:
     """A running `farlight serve`; a context manager, ready once it has printed its last address."""
 
-    def __init__(self, *arguments, addresses=1):
+    def __init__(self, *arguments, addresses=1, environment=None):
         self.arguments, self.addresses = list(map(str, arguments)), addresses
+        self.environment = environment
         self.lines = []
 
     def __enter__(self):
         self.process = subprocess.Popen([BIN / "farlight", "serve", *self.arguments], stdout=subprocess.PIPE,
-                                        stderr=subprocess.PIPE, text=True)
+                                        stderr=subprocess.PIPE, text=True, env=self.environment)
         patience = threading.Timer(TIMEOUT_S, self.process.kill)
         patience.start()
         while len(self.lines) < 1 + self.addresses:
@@ -120,6 +121,18 @@ class Serve(Case):
         serving = Serving(self.model, "--listen", self.address, *arguments, **options)
         self.addCleanup(serving.__exit__)
         return serving.__enter__()
+
+    def test_without_a_folder_of_the_user_s_it_listens_in_one_that_only_he_may_enter(self):
+        environment = {name: value for name, value in os.environ.items() if name != "XDG_RUNTIME_DIR"}
+        with Serving(self.model, environment=environment) as serving:
+            address = serving.lines[-1].split()[-1]
+            folder = pathlib.Path(address.removeprefix("unix:")).parent
+            state = folder.stat()
+            self.assertEqual((state.st_mode & 0o7777, state.st_uid), (0o700, os.getuid()))
+            self.assertEqual([entry.name for entry in folder.iterdir()], [pathlib.Path(address).name])
+            self.expect(farlight("scenes", "--server", address), 0)
+            self.assertEqual(serving.stop(), 0)
+        self.assertFalse(folder.exists())
 
     def render(self, path, *arguments, status=0, address=None):
         return self.expect(farlight("render", "--server", address or self.address, "--size", "48x36", "-o", path,
