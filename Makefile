@@ -225,6 +225,7 @@ $(B)/tests/unit/test_session_faults: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=mal
 $(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
 # What the daemon encodes is decoded by the library itself.
 $(addprefix $(B)/tests/unit/test_encode_,pool stream): TEST_LIBS += $(call pkg_libs,libavcodec libavutil)
+$(B)/tests/unit/test_encode_refused: TEST_LIBS += $(call pkg_libs,libavcodec libavutil) -Wl,--wrap=libav_load
 $(B)/tests/unit/test_viewer_camera: $(call obj,$(addprefix client/viewer/,camera.c input.c settings.c tour.c))
 $(B)/tests/unit/test_viewer_figures: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c))
 $(B)/tests/unit/test_viewer_replay: $(B)/client/viewer/replay.o

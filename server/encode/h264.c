@@ -11,6 +11,7 @@
 #include "encode/libav.h"
 #include "encode/ycbcr.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -30,8 +31,10 @@
 /* Those that the library may have, the best first: the hardware's, where there is some. */
 enum codec { CODEC_NVENC, CODEC_X264, CODEC_COUNT };
 static const char *const codec_names[CODEC_COUNT] = {"h264_nvenc", "libx264"};
-/* One that does not open, or fails, is not tried again: there is no such device. */
+/* One whose device refuses it is not tried again: there is no such device. Memory that was short once says nothing
+ * of that. */
 static atomic_bool codec_fails[CODEC_COUNT];
+enum outcome { OUTCOME_DONE, OUTCOME_NO_MEMORY, OUTCOME_REFUSED };
 
 struct encoder_stream {
     const struct libav *av;
@@ -123,31 +126,36 @@ static void stream_close(struct encoder_stream *stream)
     stream->scratch = NULL;
 }
 
-static bool open_codec(struct encoder_stream *stream, const AVCodec *codec, const struct encoder_wish *wish)
+static enum outcome outcome_of(int status)
+{
+    return status >= 0 ? OUTCOME_DONE : status == AVERROR(ENOMEM) ? OUTCOME_NO_MEMORY : OUTCOME_REFUSED;
+}
+
+static enum outcome open_codec(struct encoder_stream *stream, const AVCodec *codec, const struct encoder_wish *wish)
 {
     AVDictionary *options = NULL;
     stream->codec = stream->av->avcodec_alloc_context3(codec);
     if (!stream->codec)
-        return false;
+        return OUTCOME_NO_MEMORY;
     describe_pictures(stream);
     set_latency(stream, &options);
     set_rate(stream, wish);
-    bool good = stream->av->avcodec_open2(stream->codec, codec, &options) == 0;
+    int status = stream->av->avcodec_open2(stream->codec, codec, &options);
     stream->av->av_dict_free(&options);
-    return good;
+    return outcome_of(status);
 }
 
-static bool open_frame(struct encoder_stream *stream)
+static enum outcome open_frame(struct encoder_stream *stream)
 {
     AVFrame *frame = stream->frame = stream->av->av_frame_alloc();
     stream->packet = stream->av->av_packet_alloc();
     stream->scratch = malloc(ycbcr_scratch_bytes(stream->width));
     if (!frame || !stream->packet || !stream->scratch)
-        return false;
+        return OUTCOME_NO_MEMORY;
     frame->format = stream->codec->pix_fmt;
     frame->width = stream->codec->width;
     frame->height = stream->codec->height;
-    return stream->av->av_frame_get_buffer(frame, 0) == 0;
+    return outcome_of(stream->av->av_frame_get_buffer(frame, 0));
 }
 
 static bool stream_open(struct encoder_stream *stream, const struct picture *picture,
@@ -161,11 +169,15 @@ static bool stream_open(struct encoder_stream *stream, const struct picture *pic
         if (!codec || atomic_load(&codec_fails[which]))
             continue;
         stream->which = which;
-        if (open_codec(stream, codec, wish) && open_frame(stream))
+        enum outcome outcome = open_codec(stream, codec, wish);
+        if (outcome == OUTCOME_DONE)
+            outcome = open_frame(stream);
+        if (outcome == OUTCOME_DONE)
             return true;
         stream_close(stream);
-        /* The last one has no other to make way for, and fails for lack of memory only. */
-        atomic_store(&codec_fails[which], which + 1 < CODEC_COUNT);
+        /* The last one has no other to make way for. */
+        if (outcome == OUTCOME_REFUSED && which + 1 < CODEC_COUNT)
+            atomic_store(&codec_fails[which], true);
     }
     return false;
 }
@@ -191,17 +203,19 @@ static bool fill_frame(struct encoder_stream *stream, const struct picture *pict
 }
 
 /* One picture in, one packet out. */
-static bool encode_picture(struct encoder_stream *stream, const struct picture *picture,
-                           const struct encoder_wish *wish, struct encoded_picture *out)
+static enum outcome encode_picture(struct encoder_stream *stream, const struct picture *picture,
+                                   const struct encoder_wish *wish, struct encoded_picture *out)
 {
     if (!fill_frame(stream, picture))
-        return false;
+        return OUTCOME_NO_MEMORY;
     set_rate(stream, wish);
     stream->frame->pts = stream->next_picture++;
     stream->frame->pict_type = wish->key_frame ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
-    if (stream->av->avcodec_send_frame(stream->codec, stream->frame) < 0 ||
-        stream->av->avcodec_receive_packet(stream->codec, stream->packet) < 0)
-        return false;
+    int status = stream->av->avcodec_send_frame(stream->codec, stream->frame);
+    if (status >= 0)
+        status = stream->av->avcodec_receive_packet(stream->codec, stream->packet);
+    if (status < 0)
+        return outcome_of(status);
     const AVPacket *packet = stream->packet;
     out->size_bytes = (size_t)packet->size;
     out->key_frame = packet->flags & AV_PKT_FLAG_KEY;
@@ -209,7 +223,7 @@ static bool encode_picture(struct encoder_stream *stream, const struct picture *
     if (out->bytes)
         memcpy(out->bytes, packet->data, out->size_bytes);
     stream->av->av_packet_unref(stream->packet);
-    return out->bytes != NULL;
+    return out->bytes ? OUTCOME_DONE : OUTCOME_NO_MEMORY;
 }
 
 bool encoder_stream_encode(struct encoder_stream *stream, const struct picture *picture,
@@ -228,10 +242,13 @@ bool encoder_stream_encode(struct encoder_stream *stream, const struct picture *
                 return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no encoder of H.264 opens for %ux%u",
                                  picture->width, picture->height);
         }
-        if (encode_picture(stream, picture, wish, out))
+        enum outcome outcome = encode_picture(stream, picture, wish, out);
+        if (outcome == OUTCOME_DONE)
             return true;
         enum codec which = stream->which;
-        stream_close(stream);
+        stream_close(stream); /* the next picture begins anew */
+        if (outcome == OUTCOME_NO_MEMORY)
+            return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no memory for a picture in H.264");
         if (which + 1 == CODEC_COUNT)
             return error_set(error, ERROR_INTERNAL, "encoding", "%s gave no picture", codec_names[which]);
         atomic_store(&codec_fails[which], true);
