@@ -41,7 +41,7 @@ static const struct option options[] = {
      "Addresses to listen at, separated by blanks: unix:/PATH, tcp:HOST:PORT"},
     {"server", "readers", ANYTIME, OPTION_TEXT, AT(readers), "", 0, 0, "",
      "Users who may only look, over the Unix socket: names or numbers, separated by blanks. They attach to shared "
-     "scenes and render them, and change nothing"},
+     "scenes and render them, and change nothing; but by TCP on loopback, if that is listened to, they come as anybody"},
     {"server", "insecure", START, OPTION_BOOL, AT(insecure), "no", 0, 1, "",
      "Let TCP listen beyond loopback without a key: nothing is encrypted and nobody is asked who he is"},
     {"server", "key_file", ANYTIME, OPTION_TEXT, AT(key_file), "", 0, 0, "",
