@@ -44,12 +44,16 @@ static bool listen_until(struct fl_connection *connection, uint64_t end_ns, stru
     return true;
 }
 
+uint64_t fl_connection_silence_ns(const struct fl_connection *connection)
+{
+    const uint64_t idle_ns = connection->limits.idle_seconds * UINT64_C(1000000000);
+    return idle_ns > 0 && idle_ns / 3 < SILENCE_NS ? idle_ns / 3 : SILENCE_NS;
+}
+
 bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error)
 {
     const uint64_t end_ns = fl_now_ns() + timeout_ms * UINT64_C(1000000);
-    const uint64_t idle_ns = connection->limits.idle_seconds * UINT64_C(1000000000);
-    /* Who is silent for too long is disconnected, and who is dead does not say so. */
-    const uint64_t silence_ns = idle_ns > 0 && idle_ns / 3 < SILENCE_NS ? idle_ns / 3 : SILENCE_NS;
+    const uint64_t silence_ns = fl_connection_silence_ns(connection);
     for (;;) {
         const uint64_t now_ns = fl_now_ns();
         if (now_ns + silence_ns >= end_ns)

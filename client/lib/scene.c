@@ -18,6 +18,7 @@ struct load {
     uint64_t upload_begin_ns; /* 0: nothing was sent */
     uint64_t commit_begin_ns; /* 0: no commit is waiting for its answer */
     uint32_t commit_request;  /* as the daemon knows it */
+    uint64_t ping_due_ns;
     struct fl_error refusal;  /* the daemon's first error for an importer's request */
 };
 
@@ -132,12 +133,35 @@ static bool drain_daemon(struct load *load, struct fl_error *error)
 
 /* ---- both ---- */
 
+/* An importer may read and think for longer than the daemon bears a client that says nothing. The number is one that
+ * the importer's requests do not reach; the answer is dropped. */
+static bool ping_in_time(struct load *load, struct fl_error *error)
+{
+    struct message ping = {.type = MESSAGE_PING};
+    const uint64_t now_ns = fl_now_ns();
+    if (now_ns < load->ping_due_ns)
+        return true;
+    load->ping_due_ns = now_ns + fl_connection_silence_ns(load->connection);
+    if (!fl_stream_has_room(&load->connection->stream))
+        return true; /* it is not silent */
+    ping.ping.sent_ns = now_ns;
+    return fl_stream_push(&load->connection->stream, UINT32_MAX, 0, &ping, error);
+}
+
 static bool exchange(struct load *load, struct fl_error *error)
 {
+    if (!ping_in_time(load, error))
+        return false;
     struct fl_stream *daemon = &load->connection->stream, *importer = &load->importer->stream;
     struct pollfd polled[2] = {{.fd = daemon->fd, .events = fl_stream_events(daemon)},
                                {.fd = importer->fd, .events = fl_stream_events(importer)}};
-    if (!fl_wait(polled, 2, load->connection->interrupt_fd, load->importer->deadline_ns, error)) {
+    const uint64_t deadline_ns = load->importer->deadline_ns;
+    const uint64_t until_ns = load->ping_due_ns < deadline_ns ? load->ping_due_ns : deadline_ns;
+    if (!fl_wait(polled, 2, load->connection->interrupt_fd, until_ns, error)) {
+        if (error->code == FL_ERROR_TIMEOUT && until_ns < deadline_ns) {
+            *error = (struct fl_error){0};
+            return true;
+        }
         if (error->code == FL_ERROR_TIMEOUT)
             fl_error_set(error, FL_ERROR_TIMEOUT, load->importer->options.model, "the import took too long");
         return false;
@@ -204,7 +228,9 @@ static bool load_with(struct fl_importer *importer, struct fl_scene *scene, stru
     struct fl_connection *connection = scene->connection;
     if (!open_scene(connection, scene->scene, &importer->options, error))
         return false;
-    struct load load = {.connection = connection, .importer = importer};
+    struct load load = {.connection = connection,
+                        .importer = importer,
+                        .ping_due_ns = fl_now_ns() + fl_connection_silence_ns(connection)};
     load.relay = (struct fl_relay){
         .scene = scene->scene, .request_base = connection->last_request, .upload_base = connection->upload_sent};
     const bool loaded = relay_all(&load, error);

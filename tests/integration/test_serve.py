@@ -16,6 +16,7 @@ import time
 
 from farlight_test import BIN, TIMEOUT_S, Case, Daemon, bundled_scenes, exr_attributes, farlight
 from farlight_test import read_exr, read_png
+from test_animate import children
 from test_daemon import (EDIT_BEGIN, EDIT_COMMIT, ERROR, GOODBYE, OK, SCENE_OPEN, SET_NODE, STATS, STATS_REPLY, Peer,
                          error_code, error_text, named, set_node, text)
 
@@ -277,6 +278,24 @@ class Serve(Case):
         with Daemon("--config", config) as daemon, Serving(self.model, "--server", daemon.address):
             Viewer(daemon.path, "teapot.glb").until_closed()  # so long that who says nothing is sent away
             self.assertEqual(self.scenes(daemon.address)[0]["clients"], 1)
+
+    def test_an_importer_that_says_nothing_for_long_is_waited_for(self):
+        config = self.folder / "conf"
+        config.write_text("[network]\nidle = 1000\n")
+        with Daemon("--config", config) as daemon:
+            child = subprocess.Popen([BIN / "farlight", "render", self.model, "--server", daemon.address, "--size",
+                                      "48x36", "-o", self.folder / "a.png"], stderr=subprocess.PIPE, text=True)
+            self.addCleanup(child.stderr.close)
+            wait_until(lambda: children(child.pid, "farlight-import"), "no importer is there")
+            importer = children(child.pid, "farlight-import")[0]
+            os.kill(importer, signal.SIGSTOP)  # as one that reads and thinks
+            try:
+                Peer(daemon).until_closed()  # who says nothing has been sent away ..
+                Peer(daemon).until_closed()  # .. twice over
+            finally:
+                os.kill(importer, signal.SIGCONT)
+            _, errors = child.communicate(timeout=TIMEOUT_S)
+            self.assertEqual(child.returncode, 0, errors)
 
     def test_who_has_started_a_daemon_may_be_silent_there(self):
         config = self.folder / "conf"
