@@ -238,6 +238,13 @@ void cli_loading_close(struct cli_loading *loading);
 /* Sets the job's camera where the command line leaves it to the model. */
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error);
 
+/* ---- retry.c: daemons that are lost, and may come back ---- */
+
+bool cli_daemon_is_lost(const struct fl_error *error);
+/* Before the next try after so many failures in a row, at least 1: twice as long each time, within bounds. */
+uint32_t cli_retry_pause_ms(unsigned failures, uint32_t least_ms);
+bool cli_retry_wait(uint32_t pause_ms, struct fl_error *error); /* false: interrupted */
+
 /* ---- daemon.c: of commands that only ask a daemon ---- */
 
 struct cli_daemon {

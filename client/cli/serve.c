@@ -239,7 +239,7 @@ static const char *base_name(const char *path)
     return slash != NULL ? slash + 1 : path;
 }
 
-/* Until it is told to end, which is the good end, or the daemon is gone. */
+/* Until it is told to end, which is the good end, or the daemon is lost. */
 static bool stay(struct fl_connection *connection, struct fl_error *error)
 {
     while (fl_connection_wait(connection, WAIT_MS, error))
@@ -258,6 +258,61 @@ static bool put_up(const struct serving *serving, struct cli_loading *loading, s
     return announce(serving, loading, error);
 }
 
+static bool load_again(struct cli_loading *loading, const struct cli_job *job, struct fl_error *error)
+{
+    *error = (struct fl_error){0};
+    loading->job = job;
+    return cli_loading_begin(loading, error) && cli_loading_end(loading, error);
+}
+
+/* A daemon that was there all the time has the scene still; another one is given it, under the same name. */
+static bool come_back(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
+{
+    struct cli_job attaching = serving->job;
+    attaching.scene = loading->scene_name;
+    const bool attached = load_again(loading, &attaching, error);
+    loading->job = &serving->job;
+    if (attached || error->server_code != PROTOCOL_ERROR_CODE_UNKNOWN_ID)
+        return attached;
+    cli_loading_close(loading);
+    return load_again(loading, &serving->job, error);
+}
+
+/* A daemon of one's own is not lost but has failed. */
+static bool recover(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
+{
+    unsigned failures = 0;
+    loading->again = true;
+    while (serving->job.server != NULL && cli_daemon_is_lost(error)) {
+        const uint32_t pause_ms = cli_retry_pause_ms(++failures, error->retry_after_ms);
+        cli_progress_clear(loading->progress);
+        cli_report(error);
+        cli_loading_close(loading);
+        if (!serving->job.quiet)
+            fprintf(stderr, "farlight: trying again in %.1f s\n", pause_ms * 1e-3);
+        if (!cli_retry_wait(pause_ms, error))
+            return false;
+        if (!come_back(serving, loading, error))
+            continue;
+        cli_progress_clear(loading->progress);
+        if (!serving->job.quiet)
+            fputs("farlight: the scene is up again\n", stderr);
+        return true;
+    }
+    return false;
+}
+
+/* Until it is told to end, which is the good end, or the daemon is gone for good. */
+static bool stay_and_recover(const struct serving *serving, struct cli_loading *loading, struct fl_error *error)
+{
+    while (!stay(loading->connection, error))
+        if (!recover(serving, loading, error))
+            break;
+    if (error->code == FL_ERROR_INTERRUPTED)
+        *error = (struct fl_error){0};
+    return error->code == FL_ERROR_NONE;
+}
+
 static int serve(struct serving *serving)
 {
     struct fl_error error = {0};
@@ -274,7 +329,7 @@ static int serve(struct serving *serving)
     cli_progress_begin(&progress, serving->job.quiet);
     const bool is_up = put_up(serving, &loading, &error);
     cli_progress_end(&progress, is_up);
-    const bool done = is_up && stay(loading.connection, &error);
+    const bool done = is_up && stay_and_recover(serving, &loading, &error);
     if (loading.connection != NULL)
         fl_connection_set_interrupt(loading.connection, 0); /* it is still told in order */
     cli_loading_close(&loading);

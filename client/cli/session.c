@@ -4,15 +4,12 @@
 #include "cli/sink.h"
 #include "cli/trace_file.h"
 
-#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
 
-#define FIRST_PAUSE_MS 500u
-#define LONGEST_PAUSE_MS 30000u
 #define LONG_PASS_NS 1000000000u
 #define PASS_SAMPLES_MAX 65536u /* of one request, in the protocol */
 
@@ -280,26 +277,18 @@ static bool is_lost(const struct session *session, const struct fl_error *error)
 {
     if (!session->is_series || !session->was_loaded || session->sink_failed)
         return false;
-    /* What it says of its own state, it may say otherwise later, or another one at the same address. */
-    const bool is_passing = error->retryable || error->server_code == PROTOCOL_ERROR_CODE_SHUTTING_DOWN ||
-                            error->server_code == PROTOCOL_ERROR_CODE_DEVICE_LOST ||
-                            error->server_code == PROTOCOL_ERROR_CODE_BUSY;
-    return error->code == FL_ERROR_CONNECTION || (error->code == FL_ERROR_REFUSED && is_passing);
+    return cli_daemon_is_lost(error);
 }
 
 /* Twice as long each time. False: interrupted. */
 static bool pause_before_retry(const struct session *session, uint32_t least_ms, struct fl_error *error)
 {
-    const unsigned doublings = session->failures < 7 ? session->failures - 1 : 6;
-    uint32_t pause_ms = FIRST_PAUSE_MS << doublings;
-    pause_ms = pause_ms > least_ms ? pause_ms : least_ms;
-    pause_ms = pause_ms < LONGEST_PAUSE_MS ? pause_ms : LONGEST_PAUSE_MS;
-    struct pollfd polled = {.fd = cli_interrupt_fd(), .events = POLLIN};
+    const uint32_t pause_ms = cli_retry_pause_ms(session->failures, least_ms);
     if (!session->job->quiet)
         fprintf(stderr, "farlight: trying again in %.1f s (%u of %u); %u of %u frames are written\n",
                 pause_ms * 1e-3, session->failures, session->job->series.retries, session->done,
                 session->set.frame_count);
-    return poll(&polled, 1, (int)pause_ms) <= 0 || fl_error_set(error, FL_ERROR_INTERRUPTED, "", "interrupted");
+    return cli_retry_wait(pause_ms, error);
 }
 
 /* Whether the session goes on after this error, which is told. */

@@ -297,6 +297,17 @@ class Serve(Case):
             _, errors = child.communicate(timeout=TIMEOUT_S)
             self.assertEqual(child.returncode, 0, errors)
 
+    def test_a_daemon_that_comes_back_has_the_scene_again_under_its_name(self):
+        with Daemon() as daemon:
+            with Serving(self.model, "--server", daemon.address, "--name", "mine", "--quiet") as serving:
+                daemon.process.send_signal(signal.SIGTERM)
+                daemon.process.wait(TIMEOUT_S)
+                with Daemon("--listen", daemon.address) as another:
+                    wait_until(lambda: self.scenes(another.address) != [], "the scene did not come back")
+                    self.assertEqual([(scene["name"], scene["clients"]) for scene in self.scenes(another.address)],
+                                     [("mine", 1)])
+                    self.assertEqual(serving.stop(), 0)
+
     def test_who_has_started_a_daemon_may_be_silent_there(self):
         config = self.folder / "conf"
         config.write_text("[network]\nidle = 300\n")
