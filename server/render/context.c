@@ -43,14 +43,19 @@ static void add_span(struct stage_times *times, uint64_t origin_ns, const struct
     stage_times_add(times, span->stage, span->clock, span->wave, origin_ns + span->start_ns, span->duration_ns);
 }
 
+void context_add_times(struct render_context *context, const struct stage_times *spans)
+{
+    for (uint32_t i = 0; i < spans->count; i++)
+        add_span(&context->times, spans->origin_ns, &spans->spans[i]);
+}
+
 void context_collect(struct render_context *context)
 {
     struct stage_times *spans = &context->collected;
     spans->origin_ns = context->times.origin_ns;
     spans->count = 0;
     gpu_timer_collect(context->timer, spans);
-    for (uint32_t i = 0; i < spans->count; i++)
-        add_span(&context->times, spans->origin_ns, &spans->spans[i]);
+    context_add_times(context, spans);
     context->span_count = 0;
 }
 

@@ -33,7 +33,7 @@ struct render_context {
     struct gpu_timer *timer;
     struct frame_request request;
     struct stage_times times;
-    struct stage_times collected; /* only inside context_collect */
+    struct stage_times collected; /* only for a moment, on the way to `times` */
     struct scene_features features;
     struct frame_uniforms uniforms;
     struct gpu_buffer uniform_buffer;
@@ -64,6 +64,8 @@ struct render_context {
 void context_span_begin(struct render_context *context, enum stage_id stage);
 void context_span_end(struct render_context *context);
 void context_collect(struct render_context *context);
+/* Spans of this frame that were not measured by its timer. */
+void context_add_times(struct render_context *context, const struct stage_times *spans);
 /* What the host has done for a stage since then. */
 void context_add_cpu_time(struct render_context *context, enum stage_id stage, uint64_t start_ns);
 /* A compute program of shaders/render with no defines, in use. */

@@ -221,6 +221,8 @@ static bool read_band(struct frame_renderer *renderer, struct error *error)
 
 bool frame_step_waits(const struct frame_renderer *renderer)
 {
+    if (renderer->phase == PHASE_BUILD)
+        return tracer_update_waits(renderer->built ? renderer->second : renderer->tracer);
     return renderer->phase == PHASE_RESOLVE && renderer->copying && all_resolved(renderer) &&
            !gpu_readback_is_done(&renderer->work->copies[renderer->copied % 2]);
 }
@@ -267,6 +269,9 @@ enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_res
     case PHASE_IDLE:
         error_set(error, ERROR_INTERNAL, NULL, "a step of no frame");
         return FRAME_FAILED;
+    case PHASE_BUILD:
+        good = frame_build(renderer, error);
+        break;
     case PHASE_SAMPLE:
         good = begin_sample(renderer, error);
         break;

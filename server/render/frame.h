@@ -132,6 +132,8 @@ struct frame_scene;
 struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *error);
 void frame_scene_destroy(struct frame_scene *shared); /* after its renderers; accepts NULL */
 uint64_t frame_scene_device_bytes(const struct frame_scene *shared);
+/* For tests: how long a step of bringing a tracer to the scene may take; 0: the least that it can be cut to. */
+void frame_scene_set_piece(struct frame_scene *shared, uint64_t piece_ns);
 
 /* What one who looks has: the waves and the picture of one frame at a time, and the samples of the last one. */
 struct frame_renderer;
@@ -142,11 +144,13 @@ void frame_renderer_destroy(struct frame_renderer *renderer); /* accepts NULL */
 
 /* Renderers of one scene may have frames in progress at the same time, each stepped as one likes. A frame that
  * would change what they share (another revision, something that moves, a tracer in use that is not up to date)
- * may only begin while no other is in progress. False: it has to wait for that. */
+ * may only begin while no other is in progress. False: it has to wait for that. A tracer that is being brought to
+ * the scene for one frame is shared as well: the steps of each that waits for it bring it on. */
 bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *scene,
                      const struct scene_motion *motion, const struct frame_request *request);
 /* A frame in slices, so that others get their turn and a cancel is served: begin, then step until it is done
- * (or abandon). Between the two the scene must not be edited. A step takes a few milliseconds where the
+ * (or abandon). What a tracer has to build for it is part of the steps; abandoned with all frames that wait for
+ * it, it is forgotten. Between the two the scene must not be edited. A step takes a few milliseconds where the
  * device allows. `result` is filled by the last step. `motion`: where things are while the shutter is open; NULL:
  * as they were committed. It is not needed after frame_begin. A frame that may not begin is refused,
  * ERROR_INTERNAL. */
@@ -155,7 +159,8 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
 enum frame_progress { FRAME_FAILED, FRAME_MORE, FRAME_DONE };
 enum frame_progress frame_step(struct frame_renderer *renderer, struct frame_result *result, struct error *error);
 void frame_abandon(struct frame_renderer *renderer);
-/* Whether the next step would do nothing but wait for the device: others may have their turn first. */
+/* Whether the next step would do nothing but wait for the device, or for other threads that build a tracer's
+ * structure: others may have their turn first. */
 bool frame_step_waits(const struct frame_renderer *renderer);
 
 uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer); /* without what is shared */

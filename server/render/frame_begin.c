@@ -75,7 +75,6 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
                          const struct scene_motion *motion, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
-    const struct frame_request *request = &context->request;
     struct frame_scene *shared = renderer->shared;
     struct scene_changes changes = {0};
     uint64_t revision_before = shared->copy.revision;
@@ -88,21 +87,32 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     if (renderer->kept_showing != shared->showing)
         renderer->samples_before = 0;
     renderer->result.uploaded_bytes = changes.uploaded_bytes;
-    const struct tracer_impl *impl = find_tracer(renderer, request->tracer, "tracer", error);
-    if (!tracer_check_motion(impl, &shared->copy, error))
-        return false;
-    renderer->tracer = context->tracer =
-        tracer_set_take(&shared->tracers, &shared->copy, impl, &request->tracer_options, &context->times, error);
-    if (!context->tracer)
-        return false;
-    renderer->result.uploaded_bytes += context->tracer->stats.uploaded_bytes;
-    renderer->result.structure_bytes = context->tracer->stats.device_bytes;
-    memcpy(renderer->result.cubes, context->tracer->stats.cubes, sizeof(renderer->result.cubes));
     context->features = scene_features_of(scene);
     uint64_t start_ns = clock_now_ns();
     updated = environment_update(context->environment, renderer->device, scene, &renderer->shared->copy, error);
     stage_times_add(&context->times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return updated;
+}
+
+static struct tracer *take_tracer(struct frame_renderer *renderer, unsigned number, const char *field,
+                                  struct error *error)
+{
+    struct frame_scene *shared = renderer->shared;
+    const struct tracer_impl *impl = find_tracer(renderer, number, field, error);
+    if (!tracer_check_motion(impl, &shared->copy, error))
+        return NULL;
+    return tracer_set_take(&shared->tracers, renderer->device, impl,
+                           &renderer->work->context.request.tracer_options, error);
+}
+
+static bool take_tracers(struct frame_renderer *renderer, struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    const struct frame_request *request = &context->request;
+    renderer->tracer = context->tracer = take_tracer(renderer, request->tracer, "tracer", error);
+    if (renderer->tracer && request->compare)
+        renderer->second = take_tracer(renderer, request->compare_with, "compare_with", error);
+    return renderer->tracer && (!request->compare || renderer->second);
 }
 
 void frame_end(struct frame_renderer *renderer)
@@ -120,11 +130,9 @@ void frame_end(struct frame_renderer *renderer)
     renderer->work = NULL;
 }
 
-/* The second tracer's structure is no part of what the frame's own tracer cost. */
 static bool begin_comparison(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
-    struct frame_scene *shared = renderer->shared;
     const struct frame_request *request = &context->request;
     context->comparison = NULL;
     if (!request->compare) {
@@ -133,19 +141,14 @@ static bool begin_comparison(struct frame_renderer *renderer, struct error *erro
         return true;
     }
     uint64_t start_ns = clock_now_ns();
-    const struct tracer_impl *impl = find_tracer(renderer, request->compare_with, "compare_with", error);
-    if (!tracer_check_motion(impl, &shared->copy, error))
-        return false;
-    renderer->second =
-        tracer_set_take(&shared->tracers, &shared->copy, impl, &request->tracer_options, NULL, error);
     if (!renderer->work->comparison)
         renderer->work->comparison = comparison_create(renderer->device, error);
-    if (!renderer->second || !renderer->work->comparison)
+    if (!renderer->work->comparison)
         return false;
-    comparison_begin(renderer->work->comparison, &shared->copy, context->tracer, renderer->second,
+    comparison_begin(renderer->work->comparison, &renderer->shared->copy, context->tracer, renderer->second,
                      request->compare_far_share);
     context->comparison = renderer->work->comparison;
-    stage_times_add(&context->times, STAGE_COMPARE, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    context_add_cpu_time(context, STAGE_COMPARE, start_ns);
     return true;
 }
 
@@ -214,21 +217,12 @@ static void limit_samples(const struct frame_renderer *renderer, struct frame_re
     request->samples = request->samples < lacking ? request->samples : lacking;
 }
 
-static bool begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
-                  const struct frame_request *request, struct error *error)
+/* Once its tracers are what the scene is. */
+static bool get_ready(struct frame_renderer *renderer, struct error *error)
 {
-    if (!check_request(renderer, request, error))
-        return false;
-    renderer->work = frame_work_take(renderer->shared, integrator_impl_by_number(request->integrator), error);
-    if (!renderer->work)
-        return false;
     struct render_context *context = &renderer->work->context;
-    context->request = *request;
-    renderer->result = (struct frame_result){0};
-    renderer->samples_before = may_go_on(renderer, request) ? renderer->kept_samples : 0;
-    renderer->kept_samples = 0; /* until this one is finished */
-    stage_times_begin(&context->times);
-    if (!update_scene(renderer, scene, motion, error) || !begin_comparison(renderer, error))
+    const struct frame_request *request = &context->request;
+    if (!begin_comparison(renderer, error))
         return false;
     limit_samples(renderer, &context->request);
     camera_fill_uniforms(&context->uniforms, request, &renderer->shared->copy);
@@ -245,7 +239,72 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     renderer->result.revision = renderer->shared->copy.revision;
     renderer->sample = renderer->plane = renderer->band = renderer->copied = 0;
     renderer->copying = false;
-    return context->request.samples || context_upload_uniforms(context, error);
+    /* A picture that has all its samples is only handed out again. */
+    renderer->phase = request->samples ? PHASE_SAMPLE : PHASE_RESOLVE;
+    return request->samples || context_upload_uniforms(context, error);
+}
+
+static enum tracer_progress bring(struct frame_renderer *renderer, const struct tracer *tracer,
+                                  struct error *error)
+{
+    struct render_context *context = &renderer->work->context;
+    struct frame_scene *shared = renderer->shared;
+    struct stage_times *spans = &context->collected;
+    const uint64_t start_ns = clock_now_ns();
+    spans->origin_ns = context->times.origin_ns;
+    spans->count = 0;
+    enum tracer_progress progress =
+        tracer_set_bring(&shared->tracers, tracer, &shared->copy, shared->piece_ns, spans, error);
+    if (tracer == renderer->tracer)
+        context_add_times(context, spans);
+    else /* a structure that is no part of what the frame's own tracer cost */
+        context_add_cpu_time(context, STAGE_COMPARE, start_ns);
+    return progress;
+}
+
+bool frame_build(struct frame_renderer *renderer, struct error *error)
+{
+    const struct tracer_stats *stats = &renderer->tracer->stats;
+    enum tracer_progress progress = TRACER_DONE;
+    if (!renderer->built) {
+        progress = bring(renderer, renderer->tracer, error);
+        if (progress != TRACER_DONE)
+            return progress == TRACER_MORE;
+        renderer->built = true;
+        renderer->result.uploaded_bytes += stats->uploaded_bytes;
+        renderer->result.structure_bytes = stats->device_bytes;
+        memcpy(renderer->result.cubes, stats->cubes, sizeof(renderer->result.cubes));
+    }
+    if (renderer->second)
+        progress = bring(renderer, renderer->second, error);
+    return progress == TRACER_DONE ? get_ready(renderer, error) : progress == TRACER_MORE;
+}
+
+static bool begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
+                  const struct frame_request *request, struct error *error)
+{
+    if (!check_request(renderer, request, error))
+        return false;
+    renderer->work = frame_work_take(renderer->shared, integrator_impl_by_number(request->integrator), error);
+    if (!renderer->work)
+        return false;
+    struct render_context *context = &renderer->work->context;
+    context->request = *request;
+    renderer->result = (struct frame_result){0};
+    renderer->samples_before = may_go_on(renderer, request) ? renderer->kept_samples : 0;
+    renderer->kept_samples = 0; /* until this one is finished */
+    stage_times_begin(&context->times);
+    context->wave_number = 0;
+    return update_scene(renderer, scene, motion, error) && take_tracers(renderer, error);
+}
+
+/* A first piece of each, which may look at the scene's motion. */
+static bool begin_tracers(struct frame_renderer *renderer, struct error *error)
+{
+    renderer->built = false;
+    if (!frame_build(renderer, error))
+        return false;
+    return renderer->built || !renderer->second || bring(renderer, renderer->second, error) != TRACER_FAILED;
 }
 
 bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
@@ -254,12 +313,13 @@ bool frame_begin(struct frame_renderer *renderer, const struct scene *scene, con
     frame_abandon(renderer);
     if (!frame_may_begin(renderer, scene, motion, request))
         return error_set(error, ERROR_INTERNAL, NULL, "a frame that may not begin beside others");
-    if (!begin(renderer, scene, motion, request, error)) {
-        frame_end(renderer);
-        return false;
+    bool begun = begin(renderer, scene, motion, request, error);
+    if (begun) {
+        renderer->phase = PHASE_BUILD;
+        renderer->shared->frames++;
+        begun = begin_tracers(renderer, error);
     }
-    /* A picture that has all its samples is only handed out again. */
-    renderer->phase = renderer->work->context.request.samples ? PHASE_SAMPLE : PHASE_RESOLVE;
-    renderer->shared->frames++;
-    return true;
+    if (!begun)
+        frame_end(renderer);
+    return begun;
 }

@@ -27,8 +27,14 @@ struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *
         return NULL;
     }
     shared->device = device;
+    shared->piece_ns = PIECE_NS;
     scene_gpu_init(&shared->copy, device);
     return shared;
+}
+
+void frame_scene_set_piece(struct frame_scene *shared, uint64_t piece_ns)
+{
+    shared->piece_ns = piece_ns;
 }
 
 void frame_scene_destroy(struct frame_scene *shared)

@@ -16,6 +16,7 @@
 
 enum frame_phase {
     PHASE_IDLE,
+    PHASE_BUILD,
     PHASE_SAMPLE,
     PHASE_RASTER,
     PHASE_SLICE,
@@ -30,6 +31,7 @@ struct frame_scene {
     struct gpu_device *device;
     struct scene_gpu copy;
     struct tracer_set tracers;
+    uint64_t piece_ns; /* of bringing them to the scene */
     struct environment environment;
     struct environment_choice environment_choice;
     uint64_t showing;        /* counts up when the copy is of something else: a revision, poses */
@@ -62,6 +64,7 @@ struct frame_renderer {
     enum frame_phase phase;
     struct frame_work *work;        /* owned until it ends */
     struct tracer *tracer, *second; /* held; NULL: none */
+    bool built;                     /* `tracer` is what the scene is */
     bool rasterise;
     uint32_t samples_before; /* that the picture holds of the frames that this one goes on from */
     uint32_t sample;         /* samples of this frame that are done */
@@ -82,6 +85,9 @@ struct frame_work *frame_work_take(struct frame_scene *shared, const struct inte
 void frame_work_give(struct frame_scene *shared, struct frame_work *work); /* accepts NULL */
 void frame_work_finish(struct frame_scene *shared);                        /* all that are idle */
 uint64_t frame_work_device_bytes(const struct frame_work *work);
+/* frame_begin.c. A piece of bringing the tracers to the scene; the last one leaves the frame ready for its first
+ * sample. */
+bool frame_build(struct frame_renderer *renderer, struct error *error);
 /* frame_begin.c. Lets go of what the frame in hand holds of what is shared. */
 void frame_end(struct frame_renderer *renderer);
 /* frame_begin.c. Room for slices of slices.slice_rays and waves of context.wave_capacity rays. */

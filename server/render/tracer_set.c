@@ -34,7 +34,7 @@ static bool holds(const struct tracer_slot *slot, const struct tracer_impl *impl
 static bool is_up_to_date(const struct tracer_slot *slot)
 {
     const struct scene_changes *pending = &slot->pending;
-    return slot->tracer->updated && !pending->geometry && !pending->deformed && !pending->instances &&
+    return slot->tracer->updated && !slot->tracer->updating && !pending->geometry && !pending->deformed && !pending->instances &&
            !pending->shading && !pending->surfaces && !pending->lights;
 }
 
@@ -47,7 +47,7 @@ bool tracer_set_are_free(const struct tracer_set *set, const struct tracer_impl 
         bool wanted = false;
         for (size_t k = 0; k < count; k++)
             wanted = wanted || holds(slot, impls[k], options);
-        if (wanted && slot->users && !is_up_to_date(slot))
+        if (wanted && slot->users && !is_up_to_date(slot) && !slot->tracer->updating)
             return false;
         missing -= wanted;
         room += !wanted && !slot->users;
@@ -81,9 +81,8 @@ static struct tracer_slot *make_slot(struct tracer_set *set, struct gpu_device *
     return oldest;
 }
 
-struct tracer *tracer_set_take(struct tracer_set *set, struct scene_gpu *scene, const struct tracer_impl *impl,
-                               const struct tracer_options *options, struct stage_times *times,
-                               struct error *error)
+struct tracer *tracer_set_take(struct tracer_set *set, struct gpu_device *device, const struct tracer_impl *impl,
+                               const struct tracer_options *options, struct error *error)
 {
     if (!tracer_set_are_free(set, &impl, 1, options)) {
         error_set(error, ERROR_INTERNAL, NULL, "%s cannot be brought to the scene beside other frames",
@@ -92,22 +91,38 @@ struct tracer *tracer_set_take(struct tracer_set *set, struct scene_gpu *scene, 
     }
     struct tracer_slot *slot = find_slot(set, impl, options);
     if (!slot)
-        slot = make_slot(set, scene->device, impl, options, error);
+        slot = make_slot(set, device, impl, options, error);
     if (!slot)
         return NULL;
     slot->last_use = ++set->use_count;
-    if (!tracer_update(slot->tracer, scene, &slot->pending, times, error))
-        return NULL;
-    slot->pending = (struct scene_changes){0};
     slot->users++;
     return slot->tracer;
 }
 
-void tracer_set_give(struct tracer_set *set, const struct tracer *tracer)
+static struct tracer_slot *slot_of(struct tracer_set *set, const struct tracer *tracer)
 {
     for (int i = 0; tracer && i < TRACERS_KEPT; i++)
         if (set->slots[i].tracer == tracer)
-            set->slots[i].users--;
+            return &set->slots[i];
+    return NULL;
+}
+
+enum tracer_progress tracer_set_bring(struct tracer_set *set, const struct tracer *tracer, struct scene_gpu *scene,
+                                      uint64_t piece_ns, struct stage_times *times, struct error *error)
+{
+    struct tracer_slot *slot = slot_of(set, tracer);
+    enum tracer_progress progress =
+        tracer_update_piece(slot->tracer, scene, &slot->pending, piece_ns, times, error);
+    if (progress == TRACER_DONE)
+        slot->pending = (struct scene_changes){0};
+    return progress;
+}
+
+void tracer_set_give(struct tracer_set *set, const struct tracer *tracer)
+{
+    struct tracer_slot *slot = slot_of(set, tracer);
+    if (slot && --slot->users == 0)
+        tracer_update_abandon(slot->tracer);
 }
 
 uint64_t tracer_set_device_bytes(const struct tracer_set *set)

@@ -156,8 +156,9 @@ static bool bring_to(struct abuffer *abuffer, struct scene_gpu *scene, struct st
     return ok;
 }
 
-static bool abuffer_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
-                           struct stage_times *times, struct error *error)
+static enum tracer_progress abuffer_update(struct tracer *tracer, struct scene_gpu *scene,
+                                           const struct scene_changes *changes, struct stage_times *times,
+                                           struct error *error)
 {
     struct abuffer *abuffer = (struct abuffer *)tracer;
     struct tracer_stats *stats = &tracer->stats;
@@ -166,12 +167,12 @@ static bool abuffer_update(struct tracer *tracer, struct scene_gpu *scene, const
     /* Of surfaces it matters only where they are cut out. */
     bool cuts = changes->surfaces && (scene->has_cutout || abuffer->had_cutout);
     if (!changes->geometry && !changes->deformed && !changes->instances && !cuts)
-        return true;
+        return TRACER_DONE;
     bool ok = bring_to(abuffer, scene, times, error);
     if (!ok)
         abuffer_store_finish(&abuffer->store);
     fill_stats(abuffer);
-    return ok;
+    return tracer_progress_of(ok);
 }
 
 static bool abuffer_trace_wave(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,

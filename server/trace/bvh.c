@@ -281,14 +281,15 @@ static bool update_geometries(struct bvh *bvh, struct scene_gpu *scene, bool all
     return update_geometries(bvh, scene, true, times, error);
 }
 
-static bool bvh_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
-                       struct stage_times *times, struct error *error)
+static enum tracer_progress bvh_update(struct tracer *tracer, struct scene_gpu *scene,
+                                       const struct scene_changes *changes, struct stage_times *times,
+                                       struct error *error)
 {
     struct bvh *bvh = (struct bvh *)tracer;
     struct tracer_stats *stats = &tracer->stats;
     stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
     if (!changes->geometry && !changes->deformed && !changes->instances)
-        return true;
+        return TRACER_DONE;
     bool ok = ((!changes->geometry && !changes->deformed) ||
                update_geometries(bvh, scene, changes->geometry, times, error)) &&
               update_instances(bvh, scene, times, error);
@@ -296,7 +297,7 @@ static bool bvh_update(struct tracer *tracer, struct scene_gpu *scene, const str
         bvh_reset(bvh);
     stats->nodes = node_count(bvh);
     stats->device_bytes = bvh_store_bytes(&bvh->store) + bvh->transform_buffer.capacity_bytes;
-    return ok;
+    return tracer_progress_of(ok);
 }
 
 /* ---- waves ---- */

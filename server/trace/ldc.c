@@ -172,8 +172,9 @@ static bool bring_to(struct ldc *ldc, struct scene_gpu *scene, const struct scen
     return true;
 }
 
-static bool ldc_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
-                       struct stage_times *times, struct error *error)
+static enum tracer_progress ldc_update(struct tracer *tracer, struct scene_gpu *scene,
+                                       const struct scene_changes *changes, struct stage_times *times,
+                                       struct error *error)
 {
     struct ldc *ldc = (struct ldc *)tracer;
     struct tracer_stats *stats = &tracer->stats;
@@ -181,14 +182,14 @@ static bool ldc_update(struct tracer *tracer, struct scene_gpu *scene, const str
     for (int i = 0; i < TRACER_CUBES_MAX; i++)
         stats->cubes[i].rebuilt = false;
     if (!changes->geometry && !changes->deformed && !changes->instances && !changes->surfaces)
-        return true;
+        return TRACER_DONE;
     bool ok = bring_to(ldc, scene, changes, error);
     if (stats->cubes[TRACER_CUBE_STATIC].rebuilt || stats->cubes[TRACER_CUBE_DYNAMIC].rebuilt)
         gpu_timer_collect(ldc->timer, times); /* else there is nothing to wait for */
     if (!ok)
         reset(ldc);
     fill_stats(ldc);
-    return ok;
+    return tracer_progress_of(ok);
 }
 
 static bool ldc_trace_wave(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,

@@ -37,8 +37,9 @@ static void naive_destroy(struct tracer *tracer)
     free(tracer);
 }
 
-static bool naive_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
-                         struct stage_times *times, struct error *error)
+static enum tracer_progress naive_update(struct tracer *tracer, struct scene_gpu *scene,
+                                         const struct scene_changes *changes, struct stage_times *times,
+                                         struct error *error)
 {
     (void)changes, (void)times;
     uint64_t primitives = 1;
@@ -49,14 +50,15 @@ static bool naive_update(struct tracer *tracer, struct scene_gpu *scene, const s
         error_set(error, ERROR_LIMIT, "tracer",
                   "naive: %llu primitives; on software GL it can look at %u in this scene",
                   (unsigned long long)primitives - 1, SOFTWARE_ROUNDS_MAX / (unsigned)rounds);
-        return error_remedy(error, "take another tracer");
+        error_remedy(error, "take another tracer");
+        return TRACER_FAILED;
     }
     uint64_t rays = DISPATCH_TESTS_MAX / primitives;
     ((struct naive *)tracer)->rays_a_dispatch = rays > UINT32_MAX          ? UINT32_MAX
                                                 : rays < DISPATCH_RAYS_MIN ? DISPATCH_RAYS_MIN
                                                                            : (uint32_t)rays;
     tracer->stats = (struct tracer_stats){0}; /* there is nothing but the scene itself */
-    return true;
+    return TRACER_DONE;
 }
 
 static bool naive_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,

@@ -150,8 +150,9 @@ static struct tracer *reference_create(struct gpu_device *device, const struct t
     return &reference->base;
 }
 
-static bool reference_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
-                             struct stage_times *times, struct error *error)
+static enum tracer_progress reference_update(struct tracer *tracer, struct scene_gpu *scene,
+                                             const struct scene_changes *changes, struct stage_times *times,
+                                             struct error *error)
 {
     struct reference *reference = (struct reference *)tracer;
     uint64_t start_ns = clock_now_ns();
@@ -163,7 +164,7 @@ static bool reference_update(struct tracer *tracer, struct scene_gpu *scene, con
         book_memory(reference, &second);
     }
     stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
-    return ok;
+    return tracer_progress_of(ok);
 }
 
 /* ---- waves ---- */

@@ -81,22 +81,54 @@ void tracer_destroy(struct tracer *tracer)
         tracer->impl->destroy(tracer);
 }
 
-bool tracer_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
-                   struct stage_times *times, struct error *error)
+enum tracer_progress tracer_update_piece(struct tracer *tracer, struct scene_gpu *scene,
+                                         const struct scene_changes *changes, uint64_t piece_ns,
+                                         struct stage_times *times, struct error *error)
 {
     static const struct scene_changes everything = {
         .geometry = true, .deformed = true, .instances = true, .shading = true, .surfaces = true, .lights = true};
     gpu_push_group(tracer->device, tracer->impl->name);
-    bool ok = tracer->impl->update(tracer, scene, tracer->updated ? changes : &everything, times, error) &&
-              gpu_check(tracer->device, tracer->impl->name, error);
+    tracer->piece_end_ns = piece_ns == PIECE_WITHOUT_END ? PIECE_WITHOUT_END : clock_now_ns() + piece_ns;
+    enum tracer_progress progress =
+        tracer->impl->update(tracer, scene, tracer->updated ? changes : &everything, times, error);
+    bool good = progress != TRACER_FAILED && gpu_check(tracer->device, tracer->impl->name, error);
     gpu_pop_group(tracer->device);
-    /* After a failure nothing is known of the structure: the next update makes it anew. */
-    tracer->updated = ok;
-    return ok;
+    if (!good && progress == TRACER_MORE)
+        tracer->impl->abandon(tracer);
+    tracer->updating = good && progress == TRACER_MORE;
+    /* After a failure nothing is known of the structure: the next update makes it anew. In the middle of an update
+     * that has begun with the structure of some revision, this is what the pieces go by. */
+    tracer->updated = good && (progress == TRACER_DONE || tracer->updated);
+    return good ? progress : TRACER_FAILED;
+}
+
+bool tracer_update_waits(struct tracer *tracer)
+{
+    return tracer->updating && tracer->impl->waits && tracer->impl->waits(tracer);
+}
+
+void tracer_update_abandon(struct tracer *tracer)
+{
+    if (!tracer->updating)
+        return;
+    gpu_push_group(tracer->device, tracer->impl->name);
+    tracer->impl->abandon(tracer);
+    gpu_pop_group(tracer->device);
+    tracer->updating = tracer->updated = false;
+}
+
+bool tracer_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
+                   struct stage_times *times, struct error *error)
+{
+    enum tracer_progress progress = TRACER_MORE;
+    while (progress == TRACER_MORE)
+        progress = tracer_update_piece(tracer, scene, changes, PIECE_WITHOUT_END, times, error);
+    return progress == TRACER_DONE;
 }
 
 void tracer_outdate(struct tracer *tracer)
 {
+    tracer_update_abandon(tracer);
     tracer->updated = false;
 }
 
@@ -120,7 +152,7 @@ bool tracer_trace(struct tracer *tracer, struct scene_gpu *scene, const struct w
     if (!fits)
         return error_set(error, ERROR_INTERNAL, NULL, "%s: a wave of %u rays does not fit its buffers",
                          tracer->impl->name, wave->ray_count);
-    if (!tracer->updated)
+    if (!tracer->updated || tracer->updating)
         return error_set(error, ERROR_INTERNAL, NULL, "%s: traced before it was brought to the scene",
                          tracer->impl->name);
     if (wave->times && !tracer_check_motion(tracer->impl, scene, error))

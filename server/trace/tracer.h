@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/stage_times.h"
 #include "gpu/device.h"
+#include "trace/piece.h"
 #include "trace/scene_gpu.h"
 #include "trace/wave.h"
 
@@ -88,7 +89,10 @@ struct tracer {
     struct gpu_device *device;
     struct tracer_options options;
     struct tracer_stats stats;
-    bool updated; /* by the wrappers: the structure is that of some revision */
+    /* by the wrappers: */
+    bool updated;          /* the structure is that of some revision */
+    bool updating;         /* an update has begun and has not come to its end */
+    uint64_t piece_end_ns; /* when its piece in hand is to end: for piece_is_over() */
 };
 
 struct tracer_impl {
@@ -100,10 +104,20 @@ struct tracer_impl {
     bool still;
     struct tracer *(*create)(struct gpu_device *device, const struct tracer_options *options, struct error *error);
     void (*destroy)(struct tracer *tracer);
-    /* Brings the structure to the scene; `changes` is what changed since the last update of this tracer.
-     * Everything is marked changed on the first. Reports STAGE_BUILD and STAGE_UPLOAD. */
-    bool (*update)(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
-                   struct stage_times *times, struct error *error);
+    /* Does a piece of bringing the structure to the scene, until about tracer->piece_end_ns; `changes` is what
+     * changed since the last update of this tracer. Everything is marked changed on the first. After TRACER_MORE it
+     * is called again with the same scene, which stays as it is, but for scene->motion, which only the first piece
+     * may look at. What it has found so far the tracer keeps in its own struct: buffers of others may be bound
+     * between two pieces. Reports what the piece took as STAGE_BUILD and STAGE_UPLOAD, and keeps the stats'
+     * device_bytes true. */
+    enum tracer_progress (*update)(struct tracer *tracer, struct scene_gpu *scene,
+                                   const struct scene_changes *changes, struct stage_times *times,
+                                   struct error *error);
+    /* Lets go of an update that is not done, and of all that was built; the next one is a first one. NULL: there
+     * is never more than one piece. */
+    void (*abandon)(struct tracer *tracer);
+    /* Whether the next piece would only wait, for threads of the tracer's own. NULL: never. */
+    bool (*waits)(struct tracer *tracer);
     /* Buffers of the scene are bound. Queues the work; does not wait, unless it is done on the CPU. Rays
      * wave->first_ray .. wave->end_ray - 1, of which there are some. */
     bool (*trace)(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error);
@@ -123,7 +137,17 @@ bool tracer_check_motion(const struct tracer_impl *impl, const struct scene_gpu 
 struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *device,
                              const struct tracer_options *options, struct error *error);
 void tracer_destroy(struct tracer *tracer); /* accepts NULL */
-/* The first update, and the first one after a failure, takes everything to be changed. */
+/* An update is made of pieces of about `piece_ns` each (PIECE_NS), of which this does one. The scene and what its
+ * arrays hold must not change until it is done or abandoned. The first update, and the first one after a failure or
+ * one that was abandoned, takes everything to be changed. */
+enum tracer_progress tracer_update_piece(struct tracer *tracer, struct scene_gpu *scene,
+                                         const struct scene_changes *changes, uint64_t piece_ns,
+                                         struct stage_times *times, struct error *error);
+/* Whether the next piece would do nothing but wait. */
+bool tracer_update_waits(struct tracer *tracer);
+/* Nothing happens where no update has begun. */
+void tracer_update_abandon(struct tracer *tracer);
+/* All of it at once. */
 bool tracer_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
                    struct stage_times *times, struct error *error);
 /* So does the next one: it is not known what changed. */

@@ -6,8 +6,8 @@
  * The first frame of a form builds the structure and compiles programs: how long its begin took, which is one step
  * too, and its longest step is told apart from those of the second. Prints JSON: {"width", "height", "samples",
  * "software", "forms": [{tracer, integrator, first_begin_ns, first_greatest_ns, begin_ns, whole, frame_ns, cpu_ns,
- * "stages": [{stage, count, median_ns, p99_ns, greatest_ns, cpu_greatest_ns}]}]}; the stage "all" has the steps of
- * all. A frame is left after so many seconds (30): whole says whether it was finished. cpu: of all threads
+ * "stages": [{stage, count, median_ns, p99_ns, greatest_ns, cpu_greatest_ns}], "first_stages": [the same]}]}; the
+ * stage "all" has the steps of all. A frame is left after so many seconds (30): whole says whether it was finished. cpu: of all threads
  * together, which other work on the machine makes hardly longer. */
 #include "tests/bench/bench_options.h"
 
@@ -23,7 +23,8 @@
 
 enum { ALL = PHASE_IDLE, SHADOW = PHASE_RESOLVE + 1, STAGES, TRACERS = 5 };
 static const char *const stage_names[STAGES] = {
-    [ALL] = "all",           [PHASE_SAMPLE] = "sample",   [PHASE_RASTER] = "raster",
+    [ALL] = "all",           [PHASE_BUILD] = "build",     [PHASE_SAMPLE] = "sample",
+    [PHASE_RASTER] = "raster",
     [PHASE_SLICE] = "slice", [PHASE_PRIMARY] = "primary", [PHASE_LAYERS] = "layers",
     [PHASE_SHADE] = "shade", [PHASE_TRACE] = "trace",     [PHASE_RESOLVE] = "resolve",
     [SHADOW] = "shadow",
@@ -159,18 +160,20 @@ static bool measure(struct bench *bench, unsigned tracer, enum frame_integrator 
     const uint64_t start_ns = clock_now_ns(), cpu_start_ns = cpu_now_ns();
     good = good && step(bench, &steps, &whole, error);
     if (good) {
-        json_t *stages = json_array();
+        json_t *stages = json_array(), *first_stages = json_array();
         json_int_t frame_ns = (json_int_t)(clock_now_ns() - start_ns);
         json_int_t cpu_ns = (json_int_t)(cpu_now_ns() - cpu_start_ns);
-        for (int stage = 0; stage < STAGES; stage++)
+        for (int stage = 0; stage < STAGES; stage++) {
             describe_stage(stages, &steps, stage);
+            describe_stage(first_stages, &first, stage);
+        }
         json_array_append_new(bench->forms,
-                              json_pack("{s:s, s:s, s:I, s:I, s:I, s:b, s:I, s:I, s:o}", "tracer",
+                              json_pack("{s:s, s:s, s:I, s:I, s:I, s:b, s:I, s:I, s:o, s:o}", "tracer",
                                         tracer_impl_by_number(tracer)->name, "integrator",
                                         integrator_names[integrator], "first_begin_ns", (json_int_t)first_begin_ns,
                                         "first_greatest_ns", (json_int_t)first.list[first.count - 1].ns,
                                         "begin_ns", (json_int_t)begin_ns, "whole", whole, "frame_ns", frame_ns,
-                                        "cpu_ns", cpu_ns, "stages", stages));
+                                        "cpu_ns", cpu_ns, "stages", stages, "first_stages", first_stages));
     }
     free(first.list);
     free(steps.list);

@@ -74,8 +74,9 @@ static bool draw(struct plain_pass *pass, struct scene_gpu *scene, const uint32_
     return drawn;
 }
 
-static bool plain_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
-                         struct stage_times *times, struct error *error)
+static enum tracer_progress plain_update(struct tracer *tracer, struct scene_gpu *scene,
+                                         const struct scene_changes *changes, struct stage_times *times,
+                                         struct error *error)
 {
     (void)changes, (void)times;
     uint32_t *instances = NULL, count = 0;
@@ -83,7 +84,7 @@ static bool plain_update(struct tracer *tracer, struct scene_gpu *scene, const s
                       (count == 0 || draw((struct plain_pass *)tracer, scene, instances, count, error));
     glFinish();
     free(instances);
-    return done;
+    return tracer_progress_of(done);
 }
 
 static bool plain_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,

@@ -70,12 +70,13 @@ static struct tracer *create_tiles(struct gpu_device *device, const struct trace
     return create(device, options, SVO_KIND_TILES, error);
 }
 
-static bool svo_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
-                       struct stage_times *times, struct error *error)
+static enum tracer_progress svo_update(struct tracer *tracer, struct scene_gpu *scene,
+                                       const struct scene_changes *changes, struct stage_times *times,
+                                       struct error *error)
 {
     struct svo *svo = (struct svo *)tracer;
     if (!changes->geometry && !changes->deformed && !changes->instances && !changes->surfaces)
-        return true;
+        return TRACER_DONE;
     gpu_timer_begin(svo->timer, STAGE_BUILD, 0);
     const bool done = svo_tree_build(&svo->tree, scene, error);
     gpu_timer_end(svo->timer);
@@ -83,7 +84,7 @@ static bool svo_update(struct tracer *tracer, struct scene_gpu *scene, const str
     tracer->stats = (struct tracer_stats){.device_bytes = svo_tree_bytes(&svo->tree),
                                           .nodes = svo->tree.facts.records,
                                           .nodes_rebuilt = svo->tree.facts.records};
-    return done;
+    return tracer_progress_of(done);
 }
 
 static bool svo_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error)

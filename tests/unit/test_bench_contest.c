@@ -39,11 +39,12 @@ static void liar_destroy(struct tracer *tracer)
     free(tracer);
 }
 
-static bool liar_update(struct tracer *tracer, struct scene_gpu *gpu, const struct scene_changes *changes,
-                        struct stage_times *times, struct error *error)
+static enum tracer_progress liar_update(struct tracer *tracer, struct scene_gpu *gpu,
+                                        const struct scene_changes *changes, struct stage_times *times,
+                                        struct error *error)
 {
     (void)tracer;
-    return tracer_update(honest, gpu, changes, times, error);
+    return tracer_progress_of(tracer_update(honest, gpu, changes, times, error));
 }
 
 /* Every hundredth hit is told wrong. */

@@ -500,9 +500,13 @@ static void a_tracer_that_was_away_builds_what_has_changed_meanwhile(void **stat
         expect_ok(scene_gpu_update(&fixture.gpu, fixture.scene, NULL, &changes, NULL, &error), &error);
         tracer_set_note(&set, &changes);
         stage_times_begin(&fixture.times);
-        fixture.tracer = tracer_set_take(&set, &fixture.gpu, tracer_impl_by_number(frames[i].tracer), &options,
-                                         &fixture.times, &error);
+        fixture.tracer =
+            tracer_set_take(&set, device, tracer_impl_by_number(frames[i].tracer), &options, &error);
         expect_ok(fixture.tracer != NULL, &error);
+        enum tracer_progress progress = TRACER_MORE;
+        while (progress == TRACER_MORE)
+            progress = tracer_set_bring(&set, fixture.tracer, &fixture.gpu, 0, &fixture.times, &error);
+        expect_ok(progress == TRACER_DONE, &error);
         if (frames[i].tracer == NUMBER_LDC)
             expect_built(&fixture, frames[i].static_cube, frames[i].dynamic_cube);
         tracer_set_give(&set, fixture.tracer);
