@@ -34,8 +34,8 @@ static bool holds(const struct tracer_slot *slot, const struct tracer_impl *impl
 static bool is_up_to_date(const struct tracer_slot *slot)
 {
     const struct scene_changes *pending = &slot->pending;
-    return slot->tracer->updated && !slot->tracer->updating && !pending->geometry && !pending->deformed && !pending->instances &&
-           !pending->shading && !pending->surfaces && !pending->lights;
+    return slot->tracer->updated && !slot->tracer->updating && !pending->geometry && !pending->deformed &&
+           !pending->instances && !pending->shading && !pending->surfaces && !pending->lights;
 }
 
 bool tracer_set_are_free(const struct tracer_set *set, const struct tracer_impl *const impls[], size_t count,

@@ -29,7 +29,8 @@ bool tracer_set_are_free(const struct tracer_set *set, const struct tracer_impl 
  * was taken, and once it was brought to the scene, it stays as it is. */
 struct tracer *tracer_set_take(struct tracer_set *set, struct gpu_device *device, const struct tracer_impl *impl,
                                const struct tracer_options *options, struct error *error);
-/* Brings one that is taken to the scene, a piece at a time (tracer_update_piece). `times`: what this piece took. */
+/* Brings one that is taken to the scene, a piece at a time (tracer_update_piece). `times`: what this piece took.
+ */
 enum tracer_progress tracer_set_bring(struct tracer_set *set, const struct tracer *tracer, struct scene_gpu *scene,
                                       uint64_t piece_ns, struct stage_times *times, struct error *error);
 /* Accepts NULL. What nobody waits for any longer is not built to the end. */

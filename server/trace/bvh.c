@@ -264,21 +264,51 @@ static bool has_coarse_grid(const struct bvh *bvh)
     return false;
 }
 
-static bool update_geometries(struct bvh *bvh, struct scene_gpu *scene, bool all, struct stage_times *times,
-                              struct error *error)
+/* A piece of it. A scene is walked in one form however it came about: where the trees turn out to need another,
+ * all are built again, with boxes in floats or no longer. */
+static enum tracer_progress update_geometries(struct bvh *bvh, struct scene_gpu *scene, struct stage_times *times,
+                                              struct error *error)
 {
     struct tracer_stats *stats = &bvh->base.stats;
-    struct bvh_store_report report;
-    bool ok = bvh_store_update(&bvh->store, scene, all, &report, times, error);
+    struct bvh_store_report report = {0};
+    enum tracer_progress progress =
+        bvh_store_piece(&bvh->store, scene, bvh->base.piece_end_ns, &report, times, error);
     stats->uploaded_bytes += report.uploaded_bytes;
     stats->nodes_rebuilt += report.built_elements;
     stats->nodes_refitted += report.refitted_elements;
-    if (!ok || bvh->store.settings.whole == has_coarse_grid(bvh))
-        return ok;
-    /* All trees again, with boxes in floats or no longer: a scene is walked in one form however it came about. */
+    if (progress != TRACER_DONE || bvh->store.settings.whole == has_coarse_grid(bvh))
+        return progress;
     bvh_reset(bvh);
     bvh->store.settings.whole = !bvh->store.settings.whole;
-    return update_geometries(bvh, scene, true, times, error);
+    return bvh_store_begin(&bvh->store, scene, true, error) ? TRACER_MORE : TRACER_FAILED;
+}
+
+static enum tracer_progress go_on(struct bvh *bvh, struct scene_gpu *scene, struct stage_times *times,
+                                  struct error *error)
+{
+    enum tracer_progress progress = TRACER_MORE;
+    while (bvh->phase == BVH_TREES && progress == TRACER_MORE) {
+        progress = update_geometries(bvh, scene, times, error);
+        if (progress == TRACER_DONE)
+            bvh->phase = BVH_TOP;
+        if (progress == TRACER_FAILED || piece_is_over(bvh->base.piece_end_ns))
+            return progress == TRACER_FAILED ? TRACER_FAILED : TRACER_MORE;
+    }
+    return tracer_progress_of(update_instances(bvh, scene, times, error));
+}
+
+static bool begin_update(struct bvh *bvh, const struct scene_gpu *scene, const struct scene_changes *changes,
+                         struct error *error)
+{
+    bool trees = changes->geometry || changes->deformed;
+    bvh->phase = trees ? BVH_TREES : BVH_TOP;
+    return !trees || bvh_store_begin(&bvh->store, scene, changes->geometry, error);
+}
+
+static void fill_stats(struct bvh *bvh)
+{
+    bvh->base.stats.nodes = node_count(bvh);
+    bvh->base.stats.device_bytes = bvh_store_bytes(&bvh->store) + bvh->transform_buffer.capacity_bytes;
 }
 
 static enum tracer_progress bvh_update(struct tracer *tracer, struct scene_gpu *scene,
@@ -287,17 +317,35 @@ static enum tracer_progress bvh_update(struct tracer *tracer, struct scene_gpu *
 {
     struct bvh *bvh = (struct bvh *)tracer;
     struct tracer_stats *stats = &tracer->stats;
-    stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
-    if (!changes->geometry && !changes->deformed && !changes->instances)
-        return TRACER_DONE;
-    bool ok = ((!changes->geometry && !changes->deformed) ||
-               update_geometries(bvh, scene, changes->geometry, times, error)) &&
-              update_instances(bvh, scene, times, error);
-    if (!ok)
+    enum tracer_progress progress = TRACER_MORE;
+    if (bvh->phase == BVH_IDLE) {
+        stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
+        if (!changes->geometry && !changes->deformed && !changes->instances)
+            return TRACER_DONE;
+        if (!begin_update(bvh, scene, changes, error))
+            progress = TRACER_FAILED;
+    }
+    if (progress == TRACER_MORE)
+        progress = go_on(bvh, scene, times, error);
+    if (progress == TRACER_FAILED)
         bvh_reset(bvh);
-    stats->nodes = node_count(bvh);
-    stats->device_bytes = bvh_store_bytes(&bvh->store) + bvh->transform_buffer.capacity_bytes;
-    return tracer_progress_of(ok);
+    if (progress != TRACER_MORE)
+        bvh->phase = BVH_IDLE;
+    fill_stats(bvh);
+    return progress;
+}
+
+static void bvh_abandon(struct tracer *tracer)
+{
+    struct bvh *bvh = (struct bvh *)tracer;
+    bvh_reset(bvh);
+    bvh->phase = BVH_IDLE;
+    fill_stats(bvh);
+}
+
+static bool bvh_waits(struct tracer *tracer)
+{
+    return bvh_store_waits(&((struct bvh *)tracer)->store);
 }
 
 /* ---- waves ---- */
@@ -379,5 +427,7 @@ const struct tracer_impl tracer_bvh_impl = {
     .create = bvh_create,
     .destroy = bvh_destroy,
     .update = bvh_update,
+    .abandon = bvh_abandon,
+    .waits = bvh_waits,
     .trace = bvh_trace,
 };

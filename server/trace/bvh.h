@@ -8,8 +8,12 @@
 #include "trace/bvh_store.h"
 #include "trace/tracer.h"
 
+/* Where an update is. */
+enum bvh_phase { BVH_IDLE, BVH_TREES, BVH_TOP };
+
 struct bvh {
     struct tracer base;
+    enum bvh_phase phase;
     struct bvh_store store;
     struct bvh_top top;
     struct bvh_transform *transforms; /* mirror of the buffer, one an instance of the scene */

@@ -29,6 +29,7 @@ struct builder {
     uint32_t waiting_count;
     unsigned busy;
     bool shared; /* several threads */
+    const atomic_bool *stop;
 };
 
 /* Half the surface, as the costs of splits are. */
@@ -137,7 +138,7 @@ static void build_range(struct builder *builder, struct range range)
 {
     struct range stack[STACK_DEPTH];
     unsigned depth = 0;
-    for (;;) {
+    while (!bvh_is_stopped(builder->stop)) {
         struct range left, right;
         if (range.end - range.begin >= TASK_PRIMITIVES)
             progress_tell();
@@ -188,10 +189,10 @@ static void free_work(struct builder *builder)
 }
 
 bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count,
-                      const struct bvh_costs *costs, unsigned threads)
+                      const struct bvh_costs *costs, unsigned threads, const atomic_bool *stop)
 {
     *tree = (struct bvh_binary){.primitive_count = count};
-    struct builder builder = {.tree = tree, .boxes = boxes, .costs = costs, .shared = threads > 1};
+    struct builder builder = {.tree = tree, .boxes = boxes, .costs = costs, .shared = threads > 1, .stop = stop};
     tree->nodes = aligned_alloc(16, (2 * (size_t)count - 1) * sizeof *tree->nodes);
     tree->areas = malloc((2 * (size_t)count - 1) * sizeof *tree->areas);
     tree->order = malloc(count * sizeof *tree->order);
@@ -211,7 +212,10 @@ bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t c
     pthread_cond_destroy(&builder.changed);
     pthread_mutex_destroy(&builder.mutex);
     free_work(&builder);
-    return true;
+    if (!bvh_is_stopped(stop))
+        return true;
+    bvh_binary_finish(tree);
+    return false;
 }
 
 void bvh_binary_finish(struct bvh_binary *tree)

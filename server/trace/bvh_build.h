@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "shared/bvh_node.h"
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -48,9 +49,10 @@ struct bvh_costs {
     uint32_t leaf_max; /* 1 .. BVH_LEAF_MAX */
 };
 
-/* Builds over boxes[0..count-1], which it reorders. 1 <= count <= 2^27. False: out of memory. */
+/* Builds over boxes[0..count-1], which it reorders. 1 <= count <= 2^27. False: out of memory, or stopped: `stop`
+ * (NULL: never) was set meanwhile. */
 bool bvh_binary_build(struct bvh_binary *tree, struct bvh_box *boxes, uint32_t count,
-                      const struct bvh_costs *costs, unsigned threads);
+                      const struct bvh_costs *costs, unsigned threads, const atomic_bool *stop);
 void bvh_binary_finish(struct bvh_binary *tree);
 /* The node after i in depth-first order, gaps left out. */
 uint32_t bvh_binary_next(const struct bvh_binary_node *nodes, uint32_t i);
@@ -87,10 +89,16 @@ enum bvh_bounds { BVH_BOUNDS_OF_BOXES, BVH_BOUNDS_OF_SPHERES };
 
 struct bvh_settings {
     enum bvh_bounds bounds;
-    bool plain;       /* one order for every direction */
-    bool whole;       /* boxes in floats, not on a grid */
-    unsigned threads; /* at most; small shapes take one */
+    bool plain;              /* one order for every direction */
+    bool whole;              /* boxes in floats, not on a grid */
+    unsigned threads;        /* at most; small shapes take one */
+    const atomic_bool *stop; /* once it is set a build fails, soon; NULL: never */
 };
+
+static inline bool bvh_is_stopped(const atomic_bool *stop)
+{
+    return stop && atomic_load_explicit(stop, memory_order_relaxed);
+}
 
 /* Shapes of fewer primitives are built by one thread. */
 #define BVH_THREADED_PRIMITIVES 50000u
@@ -136,8 +144,17 @@ struct bvh_job {
     struct error error;   /* out; kind ERROR_NONE: built */
 };
 
-/* Builds all; the caller finishes the trees. Where there is much to do it is done in other threads than the
- * caller's, which waits. False: one failed; its error is in *error. */
+/* Begins to build all. Where there is much to do it is done in threads of its own, which read the shapes and what
+ * they point to until the run is finished or stopped, and are only stopped between two of a build's loops over the
+ * primitives of a range. The caller finishes the trees, in any case. NULL: out of memory. */
+struct bvh_run;
+struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_settings *settings);
+/* Waits until then, by clock_now_ns(), at most. False: it is not done. */
+bool bvh_jobs_wait(struct bvh_run *run, uint64_t until_ns);
+/* Waits for the end; *end_ns is when it came. False: one failed; its error is in *error. */
+bool bvh_jobs_finish(struct bvh_run *run, uint64_t *end_ns, struct error *error);
+void bvh_jobs_stop(struct bvh_run *run); /* accepts NULL */
+/* From beginning to end. */
 bool bvh_jobs_run(struct bvh_job *jobs, uint32_t count, const struct bvh_settings *settings, struct error *error);
 
 /* ---- the pieces, for the top tree ---- */

@@ -122,8 +122,8 @@ bool bvh_top_build(struct bvh_top *top, const struct bvh_world_box *boxes, uint3
     for (uint32_t i = 0; ok && i < count; i++)
         top->element_of[i] = BVH_NONE;
     if (filled_count > 0) {
-        ok =
-            bvh_binary_build(&binary, filled, filled_count, &costs, 1) && bake_top(top, &binary) && top_alloc(top);
+        ok = bvh_binary_build(&binary, filled, filled_count, &costs, 1, NULL) && bake_top(top, &binary) &&
+             top_alloc(top);
         if (ok) {
             fill_elements(top, &binary, instances);
             top->built_cost = tree_cost(top);

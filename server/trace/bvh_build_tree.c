@@ -29,6 +29,11 @@ struct work {
     float (*spheres)[4]; /* per place of the binary tree: centre, radius; NULL with boxes */
 };
 
+static bool is_stopped(const struct work *work)
+{
+    return bvh_is_stopped(work->settings->stop);
+}
+
 static const float *corner_of(const struct bvh_shape *shape, const float *positions, uint32_t triangle,
                               unsigned corner)
 {
@@ -75,6 +80,8 @@ static void chunk_boxes(void *context, uint32_t chunk)
 {
     struct work *work = context;
     uint32_t begin = chunk * CHUNK, end = begin + CHUNK;
+    if (is_stopped(work))
+        return;
     if (end > work->shape->primitive_count)
         end = work->shape->primitive_count;
     for (uint32_t i = begin; i < end; i++)
@@ -96,6 +103,8 @@ static void chunk_primitives(void *context, uint32_t chunk)
     struct work *work = context;
     const struct bvh_shape *shape = work->shape;
     uint32_t begin = chunk * CHUNK, end = begin + CHUNK;
+    if (is_stopped(work))
+        return;
     if (end > shape->primitive_count)
         end = shape->primitive_count;
     for (uint32_t i = begin; i < end; i++) {
@@ -195,6 +204,8 @@ static void chunk_elements(void *context, uint32_t chunk)
     const struct bvh_baked *baked = &work->baked;
     uint32_t kind = work->shape->centres_radii ? BVH_LEAF_SPHERES : BVH_LEAF_TRIANGLES;
     uint32_t begin = chunk * CHUNK, end = begin + CHUNK;
+    if (is_stopped(work))
+        return;
     if (end > baked->element_count)
         end = baked->element_count;
     for (uint32_t e = begin; e < end; e++) {
@@ -305,11 +316,15 @@ static bool build(struct work *work)
     if (!alloc_primitives(work))
         return false;
     parallel_run(threads, chunk_count(count), chunk_boxes, work);
-    if (!bvh_binary_build(&work->binary, work->boxes, count, &costs, threads))
+    if (is_stopped(work) ||
+        !bvh_binary_build(&work->binary, work->boxes, count, &costs, threads, work->settings->stop))
         return false;
     if (work->settings->bounds == BVH_BOUNDS_OF_SPHERES && !make_spheres(work))
         return false;
-    if (!bvh_bake(&work->baked, &work->binary, work->binary.areas, bvh_octants(work->settings), threads))
+    if (is_stopped(work) ||
+        !bvh_bake(&work->baked, &work->binary, work->binary.areas, bvh_octants(work->settings), threads))
+        return false;
+    if (is_stopped(work))
         return false;
     memcpy(tree->lower, work->binary.nodes[0].lower, sizeof tree->lower);
     memcpy(tree->upper, work->binary.nodes[0].upper, sizeof tree->upper);
@@ -322,6 +337,8 @@ static bool build(struct work *work)
         return false;
     parallel_run(threads, chunk_count(tree->element_count), chunk_elements, work);
     parallel_run(threads, chunk_count(count), chunk_primitives, work);
+    if (is_stopped(work))
+        return false;
     if (work->shape->deforms && bvh_octants(work->settings) == BVH_OCTANTS)
         return make_plan(work);
     return true;

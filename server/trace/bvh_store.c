@@ -14,14 +14,27 @@
  * in one piece: a call costs as much as some thousand bytes. */
 #define WRITE_WHOLE 4u
 #define WRITE_RUNS_MAX 64u
+#define UPLOAD_BYTES ((uint64_t)1 << 22) /* at a time */
 
 void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_settings *settings)
 {
     *store = (struct bvh_store){.device = device, .settings = *settings, .top_lost = true};
 }
 
+/* Also one that is still at work. */
+static void end_build(struct bvh_store_build *build)
+{
+    bvh_jobs_stop(build->run);
+    for (uint32_t i = 0; build->jobs && i < build->count; i++)
+        bvh_tree_finish(&build->jobs[i].tree);
+    free(build->jobs);
+    free(build->which);
+    *build = (struct bvh_store_build){0};
+}
+
 void bvh_store_finish(struct bvh_store *store)
 {
+    end_build(&store->build);
     gpu_buffer_finish(store->device, &store->elements);
     gpu_buffer_finish(store->device, &store->primitives);
     gpu_buffer_finish(store->device, &store->boxes);
@@ -219,8 +232,9 @@ static bool find_missing(struct bvh_store *store, const struct scene_gpu *scene,
     return ok;
 }
 
-static bool upload_tree(struct bvh_store *store, const struct scene_gpu_geometry *geometry, struct bvh_tree *tree,
-                        struct bvh_store_report *report, struct error *error)
+/* Its place, behind the others. */
+static void add_entry(struct bvh_store *store, const struct scene_gpu_geometry *geometry,
+                      const struct bvh_tree *tree)
 {
     uint32_t element = store->top_capacity, texel = 0;
     if (store->entry_count > 0) {
@@ -244,10 +258,42 @@ static bool upload_tree(struct bvh_store *store, const struct scene_gpu_geometry
     entry->grid = tree->grid;
     entry->grid_cost = tree->grid_cost;
     entry->leaf_extent = tree->leaf_extent;
+}
+
+/* What is left of an array of which so many bytes have been written already; those are given up to the next one.
+ */
+static bool upload_array(struct bvh_store *store, struct gpu_buffer *buffer, uint64_t first_byte,
+                         const void *array, uint64_t bytes, uint64_t *done, uint64_t piece_end_ns)
+{
+    while (*done < bytes) {
+        uint64_t left = bytes - *done, now = left < UPLOAD_BYTES ? left : UPLOAD_BYTES;
+        gpu_buffer_write(store->device, buffer, (size_t)(first_byte + *done), (const uint8_t *)array + *done,
+                         (size_t)now);
+        *done += now;
+        if (piece_is_over(piece_end_ns))
+            break;
+    }
+    return *done == bytes;
+}
+
+/* Goes on with the last entry's. */
+static enum tracer_progress upload_tree(struct bvh_store *store, struct bvh_tree *tree, uint64_t piece_end_ns,
+                                        struct bvh_store_report *report, struct error *error)
+{
+    struct bvh_entry *entry = &store->entries[store->entry_count - 1];
+    uint64_t *done = &store->build.uploaded_bytes;
     size_t each_bytes = bvh_element_bytes(&store->settings), element_bytes = tree->element_count * each_bytes;
     size_t texel_bytes = tree->primitive_texels * TEXEL_BYTES;
-    gpu_buffer_write(store->device, &store->elements, element * each_bytes, tree->elements, element_bytes);
-    gpu_buffer_write(store->device, &store->primitives, texel * TEXEL_BYTES, tree->primitives, texel_bytes);
+    if (*done < element_bytes && !upload_array(store, &store->elements, entry->first_element * each_bytes,
+                                               tree->elements, element_bytes, done, piece_end_ns))
+        return TRACER_MORE;
+    uint64_t texels_done = *done - element_bytes;
+    bool all = upload_array(store, &store->primitives, entry->first_texel * TEXEL_BYTES, tree->primitives,
+                            texel_bytes, &texels_done, piece_end_ns);
+    *done = element_bytes + texels_done;
+    if (!all)
+        return TRACER_MORE;
+    *done = 0;
     report->uploaded_bytes += element_bytes + texel_bytes;
     report->built_elements += tree->element_count;
     const struct bvh_refit_plan *plan = &tree->plan;
@@ -257,52 +303,74 @@ static bool upload_tree(struct bvh_store *store, const struct scene_gpu_geometry
     uint64_t part_max = store->device->facts.storage_block_bytes_max - PART_SLACK;
     if (element_bytes > part_max || texel_bytes > part_max)
         bvh_refit_plan_finish(&tree->plan);
-    return bvh_refit_init(&entry->refit, store->device, &tree->plan, error);
+    return tracer_progress_of(bvh_refit_init(&entry->refit, store->device, &tree->plan, error));
 }
 
-/* jobs[i]: of geometry which[i], its shape is given. */
-static bool build(struct bvh_store *store, const struct scene_gpu *scene, struct bvh_job *jobs,
-                  const uint32_t *which, uint32_t missing_count, struct bvh_store_report *report,
-                  struct stage_times *times, struct error *error)
+/* Of trees over the shapes of jobs[i] for the geometries which[i]; both arrays become the store's. */
+static bool begin_build(struct bvh_store *store, struct bvh_job *jobs, uint32_t *which, uint32_t count,
+                        struct error *error)
 {
+    store->build =
+        (struct bvh_store_build){.jobs = jobs, .which = which, .count = count, .start_ns = clock_now_ns()};
     struct bvh_entry *entries =
-        realloc(store->entries, ((size_t)store->entry_count + missing_count + 1) * sizeof *entries);
-    if (entries)
+        realloc(store->entries, ((size_t)store->entry_count + count + 1) * sizeof *entries);
+    if (entries) {
         store->entries = entries;
-    if (!entries)
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
-                         scene->geometry_count);
-    uint64_t start_ns = clock_now_ns();
-    bool ok = bvh_jobs_run(jobs, missing_count, &store->settings, error);
-    uint64_t built_ns = clock_now_ns(), elements = 0, texels = 0;
-    stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, built_ns - start_ns);
-    for (uint32_t i = 0; i < missing_count; i++) {
-        elements += jobs[i].tree.element_count;
-        texels += jobs[i].tree.primitive_texels;
+        store->build.run = bvh_jobs_start(jobs, count, &store->settings);
+    }
+    return store->build.run ||
+           error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the trees of %u geometries", count);
+}
+
+/* Where the trees are done: room for them. */
+static bool finish_run(struct bvh_store *store, struct stage_times *times, struct error *error)
+{
+    struct bvh_store_build *build = &store->build;
+    uint64_t elements = 0, texels = 0, built_ns;
+    bool ok = bvh_jobs_finish(build->run, &built_ns, error);
+    build->run = NULL;
+    stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, build->start_ns, built_ns - build->start_ns);
+    for (uint32_t i = 0; i < build->count; i++) {
+        elements += build->jobs[i].tree.element_count;
+        texels += build->jobs[i].tree.primitive_texels;
     }
     uint32_t top_capacity = store->top_capacity < TOP_CAPACITY_MIN ? TOP_CAPACITY_MIN : store->top_capacity;
-    ok = ok && pack(store, top_capacity, elements, texels, error);
-    for (uint32_t i = 0; i < missing_count; i++) {
-        ok = ok && upload_tree(store, &scene->geometries[which[i]], &jobs[i].tree, report, error);
-        bvh_tree_finish(&jobs[i].tree);
-    }
-    stage_times_add(times, STAGE_UPLOAD, STAGE_CPU, 0, built_ns, clock_now_ns() - built_ns);
-    return ok;
+    return ok && pack(store, top_capacity, elements, texels, error);
 }
 
-static bool build_missing(struct bvh_store *store, const struct scene_gpu *scene, const uint32_t *missing,
-                          uint32_t missing_count, struct bvh_store_report *report, struct stage_times *times,
-                          struct error *error)
+static enum tracer_progress upload_trees(struct bvh_store *store, const struct scene_gpu *scene,
+                                         uint64_t piece_end_ns, struct bvh_store_report *report,
+                                         struct error *error)
 {
-    struct bvh_job *jobs = calloc((size_t)missing_count + 1, sizeof *jobs);
-    if (!jobs)
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
-                         scene->geometry_count);
-    for (uint32_t i = 0; i < missing_count; i++)
-        jobs[i].shape = shape_of(&scene->geometries[missing[i]]);
-    bool ok = build(store, scene, jobs, missing, missing_count, report, times, error);
-    free(jobs);
-    return ok;
+    struct bvh_store_build *build = &store->build;
+    while (build->uploaded < build->count) {
+        struct bvh_tree *tree = &build->jobs[build->uploaded].tree;
+        if (build->uploaded_bytes == 0)
+            add_entry(store, &scene->geometries[build->which[build->uploaded]], tree);
+        enum tracer_progress progress = upload_tree(store, tree, piece_end_ns, report, error);
+        if (progress != TRACER_DONE)
+            return progress;
+        bvh_tree_finish(tree);
+        build->uploaded++;
+        if (piece_is_over(piece_end_ns))
+            return TRACER_MORE;
+    }
+    return TRACER_DONE;
+}
+
+static enum tracer_progress go_on_building(struct bvh_store *store, const struct scene_gpu *scene,
+                                           uint64_t piece_end_ns, struct bvh_store_report *report,
+                                           struct stage_times *times, struct error *error)
+{
+    struct bvh_store_build *build = &store->build;
+    if (build->run && !bvh_jobs_wait(build->run, piece_end_ns))
+        return TRACER_MORE;
+    uint64_t start_ns = clock_now_ns();
+    if (build->run && !finish_run(store, times, error))
+        return TRACER_FAILED;
+    enum tracer_progress progress = upload_trees(store, scene, piece_end_ns, report, error);
+    stage_times_add(times, STAGE_UPLOAD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    return progress;
 }
 
 /* Which entry each geometry of the scene has. */
@@ -335,25 +403,30 @@ static bool index_entries(struct bvh_store *store, const struct scene_gpu *scene
 }
 
 bool bvh_store_rebuild(struct bvh_store *store, const struct scene_gpu *scene, struct bvh_job *jobs,
-                       const uint32_t *which, uint32_t count, struct bvh_store_report *report,
-                       struct stage_times *times, struct error *error)
+                       uint32_t *which, uint32_t count, struct bvh_store_report *report, struct stage_times *times,
+                       struct error *error)
 {
     struct bvh_entry *old = malloc(((size_t)count + 1) * sizeof *old);
-    if (!old)
+    if (!old) {
+        free(jobs);
+        free(which);
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u trees", count);
+    }
     for (uint32_t i = 0; i < count; i++) {
         struct bvh_entry *entry = &store->entries[store->entry_of[which[i]]];
         entry->is_wanted = false;
         old[i] = *entry;
     }
     drop_unwanted(store);
-    bool ok = build(store, scene, jobs, which, count, report, times, error);
+    bool ok = begin_build(store, jobs, which, count, error) &&
+              go_on_building(store, scene, PIECE_WITHOUT_END, report, times, error) == TRACER_DONE;
     for (uint32_t i = 0; ok && i < count; i++) {
         struct bvh_entry *entry = &store->entries[store->entry_count - count + i];
         entry->leaf_extent = old[i].leaf_extent;
         entry->grid_cost = old[i].grid_cost;
         entry->deformed_revision = scene->geometries[which[i]].deformed_revision;
     }
+    end_build(&store->build);
     free(old);
     if (ok && !index_entries(store, scene))
         ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
@@ -361,27 +434,49 @@ bool bvh_store_rebuild(struct bvh_store *store, const struct scene_gpu *scene, s
     return ok;
 }
 
-bool bvh_store_update(struct bvh_store *store, struct scene_gpu *scene, bool all, struct bvh_store_report *report,
-                      struct stage_times *times, struct error *error)
+bool bvh_store_begin(struct bvh_store *store, const struct scene_gpu *scene, bool all, struct error *error)
 {
-    *report = (struct bvh_store_report){0};
     for (uint32_t i = 0; all && i < store->entry_count; i++)
         store->entries[i].deformed_revision = UINT64_MAX;
     uint32_t missing_count = 0;
     uint32_t *missing = malloc(((size_t)scene->geometry_count + 1) * sizeof *missing);
-    bool ok = missing && find_missing(store, scene, missing, &missing_count);
+    bool found = missing && find_missing(store, scene, missing, &missing_count);
+    struct bvh_job *jobs = found ? calloc((size_t)missing_count + 1, sizeof *jobs) : NULL;
+    if (!jobs) {
+        free(missing);
+        bvh_store_finish(store);
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
+                         scene->geometry_count);
+    }
+    for (uint32_t i = 0; i < missing_count; i++)
+        jobs[i].shape = shape_of(&scene->geometries[missing[i]]);
+    bool ok = begin_build(store, jobs, missing, missing_count, error);
     if (!ok)
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
-                  scene->geometry_count);
-    ok = ok && build_missing(store, scene, missing, missing_count, report, times, error);
-    free(missing);
+        bvh_store_finish(store);
+    return ok;
+}
+
+enum tracer_progress bvh_store_piece(struct bvh_store *store, struct scene_gpu *scene, uint64_t piece_end_ns,
+                                     struct bvh_store_report *report, struct stage_times *times,
+                                     struct error *error)
+{
+    enum tracer_progress progress = go_on_building(store, scene, piece_end_ns, report, times, error);
+    if (progress == TRACER_MORE)
+        return TRACER_MORE;
+    end_build(&store->build);
+    bool ok = progress == TRACER_DONE;
     if (ok && !index_entries(store, scene))
         ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
                        scene->geometry_count);
     ok = ok && bvh_store_deform(store, scene, report, times, error);
     if (!ok)
         bvh_store_finish(store);
-    return ok;
+    return tracer_progress_of(ok);
+}
+
+bool bvh_store_waits(struct bvh_store *store)
+{
+    return store->build.run && !bvh_jobs_wait(store->build.run, 0);
 }
 
 /* ---- top tree ---- */

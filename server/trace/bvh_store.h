@@ -11,6 +11,7 @@
 #include "trace/bvh_build.h"
 #include "trace/bvh_build_top.h"
 #include "trace/bvh_refit.h"
+#include "trace/piece.h"
 #include "trace/scene_gpu.h"
 
 #include <stdbool.h>
@@ -33,6 +34,17 @@ struct bvh_entry {
     float grid_cost, leaf_extent; /* as struct bvh_tree has them */
 };
 
+/* Trees that are being built, then uploaded. */
+struct bvh_store_build {
+    struct bvh_job *jobs; /* owned; NULL: there are none */
+    uint32_t *which;      /* owned; geometry of each */
+    uint32_t count;
+    struct bvh_run *run; /* NULL: it has ended */
+    uint64_t start_ns;
+    uint32_t uploaded;       /* trees */
+    uint64_t uploaded_bytes; /* of the next one's elements and primitives */
+};
+
 struct bvh_store {
     struct gpu_device *device;
     struct bvh_settings settings;
@@ -46,6 +58,7 @@ struct bvh_store {
     bool top_lost;           /* the top tree has to be written again; cleared by who does */
     struct gpu_buffer elements, primitives;
     struct gpu_buffer boxes, roots; /* of refits */
+    struct bvh_store_build build;
 };
 
 struct bvh_store_report {
@@ -54,20 +67,26 @@ struct bvh_store_report {
 
 void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_settings *settings);
 void bvh_store_finish(struct bvh_store *store);
-/* Trees for all geometries of the scene, building those that are new or changed. What is kept is not uploaded
+/* Trees for all geometries of the scene, building those that are new or changed: begun, then in pieces that end at
+ * about that time. What the scene's arrays hold must not change meanwhile. What is kept is not uploaded
  * again, though the device may move it. Trees of geometries whose vertices have moved are refitted on the device,
  * and built anew from where these are now where refitting has made one worse than BVH_REFIT_WEAR_MAX; their
  * leaf_extent and grid_cost stay those of the mesh as it is given, so that what is chosen by them does not depend
  * on earlier poses. `all`: deformed_revision of what is there says nothing. After a failure the store is empty. */
-bool bvh_store_update(struct bvh_store *store, struct scene_gpu *scene, bool all, struct bvh_store_report *report,
-                      struct stage_times *times, struct error *error);
+bool bvh_store_begin(struct bvh_store *store, const struct scene_gpu *scene, bool all, struct error *error);
+enum tracer_progress bvh_store_piece(struct bvh_store *store, struct scene_gpu *scene, uint64_t piece_end_ns,
+                                     struct bvh_store_report *report, struct stage_times *times,
+                                     struct error *error);
+/* Whether the next piece would only wait for the builder's threads. */
+bool bvh_store_waits(struct bvh_store *store);
 /* The second half of it: trees of geometries whose vertices are others than those that they were made for. */
 bool bvh_store_deform(struct bvh_store *store, struct scene_gpu *scene, struct bvh_store_report *report,
                       struct stage_times *times, struct error *error);
-/* Trees over the shapes of jobs[i] for the geometries which[i], in place of those that they have. */
+/* Trees over the shapes of jobs[i] for the geometries which[i], in place of those that they have, all at once.
+ * Both arrays become the store's, in any case. */
 bool bvh_store_rebuild(struct bvh_store *store, const struct scene_gpu *scene, struct bvh_job *jobs,
-                       const uint32_t *which, uint32_t count, struct bvh_store_report *report,
-                       struct stage_times *times, struct error *error);
+                       uint32_t *which, uint32_t count, struct bvh_store_report *report, struct stage_times *times,
+                       struct error *error);
 /* Room for a top tree of so many elements. */
 bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, struct error *error);
 /* Writes elements of the top tree: all, or those marked in `moved`. Returns the bytes. */

@@ -172,12 +172,15 @@ static bool rebuild(struct bvh_store *store, const struct scene_gpu *scene, cons
     }
     if (!ok)
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the trees of %u meshes", deforming->count);
-    ok = ok && (count == 0 || bvh_store_rebuild(store, scene, jobs, which, count, report, times, error));
+    if (ok && count > 0) {
+        ok = bvh_store_rebuild(store, scene, jobs, which, count, report, times, error);
+    } else {
+        free(which);
+        free(jobs);
+    }
     for (uint32_t i = 0; vertices && i < deforming->count; i++)
         free(vertices[i]);
     free(vertices);
-    free(which);
-    free(jobs);
     return ok;
 }
 

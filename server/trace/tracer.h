@@ -105,10 +105,10 @@ struct tracer_impl {
     struct tracer *(*create)(struct gpu_device *device, const struct tracer_options *options, struct error *error);
     void (*destroy)(struct tracer *tracer);
     /* Does a piece of bringing the structure to the scene, until about tracer->piece_end_ns; `changes` is what
-     * changed since the last update of this tracer. Everything is marked changed on the first. After TRACER_MORE it
-     * is called again with the same scene, which stays as it is, but for scene->motion, which only the first piece
-     * may look at. What it has found so far the tracer keeps in its own struct: buffers of others may be bound
-     * between two pieces. Reports what the piece took as STAGE_BUILD and STAGE_UPLOAD, and keeps the stats'
+     * changed since the last update of this tracer. Everything is marked changed on the first. After TRACER_MORE
+     * it is called again with the same scene, which stays as it is, but for scene->motion, which only the first
+     * piece may look at. What it has found so far the tracer keeps in its own struct: buffers of others may be
+     * bound between two pieces. Reports what the piece took as STAGE_BUILD and STAGE_UPLOAD, and keeps the stats'
      * device_bytes true. */
     enum tracer_progress (*update)(struct tracer *tracer, struct scene_gpu *scene,
                                    const struct scene_changes *changes, struct stage_times *times,
@@ -138,8 +138,8 @@ struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *
                              const struct tracer_options *options, struct error *error);
 void tracer_destroy(struct tracer *tracer); /* accepts NULL */
 /* An update is made of pieces of about `piece_ns` each (PIECE_NS), of which this does one. The scene and what its
- * arrays hold must not change until it is done or abandoned. The first update, and the first one after a failure or
- * one that was abandoned, takes everything to be changed. */
+ * arrays hold must not change until it is done or abandoned. The first update, and the first one after a failure
+ * or one that was abandoned, takes everything to be changed. */
 enum tracer_progress tracer_update_piece(struct tracer *tracer, struct scene_gpu *scene,
                                          const struct scene_changes *changes, uint64_t piece_ns,
                                          struct stage_times *times, struct error *error);

@@ -3,6 +3,7 @@
  * tracer; and how it is cut into steps is not seen in the picture. */
 #include "render_fixture.h"
 
+#include "render/frame_state.h"
 #include "trace/tracer.h"
 
 #include <time.h>
@@ -235,6 +236,176 @@ static void many_triangles_are_drawn_in_parts_and_none_is_left_out(void **state)
     frame_result_finish(&traced);
 }
 
+/* ---- structures ---- */
+
+/* A field of many triangles, which one tree over takes long to build, and a ball. */
+static void a_field_and_a_ball(struct fixture *fixture)
+{
+    struct scene_material *ground = fixture_material(fixture), *ball = fixture_material(fixture);
+    ball->metallic = 1.0f;
+    ball->roughness = 0.1f;
+    a_field(fixture, ground->base.id);
+    fixture_sphere(fixture, -0.8f, 0.4f, 0.4f, 0.4f, ball->base.id);
+    fixture_light(fixture, LIGHT_DIRECTIONAL, 0.0f, 0.0f, 0.0f, 3.0f);
+    fixture_commit(fixture);
+    fixture->request.width = fixture->request.height = 64;
+    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.tracer_options.ldc_resolution = fixture->request.tracer_options.abuffer_resolution = 128;
+}
+
+/* The scene is new to the device, and its structures are made in pieces of that length. */
+static void anew_in_pieces(struct fixture *fixture, uint64_t piece_ns)
+{
+    struct error error = {0};
+    frame_renderer_destroy(fixture->renderer);
+    frame_scene_destroy(fixture->shared);
+    fixture->shared = frame_scene_create(fixture->device, &error);
+    assert_non_null(fixture->shared);
+    frame_scene_set_piece(fixture->shared, piece_ns);
+    fixture->renderer = frame_renderer_create(fixture->shared, &error);
+    assert_non_null(fixture->renderer);
+}
+
+static void begin(struct fixture *fixture, struct frame_renderer *renderer)
+{
+    struct error error = {0};
+    assert_true(frame_may_begin(renderer, fixture->scene, NULL, &fixture->request));
+    if (!frame_begin(renderer, fixture->scene, NULL, &fixture->request, &error))
+        fail_msg("frame_begin: %s: %s", error.field, error.text);
+}
+
+/* A step that does something. */
+static enum frame_progress step(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
+{
+    while (renderer->phase == PHASE_BUILD && frame_step_waits(renderer))
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    return frame_step(renderer, result, error);
+}
+
+/* Returns how many steps of the frame that has begun were spent on structures. */
+static uint32_t finish(struct frame_renderer *renderer, struct frame_result *result)
+{
+    struct error error = {0};
+    uint32_t pieces = 0;
+    enum frame_progress progress = FRAME_MORE;
+    while (progress == FRAME_MORE) {
+        pieces += renderer->phase == PHASE_BUILD;
+        progress = step(renderer, result, &error);
+    }
+    if (progress != FRAME_DONE)
+        fail_msg("frame_step: %s: %s", error.field, error.text);
+    return pieces;
+}
+
+static void expect_same(const struct frame_result *got, const struct frame_result *expected)
+{
+    assert_true(got->size_bytes == expected->size_bytes);
+    assert_memory_equal(got->pixels, expected->pixels, expected->size_bytes);
+    assert_true(got->structure_bytes == expected->structure_bytes);
+}
+
+/* Which of them are cut. */
+static const bool has_pieces[TRACER_COUNT] = {[TRACER_BVH] = true};
+
+static void structures_built_in_pieces_are_the_same(void **state)
+{
+    struct fixture *fixture = *state;
+    a_field_and_a_ball(fixture);
+    for (unsigned tracer = 0; tracer < TRACER_COUNT; tracer++) {
+        struct frame_result whole = {0}, pieces = {0};
+        if (tracer == TRACER_NAIVE || !tracer_impl_by_number(tracer))
+            continue;
+        fixture->request.tracer = tracer;
+        anew_in_pieces(fixture, PIECE_WITHOUT_END);
+        begin(fixture, fixture->renderer);
+        finish(fixture->renderer, &whole);
+        anew_in_pieces(fixture, 0);
+        begin(fixture, fixture->renderer);
+        uint32_t count = finish(fixture->renderer, &pieces);
+        print_message("%s: %u pieces\n", tracer_impl_by_number(tracer)->name, count);
+        assert_true(count > 2 || !has_pieces[tracer]);
+        expect_same(&pieces, &whole);
+        assert_true(stage_times_sum_ns(&pieces.times, STAGE_BUILD, STAGE_CPU) > 0);
+        frame_result_finish(&whole);
+        frame_result_finish(&pieces);
+    }
+}
+
+/* After any number of pieces: nothing is left of it, and what comes after it is right. */
+static void a_structure_that_nobody_waits_for_is_forgotten(void **state)
+{
+    struct fixture *fixture = *state;
+    a_field_and_a_ball(fixture);
+    for (unsigned tracer = 0; tracer < TRACER_COUNT; tracer++) {
+        struct frame_result expected = {0}, result = {0};
+        struct error error = {0};
+        if (!has_pieces[tracer])
+            continue;
+        fixture->request.tracer = tracer;
+        anew_in_pieces(fixture, 0);
+        begin(fixture, fixture->renderer);
+        uint32_t count = finish(fixture->renderer, &expected);
+        for (uint32_t done = 0; done < count; done += 1 + count / 8) {
+            anew_in_pieces(fixture, 0);
+            begin(fixture, fixture->renderer);
+            for (uint32_t i = 0; i < done; i++)
+                assert_int_equal(step(fixture->renderer, &result, &error), FRAME_MORE);
+            assert_int_equal(fixture->renderer->phase, PHASE_BUILD);
+            frame_abandon(fixture->renderer);
+            /* What a builder works with may stay for the next one, but no structure. */
+            const struct tracer *tracer_left = fixture->shared->tracers.slots[0].tracer;
+            assert_false(tracer_left->updated || tracer_left->updating);
+            begin(fixture, fixture->renderer);
+            finish(fixture->renderer, &result);
+            expect_same(&result, &expected);
+            frame_result_finish(&result);
+        }
+        frame_result_finish(&expected);
+    }
+}
+
+/* The second one begins while the first one's structure is being built, and does pieces of it; the first one may
+ * go. */
+static void frames_that_wait_for_one_structure_build_it_together(void **state)
+{
+    struct fixture *fixture = *state;
+    a_field_and_a_ball(fixture);
+    for (unsigned tracer = 0; tracer < TRACER_COUNT; tracer++) {
+        struct frame_result expected = {0}, results[2] = {{0}};
+        struct error error = {0};
+        if (!has_pieces[tracer])
+            continue;
+        fixture->request.tracer = tracer;
+        anew_in_pieces(fixture, PIECE_WITHOUT_END);
+        begin(fixture, fixture->renderer);
+        finish(fixture->renderer, &expected);
+        for (int first_goes = 0; first_goes < 2; first_goes++) {
+            anew_in_pieces(fixture, 0);
+            struct frame_renderer *second = frame_renderer_create(fixture->shared, &error);
+            assert_non_null(second);
+            begin(fixture, fixture->renderer);
+            assert_int_equal(fixture->renderer->phase, PHASE_BUILD);
+            begin(fixture, second);
+            for (int i = 0; i < 2; i++)
+                assert_int_equal(step(i ? second : fixture->renderer, &results[i], &error), FRAME_MORE);
+            if (first_goes)
+                frame_abandon(fixture->renderer);
+            finish(second, &results[1]);
+            expect_same(&results[1], &expected);
+            frame_result_finish(&results[1]);
+            if (first_goes) {
+                frame_renderer_destroy(second);
+                continue;
+            }
+            assert_true(finish(fixture->renderer, &results[0]) <= 1);
+            expect_same(&results[0], &expected);
+            frame_result_finish(&results[0]);
+            frame_renderer_destroy(second);
+        }
+        frame_result_finish(&expected);
+    }
+}
+
 int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup(name, fixture_clear)
@@ -242,6 +413,9 @@ int main(void)
         TEST(no_step_is_long_where_rays_are_slow),
         TEST(every_tracer_finds_the_same_in_parts),
         TEST(many_triangles_are_drawn_in_parts_and_none_is_left_out),
+        TEST(structures_built_in_pieces_are_the_same),
+        TEST(a_structure_that_nobody_waits_for_is_forgotten),
+        TEST(frames_that_wait_for_one_structure_build_it_together),
     };
     return cmocka_run_group_tests(tests, fixture_setup, fixture_teardown);
 }

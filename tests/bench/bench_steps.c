@@ -7,8 +7,8 @@
  * too, and its longest step is told apart from those of the second. Prints JSON: {"width", "height", "samples",
  * "software", "forms": [{tracer, integrator, first_begin_ns, first_greatest_ns, begin_ns, whole, frame_ns, cpu_ns,
  * "stages": [{stage, count, median_ns, p99_ns, greatest_ns, cpu_greatest_ns}], "first_stages": [the same]}]}; the
- * stage "all" has the steps of all. A frame is left after so many seconds (30): whole says whether it was finished. cpu: of all threads
- * together, which other work on the machine makes hardly longer. */
+ * stage "all" has the steps of all. A frame is left after so many seconds (30): whole says whether it was
+ * finished. cpu: of all threads together, which other work on the machine makes hardly longer. */
 #include "tests/bench/bench_options.h"
 
 #include "base/clock.h"
@@ -23,11 +23,9 @@
 
 enum { ALL = PHASE_IDLE, SHADOW = PHASE_RESOLVE + 1, STAGES, TRACERS = 5 };
 static const char *const stage_names[STAGES] = {
-    [ALL] = "all",           [PHASE_BUILD] = "build",     [PHASE_SAMPLE] = "sample",
-    [PHASE_RASTER] = "raster",
-    [PHASE_SLICE] = "slice", [PHASE_PRIMARY] = "primary", [PHASE_LAYERS] = "layers",
-    [PHASE_SHADE] = "shade", [PHASE_TRACE] = "trace",     [PHASE_RESOLVE] = "resolve",
-    [SHADOW] = "shadow",
+    [ALL] = "all",           [PHASE_BUILD] = "build",     [PHASE_SAMPLE] = "sample", [PHASE_RASTER] = "raster",
+    [PHASE_SLICE] = "slice", [PHASE_PRIMARY] = "primary", [PHASE_LAYERS] = "layers", [PHASE_SHADE] = "shade",
+    [PHASE_TRACE] = "trace", [PHASE_RESOLVE] = "resolve", [SHADOW] = "shadow",
 };
 static const char *const integrator_names[] = {
     [INTEGRATOR_WHITTED] = "whitted", [INTEGRATOR_DISTRIBUTED] = "distributed",

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The engine with the real renderer: frames of clients that take turns are those that each would get alone. */
+#include "job/backend.h"
 #include "job/view_wishes.h"
 
 #include <poll.h>
@@ -18,11 +19,83 @@
 
 static struct engine *engine;
 
+/* ---- the real renderer, watched ----------------------------------------------------------------- */
+
+static struct tracer_impl watched_bvh;
+static struct {
+    /* Of the engine's thread: whose structure is not done; and this step did a piece. */
+    const struct tracer *building;
+    bool stepped;
+    atomic_uint pieces, beside; /* of structures that have several; steps between two of them */
+    atomic_bool held;           /* the second piece waits for `gate` */
+    atomic_bool gate;
+} watched;
+
+static enum tracer_progress watched_update(struct tracer *tracer, struct scene_gpu *scene,
+                                           const struct scene_changes *changes, struct stage_times *times,
+                                           struct error *error)
+{
+    bool goes_on = watched.building == tracer;
+    if (goes_on && atomic_load(&watched.pieces) == 1 && !atomic_load(&watched.gate)) {
+        atomic_store(&watched.held, true);
+        while (!atomic_load(&watched.gate))
+            poll(NULL, 0, 1);
+    }
+    tracer->piece_end_ns = 0; /* the least that it can be cut to */
+    enum tracer_progress progress = tracer_bvh_impl.update(tracer, scene, changes, times, error);
+    if (goes_on || progress == TRACER_MORE) {
+        watched.building = progress == TRACER_MORE ? tracer : NULL;
+        atomic_fetch_add(&watched.pieces, 1);
+    }
+    watched.stepped = true;
+    return progress;
+}
+
+static void watched_abandon(struct tracer *tracer)
+{
+    watched.building = NULL;
+    tracer_bvh_impl.abandon(tracer);
+}
+
+static struct frame_renderer *watched_renderer(struct frame_scene *shared, struct error *error)
+{
+    struct frame_renderer *renderer = frame_renderer_create(shared, error);
+    if (renderer)
+        frame_renderer_stand_in(renderer, TRACER_BVH, &watched_bvh);
+    return renderer;
+}
+
+static enum frame_progress watched_step(struct frame_renderer *renderer, struct frame_result *result,
+                                        struct error *error)
+{
+    bool building = watched.building != NULL;
+    watched.stepped = false;
+    enum frame_progress progress = frame_step(renderer, result, error);
+    atomic_fetch_add(&watched.beside, building && !watched.stepped);
+    return progress;
+}
+
+static void watch(bool gate_open)
+{
+    atomic_store(&watched.pieces, 0);
+    atomic_store(&watched.beside, 0);
+    atomic_store(&watched.held, false);
+    atomic_store(&watched.gate, gate_open);
+}
+
 static int start(void **state)
 {
     (void)state;
     struct error error = {0};
-    engine = engine_create(&(struct engine_options){.gpu = {.index = -1}}, &error);
+    static struct engine_backend backend;
+    backend = engine_backend_gpu;
+    backend.renderer_create = watched_renderer;
+    backend.step = watched_step;
+    watched_bvh = tracer_bvh_impl;
+    watched_bvh.update = watched_update;
+    watched_bvh.abandon = watched_abandon;
+    watch(true);
+    engine = engine_create(&(struct engine_options){.gpu = {.index = -1}, .backend = &backend}, &error);
     if (!engine)
         print_message("skipped: %s\n", error.text);
     return 0;
@@ -476,6 +549,186 @@ static void frames_go_on_after_a_lost_context_and_are_the_same(void **state)
     engine_event_destroy(event);
 }
 
+/* ---- structures that take long to build --------------------------------------------------------- */
+
+enum { FIELD_ALONG = 600, FIELD_TRIANGLES = 2 * FIELD_ALONG * FIELD_ALONG };
+
+/* A hilly square of many triangles in place of the plain one, each with its own vertices. */
+static void make_field(uint64_t client)
+{
+    make_scene(client, 0.5f);
+    struct scene_edit *edits = calloc(1, sizeof *edits);
+    assert_non_null(edits);
+    edits[0].object = SCENE_MESH;
+    struct scene_mesh *mesh = &edits[0].set.mesh;
+    *mesh = (struct scene_mesh){
+        .base.id = 1, .vertex_count = 3 * FIELD_TRIANGLES, .triangle_count = FIELD_TRIANGLES, .range_count = 1};
+    mesh->arrays[MESH_POSITIONS] = blob_create((size_t)FIELD_TRIANGLES * 9 * sizeof(float));
+    mesh->arrays[MESH_INDICES] = blob_create((size_t)FIELD_TRIANGLES * 3 * sizeof(uint32_t));
+    mesh->ranges = calloc(1, sizeof *mesh->ranges);
+    assert_true(mesh->arrays[MESH_POSITIONS] && mesh->arrays[MESH_INDICES] && mesh->ranges);
+    *mesh->ranges = (struct material_range){0, FIELD_TRIANGLES, 1};
+    float *positions = (float *)(void *)mesh->arrays[MESH_POSITIONS]->data;
+    uint32_t *indices = (uint32_t *)(void *)mesh->arrays[MESH_INDICES]->data;
+    for (uint32_t i = 0; i < 3 * FIELD_TRIANGLES; i++) {
+        uint32_t cell = i / 6, corner = i % 6;
+        uint32_t x = cell % FIELD_ALONG + (corner == 1 || corner == 3 || corner == 4);
+        uint32_t z = cell / FIELD_ALONG + (corner == 2 || corner == 4 || corner == 5);
+        positions[3 * i] = 2.0f * (float)x / FIELD_ALONG - 1;
+        positions[3 * i + 1] = (float)((x * 7 + z * 5) % 11) / 100;
+        positions[3 * i + 2] = 2.0f * (float)z / FIELD_ALONG - 1;
+        indices[i] = i;
+    }
+    submit((struct engine_command){
+        .kind = ENGINE_COMMIT, .client = client, .request = 2, .scene = 1, .edits = edits, .edit_count = 1});
+    expect_done();
+}
+
+static void expect_gone(uint64_t client)
+{
+    submit((struct engine_command){.kind = ENGINE_CLIENT_GONE, .client = client});
+    struct engine_event *event = next_event();
+    assert_int_equal(event->kind, ENGINE_CLIENT_FORGOTTEN);
+    engine_event_destroy(event);
+}
+
+/* Of one frame and the answer behind it. */
+static uint64_t expect_picture(uint64_t *revision)
+{
+    struct engine_event *event = next_event();
+    assert_int_equal(event->kind, ENGINE_FRAME);
+    uint64_t digest = event->frame->digest;
+    *revision = event->frame->result.revision;
+    engine_event_destroy(event);
+    expect_done();
+    return digest;
+}
+
+static void submit_picture(uint64_t client, uint32_t request)
+{
+    struct engine_command made =
+        picture(request, &(struct camera_key){.eye_world = {0, 2, 3}, .up_world = {0, 1, 0}, .fov_y = 1});
+    made.client = client;
+    made.job.frame.tracer = TRACER_BVH;
+    made.job.frame.primary = PRIMARY_TRACE;
+    submit(made);
+}
+
+/* The engine is in the middle of building, and stays there until the gate is opened. */
+static void wait_until_held(void)
+{
+    for (int i = 0; i < 60000 && !atomic_load(&watched.held); i++)
+        poll(NULL, 0, 1);
+    assert_true(atomic_load(&watched.held));
+}
+
+static void expect_answers(unsigned answers, unsigned frames)
+{
+    while (answers > 0) {
+        struct engine_event *event = next_event();
+        answers -= event->kind == ENGINE_DONE;
+        frames -= event->kind == ENGINE_FRAME;
+        engine_event_destroy(event);
+    }
+    assert_int_equal(frames, 0);
+}
+
+static void others_have_their_frames_while_a_structure_is_built(void **state)
+{
+    (void)state;
+    if (!engine)
+        skip();
+    make_scene(1, 0.5f);
+    make_field(2);
+    submit_job(1, 5, TRACER_BVH); /* its programs are there */
+    expect_answers(1, FRAMES);
+    watch(false);
+    submit_picture(2, 5);
+    wait_until_held();
+    submit_job(1, 6, TRACER_BVH);
+    atomic_store(&watched.gate, true);
+    expect_answers(2, FRAMES + 1);
+    print_message("%u pieces, %u steps of another client meanwhile\n", atomic_load(&watched.pieces),
+                  atomic_load(&watched.beside));
+    assert_true(atomic_load(&watched.pieces) > 2);
+    assert_true(atomic_load(&watched.beside) > 1);
+    expect_gone(1);
+    expect_gone(2);
+}
+
+static void what_comes_while_a_structure_is_built_leaves_it_right(void **state)
+{
+    (void)state;
+    if (!engine)
+        skip();
+    uint64_t revision, other_revision;
+    make_field(1);
+    submit_picture(1, 10);
+    uint64_t expected = expect_picture(&revision);
+    expect_gone(1);
+
+    /* A cancel ends it there. */
+    make_field(1);
+    watch(false);
+    submit_picture(1, 11);
+    wait_until_held();
+    submit((struct engine_command){.kind = ENGINE_JOB_CANCEL, .client = 1, .request = 12, .target_request = 11});
+    atomic_store(&watched.gate, true);
+    unsigned cancelled = 0;
+    for (int i = 0; i < 2; i++) { /* the job's answer and the cancel's */
+        struct pollfd poll_fd = {.fd = engine_event_fd(engine), .events = POLLIN};
+        poll(&poll_fd, 1, 60000);
+        struct engine_event *event = engine_next_event(engine);
+        assert_non_null(event);
+        assert_true(event->kind == ENGINE_FAILED || event->kind == ENGINE_DONE);
+        cancelled += event->kind == ENGINE_FAILED && event->error.kind == ERROR_CANCELLED;
+        engine_event_destroy(event);
+    }
+    assert_int_equal(cancelled, 1);
+    assert_int_equal(atomic_load(&watched.pieces), 2);
+    submit_picture(1, 13);
+    assert_true(expect_picture(&other_revision) == expected);
+    expect_gone(1);
+
+    /* An edit waits for the picture of the revision before it. */
+    make_field(1);
+    watch(false);
+    submit_picture(1, 14);
+    wait_until_held();
+    struct scene_edit *edit = calloc(1, sizeof *edit);
+    assert_non_null(edit);
+    *edit = (struct scene_edit){.kind = EDIT_REMOVE, .object = SCENE_NODE, .id = 1};
+    submit((struct engine_command){
+        .kind = ENGINE_COMMIT, .client = 1, .request = 15, .scene = 1, .edits = edit, .edit_count = 1});
+    atomic_store(&watched.gate, true);
+    unsigned frames = 0;
+    for (int i = 0; i < 3; i++) { /* the picture, its job's answer and the edit's */
+        struct engine_event *event = next_event();
+        if (event->kind == ENGINE_FRAME) {
+            assert_true(event->frame->digest == expected);
+            assert_true(event->frame->result.revision == revision);
+            frames++;
+        }
+        engine_event_destroy(event);
+    }
+    assert_int_equal(frames, 1);
+    submit_picture(1, 16);
+    assert_true(expect_picture(&other_revision) != expected);
+    assert_true(other_revision > revision);
+    expect_gone(1);
+
+    /* After a lost context it is built from the beginning. */
+    make_field(1);
+    watch(false);
+    submit_picture(1, 17);
+    wait_until_held();
+    lose_contexts(1);
+    atomic_store(&watched.gate, true);
+    assert_true(expect_picture(&other_revision) == expected);
+    assert_int_equal(atomic_load(&resets), 0);
+    expect_gone(1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -484,6 +737,8 @@ int main(void)
         cmocka_unit_test(views_of_one_scene_at_once_show_what_each_shows_alone),
         cmocka_unit_test(frames_go_on_after_a_lost_context_and_are_the_same),
         cmocka_unit_test(views_beside_each_other_come_to_the_pictures_of_single_frames),
+        cmocka_unit_test(others_have_their_frames_while_a_structure_is_built),
+        cmocka_unit_test(what_comes_while_a_structure_is_built_leaves_it_right),
     };
     return cmocka_run_group_tests(tests, start, stop);
 }

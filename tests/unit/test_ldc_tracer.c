@@ -500,8 +500,7 @@ static void a_tracer_that_was_away_builds_what_has_changed_meanwhile(void **stat
         expect_ok(scene_gpu_update(&fixture.gpu, fixture.scene, NULL, &changes, NULL, &error), &error);
         tracer_set_note(&set, &changes);
         stage_times_begin(&fixture.times);
-        fixture.tracer =
-            tracer_set_take(&set, device, tracer_impl_by_number(frames[i].tracer), &options, &error);
+        fixture.tracer = tracer_set_take(&set, device, tracer_impl_by_number(frames[i].tracer), &options, &error);
         expect_ok(fixture.tracer != NULL, &error);
         enum tracer_progress progress = TRACER_MORE;
         while (progress == TRACER_MORE)
