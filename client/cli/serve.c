@@ -324,7 +324,8 @@ static int serve(struct serving *serving)
     struct cli_loading loading = {.job = &serving->job,
                                   .progress = &progress,
                                   .sharing = PROTOCOL_SHARING_SHARED,
-                                  .scene_name = serving->name != NULL ? serving->name : base_name(serving->job.model),
+                                  .scene_name =
+                                      serving->name != NULL ? serving->name : base_name(serving->job.model),
                                   .daemon_arguments = serving->words};
     cli_progress_begin(&progress, serving->job.quiet);
     const bool is_up = put_up(serving, &loading, &error);

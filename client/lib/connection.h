@@ -83,8 +83,8 @@ bool fl_connection_wait_upload(struct fl_connection *connection, uint32_t reques
 /* The answer to `request`; other messages are dropped. An ERROR is FL_ERROR_REFUSED. */
 bool fl_connection_answer(struct fl_connection *connection, uint32_t request, enum message_type expected,
                           struct fl_received *received, uint64_t deadline_ns, struct fl_error *error);
-/* After so long a client says something, lest it be sent away for its silence; and it hears then whether the daemon
- * lives still. */
+/* After so long a client says something, lest it be sent away for its silence; and it hears then whether the
+ * daemon lives still. */
 uint64_t fl_connection_silence_ns(const struct fl_connection *connection);
 /* The daemon's error as ours; returns false. */
 bool fl_error_from_message(struct fl_error *error, const struct message_error *message);

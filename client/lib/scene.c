@@ -19,7 +19,7 @@ struct load {
     uint64_t commit_begin_ns; /* 0: no commit is waiting for its answer */
     uint32_t commit_request;  /* as the daemon knows it */
     uint64_t ping_due_ns;
-    struct fl_error refusal;  /* the daemon's first error for an importer's request */
+    struct fl_error refusal; /* the daemon's first error for an importer's request */
 };
 
 /* ---- from the importer to the daemon ---- */
@@ -133,8 +133,8 @@ static bool drain_daemon(struct load *load, struct fl_error *error)
 
 /* ---- both ---- */
 
-/* An importer may read and think for longer than the daemon bears a client that says nothing. The number is one that
- * the importer's requests do not reach; the answer is dropped. */
+/* An importer may read and think for longer than the daemon bears a client that says nothing. The number is one
+ * that the importer's requests do not reach; the answer is dropped. */
 static bool ping_in_time(struct load *load, struct fl_error *error)
 {
     struct message ping = {.type = MESSAGE_PING};

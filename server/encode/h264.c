@@ -131,7 +131,8 @@ static enum outcome outcome_of(int status)
     return status >= 0 ? OUTCOME_DONE : status == AVERROR(ENOMEM) ? OUTCOME_NO_MEMORY : OUTCOME_REFUSED;
 }
 
-static enum outcome open_codec(struct encoder_stream *stream, const AVCodec *codec, const struct encoder_wish *wish)
+static enum outcome open_codec(struct encoder_stream *stream, const AVCodec *codec,
+                               const struct encoder_wish *wish)
 {
     AVDictionary *options = NULL;
     stream->codec = stream->av->avcodec_alloc_context3(codec);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Which encoder of H.264 is taken when one fails: a device that refuses is not asked again, memory that is short for
- * a moment changes nothing. The library is the real one, but what it calls the hardware's encoder is x264 as well. */
+/* Which encoder of H.264 is taken when one fails: a device that refuses is not asked again, memory that is short
+ * for a moment changes nothing. The library is the real one, but what it calls the hardware's encoder is x264 as
+ * well. */
 #include "encode/libav.h"
 #include "encode/stream.h"
 
