@@ -28,6 +28,13 @@ bool encoder_loses(enum encoding encoding)
     return encoding == ENCODING_JPEG || encoding == ENCODING_H264;
 }
 
+enum ycbcr encoder_takes(enum encoding encoding, unsigned quality)
+{
+    if (encoding == ENCODING_H264)
+        return YCBCR_VIDEO;
+    return is_known(encoding) && impls[encoding]->takes ? impls[encoding]->takes(quality) : YCBCR_NONE;
+}
+
 bool encoder_encode(enum encoding encoding, const struct picture *picture, unsigned quality, uint8_t **out,
                     size_t *out_bytes, struct error *error)
 {
@@ -41,6 +48,9 @@ bool encoder_encode(enum encoding encoding, const struct picture *picture, unsig
     if (!capacity)
         return error_set(error, ERROR_UNSUPPORTED, "encoding", "%s cannot carry %ux%u pixels of %u bytes",
                          impl->name, picture->width, picture->height, picture->bytes_per_pixel);
+    if (picture->ycbcr != YCBCR_NONE && picture->ycbcr != encoder_takes(encoding, quality))
+        return error_set(error, ERROR_UNSUPPORTED, "encoding", "%s of quality %u does not take such planes",
+                         impl->name, quality);
     uint8_t *bytes = malloc(capacity);
     if (!bytes)
         return error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no %zu bytes to encode a frame into", capacity);

@@ -4,6 +4,7 @@
 #define FARLIGHT_ENCODE_ENCODER_H
 
 #include "base/error.h"
+#include "base/ycbcr.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -22,10 +23,16 @@ struct picture {
     uint32_t width, height;
     uint32_t bytes_per_pixel; /* 4, 8 or 16; four channels */
     const uint8_t *pixels;    /* rows from the top, without gaps */
+    /* Other than none: of RGBA8 these planes are given, and no pixels. Only what encoder_takes() says is encoded.
+     */
+    enum ycbcr ycbcr;
+    struct ycbcr_planes planes;
 };
 
 struct encoder_impl {
     const char *name;
+    /* See encoder_takes(). NULL: none, whatever the quality. */
+    enum ycbcr (*takes)(unsigned quality);
     /* 0: this encoder cannot do that picture. */
     size_t (*bound)(const struct picture *picture);
     /* Writes at most `capacity` bytes, returns how many; 0 and *error on failure. */
@@ -38,6 +45,8 @@ extern const struct encoder_impl encoder_raw_impl, encoder_zstd_impl, encoder_jp
 bool encoder_supports(enum encoding encoding, uint32_t bytes_per_pixel);
 /* What comes back is not exactly what was given, and how near it is goes by a quality. */
 bool encoder_loses(enum encoding encoding);
+/* Which planes spare it a conversion and lose nothing that it keeps; RGBA8 it takes in any case. */
+enum ycbcr encoder_takes(enum encoding encoding, unsigned quality);
 /* *out is malloc'ed; quality as in the protocol's render message. */
 bool encoder_encode(enum encoding encoding, const struct picture *picture, unsigned quality, uint8_t **out,
                     size_t *out_bytes, struct error *error);

@@ -185,12 +185,31 @@ static bool stream_open(struct encoder_stream *stream, const struct picture *pic
 
 /* ---- pictures ------------------------------------------------------------------------------------ */
 
+static void copy_plane(uint8_t *to, int to_stride, const uint8_t *from, size_t from_stride, int width, int rows)
+{
+    for (int row = 0; row < rows; row++)
+        memcpy(to + (ptrdiff_t)row * to_stride, from + (size_t)row * from_stride, (size_t)width);
+}
+
+/* What the device has converted. */
+static void copy_planes(AVFrame *frame, const struct ycbcr_planes *from)
+{
+    int width = frame->width / 2, rows = frame->height / 2;
+    copy_plane(frame->data[0], frame->linesize[0], from->y, from->y_stride_bytes, frame->width, frame->height);
+    copy_plane(frame->data[1], frame->linesize[1], from->cb, from->c_stride_bytes, width, rows);
+    copy_plane(frame->data[2], frame->linesize[2], from->cr, from->c_stride_bytes, width, rows);
+}
+
 static bool fill_frame(struct encoder_stream *stream, const struct picture *picture)
 {
     AVFrame *frame = stream->frame;
     if (stream->av->av_frame_make_writable(frame) < 0) /* an encoder may still look at the one before */
         return false;
-    const struct ycbcr_planes planes = {
+    if (picture->ycbcr != YCBCR_NONE) {
+        copy_planes(frame, &picture->planes);
+        return true;
+    }
+    const struct ycbcr_target planes = {
         .y = frame->data[0],
         .cb = frame->data[1],
         .cr = frame->data[2],
@@ -236,6 +255,8 @@ bool encoder_stream_encode(struct encoder_stream *stream, const struct picture *
         picture->height > EDGE_MAX)
         return error_set(error, ERROR_UNSUPPORTED, "encoding", "h264 cannot carry %ux%u pixels of %u bytes",
                          picture->width, picture->height, picture->bytes_per_pixel);
+    if (picture->ycbcr != YCBCR_NONE && picture->ycbcr != YCBCR_VIDEO)
+        return error_set(error, ERROR_UNSUPPORTED, "encoding", "h264 does not take such planes");
     for (;;) {
         if (!is_open) {
             stream_close(stream);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Baseline JPEG through libjpeg-turbo. Alpha is dropped. */
+/* Baseline JPEG through libjpeg-turbo. Alpha is dropped. Planes, which have half the chroma, are taken where that
+ * is all that the JPEG will have. */
 #include "encode/encoder.h"
 
 #include <limits.h>
@@ -15,6 +16,11 @@ static int subsampling(unsigned quality)
     return quality >= QUALITY_FULL_CHROMA ? TJSAMP_444 : TJSAMP_420;
 }
 
+static enum ycbcr jpeg_takes(unsigned quality)
+{
+    return subsampling(quality) == TJSAMP_420 ? YCBCR_JPEG : YCBCR_NONE;
+}
+
 static size_t jpeg_bound(const struct picture *picture)
 {
     if (picture->bytes_per_pixel != 4 || picture->width > EDGE_MAX || picture->height > EDGE_MAX)
@@ -24,6 +30,21 @@ static size_t jpeg_bound(const struct picture *picture)
     unsigned long full = tjBufSize((int)picture->width, (int)picture->height, TJSAMP_444);
     unsigned long halved = tjBufSize((int)picture->width, (int)picture->height, TJSAMP_420);
     return full == ULONG_MAX || halved == ULONG_MAX ? 0 : full > halved ? full : halved;
+}
+
+/* As libjpeg-turbo says it: 0 is success. */
+static int compress(tjhandle handle, const struct picture *picture, uint8_t *out, unsigned long *bytes,
+                    int quality)
+{
+    int width = (int)picture->width, height = (int)picture->height, chroma = subsampling((unsigned)quality);
+    if (picture->ycbcr == YCBCR_NONE)
+        return tjCompress2(handle, picture->pixels, width, 0, height, TJPF_RGBX, &out, bytes, chroma, quality,
+                           TJFLAG_NOREALLOC);
+    const struct ycbcr_planes *planes = &picture->planes;
+    const unsigned char *starts[] = {planes->y, planes->cb, planes->cr};
+    int c_stride = (int)planes->c_stride_bytes, strides[] = {(int)planes->y_stride_bytes, c_stride, c_stride};
+    return tjCompressFromYUVPlanes(handle, starts, width, strides, height, chroma, &out, bytes, quality,
+                                   TJFLAG_NOREALLOC);
 }
 
 static size_t jpeg_encode(const struct picture *picture, unsigned quality, uint8_t *out, size_t capacity,
@@ -43,9 +64,7 @@ static size_t jpeg_encode(const struct picture *picture, unsigned quality, uint8
         return 0;
     }
     unsigned long used = capacity;
-    int failed = tjCompress2(handle, picture->pixels, width, 0, height, TJPF_RGBX, &out, &used, chroma, clamped,
-                             TJFLAG_NOREALLOC);
-    if (failed) {
+    if (compress(handle, picture, out, &used, clamped)) {
         error_set(error, ERROR_INTERNAL, "encoding", "libjpeg-turbo: %s", tjGetErrorStr2(handle));
         used = 0;
     }
@@ -53,4 +72,5 @@ static size_t jpeg_encode(const struct picture *picture, unsigned quality, uint8
     return used;
 }
 
-const struct encoder_impl encoder_jpeg_impl = {.name = "jpeg", .bound = jpeg_bound, .encode = jpeg_encode};
+const struct encoder_impl encoder_jpeg_impl = {
+    .name = "jpeg", .takes = jpeg_takes, .bound = jpeg_bound, .encode = jpeg_encode};

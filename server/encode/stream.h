@@ -26,7 +26,8 @@ struct encoded_picture {
 bool encoder_stream_supports(enum encoding encoding, uint32_t bytes_per_pixel);
 /* NULL: there is no memory for it. `frames_per_second` is how many are to come at most. */
 struct encoder_stream *encoder_stream_create(enum encoding encoding, float frames_per_second, struct error *error);
-/* Each picture comes out at once. One of another size than the one before is a key frame. */
+/* Of RGBA8, or of the planes that encoder_takes() says. Each picture comes out at once. One of another size than
+ * the one before is a key frame. */
 bool encoder_stream_encode(struct encoder_stream *stream, const struct picture *picture,
                            const struct encoder_wish *wish, struct encoded_picture *out, struct error *error);
 void encoder_stream_destroy(struct encoder_stream *stream); /* accepts NULL */

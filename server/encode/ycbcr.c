@@ -94,7 +94,7 @@ static void convert_chroma(uint8_t *restrict cb, uint8_t *restrict cr, const uin
     }
 }
 
-void ycbcr_convert(const struct picture *picture, const struct ycbcr_planes *planes, uint8_t *scratch)
+void ycbcr_convert(const struct picture *picture, const struct ycbcr_target *planes, uint8_t *scratch)
 {
     uint32_t width = picture->width;
     uint8_t *upper = scratch, *lower = upper + CHANNELS * row_bytes(width);

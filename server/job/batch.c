@@ -372,6 +372,8 @@ static bool frame_take_up(struct engine *engine, struct job *job, struct error *
                     : shot_make(&shot, &job->spec, scene->scene, (uint32_t)job->next_frame, &job->bounds, error);
     if (!made)
         return false;
+    shot.request.ycbcr =
+        job->spec.kind == JOB_VIEW ? view_ycbcr(job) : encoder_takes(job->spec.encoding, job->spec.quality);
     job->frame = shot.request;
     job->time_s = shot.time_s;
     job->shutter_s = shot.shutter_s;

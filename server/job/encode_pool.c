@@ -143,8 +143,10 @@ static bool append_attachment(struct engine_frame *frame, enum frame_attachment 
     const struct frame_result *result = &frame->result;
     if (!(result->attachments & which))
         return true;
-    const struct picture picture = {result->width, result->height, ATTACHMENT_PIXEL_BYTES,
-                                    frame_result_attachment(result, which)};
+    const struct picture picture = {.width = result->width,
+                                    .height = result->height,
+                                    .bytes_per_pixel = ATTACHMENT_PIXEL_BYTES,
+                                    .pixels = frame_result_attachment(result, which)};
     uint8_t *encoded;
     if (!encoder_encode(ENCODING_PREDICTED, &picture, 1, &encoded, added_bytes, error))
         return false;
@@ -170,6 +172,12 @@ static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct en
         .bytes_per_pixel = (uint32_t)(result->size_bytes / ((size_t)result->width * rows)),
         .pixels = result->pixels,
     };
+    if (result->ycbcr != YCBCR_NONE)
+        picture = (struct picture){.width = result->width,
+                                   .height = result->height,
+                                   .bytes_per_pixel = 4,
+                                   .ycbcr = result->ycbcr,
+                                   .planes = ycbcr_planes_at(result->pixels, result->width)};
     uint64_t start_ns = clock_now_ns();
     frame->digest = XXH3_64bits(result->pixels, result->size_bytes);
     if (!encode_pixels(lane, &picture, frame, error) ||

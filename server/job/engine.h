@@ -199,7 +199,7 @@ struct engine_frame {
     enum encoding encoding;
     uint8_t *bytes; /* owned, malloc'ed */
     size_t size_bytes;
-    uint64_t digest; /* XXH3-64 of the pixels before encoding */
+    uint64_t digest; /* XXH3-64 of the pixels before encoding, as they came: see result.ycbcr */
     float time_s, shutter_s;
     uint64_t encoded_ns;              /* clock_now_ns() when it was ready to be sent */
     unsigned quality;                 /* it was encoded with; 0: lossless */

@@ -214,6 +214,8 @@ uint64_t view_due_ns(const struct job *job);
 bool view_has_news(const struct job *job);
 /* What its next frame shows. */
 bool view_take_up(struct job *job, struct shot *shot, struct error *error);
+/* Of the frame that was taken up: which planes its encoder will take for certain. */
+enum ycbcr view_ycbcr(const struct job *job);
 /* Whether the frame in progress is not worth its end any more. */
 bool view_is_stale(const struct job *job);
 /* Its frame is made: fills in what a view's frame tells. */

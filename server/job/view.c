@@ -119,6 +119,21 @@ bool view_take_up(struct job *job, struct shot *shot, struct error *error)
     return true;
 }
 
+/* While it moves; at rest it is the job's. */
+static unsigned quality_of(const struct job *job)
+{
+    const struct view_wish *wish = &job->view.wish;
+    bool adapts = wish->camera.moving && job->spec.adapt && wish->effort.quality;
+    return adapts ? wish->effort.quality : job->spec.quality;
+}
+
+enum ycbcr view_ycbcr(const struct job *job)
+{
+    /* At rest the samples that are held decide how the frame is encoded, once it is there. */
+    bool certain = job->view.wish.camera.moving || job->spec.still_encoding == job->spec.encoding;
+    return certain ? encoder_takes(job->spec.encoding, quality_of(job)) : YCBCR_NONE;
+}
+
 bool view_is_stale(const struct job *job)
 {
     struct view_wish wish = view_wishes_see(job->spec.wishes);
@@ -143,10 +158,10 @@ void view_done(struct job *job, struct engine_frame *frame)
     frame->moving = camera->moving;
     view->owes_key_frame |= view->wish.key_frame;
     view->wish.key_frame = false;
+    frame->quality = quality_of(job);
     if (camera->moving && job->spec.adapt) {
         const struct view_effort *effort = &view->wish.effort;
         frame->scale_eighths = effort->scale_eighths;
-        frame->quality = effort->quality ? effort->quality : frame->quality;
         frame->wanted_bytes = effort->bytes;
     }
     bool spares = job->spec.adapt && view->wish.effort.sparing && view->held_samples < job->spec.frame.samples;

@@ -71,13 +71,19 @@ void context_add_cpu_time(struct render_context *context, enum stage_id stage, u
     add_span(&context->times, context->times.origin_ns, &span);
 }
 
-const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error)
+const struct gpu_program *context_use_with(struct render_context *context, const char *compute,
+                                           const struct gpu_define *defines, struct error *error)
 {
-    const struct gpu_program *program =
-        gpu_program_get(context->device, &(struct gpu_program_source){.compute = compute}, error);
+    const struct gpu_program_source source = {.compute = compute, .defines = defines};
+    const struct gpu_program *program = gpu_program_get(context->device, &source, error);
     if (program)
         glUseProgram(program->name);
     return program;
+}
+
+const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error)
+{
+    return context_use_with(context, compute, NULL, error);
 }
 
 void context_bind(struct render_context *context)

@@ -70,6 +70,9 @@ void context_add_times(struct render_context *context, const struct stage_times 
 void context_add_cpu_time(struct render_context *context, enum stage_id stage, uint64_t start_ns);
 /* A compute program of shaders/render with no defines, in use. */
 const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error);
+/* `defines` ends with {0}. */
+const struct gpu_program *context_use_with(struct render_context *context, const char *compute,
+                                           const struct gpu_define *defines, struct error *error);
 /* The scene, the lights and the frame's uniforms at their places. */
 void context_bind(struct render_context *context);
 bool context_upload_uniforms(struct render_context *context, struct error *error);

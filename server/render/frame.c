@@ -252,6 +252,7 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
     result->width = request->width;
     result->height = request->height;
     result->format = request->format;
+    result->ycbcr = request->ycbcr;
     result->samples = renderer->picture.samples;
     result->primary_rays = (uint64_t)request->width * request->height * request->samples;
     result->times = context->times;

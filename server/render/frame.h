@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/stage_times.h"
+#include "base/ycbcr.h"
 #include "gpu/device.h"
 #include "scene/pose.h"
 #include "scene/scene.h"
@@ -71,6 +72,9 @@ struct frame_request {
     float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
     uint32_t layers;      /* bits; 0: the picture alone. More than it need FRAME_RGBA32F */
     uint32_t attachments; /* bits; beside the picture alone, in any format of it */
+    /* RGBA8 of the picture alone: it comes as these planes, which are less to read back, and which its encoder
+     * need not make of it. */
+    enum ycbcr ycbcr;
     /* The frame goes on where the one before it ended, if that showed the same and was to be gone on from: scene,
      * motion and request alike but for `samples` and what is done with the sum (format, tone map, exposure); it
      * adds its samples to those. n frames of k samples hold what one of n x k does, to the bit. */
@@ -92,6 +96,7 @@ struct frame_request {
  * What a picture holds:
  *   linear formats  mean radiance of the samples times 2^exposure_stops, premultiplied by alpha
  *   RGBA8           the same divided by alpha, tone-mapped, sRGB
+ *   planes          that, without alpha
  *   layers          those beside the beauty are what protocol/messages.def says of them (LAYER), and know of no
  *                   exposure
  *   attachments     those layers in 4 bytes a pixel, see frame_result_attachment()
@@ -104,7 +109,8 @@ struct frame_request {
  * revision and device gives the same bytes. Cut into other slices a frame may differ in rays within rounding of an
  * edge: how many rays `bvh` walks together follows the coherence of the slice's wave. */
 struct frame_result {
-    /* Owned; free(). Layer after layer, each of width x height pixels; behind size_bytes lie the attachments. */
+    /* Owned; free(). Layer after layer, each of width x height pixels, or planes; behind size_bytes lie the
+     * attachments. */
     uint8_t *pixels;
     uint32_t layers; /* bits, at least one */
     uint32_t attachments;
@@ -112,6 +118,7 @@ struct frame_result {
     uint32_t width, height;
     uint32_t samples; /* held per pixel, with those of the frames before that it goes on from */
     enum frame_format format;
+    enum ycbcr ycbcr; /* in place of the RGBA8; base/ycbcr.h says how the planes lie in size_bytes */
     uint64_t revision;
     uint64_t primary_rays, shadow_rays, secondary_rays, splits;
     uint64_t uploaded_bytes, structure_bytes;

@@ -73,14 +73,19 @@ enum frame_format frame_request_plane_format(const struct frame_request *request
     return request->format;
 }
 
+uint64_t frame_request_plane_bytes(const struct frame_request *request, enum frame_layer layer, uint32_t rows)
+{
+    if (layer == LAYER_BEAUTY && request->ycbcr != YCBCR_NONE)
+        return (uint64_t)ycbcr_row_bytes(request->width) * ycbcr_row_count(rows);
+    return (uint64_t)request->width * rows * picture_pixel_bytes(frame_request_plane_format(request, layer));
+}
+
 uint64_t frame_request_bytes(const struct frame_request *request)
 {
-    uint64_t pixel_bytes = 0;
-    for (uint32_t left = frame_request_planes(request); left; left &= left - 1) {
-        enum frame_layer layer = (enum frame_layer)__builtin_ctz(left);
-        pixel_bytes += picture_pixel_bytes(frame_request_plane_format(request, layer));
-    }
-    return (uint64_t)request->width * request->height * pixel_bytes;
+    uint64_t bytes = 0;
+    for (uint32_t left = frame_request_planes(request); left; left &= left - 1)
+        bytes += frame_request_plane_bytes(request, (enum frame_layer)__builtin_ctz(left), request->height);
+    return bytes;
 }
 
 static bool check_layers(const struct frame_request *request, struct error *error)
@@ -95,6 +100,9 @@ static bool check_layers(const struct frame_request *request, struct error *erro
                          request->attachments);
     if (request->attachments && frame_request_layers(request) != 1u << LAYER_BEAUTY)
         return error_set(error, ERROR_UNSUPPORTED, "attachments", "they go with the beauty alone");
+    if (request->ycbcr != YCBCR_NONE &&
+        (request->format != FRAME_RGBA8 || frame_request_layers(request) != 1u << LAYER_BEAUTY))
+        return error_set(error, ERROR_UNSUPPORTED, "format", "Y'CbCr is made of the beauty alone, as rgba8");
     return true;
 }
 

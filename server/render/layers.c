@@ -6,8 +6,6 @@
 #include "shared/layers.h"
 #include "shared/ray.h"
 
-#include <epoxy/gl.h>
-
 _Static_assert(LAYER_BIT_BEAUTY == 1 << LAYER_BEAUTY && LAYER_BIT_ALBEDO == 1 << LAYER_ALBEDO &&
                    LAYER_BIT_NORMAL == 1 << LAYER_NORMAL && LAYER_BIT_DEPTH == 1 << LAYER_DEPTH &&
                    LAYER_BIT_POSITION == 1 << LAYER_POSITION && LAYER_BIT_AO == 1 << LAYER_AO &&
@@ -53,11 +51,9 @@ static const struct gpu_program *use(struct render_context *context, const char 
         defines[n++] = (struct gpu_define){own, "1"};
     if (context->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
-    const struct gpu_program_source source = {.compute = compute, .defines = defines};
-    const struct gpu_program *program = gpu_program_get(context->device, &source, error);
+    const struct gpu_program *program = context_use_with(context, compute, defines, error);
     if (!program)
         return NULL;
-    glUseProgram(program->name);
     context_bind_hits(context);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
     gpu_uniform_uint(program, "hit_count", context->hit_count);

@@ -7,16 +7,16 @@
 
 #include <stdlib.h>
 
-static size_t row_bytes(const struct picture *picture, const struct render_context *context, uint32_t plane)
+static size_t rows_bytes(const struct picture *picture, const struct render_context *context, uint32_t plane,
+                         uint32_t rows)
 {
-    enum frame_layer layer = picture_plane_layer(picture, plane);
-    return picture->width * picture_pixel_bytes(frame_request_plane_format(&context->request, layer));
+    return (size_t)frame_request_plane_bytes(&context->request, picture_plane_layer(picture, plane), rows);
 }
 
 static size_t band_bytes(const struct picture *picture, const struct render_context *context, uint32_t plane,
                          uint32_t band)
 {
-    return picture_band_row_count(picture, band) * row_bytes(picture, context, plane);
+    return rows_bytes(picture, context, plane, picture_band_row_count(picture, band));
 }
 
 /* Where a band belongs. NULL: no memory. */
@@ -33,8 +33,8 @@ static uint8_t *band_pixels(struct picture *picture, const struct render_context
     }
     uint8_t *pixels = picture->pixels;
     for (uint32_t before = 0; before < plane; before++)
-        pixels += picture->height * row_bytes(picture, context, before);
-    return pixels + picture_band_first_row(picture, band) * row_bytes(picture, context, plane);
+        pixels += rows_bytes(picture, context, before, picture->height);
+    return pixels + rows_bytes(picture, context, plane, picture_band_first_row(picture, band));
 }
 
 bool picture_read_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,

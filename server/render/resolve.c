@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* From the sum of samples to pixels: mean, exposure and, for 8 bits, tone map and sRGB. */
+/* From the sum of samples to pixels: mean, exposure and, for 8 bits, tone map and sRGB, or Y'CbCr of that. */
 #include "render/frame_request.h"
 #include "render/layers.h"
 #include "render/picture.h"
@@ -32,28 +32,54 @@ static float scale_of(const struct picture *picture, const struct frame_request 
     return layers_of_first_sample(layer) ? 1.0f : mean;
 }
 
+static const struct gpu_program *use_pixels(struct render_context *context, enum frame_layer layer,
+                                            uint32_t pixel_count, struct error *error)
+{
+    static const char *const numbers[] = {[FRAME_RGBA8] = "0",
+                                          [FRAME_RGBA16F] = "1",
+                                          [FRAME_RGBA32F] = "2",
+                                          [FRAME_DEPTH32F] = "3",
+                                          [FRAME_NORMAL8] = "4"};
+    enum frame_format format = frame_request_plane_format(&context->request, layer);
+    const struct gpu_define defines[] = {{"FORMAT", numbers[format]}, {0}};
+    const struct gpu_program *program = context_use_with(context, "render/resolve.comp", defines, error);
+    if (program)
+        gpu_uniform_uint(program, "pixel_count", pixel_count);
+    return program;
+}
+
+static const struct gpu_program *use_ycbcr(struct render_context *context, uint32_t row_count, struct error *error)
+{
+    const struct gpu_program *program = context_use(context, "render/resolve_ycbcr.comp", error);
+    if (program) {
+        gpu_uniform_uint(program, "row_count", row_count);
+        gpu_uniform_uint(program, "ycbcr", context->request.ycbcr);
+    }
+    return program;
+}
+
 bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                           struct error *error)
 {
     enum frame_layer layer = picture_plane_layer(picture, plane);
     const struct frame_request *request = &context->request;
-    enum frame_format format = frame_request_plane_format(request, layer);
-    uint32_t pixel_count = picture_band_row_count(picture, band) * picture->width;
-    if (!gpu_buffer_reserve(context->device, &picture->resolved, pixel_count * picture_pixel_bytes(format), error))
+    uint32_t rows = picture_band_row_count(picture, band), pixel_count = rows * picture->width;
+    bool as_ycbcr = layer == LAYER_BEAUTY && request->ycbcr != YCBCR_NONE;
+    size_t bytes = (size_t)frame_request_plane_bytes(request, layer, rows);
+    if (!gpu_buffer_reserve(context->device, &picture->resolved, bytes, error))
         return false;
     context_span_begin(context, STAGE_RESOLVE);
     context_bind(context);
-    const struct gpu_program *program = context_use(context, "render/resolve.comp", error);
+    const struct gpu_program *program =
+        as_ycbcr ? use_ycbcr(context, rows, error) : use_pixels(context, layer, pixel_count, error);
     if (program) {
         float coverage_scale = layers_of_first_sample(layer) ? 1.0f : 1.0f / (float)picture->samples;
         gpu_buffer_bind_storage(picture_band(picture, plane, band), BIND_ACCUMULATION);
         gpu_buffer_bind_storage(&picture->resolved, BIND_RESOLVED);
-        gpu_uniform_uint(program, "pixel_count", pixel_count);
-        gpu_uniform_uint(program, "format_number", format);
         gpu_uniform_uint(program, "tone_map_kind", request->tone_map);
         gpu_uniform_float(program, "scale", scale_of(picture, request, layer));
         gpu_uniform_float(program, "coverage_scale", coverage_scale);
-        gpu_dispatch(context->device, program, pixel_count);
+        gpu_dispatch(context->device, program, as_ycbcr ? picture->tiles_across * ((rows + 1) / 2) : pixel_count);
     }
     context_span_end(context);
     return program && gpu_check(context->device, "resolving", error);

@@ -70,16 +70,6 @@ uint64_t wave_passes_device_bytes(const struct integrator *integrator)
            passes->light_samples.capacity_bytes;
 }
 
-static const struct gpu_program *use(struct render_context *context, const char *compute,
-                                     const struct gpu_define *defines, struct error *error)
-{
-    const struct gpu_program_source source = {.compute = compute, .defines = defines};
-    const struct gpu_program *program = gpu_program_get(context->device, &source, error);
-    if (program)
-        glUseProgram(program->name);
-    return program;
-}
-
 static void bind_shading(struct wave_passes *passes, struct render_context *context)
 {
     context_bind_hits(context);
@@ -107,7 +97,7 @@ const struct gpu_program *wave_passes_shade_program(struct wave_passes *passes, 
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     if (context->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
-    const struct gpu_program *program = use(context, compute, defines, error);
+    const struct gpu_program *program = context_use_with(context, compute, defines, error);
     if (!program)
         return NULL;
     bool last = context->wave_number >= context->request.depth + passes->kind->straight_waves;
@@ -151,7 +141,7 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
     context_bind(context);
     gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
                            UNIT_SHADE_LIGHTS, GL_RGBA32F);
-    const struct gpu_program *program = use(context, "render/left_scene.comp", defines, error);
+    const struct gpu_program *program = context_use_with(context, "render/left_scene.comp", defines, error);
     if (!program)
         return false;
     gpu_uniform_uint(program, "ray_count", context->ray_count);
@@ -184,7 +174,7 @@ static bool gather(struct wave_passes *passes, struct render_context *context, b
                    struct error *error)
 {
     const struct gpu_define defines[2] = {{passes->kind->gather, "1"}, {NULL, NULL}};
-    const struct gpu_program *program = use(context, "render/gather.comp", defines, error);
+    const struct gpu_program *program = context_use_with(context, "render/gather.comp", defines, error);
     if (!program)
         return false;
     gpu_uniform_uint(program, "ray_count", context->ray_count);
@@ -207,7 +197,7 @@ static bool move_children(struct wave_passes *passes, struct render_context *con
 {
     static const struct gpu_define times[] = {{"HAS_TIMES", "1"}, {NULL, NULL}};
     const struct gpu_program *program =
-        use(context, "render/compact_move.comp", context->scene->has_motion ? times : NULL, error);
+        context_use_with(context, "render/compact_move.comp", context->scene->has_motion ? times : NULL, error);
     if (!program)
         return false;
     gpu_uniform_uint(program, "hit_count", context->hit_count);

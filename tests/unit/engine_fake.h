@@ -258,6 +258,7 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
         .height = renderer->request.height,
         .size_bytes = all_bytes - 4 * attached * request->width * request->height,
         .format = renderer->request.format,
+        .ycbcr = request->ycbcr,
         .revision = renderer->scene->revision,
         .samples = renderer->kept_samples,
         .layers = frame_request_layers(request),

@@ -107,6 +107,11 @@ static void a_zstd_frame_arrives(void **state)
     fl_frame_destroy(frame);
 }
 
+static struct picture picture_of(const uint8_t *bytes)
+{
+    return (struct picture){.width = WIDTH, .height = HEIGHT, .bytes_per_pixel = 4, .pixels = bytes};
+}
+
 static size_t make_predicted(const struct picture *picture, uint8_t **packed)
 {
     struct error failure = {0};
@@ -121,7 +126,8 @@ static void a_predicted_frame_arrives_in_every_pixel_format(void **state)
     for (enum protocol_pixel_format format = 0; format < PROTOCOL_PIXEL_FORMAT_COUNT; format++) {
         /* The same bytes, as a picture that has fewer rows the larger its pixels are. */
         const uint32_t pixel_bytes = fl_bytes_per_pixel(format);
-        const struct picture picture = {WIDTH, HEIGHT * 4 / pixel_bytes, pixel_bytes, pixels};
+        const struct picture picture = {
+            .width = WIDTH, .height = HEIGHT * 4 / pixel_bytes, .bytes_per_pixel = pixel_bytes, .pixels = pixels};
         struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_PREDICTED);
         uint8_t *packed;
         const size_t count = make_predicted(&picture, &packed);
@@ -141,7 +147,9 @@ static void a_predicted_frame_arrives_in_every_pixel_format(void **state)
 static void a_damaged_predicted_frame_is_refused(void **state)
 {
     (void)state;
-    const struct picture picture = {WIDTH, HEIGHT, 4, pixels}, smaller = {WIDTH, HEIGHT - 1, 4, pixels};
+    const struct picture picture = picture_of(pixels);
+    struct picture smaller = picture;
+    smaller.height--;
     uint8_t *packed;
     size_t count = make_predicted(&picture, &packed);
     assert_null(receive(PROTOCOL_ENCODING_PREDICTED, packed, count - 1));
@@ -154,7 +162,8 @@ static void a_damaged_predicted_frame_is_refused(void **state)
     uint8_t other[PIXELS_BYTES];
     memcpy(other, pixels, sizeof other);
     other[77] ^= 1;
-    count = make_predicted(&(struct picture){WIDTH, HEIGHT, 4, other}, &packed);
+    struct picture changed = picture_of(other);
+    count = make_predicted(&changed, &packed);
     assert_null(receive(PROTOCOL_ENCODING_PREDICTED, packed, count));
     assert_string_equal(error.field, "frame.digest");
     free(packed);
@@ -165,8 +174,7 @@ static struct message_frame_begin make_attached(enum protocol_encoding encoding,
                                                 const uint8_t *depth, const uint8_t *normals, uint8_t **bytes)
 {
     const enum encoding numbers[] = {ENCODING_RAW, ENCODING_ZSTD, ENCODING_JPEG, ENCODING_RAW, ENCODING_PREDICTED};
-    const struct picture parts[3] = {
-        {WIDTH, HEIGHT, 4, pixels}, {WIDTH, HEIGHT, 4, depth}, {WIDTH, HEIGHT, 4, normals}};
+    const struct picture parts[3] = {picture_of(pixels), picture_of(depth), picture_of(normals)};
     size_t counts[3] = {0}, used = 0;
     *bytes = malloc(4 * PIXELS_BYTES);
     assert_non_null(*bytes);

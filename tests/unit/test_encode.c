@@ -2,6 +2,8 @@
 /* What is encoded comes back: exactly from raw, zstd and predicted, close enough from JPEG. */
 #include "encode/encoder.h"
 
+#include "../accuracy/ycbcr_exact.h"
+
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -22,7 +24,8 @@ static struct picture make_picture(uint32_t width, uint32_t height, uint32_t byt
         size_t x = i / bytes_per_pixel % width, y = i / bytes_per_pixel / width, channel = i % bytes_per_pixel;
         pixels[i] = (uint8_t)(127.5 + 120 * sin(0.05 * (double)x * (double)(channel + 1)) * cos(0.03 * (double)y));
     }
-    return (struct picture){width, height, bytes_per_pixel, pixels};
+    return (struct picture){
+        .width = width, .height = height, .bytes_per_pixel = bytes_per_pixel, .pixels = pixels};
 }
 
 static void drop_picture(struct picture *picture)
@@ -150,7 +153,7 @@ static void predicted_leaves_what_the_rule_says(void **state)
                               50, 0, 0, 255, 60, 0, 0, 255, 200, 0, 3, 255}; /* c <= min; c >= max; between */
     const uint8_t left[] = {
         10, 20, (uint8_t)-5, 40, 10, (uint8_t)(200 - 55), 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 2, 255, 0, 0, 0, 0, 0};
-    struct picture picture = {3, 2, 4, pixels};
+    struct picture picture = {.width = 3, .height = 2, .bytes_per_pixel = 4, .pixels = pixels};
     size_t bytes;
     uint8_t planes[sizeof pixels], *out = encode(ENCODING_PREDICTED, &picture, 1, &bytes);
     assert_int_equal(ZSTD_decompress(planes, sizeof planes, out, bytes), sizeof planes);
@@ -170,12 +173,30 @@ static void predicted_is_smaller_than_zstd_where_a_picture_is_smooth(void **stat
     drop_picture(&picture);
 }
 
-/* Peak signal to noise of the colours, in dB; *subsampling as the JPEG's header has it. */
-static double jpeg_psnr(uint32_t width, uint32_t height, unsigned quality, int *subsampling)
+/* The same as Y'CbCr; drop its planes. */
+static struct picture convert(const struct picture *picture, enum ycbcr kind)
 {
-    struct picture picture = make_picture(width, height, 4);
+    uint8_t *rows = exact_rows(&(struct exact_picture){picture->pixels, picture->width, picture->height, kind});
+    assert_non_null(rows);
+    struct picture made = *picture;
+    made.pixels = NULL;
+    made.ycbcr = kind;
+    made.planes = ycbcr_planes_at(rows, picture->width);
+    return made;
+}
+
+static void drop_planes(struct picture *picture)
+{
+    free((void *)(uintptr_t)picture->planes.y);
+}
+
+/* Peak signal to noise of the colours, in dB; *subsampling as the JPEG's header has it. */
+static double jpeg_psnr(const struct picture *given, const struct picture *picture, unsigned quality,
+                        int *subsampling)
+{
+    uint32_t width = picture->width, height = picture->height;
     size_t bytes;
-    uint8_t *out = encode(ENCODING_JPEG, &picture, quality, &bytes);
+    uint8_t *out = encode(ENCODING_JPEG, given, quality, &bytes);
     tjhandle handle = tjInitDecompress();
     assert_non_null(handle);
     int got_width, got_height, colourspace;
@@ -188,15 +209,22 @@ static double jpeg_psnr(uint32_t width, uint32_t height, unsigned quality, int *
     assert_int_equal(tjDecompress2(handle, out, bytes, back, (int)width, 0, (int)height, TJPF_RGBX, 0), 0);
     double sum = 0;
     for (size_t i = 0; i < (size_t)width * height * 4; i++) {
-        double difference = i % 4 < 3 ? (double)back[i] - (double)picture.pixels[i] : 0;
+        double difference = i % 4 < 3 ? (double)back[i] - (double)picture->pixels[i] : 0;
         sum += difference * difference;
     }
     tjDestroy(handle);
     free(back);
     free(out);
-    drop_picture(&picture);
     double mean = sum / (3.0 * width * height);
     return mean > 0 ? 10 * log10(255.0 * 255.0 / mean) : 99;
+}
+
+static double jpeg_psnr_at(uint32_t width, uint32_t height, unsigned quality, int *subsampling)
+{
+    struct picture picture = make_picture(width, height, 4);
+    double psnr = jpeg_psnr(&picture, &picture, quality, subsampling);
+    drop_picture(&picture);
+    return psnr;
 }
 
 static void jpeg_comes_close_and_keeps_full_chroma_from_quality_90(void **state)
@@ -210,7 +238,7 @@ static void jpeg_comes_close_and_keeps_full_chroma_from_quality_90(void **state)
     } expected[] = {{50, 37, TJSAMP_420}, {89, 43, TJSAMP_420}, {90, 45, TJSAMP_444}, {100, 50, TJSAMP_444}};
     for (size_t i = 0; i < 4; i++) {
         int subsampling;
-        double psnr = jpeg_psnr(321, 200, expected[i].quality, &subsampling);
+        double psnr = jpeg_psnr_at(321, 200, expected[i].quality, &subsampling);
         print_message("quality %u: %.1f dB\n", expected[i].quality, psnr);
         if (psnr < expected[i].psnr)
             fail_msg("quality %u gives %.1f dB, at least %.1f expected", expected[i].quality, psnr,
@@ -218,9 +246,61 @@ static void jpeg_comes_close_and_keeps_full_chroma_from_quality_90(void **state)
         assert_int_equal(subsampling, expected[i].subsampling);
     }
     int subsampling;
-    assert_true(jpeg_psnr(1, 1, 95, &subsampling) > 40);
-    jpeg_psnr(4, 3, 80, &subsampling);                  /* padded to more than at full chroma */
-    assert_true(jpeg_psnr(17, 9, 0, &subsampling) > 5); /* out of range: the lowest there is */
+    assert_true(jpeg_psnr_at(1, 1, 95, &subsampling) > 40);
+    jpeg_psnr_at(4, 3, 80, &subsampling);                  /* padded to more than at full chroma */
+    assert_true(jpeg_psnr_at(17, 9, 0, &subsampling) > 5); /* out of range: the lowest there is */
+}
+
+static void jpeg_of_planes_looks_like_that_of_their_pixels(void **state)
+{
+    (void)state;
+    static const uint32_t odd_sizes[][2] = {{1, 1}, {7, 3}, {16, 17}, {321, 199}};
+    for (size_t i = 0; i < 4; i++) {
+        for (unsigned quality = 5; quality < 90; quality += 28) {
+            struct picture picture = make_picture(odd_sizes[i][0], odd_sizes[i][1], 4);
+            struct picture planes = convert(&picture, YCBCR_JPEG);
+            int subsampling;
+            double before = jpeg_psnr(&picture, &picture, quality, &subsampling);
+            double psnr = jpeg_psnr(&planes, &picture, quality, &subsampling);
+            print_message("%ux%u, quality %u: %.2f dB, of planes %.2f dB\n", odd_sizes[i][0], odd_sizes[i][1],
+                          quality, before, psnr);
+            assert_int_equal(subsampling, TJSAMP_420);
+            /* Both have the same matrix and means, and round them elsewhere: of small pictures that is some
+             * tenths. */
+            assert_true(psnr > before - 0.5);
+            drop_planes(&planes);
+            drop_picture(&picture);
+        }
+    }
+}
+
+static void planes_are_for_the_encoder_that_takes_them(void **state)
+{
+    (void)state;
+    struct picture picture = make_picture(8, 8, 4);
+    for (unsigned quality = 0; quality <= 100; quality++) {
+        assert_int_equal(encoder_takes(ENCODING_RAW, quality), YCBCR_NONE);
+        assert_int_equal(encoder_takes(ENCODING_ZSTD, quality), YCBCR_NONE);
+        assert_int_equal(encoder_takes(ENCODING_PREDICTED, quality), YCBCR_NONE);
+        assert_int_equal(encoder_takes(ENCODING_H264, quality), YCBCR_VIDEO);
+        /* Full chroma is more than planes have. */
+        assert_int_equal(encoder_takes(ENCODING_JPEG, quality), quality < 90 ? YCBCR_JPEG : YCBCR_NONE);
+    }
+    for (enum ycbcr kind = YCBCR_VIDEO; kind <= YCBCR_JPEG; kind++) {
+        struct picture planes = convert(&picture, kind);
+        const enum encoding encodings[] = {ENCODING_RAW, ENCODING_ZSTD, ENCODING_PREDICTED, ENCODING_JPEG};
+        for (int i = 0; i < 4; i++) {
+            uint8_t *out;
+            size_t bytes;
+            struct error error = {0};
+            unsigned quality = kind == YCBCR_JPEG ? 90 : 75;
+            assert_false(encoder_encode(encodings[i], &planes, quality, &out, &bytes, &error));
+            assert_int_equal(error.kind, ERROR_UNSUPPORTED);
+            assert_null(out);
+        }
+        drop_planes(&planes);
+    }
+    drop_picture(&picture);
 }
 
 static void jpeg_carries_rgba8_only(void **state)
@@ -250,10 +330,12 @@ static void jpeg_carries_rgba8_only(void **state)
 static void impossible_sizes_are_errors_before_any_memory_is_asked_for(void **state)
 {
     (void)state;
-    const struct picture pictures[] = {{UINT32_MAX, UINT32_MAX, 16, NULL},
-                                       {0, 4, 4, NULL},
-                                       {70000, 1, 4, NULL},
-                                       {UINT32_MAX, UINT32_MAX, 8, NULL}};
+    const struct picture pictures[] = {
+        {.width = UINT32_MAX, .height = UINT32_MAX, .bytes_per_pixel = 16},
+        {.width = 0, .height = 4, .bytes_per_pixel = 4},
+        {.width = 70000, .height = 1, .bytes_per_pixel = 4},
+        {.width = UINT32_MAX, .height = UINT32_MAX, .bytes_per_pixel = 8},
+    };
     const enum encoding encodings[] = {ENCODING_ZSTD, ENCODING_RAW, ENCODING_JPEG, ENCODING_PREDICTED};
     for (int i = 0; i < 4; i++) {
         struct error error = {0};
@@ -274,6 +356,8 @@ int main(void)
         cmocka_unit_test(predicted_leaves_what_the_rule_says),
         cmocka_unit_test(predicted_is_smaller_than_zstd_where_a_picture_is_smooth),
         cmocka_unit_test(jpeg_comes_close_and_keeps_full_chroma_from_quality_90),
+        cmocka_unit_test(jpeg_of_planes_looks_like_that_of_their_pixels),
+        cmocka_unit_test(planes_are_for_the_encoder_that_takes_them),
         cmocka_unit_test(jpeg_carries_rgba8_only),
         cmocka_unit_test(impossible_sizes_are_errors_before_any_memory_is_asked_for),
     };

@@ -150,6 +150,42 @@ static void what_is_attached_lies_behind_the_picture(void **state)
     end(&fixture);
 }
 
+/* Other planes than an encoder takes are an error of that frame. */
+static void planes_come_to_the_encoder_as_they_are(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct player player = player_begin();
+    begin(&fixture, 2);
+    struct engine_frame *made = new_frame(ENCODING_H264, 0);
+    const size_t row_bytes = ycbcr_row_bytes(WIDTH), luma_bytes = ycbcr_luma_bytes(WIDTH);
+    made->result.ycbcr = YCBCR_VIDEO;
+    made->result.size_bytes = row_bytes * HEIGHT;
+    for (uint32_t y = 0; y < HEIGHT; y++) {
+        memset(made->result.pixels + y * row_bytes, 80, luma_bytes);
+        memset(made->result.pixels + y * row_bytes + luma_bytes, y % 2 ? 170 : 100, luma_bytes / 2);
+    }
+    uint64_t position = job_output_reserve(fixture.output);
+    assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
+    struct engine_event *event = next(&fixture);
+    assert_true(play(&player, event->frame->bytes, event->frame->size_bytes));
+    assert_in_range(player.frame->data[0][0], 79, 81);
+    assert_in_range(player.frame->data[1][0], 99, 101);
+    assert_in_range(player.frame->data[2][0], 169, 171);
+    engine_event_destroy(event);
+    made = new_frame(ENCODING_RAW, 1);
+    made->result.ycbcr = YCBCR_VIDEO;
+    position = job_output_reserve(fixture.output);
+    assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
+    event = queue_pop(fixture.events, 10000000000);
+    assert_non_null(event);
+    assert_int_equal(event->kind, ENGINE_FAILED);
+    assert_int_equal(event->error.kind, ERROR_UNSUPPORTED);
+    engine_event_destroy(event);
+    player_end(&player);
+    end(&fixture);
+}
+
 /* What is left over, under the address sanitizer. */
 static void a_pool_that_ends_drops_what_waits_in_a_lane(void **state)
 {
@@ -178,6 +214,7 @@ int main(void)
         cmocka_unit_test(a_stream_is_encoded_in_order_by_however_many_threads),
         cmocka_unit_test(frames_that_stand_alone_do_not_wait_for_the_stream),
         cmocka_unit_test(what_is_attached_lies_behind_the_picture),
+        cmocka_unit_test(planes_come_to_the_encoder_as_they_are),
         cmocka_unit_test(a_pool_that_ends_drops_what_waits_in_a_lane),
         cmocka_unit_test(frames_of_a_closed_output_are_not_encoded),
     };

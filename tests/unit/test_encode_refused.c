@@ -72,7 +72,7 @@ const struct libav *__wrap_libav_load(void)
 static bool encode(struct error *error)
 {
     static const uint8_t pixels[EDGE * EDGE * 4];
-    const struct picture picture = {EDGE, EDGE, 4, pixels};
+    const struct picture picture = {.width = EDGE, .height = EDGE, .bytes_per_pixel = 4, .pixels = pixels};
     struct encoder_stream *stream = encoder_stream_create(ENCODING_H264, 30, error);
     assert_non_null(stream);
     struct encoded_picture out;

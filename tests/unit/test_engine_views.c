@@ -493,6 +493,45 @@ static void a_view_that_adapts_is_smaller_while_it_moves(void **state)
     drop(frame);
 }
 
+static void expect_form(struct engine_frame *frame, enum encoding encoding, enum ycbcr form)
+{
+    assert_int_equal(frame->encoding, encoding);
+    assert_int_equal(frame->result.ycbcr, form);
+    drop(frame);
+}
+
+/* The renderer is asked for it before the frame is there; what is encoded is what it was asked for. */
+static void frames_come_in_the_form_that_their_encoder_takes(void **state)
+{
+    struct watching *watching = *state;
+    struct engine *engine = watching->engine;
+    struct engine_command *made = with_samples(view(2, watching->wishes), 2, 1);
+    made->job.adapt = true;
+    view_wishes_set_effort(watching->wishes, &(struct view_effort){0, 95, 0, true});
+    submit(engine, made);
+    /* Of rest only its samples tell whether it will be one that loses. */
+    expect_form(take(expect_frame(engine, 1, 2, 0)), ENCODING_JPEG, YCBCR_NONE);
+    expect_form(take(expect_frame(engine, 1, 2, 1)), ENCODING_RAW, YCBCR_NONE);
+    look(watching, 1, true);
+    expect_form(take(expect_frame(engine, 1, 2, 2)), ENCODING_JPEG, YCBCR_NONE); /* full chroma */
+    view_wishes_set_effort(watching->wishes, &(struct view_effort){0, 55, 0, true});
+    look(watching, 2, true);
+    expect_form(take(expect_frame(engine, 1, 2, 3)), ENCODING_JPEG, YCBCR_JPEG);
+    look(watching, 3, false);
+    expect_form(take(expect_frame(engine, 1, 2, 4)), ENCODING_JPEG, YCBCR_NONE);
+    expect_form(take(expect_frame(engine, 1, 2, 5)), ENCODING_RAW, YCBCR_NONE);
+}
+
+static void rest_that_is_encoded_as_motion_comes_in_the_same_form(void **state)
+{
+    struct watching *watching = *state;
+    struct engine_command *made = with_samples(view(2, watching->wishes), 2, 1);
+    made->job.still_encoding = ENCODING_JPEG;
+    submit(watching->engine, made);
+    expect_form(take(expect_frame(watching->engine, 1, 2, 0)), ENCODING_JPEG, YCBCR_JPEG);
+    expect_form(take(expect_frame(watching->engine, 1, 2, 1)), ENCODING_JPEG, YCBCR_JPEG);
+}
+
 static void a_view_that_does_not_adapt_stays_as_it_was_asked_for(void **state)
 {
     struct watching *watching = *state;
@@ -617,6 +656,8 @@ int main(void)
         WATCHING(a_frame_in_progress_ends_with_the_view_that_is_replaced),
         WATCHING(a_cancelled_view_ends_whatever_it_does),
         WATCHING(a_view_that_adapts_is_smaller_while_it_moves),
+        WATCHING(frames_come_in_the_form_that_their_encoder_takes),
+        WATCHING(rest_that_is_encoded_as_motion_comes_in_the_same_form),
         WATCHING(a_view_that_does_not_adapt_stays_as_it_was_asked_for),
         WATCHING(a_camera_that_spans_no_view_ends_it),
         WATCHING(the_next_frame_is_rendered_while_one_is_encoded),
