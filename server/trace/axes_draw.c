@@ -9,15 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-struct draw_command { /* as GL has it */
-    uint32_t vertex_count, instance_count, first_vertex, base_instance;
-};
-
 struct drawn { /* shared/axes.h */
     uint32_t first_id, id_offset, instance, flags;
 };
 
-_Static_assert(sizeof(struct drawn) + sizeof(struct draw_command) == AXES_INSTANCE_BYTES, "an instance");
+_Static_assert(sizeof(struct drawn) + sizeof(struct axes_command) == AXES_INSTANCE_BYTES, "an instance");
 
 void axes_draw_init(struct axes_draw *draw, struct gpu_device *device)
 {
@@ -31,6 +27,7 @@ void axes_draw_finish(struct axes_draw *draw)
     gpu_framebuffer_finish(draw->device, &draw->plain);
     gpu_object_destroy(draw->device->registry, GPU_VERTEX_ARRAY, draw->vertex_array);
     free(draw->runs);
+    free(draw->listed);
     axes_draw_init(draw, draw->device);
 }
 
@@ -59,10 +56,9 @@ static int compare_uint(const void *a, const void *b)
 
 /* Fills both tables from `instances`, which ascend. */
 static bool list_drawn(struct axes_draw *draw, const struct scene_gpu *scene, const uint32_t *instances,
-                       uint32_t count, struct drawn *drawn, struct draw_command *commands, struct error *error)
+                       uint32_t count, struct drawn *drawn, struct error *error)
 {
     uint64_t id = 0;
-    uint32_t command_count = 0;
     for (uint32_t i = 0; i < count; i++) {
         const struct instance *instance = &scene->instances[instances[i]];
         const struct geometry *geometry = &scene->geometries[instance->geometry].device;
@@ -72,17 +68,19 @@ static bool list_drawn(struct axes_draw *draw, const struct scene_gpu *scene, co
             return error_set(error, ERROR_LIMIT, NULL, "more primitives than can be numbered");
         drawn[i] = (struct drawn){(uint32_t)id, (uint32_t)id - geometry->first_primitive, instances[i],
                                   flags_of(instance, geometry)};
+        const struct axes_command command = {geometry->primitive_count, 1, geometry->first_primitive, i,
+                                             (uint32_t)id};
         id += geometry->primitive_count;
         if (i > 0 && instance->geometry == scene->instances[instances[i - 1]].geometry) {
-            commands[command_count - 1].instance_count++;
+            draw->listed[draw->command_count - 1].instance_count++;
             continue;
         }
         if (draw->run_count == 0 || draw->runs[draw->run_count - 1].sort != sort)
-            draw->runs[draw->run_count++] = (struct axes_run){sort, command_count, 0};
+            draw->runs[draw->run_count++] = (struct axes_run){sort, draw->command_count, 0};
         draw->runs[draw->run_count - 1].count++;
-        commands[command_count++] =
-            (struct draw_command){geometry->primitive_count, 1, geometry->first_primitive, i};
+        draw->listed[draw->command_count++] = command;
     }
+    draw->primitive_count = (uint32_t)id;
     return true;
 }
 
@@ -98,32 +96,42 @@ bool axes_list_instances(const struct scene_gpu *scene, uint32_t **instances, ui
     return true;
 }
 
+static void forget_list(struct axes_draw *draw)
+{
+    free(draw->runs);
+    free(draw->listed);
+    draw->runs = NULL;
+    draw->listed = NULL;
+    draw->run_count = draw->command_count = draw->drawn_count = draw->primitive_count = 0;
+}
+
 bool axes_draw_prepare(struct axes_draw *draw, const struct scene_gpu *scene, const uint32_t *instances,
                        uint32_t instance_count, struct error *error)
 {
     size_t count = instance_count ? instance_count : 1;
     uint32_t *ascending = malloc(count * sizeof(*ascending));
     struct drawn *drawn = calloc(count, sizeof(*drawn));
-    struct draw_command *commands = calloc(count, sizeof(*commands));
-    free(draw->runs);
+    forget_list(draw);
     draw->runs = calloc(count, sizeof(*draw->runs));
-    draw->run_count = 0;
-    draw->drawn_count = instance_count;
+    draw->listed = calloc(count, sizeof(*draw->listed));
     bool listed = false;
-    if (!ascending || !drawn || !commands || !draw->runs) {
+    if (!ascending || !drawn || !draw->listed || !draw->runs) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u instances", instance_count);
         goto out;
     }
     for (uint32_t i = 0; i < instance_count; i++)
         ascending[i] = instances[i];
     qsort(ascending, instance_count, sizeof(*ascending), compare_uint);
-    listed = list_drawn(draw, scene, ascending, instance_count, drawn, commands, error) &&
+    listed = list_drawn(draw, scene, ascending, instance_count, drawn, error) &&
              gpu_buffer_upload(draw->device, &draw->drawn, drawn, instance_count * sizeof(*drawn), error) &&
-             gpu_buffer_upload(draw->device, &draw->commands, commands, instance_count * sizeof(*commands), error);
+             gpu_buffer_upload(draw->device, &draw->commands, draw->listed, instance_count * sizeof(*draw->listed),
+                               error);
+    draw->drawn_count = instance_count;
 out:
     free(ascending);
     free(drawn);
-    free(commands);
+    if (!listed)
+        forget_list(draw);
     return listed;
 }
 
@@ -201,12 +209,86 @@ static void set_state(uint32_t along)
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
 }
 
-bool axes_draw(struct axes_draw *draw, const struct scene_gpu *scene, const struct axes_pass *pass,
-               struct error *error)
+/* The command that the primitive is of. */
+static uint32_t command_of(const struct axes_draw *draw, uint32_t id)
+{
+    uint32_t first = 0, end = draw->command_count;
+    while (end - first > 1) {
+        uint32_t middle = first + (end - first) / 2;
+        if (draw->listed[middle].first_id <= id)
+            first = middle;
+        else
+            end = middle;
+    }
+    return first;
+}
+
+static uint32_t end_of(const struct axes_draw *draw, uint32_t command)
+{
+    return command + 1 < draw->command_count ? draw->listed[command + 1].first_id : draw->primitive_count;
+}
+
+/* Some of a command's primitives: the rest of an instance, whole ones, the beginning of one. */
+static void draw_some(const struct axes_command *command, uint32_t first, uint32_t end)
+{
+    const uint32_t each = command->vertex_count;
+    while (first < end) {
+        const uint32_t instance = (first - command->first_id) / each, before = (first - command->first_id) % each;
+        const uint32_t left = end - first, whole = before == 0 ? left / each : 0;
+        const uint32_t rest = left < each - before ? left : each - before, count = whole > 0 ? each : rest;
+        glDrawArraysInstancedBaseInstance(GL_POINTS, (GLint)(command->first_vertex + before), (GLsizei)count,
+                                          whole > 0 ? (GLsizei)whole : 1, command->base_instance + instance);
+        first += whole > 0 ? whole * each : count;
+    }
+}
+
+/* The primitives of the run's commands that are in the range; commands that are so altogether in one call. */
+static void draw_run(const struct axes_draw *draw, const struct axes_run *run, uint32_t first, uint32_t end)
+{
+    const uint32_t run_end = run->first + run->count;
+    uint32_t command = command_of(draw, first);
+    command = command > run->first ? command : run->first;
+    while (command < run_end && draw->listed[command].first_id < end) {
+        const uint32_t from = draw->listed[command].first_id, to = end_of(draw, command);
+        uint32_t whole = 0;
+        while (first <= from && command + whole < run_end && end_of(draw, command + whole) <= end)
+            whole++;
+        if (whole > 0)
+            glMultiDrawArraysIndirect(GL_POINTS, (const void *)(command * sizeof(struct axes_command)),
+                                      (GLsizei)whole, sizeof(struct axes_command));
+        else
+            draw_some(&draw->listed[command], first > from ? first : from, end < to ? end : to);
+        command += whole > 0 ? whole : 1;
+    }
+}
+
+static bool run_has_any(const struct axes_draw *draw, const struct axes_run *run, uint32_t first, uint32_t end)
+{
+    return draw->listed[run->first].first_id < end && end_of(draw, run->first + run->count - 1) > first;
+}
+
+static bool draw_runs(struct axes_draw *draw, const struct scene_gpu *scene, const struct axes_pass *pass,
+                      uint32_t first, uint32_t end, struct error *error)
+{
+    for (uint32_t i = 0; i < draw->run_count; i++) {
+        const struct axes_run *run = &draw->runs[i];
+        if (!run_has_any(draw, run, first, end))
+            continue;
+        const struct gpu_program *program = get_program(draw, scene, pass, run->sort, error);
+        if (!program)
+            return false;
+        glUseProgram(program->name);
+        set_uniforms(pass, program);
+        draw_run(draw, run, first, end);
+    }
+    return true;
+}
+
+bool axes_draw_range(struct axes_draw *draw, const struct scene_gpu *scene, const struct axes_pass *pass,
+                     uint32_t first, uint32_t end, struct error *error)
 {
     GLint vertex_array = 0;
-    bool drawn = true;
-    if (draw->run_count == 0)
+    if (draw->run_count == 0 || first >= end)
         return true;
     if (!make_vertex_array(draw, error))
         return false;
@@ -214,20 +296,16 @@ bool axes_draw(struct axes_draw *draw, const struct scene_gpu *scene, const stru
     glGetIntegerv(GL_VERTEX_ARRAY_BINDING, &vertex_array);
     glBindVertexArray(draw->vertex_array);
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, draw->commands.name);
-    for (uint32_t i = 0; i < draw->run_count && drawn; i++) {
-        const struct axes_run *run = &draw->runs[i];
-        const struct gpu_program *program = get_program(draw, scene, pass, run->sort, error);
-        drawn = program != NULL;
-        if (!drawn)
-            break;
-        glUseProgram(program->name);
-        set_uniforms(pass, program);
-        glMultiDrawArraysIndirect(GL_POINTS, (const void *)(run->first * sizeof(struct draw_command)),
-                                  (GLsizei)run->count, sizeof(struct draw_command));
-    }
+    bool drawn = draw_runs(draw, scene, pass, first, end, error);
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
     glBindVertexArray((GLuint)vertex_array);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
     glMemoryBarrier(GL_ALL_BARRIER_BITS);
     return drawn && gpu_check(draw->device, "drawing along the axes", error);
+}
+
+bool axes_draw(struct axes_draw *draw, const struct scene_gpu *scene, const struct axes_pass *pass,
+               struct error *error)
+{
+    return axes_draw_range(draw, scene, pass, 0, draw->primitive_count, error);
 }

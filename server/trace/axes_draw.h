@@ -22,8 +22,14 @@ struct axes_run {
     uint32_t first, count;
 };
 
+/* Instances of one geometry, drawn together: as GL has it, and the id of their first primitive. */
+struct axes_command {
+    uint32_t vertex_count, instance_count, first_vertex, base_instance;
+    uint32_t first_id;
+};
+
 /* What a build uploads for each instance: its place among the primitives, and its draw. */
-#define AXES_INSTANCE_BYTES 32
+#define AXES_INSTANCE_BYTES 36
 
 struct axes_draw {
     struct gpu_device *device;
@@ -34,7 +40,9 @@ struct axes_draw {
     struct gpu_buffer commands;
     /* Of what was listed last. */
     struct axes_run *runs;
-    uint32_t run_count, drawn_count;
+    struct axes_command *listed; /* mirror of `commands` */
+    uint32_t run_count, drawn_count, command_count;
+    uint32_t primitive_count; /* of all instances; their ids are 0 .. primitive_count - 1 */
 };
 
 void axes_draw_init(struct axes_draw *draw, struct gpu_device *device);
@@ -70,5 +78,9 @@ struct axes_pass {
  * framebuffer. */
 bool axes_draw(struct axes_draw *draw, const struct scene_gpu *scene, const struct axes_pass *pass,
                struct error *error);
+/* Of the pass, what the primitives with the ids first .. end - 1 are drawn to: ranges that follow one another up
+ * to draw->primitive_count draw what axes_draw() does. Does not wait. */
+bool axes_draw_range(struct axes_draw *draw, const struct scene_gpu *scene, const struct axes_pass *pass,
+                     uint32_t first, uint32_t end, struct error *error);
 
 #endif
