@@ -13,6 +13,8 @@
 #define REFERENCES_MAX 64
 #define JOBS_MAX 64
 #define EVENTS_MAX 4096
+/* Of one job; then it stands, as if the GPU were busy with others: a million may be asked for. */
+#define FRAMES_MAX 100
 
 struct recorded_scene {
     struct scene *scene; /* NULL: this place is free */
@@ -241,13 +243,18 @@ static void say_frame(struct recorded_job *job, uint32_t samples, const struct v
     job->made++;
 }
 
+static bool has_credit(const struct recorded_job *job)
+{
+    return job->made < job->credit && job->made < FRAMES_MAX;
+}
+
 static void go_on_with_view(struct recorded_job *job)
 {
     uint64_t revision = job->reference->scene->scene->revision;
     struct view_wish wish = view_wishes_see(job->wishes);
     if (wish.camera.command != job->shown_command || revision != job->shown_revision)
         job->shown_samples = 0;
-    while (job->made < job->credit && job->shown_samples < job->samples) {
+    while (has_credit(job) && job->shown_samples < job->samples) {
         wish = view_wishes_take(job->wishes);
         job->shown_samples += job->pass_samples;
         if (job->shown_samples > job->samples || wish.camera.moving)
@@ -264,7 +271,7 @@ static void go_on(struct recorded_job *job)
         go_on_with_view(job);
         return;
     }
-    while (job->made < job->credit && job->next <= job->last)
+    while (has_credit(job) && job->next <= job->last)
         say_frame(job, job->samples, NULL);
     if (job->next <= job->last)
         return;
