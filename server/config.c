@@ -17,6 +17,9 @@
 #define GIB (1024 * MIB)
 #define TIB (1024 * GIB)
 
+#define COMMENT_COLUMNS 100
+#define COMMENT_MAX_BYTES 1024
+
 enum option_type { OPTION_TEXT, OPTION_BOOL, OPTION_LEVEL, OPTION_U32, OPTION_BYTES };
 
 /* When a value is taken: at the start, or again when the daemon is told to read its configuration. */
@@ -421,6 +424,31 @@ static bool is_default(const struct config *config, const struct option *option)
     return is_same(config, &defaults, option);
 }
 
+/* The lines stay short, as who reads a file takes no lines of any length. */
+static void print_comment(const char *text, FILE *stream)
+{
+    size_t column = 0;
+    while (*text) {
+        size_t word_bytes = strcspn(text, " ");
+        if (column == 0 || column + 1 + word_bytes > COMMENT_COLUMNS)
+            column = (size_t)fprintf(stream, "%s#", column ? "\n" : "");
+        column += (size_t)fprintf(stream, " %.*s", (int)word_bytes, text);
+        text += word_bytes + (text[word_bytes] != '\0');
+    }
+    fprintf(stream, "\n");
+}
+
+static void print_doc(const struct option *option, FILE *stream)
+{
+    char text[COMMENT_MAX_BYTES], range[64] = "";
+    if (option->type == OPTION_U32 || option->type == OPTION_BYTES)
+        snprintf(range, sizeof range, " %" PRIu64 " .. %" PRIu64 "%s%s.", option->min, option->max,
+                 option->unit[0] ? " " : "", option->unit);
+    snprintf(text, sizeof text, "%s.%s%s", option->doc, option->time == START ? " Taken at the start only." : "",
+             range);
+    print_comment(text, stream);
+}
+
 bool config_dump(const struct config *config, FILE *stream)
 {
     fprintf(stream, "# farlightd %s. What is commented out has its default.\n", FARLIGHT_VERSION);
@@ -428,13 +456,7 @@ bool config_dump(const struct config *config, FILE *stream)
         const struct option *option = &options[i];
         if (i == 0 || strcmp(option->section, options[i - 1].section) != 0)
             fprintf(stream, "\n[%s]\n", option->section);
-        fprintf(stream, "# %s.", option->doc);
-        if (option->time == START)
-            fprintf(stream, " Taken at the start only.");
-        if (option->type == OPTION_U32 || option->type == OPTION_BYTES)
-            fprintf(stream, " %" PRIu64 " .. %" PRIu64 "%s%s.", option->min, option->max,
-                    option->unit[0] ? " " : "", option->unit);
-        fprintf(stream, "\n");
+        print_doc(option, stream);
         /* A default is written as in the table, since some depend on the host. */
         if (is_default(config, option)) {
             fprintf(stream, "#%s = %s\n", option->key, option->default_text);
