@@ -130,6 +130,15 @@ void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint
         glClearNamedBufferData(buffer->name, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, &value);
 }
 
+void gpu_buffer_clear_part(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes,
+                           size_t size_bytes, uint32_t value)
+{
+    (void)device;
+    if (buffer->name && size_bytes > 0)
+        glClearNamedBufferSubData(buffer->name, GL_R32UI, (GLintptr)offset_bytes, (GLsizeiptr)size_bytes,
+                                  GL_RED_INTEGER, GL_UNSIGNED_INT, &value);
+}
+
 void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer)
 {
     /* One that was bound and never held anything has only its texture. */

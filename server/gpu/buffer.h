@@ -35,7 +35,10 @@ void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer);
 void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,
                      size_t size_bytes); /* waits for the GPU */
 void gpu_buffer_clear(struct gpu_device *device, struct gpu_buffer *buffer, uint32_t value); /* every u32 */
-void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer);                /* leaves it empty */
+/* A part of it, in whole u32. */
+void gpu_buffer_clear_part(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes,
+                           size_t size_bytes, uint32_t value);
+void gpu_buffer_finish(struct gpu_device *device, struct gpu_buffer *buffer); /* leaves it empty */
 
 /* SSBO; an empty one is bound as a few zeros. */
 void gpu_buffer_bind_storage(const struct gpu_buffer *buffer, unsigned binding);

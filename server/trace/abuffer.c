@@ -109,16 +109,21 @@ static bool place(struct abuffer *abuffer, const struct scene_gpu *scene, struct
     return placed;
 }
 
-static bool build(struct abuffer *abuffer, struct scene_gpu *scene, const struct axes_box *box,
-                  struct error *error)
+static bool begin(struct abuffer *abuffer, struct scene_gpu *scene, struct error *error)
 {
     struct abuffer_store *store = &abuffer->store;
-    memcpy(store->lower_world, box->lower_world, sizeof(store->lower_world));
-    store->cell_world = box->cell_world;
+    struct axes_box box;
+    if (!place(abuffer, scene, &box, error))
+        return false;
+    memcpy(store->lower_world, box.lower_world, sizeof(store->lower_world));
+    store->cell_world = box.cell_world;
     store->resolution = abuffer->resolution;
     store->voxels_along = abuffer->voxels_along;
-    return abuffer_build(abuffer->builder, store, scene, &abuffer->base.options, error) &&
-           abuffer_voxels_build(store, error);
+    abuffer->had_cutout = scene->has_cutout;
+    if (!abuffer_build_begin(abuffer->builder, store, scene, &abuffer->base.options, error))
+        return false;
+    abuffer->base.stats.uploaded_bytes = (uint64_t)store->drawn_count * AXES_INSTANCE_BYTES;
+    return true;
 }
 
 static void fill_stats(struct abuffer *abuffer)
@@ -139,21 +144,17 @@ static void fill_stats(struct abuffer *abuffer)
         };
 }
 
-static bool bring_to(struct abuffer *abuffer, struct scene_gpu *scene, struct stage_times *times,
-                     struct error *error)
+static enum tracer_progress do_piece(struct abuffer *abuffer, struct scene_gpu *scene, struct stage_times *times,
+                                     struct error *error)
 {
-    struct axes_box box;
-    if (!place(abuffer, scene, &box, error))
-        return false;
+    enum tracer_progress progress = TRACER_FAILED;
     gpu_timer_begin(abuffer->timer, STAGE_BUILD, 0);
-    bool ok = build(abuffer, scene, &box, error);
+    if (abuffer_build_is_on(abuffer->builder) || begin(abuffer, scene, error))
+        progress = abuffer_build_piece(abuffer->builder, abuffer->base.piece_end_ns, error);
     glFinish(); /* the time on the CPU's clock is the time until it is there */
     gpu_timer_end(abuffer->timer);
     gpu_timer_collect(abuffer->timer, times);
-    abuffer->had_cutout = scene->has_cutout;
-    abuffer->base.stats.nodes_rebuilt = abuffer->store.sample_count;
-    abuffer->base.stats.uploaded_bytes = (uint64_t)abuffer->store.drawn_count * AXES_INSTANCE_BYTES;
-    return ok;
+    return progress;
 }
 
 static enum tracer_progress abuffer_update(struct tracer *tracer, struct scene_gpu *scene,
@@ -162,17 +163,28 @@ static enum tracer_progress abuffer_update(struct tracer *tracer, struct scene_g
 {
     struct abuffer *abuffer = (struct abuffer *)tracer;
     struct tracer_stats *stats = &tracer->stats;
-    stats->uploaded_bytes = stats->nodes_rebuilt = 0;
-    stats->cubes[TRACER_CUBE_STATIC].rebuilt = false;
-    /* Of surfaces it matters only where they are cut out. */
-    bool cuts = changes->surfaces && (scene->has_cutout || abuffer->had_cutout);
-    if (!changes->geometry && !changes->deformed && !changes->instances && !cuts)
-        return TRACER_DONE;
-    bool ok = bring_to(abuffer, scene, times, error);
-    if (!ok)
+    if (!abuffer_build_is_on(abuffer->builder)) {
+        stats->uploaded_bytes = stats->nodes_rebuilt = 0;
+        stats->cubes[TRACER_CUBE_STATIC].rebuilt = false;
+        /* Of surfaces it matters only where they are cut out. */
+        bool cuts = changes->surfaces && (scene->has_cutout || abuffer->had_cutout);
+        if (!changes->geometry && !changes->deformed && !changes->instances && !cuts)
+            return TRACER_DONE;
+    }
+    enum tracer_progress progress = do_piece(abuffer, scene, times, error);
+    if (progress == TRACER_FAILED)
         abuffer_store_finish(&abuffer->store);
+    if (progress == TRACER_DONE)
+        stats->nodes_rebuilt = abuffer->store.sample_count;
     fill_stats(abuffer);
-    return tracer_progress_of(ok);
+    return progress;
+}
+
+static void abuffer_abandon(struct tracer *tracer)
+{
+    struct abuffer *abuffer = (struct abuffer *)tracer;
+    abuffer_build_abandon(abuffer->builder);
+    fill_stats(abuffer);
 }
 
 static bool abuffer_trace_wave(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,
@@ -188,5 +200,6 @@ const struct tracer_impl tracer_abuffer_impl = {
     .create = abuffer_create,
     .destroy = abuffer_destroy,
     .update = abuffer_update,
+    .abandon = abuffer_abandon,
     .trace = abuffer_trace_wave,
 };

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/abuffer_build.h"
 
+#include "base/clock.h"
 #include "trace/abuffer_build_state.h"
+#include "trace/abuffer_voxels.h"
 
 #include <epoxy/gl.h>
 #include <stdlib.h>
@@ -33,6 +35,7 @@ void abuffer_builder_destroy(struct abuffer_builder *builder)
 {
     if (!builder)
         return;
+    abuffer_deep_end(&builder->task);
     struct gpu_buffer *buffers[BUFFER_COUNT];
     list_buffers(builder, buffers);
     for (int i = 0; i < BUFFER_COUNT; i++)
@@ -99,7 +102,8 @@ static bool reserve(struct abuffer_task *task, struct error *error)
            gpu_buffer_reserve(device, &builder->build, sizeof(task->counts), error) &&
            gpu_buffer_reserve(device, &store->sums, (size_t)voxels * ABUFFER_SUM_BYTES, error) &&
            gpu_buffer_reserve(device, &store->subvoxels, subvoxels * ABUFFER_SUBVOXELS_BYTES, error) &&
-           gpu_buffer_reserve(device, &store->texels, (size_t)task->texel_count * ABUFFER_TEXEL_BYTES, error);
+           gpu_buffer_reserve(device, &store->texels, (size_t)task->texel_count * ABUFFER_TEXEL_BYTES, error) &&
+           abuffer_voxels_reserve(store, error) && abuffer_lists_reserve(task, error);
 }
 
 /* The table that ids are looked up in goes with them. */
@@ -114,23 +118,109 @@ static bool copy_drawn(struct abuffer_task *task, struct error *error)
     return true;
 }
 
-static bool build(struct abuffer_task *task, struct error *error)
+/* ---- stages ---- */
+
+static bool voxels_begin(struct abuffer_task *task, uint32_t *items, struct error *error)
 {
-    if (!list_instances(task->builder, task->scene, error))
-        return false;
-    if (task->builder->draw.drawn_count == 0) {
-        abuffer_store_finish(task->store);
-        return true;
-    }
-    return reserve(task, error) && copy_drawn(task, error) && abuffer_lists(task, error) &&
-           abuffer_runs(task, error) && gpu_check(task->builder->device, "building A-buffers", error);
+    (void)error;
+    *items = abuffer_voxel_blocks(task->store);
+    return true;
 }
 
-bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
-                   const struct tracer_options *options, struct error *error)
+static bool voxels_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
+{
+    return abuffer_voxels_pass(task->store, task->stage - ABUFFER_VOXELS_JUDGE, first, end, error);
+}
+
+/* Units are of so many items at first: a few milliseconds on software GL; on a GPU, which wants enough of them at
+ * once, so many times as many. */
+#define HARDWARE_TIMES 64u
+
+static const struct stage {
+    abuffer_stage_begin *begin;
+    abuffer_stage_run *run;
+    abuffer_stage_end *end; /* NULL: nothing */
+    uint32_t unit_items;
+} stages[ABUFFER_STAGES] = {
+    [ABUFFER_CLEAR] = {abuffer_clear_begin, abuffer_clear_run, NULL, 64},
+    [ABUFFER_DRAW] = {abuffer_draw_begin, abuffer_draw_run, NULL, 2048},
+    [ABUFFER_OCCUPIED] = {abuffer_occupied_begin, abuffer_occupied_run, abuffer_occupied_end, 4096},
+    [ABUFFER_RESOLVE] = {abuffer_resolve_begin, abuffer_resolve_run, abuffer_resolve_end, 4096},
+    [ABUFFER_UP_TO_EIGHT] = {abuffer_up_to_eight_begin, abuffer_up_to_eight_run, NULL, 2048},
+    [ABUFFER_BEYOND_EIGHT] = {abuffer_beyond_eight_begin, abuffer_beyond_eight_run, NULL, 1024},
+    [ABUFFER_DEEP] = {abuffer_deep_begin, abuffer_deep_run, NULL, 1},
+    [ABUFFER_VOXELS_JUDGE] = {voxels_begin, voxels_run, NULL, 512},
+    [ABUFFER_VOXELS_REACH_X] = {voxels_begin, voxels_run, NULL, 1024},
+    [ABUFFER_VOXELS_REACH_Y] = {voxels_begin, voxels_run, NULL, 1024},
+    [ABUFFER_VOXELS_REACH_Z] = {voxels_begin, voxels_run, NULL, 1024},
+};
+
+static uint32_t *unit_of(struct abuffer_task *task)
+{
+    struct abuffer_builder *builder = task->builder;
+    uint32_t *items = &builder->unit_items[task->stage];
+    if (*items == 0)
+        *items = stages[task->stage].unit_items * (builder->device->facts.software ? 1 : HARDWARE_TIMES);
+    return items;
+}
+
+/* Items of the stage, all that are left where nobody waits. */
+static bool run_unit(struct abuffer_task *task, uint64_t piece_end_ns, struct error *error)
+{
+    const bool whole = piece_end_ns == PIECE_WITHOUT_END;
+    const uint32_t first = task->next_item, left = task->end_item - first;
+    uint32_t *unit = unit_of(task), items = whole || left < *unit ? left : *unit;
+    const uint64_t start_ns = clock_now_ns();
+    if (items == 0)
+        return true;
+    if (!stages[task->stage].run(task, first, first + items, error))
+        return false;
+    task->next_item += items;
+    if (whole)
+        return true;
+    glFinish(); /* else what the units take would be waited for in the last one */
+    if (items == *unit)
+        *unit = piece_unit_items(items, clock_now_ns() - start_ns);
+    return true;
+}
+
+static bool end_stage(struct abuffer_task *task, struct error *error)
+{
+    const enum abuffer_stage ended = task->stage;
+    task->stage = ended + 1;
+    task->stage_begun = false;
+    return !stages[ended].end || stages[ended].end(task, error);
+}
+
+/* A unit, and what a stage begins and ends with. */
+static bool go_on(struct abuffer_task *task, uint64_t piece_end_ns, struct error *error)
+{
+    if (!task->stage_begun) {
+        task->next_item = 0;
+        if (!stages[task->stage].begin(task, &task->end_item, error))
+            return false;
+        task->stage_begun = true;
+    }
+    if (!run_unit(task, piece_end_ns, error))
+        return false;
+    return task->next_item < task->end_item || end_stage(task, error);
+}
+
+/* ---- builds ---- */
+
+static void forget(struct abuffer_builder *builder)
+{
+    abuffer_deep_end(&builder->task);
+    builder->task = (struct abuffer_task){0};
+}
+
+bool abuffer_build_begin(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
+                         const struct tracer_options *options, struct error *error)
 {
     const uint32_t tiles_along = ABUFFER_TILES_ALONG(store->resolution);
-    struct abuffer_task task = {
+    struct abuffer_task *task = &builder->task;
+    forget(builder);
+    *task = (struct abuffer_task){
         .builder = builder,
         .store = store,
         .scene = scene,
@@ -140,11 +230,54 @@ bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store,
     store->sample_count = 0;
     store->depth_max = 0;
     builder->passes = 0;
-    scene_gpu_bind(scene);
-    gpu_push_group(builder->device, "build A-buffers");
-    bool built = build(&task, error);
-    gpu_pop_group(builder->device);
-    if (!built)
+    bool begun = list_instances(builder, scene, error);
+    if (begun && builder->draw.drawn_count == 0) {
         abuffer_store_finish(store);
-    return built;
+        task->stage = ABUFFER_STAGES;
+    } else if (begun) {
+        begun = reserve(task, error) && copy_drawn(task, error);
+    }
+    if (!begun)
+        abuffer_build_abandon(builder);
+    return begun;
+}
+
+enum tracer_progress abuffer_build_piece(struct abuffer_builder *builder, uint64_t piece_end_ns,
+                                         struct error *error)
+{
+    struct abuffer_task *task = &builder->task;
+    bool good = true;
+    scene_gpu_bind(task->scene);
+    gpu_push_group(builder->device, "build A-buffers");
+    do {
+        good = task->stage == ABUFFER_STAGES || go_on(task, piece_end_ns, error);
+    } while (good && task->stage != ABUFFER_STAGES && !piece_is_over(piece_end_ns));
+    gpu_pop_group(builder->device);
+    good = good && gpu_check(builder->device, "building A-buffers", error);
+    if (good && task->stage != ABUFFER_STAGES)
+        return TRACER_MORE;
+    if (good)
+        forget(builder);
+    else
+        abuffer_build_abandon(builder);
+    return tracer_progress_of(good);
+}
+
+void abuffer_build_abandon(struct abuffer_builder *builder)
+{
+    if (builder->task.store)
+        abuffer_store_finish(builder->task.store);
+    forget(builder);
+}
+
+bool abuffer_build_is_on(const struct abuffer_builder *builder)
+{
+    return builder->task.store != NULL;
+}
+
+bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
+                   const struct tracer_options *options, struct error *error)
+{
+    return abuffer_build_begin(builder, store, scene, options, error) &&
+           abuffer_build_piece(builder, PIECE_WITHOUT_END, error) == TRACER_DONE;
 }

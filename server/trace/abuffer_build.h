@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "trace/abuffer_store.h"
+#include "trace/piece.h"
 #include "trace/scene_gpu.h"
 #include "trace/tracer.h"
 
@@ -21,10 +22,20 @@ void abuffer_builder_start_with(struct abuffer_builder *builder, uint32_t fragme
 /* Over the scene, that the last build took: 1, or 2 where there was no room for the lists at first. */
 uint32_t abuffer_builder_passes(const struct abuffer_builder *builder);
 
-/* Fills all of the store but `voxels`; the caller has set lower_world, cell_world (metres), resolution and
- * voxels_along. Waits for the device. Where the lists' buffer is too small it is made larger, and the pass is
- * repeated; where options->abuffer_mebibytes_max or the device forbid that, it fails with ERROR_LIMIT or
- * ERROR_OUT_OF_MEMORY and the store is empty. It is empty, too, where the scene has nothing to draw. */
+/* Begins to fill the store; the caller has set lower_world, cell_world (metres), resolution and voxels_along.
+ * Store, scene and options are the caller's until the build is done or abandoned. Failures leave an empty store,
+ * and so does a scene that has nothing to draw. */
+bool abuffer_build_begin(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
+                         const struct tracer_options *options, struct error *error);
+/* Goes on with what was begun, until about piece_end_ns. Waits for the device. Where the lists' buffer is too
+ * small it is made larger, and the pass is repeated; where options->abuffer_mebibytes_max or the device forbid
+ * that, it fails with ERROR_LIMIT or ERROR_OUT_OF_MEMORY. */
+enum tracer_progress abuffer_build_piece(struct abuffer_builder *builder, uint64_t piece_end_ns,
+                                         struct error *error);
+/* Leaves an empty store where one has begun; room for lists stays. */
+void abuffer_build_abandon(struct abuffer_builder *builder);
+bool abuffer_build_is_on(const struct abuffer_builder *builder);
+/* All of it at once. */
 bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
                    const struct tracer_options *options, struct error *error);
 

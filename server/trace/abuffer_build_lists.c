@@ -11,6 +11,8 @@
 /* Of a scene that is seen for the first time: nodes for so many of all texels. */
 #define TEXELS_A_NODE 4
 #define NODES_MIN 1024u
+/* Cleared together, as one item. */
+#define CLEAR_BYTES ((size_t)1 << 16)
 
 /* What lists and samples need on the device, with the texels that they hang from. */
 static uint64_t bytes_of(const struct abuffer_task *task, uint64_t nodes)
@@ -67,7 +69,7 @@ static bool reserve_nodes(struct abuffer_task *task, uint64_t nodes, struct erro
     return true;
 }
 
-static bool reserve_first(struct abuffer_task *task, struct error *error)
+bool abuffer_lists_reserve(struct abuffer_task *task, struct error *error)
 {
     struct abuffer_builder *builder = task->builder;
     uint64_t allowed = nodes_allowed(task), wanted = builder->nodes_first;
@@ -89,7 +91,70 @@ static void set_lists(const void *context, const struct gpu_program *program)
                       (float)task->store->voxels_along / (float)task->store->resolution);
 }
 
-static bool draw(struct abuffer_task *task, struct error *error)
+/* ---- what a pass begins with ---- */
+
+struct part {
+    struct gpu_buffer *buffer;
+    uint32_t value;
+};
+
+enum { CLEARED_BUFFERS = 5 };
+
+static void list_cleared(const struct abuffer_task *task, struct part parts[CLEARED_BUFFERS])
+{
+    struct abuffer_builder *builder = task->builder;
+    struct abuffer_store *store = task->store;
+    const struct part all[CLEARED_BUFFERS] = {{&builder->build, 0},
+                                              {&builder->heads, 0},
+                                              {&store->sums, 0},
+                                              {&store->subvoxels, abuffer_has_subvoxels(store) ? 0 : UINT32_MAX},
+                                              {&store->texels, 0}};
+    memcpy(parts, all, sizeof(all));
+}
+
+static uint32_t chunks_of(const struct gpu_buffer *buffer)
+{
+    return (uint32_t)((buffer->size_bytes + CLEAR_BYTES - 1) / CLEAR_BYTES);
+}
+
+bool abuffer_clear_begin(struct abuffer_task *task, uint32_t *items, struct error *error)
+{
+    (void)error;
+    struct part parts[CLEARED_BUFFERS];
+    list_cleared(task, parts);
+    *items = 0;
+    for (int i = 0; i < CLEARED_BUFFERS; i++)
+        *items += chunks_of(parts[i].buffer);
+    return true;
+}
+
+bool abuffer_clear_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
+{
+    (void)error;
+    struct part parts[CLEARED_BUFFERS];
+    list_cleared(task, parts);
+    for (uint32_t i = 0, before = 0; i < CLEARED_BUFFERS; before += chunks_of(parts[i].buffer), i++) {
+        const uint32_t from = first > before ? first - before : 0, to = end > before ? end - before : 0;
+        const size_t size = parts[i].buffer->size_bytes, from_bytes = from * CLEAR_BYTES;
+        const size_t to_bytes = to * CLEAR_BYTES < size ? to * CLEAR_BYTES : size;
+        if (from_bytes < to_bytes)
+            gpu_buffer_clear_part(task->builder->device, parts[i].buffer, from_bytes, to_bytes - from_bytes,
+                                  parts[i].value);
+    }
+    return true;
+}
+
+/* ---- the pass ---- */
+
+bool abuffer_draw_begin(struct abuffer_task *task, uint32_t *items, struct error *error)
+{
+    (void)error;
+    task->builder->passes++;
+    *items = task->builder->draw.primitive_count;
+    return true;
+}
+
+bool abuffer_draw_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
 {
     static const struct gpu_define defines[] = {{"ALL_IMAGES", "1"}, {0}};
     struct abuffer_builder *builder = task->builder;
@@ -104,21 +169,25 @@ static bool draw(struct abuffer_task *task, struct error *error)
         .context = task,
     };
     memcpy(pass.lower_world, store->lower_world, sizeof(pass.lower_world));
-    gpu_buffer_clear(device, &builder->heads, 0);
-    gpu_buffer_clear(device, &builder->build, 0);
-    gpu_buffer_clear(device, &task->store->sums, 0);
-    gpu_buffer_clear(device, &task->store->subvoxels, abuffer_has_subvoxels(store) ? 0 : UINT32_MAX);
     gpu_buffer_bind_image(device, &builder->heads, IMAGE_ABUFFER_HEADS, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->nodes, IMAGE_ABUFFER_NODES, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &task->store->sums, IMAGE_ABUFFER_SUMS, GL_R32I);
     gpu_buffer_bind_image(device, &task->store->subvoxels, IMAGE_ABUFFER_SUBVOXELS, GL_R32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_ABUFFER_BUILD_COUNTS);
-    builder->passes++;
     return axes_draw_bind_plain(&builder->draw, store->resolution, error) &&
-           axes_draw(&builder->draw, task->scene, &pass, error);
+           axes_draw_range(&builder->draw, task->scene, &pass, first, end, error);
 }
 
-static bool list_occupied(struct abuffer_task *task, struct error *error)
+/* ---- what it left ---- */
+
+bool abuffer_occupied_begin(struct abuffer_task *task, uint32_t *items, struct error *error)
+{
+    (void)error;
+    *items = task->texel_count / ABUFFER_OCCUPIED_TEXELS;
+    return true;
+}
+
+bool abuffer_occupied_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
 {
     struct abuffer_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
@@ -126,36 +195,29 @@ static bool list_occupied(struct abuffer_task *task, struct error *error)
         gpu_program_get(device, &(struct gpu_program_source){.compute = "abuffer/occupied.comp"}, error);
     if (!program)
         return false;
-    glUseProgram(program->name);
     gpu_buffer_bind_texels(device, &builder->heads, UNIT_ABUFFER_HEADS, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->occupied, IMAGE_ABUFFER_OCCUPIED, GL_R32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_ABUFFER_BUILD_COUNTS);
-    uint32_t items = task->texel_count / ABUFFER_OCCUPIED_TEXELS;
-    gpu_uniform_uint(program, "item_count", items);
-    gpu_dispatch(device, program, items);
-    abuffer_read_counts(task);
+    gpu_uniform_uint(program, "first_item", first);
+    gpu_uniform_uint(program, "end_item", end);
+    gpu_dispatch(device, program, end - first);
     return true;
 }
 
-static bool draw_and_count(struct abuffer_task *task, struct error *error)
+/* Where lists did not fit: room for all of them, and all over again. */
+bool abuffer_occupied_end(struct abuffer_task *task, struct error *error)
 {
-    return draw(task, error) && list_occupied(task, error);
-}
-
-bool abuffer_lists(struct abuffer_task *task, struct error *error)
-{
-    if (!reserve_first(task, error) || !draw_and_count(task, error))
-        return false;
+    abuffer_read_counts(task);
     if (task->counts.wraps == 0 && task->counts.nodes <= task->builder->nodes_max)
         return true;
+    if (task->builder->passes > 1)
+        return error_set(error, ERROR_INTERNAL, "abuffer", "%u fragments, where there were %u before",
+                         task->counts.nodes, task->nodes_before);
+    task->nodes_before = task->counts.nodes;
     uint64_t needed = task->counts.wraps > 0 ? UINT32_MAX : task->counts.nodes, allowed = nodes_allowed(task);
     if (needed > allowed)
         return refuse(task, needed, error);
     uint64_t wanted = needed + needed / 8; /* a scene that changes has a few more the next time */
-    if (!reserve_nodes(task, wanted < allowed ? wanted : allowed, error) || !draw_and_count(task, error))
-        return false;
-    if (task->counts.nodes > task->builder->nodes_max)
-        return error_set(error, ERROR_INTERNAL, "abuffer", "%u fragments, where there were %llu before",
-                         task->counts.nodes, (unsigned long long)needed);
-    return true;
+    task->stage = ABUFFER_CLEAR;
+    return reserve_nodes(task, wanted < allowed ? wanted : allowed, error);
 }

@@ -23,9 +23,9 @@ static bool reserve(struct abuffer_task *task, struct error *error)
            gpu_buffer_reserve(device, &builder->deep, deep * sizeof(uint32_t), error);
 }
 
-/* Binds what all of them read and write. */
+/* Items first .. end - 1 of a list. Binds what all of them read and write. */
 static const struct gpu_program *use(struct abuffer_task *task, const struct gpu_program_source *source,
-                                     uint32_t item_count, struct error *error)
+                                     uint32_t first, uint32_t end, struct error *error)
 {
     struct abuffer_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
@@ -37,16 +37,23 @@ static const struct gpu_program *use(struct abuffer_task *task, const struct gpu
     gpu_buffer_bind_texels(device, &builder->nodes, UNIT_ABUFFER_NODES, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &task->store->samples, IMAGE_ABUFFER_SAMPLES, GL_RG32UI);
     gpu_buffer_bind_image(device, &task->store->ids, IMAGE_ABUFFER_IDS, GL_R32UI);
-    gpu_uniform_uint(program, "item_count", item_count);
+    gpu_uniform_uint(program, "first_item", first);
+    gpu_uniform_uint(program, "end_item", end);
     return program;
 }
 
-static bool resolve(struct abuffer_task *task, struct error *error)
+bool abuffer_resolve_begin(struct abuffer_task *task, uint32_t *items, struct error *error)
+{
+    *items = task->counts.occupied;
+    return task->counts.nodes == 0 || reserve(task, error);
+}
+
+bool abuffer_resolve_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
 {
     struct abuffer_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     const struct gpu_program_source source = {.compute = "abuffer/resolve.comp"};
-    const struct gpu_program *program = use(task, &source, task->counts.occupied, error);
+    const struct gpu_program *program = use(task, &source, first, end, error);
     if (!program)
         return false;
     gpu_buffer_bind_texels(device, &builder->occupied, UNIT_ABUFFER_OCCUPIED, GL_R32UI);
@@ -55,43 +62,57 @@ static bool resolve(struct abuffer_task *task, struct error *error)
     gpu_buffer_bind_image(device, &builder->deep, IMAGE_ABUFFER_DEEP, GL_R32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_ABUFFER_BUILD_COUNTS);
     gpu_uniform_uint(program, "longer_max", longer_max(task));
-    gpu_dispatch(device, program, task->counts.occupied);
-    abuffer_read_counts(task);
+    gpu_dispatch(device, program, end - first);
     return true;
 }
 
-/* `count` of `longer`. */
+bool abuffer_resolve_end(struct abuffer_task *task, struct error *error)
+{
+    (void)error;
+    abuffer_read_counts(task);
+    task->store->sample_count = task->counts.nodes;
+    task->store->depth_max = task->counts.depth_max;
+    return true;
+}
+
+/* Those of `longer`. */
 static bool resolve_longer(struct abuffer_task *task, const struct gpu_program_source *source, uint32_t first,
-                           uint32_t count, struct error *error)
+                           uint32_t end, struct error *error)
 {
     struct abuffer_builder *builder = task->builder;
-    if (count == 0)
-        return true;
-    const struct gpu_program *program = use(task, source, count, error);
+    const struct gpu_program *program = use(task, source, first, end, error);
     if (!program)
         return false;
     gpu_buffer_bind_texels(builder->device, &builder->longer, UNIT_ABUFFER_LONGER, GL_R32UI);
     gpu_buffer_bind_texels(builder->device, &task->store->texels, UNIT_ABUFFER_TEXELS, GL_RG32UI);
-    gpu_uniform_uint(program, "first_item", first);
-    gpu_dispatch(builder->device, program, count);
+    gpu_dispatch(builder->device, program, end - first);
     return true;
 }
 
-bool abuffer_runs(struct abuffer_task *task, struct error *error)
+bool abuffer_up_to_eight_begin(struct abuffer_task *task, uint32_t *items, struct error *error)
+{
+    (void)error;
+    *items = task->counts.up_to_eight;
+    return true;
+}
+
+bool abuffer_up_to_eight_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
 {
     static const struct gpu_define eight[] = {{"RESOLVE_EIGHT", "1"}, {0}};
     static const struct gpu_program_source up_to_eight = {.compute = "abuffer/resolve.comp", .defines = eight};
+    return resolve_longer(task, &up_to_eight, first, end, error);
+}
+
+bool abuffer_beyond_eight_begin(struct abuffer_task *task, uint32_t *items, struct error *error)
+{
+    (void)error;
+    *items = task->counts.beyond_eight;
+    return true;
+}
+
+bool abuffer_beyond_eight_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
+{
     static const struct gpu_program_source beyond_eight = {.compute = "abuffer/sort.comp"};
-    struct abuffer_store *store = task->store;
-    gpu_buffer_clear(task->builder->device, &store->texels, 0);
-    if (task->counts.nodes == 0)
-        return true;
-    if (!reserve(task, error) || !resolve(task, error) ||
-        !resolve_longer(task, &up_to_eight, 0, task->counts.up_to_eight, error) ||
-        !resolve_longer(task, &beyond_eight, longer_max(task) - task->counts.beyond_eight,
-                        task->counts.beyond_eight, error))
-        return false;
-    store->sample_count = task->counts.nodes;
-    store->depth_max = task->counts.depth_max;
-    return task->counts.deep == 0 || abuffer_runs_deep(task, error);
+    const uint32_t from = longer_max(task) - task->counts.beyond_eight;
+    return resolve_longer(task, &beyond_eight, from + first, from + end, error);
 }

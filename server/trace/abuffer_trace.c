@@ -2,38 +2,14 @@
 #include "trace/abuffer_trace.h"
 
 #include "gpu/program.h"
-#include "shared/abuffer.h"
 #include "shared/bindings.h"
+#include "trace/abuffer_voxels.h"
 #include "trace/trace_program.h"
 
 #include <epoxy/gl.h>
 
-#define TEXEL_BYTES (4 * sizeof(uint32_t))
-#define BLOCK_VOXELS 4u /* along a side */
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX (1u << 18)
-
-bool abuffer_voxels_build(struct abuffer_store *store, struct error *error)
-{
-    static const char *const passes[] = {"VOXELS_JUDGE", "VOXELS_REACH_X", "VOXELS_REACH_Y", "VOXELS_REACH_Z"};
-    const uint64_t grid = store->voxels_along / BLOCK_VOXELS, blocks = grid * grid * grid;
-    if (store->resolution == 0)
-        return true;
-    if (!gpu_buffer_reserve(store->device, &store->voxels, blocks * ABUFFER_BLOCK_TEXELS * TEXEL_BYTES, error))
-        return false;
-    gpu_buffer_bind_texels(store->device, &store->sums, UNIT_TRACER_0, GL_RGBA32I);
-    gpu_buffer_bind_image(store->device, &store->voxels, IMAGE_ABUFFER_VOXELS, GL_RGBA32UI);
-    for (size_t i = 0; i < sizeof(passes) / sizeof(passes[0]); i++) {
-        const struct gpu_define defines[] = {{passes[i], "1"}, {NULL, NULL}};
-        const struct gpu_program_source source = {.compute = "abuffer/voxels.comp", .defines = defines};
-        const struct gpu_program *program = gpu_program_get(store->device, &source, error);
-        if (!program)
-            return false;
-        gpu_uniform_int(program, "grid", (int32_t)grid);
-        gpu_dispatch(store->device, program, blocks);
-    }
-    return true;
-}
 
 /* Crossings of samples to hits, in place. */
 static bool make_surfaces(struct abuffer_store *store, const struct scene_gpu *scene, const struct wave *wave,
@@ -84,7 +60,7 @@ bool abuffer_trace(struct abuffer_store *store, struct scene_gpu *scene, const s
     const float place[4] = {store->lower_world[0], store->lower_world[1], store->lower_world[2],
                             store->cell_world};
     gpu_uniform_int(program, "abuffer_resolution", (int32_t)store->resolution);
-    gpu_uniform_int(program, "abuffer_grid", (int32_t)(store->voxels_along / BLOCK_VOXELS));
+    gpu_uniform_int(program, "abuffer_grid", (int32_t)(store->voxels_along / ABUFFER_BLOCK_VOXELS));
     gpu_uniform_int(program, "abuffer_has_subvoxels", abuffer_has_subvoxels(store));
     gpu_uniform_int(program, "abuffer_drawn_count", (int32_t)store->drawn_count);
     gpu_uniform_vec(program, "abuffer_place", 4, place);

@@ -11,10 +11,6 @@
 
 #include <stdbool.h>
 
-/* From `sums` to `voxels`: which hold something, by which images a ray is to be searched for in each, and how far
- * nothing is. After abuffer_build(). */
-bool abuffer_voxels_build(struct abuffer_store *store, struct error *error);
-
 /* What tracer_impl.trace does. Buffers of the scene are bound. A hit's distance is that of the ray's crossing, its
  * surface that of the sample's own primitive at the place nearest to the crossing. */
 bool abuffer_trace(struct abuffer_store *store, struct scene_gpu *scene, const struct wave *wave,

@@ -5,7 +5,7 @@
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 
-uniform uint item_count; // of ABUFFER_OCCUPIED_TEXELS each
+uniform uint first_item, end_item; // of ABUFFER_OCCUPIED_TEXELS each
 
 layout(binding = UNIT_ABUFFER_HEADS) uniform usamplerBuffer heads;
 layout(binding = IMAGE_ABUFFER_OCCUPIED, r32ui) writeonly uniform uimageBuffer occupied;
@@ -13,8 +13,8 @@ layout(std430, binding = BIND_ABUFFER_BUILD_COUNTS) buffer build_block { abuffer
 
 void main()
 {
-    uint first = item_index() * ABUFFER_OCCUPIED_TEXELS;
-    if (item_index() >= item_count)
+    uint item = first_item + item_index(), first = item * ABUFFER_OCCUPIED_TEXELS;
+    if (item >= end_item)
         return;
     uint filled = 0u;
     for (uint i = 0u; i < ABUFFER_OCCUPIED_TEXELS; i++)

@@ -8,7 +8,7 @@
 #include "abuffer/list.glsl"
 #include "abuffer/run.glsl"
 
-uniform uint item_count;
+uniform uint first_item, end_item; // of the list
 
 #ifdef RESOLVE_EIGHT
 layout(binding = UNIT_ABUFFER_LONGER) uniform usamplerBuffer longer;
@@ -60,8 +60,8 @@ void list_longer(uint texel, uint count)
 
 void main()
 {
-    uint k = item_index();
-    if (k >= item_count)
+    uint k = first_item + item_index();
+    if (k >= end_item)
         return;
     uint texel = texelFetch(occupied, int(k)).x, node = head_of(texel);
     uvec3 a = take(node), b = take(node), c = take(node), d = take(node);
@@ -93,8 +93,8 @@ void main()
 // Batcher's network for eight.
 void main()
 {
-    uint k = item_index();
-    if (k >= item_count)
+    uint k = first_item + item_index();
+    if (k >= end_item)
         return;
     uint texel = texelFetch(longer, int(k)).x, node = head_of(texel);
     uvec2 words = texelFetch(texels, int(texel)).xy;

@@ -7,18 +7,17 @@
 #include "abuffer/run.glsl"
 #include "common/sort.glsl"
 
-uniform uint item_count;
-uniform uint first_item;
+uniform uint first_item, end_item; // of the list
 
 layout(binding = UNIT_ABUFFER_LONGER) uniform usamplerBuffer longer;
 layout(binding = UNIT_ABUFFER_TEXELS) uniform usamplerBuffer texels;
 
 void main()
 {
-    uint k = item_index();
-    if (k >= item_count)
+    uint k = first_item + item_index();
+    if (k >= end_item)
         return;
-    uint texel = texelFetch(longer, int(first_item + k)).x, node = head_of(texel);
+    uint texel = texelFetch(longer, int(k)).x, node = head_of(texel);
     uvec2 words = texelFetch(texels, int(texel)).xy;
     run r = run(words.x, words.y);
     for (uint i = 0u; i < r.count; i++)

@@ -10,6 +10,7 @@
 layout(binding = IMAGE_ABUFFER_VOXELS, rgba32ui) uniform uimageBuffer voxels;
 
 uniform int grid; // blocks along a side
+uniform uint first_item, end_item; // of the blocks
 
 #ifdef VOXELS_JUDGE
 
@@ -100,8 +101,9 @@ void settle(int at, ivec3 place)
 
 void main()
 {
-    int item = int(item_index());
-    if (item >= grid * grid * grid)
+    uint block = first_item + item_index();
+    if (block >= end_item)
         return;
+    int item = int(block);
     settle(ABUFFER_BLOCK_TEXELS * item, ivec3(item % grid, item / grid % grid, item / (grid * grid)));
 }

@@ -9,6 +9,7 @@
 #include "tests/unit/abuffer_samples.h"
 
 #include "trace/abuffer_trace.h"
+#include "trace/abuffer_voxels.h"
 
 #include <float.h>
 

@@ -7,6 +7,9 @@
 
 #include "gpu/registry.h"
 #include "shared/abuffer_build.h"
+#include "trace/abuffer_build_state.h"
+
+#include <epoxy/gl.h>
 
 #define RESOLUTION 32u
 #define VOXELS 16u
@@ -121,6 +124,109 @@ static void lists_that_do_not_fit_are_made_anew(void **state)
         contents_free(&again);
         fixture_finish(&fixture);
     }
+}
+
+/* ---- pieces ---- */
+
+/* By units of so many items, each a piece; leaves after `pieces`. */
+static enum tracer_progress build_in_units(struct fixture *fixture, uint32_t items, uint32_t *pieces)
+{
+    struct error error = {0};
+    enum tracer_progress progress = TRACER_MORE;
+    const uint32_t most = *pieces;
+    place(fixture, 2 * RESOLUTION, VOXELS);
+    expect_ok(abuffer_build_begin(fixture->builder, &fixture->store, &fixture->gpu, &fixture->options, &error),
+              &error);
+    for (*pieces = 0; progress == TRACER_MORE && *pieces < most; ++*pieces) {
+        for (int stage = 0; stage < ABUFFER_STAGES; stage++)
+            fixture->builder->unit_items[stage] = items;
+        /* What others do in between. */
+        for (unsigned unit = 0; unit < 8; unit++) {
+            gpu_buffer_bind_image(device, &fixture->gpu.positions, unit, GL_R32UI);
+            gpu_buffer_bind_texels(device, &fixture->gpu.positions, unit, GL_R32UI);
+            gpu_buffer_bind_storage(&fixture->gpu.positions, unit);
+        }
+        progress = abuffer_build_piece(fixture->builder, 0, &error);
+    }
+    expect_ok(progress != TRACER_FAILED, &error);
+    return progress;
+}
+
+/* However small they are, also where lists turn out to be too small in the middle. */
+static void a_build_in_pieces_is_the_same(void **state)
+{
+    (void)state;
+    static const uint32_t units[] = {5, 64, 3001};
+    struct scene *(*const scenes[])(void) = {scene_of_bodies_and_others, test_scene_spheres,
+                                             test_scene_translucent};
+    for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++) {
+        struct fixture fixture;
+        struct contents whole, pieces;
+        fixture_init(&fixture, scenes[i]());
+        build_and_read(&fixture, &whole, 2 * RESOLUTION);
+        for (size_t u = 0; u < sizeof(units) / sizeof(units[0]); u++) {
+            uint32_t count = UINT32_MAX;
+            abuffer_builder_start_with(fixture.builder, u == 0 ? 1 << 20 : 100);
+            assert_int_equal(build_in_units(&fixture, units[u], &count), TRACER_DONE);
+            assert_int_equal(abuffer_builder_passes(fixture.builder), u == 0 ? 1 : 2);
+            assert_in_range(count, ABUFFER_STAGES - 3, UINT32_MAX);
+            contents_read(&pieces, &fixture.store);
+            expect_consistent(&pieces);
+            expect_same(&whole, &pieces);
+            contents_free(&pieces);
+        }
+        contents_free(&whole);
+        fixture_finish(&fixture);
+    }
+}
+
+/* The host's part of it, too. */
+static void deep_texels_are_done_in_pieces(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents whole, pieces;
+    uint32_t count = UINT32_MAX, left;
+    fixture_init(&fixture, stack_scene(ABUFFER_LIST_MAX + 1, SHUFFLED, false));
+    build_and_read(&fixture, &whole, 2 * RESOLUTION);
+    assert_int_equal(build_in_units(&fixture, 1000, &count), TRACER_DONE);
+    contents_read(&pieces, &fixture.store);
+    expect_same(&whole, &pieces);
+    left = count - 5; /* in the middle of them: after them come four passes over voxels */
+    assert_int_equal(build_in_units(&fixture, 1000, &left), TRACER_MORE);
+    assert_non_null(fixture.builder->task.deep);
+    abuffer_build_abandon(fixture.builder);
+    contents_free(&whole);
+    contents_free(&pieces);
+    fixture_finish(&fixture);
+}
+
+/* After any piece: the store is empty, and the next build is right. */
+static void a_build_that_is_left_leaves_nothing(void **state)
+{
+    (void)state;
+    struct fixture fixture;
+    struct contents whole, again;
+    uint32_t count = UINT32_MAX;
+    fixture_init(&fixture, scene_of_bodies_and_others());
+    build_and_read(&fixture, &whole, 2 * RESOLUTION);
+    abuffer_builder_start_with(fixture.builder, 100);
+    build_in_units(&fixture, 3001, &count);
+    for (uint32_t done = 0; done < count; done++) {
+        uint32_t pieces = done;
+        abuffer_builder_start_with(fixture.builder, 100);
+        assert_int_equal(build_in_units(&fixture, 3001, &pieces), TRACER_MORE);
+        assert_true(abuffer_build_is_on(fixture.builder));
+        abuffer_build_abandon(fixture.builder);
+        assert_false(abuffer_build_is_on(fixture.builder));
+        assert_int_equal(fixture.store.resolution, 0);
+        assert_int_equal(abuffer_store_bytes(&fixture.store), 0);
+        build_and_read(&fixture, &again, 2 * RESOLUTION);
+        expect_same(&whole, &again);
+        contents_free(&again);
+    }
+    contents_free(&whole);
+    fixture_finish(&fixture);
 }
 
 static void expect_refused(struct fixture *fixture, enum error_kind kind, const char *field)
@@ -304,6 +410,9 @@ int main(void)
         cmocka_unit_test(windings_beyond_what_is_told_stay_there),
         cmocka_unit_test(coincident_surfaces_keep_their_order),
         cmocka_unit_test(lists_that_do_not_fit_are_made_anew),
+        cmocka_unit_test(a_build_in_pieces_is_the_same),
+        cmocka_unit_test(deep_texels_are_done_in_pieces),
+        cmocka_unit_test(a_build_that_is_left_leaves_nothing),
         cmocka_unit_test(more_than_is_allowed_is_refused_with_what_it_needs),
         cmocka_unit_test(texels_alone_may_be_more_than_is_allowed),
         cmocka_unit_test(what_a_device_cannot_hold_is_refused),
