@@ -141,18 +141,19 @@ static const struct stage {
     abuffer_stage_run *run;
     abuffer_stage_end *end; /* NULL: nothing */
     uint32_t unit_items;
+    abuffer_stage_fit *fit; /* NULL: all items take about as long */
 } stages[ABUFFER_STAGES] = {
-    [ABUFFER_CLEAR] = {abuffer_clear_begin, abuffer_clear_run, NULL, 64},
-    [ABUFFER_DRAW] = {abuffer_draw_begin, abuffer_draw_run, NULL, 2048},
-    [ABUFFER_OCCUPIED] = {abuffer_occupied_begin, abuffer_occupied_run, abuffer_occupied_end, 4096},
-    [ABUFFER_RESOLVE] = {abuffer_resolve_begin, abuffer_resolve_run, abuffer_resolve_end, 4096},
-    [ABUFFER_UP_TO_EIGHT] = {abuffer_up_to_eight_begin, abuffer_up_to_eight_run, NULL, 2048},
-    [ABUFFER_BEYOND_EIGHT] = {abuffer_beyond_eight_begin, abuffer_beyond_eight_run, NULL, 1024},
-    [ABUFFER_DEEP] = {abuffer_deep_begin, abuffer_deep_run, NULL, 1},
-    [ABUFFER_VOXELS_JUDGE] = {voxels_begin, voxels_run, NULL, 512},
-    [ABUFFER_VOXELS_REACH_X] = {voxels_begin, voxels_run, NULL, 1024},
-    [ABUFFER_VOXELS_REACH_Y] = {voxels_begin, voxels_run, NULL, 1024},
-    [ABUFFER_VOXELS_REACH_Z] = {voxels_begin, voxels_run, NULL, 1024},
+    [ABUFFER_CLEAR] = {abuffer_clear_begin, abuffer_clear_run, NULL, 64, NULL},
+    [ABUFFER_DRAW] = {abuffer_draw_begin, abuffer_draw_run, NULL, 2048, abuffer_draw_fit},
+    [ABUFFER_OCCUPIED] = {abuffer_occupied_begin, abuffer_occupied_run, abuffer_occupied_end, 4096, NULL},
+    [ABUFFER_RESOLVE] = {abuffer_resolve_begin, abuffer_resolve_run, abuffer_resolve_end, 4096, NULL},
+    [ABUFFER_UP_TO_EIGHT] = {abuffer_up_to_eight_begin, abuffer_up_to_eight_run, NULL, 2048, NULL},
+    [ABUFFER_BEYOND_EIGHT] = {abuffer_beyond_eight_begin, abuffer_beyond_eight_run, NULL, 1024, NULL},
+    [ABUFFER_DEEP] = {abuffer_deep_begin, abuffer_deep_run, NULL, 1, NULL},
+    [ABUFFER_VOXELS_JUDGE] = {voxels_begin, voxels_run, NULL, 512, NULL},
+    [ABUFFER_VOXELS_REACH_X] = {voxels_begin, voxels_run, NULL, 1024, NULL},
+    [ABUFFER_VOXELS_REACH_Y] = {voxels_begin, voxels_run, NULL, 1024, NULL},
+    [ABUFFER_VOXELS_REACH_Z] = {voxels_begin, voxels_run, NULL, 1024, NULL},
 };
 
 static uint32_t *unit_of(struct abuffer_task *task)
@@ -173,9 +174,14 @@ static bool run_unit(struct abuffer_task *task, uint64_t piece_end_ns, struct er
     const uint64_t start_ns = clock_now_ns();
     if (items == 0)
         return true;
+    if (stages[task->stage].fit && (!whole || task->band_count > 0))
+        items = stages[task->stage].fit(task, first, items);
     if (!stages[task->stage].run(task, first, first + items, error))
         return false;
-    task->next_item += items;
+    if (task->band_count == 0 || ++task->band == task->band_count) {
+        task->band_count = 0;
+        task->next_item += items;
+    }
     if (whole)
         return true;
     glFinish(); /* else what the units take would be waited for in the last one */

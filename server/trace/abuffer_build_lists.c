@@ -4,13 +4,18 @@
  * them, they are counted, room is made, and the pass is repeated. */
 #include "shared/bindings.h"
 #include "trace/abuffer_build_state.h"
+#include "trace/axes_cover.h"
 
 #include <epoxy/gl.h>
+#include <math.h>
 #include <string.h>
 
 /* Of a scene that is seen for the first time: nodes for so many of all texels. */
 #define TEXELS_A_NODE 4
 #define NODES_MIN 1024u
+/* What a unit of draws fills, at most: some milliseconds on software GL. */
+#define DRAW_TEXELS_SOFTWARE 65536.0
+#define DRAW_TEXELS_HARDWARE 16777216.0
 /* Cleared together, as one item. */
 #define CLEAR_BYTES ((size_t)1 << 16)
 
@@ -154,6 +159,23 @@ bool abuffer_draw_begin(struct abuffer_task *task, uint32_t *items, struct error
     return true;
 }
 
+uint32_t abuffer_draw_fit(struct abuffer_task *task, uint32_t first, uint32_t items)
+{
+    const struct abuffer_store *store = task->store;
+    const double most = task->builder->device->facts.software ? DRAW_TEXELS_SOFTWARE : DRAW_TEXELS_HARDWARE;
+    double texels;
+    if (task->band_count > 0)
+        return 1;
+    const uint32_t end =
+        axes_cover_end(&task->builder->draw, task->scene, store->cell_world, first, first + items, most, &texels);
+    if (end == first + 1 && texels > 2 * most) {
+        const double bands = ceil(texels / most), bands_max = (store->resolution + 7) / 8;
+        task->band_count = (uint32_t)(bands < bands_max ? bands : bands_max);
+        task->band = 0;
+    }
+    return end - first;
+}
+
 bool abuffer_draw_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error)
 {
     static const struct gpu_define defines[] = {{"ALL_IMAGES", "1"}, {0}};
@@ -168,6 +190,10 @@ bool abuffer_draw_run(struct abuffer_task *task, uint32_t first, uint32_t end, s
         .set = set_lists,
         .context = task,
     };
+    if (task->band_count > 0) {
+        pass.first_row = (uint32_t)((uint64_t)store->resolution * task->band / task->band_count);
+        pass.end_row = (uint32_t)((uint64_t)store->resolution * (task->band + 1) / task->band_count);
+    }
     memcpy(pass.lower_world, store->lower_world, sizeof(pass.lower_world));
     gpu_buffer_bind_image(device, &builder->heads, IMAGE_ABUFFER_HEADS, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->nodes, IMAGE_ABUFFER_NODES, GL_RGBA32UI);

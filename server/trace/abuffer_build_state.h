@@ -36,7 +36,9 @@ struct abuffer_task {
     uint32_t nodes_before;    /* counted where there was no room for them */
     enum abuffer_stage stage; /* ABUFFER_STAGES: all is done */
     bool stage_begun;
-    uint32_t next_item, end_item;       /* of the stage */
+    uint32_t next_item, end_item; /* of the stage */
+    /* A primitive that covers much is drawn to so many bands of rows, one after the other; 0: there is none. */
+    uint32_t band, band_count;
     struct abuffer_build_counts counts; /* as last read back */
     struct abuffer_deep *deep;
 };
@@ -63,12 +65,15 @@ struct abuffer_builder {
  * looks at what there is when all are done. */
 typedef bool abuffer_stage_begin(struct abuffer_task *task, uint32_t *items, struct error *error);
 typedef bool abuffer_stage_run(struct abuffer_task *task, uint32_t first, uint32_t end, struct error *error);
+/* How many of the next items make a unit that is no longer than others, at least one. */
+typedef uint32_t abuffer_stage_fit(struct abuffer_task *task, uint32_t first, uint32_t items);
 typedef bool abuffer_stage_end(struct abuffer_task *task, struct error *error);
 
 /* abuffer_build_lists.c. Draws the scene into `heads`, `nodes` and the store's sums, and lists the texels that
  * have any. */
 abuffer_stage_begin abuffer_clear_begin, abuffer_draw_begin, abuffer_occupied_begin;
 abuffer_stage_run abuffer_clear_run, abuffer_draw_run, abuffer_occupied_run;
+abuffer_stage_fit abuffer_draw_fit;
 abuffer_stage_end abuffer_occupied_end;
 /* abuffer_build_lists.c. Whether the options allow as many texels, empty ones too. */
 bool abuffer_texels_allowed(const struct abuffer_task *task, struct error *error);

@@ -28,6 +28,7 @@ void axes_draw_finish(struct axes_draw *draw)
     gpu_object_destroy(draw->device->registry, GPU_VERTEX_ARRAY, draw->vertex_array);
     free(draw->runs);
     free(draw->listed);
+    free(draw->instances);
     axes_draw_init(draw, draw->device);
 }
 
@@ -100,8 +101,10 @@ static void forget_list(struct axes_draw *draw)
 {
     free(draw->runs);
     free(draw->listed);
+    free(draw->instances);
     draw->runs = NULL;
     draw->listed = NULL;
+    draw->instances = NULL;
     draw->run_count = draw->command_count = draw->drawn_count = draw->primitive_count = 0;
 }
 
@@ -109,9 +112,9 @@ bool axes_draw_prepare(struct axes_draw *draw, const struct scene_gpu *scene, co
                        uint32_t instance_count, struct error *error)
 {
     size_t count = instance_count ? instance_count : 1;
-    uint32_t *ascending = malloc(count * sizeof(*ascending));
     struct drawn *drawn = calloc(count, sizeof(*drawn));
     forget_list(draw);
+    uint32_t *ascending = draw->instances = malloc(count * sizeof(*ascending));
     draw->runs = calloc(count, sizeof(*draw->runs));
     draw->listed = calloc(count, sizeof(*draw->listed));
     bool listed = false;
@@ -128,7 +131,6 @@ bool axes_draw_prepare(struct axes_draw *draw, const struct scene_gpu *scene, co
                                error);
     draw->drawn_count = instance_count;
 out:
-    free(ascending);
     free(drawn);
     if (!listed)
         forget_list(draw);
@@ -199,18 +201,22 @@ static void set_uniforms(const struct axes_pass *pass, const struct gpu_program 
         pass->set(pass->context, program);
 }
 
-static void set_state(uint32_t along)
+static void set_state(const struct axes_pass *pass)
 {
-    glViewport(0, 0, (GLsizei)along, (GLsizei)along);
+    const GLsizei along = (GLsizei)pass->resolution;
+    glViewport(0, 0, along, along);
     glDisable(GL_BLEND);
     glDisable(GL_SCISSOR_TEST);
+    if (pass->end_row > 0) {
+        glEnable(GL_SCISSOR_TEST);
+        glScissor(0, (GLint)pass->first_row, along, (GLsizei)(pass->end_row - pass->first_row));
+    }
     glDisable(GL_CULL_FACE);
     glFrontFace(GL_CCW); /* gl_FrontFacing: others leave it either way */
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
 }
 
-/* The command that the primitive is of. */
-static uint32_t command_of(const struct axes_draw *draw, uint32_t id)
+uint32_t axes_draw_command_of(const struct axes_draw *draw, uint32_t id)
 {
     uint32_t first = 0, end = draw->command_count;
     while (end - first > 1) {
@@ -246,7 +252,7 @@ static void draw_some(const struct axes_command *command, uint32_t first, uint32
 static void draw_run(const struct axes_draw *draw, const struct axes_run *run, uint32_t first, uint32_t end)
 {
     const uint32_t run_end = run->first + run->count;
-    uint32_t command = command_of(draw, first);
+    uint32_t command = axes_draw_command_of(draw, first);
     command = command > run->first ? command : run->first;
     while (command < run_end && draw->listed[command].first_id < end) {
         const uint32_t from = draw->listed[command].first_id, to = end_of(draw, command);
@@ -292,11 +298,12 @@ bool axes_draw_range(struct axes_draw *draw, const struct scene_gpu *scene, cons
         return true;
     if (!make_vertex_array(draw, error))
         return false;
-    set_state(pass->resolution);
+    set_state(pass);
     glGetIntegerv(GL_VERTEX_ARRAY_BINDING, &vertex_array);
     glBindVertexArray(draw->vertex_array);
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, draw->commands.name);
     bool drawn = draw_runs(draw, scene, pass, first, end, error);
+    glDisable(GL_SCISSOR_TEST);
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, 0);
     glBindVertexArray((GLuint)vertex_array);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);

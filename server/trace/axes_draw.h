@@ -41,6 +41,7 @@ struct axes_draw {
     /* Of what was listed last. */
     struct axes_run *runs;
     struct axes_command *listed; /* mirror of `commands` */
+    uint32_t *instances;         /* that were listed, ascending */
     uint32_t run_count, drawn_count, command_count;
     uint32_t primitive_count; /* of all instances; their ids are 0 .. primitive_count - 1 */
 };
@@ -67,6 +68,7 @@ struct axes_pass {
     bool cutouts_ignored;             /* nothing is cut out: every primitive is drawn whole */
     float lower_world[3], cell_world; /* of the cube */
     uint32_t resolution;              /* texels along a side of the images */
+    uint32_t first_row, end_row;      /* of each image, what is drawn; 0, 0: all */
     float overlap; /* of the greatest component of a normal, to be in an axis' image; without ALL_IMAGES */
     /* Sets further uniforms of each program; may be NULL */
     void (*set)(const void *context, const struct gpu_program *program);
@@ -82,5 +84,7 @@ bool axes_draw(struct axes_draw *draw, const struct scene_gpu *scene, const stru
  * to draw->primitive_count draw what axes_draw() does. Does not wait. */
 bool axes_draw_range(struct axes_draw *draw, const struct scene_gpu *scene, const struct axes_pass *pass,
                      uint32_t first, uint32_t end, struct error *error);
+/* Which of `listed` a primitive's id is of; there are some. */
+uint32_t axes_draw_command_of(const struct axes_draw *draw, uint32_t id);
 
 #endif
