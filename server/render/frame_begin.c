@@ -110,9 +110,12 @@ static bool take_tracers(struct frame_renderer *renderer, struct error *error)
     struct render_context *context = &renderer->work->context;
     const struct frame_request *request = &context->request;
     renderer->tracer = context->tracer = take_tracer(renderer, request->tracer, "tracer", error);
-    if (renderer->tracer && request->compare)
-        renderer->second = take_tracer(renderer, request->compare_with, "compare_with", error);
-    return renderer->tracer && (!request->compare || renderer->second);
+    if (!renderer->tracer || !request->compare)
+        return renderer->tracer;
+    renderer->second = request->compare_with == request->tracer
+                           ? tracer_set_take_again(&renderer->shared->tracers, renderer->tracer)
+                           : take_tracer(renderer, request->compare_with, "compare_with", error);
+    return renderer->second;
 }
 
 void frame_end(struct frame_renderer *renderer)

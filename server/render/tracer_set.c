@@ -107,6 +107,12 @@ static struct tracer_slot *slot_of(struct tracer_set *set, const struct tracer *
     return NULL;
 }
 
+struct tracer *tracer_set_take_again(struct tracer_set *set, struct tracer *tracer)
+{
+    slot_of(set, tracer)->users++;
+    return tracer;
+}
+
 enum tracer_progress tracer_set_bring(struct tracer_set *set, const struct tracer *tracer, struct scene_gpu *scene,
                                       uint64_t piece_ns, struct stage_times *times, struct error *error)
 {

@@ -29,6 +29,8 @@ bool tracer_set_are_free(const struct tracer_set *set, const struct tracer_impl 
  * was taken, and once it was brought to the scene, it stays as it is. */
 struct tracer *tracer_set_take(struct tracer_set *set, struct gpu_device *device, const struct tracer_impl *impl,
                                const struct tracer_options *options, struct error *error);
+/* One that is taken, for a second purpose of who took it, whether or not it was brought to the scene yet. */
+struct tracer *tracer_set_take_again(struct tracer_set *set, struct tracer *tracer);
 /* Brings one that is taken to the scene, a piece at a time (tracer_update_piece). `times`: what this piece took.
  */
 enum tracer_progress tracer_set_bring(struct tracer_set *set, const struct tracer *tracer, struct scene_gpu *scene,
