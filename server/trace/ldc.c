@@ -21,8 +21,20 @@
 #define RESOLUTION_MAX 4096
 #define RESOLUTION_DEFAULT 1024
 
+/* What the next unit of an update does. */
+enum ldc_phase {
+    LDC_IDLE,
+    LDC_CUBE, /* begins a cube */
+    LDC_SAMPLES,
+    LDC_LEVELS,
+};
+
 struct ldc {
     struct tracer base;
+    enum ldc_phase phase;
+    unsigned which;               /* the cube in hand */
+    bool stale[TRACER_CUBES_MAX]; /* to be built by this update */
+    struct ldc_levels levels;     /* in hand */
     struct ldc_store store;
     struct ldc_builder *builder;
     struct ldc_parts parts;
@@ -84,6 +96,7 @@ static void ldc_destroy(struct tracer *tracer)
     if (!ldc)
         return;
     ldc_parts_finish(&ldc->parts);
+    ldc_levels_finish(&ldc->levels);
     ldc_builder_destroy(ldc->builder);
     ldc_store_finish(&ldc->store);
     gpu_timer_destroy(ldc->timer);
@@ -116,6 +129,9 @@ static struct tracer *ldc_create(struct gpu_device *device, const struct tracer_
 static void reset(struct ldc *ldc)
 {
     struct gpu_device *device = ldc->store.device;
+    ldc->phase = LDC_IDLE;
+    ldc_levels_finish(&ldc->levels);
+    ldc_builder_clear(ldc->builder);
     ldc_parts_finish(&ldc->parts);
     ldc_store_finish(&ldc->store);
     ldc_store_init(&ldc->store, device);
@@ -123,26 +139,84 @@ static void reset(struct ldc *ldc)
 
 /* ---- updates ---- */
 
-static bool build_cube(struct ldc *ldc, unsigned which, struct scene_gpu *scene, struct error *error)
+/* Goes on to the next of the cubes that are to be built and have something in them, from ldc->which on. */
+static enum tracer_progress find_cube(struct ldc *ldc)
 {
-    const struct ldc_part *part = &ldc->parts.parts[which];
-    struct ldc_cube *cube = &ldc->store.cubes[which];
-    *cube = (struct ldc_cube){.cell_world = part->box.cell_world, .resolution = ldc->resolution};
-    memcpy(cube->lower_world, part->box.lower_world, sizeof(cube->lower_world));
-    if (part->count == 0) {
-        cube->resolution = 0;
-        return true;
+    for (; ldc->which < TRACER_CUBES_MAX; ldc->which++) {
+        const struct ldc_part *part = &ldc->parts.parts[ldc->which];
+        struct ldc_cube *cube = &ldc->store.cubes[ldc->which];
+        if (!ldc->stale[ldc->which])
+            continue;
+        *cube = (struct ldc_cube){.cell_world = part->box.cell_world};
+        memcpy(cube->lower_world, part->box.lower_world, sizeof(cube->lower_world));
+        if (part->count == 0)
+            continue;
+        cube->resolution = ldc->resolution;
+        ldc->phase = LDC_CUBE;
+        return TRACER_MORE;
     }
+    return TRACER_DONE;
+}
+
+static enum tracer_progress begin_cube(struct ldc *ldc, struct scene_gpu *scene, struct error *error)
+{
+    const struct ldc_part *part = &ldc->parts.parts[ldc->which];
+    ldc->phase = LDC_SAMPLES;
+    return ldc_build_begin(ldc->builder, &ldc->store, ldc->which, scene, part->instances, part->count,
+                           &ldc->base.options, error);
+}
+
+static enum tracer_progress end_cube(struct ldc *ldc)
+{
+    struct tracer_stats *stats = &ldc->base.stats;
+    stats->nodes_rebuilt += ldc->store.cubes[ldc->which].node_count;
+    stats->uploaded_bytes += (uint64_t)ldc->parts.parts[ldc->which].count * AXES_INSTANCE_BYTES;
+    stats->cubes[ldc->which].rebuilt = true;
+    ldc->which++;
+    return find_cube(ldc);
+}
+
+static enum tracer_progress do_unit(struct ldc *ldc, struct scene_gpu *scene, struct error *error)
+{
+    if (ldc->phase == LDC_CUBE)
+        return begin_cube(ldc, scene, error);
+    enum tracer_progress progress =
+        ldc->phase == LDC_SAMPLES ? ldc_build_go_on(ldc->builder, error) : ldc_levels_go_on(&ldc->levels, error);
+    if (progress != TRACER_DONE)
+        return progress;
+    if (ldc->phase == LDC_LEVELS)
+        return end_cube(ldc);
+    ldc->phase = LDC_LEVELS;
+    ldc_levels_begin(&ldc->levels, &ldc->store, ldc->which, &ldc->base.options);
+    return TRACER_MORE;
+}
+
+/* Units of one cube. The CPU's clock is to tell when the device is through with them. */
+static enum tracer_progress go_on_with_cube(struct ldc *ldc, struct scene_gpu *scene, struct error *error)
+{
+    const uint64_t piece_end_ns = ldc->base.piece_end_ns;
+    const unsigned which = ldc->which;
+    enum tracer_progress progress = TRACER_MORE;
     gpu_timer_begin(ldc->timer, STAGE_BUILD, which);
-    bool ok = ldc_build(ldc->builder, &ldc->store, which, scene, part->instances, part->count, &ldc->base.options,
-                        error) &&
-              ldc_levels_build(&ldc->store, which, &ldc->base.options, error);
-    glFinish(); /* the time of this cube on the CPU's clock is the time until it is there */
+    do {
+        progress = do_unit(ldc, scene, error);
+        if (piece_end_ns != PIECE_WITHOUT_END || ldc->which != which)
+            glFinish();
+    } while (progress == TRACER_MORE && ldc->which == which && !piece_is_over(piece_end_ns));
     gpu_timer_end(ldc->timer);
-    ldc->base.stats.nodes_rebuilt += cube->node_count;
-    ldc->base.stats.uploaded_bytes += (uint64_t)part->count * AXES_INSTANCE_BYTES;
-    ldc->base.stats.cubes[which].rebuilt = true;
-    return ok;
+    return progress;
+}
+
+static enum tracer_progress go_on(struct ldc *ldc, struct scene_gpu *scene, struct stage_times *times,
+                                  struct error *error)
+{
+    enum tracer_progress progress = TRACER_MORE;
+    scene_gpu_bind(scene);
+    do
+        progress = go_on_with_cube(ldc, scene, error);
+    while (progress == TRACER_MORE && !piece_is_over(ldc->base.piece_end_ns));
+    gpu_timer_collect(ldc->timer, times);
+    return progress;
 }
 
 static void fill_stats(struct ldc *ldc)
@@ -154,22 +228,23 @@ static void fill_stats(struct ldc *ldc)
         stats->nodes += cube->resolution ? cube->node_count : 0;
         stats->cubes[i] = ldc_cube_stats(cube, stats->cubes[i].rebuilt);
     }
-    stats->device_bytes = ldc_store_bytes(&ldc->store) + ldc_builder_bytes(ldc->builder);
+    stats->device_bytes =
+        ldc_store_bytes(&ldc->store) + ldc_builder_bytes(ldc->builder) + ldc_levels_bytes(&ldc->levels);
 }
 
-static bool bring_to(struct ldc *ldc, struct scene_gpu *scene, const struct scene_changes *changes,
-                     struct error *error)
+/* Which cubes are to be built. Of materials it is known which have changed, but not where they are. */
+static enum tracer_progress begin_update(struct ldc *ldc, const struct scene_gpu *scene,
+                                         const struct scene_changes *changes, struct error *error)
 {
-    bool stale[TRACER_CUBES_MAX];
-    if (!ldc_parts_update(&ldc->parts, scene, ldc->resolution, changes->geometry, stale, error))
-        return false;
-    bool all = changes->surfaces; /* of which materials is known, but not where they are */
+    bool any = changes->surfaces;
+    if (!ldc_parts_update(&ldc->parts, scene, ldc->resolution, changes->geometry, ldc->stale, error))
+        return TRACER_FAILED;
     for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
-        all = all || stale[i]; /* what lies behind a cube goes with it */
-        if (all && !build_cube(ldc, i, scene, error))
-            return false;
+        any = any || ldc->stale[i]; /* what lies behind a cube goes with it */
+        ldc->stale[i] = any;
     }
-    return true;
+    ldc->which = 0;
+    return find_cube(ldc);
 }
 
 static enum tracer_progress ldc_update(struct tracer *tracer, struct scene_gpu *scene,
@@ -178,18 +253,30 @@ static enum tracer_progress ldc_update(struct tracer *tracer, struct scene_gpu *
 {
     struct ldc *ldc = (struct ldc *)tracer;
     struct tracer_stats *stats = &tracer->stats;
-    stats->uploaded_bytes = stats->nodes_rebuilt = 0;
-    for (int i = 0; i < TRACER_CUBES_MAX; i++)
-        stats->cubes[i].rebuilt = false;
-    if (!changes->geometry && !changes->deformed && !changes->instances && !changes->surfaces)
-        return TRACER_DONE;
-    bool ok = bring_to(ldc, scene, changes, error);
-    if (stats->cubes[TRACER_CUBE_STATIC].rebuilt || stats->cubes[TRACER_CUBE_DYNAMIC].rebuilt)
-        gpu_timer_collect(ldc->timer, times); /* else there is nothing to wait for */
-    if (!ok)
+    enum tracer_progress progress = TRACER_MORE;
+    if (ldc->phase == LDC_IDLE) {
+        stats->uploaded_bytes = stats->nodes_rebuilt = 0;
+        for (int i = 0; i < TRACER_CUBES_MAX; i++)
+            stats->cubes[i].rebuilt = false;
+        if (!changes->geometry && !changes->deformed && !changes->instances && !changes->surfaces)
+            return TRACER_DONE;
+        progress = begin_update(ldc, scene, changes, error);
+    }
+    if (progress == TRACER_MORE)
+        progress = go_on(ldc, scene, times, error);
+    if (progress == TRACER_FAILED)
         reset(ldc);
+    if (progress == TRACER_DONE)
+        ldc->phase = LDC_IDLE;
     fill_stats(ldc);
-    return tracer_progress_of(ok);
+    return progress;
+}
+
+static void ldc_abandon(struct tracer *tracer)
+{
+    struct ldc *ldc = (struct ldc *)tracer;
+    reset(ldc);
+    fill_stats(ldc);
 }
 
 static bool ldc_trace_wave(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,
@@ -206,5 +293,6 @@ const struct tracer_impl tracer_ldc_impl = {
     .create = ldc_create,
     .destroy = ldc_destroy,
     .update = ldc_update,
+    .abandon = ldc_abandon,
     .trace = ldc_trace_wave,
 };

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/ldc_build.h"
 
-#include "base/log.h"
 #include "shared/bindings.h"
 #include "trace/ldc_build_state.h"
 
@@ -32,21 +31,28 @@ static void list_buffers(struct ldc_builder *builder, struct gpu_buffer *buffers
         buffers[i] = all[i];
 }
 
+void ldc_builder_clear(struct ldc_builder *builder)
+{
+    struct gpu_device *device = builder->device;
+    struct gpu_buffer *buffers[BUFFER_COUNT];
+    list_buffers(builder, buffers);
+    for (size_t i = 0; i < BUFFER_COUNT; i++)
+        gpu_buffer_finish(device, buffers[i]);
+    for (int i = 0; i < 2; i++) {
+        gpu_framebuffer_finish(device, &builder->layer_framebuffers[i]);
+        gpu_texture_finish(device, &builder->layers[i]);
+    }
+    gpu_texture_finish(device, &builder->layer_surface);
+    gpu_texture_finish(device, &builder->depth);
+    axes_draw_finish(&builder->draw);
+    *builder = (struct ldc_builder){.device = device, .draw = builder->draw};
+}
+
 void ldc_builder_destroy(struct ldc_builder *builder)
 {
     if (!builder)
         return;
-    struct gpu_buffer *buffers[BUFFER_COUNT];
-    list_buffers(builder, buffers);
-    for (size_t i = 0; i < BUFFER_COUNT; i++)
-        gpu_buffer_finish(builder->device, buffers[i]);
-    for (int i = 0; i < 2; i++) {
-        gpu_framebuffer_finish(builder->device, &builder->layer_framebuffers[i]);
-        gpu_texture_finish(builder->device, &builder->layers[i]);
-    }
-    gpu_texture_finish(builder->device, &builder->layer_surface);
-    gpu_texture_finish(builder->device, &builder->depth);
-    axes_draw_finish(&builder->draw);
+    ldc_builder_clear(builder);
     free(builder);
 }
 
@@ -131,28 +137,13 @@ static void place_cube(struct ldc_store *store, unsigned which)
 
 /* In one pass, which is the faster way wherever it was measured (bench_forms samples, software GL: 8.5 times at 8
  * layers, 40 times at 48); by peeling where that is asked for, or the lists of one pass have no room. */
-static bool find_fragments(struct ldc_task *task, struct error *error)
-{
-    struct error own = {0};
-    if (task->options->ldc_build != LDC_BUILD_PEEL) {
-        if (ldc_lists(task, &own))
-            return true;
-        if (own.kind != ERROR_NONE) {
-            if (error)
-                *error = own;
-            return false;
-        }
-        log_write(LOG_DEBUG, "trace", "layered depth cube: no room for lists of fragments, it is peeled");
-    }
-    return ldc_peel(task, error);
-}
-
-static bool build(struct ldc_task *task, struct error *error)
+static bool begin(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
     uint64_t texels = (uint64_t)task->cube->first_texel + task->texel_count;
+    task->next = task->options->ldc_build == LDC_BUILD_PEEL ? ldc_peel : ldc_lists;
     if (texels > device->facts.texture_buffer_texels_max)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
                          "%llu texels are more than the device takes", (unsigned long long)texels);
@@ -161,36 +152,58 @@ static bool build(struct ldc_task *task, struct error *error)
            gpu_buffer_reserve(device, &builder->counts, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->places, texel_numbers, error) &&
            gpu_buffer_reserve(device, &builder->occupied, texel_numbers, error) &&
-           gpu_buffer_reserve(device, &builder->build, sizeof(struct ldc_build_counts), error) &&
-           find_fragments(task, error) && ldc_pack(task, error) &&
-           gpu_check(device, "building a layered depth cube", error);
+           gpu_buffer_reserve(device, &builder->build, sizeof(struct ldc_build_counts), error);
+}
+
+/* After a unit. */
+static enum tracer_progress progress_of(const struct ldc_task *task, bool good)
+{
+    if (good)
+        return task->next ? TRACER_MORE : TRACER_DONE;
+    task->cube->resolution = 0;
+    task->cube->sample_count = task->cube->quad_count = 0;
+    return TRACER_FAILED;
+}
+
+enum tracer_progress ldc_build_begin(struct ldc_builder *builder, struct ldc_store *store, unsigned which,
+                                     struct scene_gpu *scene, const uint32_t *instances, uint32_t instance_count,
+                                     const struct tracer_options *options, struct error *error)
+{
+    struct ldc_cube *cube = &store->cubes[which];
+    uint32_t resolution = cube->resolution;
+    place_cube(store, which);
+    builder->task = (struct ldc_task){
+        .builder = builder,
+        .store = store,
+        .cube = cube,
+        .scene = scene,
+        .options = options,
+        .next = begin,
+        .texel_count = 3 * resolution * resolution,
+        .layers_max = options->ldc_layers_max > 0 && options->ldc_layers_max < LDC_LAYERS_MAX
+                          ? options->ldc_layers_max
+                          : LDC_LAYERS_MAX,
+    };
+    return progress_of(&builder->task, axes_draw_prepare(&builder->draw, scene, instances, instance_count, error));
+}
+
+enum tracer_progress ldc_build_go_on(struct ldc_builder *builder, struct error *error)
+{
+    struct ldc_task *task = &builder->task;
+    gpu_push_group(builder->device, "build a layered depth cube");
+    bool good = task->next(task, error) && gpu_check(builder->device, "building a layered depth cube", error);
+    gpu_pop_group(builder->device);
+    return progress_of(task, good);
 }
 
 bool ldc_build(struct ldc_builder *builder, struct ldc_store *store, unsigned which, struct scene_gpu *scene,
                const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
                struct error *error)
 {
-    struct ldc_cube *cube = &store->cubes[which];
-    uint32_t resolution = cube->resolution;
-    place_cube(store, which);
-    struct ldc_task task = {
-        .builder = builder,
-        .store = store,
-        .cube = cube,
-        .scene = scene,
-        .options = options,
-        .texel_count = 3 * resolution * resolution,
-        .layers_max = options->ldc_layers_max > 0 && options->ldc_layers_max < LDC_LAYERS_MAX
-                          ? options->ldc_layers_max
-                          : LDC_LAYERS_MAX,
-    };
     scene_gpu_bind(scene);
-    gpu_push_group(builder->device, "build a layered depth cube");
-    bool built = axes_draw_prepare(&builder->draw, scene, instances, instance_count, error) && build(&task, error);
-    gpu_pop_group(builder->device);
-    if (!built) {
-        cube->resolution = 0;
-        cube->sample_count = cube->quad_count = 0;
-    }
-    return built;
+    enum tracer_progress progress =
+        ldc_build_begin(builder, store, which, scene, instances, instance_count, options, error);
+    while (progress == TRACER_MORE)
+        progress = ldc_build_go_on(builder, error);
+    return progress == TRACER_DONE;
 }

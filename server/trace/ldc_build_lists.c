@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* One pass over the scene: every fragment that falls on a texel is noted. The first few of a texel have slots of
  * their own, the others go into a list, in any order, and then to their texels' places. */
+#include "base/log.h"
 #include "shared/bindings.h"
 #include "trace/ldc_build_state.h"
 
@@ -57,11 +58,13 @@ static void set_lists(const void *context, const struct gpu_program *program)
     gpu_uniform_uint(program, "fragments_max", task->builder->fragments_max);
 }
 
-/* Of fragments without slots there was room for all, or task->counts says how many there are. */
+static ldc_unit give_places;
+
 static bool draw_lists(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
+    task->next = give_places;
     gpu_buffer_clear(device, &builder->counts, 0);
     gpu_buffer_clear(device, &builder->build, 0);
     gpu_buffer_bind_image(device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
@@ -69,12 +72,30 @@ static bool draw_lists(struct ldc_task *task, struct error *error)
     gpu_buffer_bind_image(device, &builder->fragments, IMAGE_LDC_FRAGMENTS, GL_RGBA32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
     return axes_draw_bind_plain(&builder->draw, task->cube->resolution, error) &&
-           ldc_draw(task, LDC_PASS_LISTS, set_lists, error) && ldc_give_places(task, UINT32_MAX, error);
+           ldc_draw(task, LDC_PASS_LISTS, set_lists, error);
+}
+
+/* Texels with many fragments are sorted apart. */
+static bool sort_deep(struct ldc_task *task, struct error *error)
+{
+    task->next = ldc_pack;
+    const struct gpu_program *program = ldc_use(task->builder->device, "ldc/sort.comp", error);
+    if (!program)
+        return false;
+    ldc_bind_runs(task, program);
+    gpu_dispatch(task->builder->device, program, task->counts.occupied);
+    return true;
+}
+
+static ldc_unit *sort_or_pack(const struct ldc_task *task)
+{
+    return task->counts.layers_needed > LDC_PACK_SORTS ? sort_deep : ldc_pack;
 }
 
 /* Those without slots, to behind those with. */
 static bool order(struct ldc_task *task, struct error *error)
 {
+    task->next = sort_or_pack(task);
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
     uint64_t slot_bytes = (uint64_t)task->slots * task->texel_count * LDC_ORDERED_BYTES;
@@ -92,19 +113,6 @@ static bool order(struct ldc_task *task, struct error *error)
     return true;
 }
 
-/* Texels with many fragments are sorted apart. */
-static bool sort_deep(struct ldc_task *task, struct error *error)
-{
-    if (task->counts.layers_needed <= LDC_PACK_SORTS)
-        return true;
-    const struct gpu_program *program = ldc_use(task->builder->device, "ldc/sort.comp", error);
-    if (!program)
-        return false;
-    ldc_bind_runs(task, program);
-    gpu_dispatch(task->builder->device, program, task->counts.occupied);
-    return true;
-}
-
 /* Whether there is room, and the sort's loops come to an end; makes it. */
 static bool can_list(struct ldc_task *task)
 {
@@ -119,21 +127,39 @@ static bool can_list(struct ldc_task *task)
     return reserve_fragments(task, (uint32_t)(wanted < texels_max ? wanted : texels_max), NULL);
 }
 
+static bool peel_instead(struct ldc_task *task)
+{
+    log_write(LOG_DEBUG, "trace", "layered depth cube: no room for lists of fragments, it is peeled");
+    task->next = ldc_peel;
+    return true;
+}
+
+static bool give_places(struct ldc_task *task, struct error *error)
+{
+    if (!ldc_give_places(task, UINT32_MAX, error))
+        return false;
+    bool complete = task->drawn_again || task->counts.places <= task->builder->fragments_max;
+    if (!can_list(task))
+        return peel_instead(task);
+    if (!complete) { /* once more, with room for all */
+        task->drawn_again = true;
+        task->next = draw_lists;
+        return true;
+    }
+    suggest_slots(task);
+    task->next = task->counts.places > 0 ? order : sort_or_pack(task);
+    return ldc_limit(task, error);
+}
+
 bool ldc_lists(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
+    (void)error; /* where there is no room it is peeled */
     task->slots = choose_slots(task);
+    task->next = draw_lists;
     size_t ordered_bytes = (size_t)task->slots * task->texel_count * LDC_ORDERED_BYTES;
-    if (builder->ordered.size_bytes < ordered_bytes &&
-        !gpu_buffer_reserve(builder->device, &builder->ordered, ordered_bytes, NULL))
-        return false;
-    if (builder->fragments_max == 0 && !reserve_fragments(task, task->texel_count / 4, NULL))
-        return false;
-    if (!draw_lists(task, error))
-        return false;
-    bool complete = task->counts.places <= builder->fragments_max;
-    if (!can_list(task) || (!complete && !draw_lists(task, error))) /* once more, with room for all */
-        return false;
-    suggest_slots(task);
-    return ldc_limit(task, error) && (task->counts.places == 0 || order(task, error)) && sort_deep(task, error);
+    bool room = builder->ordered.size_bytes >= ordered_bytes ||
+                gpu_buffer_reserve(builder->device, &builder->ordered, ordered_bytes, NULL);
+    room = room && (builder->fragments_max > 0 || reserve_fragments(task, task->texel_count / 4, NULL));
+    return room || peel_instead(task);
 }

@@ -107,12 +107,11 @@ static bool sample(struct ldc_task *task, struct error *error)
     return true;
 }
 
-bool ldc_pack(struct ldc_task *task, struct error *error)
+/* How much there is, and what the samples show. */
+static bool settle(struct ldc_task *task, struct error *error)
 {
     struct ldc_cube *cube = task->cube;
-    clear_texels(task);
-    if (!reserve(task, task->counts.samples_max, task->counts.quads_max, error) || !pack(task, error))
-        return false;
+    task->next = NULL;
     ldc_read_counts(task);
     if (!task->peeled && task->counts.samples > 0 && !sample(task, error))
         return false;
@@ -122,4 +121,11 @@ bool ldc_pack(struct ldc_task *task, struct error *error)
     cube->layers_kept = cube->layers_needed < task->layers_max ? cube->layers_needed : task->layers_max;
     cube->samples_lost = task->counts.samples_lost;
     return true;
+}
+
+bool ldc_pack(struct ldc_task *task, struct error *error)
+{
+    task->next = settle;
+    clear_texels(task);
+    return reserve(task, task->counts.samples_max, task->counts.quads_max, error) && pack(task, error);
 }

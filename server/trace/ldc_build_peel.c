@@ -10,20 +10,6 @@
 #include <math.h>
 #include <string.h>
 
-static bool count_fragments(struct ldc_task *task, struct error *error)
-{
-    struct ldc_builder *builder = task->builder;
-    struct gpu_device *device = builder->device;
-    uint32_t layers_allowed = task->layers_max;
-    task->slots = 0;
-    gpu_buffer_clear(device, &builder->counts, 0);
-    gpu_buffer_bind_image(device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
-    return axes_draw_bind_plain(&builder->draw, task->cube->resolution, error) &&
-           ldc_draw(task, LDC_PASS_COUNT, NULL, error) && ldc_give_places(task, layers_allowed, error) &&
-           ldc_limit(task, error) &&
-           (task->layers_max == layers_allowed || ldc_give_places(task, task->layers_max, error));
-}
-
 static bool reserve(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
@@ -59,12 +45,15 @@ static void set_peel(const void *context, const struct gpu_program *program)
     gpu_uniform_float(program, "unit_per_cell", ldexpf(1.0f, -exponent - 1));
 }
 
-static bool draw_layer(struct ldc_task *task, unsigned into, struct error *error)
+static ldc_unit note_layer;
+
+static bool draw_layer(struct ldc_task *task, struct error *error)
 {
     static const GLuint nothing[4] = {LDC_NO_DEPTH_BITS, 0, 0, 0};
     static const GLfloat farthest = 1.0f;
     struct ldc_builder *builder = task->builder;
-    unsigned framebuffer = builder->layer_framebuffers[into].name;
+    const unsigned into = task->layer & 1, framebuffer = builder->layer_framebuffers[into].name;
+    task->next = note_layer;
     glClearNamedFramebufferuiv(framebuffer, GL_COLOR, 0, nothing);
     glDepthMask(GL_TRUE);
     glClearNamedFramebufferfv(framebuffer, GL_DEPTH, 0, &farthest);
@@ -77,7 +66,7 @@ static bool draw_layer(struct ldc_task *task, unsigned into, struct error *error
     return drawn;
 }
 
-static bool note_layer(struct ldc_task *task, unsigned from, uint32_t layer, struct error *error)
+static bool note_layer(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
@@ -86,34 +75,52 @@ static bool note_layer(struct ldc_task *task, unsigned from, uint32_t layer, str
         return false;
     gpu_buffer_bind_texels(device, &builder->occupied, UNIT_LDC_OCCUPIED, GL_R32UI);
     gpu_buffer_bind_texels(device, &builder->places, UNIT_LDC_PLACES, GL_R32UI);
-    gpu_texture_bind(&builder->layers[from], UNIT_LDC_LAYER);
+    gpu_texture_bind(&builder->layers[task->layer & 1], UNIT_LDC_LAYER);
     gpu_texture_bind(&builder->layer_surface, UNIT_LDC_LAYER_SURFACE);
     gpu_buffer_bind_image(device, &builder->peeled, IMAGE_LDC_PEELED_SURFACE, GL_RGBA32UI);
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
     gpu_buffer_bind_image(device, &builder->found, IMAGE_LDC_FOUND, GL_R32UI);
     gpu_uniform_uint(program, "occupied_count", task->counts.occupied);
     gpu_uniform_uint(program, "texels_along", task->cube->resolution);
-    gpu_uniform_uint(program, "layer", layer);
+    gpu_uniform_uint(program, "layer", task->layer);
     gpu_dispatch(device, program, task->counts.occupied);
+    task->next = ++task->layer < task->layers ? draw_layer : ldc_pack;
     return true;
 }
 
-bool ldc_peel(struct ldc_task *task, struct error *error)
+static bool begin_layers(struct ldc_task *task, struct error *error)
 {
     /* Before the first layer: every fragment lies behind it. */
     static const GLfloat before_all = -1.0f;
     GLuint first[4] = {0};
     memcpy(&first[0], &before_all, sizeof(first[0]));
     struct ldc_builder *builder = task->builder;
-    if (!count_fragments(task, error) || !reserve(task, error))
+    if (!reserve(task, error))
         return false;
     task->peeled = true;
-    uint32_t layers =
-        task->counts.layers_needed < task->layers_max ? task->counts.layers_needed : task->layers_max;
+    task->layer = 0;
+    task->layers = task->counts.layers_needed < task->layers_max ? task->counts.layers_needed : task->layers_max;
+    task->next = task->layers > 0 ? draw_layer : ldc_pack;
     gpu_buffer_clear(builder->device, &builder->found, 0);
     glClearNamedFramebufferuiv(builder->layer_framebuffers[1].name, GL_COLOR, 0, first);
-    for (uint32_t layer = 0; layer < layers; layer++)
-        if (!draw_layer(task, layer & 1, error) || !note_layer(task, layer & 1, layer, error))
-            return false;
     return true;
+}
+
+static bool count_places(struct ldc_task *task, struct error *error)
+{
+    const uint32_t layers_allowed = task->layers_max;
+    task->next = begin_layers;
+    return ldc_give_places(task, layers_allowed, error) && ldc_limit(task, error) &&
+           (task->layers_max == layers_allowed || ldc_give_places(task, task->layers_max, error));
+}
+
+bool ldc_peel(struct ldc_task *task, struct error *error)
+{
+    struct ldc_builder *builder = task->builder;
+    task->next = count_places;
+    task->slots = 0;
+    gpu_buffer_clear(builder->device, &builder->counts, 0);
+    gpu_buffer_bind_image(builder->device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
+    return axes_draw_bind_plain(&builder->draw, task->cube->resolution, error) &&
+           ldc_draw(task, LDC_PASS_COUNT, NULL, error);
 }

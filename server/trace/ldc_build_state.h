@@ -10,8 +10,31 @@
 #include "trace/axes_draw.h"
 #include "trace/ldc_build.h"
 
+struct ldc_task;
+/* Does a unit of a build and says in task->next what comes after it. Binds all that it needs but the scene's
+ * buffers: others may have been at work since the unit before. */
+typedef bool ldc_unit(struct ldc_task *task, struct error *error);
+
+/* One build. */
+struct ldc_task {
+    struct ldc_builder *builder;
+    struct ldc_store *store;
+    struct ldc_cube *cube;
+    struct scene_gpu *scene;
+    const struct tracer_options *options;
+    ldc_unit *next; /* NULL: it is done */
+    uint32_t texel_count;
+    uint32_t layers_max;
+    bool drawn_again;               /* lists: with room for all */
+    bool peeled;                    /* `ordered` is sorted, and `found` says how many each texel has */
+    uint32_t layer, layers;         /* peeling: the one in hand, and how many there will be */
+    uint32_t slots;                 /* in `ordered` */
+    struct ldc_build_counts counts; /* as last read back */
+};
+
 struct ldc_builder {
     struct gpu_device *device;
+    struct ldc_task task;
     struct axes_draw draw;
     /* shared/ldc_build.h */
     struct gpu_buffer counts, occupied, ordered, places, fragments, found, visible, build, histogram;
@@ -24,20 +47,6 @@ struct ldc_builder {
     uint32_t fragments_max; /* for which there is room in `fragments` */
 };
 
-/* One call of ldc_build(). */
-struct ldc_task {
-    struct ldc_builder *builder;
-    struct ldc_store *store;
-    struct ldc_cube *cube;
-    struct scene_gpu *scene;
-    const struct tracer_options *options;
-    uint32_t texel_count;
-    uint32_t layers_max;
-    bool peeled;                    /* `ordered` is sorted, and `found` says how many each texel has */
-    uint32_t slots;                 /* in `ordered` */
-    struct ldc_build_counts counts; /* as last read back */
-};
-
 enum ldc_pass { LDC_PASS_LISTS, LDC_PASS_COUNT, LDC_PASS_PEEL };
 
 /* ldc_build_draw.c. Draws what is listed. The framebuffer and the pass's own images are bound already; `set` (may
@@ -45,8 +54,8 @@ enum ldc_pass { LDC_PASS_LISTS, LDC_PASS_COUNT, LDC_PASS_PEEL };
 bool ldc_draw(struct ldc_task *task, enum ldc_pass pass,
               void (*set)(const void *task, const struct gpu_program *program), struct error *error);
 
-/* ldc_build_lists.c. Leaves the fragments in `ordered`, and what was counted in task->counts. False and no error
- * where there are more than lists can hold: to be peeled. */
+/* ldc_build_lists.c. This unit and those after it leave the fragments in `ordered`, and what was counted in
+ * task->counts, and go on to ldc_pack; or to ldc_peel, where there are more than lists can hold. */
 bool ldc_lists(struct ldc_task *task, struct error *error);
 /* ldc_build_peel.c. Likewise. */
 bool ldc_peel(struct ldc_task *task, struct error *error);
@@ -58,7 +67,7 @@ bool ldc_give_places(struct ldc_task *task, uint32_t kept, struct error *error);
  * do not; counts.samples_max and .quads_max follow. Fails where not even one layer fits. */
 bool ldc_limit(struct ldc_task *task, struct error *error);
 
-/* ldc_build_pack.c. From `ordered` to the cube's buffers. */
+/* ldc_build_pack.c. This unit and the one after it: from `ordered` to the cube's buffers. */
 bool ldc_pack(struct ldc_task *task, struct error *error);
 
 /* What a program that has ldc/sample.glsl needs to know of the scene; ends with {0}. */

@@ -92,72 +92,124 @@ static void set_place(const struct gpu_program *program, const char *which, cons
     }
 }
 
-static bool build_ranges(struct ldc_store *store, unsigned which, const struct ldc_level_layout *layout,
-                         struct error *error)
+/* One level of them; the first time, room for all. */
+static enum tracer_progress build_ranges(struct ldc_levels *levels, struct error *error)
 {
-    struct ldc_cube *cube = &store->cubes[which];
-    if (!ldc_levels_reserve(store, which, 3 * (uint64_t)layout->image_nodes, 0, RANGE_BYTES, error))
-        return false;
+    struct ldc_store *store = levels->store;
+    struct ldc_cube *cube = &store->cubes[levels->at];
+    const struct ldc_level_layout *layout = &levels->layout;
+    const uint32_t level = ++levels->level;
+    if (level == 1 &&
+        !ldc_levels_reserve(store, levels->at, 3 * (uint64_t)layout->image_nodes, 0, RANGE_BYTES, error))
+        return TRACER_FAILED;
     char bits[4];
     snprintf(bits, sizeof bits, "%u", layout->bits);
-    bool ok = true;
-    for (uint32_t level = 1; ok && level <= layout->top; level++) {
-        const struct gpu_define defines[] = {
-            {"LDC_LEVEL_BITS", bits}, {level == 1 ? "LDC_FROM_TEXELS" : NULL, "1"}, {NULL, NULL}};
-        const struct gpu_program_source source = {.compute = "ldc/levels.comp", .defines = defines};
-        const struct gpu_program *program = gpu_program_get(store->device, &source, error);
-        ok = program != NULL;
-        if (!ok)
-            break;
-        const struct place below = place_of(cube, layout, level - 1), here = place_of(cube, layout, level);
-        if (level == 1) {
-            gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
-            gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
-        } else {
-            gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_0, GL_RG32F);
-        }
-        gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_LDC_NODES, GL_RG32F);
-        set_place(program, "below", &below);
-        set_place(program, "here", &here);
-        gpu_dispatch(store->device, program, 3 * (uint64_t)here.width * here.width);
+    const struct gpu_define defines[] = {
+        {"LDC_LEVEL_BITS", bits}, {level == 1 ? "LDC_FROM_TEXELS" : NULL, "1"}, {NULL, NULL}};
+    const struct gpu_program_source source = {.compute = "ldc/levels.comp", .defines = defines};
+    const struct gpu_program *program = gpu_program_get(store->device, &source, error);
+    if (!program)
+        return TRACER_FAILED;
+    const struct place below = place_of(cube, layout, level - 1), here = place_of(cube, layout, level);
+    if (level == 1) {
+        gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
+        gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_1, GL_RG32UI);
+    } else {
+        gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_0, GL_RG32F);
     }
-    return ok;
+    gpu_buffer_bind_image(store->device, &store->nodes, IMAGE_LDC_NODES, GL_RG32F);
+    set_place(program, "below", &below);
+    set_place(program, "here", &here);
+    gpu_dispatch(store->device, program, 3 * (uint64_t)here.width * here.width);
+    return level < layout->top ? TRACER_MORE : TRACER_DONE;
 }
 
-static bool build_levels(struct ldc_store *store, unsigned which, const struct tracer_options *options,
-                         struct error *error)
+static void begin_cube(struct ldc_levels *levels, unsigned which)
 {
+    struct ldc_store *store = levels->store;
     struct ldc_cube *cube = &store->cubes[which];
+    levels->at = which;
+    levels->level = 0;
     cube->node_count = cube->entry_count = 0;
     if (cube->resolution == 0)
-        return true;
-    const struct ldc_level_layout layout = ldc_level_layout_of(store, cube->resolution, options);
-    bool ok = layout.cells ? ldc_cells_build(store, which, layout.grid, error)
-                           : build_ranges(store, which, &layout, error);
-    if (!ok)
+        return;
+    levels->layout = ldc_level_layout_of(store, cube->resolution, levels->options);
+    if (levels->layout.cells)
+        ldc_cells_begin(&levels->cells, store, which, levels->layout.grid);
+}
+
+/* A unit of the cube in hand. */
+static enum tracer_progress build_levels(struct ldc_levels *levels, struct error *error)
+{
+    struct ldc_cube *cube = &levels->store->cubes[levels->at];
+    if (cube->resolution == 0)
+        return TRACER_DONE;
+    enum tracer_progress progress =
+        levels->layout.cells ? ldc_cells_go_on(&levels->cells, error) : build_ranges(levels, error);
+    if (progress == TRACER_FAILED)
         cube->node_count = cube->entry_count = 0;
-    return ok;
+    if (progress != TRACER_MORE)
+        ldc_cells_finish(&levels->cells);
+    return progress;
+}
+
+/* What failed was cells that nobody asked for by name, as there are too many. */
+static bool may_have_ranges(const struct ldc_levels *levels, const struct error *of_cells)
+{
+    return levels->options->ldc_levels == LDC_LEVELS_AUTO && !levels->store->no_cells &&
+           (of_cells->kind == ERROR_LIMIT || of_cells->kind == ERROR_OUT_OF_MEMORY);
+}
+
+void ldc_levels_begin(struct ldc_levels *levels, struct ldc_store *store, unsigned which,
+                      const struct tracer_options *options)
+{
+    *levels = (struct ldc_levels){.store = store, .options = options, .which = which};
+    if (which == TRACER_CUBE_STATIC)
+        store->no_cells = false;
+    begin_cube(levels, which);
+}
+
+enum tracer_progress ldc_levels_go_on(struct ldc_levels *levels, struct error *error)
+{
+    struct ldc_store *store = levels->store;
+    struct error own = {0};
+    gpu_push_group(store->device, "ldc levels");
+    enum tracer_progress progress = build_levels(levels, &own);
+    gpu_pop_group(store->device);
+    if (progress == TRACER_FAILED && may_have_ranges(levels, &own)) {
+        log_write(LOG_WARNING, "ldc", "%s: rays take the slower way by a pyramid", own.text);
+        gpu_buffer_finish(store->device, &store->entries);
+        store->no_cells = true;
+        begin_cube(levels, 0);
+        return TRACER_MORE;
+    }
+    if (progress == TRACER_FAILED && error && error->kind == ERROR_NONE)
+        *error = own;
+    if (progress != TRACER_DONE || levels->at == levels->which)
+        return progress;
+    begin_cube(levels, levels->at + 1);
+    return TRACER_MORE;
+}
+
+void ldc_levels_finish(struct ldc_levels *levels)
+{
+    ldc_cells_finish(&levels->cells);
+    *levels = (struct ldc_levels){0};
+}
+
+uint64_t ldc_levels_bytes(const struct ldc_levels *levels)
+{
+    return (uint64_t)levels->cells.list.capacity_bytes + levels->cells.counter.capacity_bytes;
 }
 
 bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
                       struct error *error)
 {
-    struct error of_cells = {0};
-    if (which == TRACER_CUBE_STATIC)
-        store->no_cells = false;
-    gpu_push_group(store->device, "ldc levels");
-    bool ok = build_levels(store, which, options, &of_cells);
-    bool again = !ok && options->ldc_levels == LDC_LEVELS_AUTO && !store->no_cells &&
-                 (of_cells.kind == ERROR_LIMIT || of_cells.kind == ERROR_OUT_OF_MEMORY);
-    if (again) {
-        log_write(LOG_WARNING, "ldc", "%s: rays take the slower way by a pyramid", of_cells.text);
-        gpu_buffer_finish(store->device, &store->entries);
-        store->no_cells = ok = true;
-        for (unsigned i = 0; ok && i <= which; i++)
-            ok = build_levels(store, i, options, error);
-    } else if (!ok && error && error->kind == ERROR_NONE) {
-        *error = of_cells;
-    }
-    gpu_pop_group(store->device);
-    return ok;
+    struct ldc_levels levels;
+    enum tracer_progress progress = TRACER_MORE;
+    ldc_levels_begin(&levels, store, which, options);
+    while (progress == TRACER_MORE)
+        progress = ldc_levels_go_on(&levels, error);
+    ldc_levels_finish(&levels);
+    return progress == TRACER_DONE;
 }

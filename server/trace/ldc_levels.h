@@ -14,6 +14,7 @@
 #define FARLIGHT_TRACE_LDC_LEVELS_H
 
 #include "base/error.h"
+#include "trace/ldc_cells.h"
 #include "trace/ldc_store.h"
 #include "trace/tracer.h"
 
@@ -40,8 +41,26 @@ struct ldc_level_layout ldc_level_layout_of(const struct ldc_store *store, uint3
 bool ldc_levels_reserve(struct ldc_store *store, unsigned which, uint64_t node_count, uint64_t kept,
                         size_t node_bytes, struct error *error);
 
-/* Writes the nodes of cube `which`, whose samples are there. Where cells are more than the device takes (of some
- * twenty million samples on software GL) and were not asked for by name, all cubes get a pyramid. */
+/* What is being made; all-zero: nothing. */
+struct ldc_levels {
+    struct ldc_store *store;
+    const struct tracer_options *options;
+    unsigned which, at; /* up to which cube, and the one in hand */
+    struct ldc_level_layout layout;
+    uint32_t level; /* of ranges: the last that was made */
+    struct ldc_cells cells;
+};
+
+/* Begins to write the nodes of cube `which`, whose samples are there. Where cells are more than the device takes
+ * (of some twenty million samples on software GL) and were not asked for by name, all cubes get a pyramid. Store
+ * and options must stay until it is done. */
+void ldc_levels_begin(struct ldc_levels *levels, struct ldc_store *store, unsigned which,
+                      const struct tracer_options *options);
+/* A pass of it. Queues the work; some read counts back. */
+enum tracer_progress ldc_levels_go_on(struct ldc_levels *levels, struct error *error);
+void ldc_levels_finish(struct ldc_levels *levels);          /* lets go of it, done or not */
+uint64_t ldc_levels_bytes(const struct ldc_levels *levels); /* of the device, besides the store */
+/* All of it at once. */
 bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
                       struct error *error);
 

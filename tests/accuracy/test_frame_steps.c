@@ -9,6 +9,8 @@
 #include <time.h>
 
 #define TRACER_BVH 0
+#define TRACER_REFERENCE 2
+#define TRACER_LDC 3
 #define TRACER_ABUFFER 4
 #define TRACER_COUNT 5
 
@@ -305,26 +307,43 @@ static void expect_same(const struct frame_result *got, const struct frame_resul
     assert_true(got->structure_bytes == expected->structure_bytes);
 }
 
-/* Which of them are cut. */
-static const bool has_pieces[TRACER_COUNT] = {[TRACER_BVH] = true, [TRACER_ABUFFER] = true};
+/* Which of them are cut, and in which ways a structure is built. */
+static const struct way {
+    const char *name;
+    unsigned tracer, ldc_build;
+    bool has_pieces;
+} ways[] = {
+    {"bvh", TRACER_BVH, LDC_BUILD_AUTO, true},
+    {"reference", TRACER_REFERENCE, LDC_BUILD_AUTO, false},
+    {"ldc, lists", TRACER_LDC, LDC_BUILD_LISTS, true},
+    {"ldc, peeled", TRACER_LDC, LDC_BUILD_PEEL, true},
+    {"abuffer", TRACER_ABUFFER, LDC_BUILD_AUTO, true},
+};
+enum { WAYS = sizeof(ways) / sizeof(ways[0]) };
+
+static bool take_way(struct fixture *fixture, const struct way *way)
+{
+    fixture->request.tracer = way->tracer;
+    fixture->request.tracer_options.ldc_build = way->ldc_build;
+    return tracer_impl_by_number(way->tracer) != NULL;
+}
 
 static void structures_built_in_pieces_are_the_same(void **state)
 {
     struct fixture *fixture = *state;
     a_field_and_a_ball(fixture);
-    for (unsigned tracer = 0; tracer < TRACER_COUNT; tracer++) {
+    for (const struct way *way = ways; way < ways + WAYS; way++) {
         struct frame_result whole = {0}, pieces = {0};
-        if (tracer == TRACER_NAIVE || !tracer_impl_by_number(tracer))
+        if (!take_way(fixture, way))
             continue;
-        fixture->request.tracer = tracer;
         anew_in_pieces(fixture, PIECE_WITHOUT_END);
         begin(fixture, fixture->renderer);
         finish(fixture->renderer, &whole);
         anew_in_pieces(fixture, 0);
         begin(fixture, fixture->renderer);
         uint32_t count = finish(fixture->renderer, &pieces);
-        print_message("%s: %u pieces\n", tracer_impl_by_number(tracer)->name, count);
-        assert_true(count > 2 || !has_pieces[tracer]);
+        print_message("%s: %u pieces\n", way->name, count);
+        assert_true(count > 2 || !way->has_pieces);
         expect_same(&pieces, &whole);
         assert_true(stage_times_sum_ns(&pieces.times, STAGE_BUILD, STAGE_CPU) > 0);
         frame_result_finish(&whole);
@@ -337,12 +356,11 @@ static void a_structure_that_nobody_waits_for_is_forgotten(void **state)
 {
     struct fixture *fixture = *state;
     a_field_and_a_ball(fixture);
-    for (unsigned tracer = 0; tracer < TRACER_COUNT; tracer++) {
+    for (const struct way *way = ways; way < ways + WAYS; way++) {
         struct frame_result expected = {0}, result = {0};
         struct error error = {0};
-        if (!has_pieces[tracer])
+        if (!way->has_pieces || !take_way(fixture, way))
             continue;
-        fixture->request.tracer = tracer;
         anew_in_pieces(fixture, 0);
         begin(fixture, fixture->renderer);
         uint32_t count = finish(fixture->renderer, &expected);
@@ -373,12 +391,11 @@ static void frames_that_wait_for_one_structure_build_it_together(void **state)
 {
     struct fixture *fixture = *state;
     a_field_and_a_ball(fixture);
-    for (unsigned tracer = 0; tracer < TRACER_COUNT; tracer++) {
+    for (const struct way *way = ways; way < ways + WAYS; way++) {
         struct frame_result expected = {0}, results[2] = {{0}};
         struct error error = {0};
-        if (!has_pieces[tracer])
+        if (!way->has_pieces || !take_way(fixture, way))
             continue;
-        fixture->request.tracer = tracer;
         anew_in_pieces(fixture, PIECE_WITHOUT_END);
         begin(fixture, fixture->renderer);
         finish(fixture->renderer, &expected);
