@@ -180,8 +180,9 @@ static enum tracer_progress do_unit(struct ldc *ldc, struct scene_gpu *scene, st
 {
     if (ldc->phase == LDC_CUBE)
         return begin_cube(ldc, scene, error);
-    enum tracer_progress progress =
-        ldc->phase == LDC_SAMPLES ? ldc_build_go_on(ldc->builder, error) : ldc_levels_go_on(&ldc->levels, error);
+    const bool at_once = ldc->base.piece_end_ns == PIECE_WITHOUT_END;
+    enum tracer_progress progress = ldc->phase == LDC_SAMPLES ? ldc_build_go_on(ldc->builder, at_once, error)
+                                                              : ldc_levels_go_on(&ldc->levels, error);
     if (progress != TRACER_DONE)
         return progress;
     if (ldc->phase == LDC_LEVELS)

@@ -187,9 +187,10 @@ enum tracer_progress ldc_build_begin(struct ldc_builder *builder, struct ldc_sto
     return progress_of(&builder->task, axes_draw_prepare(&builder->draw, scene, instances, instance_count, error));
 }
 
-enum tracer_progress ldc_build_go_on(struct ldc_builder *builder, struct error *error)
+enum tracer_progress ldc_build_go_on(struct ldc_builder *builder, bool at_once, struct error *error)
 {
     struct ldc_task *task = &builder->task;
+    task->at_once = at_once;
     gpu_push_group(builder->device, "build a layered depth cube");
     bool good = task->next(task, error) && gpu_check(builder->device, "building a layered depth cube", error);
     gpu_pop_group(builder->device);
@@ -204,6 +205,6 @@ bool ldc_build(struct ldc_builder *builder, struct ldc_store *store, unsigned wh
     enum tracer_progress progress =
         ldc_build_begin(builder, store, which, scene, instances, instance_count, options, error);
     while (progress == TRACER_MORE)
-        progress = ldc_build_go_on(builder, error);
+        progress = ldc_build_go_on(builder, true, error);
     return progress == TRACER_DONE;
 }

@@ -64,15 +64,16 @@ static bool draw_lists(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
     struct gpu_device *device = builder->device;
-    task->next = give_places;
-    gpu_buffer_clear(device, &builder->counts, 0);
-    gpu_buffer_clear(device, &builder->build, 0);
+    if (task->drawn == 0) {
+        gpu_buffer_clear(device, &builder->counts, 0);
+        gpu_buffer_clear(device, &builder->build, 0);
+    }
     gpu_buffer_bind_image(device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
     gpu_buffer_bind_image(device, &builder->ordered, IMAGE_LDC_ORDERED, GL_RG32UI);
     gpu_buffer_bind_image(device, &builder->fragments, IMAGE_LDC_FRAGMENTS, GL_RGBA32UI);
     gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
     return axes_draw_bind_plain(&builder->draw, task->cube->resolution, error) &&
-           ldc_draw(task, LDC_PASS_LISTS, set_lists, error);
+           ldc_draw(task, LDC_PASS_LISTS, set_lists, give_places, error);
 }
 
 /* Texels with many fragments are sorted apart. */

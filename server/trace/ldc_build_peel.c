@@ -53,15 +53,16 @@ static bool draw_layer(struct ldc_task *task, struct error *error)
     static const GLfloat farthest = 1.0f;
     struct ldc_builder *builder = task->builder;
     const unsigned into = task->layer & 1, framebuffer = builder->layer_framebuffers[into].name;
-    task->next = note_layer;
-    glClearNamedFramebufferuiv(framebuffer, GL_COLOR, 0, nothing);
     glDepthMask(GL_TRUE);
-    glClearNamedFramebufferfv(framebuffer, GL_DEPTH, 0, &farthest);
+    if (task->drawn == 0) {
+        glClearNamedFramebufferuiv(framebuffer, GL_COLOR, 0, nothing);
+        glClearNamedFramebufferfv(framebuffer, GL_DEPTH, 0, &farthest);
+    }
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_LESS); /* of equal depths the first stays: instances are drawn in their order */
     gpu_texture_bind(&builder->layers[!into], UNIT_LDC_LAYER);
-    bool drawn = ldc_draw(task, LDC_PASS_PEEL, set_peel, error);
+    bool drawn = ldc_draw(task, LDC_PASS_PEEL, set_peel, note_layer, error);
     glDisable(GL_DEPTH_TEST);
     return drawn;
 }
@@ -117,10 +118,10 @@ static bool count_places(struct ldc_task *task, struct error *error)
 bool ldc_peel(struct ldc_task *task, struct error *error)
 {
     struct ldc_builder *builder = task->builder;
-    task->next = count_places;
     task->slots = 0;
-    gpu_buffer_clear(builder->device, &builder->counts, 0);
+    if (task->drawn == 0)
+        gpu_buffer_clear(builder->device, &builder->counts, 0);
     gpu_buffer_bind_image(builder->device, &builder->counts, IMAGE_LDC_COUNTS, GL_R32UI);
     return axes_draw_bind_plain(&builder->draw, task->cube->resolution, error) &&
-           ldc_draw(task, LDC_PASS_COUNT, NULL, error);
+           ldc_draw(task, LDC_PASS_COUNT, NULL, count_places, error);
 }

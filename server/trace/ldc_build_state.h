@@ -23,6 +23,8 @@ struct ldc_task {
     struct scene_gpu *scene;
     const struct tracer_options *options;
     ldc_unit *next; /* NULL: it is done */
+    bool at_once;   /* a pass over the scene is one unit, however long it takes */
+    uint32_t drawn; /* of the listed primitives, by the pass in hand */
     uint32_t texel_count;
     uint32_t layers_max;
     bool drawn_again;               /* lists: with room for all */
@@ -42,17 +44,20 @@ struct ldc_builder {
     /* Peeling: geometry of the layer that is drawn and of the one before it, by turns. */
     struct gpu_texture layers[2], layer_surface, depth;
     struct gpu_framebuffer layer_framebuffers[2];
-    uint32_t slots;         /* of a texel: what the last build in one pass suggests */
-    uint32_t slots_texels;  /* of how many texels that was */
-    uint32_t fragments_max; /* for which there is room in `fragments` */
+    uint32_t slots;             /* of a texel: what the last build in one pass suggests */
+    uint32_t slots_texels;      /* of how many texels that was */
+    uint32_t primitives_a_unit; /* to be drawn; 0: not known yet */
+    uint32_t fragments_max;     /* for which there is room in `fragments` */
 };
 
 enum ldc_pass { LDC_PASS_LISTS, LDC_PASS_COUNT, LDC_PASS_PEEL };
 
-/* ldc_build_draw.c. Draws what is listed. The framebuffer and the pass's own images are bound already; `set` (may
- * be NULL) sets its uniforms, and is given the task. */
+/* ldc_build_draw.c. Draws some of what is listed, from task->drawn on, which is 0 as a pass begins; when all is
+ * drawn, the unit after this one is `then`, else it is this one again. The framebuffer and the pass's own images
+ * are bound already; `set` (may be NULL) sets its uniforms, and is given the task. */
 bool ldc_draw(struct ldc_task *task, enum ldc_pass pass,
-              void (*set)(const void *task, const struct gpu_program *program), struct error *error);
+              void (*set)(const void *task, const struct gpu_program *program), ldc_unit *then,
+              struct error *error);
 
 /* ldc_build_lists.c. This unit and those after it leave the fragments in `ordered`, and what was counted in
  * task->counts, and go on to ldc_pack; or to ldc_peel, where there are more than lists can hold. */
