@@ -32,36 +32,6 @@ static void clear_texels(struct ldc_task *task)
         (GLsizeiptr)task->texel_count * LDC_TEXEL_BYTES, GL_RGBA_INTEGER, GL_UNSIGNED_INT, empty);
 }
 
-static bool pack(struct ldc_task *task, struct error *error)
-{
-    struct gpu_device *device = task->builder->device;
-    struct ldc_builder *builder = task->builder;
-    struct ldc_store *store = task->store;
-    const struct gpu_define defines[] = {{task->peeled ? "PEELED" : NULL, "1"}, {0}};
-    const struct gpu_program *program = gpu_program_get(
-        device, &(struct gpu_program_source){.compute = "ldc/pack.comp", .defines = defines}, error);
-    if (!program)
-        return false;
-    if (task->peeled) {
-        gpu_buffer_bind_texels(device, &builder->found, UNIT_LDC_FOUND, GL_R32UI);
-        gpu_buffer_bind_texels(device, &builder->peeled, UNIT_LDC_PEELED_SURFACE, GL_RGBA32UI);
-        gpu_buffer_bind_image(device, &store->geometry, IMAGE_LDC_GEOMETRY, GL_RG32UI);
-        gpu_buffer_bind_image(device, &store->surface, IMAGE_LDC_SURFACE, GL_RGBA32UI);
-    } else {
-        gpu_buffer_bind_image(device, &builder->visible, IMAGE_LDC_VISIBLE, GL_RGBA32UI);
-    }
-    ldc_bind_runs(task, program);
-    gpu_buffer_bind_image(device, &store->texels, IMAGE_LDC_TEXELS, GL_RGBA32UI);
-    gpu_buffer_bind_image(device, &store->quads, IMAGE_LDC_QUADS, GL_RGBA32F);
-    gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
-    gpu_uniform_uint(program, "first_texel", task->cube->first_texel);
-    gpu_uniform_uint(program, "first_sample", task->cube->first_sample);
-    gpu_uniform_uint(program, "first_quad", task->cube->first_quad);
-    gpu_uniform_uint(program, "layers_max", task->layers_max);
-    gpu_dispatch(device, program, (task->counts.occupied + LDC_PACK_TEXELS - 1) / LDC_PACK_TEXELS);
-    return true;
-}
-
 void ldc_sample_defines(const struct ldc_task *task, struct gpu_define defines[LDC_SAMPLE_DEFINES_MAX])
 {
     size_t n = 0, cursor = 0;
@@ -123,9 +93,40 @@ static bool settle(struct ldc_task *task, struct error *error)
     return true;
 }
 
-bool ldc_pack(struct ldc_task *task, struct error *error)
+static bool pack(struct ldc_task *task, struct error *error)
 {
     task->next = settle;
+    struct gpu_device *device = task->builder->device;
+    struct ldc_builder *builder = task->builder;
+    struct ldc_store *store = task->store;
+    const struct gpu_define defines[] = {{task->peeled ? "PEELED" : NULL, "1"}, {0}};
+    const struct gpu_program *program = gpu_program_get(
+        device, &(struct gpu_program_source){.compute = "ldc/pack.comp", .defines = defines}, error);
+    if (!program)
+        return false;
+    if (task->peeled) {
+        gpu_buffer_bind_texels(device, &builder->found, UNIT_LDC_FOUND, GL_R32UI);
+        gpu_buffer_bind_texels(device, &builder->peeled, UNIT_LDC_PEELED_SURFACE, GL_RGBA32UI);
+        gpu_buffer_bind_image(device, &store->geometry, IMAGE_LDC_GEOMETRY, GL_RG32UI);
+        gpu_buffer_bind_image(device, &store->surface, IMAGE_LDC_SURFACE, GL_RGBA32UI);
+    } else {
+        gpu_buffer_bind_image(device, &builder->visible, IMAGE_LDC_VISIBLE, GL_RGBA32UI);
+    }
+    ldc_bind_runs(task, program);
+    gpu_buffer_bind_image(device, &store->texels, IMAGE_LDC_TEXELS, GL_RGBA32UI);
+    gpu_buffer_bind_image(device, &store->quads, IMAGE_LDC_QUADS, GL_RGBA32F);
+    gpu_buffer_bind_storage(&builder->build, BIND_LDC_BUILD_COUNTS);
+    gpu_uniform_uint(program, "first_texel", task->cube->first_texel);
+    gpu_uniform_uint(program, "first_sample", task->cube->first_sample);
+    gpu_uniform_uint(program, "first_quad", task->cube->first_quad);
+    gpu_uniform_uint(program, "layers_max", task->layers_max);
+    gpu_dispatch(device, program, (task->counts.occupied + LDC_PACK_TEXELS - 1) / LDC_PACK_TEXELS);
+    return true;
+}
+
+bool ldc_pack(struct ldc_task *task, struct error *error)
+{
+    task->next = pack;
     clear_texels(task);
-    return reserve(task, task->counts.samples_max, task->counts.quads_max, error) && pack(task, error);
+    return reserve(task, task->counts.samples_max, task->counts.quads_max, error);
 }

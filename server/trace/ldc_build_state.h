@@ -72,7 +72,7 @@ bool ldc_give_places(struct ldc_task *task, uint32_t kept, struct error *error);
  * do not; counts.samples_max and .quads_max follow. Fails where not even one layer fits. */
 bool ldc_limit(struct ldc_task *task, struct error *error);
 
-/* ldc_build_pack.c. This unit and the one after it: from `ordered` to the cube's buffers. */
+/* ldc_build_pack.c. This unit and those after it: from `ordered` to the cube's buffers. */
 bool ldc_pack(struct ldc_task *task, struct error *error);
 
 /* What a program that has ldc/sample.glsl needs to know of the scene; ends with {0}. */

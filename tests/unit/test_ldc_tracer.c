@@ -440,6 +440,54 @@ static void after_a_failure_the_next_update_starts_anew(void **state)
     fixture_finish(&fixture);
 }
 
+/* What of the device's memory is not the scene's is the structure's, in the middle of an update too, and nothing
+ * is left of one that is abandoned, wherever that was or where it failed. */
+static void a_build_in_pieces_tells_what_it_takes_and_gives_it_back(void **state)
+{
+    (void)state;
+    static const struct scene_changes all = {.geometry = true, .instances = true, .surfaces = true};
+    struct tracer_options options = small;
+    for (options.ldc_build = LDC_BUILD_PEEL; options.ldc_build <= LDC_BUILD_LISTS; options.ldc_build++) {
+        struct fixture fixture;
+        struct error error = {0};
+        fixture_init(&fixture, scene_of_boxes(3), &options);
+        struct tracer *tracer = fixture.tracer;
+        uint64_t others_bytes = device->memory_used_bytes - tracer->stats.device_bytes;
+        for (uint32_t pieces = 1;; pieces++) {
+            tracer_outdate(tracer);
+            enum tracer_progress progress = TRACER_MORE;
+            for (uint32_t i = 0; i < pieces && progress == TRACER_MORE; i++) {
+                progress = tracer_update_piece(tracer, &fixture.gpu, &all, 0, &fixture.times, &error);
+                assert_int_equal(device->memory_used_bytes - others_bytes, tracer->stats.device_bytes);
+            }
+            expect_ok(progress != TRACER_FAILED, &error);
+            if (progress == TRACER_DONE) {
+                assert_true(pieces > 10);
+                break;
+            }
+            tracer_update_abandon(tracer);
+            assert_int_equal(tracer->stats.device_bytes, 0);
+            assert_int_equal(device->memory_used_bytes, others_bytes);
+        }
+        expect_distance(distance_below(&fixture, 4, 0), 9.5);
+        tracer_outdate(tracer);
+        assert_int_equal(tracer_update_piece(tracer, &fixture.gpu, &all, 0, &fixture.times, &error), TRACER_MORE);
+        uint64_t limit = device->memory_limit_bytes;
+        device->memory_limit_bytes = 1;
+        enum tracer_progress progress = TRACER_MORE;
+        /* Buffers are there from the build before: what this one needs anew are its cells. */
+        while (progress == TRACER_MORE)
+            progress = tracer_update_piece(tracer, &fixture.gpu, &all, 0, &fixture.times, &error);
+        device->memory_limit_bytes = limit;
+        assert_int_equal(progress, TRACER_FAILED);
+        assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
+        assert_int_equal(device->memory_used_bytes, others_bytes);
+        update(&fixture);
+        expect_distance(distance_below(&fixture, 4, 0), 9.5);
+        fixture_finish(&fixture);
+    }
+}
+
 static void rays_that_have_times_are_refused_where_something_moves(void **state)
 {
     (void)state;
@@ -533,6 +581,7 @@ int main(void)
         cmocka_unit_test(flat_and_tiny_and_huge_scenes_have_cells),
         cmocka_unit_test(more_layers_than_may_be_kept_are_reported_and_the_nearest_stay),
         cmocka_unit_test(after_a_failure_the_next_update_starts_anew),
+        cmocka_unit_test(a_build_in_pieces_tells_what_it_takes_and_gives_it_back),
         cmocka_unit_test(rays_that_have_times_are_refused_where_something_moves),
         cmocka_unit_test(a_tracer_that_was_away_builds_what_has_changed_meanwhile),
     };
