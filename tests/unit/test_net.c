@@ -401,6 +401,29 @@ static void on_sent(void *context, uint64_t begun_ns, uint64_t now_ns)
     sent_calls++;
 }
 
+/* A queue, and a body that several of its messages send "bcd" of. */
+struct queue_scene {
+    struct out_queue queue;
+    struct out_chunk body;
+};
+
+static void queue_begin(struct queue_scene *scene)
+{
+    *scene = (struct queue_scene){
+        .body = {.references = 1, .data = (const uint8_t *)"abcdef", .size_bytes = 6, .release = on_release}};
+    released = sent_calls = 0;
+    out_queue_init(&scene->queue);
+}
+
+/* Nothing of it is left. */
+static void queue_end(struct queue_scene *scene)
+{
+    out_queue_finish(&scene->queue);
+    assert_int_equal(released, 0);
+    out_chunk_unref(&scene->body);
+    assert_int_equal(released, 1);
+}
+
 static void push(struct out_queue *queue, const char *head, uint32_t request, struct out_chunk *body, bool bulk)
 {
     struct out_message *message = out_message_create(strlen(head));
@@ -442,125 +465,104 @@ static void control_goes_first_and_nothing_is_lost_however_little_is_taken(void 
 {
     (void)state;
     for (size_t step = 1; step < 30; step++) {
-        struct out_queue queue;
-        struct out_chunk body = {
-            .references = 1, .data = (const uint8_t *)"abcdef", .size_bytes = 6, .release = on_release};
+        struct queue_scene scene;
         char text[64];
-        released = sent_calls = 0;
-        out_queue_init(&queue);
-        push(&queue, "B1", 1, &body, true);
-        push(&queue, "B2", 2, &body, true);
-        push(&queue, "C1", 0, NULL, false);
-        assert_int_equal(queue.queued_bytes, 16);
-        assert_int_equal(queue.queued_bulk_bytes, 14);
-        drain(&queue, step, text);
+        queue_begin(&scene);
+        push(&scene.queue, "B1", 1, &scene.body, true);
+        push(&scene.queue, "B2", 2, &scene.body, true);
+        push(&scene.queue, "C1", 0, NULL, false);
+        assert_int_equal(scene.queue.queued_bytes, 16);
+        assert_int_equal(scene.queue.queued_bulk_bytes, 14);
+        drain(&scene.queue, step, text);
         assert_string_equal(text, "C1B1bcd..B2bcd..");
-        assert_int_equal(queue.queued_bytes, 0);
+        assert_int_equal(scene.queue.queued_bytes, 0);
         assert_int_equal(sent_calls, 2);
-        assert_int_equal(released, 0);
-        out_chunk_unref(&body);
-        assert_int_equal(released, 1);
-        out_queue_finish(&queue);
+        queue_end(&scene);
     }
 }
 
 static void what_is_dropped_is_not_sent_but_what_was_begun_is_finished(void **state)
 {
     (void)state;
-    struct out_queue queue;
-    struct out_chunk body = {
-        .references = 1, .data = (const uint8_t *)"abcdef", .size_bytes = 6, .release = on_release};
+    struct queue_scene scene;
     struct iovec parts[16];
     char text[64];
-    released = sent_calls = 0;
-    out_queue_init(&queue);
-    push(&queue, "B1", 7, &body, true);
-    push(&queue, "B2", 7, &body, true);
-    push(&queue, "B3", 8, &body, true);
-    out_queue_gather(&queue, parts, 16);
-    out_queue_advance(&queue, 3, 1, 2); /* "B1b" is with the kernel */
-    push(&queue, "C1", 7, NULL, false);
-    out_queue_drop_bulk(&queue, 7);
-    drain(&queue, 100, text);
+    queue_begin(&scene);
+    push(&scene.queue, "B1", 7, &scene.body, true);
+    push(&scene.queue, "B2", 7, &scene.body, true);
+    push(&scene.queue, "B3", 8, &scene.body, true);
+    out_queue_gather(&scene.queue, parts, 16);
+    out_queue_advance(&scene.queue, 3, 1, 2); /* "B1b" is with the kernel */
+    push(&scene.queue, "C1", 7, NULL, false);
+    out_queue_drop_bulk(&scene.queue, 7);
+    drain(&scene.queue, 100, text);
     assert_string_equal(text, "cd..B3bcd..C1");
     assert_int_equal(sent_calls, 1);
-    assert_int_equal(queue.queued_bytes, 0);
-    assert_int_equal(queue.queued_bulk_bytes, 0);
-    assert_int_equal(queue.sending_bytes, 0);
-    push(&queue, "B4", 8, &body, true);
-    out_queue_finish(&queue);
-    out_chunk_unref(&body);
-    assert_int_equal(released, 1);
+    assert_int_equal(scene.queue.queued_bytes, 0);
+    assert_int_equal(scene.queue.queued_bulk_bytes, 0);
+    assert_int_equal(scene.queue.sending_bytes, 0);
+    push(&scene.queue, "B4", 8, &scene.body, true);
+    queue_end(&scene);
 }
 
 static void what_was_begun_is_sent_and_told_when_the_rest_is_dropped(void **state)
 {
     (void)state;
-    struct out_queue queue;
-    struct out_chunk body = {
-        .references = 1, .data = (const uint8_t *)"abcdef", .size_bytes = 6, .release = on_release};
+    struct queue_scene scene;
     struct iovec parts[16];
     char text[64];
-    released = sent_calls = 0;
-    out_queue_init(&queue);
-    push(&queue, "B1", 7, &body, true); /* 7 bytes each */
-    push(&queue, "B2", 7, &body, true);
-    push(&queue, "O1", 8, &body, true);
-    out_queue_gather(&queue, parts, 16);
-    out_queue_advance(&queue, 3, 1, 2);
-    push(&queue, "B3", 7, &body, true);
-    assert_int_equal(out_queue_drop_unbegun(&queue, 7), 14);
-    assert_int_equal(out_queue_drop_unbegun(&queue, 7), 0);
-    push(&queue, "C1", 7, NULL, false);
-    drain(&queue, 100, text);
+    queue_begin(&scene);
+    push(&scene.queue, "B1", 7, &scene.body, true); /* 7 bytes each */
+    push(&scene.queue, "B2", 7, &scene.body, true);
+    push(&scene.queue, "O1", 8, &scene.body, true);
+    out_queue_gather(&scene.queue, parts, 16);
+    out_queue_advance(&scene.queue, 3, 1, 2);
+    push(&scene.queue, "B3", 7, &scene.body, true);
+    assert_int_equal(out_queue_drop_unbegun(&scene.queue, 7), 14);
+    assert_int_equal(out_queue_drop_unbegun(&scene.queue, 7), 0);
+    push(&scene.queue, "C1", 7, NULL, false);
+    drain(&scene.queue, 100, text);
     assert_string_equal(text, "cd..O1bcd..C1");
     assert_int_equal(sent_calls, 2); /* B1 and O1 */
-    assert_int_equal(queue.queued_bytes, 0);
-    assert_int_equal(queue.sending_bytes, 0);
-    assert_int_equal(queue.queued_bulk_bytes, 0);
-    out_queue_finish(&queue);
-    out_chunk_unref(&body);
-    assert_int_equal(released, 1);
+    assert_int_equal(scene.queue.queued_bytes, 0);
+    assert_int_equal(scene.queue.sending_bytes, 0);
+    assert_int_equal(scene.queue.queued_bulk_bytes, 0);
+    queue_end(&scene);
 }
 
 /* What a sealed connection has copied, but the kernel has not taken yet. */
 static void what_was_taken_is_begun_but_not_sent(void **state)
 {
     (void)state;
-    struct out_queue queue;
-    struct out_chunk body = {
-        .references = 1, .data = (const uint8_t *)"abcdef", .size_bytes = 6, .release = on_release};
+    struct queue_scene scene;
     struct iovec parts[16];
     char text[64];
-    released = sent_calls = 0;
-    out_queue_init(&queue);
-    push(&queue, "B1", 7, &body, true); /* 7 bytes each */
-    push(&queue, "B2", 7, &body, true);
-    push(&queue, "B3", 7, &body, true);
-    out_queue_gather(&queue, parts, 16);
-    out_queue_take(&queue, 9); /* B1 and the head of B2 */
-    assert_int_equal(out_queue_gather(&queue, parts, 16), 5);
+    queue_begin(&scene);
+    push(&scene.queue, "B1", 7, &scene.body, true); /* 7 bytes each */
+    push(&scene.queue, "B2", 7, &scene.body, true);
+    push(&scene.queue, "B3", 7, &scene.body, true);
+    out_queue_gather(&scene.queue, parts, 16);
+    out_queue_take(&scene.queue, 9); /* B1 and the head of B2 */
+    assert_int_equal(out_queue_gather(&scene.queue, parts, 16), 5);
     assert_int_equal(parts[0].iov_len, 3);
     assert_memory_equal(parts[0].iov_base, "bcd", 3);
-    assert_int_equal(queue.queued_bytes, 21);
-    push(&queue, "C1", 7, NULL, false);
-    out_queue_drop_bulk(&queue, 7); /* B3 only: the others are under way */
-    assert_int_equal(queue.queued_bytes, 16);
-    out_queue_advance(&queue, 4, 1, 2);
-    assert_int_equal(queue.queued_bytes, 12);
-    assert_int_equal(queue.taken_bytes, 5);
+    assert_int_equal(scene.queue.queued_bytes, 21);
+    push(&scene.queue, "C1", 7, NULL, false);
+    out_queue_drop_bulk(&scene.queue, 7); /* B3 only: the others are under way */
+    assert_int_equal(scene.queue.queued_bytes, 16);
+    out_queue_advance(&scene.queue, 4, 1, 2);
+    assert_int_equal(scene.queue.queued_bytes, 12);
+    assert_int_equal(scene.queue.taken_bytes, 5);
     assert_int_equal(sent_calls, 0);
-    out_queue_advance(&queue, 5, 1, 2);
-    assert_int_equal(queue.taken_bytes, 0);
-    drain(&queue, 100, text);
+    out_queue_advance(&scene.queue, 5, 1, 2);
+    assert_int_equal(scene.queue.taken_bytes, 0);
+    drain(&scene.queue, 100, text);
     assert_string_equal(text, "bcd..C1");
     assert_int_equal(sent_calls, 0); /* of a request that was dropped */
-    assert_int_equal(queue.queued_bytes, 0);
-    assert_int_equal(queue.sending_bytes, 0);
-    assert_int_equal(queue.queued_bulk_bytes, 0);
-    out_queue_finish(&queue);
-    out_chunk_unref(&body);
-    assert_int_equal(released, 1);
+    assert_int_equal(scene.queue.queued_bytes, 0);
+    assert_int_equal(scene.queue.sending_bytes, 0);
+    assert_int_equal(scene.queue.queued_bulk_bytes, 0);
+    queue_end(&scene);
 }
 
 /* A client may ask for a great many short answers and then read them all at once. */
