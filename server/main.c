@@ -174,7 +174,7 @@ static bool begin_to_listen(struct daemon *daemon, const struct config *config, 
 
 /* `fd` < 0: there is no client yet. */
 static bool serve(struct daemon *daemon, const struct config *config, int fd, bool listens,
-                  struct timeline *timeline, struct error *error)
+                  struct timeline *timeline, bool *device_gone, struct error *error)
 {
     struct engine_options engine_options;
     struct hub_options options;
@@ -191,11 +191,9 @@ static bool serve(struct daemon *daemon, const struct config *config, int fd, bo
     bool ok = daemon_start(daemon, &options, error) && (fd < 0 || daemon_serve_fd(daemon, fd, error));
     if (ok) {
         daemon_print_ready(daemon, stdout);
-        ok = daemon_run(daemon, error);
+        ok = daemon_run(daemon, device_gone, error);
     }
-    bool device_gone = daemon->device_gone;
     daemon_finish(daemon);
-    daemon->device_gone = device_gone;
     engine_destroy(engine);
     return ok;
 }
@@ -223,9 +221,9 @@ int main(int argc, char **argv)
     struct timeline *timeline = NULL;
     if (config.trace_file[0])
         timeline = timeline_create(config.trace_file, config.trace_file_bytes, &error);
-    bool ok =
-        (timeline || !config.trace_file[0]) && serve(&daemon, &config, arguments.fd, listens, timeline, &error);
-    bool device_gone = daemon.device_gone;
+    bool device_gone = false;
+    bool ok = (timeline || !config.trace_file[0]) &&
+              serve(&daemon, &config, arguments.fd, listens, timeline, &device_gone, &error);
     daemon_finish(&daemon); /* what was begun before it failed */
     timeline_destroy(timeline);
     return !ok ? fail(&error) : device_gone ? EX_TEMPFAIL : EXIT_SUCCESS;

@@ -294,10 +294,12 @@ void daemon_print_ready(const struct daemon *daemon, FILE *stream)
     fflush(stream);
 }
 
-bool daemon_run(struct daemon *daemon, struct error *error)
+bool daemon_run(struct daemon *daemon, bool *device_gone, struct error *error)
 {
     notify_manager("READY=1");
-    return loop_run(daemon->loop, error);
+    bool ok = loop_run(daemon->loop, error);
+    *device_gone = daemon->device_gone;
+    return ok;
 }
 
 static void close_sessions(struct daemon *daemon)

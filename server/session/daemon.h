@@ -45,9 +45,9 @@ bool daemon_start(struct daemon *daemon, const struct hub_options *options, stru
 bool daemon_serve_fd(struct daemon *daemon, int fd, struct error *error);
 /* "READY ADDRESS", one line an address, with the port that was chosen; "READY" alone where it listens nowhere. */
 void daemon_print_ready(const struct daemon *daemon, FILE *stream);
-/* Until SIGTERM or SIGINT comes, the device is lost for good (then `device_gone` is set), or the client of
+/* Until SIGTERM or SIGINT comes, the device is lost for good (then *device_gone is true), or the client of
  * daemon_serve_fd() is gone. Says goodbye to all. */
-bool daemon_run(struct daemon *daemon, struct error *error);
+bool daemon_run(struct daemon *daemon, bool *device_gone, struct error *error);
 void daemon_finish(struct daemon *daemon); /* whatever was begun; before the engine is destroyed */
 
 #endif

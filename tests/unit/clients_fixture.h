@@ -28,7 +28,8 @@ static inline void *run(void *context)
 {
     (void)context;
     struct error error = {0};
-    daemon_run(&served.daemon, &error);
+    bool device_gone;
+    daemon_run(&served.daemon, &device_gone, &error);
     return NULL;
 }
 

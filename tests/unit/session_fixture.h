@@ -84,7 +84,8 @@ static inline void *run(void *context)
 {
     (void)context;
     struct error error = {0};
-    daemon_run(&served, &error);
+    bool device_gone;
+    daemon_run(&served, &device_gone, &error);
     return NULL;
 }
 
