@@ -22,55 +22,15 @@ static void print_rules(void)
 
 static void print_limits(void)
 {
-    static const struct {
-        unsigned bytes;
-        const char *what;
-    } limits[] = {
-        {8, "bytes that may wait for a client that does not read"},
-        {8, "memory of a scene, bytes"},
-        {4, "milliseconds for the handshake"},
-        {4, "payload of a message without bulk data, bytes"},
-        {4, "bulk data of one message from the daemon, bytes"},
-        {4, "requests in flight"},
-        {4, "scenes of a client"},
-        {4, "jobs of a client at once"},
-        {4, "nodes of a scene"},
-        {4, "texels along a side of a texture"},
-        {4, "width of a picture, pixels"},
-        {4, "height of a picture, pixels"},
-        {4, "samples of a pixel"},
-        {4, "seconds of silence; 0: any"},
-        {8, "bytes waiting for a client from which on nothing is read from it"},
-        {8, "memory of the device, bytes; 0: no limit"},
-        {8, "memory of the blobs of all clients, bytes"},
-        {8, "memory of a client's edits that are not answered yet, bytes"},
-        {8, "memory of the frames of all jobs, bytes"},
-        {8, "memory of the samples of one layered depth cube, bytes; 0: no limit of its own"},
-        {8, "memory of the lists of the tracer abuffer, bytes; 0: no limit of its own"},
-        {8, "blob data that a client may send ahead, bytes; `credit` says how far that is"},
-        {8, "frames of a job that wait to be sent, bytes; one frame may always wait"},
-        {4, "milliseconds that more bytes than at offset 112 may wait for a client before it is disconnected"},
-        {4, "milliseconds that a message may take whatever its size"},
-        {4, "bytes a second of a message that takes longer"},
-        {4, "connected clients"},
-        {4, "connections whose handshake is not done"},
-        {4, "those of one TCP address"},
-        {4, "milliseconds until a wrong key is answered"},
-        {4, "wrong keys of one network in a minute"},
-        {4, "depth of the node hierarchy; a root has depth 1"},
-        {4, "blobs that a connection may name"},
-        {4, "edits of a client that are not answered yet"},
-        {4, "seconds that a kept or shared scene stays when its last client is gone; 0: none"},
-        {4, "scenes of all clients that stay so"},
-        {4, "layers of a layered depth cube"},
-    };
-    unsigned offset = 0;
+    static const struct handshake_limits none;
+    struct handshake_limit limit;
+    unsigned offset = 48;
     printf("The limits in force at the daemon. What is missing at the end is 0 (not told), what is more is "
            "skipped.\n\n"
-           "| offset | type | limit |\n| ---: | --- | --- |\n");
-    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
-        printf("| %u | u%u | %s |\n", 48 + offset, 8 * limits[i].bytes, limits[i].what);
-        offset += limits[i].bytes;
+           "| offset | type | name | limit |\n| ---: | --- | --- | --- |\n");
+    for (size_t i = 0; handshake_limit_at(&none, i, &limit); i++) {
+        printf("| %u | u%u | `%s` | %s |\n", offset, 8 * limit.bytes, limit.name, limit.what);
+        offset += limit.bytes;
     }
     printf("\n");
 }

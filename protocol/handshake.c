@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "protocol/handshake.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "protocol/describe.h"
@@ -9,7 +10,39 @@
 
 #define LIMITS_MAX_BYTES 256u /* of a newer peer's */
 
+static const struct {
+    const char *name, *what;
+    size_t offset; /* in struct handshake_limits */
+    unsigned bytes;
+} limits[] = {
+#define LIMIT(type, name, what)                                                                                   \
+    {#name, what, offsetof(struct handshake_limits, name), sizeof((struct handshake_limits *)0)->name},
+#include "protocol/limits.def"
+#undef LIMIT
+};
+#define LIMIT_COUNT (sizeof limits / sizeof limits[0])
+
 static const uint8_t magic[4] = {'F', 'A', 'R', 'L'};
+
+/* ---- limits ---- */
+
+bool handshake_limit_at(const struct handshake_limits *values, size_t index, struct handshake_limit *out)
+{
+    if (index >= LIMIT_COUNT) {
+        return false;
+    }
+    const uint8_t *at = (const uint8_t *)values + limits[index].offset;
+    uint64_t value;
+    uint32_t narrow;
+    if (limits[index].bytes == sizeof narrow) {
+        memcpy(&narrow, at, sizeof narrow);
+        value = narrow;
+    } else {
+        memcpy(&value, at, sizeof value);
+    }
+    *out = (struct handshake_limit){limits[index].name, limits[index].what, limits[index].bytes, value};
+    return true;
+}
 
 /* ---- encode ---- */
 
@@ -43,46 +76,6 @@ size_t handshake_hello_encode(uint8_t out[HANDSHAKE_HELLO_MAX_BYTES], const stru
     return put_text(&writer, hello->name, HANDSHAKE_NAME_MAX_BYTES) ? finish(&writer) : 0;
 }
 
-/* The limits in wire order; the parser goes through the same list. */
-#define LIMITS(U64, U32)                                                                                          \
-    U64(queued_output_bytes)                                                                                      \
-    U64(scene_memory_bytes)                                                                                       \
-    U32(handshake_ms)                                                                                             \
-    U32(control_payload_max_bytes)                                                                                \
-    U32(bulk_chunk_max_bytes)                                                                                     \
-    U32(requests_in_flight)                                                                                       \
-    U32(scenes_per_client)                                                                                        \
-    U32(views_per_client)                                                                                         \
-    U32(nodes_max)                                                                                                \
-    U32(texture_edge_max)                                                                                         \
-    U32(width_max)                                                                                                \
-    U32(height_max)                                                                                               \
-    U32(samples_max)                                                                                              \
-    U32(idle_seconds)                                                                                             \
-    U64(queued_soft_bytes)                                                                                        \
-    U64(device_memory_bytes)                                                                                      \
-    U64(blob_memory_bytes)                                                                                        \
-    U64(transaction_memory_bytes)                                                                                 \
-    U64(frame_memory_bytes)                                                                                       \
-    U64(ldc_memory_bytes)                                                                                         \
-    U64(abuffer_memory_bytes)                                                                                     \
-    U64(upload_window_bytes)                                                                                      \
-    U64(frame_window_bytes)                                                                                       \
-    U32(queued_soft_ms)                                                                                           \
-    U32(progress_grace_ms)                                                                                        \
-    U32(progress_bytes_per_s)                                                                                     \
-    U32(clients_max)                                                                                              \
-    U32(unauthenticated_max)                                                                                      \
-    U32(unauthenticated_per_address)                                                                              \
-    U32(wrong_key_ms)                                                                                             \
-    U32(wrong_keys_per_minute)                                                                                    \
-    U32(depth_max)                                                                                                \
-    U32(blobs_per_client)                                                                                         \
-    U32(transaction_edits)                                                                                        \
-    U32(scene_linger_seconds)                                                                                     \
-    U32(scenes_lingering)                                                                                         \
-    U32(ldc_layers_max)
-
 size_t handshake_reply_encode(uint8_t out[HANDSHAKE_REPLY_MAX_BYTES], const struct handshake_reply *reply)
 {
     struct writer writer;
@@ -93,11 +86,9 @@ size_t handshake_reply_encode(uint8_t out[HANDSHAKE_REPLY_MAX_BYTES], const stru
     writer_put_u64(&writer, reply->capabilities);
     writer_put_bytes(&writer, reply->nonce, sizeof reply->nonce);
     writer_put_bytes(&writer, reply->session_token, sizeof reply->session_token);
-#define PUT_U64(field) writer_put_u64(&writer, reply->limits.field);
-#define PUT_U32(field) writer_put_u32(&writer, reply->limits.field);
-    LIMITS(PUT_U64, PUT_U32)
-#undef PUT_U64
-#undef PUT_U32
+#define LIMIT(type, name, what) writer_put_##type(&writer, reply->limits.name);
+#include "protocol/limits.def"
+#undef LIMIT
     if (!put_text(&writer, reply->name, HANDSHAKE_NAME_MAX_BYTES) ||
         !put_text(&writer, reply->text, HANDSHAKE_TEXT_MAX_BYTES)) {
         return 0;
@@ -176,11 +167,9 @@ static void get_limits(struct handshake_limits *out, const uint8_t *bytes, size_
 {
     struct reader reader;
     reader_init(&reader, bytes, count);
-#define GET_U64(field) out->field = reader_u64(&reader);
-#define GET_U32(field) out->field = reader_u32(&reader);
-    LIMITS(GET_U64, GET_U32)
-#undef GET_U64
-#undef GET_U32
+#define LIMIT(type, name, what) out->name = reader_##type(&reader);
+#include "protocol/limits.def"
+#undef LIMIT
 }
 
 static enum handshake_result parse_reply(struct handshake_reply *out, struct reader *reader,
@@ -198,11 +187,11 @@ static enum handshake_result parse_reply(struct handshake_reply *out, struct rea
     out->capabilities = reader_u64(reader);
     reader_bytes(reader, out->nonce, sizeof out->nonce);
     reader_bytes(reader, out->session_token, sizeof out->session_token);
-    const uint8_t *limits = reader_view(reader, limits_bytes);
-    if (limits == NULL) {
+    const uint8_t *told = reader_view(reader, limits_bytes);
+    if (told == NULL) {
         return HANDSHAKE_NEED_MORE;
     }
-    get_limits(&out->limits, limits, limits_bytes);
+    get_limits(&out->limits, told, limits_bytes);
     result = get_text(reader, out->name, HANDSHAKE_NAME_MAX_BYTES, "name", error);
     if (result == HANDSHAKE_CONSUMED) {
         result = get_text(reader, out->text, HANDSHAKE_TEXT_MAX_BYTES, "text", error);

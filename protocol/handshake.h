@@ -15,7 +15,7 @@
  *    8  u64 capabilities                    bits that both understand
  *   16  nonce, 16 bytes
  *   32  session token, 16 bytes
- *   48  limits, in the order of struct handshake_limits, packed; what is missing is 0, what is more is skipped
+ *   48  limits, in the order of limits.def, packed; what is missing is 0, what is more is skipped
  *       u8 name_bytes (at most 64), name; u8 text_bytes, text (empty unless version is 0)
  *       zeros up to a multiple of 8 */
 #ifndef FARLIGHT_PROTOCOL_HANDSHAKE_H
@@ -35,7 +35,6 @@ extern "C" {
 #define HANDSHAKE_TEXT_MAX_BYTES 255u
 #define HANDSHAKE_NONCE_BYTES 16u
 #define HANDSHAKE_TOKEN_BYTES 16u
-#define HANDSHAKE_LIMITS_BYTES 192u /* of our struct handshake_limits on the wire */
 
 /* Bits of `capabilities`. */
 #define HANDSHAKE_CAN_H264 (UINT64_C(1) << 0)      /* client: decodes it; daemon: encodes it */
@@ -53,45 +52,30 @@ struct handshake_hello {
 
 /* Limits in force at the daemon; 0: not told. In wire order. */
 struct handshake_limits {
-    uint64_t queued_output_bytes;
-    uint64_t scene_memory_bytes;
-    uint32_t handshake_ms;
-    uint32_t control_payload_max_bytes;
-    uint32_t bulk_chunk_max_bytes;
-    uint32_t requests_in_flight;
-    uint32_t scenes_per_client;
-    uint32_t views_per_client;
-    uint32_t nodes_max;
-    uint32_t texture_edge_max;
-    uint32_t width_max;
-    uint32_t height_max;
-    uint32_t samples_max;
-    uint32_t idle_seconds;
-
-    uint64_t queued_soft_bytes;
-    uint64_t device_memory_bytes;
-    uint64_t blob_memory_bytes;
-    uint64_t transaction_memory_bytes;
-    uint64_t frame_memory_bytes;
-    uint64_t ldc_memory_bytes;
-    uint64_t abuffer_memory_bytes;
-    uint64_t upload_window_bytes;
-    uint64_t frame_window_bytes;
-    uint32_t queued_soft_ms;
-    uint32_t progress_grace_ms;
-    uint32_t progress_bytes_per_s;
-    uint32_t clients_max;
-    uint32_t unauthenticated_max;
-    uint32_t unauthenticated_per_address;
-    uint32_t wrong_key_ms;
-    uint32_t wrong_keys_per_minute;
-    uint32_t depth_max; /* of the node hierarchy */
-    uint32_t blobs_per_client;
-    uint32_t transaction_edits;
-    uint32_t scene_linger_seconds;
-    uint32_t scenes_lingering;
-    uint32_t ldc_layers_max;
+#define LIMIT(type, name, what) LIMIT_##type(name)
+#define LIMIT_u64(name) uint64_t name;
+#define LIMIT_u32(name) uint32_t name;
+#include "protocol/limits.def"
+#undef LIMIT_u64
+#undef LIMIT_u32
+#undef LIMIT
 };
+
+enum {
+    HANDSHAKE_LIMITS_BYTES = 0 /* on the wire */
+#define LIMIT(type, name, what) +sizeof(((struct handshake_limits *)0)->name)
+#include "protocol/limits.def"
+#undef LIMIT
+};
+
+struct handshake_limit {
+    const char *name, *what; /* what it limits, in words */
+    unsigned bytes;          /* on the wire: 4 or 8 */
+    uint64_t value;
+};
+
+/* Limit `index` in wire order; false: there are not so many. */
+bool handshake_limit_at(const struct handshake_limits *limits, size_t index, struct handshake_limit *out);
 
 struct handshake_reply {
     uint16_t version;

@@ -6,15 +6,19 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#define KEY_JSON 0x400
+enum { KEY_JSON = 0x400, KEY_LIMITS };
 
 struct stats_options {
     struct cli_daemon daemon;
-    bool json;
+    bool json, limits;
     struct cli_job job; /* holds the error of what was typed */
 };
 
-static const struct argp_option options[] = {{"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0}, {0}};
+static const struct argp_option options[] = {
+    {"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0},
+    {"limits", KEY_LIMITS, NULL, 0, "What the daemon allows, too (in JSON always)", 0},
+    {0},
+};
 
 static const struct argp_child children[] = {{&cli_daemon_argp, 0, NULL, 0}, {0}};
 
@@ -27,6 +31,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case KEY_JSON:
         wanted->json = true;
+        return 0;
+    case KEY_LIMITS:
+        wanted->limits = true;
         return 0;
     case ARGP_KEY_ARG:
         return cli_usage(&wanted->job, value, "is not expected");
@@ -95,7 +102,16 @@ static json_t *stages_array(const struct message_stats_reply *reply)
     return array;
 }
 
-static void print_json(const struct message_stats_reply *reply)
+static json_t *limits_object(const struct fl_connection *connection)
+{
+    json_t *object = json_object();
+    struct fl_limit limit;
+    for (size_t i = 0; fl_connection_limit(connection, i, &limit); i++)
+        set(object, limit.name, limit.value);
+    return object;
+}
+
+static void print_json(const struct fl_connection *connection, const struct message_stats_reply *reply)
 {
     json_t *object =
         json_pack("{s:s,s:s,s:s}", "version", reply->version, "device", reply->device, "driver", reply->driver);
@@ -110,6 +126,7 @@ static void print_json(const struct message_stats_reply *reply)
     set(object, "device_objects", reply->device_objects);
     set(object, "blobs", reply->blobs);
     set(object, "blob_bytes", reply->blob_bytes);
+    json_object_set_new(object, "limits", limits_object(connection));
     json_object_set_new(object, "clients", clients_array(reply));
     json_object_set_new(object, "scenes", scenes_array(reply));
     json_object_set_new(object, "stages", stages_array(reply));
@@ -179,12 +196,20 @@ static void print_table(const struct message_stats_reply *reply)
     print_stages(reply);
 }
 
+static void print_limits(const struct fl_connection *connection)
+{
+    struct fl_limit limit;
+    for (size_t i = 0; fl_connection_limit(connection, i, &limit); i++)
+        printf("limit  %-27s %14" PRIu64 "  %s\n", limit.name, limit.value, limit.what);
+}
+
 int cli_stats(int argc, char **argv)
 {
-    static const struct argp argp = {.options = options,
-                                     .parser = parse,
-                                     .children = children,
-                                     .doc = "Show a daemon's device, clients, scenes, memory and stage times."};
+    static const struct argp argp = {
+        .options = options,
+        .parser = parse,
+        .children = children,
+        .doc = "Show a daemon's device, clients, scenes, memory, stage times and limits."};
     struct stats_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
@@ -193,9 +218,11 @@ int cli_stats(int argc, char **argv)
     const struct message_stats_reply *reply = NULL;
     const bool done = connection != NULL && fl_stats(connection, &reply, &error);
     if (done && wanted.json)
-        print_json(reply);
+        print_json(connection, reply);
     else if (done)
         print_table(reply);
+    if (done && wanted.limits && !wanted.json)
+        print_limits(connection);
     fl_connection_destroy(connection);
     return done ? CLI_DONE : cli_report(&error);
 }

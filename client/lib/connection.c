@@ -451,3 +451,12 @@ const char *fl_connection_address(const struct fl_connection *connection)
 {
     return connection->address;
 }
+
+bool fl_connection_limit(const struct fl_connection *connection, size_t index, struct fl_limit *limit)
+{
+    struct handshake_limit told;
+    if (!handshake_limit_at(&connection->limits, index, &told))
+        return false;
+    *limit = (struct fl_limit){told.name, told.what, told.value};
+    return true;
+}

@@ -113,6 +113,15 @@ FL_API bool fl_connection_wait(struct fl_connection *connection, unsigned timeou
 FL_API bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct fl_error *error);
 /* The daemon lets this client look, but edit nothing. */
 FL_API bool fl_connection_is_read_only(const struct fl_connection *connection);
+
+struct fl_limit {
+    const char *name, *what; /* what it limits, in words; static */
+    uint64_t value;          /* in the unit that its name or `what` says; 0: the daemon told none */
+};
+
+/* What the daemon allows, as it told when the connection was made; in the protocol's order. False: there is no
+ * limit of that index. */
+FL_API bool fl_connection_limit(const struct fl_connection *connection, size_t index, struct fl_limit *limit);
 /* *reply is valid until the next call on the connection. */
 FL_API bool fl_stats(struct fl_connection *connection, const struct message_stats_reply **reply,
                      struct fl_error *error);

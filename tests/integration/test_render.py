@@ -213,6 +213,17 @@ class ThroughADaemon(Case):
             self.assertTrue(record["device"])
             self.assertGreaterEqual(record["frames"], 1)
 
+    def test_stats_tell_the_limits_that_the_configuration_sets(self):
+        changed = dict(os.environ, FARLIGHT_LIMITS_SCENES="7")
+        with Daemon(environment=changed) as daemon:
+            record = json.loads(self.expect(farlight("stats", "--server", daemon.address, "--json"), 0).stdout)
+            table = self.expect(farlight("stats", "--server", daemon.address, "--limits"), 0).stdout
+            without = self.expect(farlight("stats", "--server", daemon.address), 0).stdout
+        self.assertEqual((record["limits"]["scenes_per_client"], record["limits"]["samples_max"]), (7, 65536))
+        self.assertRegex(table, r"(?m)^limit  scenes_per_client +7  scenes of a client$")
+        self.assertEqual(sum(line.startswith("limit ") for line in table.splitlines()), len(record["limits"]))
+        self.assertNotIn("limit ", without)
+
     def test_info_counts_what_is_in_a_file(self):
         text = self.expect(farlight("info", bundled_scenes() / "cornell.glb"), 0).stdout
         for word in ("triangles", "materials", "lights", "cameras"):
