@@ -347,7 +347,7 @@ install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/farlight \
 	    $(addprefix $(DESTDIR)$(PREFIX)/share/man/man,1 5 8) \
 	    $(DESTDIR)$(PREFIX)/share/doc/farlight/examples $(DESTDIR)/etc/farlight \
-	    $(DESTDIR)$(PREFIX)/lib/systemd/system
+	    $(DESTDIR)$(PREFIX)/lib/systemd/system $(DESTDIR)$(PREFIX)/lib/sysusers.d
 	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
 	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
@@ -367,6 +367,7 @@ install: all
 	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight
 	sed 's#/usr/local/bin#$(PREFIX)/bin#' conf/farlightd.service >$(DESTDIR)$(PREFIX)/lib/systemd/system/farlightd.service
 	install -m 644 conf/farlightd.socket $(DESTDIR)$(PREFIX)/lib/systemd/system
+	install -m 644 conf/sysusers.conf $(DESTDIR)$(PREFIX)/lib/sysusers.d/farlight.conf
 
 uninstall:
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/bin/,$(notdir $(PROGRAMS)))
@@ -375,7 +376,8 @@ uninstall:
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/share/man/man8/,$(notdir $(wildcard conf/man/*.8)))
 	rm -f $(DESTDIR)$(PREFIX)/lib/$(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so \
 	    $(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
-	rm -f $(addprefix $(DESTDIR)$(PREFIX)/lib/systemd/system/farlightd.,service socket)
+	rm -f $(addprefix $(DESTDIR)$(PREFIX)/lib/systemd/system/farlightd.,service socket) \
+	    $(DESTDIR)$(PREFIX)/lib/sysusers.d/farlight.conf
 	rm -rf $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)$(PREFIX)/share/farlight $(DESTDIR)$(PREFIX)/include/farlight
 
 clean:
