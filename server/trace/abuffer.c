@@ -99,30 +99,32 @@ static struct tracer *abuffer_create(struct gpu_device *device, const struct tra
 /* ---- updates ---- */
 
 /* Round all that is drawn. */
-static bool place(struct abuffer *abuffer, const struct scene_gpu *scene, struct axes_box *box,
-                  struct error *error)
-{
-    uint32_t *instances = NULL, count = 0;
-    bool listed = axes_list_instances(scene, &instances, &count, error);
-    bool placed = listed && axes_box_place(box, scene, instances, count, abuffer->resolution, error);
-    free(instances);
-    return placed;
-}
-
-static bool begin(struct abuffer *abuffer, struct scene_gpu *scene, struct error *error)
+static bool place(struct abuffer *abuffer, const struct scene_gpu *scene, const uint32_t *instances,
+                  uint32_t count, struct error *error)
 {
     struct abuffer_store *store = &abuffer->store;
     struct axes_box box;
-    if (!place(abuffer, scene, &box, error))
+    if (!axes_box_place(&box, scene, instances, count, abuffer->resolution, error))
         return false;
     memcpy(store->lower_world, box.lower_world, sizeof(store->lower_world));
     store->cell_world = box.cell_world;
     store->resolution = abuffer->resolution;
     store->voxels_along = abuffer->voxels_along;
-    abuffer->had_cutout = scene->has_cutout;
-    if (!abuffer_build_begin(abuffer->builder, store, scene, &abuffer->base.options, error))
+    return true;
+}
+
+static bool begin(struct abuffer *abuffer, struct scene_gpu *scene, struct error *error)
+{
+    uint32_t *instances = NULL, count = 0;
+    bool begun = axes_list_instances(scene, &instances, &count, error) &&
+                 place(abuffer, scene, instances, count, error) &&
+                 abuffer_build_begin(abuffer->builder, &abuffer->store, scene, instances, count,
+                                     &abuffer->base.options, error);
+    free(instances);
+    if (!begun)
         return false;
-    abuffer->base.stats.uploaded_bytes = (uint64_t)store->drawn_count * AXES_INSTANCE_BYTES;
+    abuffer->had_cutout = scene->has_cutout;
+    abuffer->base.stats.uploaded_bytes = (uint64_t)abuffer->store.drawn_count * AXES_INSTANCE_BYTES;
     return true;
 }
 

@@ -72,16 +72,6 @@ void abuffer_read_counts(struct abuffer_task *task)
     gpu_buffer_read(task->builder->device, &task->builder->build, 0, &task->counts, sizeof(task->counts));
 }
 
-/* Of the whole scene, for the draws that follow. */
-static bool list_instances(struct abuffer_builder *builder, const struct scene_gpu *scene, struct error *error)
-{
-    uint32_t *instances = NULL, count = 0;
-    bool listed = axes_list_instances(scene, &instances, &count, error) &&
-                  axes_draw_prepare(&builder->draw, scene, instances, count, error);
-    free(instances);
-    return listed;
-}
-
 static bool reserve(struct abuffer_task *task, struct error *error)
 {
     struct abuffer_builder *builder = task->builder;
@@ -221,7 +211,8 @@ static void forget(struct abuffer_builder *builder)
 }
 
 bool abuffer_build_begin(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
-                         const struct tracer_options *options, struct error *error)
+                         const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
+                         struct error *error)
 {
     const uint32_t tiles_along = ABUFFER_TILES_ALONG(store->resolution);
     struct abuffer_task *task = &builder->task;
@@ -236,7 +227,7 @@ bool abuffer_build_begin(struct abuffer_builder *builder, struct abuffer_store *
     store->sample_count = 0;
     store->depth_max = 0;
     builder->passes = 0;
-    bool begun = list_instances(builder, scene, error);
+    bool begun = axes_draw_prepare(&builder->draw, scene, instances, instance_count, error);
     if (begun && builder->draw.drawn_count == 0) {
         abuffer_store_finish(store);
         task->stage = ABUFFER_STAGES;
@@ -282,8 +273,9 @@ bool abuffer_build_is_on(const struct abuffer_builder *builder)
 }
 
 bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
-                   const struct tracer_options *options, struct error *error)
+                   const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
+                   struct error *error)
 {
-    return abuffer_build_begin(builder, store, scene, options, error) &&
+    return abuffer_build_begin(builder, store, scene, instances, instance_count, options, error) &&
            abuffer_build_piece(builder, PIECE_WITHOUT_END, error) == TRACER_DONE;
 }

@@ -10,6 +10,7 @@
 #include "trace/tracer.h"
 
 #include <stdbool.h>
+#include <stdint.h>
 
 struct abuffer_builder;
 
@@ -22,11 +23,13 @@ void abuffer_builder_start_with(struct abuffer_builder *builder, uint32_t fragme
 /* Over the scene, that the last build took: 1, or 2 where there was no room for the lists at first. */
 uint32_t abuffer_builder_passes(const struct abuffer_builder *builder);
 
-/* Begins to fill the store; the caller has set lower_world, cell_world (metres), resolution and voxels_along.
- * Store, scene and options are the caller's until the build is done or abandoned. Failures leave an empty store,
- * and so does a scene that has nothing to draw. */
+/* Begins to fill the store with instances[0 .. instance_count - 1] (scene_gpu's, which need not ascend); the
+ * caller has set lower_world, cell_world (metres), resolution and voxels_along. The list is read before this
+ * returns, and stays the caller's; store, scene and options must stay until the build is done or abandoned.
+ * Failures leave an empty store, and so does a list of nothing. */
 bool abuffer_build_begin(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
-                         const struct tracer_options *options, struct error *error);
+                         const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
+                         struct error *error);
 /* Goes on with what was begun, until about piece_end_ns. Waits for the device. Where the lists' buffer is too
  * small it is made larger, and the pass is repeated; where options->abuffer_mebibytes_max or the device forbid
  * that, it fails with ERROR_LIMIT or ERROR_OUT_OF_MEMORY. */
@@ -37,6 +40,7 @@ void abuffer_build_abandon(struct abuffer_builder *builder);
 bool abuffer_build_is_on(const struct abuffer_builder *builder);
 /* All of it at once. */
 bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
-                   const struct tracer_options *options, struct error *error);
+                   const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
+                   struct error *error);
 
 #endif

@@ -7,6 +7,7 @@
 
 #include "shared/abuffer.h"
 #include "trace/abuffer_build.h"
+#include "trace/axes_draw.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -18,6 +19,7 @@ struct fixture {
     struct abuffer_builder *builder;
     struct abuffer_store store;
     struct tracer_options options;
+    uint32_t *instances, instance_count; /* that are drawn */
 };
 
 /* To the motion; to what was committed where it is NULL. */
@@ -26,6 +28,8 @@ static inline void fixture_update(struct fixture *fixture, const struct scene_mo
     struct error error = {0};
     struct scene_changes changes;
     expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, &error), &error);
+    free(fixture->instances);
+    expect_ok(axes_list_instances(&fixture->gpu, &fixture->instances, &fixture->instance_count, &error), &error);
 }
 
 static inline void fixture_init(struct fixture *fixture, struct scene *scene)
@@ -45,6 +49,7 @@ static inline void fixture_finish(struct fixture *fixture)
     abuffer_store_finish(&fixture->store);
     scene_gpu_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
+    free(fixture->instances);
 }
 
 /* Round all instances. */
@@ -63,7 +68,8 @@ static inline void place(struct fixture *fixture, uint32_t resolution, uint32_t 
 
 static inline bool try_build(struct fixture *fixture, struct error *error)
 {
-    return abuffer_build(fixture->builder, &fixture->store, &fixture->gpu, &fixture->options, error);
+    return abuffer_build(fixture->builder, &fixture->store, &fixture->gpu, fixture->instances,
+                         fixture->instance_count, &fixture->options, error);
 }
 
 static inline void build(struct fixture *fixture, uint32_t resolution, uint32_t voxels_along)

@@ -136,7 +136,8 @@ static enum tracer_progress build_in_units(struct fixture *fixture, uint32_t res
     enum tracer_progress progress = TRACER_MORE;
     const uint32_t most = *pieces;
     place(fixture, resolution, VOXELS);
-    expect_ok(abuffer_build_begin(fixture->builder, &fixture->store, &fixture->gpu, &fixture->options, &error),
+    expect_ok(abuffer_build_begin(fixture->builder, &fixture->store, &fixture->gpu, fixture->instances,
+                                  fixture->instance_count, &fixture->options, &error),
               &error);
     for (*pieces = 0; progress == TRACER_MORE && *pieces < most; ++*pieces) {
         for (int stage = 0; stage < ABUFFER_STAGES; stage++)
