@@ -417,6 +417,9 @@ struct fl_view_camera {
     float fov_y;
     float time_s;
     bool moving; /* more will follow soon */
+    /* A camera of the scene (fl_camera_info.node): the view looks through it, where clips have brought it at
+     * time_s, and the four fields at the top do not count, but must be sound. 0: they do. */
+    uint32_t node;
 };
 
 FL_API struct fl_view *fl_view_start(struct fl_scene *scene, const struct fl_view_options *options,

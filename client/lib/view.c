@@ -162,6 +162,7 @@ bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uin
     memcpy(look->look_at_world, camera->look_at_world, sizeof look->look_at_world);
     memcpy(look->up_world, camera->up_world, sizeof look->up_world);
     look->fov_y = camera->fov_y;
+    look->node = camera->node;
     const uint64_t now_ns = fl_now_ns();
     if (!check(view, error) || !fl_connection_send(view->connection, 0, 0, &message, error))
         return false;

@@ -93,7 +93,10 @@ static void tick(struct viewer *viewer, uint64_t now_ns)
         viewer->glide_begin_ns = share < 1 ? viewer->glide_begin_ns : 0;
         moved = true;
     }
-    moved = controls_fly(&viewer->controls, seconds, &viewer->camera) || moved;
+    if (controls_fly(&viewer->controls, seconds, &viewer->camera)) {
+        viewer->followed = 0;
+        moved = true;
+    }
     moved = tour_advance(&viewer->tour, seconds) || moved;
     viewer->must_look = viewer->must_look || moved;
     viewer->moved_ns = moved ? now_ns : viewer->moved_ns;

@@ -79,7 +79,7 @@ static void act_on_scene(struct viewer *viewer, enum action action)
     switch (action) {
     case ACTION_HOME:
         if (viewer->has_home)
-            viewer_go(viewer, &viewer->home);
+            viewer_go(viewer, &viewer->home, viewer_home_node(viewer));
         viewer->tour.camera = TOUR_NONE;
         break;
     case ACTION_FOCUS:
@@ -158,6 +158,7 @@ void viewer_input(struct viewer *viewer, const struct input *input)
     if (!viewer->has_camera || !controls_input(&viewer->controls, input, viewer->height, &viewer->camera))
         return;
     viewer->glide_begin_ns = 0; /* a hand is stronger */
+    viewer->followed = 0;
     viewer->must_look = true;
     viewer->moved_ns = viewer_now_ns();
 }

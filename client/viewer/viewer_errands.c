@@ -8,8 +8,19 @@
 
 #define COMPARED_SAMPLES 4u /* of a pixel: the reference may take long */
 
-void viewer_go(struct viewer *viewer, const struct viewer_camera *camera)
+bool viewer_follows(const struct viewer *viewer)
 {
+    return viewer->followed != 0 && viewer->tour.clip != TOUR_NONE && viewer->glide_begin_ns == 0;
+}
+
+uint32_t viewer_home_node(const struct viewer *viewer)
+{
+    return viewer->view.job.camera_path == PROTOCOL_CAMERA_PATH_NODE ? viewer->view.job.camera_node : 0;
+}
+
+void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32_t node)
+{
+    viewer->followed = node;
     if (!viewer->has_camera || viewer->options->replay != NULL) {
         viewer->camera = *camera;
         viewer->glide_begin_ns = 0;
@@ -48,6 +59,12 @@ static void fill_key(const struct viewer_camera *camera, struct record_camera_ke
     memcpy(key->look_at_world, out.look_at_world, sizeof key->look_at_world);
     memcpy(key->up_world, out.up_world, sizeof key->up_world);
     key->fov_y = out.fov_y;
+}
+
+static void use_node(struct fl_job_options *job, uint32_t node)
+{
+    job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+    job->camera_node = node;
 }
 
 static void use_key(struct fl_job_options *job, struct record_camera_key *key)
@@ -97,7 +114,10 @@ static void fill_reference(const struct viewer *viewer, struct fl_job_options *j
     job->accumulate = true; /* with the random numbers of a view */
     job->encoding = session_is_local(viewer->session) ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
     fill_key(&viewer->camera, key);
-    use_key(job, key);
+    if (viewer_follows(viewer))
+        use_node(job, viewer->followed);
+    else
+        use_key(job, key);
 }
 
 static bool ask(struct viewer *viewer, enum errand errand, struct fl_error *refusal)
@@ -108,8 +128,7 @@ static bool ask(struct viewer *viewer, enum errand errand, struct fl_error *refu
     fill_probe(viewer, &job);
     switch (errand) {
     case ERRAND_CAMERA:
-        job.camera_path = PROTOCOL_CAMERA_PATH_NODE;
-        job.camera_node = viewer->camera_node;
+        use_node(&job, viewer->camera_node);
         break;
     case ERRAND_FOCUS:
         aim(viewer, &key);
@@ -167,7 +186,7 @@ static void take_camera(struct viewer *viewer, enum errand errand, const struct 
         viewer->home = camera;
         viewer->has_home = true;
     }
-    viewer_go(viewer, &camera);
+    viewer_go(viewer, &camera, errand == ERRAND_HOME ? viewer_home_node(viewer) : viewer->camera_node);
 }
 
 static void take_focus(struct viewer *viewer, const struct fl_frame *frame)
@@ -179,7 +198,7 @@ static void take_focus(struct viewer *viewer, const struct fl_frame *frame)
         return;
     }
     camera_focus(&camera, place);
-    viewer_go(viewer, &camera);
+    viewer_go(viewer, &camera, 0);
     viewer_say(viewer, "focus: %.4g m away", camera_distance(&camera));
 }
 

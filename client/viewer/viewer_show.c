@@ -63,6 +63,7 @@ static void look(struct viewer *viewer, bool moving, uint64_t now_ns)
 {
     struct fl_view_camera camera = {.time_s = (float)viewer->tour.time_s, .moving = moving};
     camera_export(&viewer->camera, &camera);
+    camera.node = viewer_follows(viewer) ? viewer->followed : 0;
     if (!session_look(viewer->session, &camera, &viewer->command))
         return;
     viewer->must_look = false;
@@ -113,6 +114,8 @@ static void take(struct viewer *viewer, struct fl_frame *frame)
     viewer->frame.depth = NULL;
     viewer->frame.normals = NULL;
     viewer->frame.pixels = NULL;
+    if (viewer_follows(viewer)) /* for a hand to begin there */
+        camera_from_frame(&viewer->camera, frame, camera_distance(&viewer->camera));
     viewer->frames++;
     viewer->taken = viewer->settings;
     viewer->must_draw = true;
@@ -127,6 +130,7 @@ static void refuse(struct viewer *viewer, const struct fl_error *refusal)
     }
     viewer_say(viewer, "not possible: %s", refusal->text);
     viewer->settings = viewer->taken;
+    viewer->followed = 0; /* somebody may have taken its node away */
     viewer->must_show = true;
 }
 

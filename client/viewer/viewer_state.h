@@ -36,6 +36,7 @@ struct viewer {
 
     struct viewer_camera camera, home;
     bool has_camera, has_home;
+    uint32_t followed; /* node of the camera that was gone to and not left since, for clips to move; 0: none */
     struct viewer_camera glide_from, glide_to; /* from .. to, since then; 0: it does not glide */
     uint64_t glide_begin_ns;
 
@@ -90,8 +91,12 @@ void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *
 
 void viewer_errands(struct viewer *viewer);
 void viewer_drop_errands(struct viewer *viewer); /* of a connection that is gone */
-/* Goes there; gently, but for a replay. */
-void viewer_go(struct viewer *viewer, const struct viewer_camera *camera);
+/* Goes there; gently, but for a replay. `node`: of the scene's camera that is there, which is followed from then
+ * on while a clip is chosen; 0: none. */
+void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32_t node);
+/* The picture is one through the camera `followed`: `camera` only repeats where the last frame was seen from. */
+bool viewer_follows(const struct viewer *viewer);
+uint32_t viewer_home_node(const struct viewer *viewer); /* of the camera at home; 0: it is none of the scene's */
 
 /* ---- viewer_act.c ---- */
 

@@ -88,19 +88,44 @@ bool shot_make(struct shot *shot, const struct engine_job *job, const struct sce
     return true;
 }
 
+/* Where the view looks from is its client's word, whatever the clips say of the job's camera. */
+static bool look_from_key(const struct camera_key *key, struct animation_view *view, struct error *error)
+{
+    if (!animation_key_camera(key, "view_camera.up_world", &view->camera, error))
+        return false;
+    view->focus = animation_distance(&view->camera, key->look_at_world);
+    return true;
+}
+
+/* As a job along that node's path would, at that time. */
+static bool look_through_node(const struct engine_job *job, const struct scene *scene,
+                              const struct scene_pose *pose, const struct view_camera *from,
+                              struct animation_bounds *bounds, struct animation_view *view, struct error *error)
+{
+    struct engine_job along = *job;
+    along.path = CAMERA_NODE;
+    along.camera_node = from->node;
+    struct error local = {0};
+    if (animation_view(&along, scene, pose, (double)from->key.time_s, bounds, view, &local))
+        return true;
+    return error_set(error, local.kind, "view_camera.node", "%s", local.text);
+}
+
 bool shot_look(struct shot *shot, const struct engine_job *job, const struct scene *scene,
-               const struct camera_key *key, struct error *error)
+               const struct view_camera *from, struct animation_bounds *bounds, struct error *error)
 {
     static const struct pose_view nothing = {0};
-    struct animation_view view = {0};
-    if (!animation_key_camera(key, "view_camera.up_world", &view.camera, error) ||
-        !shot_begin(shot, job, scene, (double)key->time_s, error))
+    if (!shot_begin(shot, job, scene, (double)from->key.time_s, error))
         return false;
-    /* Where the view looks from is its client's word, whatever the clips say of the job's camera. */
-    const struct pose_view *given = shot->motion.pose_count ? &shot->motion.poses[0].view : &nothing;
-    view.focus = animation_distance(&view.camera, key->look_at_world);
+    const struct scene_pose *pose = shot->motion.pose_count ? &shot->motion.poses[0] : NULL;
+    struct animation_view view = {0};
+    if (!(from->node ? look_through_node(job, scene, pose, from, bounds, &view, error)
+                     : look_from_key(&from->key, &view, error))) {
+        shot_finish(shot);
+        return false;
+    }
     shot->request.camera = view.camera;
-    set_lens(&shot->request, &view, given);
+    set_lens(&shot->request, &view, pose ? &pose->view : &nothing);
     return true;
 }
 

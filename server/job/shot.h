@@ -5,6 +5,7 @@
 #define FARLIGHT_JOB_SHOT_H
 
 #include "job/animation.h"
+#include "job/view_wishes.h"
 
 struct shot {
     struct frame_request request;
@@ -15,10 +16,10 @@ struct shot {
 /* `bounds` may be kept from frame to frame, or NULL. On failure there is nothing to finish. */
 bool shot_make(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
                struct animation_bounds *bounds, struct error *error);
-/* The same from another place and at another time than the job's frames have: those of `key`. Noise is the job's
+/* The same from another place and at another time than the job's frames have: those of `from`. Noise is the job's
  * own, so that what is seen from one place is one picture. */
 bool shot_look(struct shot *shot, const struct engine_job *job, const struct scene *scene,
-               const struct camera_key *key, struct error *error);
+               const struct view_camera *from, struct animation_bounds *bounds, struct error *error);
 void shot_finish(struct shot *shot);
 /* The same for frame 0 as for the job; for others another noise. */
 uint64_t shot_seed(uint64_t job_seed, uint32_t frame);

@@ -107,7 +107,7 @@ bool view_take_up(struct job *job, struct shot *shot, struct error *error)
     view->wish.key_frame |= key_frame;
     view->refining = !has_news(job, &view->wish);
     bool made = view->wish.camera.command
-                    ? shot_look(shot, &job->spec, scene, &view->wish.camera.key, error)
+                    ? shot_look(shot, &job->spec, scene, &view->wish.camera, &job->bounds, error)
                     : shot_make(shot, &job->spec, scene, job->spec.first_frame, &job->bounds, error);
     if (!made)
         return false;

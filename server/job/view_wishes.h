@@ -15,6 +15,7 @@ struct view_camera {
     uint64_t received_ns;  /* clock_now_ns() when the network thread read it */
     bool moving;           /* more will follow soon */
     struct camera_key key; /* its time is that of the job */
+    uint32_t node;         /* that shows a camera, which counts instead of the key's, but for the time; 0: none */
 };
 
 struct view_wishes;

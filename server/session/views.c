@@ -323,6 +323,7 @@ void views_look(struct session *session, const struct message_view_camera *messa
         .received_ns = session->connection->last_received_ns,
         .moving = message->moving != 0,
         .key = {.time_s = message->time_s, .fov_y = message->fov_y},
+        .node = message->node,
     };
     memcpy(camera.key.eye_world, message->eye_world, sizeof camera.key.eye_world);
     memcpy(camera.key.look_at_world, message->look_at_world, sizeof camera.key.look_at_world);

@@ -46,6 +46,21 @@ def difference(a, b):
     return total / (3 * width * height)
 
 
+def riding_camera(source, target):
+    """The roundabout, with its camera on the platform that turns."""
+    data = source.read_bytes()
+    json_bytes = struct.unpack_from("<I", data, 12)[0]
+    model = json.loads(data[20:20 + json_bytes])
+    nodes, names = model["nodes"], [node.get("name") for node in model["nodes"]]
+    model["scenes"][0]["nodes"].remove(names.index("camera"))
+    nodes[names.index("platform")]["children"].append(names.index("camera"))
+    text = json.dumps(model).encode()
+    text += b" " * (-len(text) % 4)
+    rest_of_file = data[20 + json_bytes:]
+    target.write_bytes(struct.pack("<4sIIII", data[:4], 2, 20 + len(text) + len(rest_of_file), len(text), 0x4e4f534a) +
+                       text + rest_of_file)
+
+
 class Viewer(Case):
     def start(self, events, *options, scene="teapot.glb", size=SIZE, environment=None):
         path = self.folder / "replay.json"
@@ -167,6 +182,27 @@ class WithoutAWindow(Viewer):
         self.assertNotEqual(states["camera"]["camera"], "")
         self.assertEqual(states["first"]["eye"], states["home"]["eye"])
         self.assertEqual(states["home"]["camera"], "")
+
+    def test_a_camera_that_a_clip_moves_is_followed_until_a_hand_leads(self):
+        scene = self.folder / "riding.glb"
+        riding_camera(bundled_scenes() / "carousel.glb", scene)
+        states = self.replay([rest(), {"state": "first"}, {"key": "v"}, {"after": 0.5}, {"key": "space"}, rest(8),
+                              {"state": "ridden"}, *HIDE, {"screenshot": "ridden.png"}, *drag(160, 90, 40, 0), rest(),
+                              {"state": "led"}, {"key": "right"}, rest(), {"state": "left alone"}, {"key": "c"},
+                              rest(), {"state": "back"}, {"key": "right"}, rest(), {"state": "stepped"}, {"key": "x"},
+                              rest(8), {"state": "true"}], scene=scene)
+        self.assertGreater(distance(states["first"]["eye"], states["ridden"]["eye"]), 0.1)
+        self.assertGreater(distance(states["ridden"]["eye"], states["led"]["eye"]), 0.1)
+        self.assertEqual(states["led"]["eye"], states["left alone"]["eye"])
+        self.assertGreater(states["left alone"]["time_s"], states["led"]["time_s"])
+        self.assertGreater(distance(states["back"]["eye"], states["stepped"]["eye"]), 0.01)
+        self.assertLess(states["true"]["errors"]["mean"], 1e-4)  # the reference looks from there, too
+        result = farlight("render", scene, "-q", "-o", self.folder / "render.png", "--size", f"{SIZE[0]}x{SIZE[1]}",
+                          "--samples", "8", "--integrator", "whitted", "--progressive", "--camera", "camera", "--clip",
+                          "ride", "--time", f"{states['ridden']['time_s']:.9g}")
+        self.expect(result, 0)
+        # As where nothing moves: rounding in the order of the passes.
+        self.assertLess(difference(self.folder / "ridden.png", self.folder / "render.png"), 0.05)
 
     def test_keys_that_are_held_fly_and_the_wheel_goes_nearer(self):
         states = self.replay([rest(), {"state": "first"}, {"key": "d", "hold": 0.3}, rest(), {"state": "right"},

@@ -19,6 +19,7 @@ static struct {
     uint32_t last_acked;
     struct message_render first, last;
     bool was_moving, closed_after_cancel;
+    uint32_t node;
 } seen;
 
 static int begin(void **state)
@@ -84,6 +85,7 @@ static bool look(struct daemon *daemon, struct framing_header *header, struct me
         seen.cameras++;
         seen.last_command = message->view_camera.command;
         seen.was_moving = message->view_camera.moving != 0;
+        seen.node = message->view_camera.node;
         break;
     case MESSAGE_FRAME_ACK:
         seen.acks += message->frame_ack.want_key_frame == 0 && message->frame_ack.whole;
@@ -144,7 +146,7 @@ static const struct fl_view_options some_options = {
     .weight = 5,
     .adapt = true};
 static const struct fl_view_camera some_camera = {
-    .eye_world = {0, 0, 5}, .up_world = {0, 1, 0}, .fov_y = 0.7f, .time_s = 1.5f, .moving = true};
+    .eye_world = {0, 0, 5}, .up_world = {0, 1, 0}, .fov_y = 0.7f, .time_s = 1.5f, .moving = true, .node = 9};
 
 static struct fl_view *start_view(struct fl_scene *scene)
 {
@@ -219,6 +221,7 @@ static void cameras_are_sent_and_frames_name_them_with_their_times(void **state)
     assert_int_equal(seen.first.credit, IN_FLIGHT);
     assert_true(seen.first.exposure_stops == 1);
     assert_true(seen.was_moving);
+    assert_int_equal(seen.node, 9);
     assert_int_equal(seen.cancels, 1);
 }
 

@@ -231,6 +231,7 @@ static void send_camera_on(uint32_t channel, uint64_t number, bool moving)
     message.view_camera.look_at_world[2] = -1;
     message.view_camera.up_world[1] = 1;
     message.view_camera.fov_y = 0.5f;
+    message.view_camera.node = 4;
     send_message(0, 0, &message);
 }
 
@@ -306,6 +307,7 @@ static void a_frame_names_the_camera_that_it_shows(void **state)
     assert_true(camera.moving);
     assert_true(before_ns <= camera.received_ns && camera.received_ns <= clock_now_ns());
     assert_true(camera.key.time_s == 0.25f && camera.key.eye_world[1] == 7 && camera.key.fov_y == 0.5f);
+    assert_int_equal(camera.node, 4);
     assert_true(camera.key.look_at_world[2] == -1 && camera.key.up_world[1] == 1);
     say_frame(2, 0, 7);
     struct message_frame_begin begin;

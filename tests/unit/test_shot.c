@@ -311,9 +311,9 @@ static void who_looks_for_himself_sees_the_scene_of_that_time_from_where_he_says
     struct clip_use uses[] = {{.clip = 1, .speed = 1}, {.clip = 3, .speed = 1}};
     struct engine_job job = job_of(CAMERA_KEYS, uses, 2);
     struct shot frame = shot_at(&job, scene, 5), look;
-    struct camera_key key = home;
-    key.time_s = 0.5f;
-    assert_true(shot_look(&look, &job, scene, &key, NULL));
+    struct view_camera from = {.command = 1, .key = home};
+    from.key.time_s = 0.5f;
+    assert_true(shot_look(&look, &job, scene, &from, NULL, NULL));
     assert_true(look.time_s == frame.time_s);
     assert_int_equal(look.motion.pose_count, frame.motion.pose_count);
     assert_memory_equal(look.motion.poses[0].nodes[0].parent_from_node,
@@ -327,10 +327,42 @@ static void who_looks_for_himself_sees_the_scene_of_that_time_from_where_he_says
     shot_finish(&frame);
     shot_finish(&look);
     struct error error = {0};
-    memcpy(key.up_world, (float[]){0, 0, 2}, 12); /* along the view */
-    assert_false(shot_look(&look, &job, scene, &key, &error));
+    memcpy(from.key.up_world, (float[]){0, 0, 2}, 12); /* along the view */
+    assert_false(shot_look(&look, &job, scene, &from, NULL, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "view_camera.up_world");
+    scene_destroy(scene);
+}
+
+static void a_view_through_a_camera_of_the_scene_shows_what_a_job_along_it_does(void **state)
+{
+    (void)state;
+    struct scene *scene = turning_scene(90);
+    struct clip_use use = {.clip = 1, .speed = 1};
+    struct engine_job along = job_of(CAMERA_NODE, &use, 1), watched = job_of(CAMERA_KEYS, &use, 1);
+    along.frame.aperture = watched.frame.aperture = 0.5f; /* it is focused alike */
+    for (uint32_t frame = 0; frame <= 10; frame += 5) {
+        struct shot expected = shot_at(&along, scene, frame), look;
+        struct view_camera from = {.command = 1, .key = home, .node = 3};
+        from.key.time_s = expected.time_s;
+        assert_true(shot_look(&look, &watched, scene, &from, NULL, NULL));
+        assert_memory_equal(&look.request.camera, &expected.request.camera, sizeof look.request.camera);
+        assert_true(look.request.focus == expected.request.focus);
+        shot_finish(&expected);
+        shot_finish(&look);
+    }
+    static const struct {
+        uint32_t node;
+        enum error_kind kind;
+    } refused[] = {{99, ERROR_UNKNOWN_ID}, {1, ERROR_INVALID}};
+    for (size_t i = 0; i < 2; i++) {
+        struct error error = {0};
+        struct shot look;
+        struct view_camera from = {.command = 1, .key = home, .node = refused[i].node};
+        assert_false(shot_look(&look, &watched, scene, &from, NULL, &error));
+        assert_int_equal(error.kind, refused[i].kind);
+        assert_string_equal(error.field, "view_camera.node");
+    }
     scene_destroy(scene);
 }
 
@@ -466,6 +498,7 @@ int main(void)
         cmocka_unit_test(frames_show_the_same_however_their_range_was_divided),
         cmocka_unit_test(a_clip_that_goes_ends_the_job_and_says_which),
         cmocka_unit_test(who_looks_for_himself_sees_the_scene_of_that_time_from_where_he_says),
+        cmocka_unit_test(a_view_through_a_camera_of_the_scene_shows_what_a_job_along_it_does),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
