@@ -55,18 +55,6 @@ uint64_t abuffer_builder_bytes(const struct abuffer_builder *builder)
     return bytes;
 }
 
-void abuffer_builder_start_with(struct abuffer_builder *builder, uint32_t fragments)
-{
-    gpu_buffer_finish(builder->device, &builder->nodes);
-    builder->nodes_max = 0;
-    builder->nodes_first = fragments;
-}
-
-uint32_t abuffer_builder_passes(const struct abuffer_builder *builder)
-{
-    return builder->passes;
-}
-
 void abuffer_read_counts(struct abuffer_task *task)
 {
     gpu_buffer_read(task->builder->device, &task->builder->build, 0, &task->counts, sizeof(task->counts));
@@ -270,12 +258,4 @@ void abuffer_build_abandon(struct abuffer_builder *builder)
 bool abuffer_build_is_on(const struct abuffer_builder *builder)
 {
     return builder->task.store != NULL;
-}
-
-bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
-                   const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
-                   struct error *error)
-{
-    return abuffer_build_begin(builder, store, scene, instances, instance_count, options, error) &&
-           abuffer_build_piece(builder, PIECE_WITHOUT_END, error) == TRACER_DONE;
 }

@@ -18,11 +18,6 @@ struct abuffer_builder *abuffer_builder_create(struct gpu_device *device, struct
 void abuffer_builder_destroy(struct abuffer_builder *builder); /* accepts NULL */
 uint64_t abuffer_builder_bytes(const struct abuffer_builder *builder);
 
-/* For tests: gives back what lists have room for; the next build begins with as many fragments. */
-void abuffer_builder_start_with(struct abuffer_builder *builder, uint32_t fragments);
-/* Over the scene, that the last build took: 1, or 2 where there was no room for the lists at first. */
-uint32_t abuffer_builder_passes(const struct abuffer_builder *builder);
-
 /* Begins to fill the store with instances[0 .. instance_count - 1] (scene_gpu's, which need not ascend); the
  * caller has set lower_world, cell_world (metres), resolution and voxels_along. The list is read before this
  * returns, and stays the caller's; store, scene and options must stay until the build is done or abandoned.
@@ -38,9 +33,5 @@ enum tracer_progress abuffer_build_piece(struct abuffer_builder *builder, uint64
 /* Leaves an empty store where one has begun; room for lists stays. */
 void abuffer_build_abandon(struct abuffer_builder *builder);
 bool abuffer_build_is_on(const struct abuffer_builder *builder);
-/* All of it at once. */
-bool abuffer_build(struct abuffer_builder *builder, struct abuffer_store *store, struct scene_gpu *scene,
-                   const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
-                   struct error *error);
 
 #endif

@@ -77,11 +77,10 @@ static bool reserve_nodes(struct abuffer_task *task, uint64_t nodes, struct erro
 bool abuffer_lists_reserve(struct abuffer_task *task, struct error *error)
 {
     struct abuffer_builder *builder = task->builder;
-    uint64_t allowed = nodes_allowed(task), wanted = builder->nodes_first;
+    uint64_t allowed = nodes_allowed(task), wanted = task->texel_count / TEXELS_A_NODE;
     if (builder->nodes_max > 0 && builder->nodes_max <= allowed)
         return true;
-    if (wanted == 0)
-        wanted = task->texel_count / TEXELS_A_NODE > NODES_MIN ? task->texel_count / TEXELS_A_NODE : NODES_MIN;
+    wanted = wanted > NODES_MIN ? wanted : NODES_MIN;
     wanted = wanted < allowed ? wanted : allowed;
     return reserve_nodes(task, wanted > 0 ? wanted : 1, error);
 }

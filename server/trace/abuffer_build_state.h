@@ -48,9 +48,8 @@ struct abuffer_builder {
     struct axes_draw draw;
     struct gpu_buffer heads, nodes, occupied, longer, deep, build; /* shared/abuffer_build.h */
     uint32_t nodes_max;                                            /* for which there is room in `nodes` */
-    uint32_t nodes_first;                /* so many at first; 0: chosen from the number of texels */
-    uint32_t passes;                     /* over the scene, of the last build */
-    uint32_t unit_items[ABUFFER_STAGES]; /* that are done together; 0: not known yet */
+    uint32_t passes;                                               /* over the scene, of the last build */
+    uint32_t unit_items[ABUFFER_STAGES];                           /* that are done together; 0: not known yet */
     struct abuffer_task task;
 };
 

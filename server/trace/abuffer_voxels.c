@@ -39,13 +39,3 @@ bool abuffer_voxels_pass(struct abuffer_store *store, unsigned pass, uint32_t fi
     gpu_dispatch(store->device, program, end - first);
     return true;
 }
-
-bool abuffer_voxels_build(struct abuffer_store *store, struct error *error)
-{
-    if (store->resolution == 0)
-        return true;
-    bool built = abuffer_voxels_reserve(store, error);
-    for (unsigned pass = 0; built && pass < ABUFFER_VOXEL_PASSES; pass++)
-        built = abuffer_voxels_pass(store, pass, 0, abuffer_voxel_blocks(store), error);
-    return built;
-}

@@ -19,7 +19,5 @@ bool abuffer_voxels_reserve(struct abuffer_store *store, struct error *error);
 /* Blocks first .. end - 1 of a pass, before which all blocks of the passes before it are done. */
 bool abuffer_voxels_pass(struct abuffer_store *store, unsigned pass, uint32_t first, uint32_t end,
                          struct error *error);
-/* All of it at once; nothing of an empty store. */
-bool abuffer_voxels_build(struct abuffer_store *store, struct error *error);
 
 #endif

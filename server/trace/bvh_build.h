@@ -154,8 +154,6 @@ bool bvh_jobs_wait(struct bvh_run *run, uint64_t until_ns);
 /* Waits for the end; *end_ns is when it came. False: one failed; its error is in *error. */
 bool bvh_jobs_finish(struct bvh_run *run, uint64_t *end_ns, struct error *error);
 void bvh_jobs_stop(struct bvh_run *run); /* accepts NULL */
-/* From beginning to end. */
-bool bvh_jobs_run(struct bvh_job *jobs, uint32_t count, const struct bvh_settings *settings, struct error *error);
 
 /* ---- the pieces, for the top tree ---- */
 

@@ -143,11 +143,3 @@ void bvh_jobs_stop(struct bvh_run *run)
     atomic_store(&run->stop, true);
     destroy(run);
 }
-
-bool bvh_jobs_run(struct bvh_job *jobs, uint32_t count, const struct bvh_settings *settings, struct error *error)
-{
-    uint64_t end_ns;
-    struct bvh_run *run = bvh_jobs_start(jobs, count, settings);
-    return run ? bvh_jobs_finish(run, &end_ns, error)
-               : error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the builder of %u trees", count);
-}

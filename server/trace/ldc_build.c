@@ -196,15 +196,3 @@ enum tracer_progress ldc_build_go_on(struct ldc_builder *builder, bool at_once, 
     gpu_pop_group(builder->device);
     return progress_of(task, good);
 }
-
-bool ldc_build(struct ldc_builder *builder, struct ldc_store *store, unsigned which, struct scene_gpu *scene,
-               const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
-               struct error *error)
-{
-    scene_gpu_bind(scene);
-    enum tracer_progress progress =
-        ldc_build_begin(builder, store, which, scene, instances, instance_count, options, error);
-    while (progress == TRACER_MORE)
-        progress = ldc_build_go_on(builder, true, error);
-    return progress == TRACER_DONE;
-}

@@ -34,9 +34,5 @@ enum tracer_progress ldc_build_begin(struct ldc_builder *builder, struct ldc_sto
  * to be done at once, or a pass over what it gave. Queues the work; some units wait for it. On failure the cube is
  * empty. */
 enum tracer_progress ldc_build_go_on(struct ldc_builder *builder, bool at_once, struct error *error);
-/* All of it at once, with the scene bound by the build itself. */
-bool ldc_build(struct ldc_builder *builder, struct ldc_store *store, unsigned which, struct scene_gpu *scene,
-               const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
-               struct error *error);
 
 #endif

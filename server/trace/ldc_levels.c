@@ -201,15 +201,3 @@ uint64_t ldc_levels_bytes(const struct ldc_levels *levels)
 {
     return (uint64_t)levels->cells.list.capacity_bytes + levels->cells.counter.capacity_bytes;
 }
-
-bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
-                      struct error *error)
-{
-    struct ldc_levels levels;
-    enum tracer_progress progress = TRACER_MORE;
-    ldc_levels_begin(&levels, store, which, options);
-    while (progress == TRACER_MORE)
-        progress = ldc_levels_go_on(&levels, error);
-    ldc_levels_finish(&levels);
-    return progress == TRACER_DONE;
-}

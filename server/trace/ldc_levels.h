@@ -60,8 +60,5 @@ void ldc_levels_begin(struct ldc_levels *levels, struct ldc_store *store, unsign
 enum tracer_progress ldc_levels_go_on(struct ldc_levels *levels, struct error *error);
 void ldc_levels_finish(struct ldc_levels *levels);          /* lets go of it, done or not */
 uint64_t ldc_levels_bytes(const struct ldc_levels *levels); /* of the device, besides the store */
-/* All of it at once. */
-bool ldc_levels_build(struct ldc_store *store, unsigned which, const struct tracer_options *options,
-                      struct error *error);
 
 #endif

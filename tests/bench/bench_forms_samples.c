@@ -42,9 +42,13 @@ static bool build(struct bench_forms *bench, const struct bench_form *form, stru
     place(&sampled->store.cubes[TRACER_CUBE_STATIC], gpu, form->options.ldc_resolution);
     glFinish();
     const uint64_t start_ns = clock_now_ns();
-    const bool built = ldc_build(sampled->builder, &sampled->store, TRACER_CUBE_STATIC, gpu, instances,
-                                 gpu->instance_count, &form->options, error);
+    scene_gpu_bind(gpu);
+    enum tracer_progress progress = ldc_build_begin(sampled->builder, &sampled->store, TRACER_CUBE_STATIC, gpu,
+                                                    instances, gpu->instance_count, &form->options, error);
+    while (progress == TRACER_MORE)
+        progress = ldc_build_go_on(sampled->builder, true, error);
     glFinish();
+    const bool built = progress == TRACER_DONE;
     if (built && counts)
         bench_add(&sampled->runs, clock_now_ns() - start_ns);
     return built;

@@ -66,10 +66,12 @@ static inline void place(struct fixture *fixture, uint32_t resolution, uint32_t 
         store->lower_world[k] = fixture->gpu.lower_world[k] - 0.0005f * longest;
 }
 
+/* All of it at once. */
 static inline bool try_build(struct fixture *fixture, struct error *error)
 {
-    return abuffer_build(fixture->builder, &fixture->store, &fixture->gpu, fixture->instances,
-                         fixture->instance_count, &fixture->options, error);
+    return abuffer_build_begin(fixture->builder, &fixture->store, &fixture->gpu, fixture->instances,
+                               fixture->instance_count, &fixture->options, error) &&
+           abuffer_build_piece(fixture->builder, PIECE_WITHOUT_END, error) == TRACER_DONE;
 }
 
 static inline void build(struct fixture *fixture, uint32_t resolution, uint32_t voxels_along)

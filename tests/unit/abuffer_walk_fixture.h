@@ -47,9 +47,12 @@ static inline void fixture_init(struct fixture *fixture, struct scene *scene, ui
 
 static inline void fixture_build(struct fixture *fixture)
 {
+    struct abuffer_store *store = &fixture->store;
     struct error error = {0};
-    expect_ok(abuffer_upload(&fixture->samples, &fixture->store, 1, &error), &error);
-    expect_ok(abuffer_voxels_build(&fixture->store, &error), &error);
+    expect_ok(abuffer_upload(&fixture->samples, store, 1, &error), &error);
+    expect_ok(abuffer_voxels_reserve(store, &error), &error);
+    for (unsigned pass = 0; pass < ABUFFER_VOXEL_PASSES; pass++)
+        expect_ok(abuffer_voxels_pass(store, pass, 0, abuffer_voxel_blocks(store), &error), &error);
 }
 
 static inline void fixture_finish(struct fixture *fixture)

@@ -66,12 +66,22 @@ static inline void place(struct fixture *fixture, unsigned which, uint32_t resol
         cube->lower_world[k] = fixture->gpu.lower_world[k] - 0.0005f * longest;
 }
 
+/* All of it at once. */
+static inline bool try_build(struct fixture *fixture, unsigned which, const uint32_t *instances, uint32_t count,
+                             struct error *error)
+{
+    scene_gpu_bind(&fixture->gpu);
+    enum tracer_progress progress = ldc_build_begin(fixture->builder, &fixture->store, which, &fixture->gpu,
+                                                    instances, count, &fixture->options, error);
+    while (progress == TRACER_MORE)
+        progress = ldc_build_go_on(fixture->builder, true, error);
+    return progress == TRACER_DONE;
+}
+
 static inline void build(struct fixture *fixture, unsigned which, const uint32_t *instances, uint32_t count)
 {
     struct error error = {0};
-    expect_ok(ldc_build(fixture->builder, &fixture->store, which, &fixture->gpu, instances, count,
-                        &fixture->options, &error),
-              &error);
+    expect_ok(try_build(fixture, which, instances, count, &error), &error);
 }
 
 /* A cube, read back. */

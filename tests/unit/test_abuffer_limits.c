@@ -95,6 +95,16 @@ static void coincident_surfaces_keep_their_order(void **state)
 
 /* ---- room ---- */
 
+/* The next build has room for so many fragments, as if none had needed more so far. */
+static void start_with(struct fixture *fixture, uint32_t fragments)
+{
+    struct abuffer_builder *builder = fixture->builder;
+    struct error error = {0};
+    gpu_buffer_finish(device, &builder->nodes);
+    expect_ok(gpu_buffer_reserve(device, &builder->nodes, (size_t)fragments * ABUFFER_NODE_BYTES, &error), &error);
+    builder->nodes_max = fragments;
+}
+
 /* Nothing is lost where the lists did not fit at first, and what was drawn for nothing leaves no trace. */
 static void lists_that_do_not_fit_are_made_anew(void **state)
 {
@@ -105,20 +115,20 @@ static void lists_that_do_not_fit_are_made_anew(void **state)
         struct fixture fixture;
         struct contents roomy, grown, again;
         fixture_init(&fixture, scenes[i]());
-        abuffer_builder_start_with(fixture.builder, 1u << 20);
+        start_with(&fixture, 1u << 20);
         build_and_read(&fixture, &roomy, 3 * RESOLUTION);
-        assert_int_equal(abuffer_builder_passes(fixture.builder), 1);
+        assert_int_equal(fixture.builder->passes, 1);
         assert_in_range(roomy.store.sample_count, 1000, 1u << 20);
         for (uint32_t first = 1; first < roomy.store.sample_count; first = 7 * first + 1) {
-            abuffer_builder_start_with(fixture.builder, first);
+            start_with(&fixture, first);
             build_and_read(&fixture, &grown, 3 * RESOLUTION);
-            assert_int_equal(abuffer_builder_passes(fixture.builder), 2);
+            assert_int_equal(fixture.builder->passes, 2);
             expect_same(&roomy, &grown);
             contents_free(&grown);
         }
         /* Once there is room there stays room. */
         build_and_read(&fixture, &again, 3 * RESOLUTION);
-        assert_int_equal(abuffer_builder_passes(fixture.builder), 1);
+        assert_int_equal(fixture.builder->passes, 1);
         expect_same(&roomy, &again);
         contents_free(&roomy);
         contents_free(&again);
@@ -168,9 +178,9 @@ static void a_build_in_pieces_is_the_same(void **state)
         build_and_read(&fixture, &whole, 2 * RESOLUTION);
         for (size_t u = 0; u < sizeof(units) / sizeof(units[0]); u++) {
             uint32_t count = UINT32_MAX;
-            abuffer_builder_start_with(fixture.builder, u == 0 ? 1 << 20 : 100);
+            start_with(&fixture, u == 0 ? 1 << 20 : 100);
             assert_int_equal(build_in_units(&fixture, 2 * RESOLUTION, units[u], &count), TRACER_DONE);
-            assert_int_equal(abuffer_builder_passes(fixture.builder), u == 0 ? 1 : 2);
+            assert_int_equal(fixture.builder->passes, u == 0 ? 1 : 2);
             assert_in_range(count, ABUFFER_STAGES - 3, UINT32_MAX);
             contents_read(&pieces, &fixture.store);
             expect_consistent(&pieces);
@@ -233,11 +243,11 @@ static void a_build_that_is_left_leaves_nothing(void **state)
     uint32_t count = UINT32_MAX;
     fixture_init(&fixture, scene_of_bodies_and_others());
     build_and_read(&fixture, &whole, 2 * RESOLUTION);
-    abuffer_builder_start_with(fixture.builder, 100);
+    start_with(&fixture, 100);
     build_in_units(&fixture, 2 * RESOLUTION, 3001, &count);
     for (uint32_t done = 0; done < count; done++) {
         uint32_t pieces = done;
-        abuffer_builder_start_with(fixture.builder, 100);
+        start_with(&fixture, 100);
         assert_int_equal(build_in_units(&fixture, 2 * RESOLUTION, 3001, &pieces), TRACER_MORE);
         assert_true(abuffer_build_is_on(fixture.builder));
         abuffer_build_abandon(fixture.builder);
@@ -278,7 +288,7 @@ static void more_than_is_allowed_is_refused_with_what_it_needs(void **state)
     uint32_t needed = (uint32_t)((bytes + (1 << 20) - 1) >> 20);
     assert_in_range(needed, 10, 100);
     fixture.options.abuffer_mebibytes_max = needed;
-    abuffer_builder_start_with(fixture.builder, 1000);
+    start_with(&fixture, 1000);
     build_and_read(&fixture, &some, 2 * RESOLUTION);
     expect_same(&all, &some);
     assert_in_range(some.store.sample_count * 28, 1, (uint64_t)needed << 20);

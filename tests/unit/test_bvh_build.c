@@ -614,6 +614,14 @@ static void a_shape_without_primitives_is_refused(void **state)
     assert_null(tree.elements);
 }
 
+static bool run_jobs(struct bvh_job *jobs, uint32_t count, struct error *error)
+{
+    uint64_t end_ns;
+    struct bvh_run *run = bvh_jobs_start(jobs, count, &packed);
+    assert_non_null(run);
+    return bvh_jobs_finish(run, &end_ns, error);
+}
+
 static void several_shapes_are_built_together(void **state)
 {
     (void)state;
@@ -623,7 +631,7 @@ static void several_shapes_are_built_together(void **state)
     struct error error = {0};
     for (size_t i = 0; i < COUNT(inputs); i++)
         jobs[i].shape = inputs[i].shape;
-    assert_true(bvh_jobs_run(jobs, COUNT(jobs), &packed, &error));
+    assert_true(run_jobs(jobs, COUNT(jobs), &error));
     for (size_t i = 0; i < COUNT(inputs); i++) {
         const struct view view = view_of(&jobs[i].tree, &packed);
         for (uint32_t octant = 0; octant < BVH_OCTANTS; octant++) {
@@ -634,7 +642,7 @@ static void several_shapes_are_built_together(void **state)
         input_finish(&inputs[i]);
     }
     jobs[0].shape.primitive_count = 0;
-    assert_false(bvh_jobs_run(jobs, 1, &packed, &error));
+    assert_false(run_jobs(jobs, 1, &error));
     assert_int_equal(error.kind, ERROR_LIMIT);
 }
 

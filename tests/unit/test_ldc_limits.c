@@ -128,8 +128,7 @@ static void memory_limits_the_layers(void **state)
     contents_free(&some);
     /* Not even one layer. */
     place(&fixture, TRACER_CUBE_STATIC, 512);
-    assert_false(ldc_build(fixture.builder, &fixture.store, TRACER_CUBE_STATIC, &fixture.gpu, fixture.instances,
-                           fixture.gpu.instance_count, &fixture.options, &error));
+    assert_false(try_build(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count, &error));
     assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
     assert_int_equal(fixture.store.cubes[TRACER_CUBE_STATIC].resolution, 0);
     assert_int_equal(fixture.store.cubes[TRACER_CUBE_STATIC].sample_count, 0);
@@ -171,8 +170,7 @@ static void images_that_a_device_cannot_read_are_refused(void **state)
     place(&fixture, TRACER_CUBE_DYNAMIC, RESOLUTION);
     build(&fixture, TRACER_CUBE_DYNAMIC, fixture.instances, 1);
     place(&fixture, TRACER_CUBE_DYNAMIC, RESOLUTION + 1);
-    assert_false(ldc_build(fixture.builder, &fixture.store, TRACER_CUBE_DYNAMIC, &fixture.gpu, fixture.instances,
-                           1, &fixture.options, &error));
+    assert_false(try_build(&fixture, TRACER_CUBE_DYNAMIC, fixture.instances, 1, &error));
     device->facts.texture_buffer_texels_max = texels_max;
     assert_int_equal(error.kind, ERROR_LIMIT);
     assert_string_equal(error.field, "options.ldc_resolution");

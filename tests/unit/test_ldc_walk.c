@@ -217,7 +217,6 @@ static void where_cells_do_not_fit_a_pyramid_is_walked(void **state)
 {
     (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
-    struct error error = {0};
     struct fixture fixture;
     fixture_init(&fixture, NULL);
     start_samples(&fixture.samples[TRACER_CUBE_STATIC], 40, 4, -2, -2, -2);
@@ -229,9 +228,9 @@ static void where_cells_do_not_fit_a_pyramid_is_walked(void **state)
     assert_false(fixture.store.no_cells);
     const uint64_t texels_max = device->facts.texture_buffer_texels_max;
     device->facts.texture_buffer_texels_max = 4ull * fixture.store.cubes[TRACER_CUBE_DYNAMIC].entry_count;
-    assert_true(ldc_levels_build(&fixture.store, TRACER_CUBE_STATIC, &forms[0].options, &error));
+    build_levels(&fixture, TRACER_CUBE_STATIC, &forms[0].options);
     assert_false(fixture.store.no_cells);
-    assert_true(ldc_levels_build(&fixture.store, TRACER_CUBE_DYNAMIC, &forms[0].options, &error));
+    build_levels(&fixture, TRACER_CUBE_DYNAMIC, &forms[0].options);
     assert_true(fixture.store.no_cells);
     expect_like_brute_force(&fixture, rays, RAY_COUNT, RAY_COUNT / 8);
     device->facts.texture_buffer_texels_max = texels_max;
