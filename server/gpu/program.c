@@ -244,11 +244,6 @@ void gpu_uniform_vec(const struct gpu_program *program, const char *name, unsign
     }
 }
 
-void gpu_uniform_rows(const struct gpu_program *program, const char *name, const float *rows, unsigned row_count)
-{
-    glProgramUniform4fv(program->name, glGetUniformLocation(program->name, name), (GLsizei)row_count, rows);
-}
-
 void gpu_dispatch(struct gpu_device *device, const struct gpu_program *program, uint64_t items)
 {
     if (items == 0)

@@ -39,8 +39,6 @@ void gpu_uniform_uint(const struct gpu_program *program, const char *name, uint3
 void gpu_uniform_int(const struct gpu_program *program, const char *name, int32_t value);
 void gpu_uniform_float(const struct gpu_program *program, const char *name, float value);
 void gpu_uniform_vec(const struct gpu_program *program, const char *name, unsigned components, const float *value);
-/* vec4 name[row_count] */
-void gpu_uniform_rows(const struct gpu_program *program, const char *name, const float *rows, unsigned row_count);
 
 /* Dispatches ceil(items / local size) groups on x, then glMemoryBarrier(GL_ALL_BARRIER_BITS). More than
  * facts.work_groups_max groups are spread over y; the shader finds its item with

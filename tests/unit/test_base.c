@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* base: errors, arena, map, stage times, blobs. */
+/* base: errors, map, stage times, blobs. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -7,7 +7,6 @@
 
 #include <cmocka.h>
 
-#include "base/arena.h"
 #include "base/blob.h"
 #include "base/error.h"
 #include "base/hashmap.h"
@@ -30,38 +29,6 @@ static void the_first_error_wins(void **state)
     assert_false(error_remedy(&error, "use %s", "8"));
     assert_string_equal(error.remedy, "use 8");
     assert_false(error_set(NULL, ERROR_INVALID, NULL, "nobody listens"));
-}
-
-static void an_arena_gives_zeroed_aligned_memory_up_to_its_limit(void **state)
-{
-    (void)state;
-    struct arena arena;
-    arena_init(&arena, 1000);
-    unsigned char *memory = arena_alloc(&arena, 9, 11);
-    assert_non_null(memory);
-    assert_int_equal((uintptr_t)memory % 16, 0);
-    for (int i = 0; i < 99; i++)
-        assert_int_equal(memory[i], 0);
-    memset(memory, 0xff, 99);
-    assert_null(arena_alloc(&arena, 1, 900));
-    assert_null(arena_alloc(&arena, SIZE_MAX / 2, 3));
-    assert_string_equal(arena_strdup(&arena, "name"), "name");
-    arena_reset(&arena);
-    memory = arena_alloc(&arena, 1, 1000 - 8);
-    assert_non_null(memory);
-    assert_int_equal(memory[0], 0);
-    arena_finish(&arena);
-}
-
-static void an_arena_grows_beyond_its_first_block(void **state)
-{
-    (void)state;
-    struct arena arena;
-    arena_init(&arena, 0);
-    for (int i = 0; i < 100; i++)
-        memset(arena_alloc(&arena, 1, 5000), i, 5000);
-    assert_non_null(arena_alloc(&arena, 1, 1 << 20));
-    arena_finish(&arena);
 }
 
 /* Against a plain array of flags, with keys that a client would choose and keys that collide. */
@@ -214,8 +181,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_first_error_wins),
-        cmocka_unit_test(an_arena_gives_zeroed_aligned_memory_up_to_its_limit),
-        cmocka_unit_test(an_arena_grows_beyond_its_first_block),
         cmocka_unit_test(a_map_keeps_what_was_put_and_forgets_what_was_removed),
         cmocka_unit_test(keys_chosen_to_collide_do_not_make_a_map_slow),
         cmocka_unit_test(a_map_is_walked_in_the_order_of_insertion),
