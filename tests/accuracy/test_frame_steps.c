@@ -313,10 +313,8 @@ static const struct way {
     unsigned tracer, ldc_build;
     bool has_pieces;
 } ways[] = {
-    {"bvh", TRACER_BVH, LDC_BUILD_AUTO, true},
-    {"reference", TRACER_REFERENCE, LDC_BUILD_AUTO, false},
-    {"ldc, lists", TRACER_LDC, LDC_BUILD_LISTS, true},
-    {"ldc, peeled", TRACER_LDC, LDC_BUILD_PEEL, true},
+    {"bvh", TRACER_BVH, LDC_BUILD_AUTO, true},         {"reference", TRACER_REFERENCE, LDC_BUILD_AUTO, false},
+    {"ldc, lists", TRACER_LDC, LDC_BUILD_LISTS, true}, {"ldc, peeled", TRACER_LDC, LDC_BUILD_PEEL, true},
     {"abuffer", TRACER_ABUFFER, LDC_BUILD_AUTO, true},
 };
 enum { WAYS = sizeof(ways) / sizeof(ways[0]) };
