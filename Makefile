@@ -294,8 +294,9 @@ BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libc
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb
 PLOT_PACKAGES := gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3
+FUZZ_PACKAGES := clang libclang-rt-14-dev
 
-.PHONY: tests build-packages test-packages plot-packages lint-packages test demo bench soak bench-plot check-headers lint format install uninstall clean help
+.PHONY: tests build-packages test-packages plot-packages lint-packages fuzz-packages test demo bench soak bench-plot check-headers lint format install uninstall clean help
 tests: $(UNIT_TESTS) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(BENCH_VIEW) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -306,6 +307,8 @@ plot-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(PLOT_PACKAGES)
 lint-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(LINT_PACKAGES)
+fuzz-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(FUZZ_PACKAGES)
 
 JOBS ?= $(shell nproc)
 # A second make, because packages that were just installed change what pkg-config says.
@@ -399,15 +402,16 @@ help:
 .SECONDARY:
 
 # ---- fuzz ----
-# make fuzz SECONDS=20: every fuzzer in turn, from valid inputs made of the table and from those that are kept. What they
-# find stays in build/fuzz/found; their corpus lives in build/fuzz/corpus and grows from run to run. make fuzz-keep takes
-# what of it reaches more than others into tests/fuzz/corpus, which the unit tests run.
+# make fuzz SECONDS=20: every fuzzer for so long, $(JOBS) at once, from valid inputs made of the table and from those that
+# are kept. What they find stays in build/fuzz/found; their corpus lives in build/fuzz/corpus and grows from run to run.
+# make fuzz-keep takes what of it reaches more than others into tests/fuzz/corpus, which the unit tests run.
 FUZZ_SECONDS ?= 20
 ifeq ($(origin SECONDS),command line)
 FUZZ_SECONDS := $(SECONDS)
 endif
 FUZZERS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 FUZZ_SEED := $(B)/tests/fuzz/seed
+FUZZ_DICTIONARY := $(B)/seed/protocol.dict
 KEPT_BYTES := 1600
 KEPT_BYTES_OF_ALL := 65536
 $(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(B)/server/base/blob.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
@@ -428,22 +432,24 @@ ifeq ($(config),fuzz)
 fuzz: $(addprefix run-fuzz-,$(FUZZERS))
 fuzz-keep: $(addprefix keep-fuzz-,$(FUZZERS))
 else
-fuzz fuzz-keep:
-	$(MAKE) config=fuzz $@
+fuzz fuzz-keep: fuzz-packages
+	$(MAKE) -j$(JOBS) config=fuzz $@
 endif
-$(addprefix run-fuzz-,$(FUZZERS)): run-fuzz-%: $(B)/tests/fuzz/fuzz_% $(FUZZ_SEED)
+# The dictionary, and with it the valid inputs.
+$(FUZZ_DICTIONARY): $(FUZZ_SEED)
+	$< $(@D)
+# The limit of an input's time is wall time: most take a millisecond, and other work must not look like a hang.
+$(addprefix run-fuzz-,$(FUZZERS)): run-fuzz-%: $(B)/tests/fuzz/fuzz_% $(FUZZ_DICTIONARY)
 	@mkdir -p $(B)/corpus/$* $(B)/found
-	$(FUZZ_SEED) $(B)/seed
-	$< -max_total_time=$(FUZZ_SECONDS) -max_len=8192 -timeout=5 -rss_limit_mb=1024 -use_value_profile=1 \
-		-print_final_stats=1 -dict=$(B)/seed/protocol.dict -artifact_prefix=$(B)/found/$*- $(B)/corpus/$* $(B)/seed/$* \
+	@$< -max_total_time=$(FUZZ_SECONDS) -max_len=8192 -timeout=20 -rss_limit_mb=1024 -use_value_profile=1 \
+		-print_final_stats=1 -dict=$(FUZZ_DICTIONARY) -artifact_prefix=$(B)/found/$*- $(B)/corpus/$* $(B)/seed/$* \
 		$(wildcard tests/fuzz/corpus/$*) $(FUZZ_FLAGS) \
 		>$(B)/found/$*.log 2>&1 || { tail -n 60 $(B)/found/$*.log; exit 1; }
-	@grep -E '^stat::(number|average|new)|DONE' $(B)/found/$*.log
+	@sed -n 's/.*DONE/$*: &/p' $(B)/found/$*.log
 # Small ones, and of each fuzzer no more than so much, as they come (their names are hashes), so that it stays small.
-$(addprefix keep-fuzz-,$(FUZZERS)): keep-fuzz-%: $(B)/tests/fuzz/fuzz_% $(FUZZ_SEED)
+$(addprefix keep-fuzz-,$(FUZZERS)): keep-fuzz-%: $(B)/tests/fuzz/fuzz_% $(FUZZ_DICTIONARY)
 	@mkdir -p $(B)/corpus/$* $(B)/kept/$* tests/fuzz/corpus/$*
 	@rm -f $(B)/kept/$*/*
-	$(FUZZ_SEED) $(B)/seed
 	$< -merge=1 -use_counters=0 -max_len=$(KEPT_BYTES) $(B)/kept/$* tests/fuzz/corpus/$* $(B)/seed/$* $(B)/corpus/$* >$(B)/found/$*-keep.log 2>&1
 	@rm -f tests/fuzz/corpus/$*/*
 	@bytes=0; for file in $(B)/kept/$*/*; do bytes=$$((bytes + $$(stat -c %s $$file))); \
