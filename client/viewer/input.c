@@ -21,7 +21,7 @@ const struct binding input_bindings[] = {
     {"Home, H", "home", ACTION_HOME, ACTION_HOME, "back to the first camera"},
     {NULL, "h", ACTION_HOME, ACTION_HOME, NULL},
     {"C, Shift+C", "c", ACTION_NEXT_CAMERA, ACTION_PREVIOUS_CAMERA,
-     "next, previous camera of the scene; clips move it"},
+     "next, previous camera of the scene"},
     {"V, Shift+V", "v", ACTION_NEXT_CLIP, ACTION_PREVIOUS_CLIP, "next, previous clip"},
     {"Space", "space", ACTION_PLAY, ACTION_PLAY, "play, pause"},
     {", .", ",", ACTION_SLOWER, ACTION_SLOWER, "slower, faster"},
