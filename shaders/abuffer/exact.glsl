@@ -76,19 +76,22 @@ ivec2 texel_beside(vec2 p, int k)
 // The next sample that may be of the same surface, of a triangle that is not seen yet; false: there is none.
 bool next_beside(inout samples_beside b, out int index, out uint id)
 {
-    bool is_new;
-    do {
+    bool is_new = false;
+    index = 0;
+    id = 0u;
+    // After the fourth there is none: who began a fifth would see the first again, and never come to an end.
+    while (!is_new && (b.columns < 4 || b.column.next < b.column.end)) {
         if (b.column.next >= b.column.end) {
             b.column = scan_of(column_at(b.axis, texel_beside(b.p.xy, b.columns)));
             b.columns++;
         }
         uvec2 words;
-        bool is_one = scan(b.column, b.p.z - BESIDE, index, words);
+        bool is_one = scan_singly(b.column, b.p.z - BESIDE, index, words);
         bool is_behind = is_one && depth_of(words) > b.p.z + BESIDE;
         b.column.next = is_behind ? b.column.end : b.column.next;
         id = texelFetch(abuffer_ids, index).x;
         is_new = is_one && !is_behind && id >= b.first_id && id < b.end_id && all(notEqual(uvec3(id), b.seen));
-    } while (!is_new && (b.columns < 4 || b.column.next < b.column.end));
+    }
     b.seen.yz = is_new ? uvec2(id, b.seen.y) : b.seen.yz;
     return is_new;
 }
