@@ -117,7 +117,7 @@ def models(bench, left_out):
 
 def measure_rates(bench, daemon, scenes, encodings):
     rows = []
-    size = ["--size", "64x64", "--seconds", "1"] if bench.tiny else ["--size", "1280x720", "--seconds", "8"]
+    size = ["--size", "64x64", "--seconds", "3"] if bench.tiny else ["--size", "1280x720", "--seconds", "8"]
     for title, model in scenes:
         for encoding in encodings:
             say(f"  {title}, {encoding}")
@@ -134,7 +134,7 @@ def measure_latency(bench, daemon, model, where, times, *options):
     runs, way = {"p50_ms": [], "p99_ms": [], "late_p99_ms": []}, []
     count = 0
     for _ in range(bench.times(3)):
-        told = watch(bench, daemon, model, *SMALL, "--seconds", 1 if bench.tiny else 20, *options)
+        told = watch(bench, daemon, model, *SMALL, "--seconds", 3 if bench.tiny else 20, *options)
         frames = frames_of(told)
         beyond = [beyond_stages_ms(frame, times) for frame in frames]
         runs["p50_ms"].append(percentile(beyond, 0.5))
@@ -151,13 +151,13 @@ def measure_processor(bench, daemon, model):
     say("  the daemon's own time")
     runs = []
     for _ in range(bench.times(3)):
-        told = watch(bench, daemon, model, *SMALL, "--seconds", 1 if bench.tiny else 10, "--looks", 0)
+        told = watch(bench, daemon, model, *SMALL, "--seconds", 3 if bench.tiny else 10, "--looks", 0)
         runs.append(told["threads_ns"].get("farlightd", 0) / 1e6 / len(frames_of(told)))
     return figure(runs)
 
 
 def measure_viewers(bench, daemon, model):
-    count, seconds = (4, 2) if bench.tiny else (64, 60)
+    count, seconds = (4, 5) if bench.tiny else (64, 60)
     say(f"  {count} viewers")
     served = [0] * count
     for frame in frames_of(watch(bench, daemon, model, *SMALL, "--viewers", count, "--seconds", seconds, "--looks", 30)):
@@ -190,7 +190,7 @@ def rendering_allows(frames):
 
 
 def measure_link(bench, model, kbit_per_s, encoding):
-    seconds = 2 if bench.tiny else bench.link_seconds
+    seconds = 5 if bench.tiny else bench.link_seconds
     say(f"  a link of {kbit_per_s / 1000:.0f} Mbit/s, {encoding}, {seconds} s")
     told, why = over_a_link(bench, model, kbit_per_s, seconds, encoding)
     if told is None:
