@@ -56,24 +56,27 @@ TEST_PKGS := cmocka
 pkg_cflags = $(shell $(PKG_CONFIG) --cflags $(1) 2>/dev/null)
 pkg_libs = $(shell $(PKG_CONFIG) --libs $(1) 2>/dev/null)
 
+# All files of a kind below a folder, at any depth: $(call sources,FOLDER,c h).
+sources = $(sort $(foreach ending,$(2),$(shell find $(1) -name '*.$(ending)')))
+
 # ---- sources ---------------------------------------------------------------------------------------
 # Sealed connections are for the daemon and the library alone: helper programs go without libsodium.
-SEALED_SRC := $(wildcard protocol/sealed*.c)
-PROTOCOL_SRC := $(filter-out protocol/docgen% $(SEALED_SRC),$(wildcard protocol/*.c))
-SERVER_SRC := $(filter-out server/main.c,$(wildcard server/*.c server/*/*.c))
+SEALED_SRC := $(call sources,protocol/sealed,c)
+DOCS_SRC := $(call sources,protocol/docs,c)
+PROTOCOL_SRC := $(filter-out $(DOCS_SRC) $(SEALED_SRC),$(call sources,protocol,c))
+SERVER_SRC := $(filter-out server/main.c,$(call sources,server,c))
 ifneq ($(EMBREE),1)
-SERVER_SRC := $(filter-out server/trace/reference%,$(SERVER_SRC))
+SERVER_SRC := $(filter-out server/trace/reference/%,$(SERVER_SRC))
 endif
-LIB_SRC := $(wildcard client/lib/*.c)
-CLI_SRC := $(wildcard client/cli/*.c)
-IMPORT_C := $(wildcard client/import/*.c)
-IMPORT_CXX := $(wildcard client/import/*.cpp)
-EXPORT_C := $(wildcard client/output/*.c)
-EXPORT_CXX := $(wildcard client/output/*.cpp)
-VIDEO_C := $(wildcard client/video/*.c)
-VIEWER_C := $(wildcard client/viewer/*.c)
-SHADERS := $(sort $(patsubst shaders/%,%,$(wildcard shaders/*/*.h shaders/*/*.glsl shaders/*/*.comp shaders/*/*.vert \
-           shaders/*/*.geom shaders/*/*.frag shaders/*.comp)))
+LIB_SRC := $(call sources,client/lib,c)
+CLI_SRC := $(call sources,client/cli,c)
+IMPORT_C := $(call sources,client/import,c)
+IMPORT_CXX := $(call sources,client/import,cpp)
+EXPORT_C := $(call sources,client/output,c)
+EXPORT_CXX := $(call sources,client/output,cpp)
+VIDEO_C := $(call sources,client/video,c)
+VIEWER_C := $(call sources,client/viewer,c)
+SHADERS := $(patsubst shaders/%,%,$(call sources,shaders,h glsl comp vert geom frag))
 
 # V=1 shows the commands.
 ifeq ($(V),)
@@ -88,11 +91,11 @@ SEALED_OBJ := $(call obj,$(SEALED_SRC))
 SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ)
 LIB_OBJ := $(call obj,$(LIB_SRC)) $(SEALED_OBJ)
 CLI_OBJ := $(call obj,$(CLI_SRC))
-# Helper programs share the importer's sandbox and the protocol.
-IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX))
-EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/client/import/sandbox.o
-VIDEO_OBJ := $(call obj,$(VIDEO_C) $(addprefix client/output/,channel.c file.c incoming.c) \
-    $(addprefix client/lib/,rate.c ycbcr.c)) $(B)/client/import/sandbox.o
+# What the helper programs share is linked to each of them, as an archive: each takes what it needs.
+HELPER_OBJ := $(call obj,$(call sources,client/helper,c))
+IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX)) $(B)/helper.a
+EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/helper.a
+VIDEO_OBJ := $(call obj,$(VIDEO_C) $(addprefix client/lib/,rate.c ycbcr.c)) $(B)/helper.a
 
 # The viewer takes the command line as render does.
 VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interrupt.c job_complete.c job_light.c job_options.c \
@@ -157,7 +160,7 @@ $(B)/shader_sources.o: $(B)/shader_sources.c
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) -c $< -o $@
 
 # Programs that measure or test the rival of tests/bench/svo have its shaders too.
-RIVAL_SHADERS := $(sort $(patsubst tests/bench/%,%,$(wildcard $(addprefix tests/bench/svo/*.,h glsl comp frag))))
+RIVAL_SHADERS := $(patsubst tests/bench/%,%,$(call sources,tests/bench/svo,h glsl comp frag))
 $(B)/tests/bench/shader_sources.c: shaders/embed.sh $(addprefix shaders/,$(SHADERS)) $(addprefix tests/bench/,$(RIVAL_SHADERS)) Makefile
 	@mkdir -p $(@D)
 	shaders/embed.sh $(CURDIR)/shaders $(SHADERS) -- $(CURDIR)/tests/bench $(RIVAL_SHADERS) >$@.new && mv $@.new $@
@@ -177,6 +180,8 @@ $(B)/farlightd: $(B)/server/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(SERVER_LIBS) -o $@
 $(B)/farlight: $(CLI_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(CLIENT_LIBS) -o $@
+$(B)/helper.a: $(HELPER_OBJ)
+	$(call say,AR)rm -f $@ && $(AR) rcs $@ $^
 $(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) -o $@
 $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ)
@@ -185,9 +190,9 @@ $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
 $(B)/farlight-view: $(VIEWER_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIEWER_LIBS) -o $@
-$(B)/protocol-docgen: $(call obj,$(wildcard protocol/docgen*.c)) $(PROTOCOL_OBJ) $(SEALED_OBJ)
+$(B)/protocol-docgen: $(call obj,$(DOCS_SRC)) $(PROTOCOL_OBJ) $(SEALED_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libxxhash) -o $@
-$(B)/protocol.md: $(B)/protocol-docgen protocol/guide.md
+$(B)/protocol.md: $(B)/protocol-docgen protocol/docs/guide.md
 	$^ >$@.new && mv $@.new $@
 
 # ---- tests -----------------------------------------------------------------------------------------
@@ -335,8 +340,7 @@ bench-plot: plot-packages
 
 check-headers:
 	@tests/tools/check_headers.sh $(CC) -I. -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS)
-FORMATTED = $(wildcard server/*.[ch] server/*/*.[ch] shaders/shared/*.h protocol/*.[ch] client/*/*.[ch] client/*/*.hpp \
-    client/*/*.cpp tests/*/*.[ch])
+FORMATTED = $(call sources,server protocol client tests shaders,c h hpp cpp)
 format:
 	clang-format -i $(FORMATTED)
 lint: lint-packages

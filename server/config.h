@@ -6,7 +6,7 @@
 #define FARLIGHT_CONFIG_H
 
 #include "base/error.h"
-#include "job/engine.h"
+#include "engine/engine.h"
 #include "session/hub.h"
 
 #include <stdbool.h>

@@ -7,7 +7,7 @@
 #include "base/timeline.h"
 #include "config.h"
 #include "gpu/device.h"
-#include "job/engine.h"
+#include "engine/engine.h"
 #include "session/daemon.h"
 
 #include <argp.h>

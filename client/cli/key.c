@@ -2,7 +2,7 @@
 /* Keys of sealed connections. */
 #include "cli/cli.h"
 
-#include "protocol/sealed_key.h"
+#include "protocol/sealed/key.h"
 
 #include <errno.h>
 #include <stdlib.h>

@@ -5,7 +5,7 @@
 #include "files.h"
 #include "formats.h"
 #include "import.h"
-#include "sandbox.h"
+#include "helper/sandbox.h"
 #include "send.h"
 
 #include <argp.h>

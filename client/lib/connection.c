@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/connection.h"
 
-#include "protocol/sealed_key.h"
+#include "protocol/sealed/key.h"
 
 #include <stdio.h>
 #include <stdlib.h>

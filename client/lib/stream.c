@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/stream.h"
 
-#include "protocol/sealed_link.h"
+#include "protocol/sealed/link.h"
 
 #include <errno.h>
 #include <fcntl.h>

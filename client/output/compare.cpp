@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "compare.h"
-#include "file.h"
+#include "helper/file.h"
 #include "heat_map.hpp"
 #include "image.h"
 #include "picture.hpp"

@@ -2,9 +2,9 @@
 /* farlight-export: takes pictures over a socket that the program that started it has connected already, and
  * writes image files; compares image files. A program of its own so that nothing else links OpenImageIO; it may
  * write beneath one folder, read the files that it was started with, and open nothing else. */
-#include "file.h"
+#include "helper/file.h"
 #include "image.h"
-#include "import/sandbox.h"
+#include "helper/sandbox.h"
 #include "serve.h"
 
 #include <argp.h>

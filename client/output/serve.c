@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* The stream of requests: pictures to be written, files to be compared. */
 #include "serve.h"
-#include "channel.h"
-#include "file.h"
+#include "helper/channel.h"
+#include "helper/file.h"
 #include "image.h"
-#include "incoming.h"
+#include "helper/incoming.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -3,8 +3,8 @@
  * videos. A program of its own so that nothing else links libavcodec; it may write beneath one folder and open
  * nothing else. */
 #include "encode.h"
-#include "import/sandbox.h"
-#include "output/file.h"
+#include "helper/sandbox.h"
+#include "helper/file.h"
 #include "serve.h"
 
 #include <argp.h>

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "serve.h"
 #include "encode.h"
-#include "output/channel.h"
-#include "output/file.h"
-#include "output/incoming.h"
+#include "helper/channel.h"
+#include "helper/file.h"
+#include "helper/incoming.h"
 
 #include <stdio.h>
 #include <sys/stat.h>

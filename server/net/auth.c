@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "net/auth.h"
 
-#include "protocol/sealed_key.h"
+#include "protocol/sealed/key.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "net/address.h"
-#include "protocol/sealed.h"
+#include "protocol/sealed/sealed.h"
 
 #include <stdbool.h>
 #include <stddef.h>

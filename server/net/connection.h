@@ -11,7 +11,7 @@
 #include "net/out_queue.h"
 #include "protocol/framing.h"
 #include "protocol/handshake.h"
-#include "protocol/sealed_link.h"
+#include "protocol/sealed/link.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -97,7 +97,7 @@ static float distance_along_view(const struct frame_camera *camera, const float 
 }
 
 /* Farther along the view than anything in the scene. */
-static float far_distance(const struct frame_camera *camera, const struct scene_gpu *scene, float near)
+static float far_distance(const struct frame_camera *camera, const struct gpu_scene *scene, float near)
 {
     float far = near + 1.0f;
     for (int corner = 0; corner < 8 && scene->instance_count > 0; corner++) {
@@ -114,7 +114,7 @@ static float far_distance(const struct frame_camera *camera, const struct scene_
 }
 
 /* Of the middle of the scene; where that is not in front of the camera, of half the scene's size. */
-static float focus_distance(const struct frame_camera *camera, const struct scene_gpu *scene)
+static float focus_distance(const struct frame_camera *camera, const struct gpu_scene *scene)
 {
     float middle[3];
     for (int i = 0; i < 3; i++)
@@ -126,7 +126,7 @@ static float focus_distance(const struct frame_camera *camera, const struct scen
 }
 
 void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_request *request,
-                          const struct scene_gpu *scene)
+                          const struct gpu_scene *scene)
 {
     const struct frame_camera *camera = &request->camera;
     bool orthographic = camera->fov_y == 0.0f;

@@ -5,11 +5,11 @@
 
 #include "render/frame.h"
 #include "shared/frame.h"
-#include "trace/scene_gpu.h"
+#include "gpu_scene/scene.h"
 
 /* Fills the camera's and the lens's part of the uniforms; a near, far or focal distance that the request leaves
  * open comes from the scene. */
 void camera_fill_uniforms(struct frame_uniforms *uniforms, const struct frame_request *request,
-                          const struct scene_gpu *scene);
+                          const struct gpu_scene *scene);
 
 #endif

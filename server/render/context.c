@@ -88,7 +88,7 @@ const struct gpu_program *context_use(struct render_context *context, const char
 
 void context_bind(struct render_context *context)
 {
-    scene_gpu_bind(context->scene);
+    gpu_scene_bind(context->scene);
     gpu_buffer_bind_uniform(&context->uniform_buffer, UNIFORM_FRAME);
 }
 

@@ -11,9 +11,9 @@
 #include "render/features.h"
 #include "render/frame.h"
 #include "shared/frame.h"
-#include "trace/scene_gpu.h"
+#include "gpu_scene/scene.h"
 #include "trace/tracer.h"
-#include "trace/wave_compare.h"
+#include "render/compare/rays.h"
 
 /* Some pixels: slots of shared/frame.h's order, all in one band. Of each as many samples as are in hand together,
  * uniforms.sample_shift. */
@@ -25,7 +25,7 @@ struct slice {
 
 struct render_context {
     struct gpu_device *device;
-    struct scene_gpu *scene; /* shared with other frames, as are the next three */
+    struct gpu_scene *scene; /* shared with other frames, as are the next three */
     struct environment *environment;
     struct environment_choice *environment_choice; /* which the integrator path keeps up */
     struct tracer *tracer;

@@ -134,7 +134,7 @@ static bool make_default_light(struct environment *environment, struct gpu_devic
 }
 
 bool environment_update(struct environment *environment, struct gpu_device *device, const struct scene *scene,
-                        const struct scene_gpu *gpu, struct error *error)
+                        const struct gpu_scene *gpu, struct error *error)
 {
     static const float white[3] = {1.0f, 1.0f, 1.0f};
     const struct scene_environment *given = &scene->environment;
@@ -167,7 +167,7 @@ bool environment_update(struct environment *environment, struct gpu_device *devi
 }
 
 void environment_fill_uniforms(const struct environment *environment, struct frame_uniforms *uniforms,
-                               const struct scene_gpu *gpu)
+                               const struct gpu_scene *gpu)
 {
     memcpy(uniforms->environment_colour, gpu->environment_colour, sizeof(gpu->environment_colour));
     uniforms->environment_colour[3] = gpu->environment_rotation;
@@ -177,7 +177,7 @@ void environment_fill_uniforms(const struct environment *environment, struct fra
     uniforms->light_count = environment->default_light ? 1 : gpu->light_count;
 }
 
-struct gpu_buffer *environment_lights(struct environment *environment, struct scene_gpu *gpu)
+struct gpu_buffer *environment_lights(struct environment *environment, struct gpu_scene *gpu)
 {
     return environment->default_light ? &environment->default_lights : &gpu->lights;
 }

@@ -10,7 +10,7 @@
 #include "gpu/buffer.h"
 #include "shared/frame.h"
 #include "shared/light.h"
-#include "trace/scene_gpu.h"
+#include "gpu_scene/scene.h"
 
 struct environment {
     bool known;             /* the rest is of `revision` */
@@ -24,11 +24,11 @@ struct environment {
 /* Of an image's texel; infinity is the greatest number that a half holds, and what is not a number is 0. */
 float environment_float_from_half(uint16_t half);
 bool environment_update(struct environment *environment, struct gpu_device *device, const struct scene *scene,
-                        const struct scene_gpu *gpu, struct error *error);
+                        const struct gpu_scene *gpu, struct error *error);
 void environment_fill_uniforms(const struct environment *environment, struct frame_uniforms *uniforms,
-                               const struct scene_gpu *gpu);
+                               const struct gpu_scene *gpu);
 /* Of the scene, or the default light where it has none. */
-struct gpu_buffer *environment_lights(struct environment *environment, struct scene_gpu *gpu);
+struct gpu_buffer *environment_lights(struct environment *environment, struct gpu_scene *gpu);
 void environment_finish(struct environment *environment, struct gpu_device *device);
 
 #endif

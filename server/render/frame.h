@@ -10,7 +10,7 @@
 #include "scene/pose.h"
 #include "scene/scene.h"
 #include "trace/tracer.h"
-#include "trace/wave_compare.h"
+#include "render/compare/rays.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -86,7 +86,7 @@ struct frame_request {
      * and the result has what came of it. The picture is that of `tracer`. */
     bool compare;
     unsigned compare_with;   /* protocol's number; with the same options */
-    float compare_far_share; /* 0: WAVE_FAR_SHARE, see trace/wave_compare.h */
+    float compare_far_share; /* 0: WAVE_FAR_SHARE, see render/compare/rays.h */
 };
 
 /* Of one sample, that is not to be added to, the place is the pixel's middle; several are spread by the filter.
@@ -140,7 +140,7 @@ struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *
 void frame_scene_destroy(struct frame_scene *shared); /* after its renderers; accepts NULL */
 uint64_t frame_scene_device_bytes(const struct frame_scene *shared);
 /* For tests: how long a step of bringing a tracer to the scene may take; 0: the least that it can be cut to. */
-void frame_scene_set_piece(struct frame_scene *shared, uint64_t piece_ns);
+void frame_scene_set_step(struct frame_scene *shared, uint64_t step_ns);
 
 /* What one who looks has: the waves and the picture of one frame at a time, and the samples of the last one. */
 struct frame_renderer;

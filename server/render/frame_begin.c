@@ -59,7 +59,7 @@ bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *
     size_t count = request->compare ? 2 : 1;
     if (is_alone(renderer) || refused.kind != ERROR_NONE)
         return true;
-    return scene_gpu_is_current(&renderer->shared->copy, scene, motion) &&
+    return gpu_scene_is_current(&renderer->shared->copy, scene, motion) &&
            tracer_set_are_free(&renderer->shared->tracers, impls, count, &request->tracer_options);
 }
 
@@ -78,7 +78,7 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     struct frame_scene *shared = renderer->shared;
     struct scene_changes changes = {0};
     uint64_t revision_before = shared->copy.revision;
-    bool updated = scene_gpu_update(&shared->copy, scene, motion, &changes, &context->times, error);
+    bool updated = gpu_scene_update(&shared->copy, scene, motion, &changes, &context->times, error);
     tracer_set_note(&shared->tracers, updated ? &changes : NULL);
     note_showing(shared, revision_before, &changes);
     if (!updated)
@@ -257,7 +257,7 @@ static enum tracer_progress bring(struct frame_renderer *renderer, const struct 
     spans->origin_ns = context->times.origin_ns;
     spans->count = 0;
     enum tracer_progress progress =
-        tracer_set_bring(&shared->tracers, tracer, &shared->copy, shared->piece_ns, spans, error);
+        tracer_set_bring(&shared->tracers, tracer, &shared->copy, shared->step_ns, spans, error);
     if (tracer == renderer->tracer)
         context_add_times(context, spans);
     else /* a structure that is no part of what the frame's own tracer cost */
@@ -301,7 +301,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     return update_scene(renderer, scene, motion, error) && take_tracers(renderer, error);
 }
 
-/* A first piece of each, which may look at the scene's motion. */
+/* A first step of each, which may look at the scene's motion. */
 static bool begin_tracers(struct frame_renderer *renderer, struct error *error)
 {
     renderer->built = false;

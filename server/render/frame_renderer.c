@@ -27,14 +27,14 @@ struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *
         return NULL;
     }
     shared->device = device;
-    shared->piece_ns = PIECE_NS;
-    scene_gpu_init(&shared->copy, device);
+    shared->step_ns = STEP_NS;
+    gpu_scene_init(&shared->copy, device);
     return shared;
 }
 
-void frame_scene_set_piece(struct frame_scene *shared, uint64_t piece_ns)
+void frame_scene_set_step(struct frame_scene *shared, uint64_t step_ns)
 {
-    shared->piece_ns = piece_ns;
+    shared->step_ns = step_ns;
 }
 
 void frame_scene_destroy(struct frame_scene *shared)
@@ -45,13 +45,13 @@ void frame_scene_destroy(struct frame_scene *shared)
     tracer_set_finish(&shared->tracers);
     environment_finish(&shared->environment, shared->device);
     environment_choice_finish(&shared->environment_choice, shared->device);
-    scene_gpu_finish(&shared->copy);
+    gpu_scene_finish(&shared->copy);
     free(shared);
 }
 
 uint64_t frame_scene_device_bytes(const struct frame_scene *shared)
 {
-    uint64_t sum = scene_gpu_device_bytes(&shared->copy) + tracer_set_device_bytes(&shared->tracers) +
+    uint64_t sum = gpu_scene_device_bytes(&shared->copy) + tracer_set_device_bytes(&shared->tracers) +
                    shared->environment_choice.table.capacity_bytes;
     for (const struct frame_work *work = shared->idle; work; work = work->next)
         sum += frame_work_device_bytes(work);

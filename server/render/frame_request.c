@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/frame_request.h"
 
-#include "render/integrator.h"
+#include "render/integrators/integrator.h"
 #include "render/picture.h"
 
 #include <math.h>

@@ -4,10 +4,10 @@
 #ifndef FARLIGHT_RENDER_FRAME_STATE_H
 #define FARLIGHT_RENDER_FRAME_STATE_H
 
-#include "render/comparison.h"
+#include "render/compare/waves.h"
 #include "render/context.h"
 #include "render/frame.h"
-#include "render/integrator.h"
+#include "render/integrators/integrator.h"
 #include "render/layers.h"
 #include "render/picture.h"
 #include "render/primary.h"
@@ -29,9 +29,9 @@ enum frame_phase {
 
 struct frame_scene {
     struct gpu_device *device;
-    struct scene_gpu copy;
+    struct gpu_scene copy;
     struct tracer_set tracers;
-    uint64_t piece_ns; /* of bringing them to the scene */
+    uint64_t step_ns; /* of bringing them to the scene */
     struct environment environment;
     struct environment_choice environment_choice;
     uint64_t showing;        /* counts up when the copy is of something else: a revision, poses */
@@ -85,7 +85,7 @@ struct frame_work *frame_work_take(struct frame_scene *shared, const struct inte
 void frame_work_give(struct frame_scene *shared, struct frame_work *work); /* accepts NULL */
 void frame_work_finish(struct frame_scene *shared);                        /* all that are idle */
 uint64_t frame_work_device_bytes(const struct frame_work *work);
-/* frame_begin.c. A piece of bringing the tracers to the scene; the last one leaves the frame ready for its first
+/* frame_begin.c. A step of bringing the tracers to the scene; the last one leaves the frame ready for its first
  * sample. */
 bool frame_build(struct frame_renderer *renderer, struct error *error);
 /* frame_begin.c. Lets go of what the frame in hand holds of what is shared. */

@@ -64,7 +64,7 @@ static const enum primitive_kind kind_of_sort[SORT_COUNT] = {PRIMITIVE_TRIANGLES
                                                              PRIMITIVE_DISCS, PRIMITIVE_SPHERES};
 
 /* Primitives of an instance (all discs count as one) that are of a sort. */
-static uint32_t primitives_of(const struct scene_gpu *scene, enum primitive_sort sort, uint32_t instance,
+static uint32_t primitives_of(const struct gpu_scene *scene, enum primitive_sort sort, uint32_t instance,
                               uint32_t *first)
 {
     *first = 0;
@@ -87,7 +87,7 @@ static bool has_cutout(const struct render_context *context, enum primitive_sort
 static bool draw_sort(struct primary *primary, struct render_context *context, uint32_t *budget,
                       struct error *error)
 {
-    const struct scene_gpu *scene = context->scene;
+    const struct gpu_scene *scene = context->scene;
     enum primitive_sort sort = (enum primitive_sort)primary->sort;
     enum primitive_kind kind = kind_of_sort[sort];
     uint32_t end = sort == SORT_DISCS ? 1 : scene->instance_count;

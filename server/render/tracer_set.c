@@ -113,12 +113,11 @@ struct tracer *tracer_set_take_again(struct tracer_set *set, struct tracer *trac
     return tracer;
 }
 
-enum tracer_progress tracer_set_bring(struct tracer_set *set, const struct tracer *tracer, struct scene_gpu *scene,
-                                      uint64_t piece_ns, struct stage_times *times, struct error *error)
+enum tracer_progress tracer_set_bring(struct tracer_set *set, const struct tracer *tracer, struct gpu_scene *scene,
+                                      uint64_t step_ns, struct stage_times *times, struct error *error)
 {
     struct tracer_slot *slot = slot_of(set, tracer);
-    enum tracer_progress progress =
-        tracer_update_piece(slot->tracer, scene, &slot->pending, piece_ns, times, error);
+    enum tracer_progress progress = tracer_update_step(slot->tracer, scene, &slot->pending, step_ns, times, error);
     if (progress == TRACER_DONE)
         slot->pending = (struct scene_changes){0};
     return progress;

@@ -5,7 +5,7 @@
 #ifndef FARLIGHT_RENDER_WAVE_PASSES_H
 #define FARLIGHT_RENDER_WAVE_PASSES_H
 
-#include "render/integrator.h"
+#include "render/integrators/integrator.h"
 
 struct wave_passes;
 

@@ -2,7 +2,7 @@
 #include "render/wave_trace.h"
 
 #include "base/clock.h"
-#include "render/comparison.h"
+#include "render/compare/waves.h"
 
 #include <epoxy/gl.h>
 

@@ -4,7 +4,7 @@
 #define FARLIGHT_RENDER_WAVE_TRACE_H
 
 #include "render/context.h"
-#include "trace/wave_compare.h"
+#include "render/compare/rays.h"
 
 /* Traces a wave with the frame's tracer, or as much of it as is a short step, and counts that in context->traced;
  * *done: it was the last part, and context->traced is 0 again for the next wave. What is in the wave stays as it

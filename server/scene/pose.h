@@ -95,7 +95,7 @@ bool scene_skin_matrices(const struct scene *scene, const struct scene_pose *pos
                          float *world_from_mesh, struct error *error);
 /* The vertices that a node shows, worked out on the CPU: 3 floats a vertex into `positions`, and into `normals`,
  * of unit length, where that is not NULL and the mesh has some. In world space with a skin, else in the node's.
- * The GPU's twin is shaders/deform.comp. */
+ * The GPU's twin is shaders/gpu_scene/deform.comp. */
 bool scene_deform(const struct scene *scene, const struct scene_pose *pose, const struct scene_node *node,
                   float *positions, float *normals, struct error *error);
 

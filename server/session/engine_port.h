@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_SESSION_ENGINE_PORT_H
 #define FARLIGHT_SESSION_ENGINE_PORT_H
 
-#include "job/engine.h"
+#include "engine/engine.h"
 
 struct engine_port {
     void *context;

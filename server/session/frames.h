@@ -4,7 +4,7 @@
 #ifndef FARLIGHT_SESSION_FRAMES_H
 #define FARLIGHT_SESSION_FRAMES_H
 
-#include "job/engine.h"
+#include "engine/engine.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_SESSION_JOB_TERMS_H
 #define FARLIGHT_SESSION_JOB_TERMS_H
 
-#include "job/engine.h"
+#include "engine/engine.h"
 #include "protocol/messages.h"
 
 #include <stdbool.h>

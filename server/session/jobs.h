@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_SESSION_JOBS_H
 #define FARLIGHT_SESSION_JOBS_H
 
-#include "job/engine.h"
+#include "engine/engine.h"
 #include "net/loop.h"
 #include "protocol/framing.h"
 #include "session/requests.h"

@@ -3,7 +3,7 @@
 #include "base/error.h"
 #include "base/stage_times.h"
 #include "encode/encoder.h"
-#include "job/engine.h"
+#include "engine/engine.h"
 #include "protocol/messages.h"
 #include "render/frame.h"
 #include "scene/scene.h"

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_SESSION_SCENES_H
 #define FARLIGHT_SESSION_SCENES_H
 
-#include "job/engine.h"
+#include "engine/engine.h"
 #include "protocol/framing.h"
 #include "session/requests.h"
 

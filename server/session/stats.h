@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_SESSION_STATS_H
 #define FARLIGHT_SESSION_STATS_H
 
-#include "job/engine.h"
+#include "engine/engine.h"
 #include "session/requests.h"
 
 void stats_answer(struct session *session, struct request *request, const struct engine_stats *stats);

@@ -9,7 +9,7 @@
 #ifndef FARLIGHT_SESSION_VIEWS_H
 #define FARLIGHT_SESSION_VIEWS_H
 
-#include "job/view_wishes.h"
+#include "engine/view_wishes.h"
 #include "protocol/messages.h"
 #include "session/jobs.h"
 #include "session/pacing.h"

@@ -52,7 +52,7 @@ const struct tracer_impl *tracer_find(unsigned number, const char *field, struct
     return NULL;
 }
 
-bool tracer_check_motion(const struct tracer_impl *impl, const struct scene_gpu *scene, struct error *error)
+bool tracer_check_motion(const struct tracer_impl *impl, const struct gpu_scene *scene, struct error *error)
 {
     if (!impl->still || !scene->has_motion)
         return true;
@@ -81,14 +81,14 @@ void tracer_destroy(struct tracer *tracer)
         tracer->impl->destroy(tracer);
 }
 
-enum tracer_progress tracer_update_piece(struct tracer *tracer, struct scene_gpu *scene,
-                                         const struct scene_changes *changes, uint64_t piece_ns,
-                                         struct stage_times *times, struct error *error)
+enum tracer_progress tracer_update_step(struct tracer *tracer, struct gpu_scene *scene,
+                                        const struct scene_changes *changes, uint64_t step_ns,
+                                        struct stage_times *times, struct error *error)
 {
     static const struct scene_changes everything = {
         .geometry = true, .deformed = true, .instances = true, .shading = true, .surfaces = true, .lights = true};
     gpu_push_group(tracer->device, tracer->impl->name);
-    tracer->piece_end_ns = piece_ns == PIECE_WITHOUT_END ? PIECE_WITHOUT_END : clock_now_ns() + piece_ns;
+    tracer->step_end_ns = step_ns == STEP_WITHOUT_END ? STEP_WITHOUT_END : clock_now_ns() + step_ns;
     enum tracer_progress progress =
         tracer->impl->update(tracer, scene, tracer->updated ? changes : &everything, times, error);
     bool good = progress != TRACER_FAILED && gpu_check(tracer->device, tracer->impl->name, error);
@@ -97,7 +97,7 @@ enum tracer_progress tracer_update_piece(struct tracer *tracer, struct scene_gpu
         tracer->impl->abandon(tracer);
     tracer->updating = good && progress == TRACER_MORE;
     /* After a failure nothing is known of the structure: the next update makes it anew. In the middle of an update
-     * that has begun with the structure of some revision, this is what the pieces go by. */
+     * that has begun with the structure of some revision, this is what the steps go by. */
     tracer->updated = good && (progress == TRACER_DONE || tracer->updated);
     return good ? progress : TRACER_FAILED;
 }
@@ -117,12 +117,12 @@ void tracer_update_abandon(struct tracer *tracer)
     tracer->updating = tracer->updated = false;
 }
 
-bool tracer_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
+bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct scene_changes *changes,
                    struct stage_times *times, struct error *error)
 {
     enum tracer_progress progress = TRACER_MORE;
     while (progress == TRACER_MORE)
-        progress = tracer_update_piece(tracer, scene, changes, PIECE_WITHOUT_END, times, error);
+        progress = tracer_update_step(tracer, scene, changes, STEP_WITHOUT_END, times, error);
     return progress == TRACER_DONE;
 }
 
@@ -137,7 +137,7 @@ static bool buffer_holds(const struct gpu_buffer *buffer, uint32_t count, size_t
     return buffer && buffer->size_bytes / item_bytes >= count;
 }
 
-bool tracer_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error)
+bool tracer_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error)
 {
     struct wave part = *wave;
     part.end_ray = wave->end_ray > 0 ? wave->end_ray : wave->ray_count;

@@ -6,8 +6,8 @@
 #include "base/error.h"
 #include "base/stage_times.h"
 #include "gpu/device.h"
-#include "trace/piece.h"
-#include "trace/scene_gpu.h"
+#include "trace/step.h"
+#include "gpu_scene/scene.h"
 #include "trace/wave.h"
 
 #include <stdbool.h>
@@ -90,9 +90,9 @@ struct tracer {
     struct tracer_options options;
     struct tracer_stats stats;
     /* by the wrappers: */
-    bool updated;          /* the structure is that of some revision */
-    bool updating;         /* an update has begun and has not come to its end */
-    uint64_t piece_end_ns; /* when its piece in hand is to end: for piece_is_over() */
+    bool updated;         /* the structure is that of some revision */
+    bool updating;        /* an update has begun and has not come to its end */
+    uint64_t step_end_ns; /* when its step in hand is to end: for step_is_over() */
 };
 
 struct tracer_impl {
@@ -104,23 +104,23 @@ struct tracer_impl {
     bool still;
     struct tracer *(*create)(struct gpu_device *device, const struct tracer_options *options, struct error *error);
     void (*destroy)(struct tracer *tracer);
-    /* Does a piece of bringing the structure to the scene, until about tracer->piece_end_ns; `changes` is what
+    /* Does a step of bringing the structure to the scene, until about tracer->step_end_ns; `changes` is what
      * changed since the last update of this tracer. Everything is marked changed on the first. After TRACER_MORE
      * it is called again with the same scene, which stays as it is, but for scene->motion, which only the first
-     * piece may look at. What it has found so far the tracer keeps in its own struct: buffers of others may be
-     * bound between two pieces. Reports what the piece took as STAGE_BUILD and STAGE_UPLOAD, and keeps the stats'
+     * step may look at. What it has found so far the tracer keeps in its own struct: buffers of others may be
+     * bound between two steps. Reports what the step took as STAGE_BUILD and STAGE_UPLOAD, and keeps the stats'
      * device_bytes true. */
-    enum tracer_progress (*update)(struct tracer *tracer, struct scene_gpu *scene,
+    enum tracer_progress (*update)(struct tracer *tracer, struct gpu_scene *scene,
                                    const struct scene_changes *changes, struct stage_times *times,
                                    struct error *error);
     /* Lets go of an update that is not done, and of all that was built; the next one is a first one. NULL: there
-     * is never more than one piece. */
+     * is never more than one step. */
     void (*abandon)(struct tracer *tracer);
-    /* Whether the next piece would only wait, for threads of the tracer's own. NULL: never. */
+    /* Whether the next step would only wait, for threads of the tracer's own. NULL: never. */
     bool (*waits)(struct tracer *tracer);
     /* Buffers of the scene are bound. Queues the work; does not wait, unless it is done on the CPU. Rays
      * wave->first_ray .. wave->end_ray - 1, of which there are some. */
-    bool (*trace)(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error);
+    bool (*trace)(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error);
 };
 
 extern const struct tracer_impl tracer_bvh_impl, tracer_naive_impl, tracer_reference_impl, tracer_ldc_impl,
@@ -132,28 +132,28 @@ const struct tracer_impl *tracer_impl_by_number(unsigned number);
 const struct tracer_impl *tracer_find(unsigned number, const char *field, struct error *error);
 
 /* Whether the tracer can show what moves while the shutter is open, if something does; else ERROR_UNSUPPORTED. */
-bool tracer_check_motion(const struct tracer_impl *impl, const struct scene_gpu *scene, struct error *error);
+bool tracer_check_motion(const struct tracer_impl *impl, const struct gpu_scene *scene, struct error *error);
 
 struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *device,
                              const struct tracer_options *options, struct error *error);
 void tracer_destroy(struct tracer *tracer); /* accepts NULL */
-/* An update is made of pieces of about `piece_ns` each (PIECE_NS), of which this does one. The scene and what its
+/* An update is made of steps of about `step_ns` each (STEP_NS), of which this does one. The scene and what its
  * arrays hold must not change until it is done or abandoned. The first update, and the first one after a failure
  * or one that was abandoned, takes everything to be changed. */
-enum tracer_progress tracer_update_piece(struct tracer *tracer, struct scene_gpu *scene,
-                                         const struct scene_changes *changes, uint64_t piece_ns,
-                                         struct stage_times *times, struct error *error);
-/* Whether the next piece would do nothing but wait. */
+enum tracer_progress tracer_update_step(struct tracer *tracer, struct gpu_scene *scene,
+                                        const struct scene_changes *changes, uint64_t step_ns,
+                                        struct stage_times *times, struct error *error);
+/* Whether the next step would do nothing but wait. */
 bool tracer_update_waits(struct tracer *tracer);
 /* Nothing happens where no update has begun. */
 void tracer_update_abandon(struct tracer *tracer);
 /* All of it at once. */
-bool tracer_update(struct tracer *tracer, struct scene_gpu *scene, const struct scene_changes *changes,
+bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct scene_changes *changes,
                    struct stage_times *times, struct error *error);
 /* So does the next one: it is not known what changed. */
 void tracer_outdate(struct tracer *tracer);
 /* Traces rays 0 .. wave->ray_count - 1 (at least 1 and at most what the buffers hold, which is checked), or the
  * part of them that the wave names. */
-bool tracer_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error);
+bool tracer_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error);
 
 #endif

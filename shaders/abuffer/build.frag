@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Links what falls on a texel into its list, and adds it to the voxels that it touches.
 // Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014, section 3.1.
-// Defines: those of common/axes_fragment.glsl; ALL_IMAGES, of axes/draw.geom, always.
+// Defines: those of raster/fragment.glsl; ALL_IMAGES, of raster/draw.geom, always.
 
-#include "shared/abuffer_build.h"
+#include "abuffer/layout.h"
 #include "shared/bindings.h"
-#include "common/axes_face.glsl"
-#include "common/axes_fragment.glsl"
+#include "raster/face.glsl"
+#include "raster/fragment.glsl"
 
 uniform uint nodes_max;         // that there is room for
 uniform uint voxels_along;      // a side of the grid

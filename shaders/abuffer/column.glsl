@@ -5,8 +5,8 @@
 //
 // Define: ABUFFER_COUNT_STEPS crossings are not samples but, for the benchmark, what the walk did: blocks of voxels looked
 // at in place of the distance, samples looked at in that of the primitive, texels in that of the instance.
-#include "shared/abuffer.h"
-#include "shared/axes.h"
+#include "abuffer/layout.h"
+#include "raster/layout.h"
 #include "shared/bindings.h"
 #include "common/cell_ray.glsl"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The list of a texel's nodes.
-#include "shared/abuffer_build.h"
+#include "abuffer/layout.h"
 #include "shared/bindings.h"
 
 layout(binding = UNIT_ABUFFER_HEADS) uniform usamplerBuffer heads;

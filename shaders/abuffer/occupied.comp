@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which texels have lists, in their order: what is beside each other in an image lies together in what is made of it.
 
-#include "shared/abuffer_build.h"
+#include "abuffer/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 

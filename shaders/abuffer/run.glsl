@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The samples of a texel while they are sorted: depth, id, bits of ABUFFER_NODE_*, in place of which a sample's own come
 // last.
-#include "shared/abuffer_build.h"
+#include "abuffer/layout.h"
 #include "shared/bindings.h"
 
 layout(binding = IMAGE_ABUFFER_SAMPLES, rg32ui) uniform uimageBuffer samples;

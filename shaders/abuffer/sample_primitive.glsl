@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // From a sample to the primitive that it is of, and to the place on that.
-#include "shared/abuffer.h"
-#include "shared/axes.h"
+#include "abuffer/layout.h"
+#include "raster/layout.h"
 #include "shared/bindings.h"
 #include "common/crossing.glsl"
 #include "common/alpha.glsl"

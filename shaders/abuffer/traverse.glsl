@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The walk through voxels and A-buffers (shared/abuffer.h). Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization.
+// The walk through voxels and A-buffers (abuffer/layout.h). Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization.
 // 2014.
 //
-// The host (trace/abuffer_trace.c) sets, besides the defines of trace.comp, those that the files included here name.
+// The host (trace/abuffer/trace.c) sets, besides the defines of trace.comp, those that the files included here name.
 //
 // Defines: ABUFFER_STEPS the search is by so many steps a subvoxel (abuffer/steps.glsl), else by 2D DDA
 // (abuffer/planes.glsl), and what it finds is held against triangles (abuffer/exact.glsl); ABUFFER_EMPTY there is nothing

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// From what was summed of each voxel's samples to what a ray has to know of it (shared/abuffer.h), and how far it is empty
+// From what was summed of each voxel's samples to what a ray has to know of it (abuffer/layout.h), and how far it is empty
 // around blocks that hold nothing. One invocation a block.
 //
 // Defines, one a pass, in this order: VOXELS_JUDGE; VOXELS_REACH_X, VOXELS_REACH_Y, VOXELS_REACH_Z.
-#include "shared/abuffer.h"
+#include "abuffer/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 

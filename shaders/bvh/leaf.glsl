@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A leaf's primitives against the rays that are walked together.
-#include "shared/bvh_node.h"
+#include "bvh/layout.h"
 #include "common/candidate.glsl"
 
 layout(binding = UNIT_TRACER_2) uniform usamplerBuffer bvh_primitives;

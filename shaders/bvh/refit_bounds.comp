@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Boxes of a tree whose triangles have moved, bottom-up: one dispatch for the leaves, which writes their triangles where the
-// walk reads them too, then one for each step above them (trace/bvh_build_refit.c). Order and links of the tree stay.
+// walk reads them too, then one for each step above them (trace/bvh/build_refit.c). Order and links of the tree stay.
 //
 // What is written is a storage buffer: measured on software GL, that takes 0.7 of the time of an image.
 //
 // Defines: REFIT_LEAVES for the leaves' pass, REFIT_CLOSE where their triangles move while the shutter is open.
-#include "shared/bvh_node.h"
+#include "bvh/layout.h"
 #include "common/dispatch.glsl"
 #include "shared/bindings.h"
 
@@ -53,7 +53,7 @@ void store(uvec4 record, box b)
 
 layout(binding = UNIT_TRACER_1) uniform usamplerBuffer corners; // vertices of the mesh and number of each triangle
 layout(binding = UNIT_POSITIONS) uniform samplerBuffer positions;
-layout(std430, binding = BIND_TRACER_0) writeonly buffer primitive_block { uvec4 primitives[]; }; // shared/bvh_node.h
+layout(std430, binding = BIND_TRACER_0) writeonly buffer primitive_block { uvec4 primitives[]; }; // bvh/layout.h
 uniform uint first_texel;  // of this tree's
 uniform uint close_texels; // from a triangle to itself as the shutter closes
 uniform uint first_vertex; // of the mesh in `positions`

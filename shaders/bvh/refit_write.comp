@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // From boxes (refit_bounds.comp) to elements as the walk reads them, in all octants' copies. The C twin is
-// bvh_write_element() in trace/bvh_build_element.c.
+// bvh_write_element() in trace/bvh/build_element.c.
 //
 // Defines: BVH_PACKED, BVH_SPHERES as in traverse.glsl, one of them or none.
-#include "shared/bvh_node.h"
+#include "bvh/layout.h"
 #include "common/dispatch.glsl"
 #include "shared/bindings.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Stackless traversal of a two-level bounding volume tree by baked links; layout and octants: shared/bvh_node.h.
+// Stackless traversal of a two-level bounding volume tree by baked links; layout and octants: bvh/layout.h.
 // 'Stackless traversal of a sphere BVH', sections 4 (links), 5 (rays together) and 6 (transform elements).
 //
-// The host (trace/bvh.c) sets, besides the defines of trace.comp:
+// The host (trace/bvh/tracer.c) sets, besides the defines of trace.comp:
 //   BVH_SPHERES  bounds are spheres, not boxes
 //   BVH_PACKED   boxes are on a grid
 //   BVH_PLAIN    the paper's form, for comparison: elements in a storage buffer, one order for all directions
@@ -26,7 +26,7 @@
 // invocations of a SIMD group first find their leaf, then all test primitives (the paper's PROCESSGEOMETRY):
 // software GL runs the code of both sides of a branch for the whole group, so leaf code in the inner loop would
 // be paid for at each element.
-#include "shared/bvh_node.h"
+#include "bvh/layout.h"
 #include "bvh/bounds.glsl"
 #include "bvh/leaf.glsl"
 #include "bvh/together.glsl"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The scene's geometry on the device: what scene_gpu_bind() binds. Layouts: shared/geometry.h.
+// The scene's geometry on the device: what gpu_scene_bind() binds. Layouts: shared/geometry.h.
 #include "shared/bindings.h"
 #include "shared/geometry.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A place on a surface as a sampled tracer stores it: the four words of `surface` in shared/ldc.h. They are written
+// A place on a surface as a sampled tracer stores it: the four words of shared/surface_sample.h. They are written
 // when a sample is taken, and read where it is shaded or where a shadow ray asks for alpha and tint. Shares are what
 // the material's own values are multiplied by.
-#include "shared/ldc.h"
+#include "shared/surface_sample.h"
 #include "common/colour.glsl"
 #include "common/math.glsl"
 
@@ -31,8 +31,8 @@ uvec4 pack_sample(surface_sample s)
     vec3 colour = srgb_from_linear(clamp(s.base_colour.rgb, vec3(0.0), vec3(1.0)));
     vec3 emission = sqrt(clamp(s.emission, vec3(0.0), vec3(1.0)));
     return uvec4(packUnorm4x8(vec4(colour, s.base_colour.a)), pack_unit(s.normal),
-                 (s.material & LDC_MATERIAL_MASK) | sample_bits(s.metallic, LDC_METALLIC_SHIFT, 4u) |
-                     sample_bits(s.transmission, LDC_TRANSMISSION_SHIFT, 4u),
+                 (s.material & SAMPLE_MATERIAL_MASK) | sample_bits(s.metallic, SAMPLE_METALLIC_SHIFT, 4u) |
+                     sample_bits(s.transmission, SAMPLE_TRANSMISSION_SHIFT, 4u),
                  sample_bits(s.roughness, 0u, 8u) | sample_bits(s.occlusion, 8u, 8u) |
                      sample_bits(emission.r, 16u, 5u) | sample_bits(emission.g, 21u, 6u) |
                      sample_bits(emission.b, 27u, 5u));
@@ -52,12 +52,12 @@ float sample_alpha(uvec4 words)
 
 uint sample_material(uvec4 words)
 {
-    return words.z & LDC_MATERIAL_MASK;
+    return words.z & SAMPLE_MATERIAL_MASK;
 }
 
 float sample_transmission(uvec4 words)
 {
-    return sample_share(words.z, int(LDC_TRANSMISSION_SHIFT), 4);
+    return sample_share(words.z, int(SAMPLE_TRANSMISSION_SHIFT), 4);
 }
 
 surface_sample unpack_sample(uvec4 words)
@@ -66,7 +66,7 @@ surface_sample unpack_sample(uvec4 words)
     s.base_colour = sample_base_colour(words);
     s.normal = unpack_unit(words.y);
     s.material = sample_material(words);
-    s.metallic = sample_share(words.z, int(LDC_METALLIC_SHIFT), 4);
+    s.metallic = sample_share(words.z, int(SAMPLE_METALLIC_SHIFT), 4);
     s.transmission = sample_transmission(words);
     s.roughness = sample_share(words.w, 0, 8);
     s.occlusion = sample_share(words.w, 8, 8);

@@ -2,14 +2,15 @@
 // Where a primitive lies under the middle of a texel. For the lists only its depth and its id are noted: of what it is
 // made is found out once for each sample that stays (sample.comp). Peeling writes the paper's two targets in each pass.
 // Defines:
-//   those of common/axes_fragment.glsl
+//   those of raster/fragment.glsl
 //   BUILD_PASS      0: each texel's fragments are noted; 1: they are counted only; 2: of those behind the layer
 //                   before, the nearest is kept (depth peeling)
 //   with BUILD_PASS 2 those of ldc/sample.glsl
 
+#include "ldc/layout.h"
 #include "shared/bindings.h"
-#include "common/axes_fragment.glsl"
-#include "common/axes_image.glsl"
+#include "raster/fragment.glsl"
+#include "raster/image.glsl"
 #include "ldc/sample.glsl"
 
 #if BUILD_PASS == 2

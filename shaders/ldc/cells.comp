@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which cells of a cube samples' planes pass, and which samples these are: nodes, blocks and entries of shared/ldc.h.
+// Which cells of a cube samples' planes pass, and which samples these are: nodes, blocks and entries of ldc/layout.h.
 //
 // Defines, one of them:
 //   CELLS_LIST     notes of each sample in which texel it is; an item is a texel of the images
@@ -11,6 +11,7 @@
 //   CELLS_FURTHER  writes those of cells that have one; an item is such an entry
 //   CELLS_SORT     puts the entries of such cells in order; an item is the same
 //   CELLS_REACH_X, CELLS_REACH_Y, CELLS_REACH_Z   how far it is empty; an item is a node
+#include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 #include "ldc/plane.glsl"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The walk through a cube's cells, all three images at once: from the first cell on the ray's way that a sample's plane
-// passes to the next, so that what is found first is, up to a cell, the nearest. How cells are found is in shared/ldc.h
+// passes to the next, so that what is found first is, up to a cell, the nearest. How cells are found is in ldc/layout.h
 // (LDC_NODE_*): a node of 16 x 16 x 16 cells knows how far it is empty around it, which of its 64 blocks of 4 x 4 x 4
 // hold something, and a block knows that of each cell.
 #include "ldc/found.glsl"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // How many texels have how many fragments; 255 stands for more too.
 
-#include "shared/ldc_build.h"
+#include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 

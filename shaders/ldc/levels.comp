@@ -4,6 +4,7 @@
 // wherever they count, not only the samples.
 //
 // Defines: LDC_FROM_TEXELS the level below is the texels; LDC_LEVEL_BITS.
+#include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 #include "ldc/plane.glsl"

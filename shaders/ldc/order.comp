@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Fragments that there was no slot for, which came in any order, to their texels' places.
 
-#include "shared/ldc_build.h"
+#include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 

@@ -3,7 +3,7 @@
 // more than may be kept. Writes texels and quads, and what sample.comp needs to know of each sample.
 // Define: PEELED  they are sorted already, each once, and samples already
 
-#include "shared/ldc.h"
+#include "ldc/layout.h"
 #include "common/dispatch.glsl"
 #include "ldc/run.glsl"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Notes a layer that was peeled off the scene with its texels, behind those before it.
 
-#include "shared/ldc.h"
+#include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which texels have fragments, how many those are in all, and where those lie that there are no slots for.
 
-#include "shared/ldc_build.h"
+#include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
 

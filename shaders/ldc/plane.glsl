@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The plane of a sample, and how far it goes.
-#include "shared/ldc.h"
+#include "ldc/layout.h"
 #include "common/math.glsl"
 
 // How far beyond its texel a sample's plane still counts, in cells: what neighbours' planes may leave open between

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A texel's fragments where they lie in `ordered`: those with slots, then those without. The host binds counts, places,
 // occupied and ordered, and sets the uniforms below.
-#include "shared/ldc_build.h"
+#include "ldc/layout.h"
 #include "shared/bindings.h"
 
 uniform uint occupied_count;

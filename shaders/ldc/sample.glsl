@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Of what the surface is made at a point of a primitive: the words of shared/ldc.h. Textures are applied over the size
+// Of what the surface is made at a point of a primitive: the words of ldc/layout.h. Textures are applied over the size
 // of a cell, as common/material.glsl applies them; what the material itself says is not.
 // Defines: those of common/material.glsl; HAS_COLOURS: some mesh has vertex colours.
 
-#include "shared/ldc.h"
-#include "shared/ldc_build.h"
-#include "common/axes_cube.glsl"
+#include "ldc/layout.h"
+#include "raster/cube.glsl"
 #include "common/material.glsl"
 #include "common/sampled.glsl"
 

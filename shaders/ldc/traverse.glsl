@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The walk through layered depth cubes (shared/ldc.h). Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary
+// The walk through layered depth cubes (ldc/layout.h). Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary
 // Effects. 2007.
 //
-// The host (trace/ldc_trace.c) sets, besides the defines of trace.comp, those that the files included here name.
+// The host (trace/ldc/trace.c) sets, besides the defines of trace.comp, those that the files included here name.
 //
 // RAYS_TOGETHER rays are one invocation's, one behind the other: fewer invocations, each with more to do. (Rays that go on
 // with the next as soon as they are done, each at its own, were slower still: what begins a ray was then run each round.)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One list of binding points, so that no two passes disagree. */
+/* Binding points that more than one room uses. What a tracer binds for itself is in its layout.h, in terms of the
+ * points that are reserved here for the tracer in use. */
 #ifndef FARLIGHT_SHARED_BINDINGS_H
 #define FARLIGHT_SHARED_BINDINGS_H
 
@@ -20,40 +21,12 @@
 #define BIND_PASS_2 13
 #define BIND_PASS_3 14
 #define BIND_PASS_4 15
-#define BIND_LDC_BUILD_COUNTS BIND_TRACER_0 /* struct ldc_build_counts */
-#define BIND_LDC_HISTOGRAM BIND_TRACER_1
-#define BIND_ABUFFER_BUILD_COUNTS BIND_TRACER_0 /* struct abuffer_build_counts */
 
 /* image units */
 #define IMAGE_HITS 0
 #define IMAGE_POSITIONS 0 /* deform.comp */
 #define IMAGE_NORMALS 1
 #define IMAGE_TANGENTS 2
-#define IMAGE_LDC_COUNTS 0 /* ldc/build.*, and the passes behind it: shared/ldc_build.h */
-#define IMAGE_LDC_ORDERED 1
-#define IMAGE_LDC_FRAGMENTS 2
-#define IMAGE_LDC_PLACES 2
-#define IMAGE_LDC_OCCUPIED 3
-#define IMAGE_LDC_FOUND 2
-#define IMAGE_LDC_TEXELS 2
-#define IMAGE_LDC_QUADS 3
-#define IMAGE_LDC_VISIBLE 4
-#define IMAGE_LDC_PEELED_SURFACE 3
-#define IMAGE_LDC_GEOMETRY 0
-#define IMAGE_LDC_SURFACE 5
-#define IMAGE_LDC_NODES 0 /* ldc/levels.comp, ldc/cells.comp */
-#define IMAGE_LDC_ENTRIES 1
-#define IMAGE_ABUFFER_HEADS 0 /* abuffer/build.frag, and the passes behind it: shared/abuffer_build.h */
-#define IMAGE_ABUFFER_NODES 1
-#define IMAGE_ABUFFER_SUMS 2
-#define IMAGE_ABUFFER_SUBVOXELS 3
-#define IMAGE_ABUFFER_OCCUPIED 0
-#define IMAGE_ABUFFER_TEXELS 0
-#define IMAGE_ABUFFER_SAMPLES 1
-#define IMAGE_ABUFFER_IDS 2
-#define IMAGE_ABUFFER_DEEP 3
-#define IMAGE_ABUFFER_LONGER 4
-#define IMAGE_ABUFFER_VOXELS 0 /* abuffer/voxels.comp */
 
 /* texture units */
 #define UNIT_TRIANGLES 0
@@ -89,21 +62,6 @@
 #define UNIT_SHADE_LIGHTS UNIT_TRACER_2
 #define UNIT_SHADE_ENVIRONMENT UNIT_TRACER_3 /* choice among its directions: common/environment_choice.glsl */
 #define UNIT_MOVE_CHILDREN UNIT_TRACER_0
-#define UNIT_LDC_COUNTS UNIT_TRACER_0
-#define UNIT_LDC_PLACES UNIT_TRACER_1
-#define UNIT_LDC_FRAGMENTS UNIT_TRACER_2 /* in passes of lists, .. */
-#define UNIT_LDC_FOUND UNIT_TRACER_2     /* .. of peeling */
-#define UNIT_LDC_VISIBLE UNIT_TRACER_3
-#define UNIT_LDC_DRAWN UNIT_TRACER_4
-#define UNIT_LDC_LAYER UNIT_TRACER_5
-#define UNIT_LDC_OCCUPIED UNIT_TRACER_6
-#define UNIT_LDC_LAYER_SURFACE UNIT_TRACER_0 /* of peeling too */
-#define UNIT_LDC_PEELED_SURFACE UNIT_TRACER_3
-#define UNIT_ABUFFER_HEADS UNIT_TRACER_0 /* while they are built */
-#define UNIT_ABUFFER_NODES UNIT_TRACER_1
-#define UNIT_ABUFFER_OCCUPIED UNIT_TRACER_2
-#define UNIT_ABUFFER_TEXELS UNIT_TRACER_3
-#define UNIT_ABUFFER_LONGER UNIT_TRACER_4
 #define UNIT_PASS_0 16
 #define UNIT_PASS_1 17
 #define UNIT_RAYS 18

@@ -23,8 +23,9 @@ SHARED_SIZE(hit, 48)
 #define HIT_MATERIAL_MASK 0x00ffffffu
 #define HIT_BACK_FACE 0x01000000u /* the ray came from inside */
 #define HIT_HAS_TANGENT 0x02000000u
-/* A stored sample: u0, v0, u1, v1 hold the bits of its four words of `surface` (shared/ldc.h) in place of texture
- * coordinates; textures are applied already. `primitive` and `instance` are HIT_NO_PRIMITIVE, `colour` is white.
+/* A stored sample: u0, v0, u1, v1 hold the bits of its four words of `surface` (shared/surface_sample.h) in place
+ * of texture coordinates; textures are applied already. `primitive` and `instance` are HIT_NO_PRIMITIVE, `colour`
+ * is white.
  */
 #define HIT_SAMPLED 0x04000000u
 #define HIT_NO_PRIMITIVE 0xffffffffu

@@ -52,16 +52,16 @@ struct extent {
 
 static inline struct extent scene_extent(struct fixture *fixture)
 {
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct scene_changes changes;
     struct error error = {0};
     struct extent extent;
-    scene_gpu_init(&gpu, fixture->device);
-    assert_true(scene_gpu_update(&gpu, fixture->scene, NULL, &changes, NULL, &error));
+    gpu_scene_init(&gpu, fixture->device);
+    assert_true(gpu_scene_update(&gpu, fixture->scene, NULL, &changes, NULL, &error));
     memcpy(extent.lower_world, gpu.lower_world, sizeof(extent.lower_world));
     memcpy(extent.upper_world, gpu.upper_world, sizeof(extent.upper_world));
     extent.diagonal = gpu.diagonal;
-    scene_gpu_finish(&gpu);
+    gpu_scene_finish(&gpu);
     return extent;
 }
 

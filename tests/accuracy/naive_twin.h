@@ -89,7 +89,7 @@ static inline void twin_init_shapes(struct twin *twin, const struct scene_motion
     }
 }
 
-/* `motion` as for scene_gpu_update; not needed afterwards. */
+/* `motion` as for gpu_scene_update; not needed afterwards. */
 static inline void twin_init_moving(struct twin *twin, const struct scene *scene,
                                     const struct scene_motion *motion)
 {

@@ -12,7 +12,7 @@
 #include "gpu/device.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
-#include "trace/scene_gpu.h"
+#include "gpu_scene/scene.h"
 #include "trace/tracer.h"
 
 #include <float.h>
@@ -48,7 +48,7 @@ static struct gpu_device *device;
 
 struct arena {
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct tracer *bvh, *reference;
     struct gpu_buffer ray_buffer, answer_buffer;
     struct ray *rays;
@@ -230,7 +230,7 @@ static void *trace(struct arena *arena, struct tracer *tracer, const struct ray 
                               .hits = &arena->answer_buffer,
                               .visibility = &arena->answer_buffer,
                               .shared_origin = kind == RAYS_PRIMARY};
-    scene_gpu_bind(&arena->gpu);
+    gpu_scene_bind(&arena->gpu);
     expect_ok(tracer_trace(tracer, &arena->gpu, &wave, &error), &error);
     void *answers = malloc(bytes);
     gpu_buffer_read(device, &arena->answer_buffer, 0, answers, bytes);
@@ -251,8 +251,8 @@ static void arena_init(struct arena *arena, struct scene *scene)
     struct error error = {0};
     struct scene_changes changes;
     *arena = (struct arena){.scene = scene, .rays = malloc(RAY_COUNT * sizeof(struct ray))};
-    scene_gpu_init(&arena->gpu, device);
-    expect_ok(scene_gpu_update(&arena->gpu, scene, NULL, &changes, NULL, &error), &error);
+    gpu_scene_init(&arena->gpu, device);
+    expect_ok(gpu_scene_update(&arena->gpu, scene, NULL, &changes, NULL, &error), &error);
     arena->bvh = make_tracer(arena, BVH);
     arena->reference = make_tracer(arena, REFERENCE);
     make_primary(arena);
@@ -265,7 +265,7 @@ static void arena_finish(struct arena *arena)
     tracer_destroy(arena->reference);
     gpu_buffer_finish(device, &arena->ray_buffer);
     gpu_buffer_finish(device, &arena->answer_buffer);
-    scene_gpu_finish(&arena->gpu);
+    gpu_scene_finish(&arena->gpu);
     scene_destroy(arena->scene);
     free(arena->rays);
     free(arena->primary_hits);
@@ -474,7 +474,7 @@ static void a_transform_that_embree_cannot_invert_is_refused_by_name(void **stat
         test_transform(m, scale, scale, scale, 1, 0.3f, 0, 0, 0);
         test_node(&edits, 4, 0, NODE_MESH, 1, m);
         test_commit(&edits);
-        expect_ok(scene_gpu_update(&arena.gpu, arena.scene, NULL, &changes, NULL, &error), &error);
+        expect_ok(gpu_scene_update(&arena.gpu, arena.scene, NULL, &changes, NULL, &error), &error);
         bool ok = tracer_update(arena.reference, &arena.gpu, &all, NULL, &error);
         assert_int_equal(ok, round == 1);
         assert_int_equal(error.kind, round == 0 ? ERROR_UNSUPPORTED : ERROR_NONE);
@@ -500,7 +500,7 @@ static void a_scene_beyond_what_embree_sees_is_refused(void **state)
     test_transform(m, 5e9f, 5e9f, 5e9f, 1, 0.3f, 0, 0, 0);
     test_node(&edits, 3, 0, NODE_MESH, 1, m);
     test_commit(&edits);
-    expect_ok(scene_gpu_update(&arena.gpu, arena.scene, NULL, &changes, NULL, &error), &error);
+    expect_ok(gpu_scene_update(&arena.gpu, arena.scene, NULL, &changes, NULL, &error), &error);
     assert_false(tracer_update(arena.reference, &arena.gpu, &all, NULL, &error));
     assert_int_equal(error.kind, ERROR_UNSUPPORTED);
     assert_string_equal(error.field, "tracer");

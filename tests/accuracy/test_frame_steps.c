@@ -24,7 +24,7 @@ static bool slow;
 static uint64_t rays_of_step;
 static unsigned waves_of_step;
 
-static bool count_rays(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,
+static bool count_rays(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
                        struct error *error)
 {
     const uint64_t rays = wave->end_ray - wave->first_ray, ns = slow ? rays * RAY_NS : 0;
@@ -257,14 +257,14 @@ static void a_field_and_a_ball(struct fixture *fixture)
 }
 
 /* The scene is new to the device, and its structures are made in pieces of that length. */
-static void anew_in_pieces(struct fixture *fixture, uint64_t piece_ns)
+static void anew_in_pieces(struct fixture *fixture, uint64_t step_ns)
 {
     struct error error = {0};
     frame_renderer_destroy(fixture->renderer);
     frame_scene_destroy(fixture->shared);
     fixture->shared = frame_scene_create(fixture->device, &error);
     assert_non_null(fixture->shared);
-    frame_scene_set_piece(fixture->shared, piece_ns);
+    frame_scene_set_step(fixture->shared, step_ns);
     fixture->renderer = frame_renderer_create(fixture->shared, &error);
     assert_non_null(fixture->renderer);
 }
@@ -334,7 +334,7 @@ static void structures_built_in_pieces_are_the_same(void **state)
         struct frame_result whole = {0}, pieces = {0};
         if (!take_way(fixture, way))
             continue;
-        anew_in_pieces(fixture, PIECE_WITHOUT_END);
+        anew_in_pieces(fixture, STEP_WITHOUT_END);
         begin(fixture, fixture->renderer);
         finish(fixture->renderer, &whole);
         anew_in_pieces(fixture, 0);
@@ -394,7 +394,7 @@ static void frames_that_wait_for_one_structure_build_it_together(void **state)
         struct error error = {0};
         if (!way->has_pieces || !take_way(fixture, way))
             continue;
-        anew_in_pieces(fixture, PIECE_WITHOUT_END);
+        anew_in_pieces(fixture, STEP_WITHOUT_END);
         begin(fixture, fixture->renderer);
         finish(fixture->renderer, &expected);
         for (int first_goes = 0; first_goes < 2; first_goes++) {

@@ -9,8 +9,8 @@
 #include "gpu/device.h"
 #include "shared/hit.h"
 #include "shared/material.h"
-#include "trace/scene_gpu.h"
-#include "trace/trace_program.h"
+#include "gpu_scene/scene.h"
+#include "trace/program.h"
 #include "trace/tracer.h"
 
 #include <setjmp.h>
@@ -69,7 +69,7 @@ static struct gpu_device *device;
 struct fixture {
     struct scene *scene;
     struct scene_motion motion;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct tracer *tracer;
     struct twin twin;
     struct gpu_buffer rays, times, answers;
@@ -124,7 +124,7 @@ static void update(struct fixture *fixture)
 {
     struct error error = {0};
     struct scene_changes changes;
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, motion_of(fixture), &changes, NULL, &error), &error);
+    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, motion_of(fixture), &changes, NULL, &error), &error);
     expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &changes, NULL, &error), &error);
     fixture->materials = realloc(fixture->materials, fixture->gpu.materials.size_bytes);
     gpu_buffer_read(device, &fixture->gpu.materials, 0, fixture->materials, fixture->gpu.materials.size_bytes);
@@ -138,7 +138,7 @@ static void fixture_init(struct fixture *fixture, const struct tracer_row *trace
     assert_non_null(impl);
     if (scene->move)
         scene->move(&fixture->motion, scene->pose_count);
-    scene_gpu_init(&fixture->gpu, device);
+    gpu_scene_init(&fixture->gpu, device);
     fixture->tracer = tracer_create(impl, device, &tracer->options, &error);
     expect_ok(fixture->tracer != NULL, &error);
     update(fixture);
@@ -154,7 +154,7 @@ static void fixture_finish(struct fixture *fixture)
     gpu_buffer_finish(device, &fixture->times);
     gpu_buffer_finish(device, &fixture->answers);
     tracer_destroy(fixture->tracer);
-    scene_gpu_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
     free(fixture->host_rays);
     free(fixture->materials);
@@ -176,7 +176,7 @@ static void *trace(struct fixture *fixture, enum wave_kind kind, uint32_t ray_co
         .hits = &fixture->answers,
         .visibility = &fixture->answers,
         .times = fixture->motion.pose_count > 1 && !fixture->leaves_times_out ? &fixture->times : NULL};
-    scene_gpu_bind(&fixture->gpu);
+    gpu_scene_bind(&fixture->gpu);
     expect_ok(tracer_trace(fixture->tracer, &fixture->gpu, &wave, &error), &error);
     void *answers = malloc(size_bytes);
     gpu_buffer_read(device, &fixture->answers, 0, answers, size_bytes);

@@ -51,7 +51,7 @@ static void spoil_hit(struct hit *hit, uint32_t index, float diagonal)
         hit->normal_shading = 0;
 }
 
-static void spoil(struct scene_gpu *scene, const struct wave *wave)
+static void spoil(struct gpu_scene *scene, const struct wave *wave)
 {
     struct gpu_device *device = scene->device;
     size_t bytes = wave->ray_count * (wave->kind == WAVE_ANY ? sizeof(uint) : sizeof(struct hit));
@@ -71,7 +71,7 @@ static void spoil(struct scene_gpu *scene, const struct wave *wave)
     free(answers);
 }
 
-static bool wrong_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,
+static bool wrong_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
                         struct error *error)
 {
     wrong.waves++;

@@ -49,7 +49,7 @@ enum { WAVE_PRIMARY, WAVE_BOUNCE, WAVE_SHADOW, WAVE_KINDS };
 struct bench {
     struct gpu_device *device;
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct gpu_buffer ray_buffer, answers;
     struct ray *rays[WAVE_KINDS];
     void *reference[WAVE_KINDS]; /* what the first form answered */
@@ -175,7 +175,7 @@ static double measure(struct bench *bench, struct tracer *tracer, int kind, doub
                               &error) &&
                 gpu_buffer_reserve(bench->device, &bench->answers, bytes, &error),
             &error);
-    scene_gpu_bind(&bench->gpu);
+    gpu_scene_bind(&bench->gpu);
     uint64_t start_ns = clock_now_ns();
     run(bench, tracer, kind, false);
     uint64_t first_ns = clock_now_ns() - start_ns;
@@ -232,8 +232,8 @@ static bool bench_scene(struct gpu_device *device, uint32_t triangles)
     struct error error = {0};
     struct scene_changes changes;
     bench.scene = bench_family_scene(triangles);
-    scene_gpu_init(&bench.gpu, device);
-    require(scene_gpu_update(&bench.gpu, bench.scene, NULL, &changes, NULL, &error), &error);
+    gpu_scene_init(&bench.gpu, device);
+    require(gpu_scene_update(&bench.gpu, bench.scene, NULL, &changes, NULL, &error), &error);
     for (int kind = 0; kind < WAVE_KINDS; kind++)
         bench.rays[kind] = malloc(RAY_COUNT * sizeof(struct ray));
     make_camera_rays(bench.rays[WAVE_PRIMARY]);
@@ -250,7 +250,7 @@ static bool bench_scene(struct gpu_device *device, uint32_t triangles)
     }
     gpu_buffer_finish(device, &bench.ray_buffer);
     gpu_buffer_finish(device, &bench.answers);
-    scene_gpu_finish(&bench.gpu);
+    gpu_scene_finish(&bench.gpu);
     scene_destroy(bench.scene);
     return !bench.failed;
 }

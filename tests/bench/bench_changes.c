@@ -12,7 +12,7 @@
 #include "render/frame.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
-#include "trace/bvh.h"
+#include "trace/bvh/tracer.h"
 
 #include <epoxy/gl.h>
 #include <jansson.h>
@@ -140,7 +140,7 @@ static json_t *bench_instances(struct gpu_device *device, uint32_t count, uint32
 struct bent {
     struct gpu_device *device;
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct tracer *refitted, *rebuilt;
     float *vertices; /* 4 each, as the device has them */
     uint32_t vertex_count;
@@ -187,7 +187,7 @@ static struct hit *trace(struct bent *bent, struct tracer *tracer, struct gpu_bu
     struct gpu_buffer answers = {0};
     struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
     require(gpu_buffer_reserve(bent->device, &answers, RAY_COUNT * sizeof *hits, &error), &error);
-    scene_gpu_bind(&bent->gpu);
+    gpu_scene_bind(&bent->gpu);
     const struct wave wave = {.ray_count = RAY_COUNT, .rays = rays, .hits = &answers, .crossings_only = true};
     for (int run = 0; run < 4; run++) {
         uint64_t start_ns = clock_now_ns();
@@ -237,8 +237,8 @@ static void bent_init(struct bent *bent, struct gpu_device *device, uint32_t tri
     test_node(&edits, 1, 0, NODE_MESH, 1, NULL);
     test_commit(&edits);
     *bent = (struct bent){.device = device, .scene = edits.scene};
-    scene_gpu_init(&bent->gpu, device);
-    require(scene_gpu_update(&bent->gpu, bent->scene, NULL, &changes, NULL, &error), &error);
+    gpu_scene_init(&bent->gpu, device);
+    require(gpu_scene_update(&bent->gpu, bent->scene, NULL, &changes, NULL, &error), &error);
     bent->gpu.geometries[0].node = 1; /* as if it had a skin */
     bent->vertex_count = bent->gpu.geometries[0].device.vertex_count;
     bent->vertices = calloc(bent->vertex_count, 4 * sizeof *bent->vertices);
@@ -278,7 +278,7 @@ static json_t *bench_refit(struct gpu_device *device, uint32_t triangles, uint32
                                (int)RAY_COUNT, "differing", (int)differing);
     tracer_destroy(bent.refitted);
     tracer_destroy(bent.rebuilt);
-    scene_gpu_finish(&bent.gpu);
+    gpu_scene_finish(&bent.gpu);
     scene_destroy(bent.scene);
     free(bent.vertices);
     return result;

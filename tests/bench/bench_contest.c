@@ -32,7 +32,7 @@ struct bench_contender *bench_contest_add(struct bench_contest *contest, const c
 bool bench_contest_fits(const struct bench_contest *contest, const struct bench_contender *contender,
                         enum bench_wave_kind kind)
 {
-    const struct scene_gpu *scene = &contest->scene->gpu;
+    const struct gpu_scene *scene = &contest->scene->gpu;
     const bool is_any = bench_wave_facts[kind].is_any;
     if (contender->way == BENCH_WALK)
         return !is_any; /* a visibility is all that there is */
@@ -267,7 +267,7 @@ bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *
         contest->contenders[i].runs.count = 0;
         contest->contenders[i].is_compared = false;
     }
-    scene_gpu_bind(&contest->scene->gpu);
+    gpu_scene_bind(&contest->scene->gpu);
     ok = ok && upload(contest, wave, error);
     for (unsigned round = 0; ok && round <= contest->runs; round++)
         ok = run_round(contest, round, wave, truth, raw, truths, answers, error);
@@ -281,7 +281,7 @@ bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *
 static bool trace_once(struct bench_contest *contest, struct tracer *tracer, bool crossings_only,
                        const struct bench_wave *wave, struct hit *hits, struct error *error)
 {
-    scene_gpu_bind(&contest->scene->gpu);
+    gpu_scene_bind(&contest->scene->gpu);
     if (!upload(contest, wave, error) || !run_tracer(contest, tracer, crossings_only, wave, error))
         return false;
     gpu_buffer_read(contest->device, &contest->answer_buffer, 0, hits, wave->ray_count * sizeof *hits);

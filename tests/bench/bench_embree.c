@@ -44,11 +44,11 @@ static void flat_finish(struct flat *flat)
     free(flat->disc_normals);
 }
 
-static bool flat_reserve(struct flat *flat, const struct scene_gpu *scene)
+static bool flat_reserve(struct flat *flat, const struct gpu_scene *scene)
 {
     size_t triangles = 0, spheres = 0;
     for (uint32_t i = 0; i < scene->instance_count; i++) {
-        const struct scene_gpu_geometry *geometry = &scene->geometries[scene->instances[i].geometry];
+        const struct gpu_scene_geometry *geometry = &scene->geometries[scene->instances[i].geometry];
         *(geometry->mesh ? &triangles : &spheres) += geometry->device.primitive_count;
     }
     /* One more than is needed: Embree reads 16 bytes at the last vertex. */
@@ -91,12 +91,12 @@ static bool add_spheres(struct flat *flat, const float m[12], const struct scene
     return true;
 }
 
-static bool flatten(struct flat *flat, const struct scene_gpu *scene, struct error *error)
+static bool flatten(struct flat *flat, const struct gpu_scene *scene, struct error *error)
 {
     if (!flat_reserve(flat, scene))
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for Embree's triangles");
     for (uint32_t i = 0; i < scene->instance_count; i++) {
-        const struct scene_gpu_geometry *geometry = &scene->geometries[scene->instances[i].geometry];
+        const struct gpu_scene_geometry *geometry = &scene->geometries[scene->instances[i].geometry];
         float m[12];
         memcpy(m, scene->instances[i].world_from_object, sizeof m);
         if (geometry->mesh)
@@ -154,7 +154,7 @@ static void describe_scene(struct bench_embree *embree, const struct flat *flat,
     }
 }
 
-struct bench_embree *bench_embree_create(const struct scene_gpu *scene, bool robust, uint64_t *build_ns,
+struct bench_embree *bench_embree_create(const struct gpu_scene *scene, bool robust, uint64_t *build_ns,
                                          struct error *error)
 {
     struct flat flat = {0};

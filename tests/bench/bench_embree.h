@@ -5,7 +5,7 @@
 #define FARLIGHT_TESTS_BENCH_EMBREE_H
 
 #include "shared/ray.h"
-#include "trace/scene_gpu.h"
+#include "gpu_scene/scene.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -30,7 +30,7 @@ struct bench_embree_wave {
 
 /* `robust`: RTC_SCENE_FLAG_ROBUST, else the default flags. *build_ns: Embree's own build. NULL and *error: no
  * memory, or a sphere is squeezed by its transform, which Embree has no points for. */
-struct bench_embree *bench_embree_create(const struct scene_gpu *scene, bool robust, uint64_t *build_ns,
+struct bench_embree *bench_embree_create(const struct gpu_scene *scene, bool robust, uint64_t *build_ns,
                                          struct error *error);
 void bench_embree_destroy(struct bench_embree *embree);         /* accepts NULL */
 uint64_t bench_embree_bytes(const struct bench_embree *embree); /* its structure, without the triangles */

@@ -5,7 +5,7 @@
 #include "tests/bench/bench_forms.h"
 
 #include "base/clock.h"
-#include "trace/ldc_build.h"
+#include "trace/ldc/build.h"
 
 #include <epoxy/gl.h>
 
@@ -24,7 +24,7 @@ struct sampled {
     struct bench_runs runs;
 };
 
-static void place(struct ldc_cube *cube, const struct scene_gpu *gpu, uint32_t resolution)
+static void place(struct ldc_cube *cube, const struct gpu_scene *gpu, uint32_t resolution)
 {
     float longest = 0;
     for (int k = 0; k < 3; k++)
@@ -38,11 +38,11 @@ static void place(struct ldc_cube *cube, const struct scene_gpu *gpu, uint32_t r
 static bool build(struct bench_forms *bench, const struct bench_form *form, struct sampled *sampled,
                   const uint32_t *instances, bool counts, struct error *error)
 {
-    struct scene_gpu *gpu = &bench->scene.gpu;
+    struct gpu_scene *gpu = &bench->scene.gpu;
     place(&sampled->store.cubes[TRACER_CUBE_STATIC], gpu, form->options.ldc_resolution);
     glFinish();
     const uint64_t start_ns = clock_now_ns();
-    scene_gpu_bind(gpu);
+    gpu_scene_bind(gpu);
     enum tracer_progress progress = ldc_build_begin(sampled->builder, &sampled->store, TRACER_CUBE_STATIC, gpu,
                                                     instances, gpu->instance_count, &form->options, error);
     while (progress == TRACER_MORE)

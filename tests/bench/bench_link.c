@@ -7,7 +7,7 @@
 #include "lib/connection.h"
 #include "net/connection.h"
 #include "net/listen.h"
-#include "protocol/sealed_key.h"
+#include "protocol/sealed/key.h"
 #include "session/frames.h"
 
 #include <inttypes.h>

@@ -97,7 +97,7 @@ static void upload(struct bench *bench, const struct ray *rays, uint32_t count)
     require(gpu_buffer_upload(bench->device, &bench->rays, rays, count * sizeof *rays, &error) &&
                 gpu_buffer_reserve(bench->device, &bench->hits, count * sizeof(struct hit), &error),
             &error);
-    scene_gpu_bind(&bench->scene.gpu);
+    gpu_scene_bind(&bench->scene.gpu);
 }
 
 static void check(struct bench *bench, struct tracer *tracer, const struct hit *expected, uint32_t count)

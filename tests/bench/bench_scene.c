@@ -109,7 +109,7 @@ static void choose_light(struct bench_scene *scene)
 static void count_primitives(struct bench_scene *scene)
 {
     for (uint32_t i = 0; i < scene->gpu.instance_count; i++) {
-        const struct scene_gpu_geometry *geometry = &scene->gpu.geometries[scene->gpu.instances[i].geometry];
+        const struct gpu_scene_geometry *geometry = &scene->gpu.geometries[scene->gpu.instances[i].geometry];
         *(geometry->mesh ? &scene->triangle_count : &scene->sphere_count) += geometry->device.primitive_count;
     }
 }
@@ -119,7 +119,7 @@ bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
 {
     struct scene_changes changes;
     memset(scene, 0, sizeof *scene);
-    scene_gpu_init(&scene->gpu, device);
+    gpu_scene_init(&scene->gpu, device);
     if (options->model) {
         if (!load_model(&scene->loaded, options->model, error))
             return false;
@@ -130,7 +130,7 @@ bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
     if ((options->mirrors || options->glass) &&
         !bench_make_alike(scene->loaded.scene, options->mirrors ? BENCH_MIRROR : BENCH_GLASS, error))
         return false;
-    if (!scene_gpu_update(&scene->gpu, scene->loaded.scene, NULL, &changes, NULL, error) ||
+    if (!gpu_scene_update(&scene->gpu, scene->loaded.scene, NULL, &changes, NULL, error) ||
         !choose_camera(scene, options, error))
         return false;
     choose_light(scene);
@@ -140,6 +140,6 @@ bool bench_scene_init(struct bench_scene *scene, struct gpu_device *device,
 
 void bench_scene_finish(struct bench_scene *scene)
 {
-    scene_gpu_finish(&scene->gpu);
+    gpu_scene_finish(&scene->gpu);
     load_model_finish(&scene->loaded);
 }

@@ -5,7 +5,7 @@
 
 #include "render/frame.h"
 #include "tests/bench/load_model.h"
-#include "trace/scene_gpu.h"
+#include "gpu_scene/scene.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -22,7 +22,7 @@ struct bench_scene_options {
 
 struct bench_scene {
     struct loaded_model loaded;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct frame_camera camera;            /* perspective */
     float light_world[3];                  /* a point that shadow rays go to */
     uint64_t triangle_count, sphere_count; /* as the rays meet them: every instance counts */

@@ -2,8 +2,8 @@
 #include "tests/bench/plain_pass.h"
 
 #include "gpu/texture.h"
-#include "trace/axes_box.h"
-#include "trace/axes_draw.h"
+#include "trace/raster/box.h"
+#include "trace/raster/draw.h"
 
 #include <epoxy/gl.h>
 
@@ -47,7 +47,7 @@ static struct tracer *plain_create(struct gpu_device *device, const struct trace
     return NULL;
 }
 
-static bool draw(struct plain_pass *pass, struct scene_gpu *scene, const uint32_t *instances, uint32_t count,
+static bool draw(struct plain_pass *pass, struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
                  struct error *error)
 {
     static const struct gpu_define all_images[] = {{"ALL_IMAGES", "1"}, {0}};
@@ -63,7 +63,7 @@ static bool draw(struct plain_pass *pass, struct scene_gpu *scene, const uint32_
         .resolution = pass->resolution,
     };
     memcpy(axes.lower_world, box.lower_world, sizeof axes.lower_world);
-    scene_gpu_bind(scene);
+    gpu_scene_bind(scene);
     glDepthMask(GL_TRUE);
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_LESS);
@@ -74,7 +74,7 @@ static bool draw(struct plain_pass *pass, struct scene_gpu *scene, const uint32_
     return drawn;
 }
 
-static enum tracer_progress plain_update(struct tracer *tracer, struct scene_gpu *scene,
+static enum tracer_progress plain_update(struct tracer *tracer, struct gpu_scene *scene,
                                          const struct scene_changes *changes, struct stage_times *times,
                                          struct error *error)
 {
@@ -87,7 +87,7 @@ static enum tracer_progress plain_update(struct tracer *tracer, struct scene_gpu
     return tracer_progress_of(done);
 }
 
-static bool plain_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave,
+static bool plain_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
                         struct error *error)
 {
     (void)tracer, (void)scene, (void)wave;

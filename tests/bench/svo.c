@@ -4,7 +4,7 @@
 #include "gpu/timer.h"
 #include "tests/bench/svo/svo.h"
 #include "tests/bench/svo_build.h"
-#include "trace/trace_program.h"
+#include "trace/program.h"
 
 #include <epoxy/gl.h>
 
@@ -70,7 +70,7 @@ static struct tracer *create_tiles(struct gpu_device *device, const struct trace
     return create(device, options, SVO_KIND_TILES, error);
 }
 
-static enum tracer_progress svo_update(struct tracer *tracer, struct scene_gpu *scene,
+static enum tracer_progress svo_update(struct tracer *tracer, struct gpu_scene *scene,
                                        const struct scene_changes *changes, struct stage_times *times,
                                        struct error *error)
 {
@@ -87,7 +87,7 @@ static enum tracer_progress svo_update(struct tracer *tracer, struct scene_gpu *
     return tracer_progress_of(done);
 }
 
-static bool svo_trace(struct tracer *tracer, struct scene_gpu *scene, const struct wave *wave, struct error *error)
+static bool svo_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error)
 {
     struct svo_tree *tree = &((struct svo *)tracer)->tree;
     const bool tiles = tree->kind == SVO_KIND_TILES;

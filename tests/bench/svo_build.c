@@ -4,8 +4,8 @@
 #include "base/clock.h"
 #include "gpu/program.h"
 #include "tests/bench/svo/svo.h"
-#include "trace/axes_box.h"
-#include "trace/ldc_store.h"
+#include "trace/raster/box.h"
+#include "trace/ldc/store.h"
 
 #include <epoxy/gl.h>
 
@@ -53,7 +53,7 @@ uint64_t svo_tree_bytes(const struct svo_tree *tree)
 /* ---- the cube ---- */
 
 /* The one that A-buffers of as many texels have: leaves' cells are their texels. */
-static bool place(struct svo_tree *tree, const struct scene_gpu *scene, const uint32_t *instances, uint32_t count,
+static bool place(struct svo_tree *tree, const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
                   struct error *error)
 {
     struct axes_box box;
@@ -64,7 +64,7 @@ static bool place(struct svo_tree *tree, const struct scene_gpu *scene, const ui
     for (int k = 0; k < 3; k++) {
         float upper_world = box.lower_world[k], lower[3], upper[3];
         for (uint32_t i = 0; i < count; i++) {
-            scene_gpu_instance_bounds(scene, instances[i], lower, upper);
+            gpu_scene_instance_bounds(scene, instances[i], lower, upper);
             upper_world = fmaxf(upper_world, upper[k]);
         }
         tree->lower_cells[k] = 0;
@@ -97,7 +97,7 @@ static uint32_t fragment_bytes(const struct svo_tree *tree)
 }
 
 /* Once more with room for all, where there was too little. */
-static bool voxelise(struct svo_tree *tree, const struct scene_gpu *scene, struct error *error)
+static bool voxelise(struct svo_tree *tree, const struct gpu_scene *scene, struct error *error)
 {
     static const struct gpu_define defines[][2] = {[SVO_KIND_CELLS] = {{0}},
                                                    [SVO_KIND_PLANES] = {{"SVO_PLANES", "1"}, {0}},
@@ -283,7 +283,7 @@ static bool grow_records(struct svo_tree *tree, struct error *error)
 
 /* ---- all ---- */
 
-static bool build(struct svo_tree *tree, struct scene_gpu *scene, struct error *error)
+static bool build(struct svo_tree *tree, struct gpu_scene *scene, struct error *error)
 {
     struct gpu_device *device = tree->device;
     const uint64_t start_ns = clock_now_ns();
@@ -299,7 +299,7 @@ static bool build(struct svo_tree *tree, struct scene_gpu *scene, struct error *
     return gpu_check(device, "building an octree", error);
 }
 
-bool svo_tree_build(struct svo_tree *tree, struct scene_gpu *scene, struct error *error)
+bool svo_tree_build(struct svo_tree *tree, struct gpu_scene *scene, struct error *error)
 {
     uint32_t *instances = malloc((scene->instance_count + 1u) * sizeof *instances), count = 0;
     tree->facts = (struct svo_build_facts){0};
@@ -308,7 +308,7 @@ bool svo_tree_build(struct svo_tree *tree, struct scene_gpu *scene, struct error
     for (uint32_t i = 0; i < scene->instance_count; i++)
         if (scene->geometries[scene->instances[i].geometry].device.primitive_count > 0)
             instances[count++] = i;
-    scene_gpu_bind(scene);
+    gpu_scene_bind(scene);
     bool done = true;
     if (count > 0)
         done = place(tree, scene, instances, count, error) &&

@@ -6,8 +6,8 @@
 #include "base/error.h"
 #include "gpu/program.h"
 #include "tests/bench/svo.h"
-#include "trace/axes_draw.h"
-#include "trace/scene_gpu.h"
+#include "trace/raster/draw.h"
+#include "gpu_scene/scene.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -33,7 +33,7 @@ struct svo_tree {
 void svo_tree_init(struct svo_tree *tree, struct gpu_device *device, uint32_t resolution, enum svo_kind kind);
 void svo_tree_finish(struct svo_tree *tree);
 uint64_t svo_tree_bytes(const struct svo_tree *tree);
-bool svo_tree_build(struct svo_tree *tree, struct scene_gpu *scene, struct error *error);
+bool svo_tree_build(struct svo_tree *tree, struct gpu_scene *scene, struct error *error);
 
 /* ---- between svo_build.c and svo_tiles.c ---- */
 

@@ -3,7 +3,7 @@
 
 #include "base/clock.h"
 #include "base/queue.h"
-#include "job/view_wishes.h"
+#include "engine/view_wishes.h"
 #include "tests/fuzz/fuzz.h"
 
 #include <stdlib.h>

@@ -7,7 +7,7 @@
 #include <sodium.h>
 #include <stdint.h>
 
-#include "protocol/sealed_link.h"
+#include "protocol/sealed/link.h"
 
 static const struct sealed_key sealed_fuzz_key = {.bytes = "the key of every fuzzed session"};
 

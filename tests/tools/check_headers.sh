@@ -4,8 +4,7 @@
 set -u
 failed=0
 count=0
-for header in protocol/*.h server/*.h server/*/*.h shaders/shared/*.h client/*/*.h; do
-    [ -f "$header" ] || continue
+for header in $(find protocol server shaders client -name '*.h' | sort); do
     count=$((count + 1))
     "$@" -std=c17 -D_GNU_SOURCE -fsyntax-only -Wall -Wextra -x c "$header" 2>/tmp/header.$$ || {
         echo "$header does not compile alone:"

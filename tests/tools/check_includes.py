@@ -9,42 +9,57 @@ import re
 import sys
 
 # Folder -> folders of the project that it may include from (itself is always allowed).
+BASE, GPU = "server/base", "server/gpu"
+STRUCTURES = {BASE, GPU, "server/scene", "server/gpu_scene", "server/trace", "shaders/shared"}  # what each may use
 MAY_INCLUDE = {
     "protocol": set(),
-    "server/base": set(),
-    "server/scene": {"server/base"},
-    "server/gpu": {"server/base"},
-    "server/trace": {"server/base", "server/gpu", "server/scene", "shaders/shared"},
-    "server/render": {"server/base", "server/gpu", "server/scene", "server/trace", "shaders/shared"},
-    "server/encode": {"server/base"},
-    "server/job": {"server/base", "server/gpu", "server/scene", "server/trace", "server/render", "server/encode"},
-    "server/net": {"server/base", "protocol"},
-    "server/session": {"server/base", "server/net", "server/scene", "server/job", "server/encode", "server/render",
-                       "protocol", "server"},
-    "server": {"server/base", "server/net", "server/session", "server/job", "server/gpu", "server/scene",
-               "server/encode", "protocol"},
-    "client/lib": {"protocol"},
-    "client/cli": {"client/lib", "protocol"},
-    "client/import": {"protocol"},
-    "client/output": {"protocol", "client/import"},  # the sandbox is shared
-    "client/video": {"protocol", "client/import", "client/output", "client/lib"},  # sandbox; channel; ycbcr, rate
+    "protocol/sealed": {"protocol"},
+    "protocol/docs": {"protocol", "protocol/sealed"},
+    BASE: set(),
+    "server/scene": {BASE},
+    GPU: {BASE},
+    "server/gpu_scene": {BASE, GPU, "server/scene", "shaders/shared"},
+    "server/trace": STRUCTURES,
+    "server/trace/raster": STRUCTURES | {"shaders/raster"},
+    "server/trace/abuffer": STRUCTURES | {"server/trace/raster", "shaders/abuffer"},
+    "server/trace/bvh": STRUCTURES | {"shaders/bvh"},
+    "server/trace/ldc": STRUCTURES | {"server/trace/raster", "shaders/ldc"},
+    "server/trace/naive": STRUCTURES,
+    "server/trace/reference": STRUCTURES,
+    "server/render": STRUCTURES,
+    "server/encode": {BASE},
+    "server/engine": {BASE, GPU, "server/scene", "server/gpu_scene", "server/trace", "server/render", "server/encode"},
+    "server/net": {BASE, "protocol", "protocol/sealed"},
+    "server/session": {BASE, "server/net", "server/scene", "server/engine", "server/encode", "server/render",
+                       "protocol", "protocol/sealed", "server"},
+    "server": {BASE, GPU, "server/net", "server/session", "server/engine", "server/encode", "protocol",
+               "protocol/sealed"},
+    "client/lib": {"protocol", "protocol/sealed"},
+    "client/cli": {"client/lib", "protocol", "protocol/sealed"},
+    "client/helper": {"protocol"},
+    "client/import": {"client/helper", "protocol"},
+    "client/output": {"client/helper", "protocol"},
+    "client/video": {"client/helper", "client/lib", "protocol"},  # of lib: ycbcr, rate
     "client/viewer": {"protocol", "client/lib", "client/cli"},  # the command line is parsed as that of render
     "shaders/shared": set(),
+    "shaders/raster": {"shaders/shared"},
+    "shaders/abuffer": {"shaders/shared", "shaders/raster"},
+    "shaders/bvh": {"shaders/shared"},
+    "shaders/ldc": {"shaders/shared", "shaders/raster"},
 }
-# System headers that only some folders may use, or in a folder only files whose names begin so.
+# System headers that only some folders, and those below them, may use.
 RESTRICTED = [
-    (re.compile(r"^(epoxy|GL|EGL)/"), {"server/gpu", "server/trace", "server/render"}),
-    (re.compile(r"^embree"), {"server/trace"}),
+    (re.compile(r"^(epoxy|GL|EGL)/"), {"server/gpu", "server/gpu_scene", "server/trace", "server/render"}),
+    (re.compile(r"^embree"), {"server/trace/reference"}),
     (re.compile(r"^(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h"),
-     {"server/base", "server/net", "client/lib", "client/import", "client/output", "client/cli"}),
+     {"server/base", "server/net", "client/lib", "client/helper", "client/import", "client/cli"}),
     (re.compile(r"^lib(av|sw)"), {"client/video", "client/viewer", "server/encode"}),
     (re.compile(r"^SDL2?/"), {"client/viewer"}),
     (re.compile(r"^OpenImageIO/"), {"client/import", "client/output"}),
     (re.compile(r"^(tiny_gltf|tiny_obj_loader)"), {"client/import"}),
     (re.compile(r"^(turbojpeg|zstd)\.h"), {"server/encode", "client/lib"}),
-    # Of the protocol's files only those of sealed connections, which helper programs are not linked to.
     (re.compile(r"^sodium\.h"), {"server/base", "server/session", "client/lib", "client/import", "protocol/sealed",
-                                  "protocol/docgen"}),
+                                  "protocol/docs"}),
 ]
 ROOTS = ("", "server", "shaders", "client")  # as the compiler's -I
 INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"([^"]+)"|<([^>]+)>)')
@@ -84,12 +99,11 @@ def check(path, report):
             elif owner(target) != here and owner(target) not in MAY_INCLUDE[here]:
                 report(path, number, f"{here} may not include {owner(target)} ({quoted})")
         for pattern, allowed in RESTRICTED:
-            names = {here, f"{here}/{path.stem.partition('_')[0]}"}
-            if system and pattern.match(system) and not names & allowed:
+            if system and pattern.match(system) and not any(here == one or here.startswith(one + "/") for one in allowed):
                 report(path, number, f"<{system}> belongs to {', '.join(sorted(allowed))}")
 
 
-SHADER_INCLUDE_OK = re.compile(r"^(shared|common)/")
+SHADER_INCLUDE_OK = re.compile(r"^(shared|common|raster)/")
 
 
 def check_shader(path, report):
@@ -101,8 +115,8 @@ def check_shader(path, report):
             name = match.group(1)
             if not (pathlib.Path("shaders") / name).is_file():
                 report(path, number, f"no such shader file: {name}")
-            elif not SHADER_INCLUDE_OK.match(name) and not name.startswith(tracer + "/") and path.parent.name != "shaders":
-                report(path, number, f"{tracer} may include shared/, common/ and itself, not {name}")
+            elif not SHADER_INCLUDE_OK.match(name) and not name.startswith(tracer + "/"):
+                report(path, number, f"{tracer} may include shared/, common/, raster/ and itself, not {name}")
     has_main = re.search(r"^\s*void\s+main\s*\(", text, re.M) is not None
     if has_main != (path.suffix in {".comp", ".vert", ".geom", ".frag"}):
         report(path, 1, "main() stands in files with a stage suffix, and only there")

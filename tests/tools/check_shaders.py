@@ -33,7 +33,7 @@ TRACERS = [{"TRAVERSE": '"naive/traverse.glsl"', "TRACER_NAIVE": "1", "RAYS_TOGE
     {"TRAVERSE": f'"svo/{walk}.glsl"', "TRACER_SVO": "1", "RAYS_TOGETHER": "1", **tree}
     for walk, tree in (("traverse", {"SVO_TOP_SHIFT": "8"}), ("tile_traverse", {"SVO_LEVELS": "10"}))]
 CHOICES = {
-    "trace.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
+    "trace/wave.comp": [TRACERS, [{}, {"ANY_HIT": "1"}]],
     "bvh/coherence.comp": [[{"RAYS_TOGETHER": "8"}]],
     "bvh/refit_write.comp": [[{"BVH_PACKED": "1"}, {}, {"BVH_SPHERES": "1"}]],
     "abuffer/voxels.comp": [[{"VOXELS_" + stage: "1"} for stage in "JUDGE REACH_X REACH_Y REACH_Z".split()]],
@@ -50,9 +50,9 @@ CHOICES = {
 # Defines that come only with others.
 WITH = {"BVH_DEFORMS_IN_SHUTTER": ("BVH_DEFORMS", "HAS_MOTION")}
 STAGES = {"render/primary.vert": ["render/primary.vert", "render/primary.frag"],
-          "ldc/build.frag": ["axes/draw.vert", "axes/draw.geom", "ldc/build.frag"],
-          "abuffer/build.frag": ["axes/draw.vert", "axes/draw.geom", "abuffer/build.frag"],
-          "svo/voxelise.frag": ["axes/draw.vert", "axes/draw.geom", "svo/voxelise.frag"]}
+          "ldc/build.frag": ["raster/draw.vert", "raster/draw.geom", "ldc/build.frag"],
+          "abuffer/build.frag": ["raster/draw.vert", "raster/draw.geom", "abuffer/build.frag"],
+          "svo/voxelise.frag": ["raster/draw.vert", "raster/draw.geom", "svo/voxelise.frag"]}
 # Storage blocks of a stage; server/gpu/device.c asks a driver for as many.
 STORAGE_BLOCKS_MAX = {".comp": 16, ".vert": 4, ".geom": 0, ".frag": 8}
 

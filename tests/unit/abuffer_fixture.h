@@ -5,9 +5,9 @@
 
 #include "tests/unit/device_fixture.h"
 
-#include "shared/abuffer.h"
-#include "trace/abuffer_build.h"
-#include "trace/axes_draw.h"
+#include "abuffer/layout.h"
+#include "trace/abuffer/build.h"
+#include "trace/raster/draw.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -15,7 +15,7 @@
 
 struct fixture {
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct abuffer_builder *builder;
     struct abuffer_store store;
     struct tracer_options options;
@@ -27,7 +27,7 @@ static inline void fixture_update(struct fixture *fixture, const struct scene_mo
 {
     struct error error = {0};
     struct scene_changes changes;
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, &error), &error);
+    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, &error), &error);
     free(fixture->instances);
     expect_ok(axes_list_instances(&fixture->gpu, &fixture->instances, &fixture->instance_count, &error), &error);
 }
@@ -36,7 +36,7 @@ static inline void fixture_init(struct fixture *fixture, struct scene *scene)
 {
     struct error error = {0};
     *fixture = (struct fixture){.scene = scene};
-    scene_gpu_init(&fixture->gpu, device);
+    gpu_scene_init(&fixture->gpu, device);
     fixture_update(fixture, NULL);
     fixture->builder = abuffer_builder_create(device, &error);
     expect_ok(fixture->builder != NULL, &error);
@@ -47,7 +47,7 @@ static inline void fixture_finish(struct fixture *fixture)
 {
     abuffer_builder_destroy(fixture->builder);
     abuffer_store_finish(&fixture->store);
-    scene_gpu_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
     free(fixture->instances);
 }
@@ -71,7 +71,7 @@ static inline bool try_build(struct fixture *fixture, struct error *error)
 {
     return abuffer_build_begin(fixture->builder, &fixture->store, &fixture->gpu, fixture->instances,
                                fixture->instance_count, &fixture->options, error) &&
-           abuffer_build_piece(fixture->builder, PIECE_WITHOUT_END, error) == TRACER_DONE;
+           abuffer_build_step(fixture->builder, STEP_WITHOUT_END, error) == TRACER_DONE;
 }
 
 static inline void build(struct fixture *fixture, uint32_t resolution, uint32_t voxels_along)

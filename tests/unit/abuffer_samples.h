@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* A-buffers made on the CPU from triangles, as shared/abuffer.h has them, and what rays meet of the triangles
+/* A-buffers made on the CPU from triangles, as abuffer/layout.h has them, and what rays meet of the triangles
  * themselves: for the tests of the walk. */
 #ifndef FARLIGHT_TESTS_ABUFFER_SAMPLES_H
 #define FARLIGHT_TESTS_ABUFFER_SAMPLES_H
 
-#include "shared/abuffer.h"
-#include "shared/axes.h"
-#include "trace/abuffer_store.h"
+#include "abuffer/layout.h"
+#include "raster/layout.h"
+#include "trace/abuffer/store.h"
 
 #include <math.h>
 #include <stdbool.h>

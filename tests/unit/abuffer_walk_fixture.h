@@ -8,8 +8,8 @@
 #include "tests/unit/device_fixture.h"
 #include "tests/unit/abuffer_samples.h"
 
-#include "trace/abuffer_trace.h"
-#include "trace/abuffer_voxels.h"
+#include "trace/abuffer/trace.h"
+#include "trace/abuffer/voxels.h"
 
 #include <float.h>
 
@@ -29,7 +29,7 @@ enum { DDA, LINEAR3, LINEAR1, FORM_COUNT };
 
 struct fixture {
     struct scene *scene;
-    struct scene_gpu gpu; /* has the materials, and no geometry that a tracer would see */
+    struct gpu_scene gpu; /* has the materials, and no geometry that a tracer would see */
     struct abuffer_store store;
     struct abuffer_samples samples;
 };
@@ -40,8 +40,8 @@ static inline void fixture_init(struct fixture *fixture, struct scene *scene, ui
     struct scene_changes changes;
     *fixture = (struct fixture){.scene = scene ? scene : test_scene_create(),
                                 .samples = {.resolution = resolution, .voxels_along = voxels}};
-    scene_gpu_init(&fixture->gpu, device);
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, NULL, &changes, NULL, &error), &error);
+    gpu_scene_init(&fixture->gpu, device);
+    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, NULL, &changes, NULL, &error), &error);
     abuffer_store_init(&fixture->store, device);
 }
 
@@ -58,7 +58,7 @@ static inline void fixture_build(struct fixture *fixture)
 static inline void fixture_finish(struct fixture *fixture)
 {
     abuffer_store_finish(&fixture->store);
-    scene_gpu_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
     abuffer_free(&fixture->samples);
 }
@@ -71,7 +71,7 @@ struct walk {
 static inline bool walk_wave(void *user, const struct wave *wave, struct error *error)
 {
     const struct walk *walk = user;
-    scene_gpu_bind(&walk->fixture->gpu);
+    gpu_scene_bind(&walk->fixture->gpu);
     return abuffer_trace(&walk->fixture->store, &walk->fixture->gpu, wave, walk->options, error);
 }
 

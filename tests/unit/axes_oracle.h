@@ -4,9 +4,9 @@
 #ifndef FARLIGHT_TESTS_AXES_ORACLE_H
 #define FARLIGHT_TESTS_AXES_ORACLE_H
 
-#include "shared/axes.h"
+#include "raster/layout.h"
 #include "shared/material.h"
-#include "trace/scene_gpu.h"
+#include "gpu_scene/scene.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -35,7 +35,7 @@ struct oracle_texel {
 
 /* The scene's buffers, read back. */
 struct oracle_scene {
-    const struct scene_gpu *gpu;
+    const struct gpu_scene *gpu;
     uint32_t (*triangles)[4];
     float (*positions)[4];
     float (*normals)[4];
@@ -65,7 +65,7 @@ static inline void *oracle_read(struct gpu_device *of, const struct gpu_buffer *
     return data;
 }
 
-static inline void oracle_scene_init(struct oracle_scene *scene, const struct scene_gpu *gpu)
+static inline void oracle_scene_init(struct oracle_scene *scene, const struct gpu_scene *gpu)
 {
     *scene = (struct oracle_scene){.gpu = gpu};
     scene->triangles = oracle_read(gpu->device, &gpu->triangles);

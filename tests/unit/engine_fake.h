@@ -4,8 +4,8 @@
 #define FARLIGHT_TESTS_ENGINE_FAKE_H
 
 #include "base/clock.h"
-#include "job/backend.h"
-#include "job/engine.h"
+#include "engine/backend.h"
+#include "engine/engine.h"
 #include "render/frame_request.h"
 
 #include <poll.h>

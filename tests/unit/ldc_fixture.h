@@ -5,8 +5,9 @@
 
 #include "tests/unit/device_fixture.h"
 
-#include "shared/ldc.h"
-#include "trace/ldc_build.h"
+#include "ldc/layout.h"
+#include "shared/surface_sample.h"
+#include "trace/ldc/build.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -15,7 +16,7 @@
 /* A scene and cubes of it. */
 struct fixture {
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct ldc_builder *builder;
     struct ldc_store store;
     struct tracer_options options;
@@ -27,14 +28,14 @@ static inline void fixture_update(struct fixture *fixture, const struct scene_mo
 {
     struct error error = {0};
     struct scene_changes changes;
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, &error), &error);
+    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, &error), &error);
 }
 
 static inline void fixture_init(struct fixture *fixture, struct scene *scene)
 {
     struct error error = {0};
     *fixture = (struct fixture){.scene = scene};
-    scene_gpu_init(&fixture->gpu, device);
+    gpu_scene_init(&fixture->gpu, device);
     fixture_update(fixture, NULL);
     fixture->builder = ldc_builder_create(device, &error);
     expect_ok(fixture->builder != NULL, &error);
@@ -48,7 +49,7 @@ static inline void fixture_finish(struct fixture *fixture)
 {
     ldc_builder_destroy(fixture->builder);
     ldc_store_finish(&fixture->store);
-    scene_gpu_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
     free(fixture->instances);
 }
@@ -70,7 +71,7 @@ static inline void place(struct fixture *fixture, unsigned which, uint32_t resol
 static inline bool try_build(struct fixture *fixture, unsigned which, const uint32_t *instances, uint32_t count,
                              struct error *error)
 {
-    scene_gpu_bind(&fixture->gpu);
+    gpu_scene_bind(&fixture->gpu);
     enum tracer_progress progress = ldc_build_begin(fixture->builder, &fixture->store, which, &fixture->gpu,
                                                     instances, count, &fixture->options, error);
     while (progress == TRACER_MORE)

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* A cube made on the CPU, sample by sample as shared/ldc.h has it: what the walk's tests compare with. */
+/* A cube made on the CPU, sample by sample as ldc/layout.h has it: what the walk's tests compare with. */
 #ifndef FARLIGHT_TESTS_LDC_SAMPLES_H
 #define FARLIGHT_TESTS_LDC_SAMPLES_H
 
-#include "shared/ldc.h"
-#include "trace/ldc_store.h"
+#include "ldc/layout.h"
+#include "trace/ldc/store.h"
 
 #include <math.h>
 #include <stdbool.h>

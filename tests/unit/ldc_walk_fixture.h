@@ -7,8 +7,8 @@
 #include "tests/unit/device_fixture.h"
 #include "tests/unit/ldc_samples.h"
 
-#include "trace/ldc_levels.h"
-#include "trace/ldc_trace.h"
+#include "trace/ldc/levels.h"
+#include "trace/ldc/trace.h"
 
 #include <float.h>
 
@@ -36,7 +36,7 @@ static const struct form {
 
 struct fixture {
     struct scene *scene;
-    struct scene_gpu gpu; /* has the materials, and no geometry that a tracer would see */
+    struct gpu_scene gpu; /* has the materials, and no geometry that a tracer would see */
     struct ldc_store store;
     struct ldc_samples samples[TRACER_CUBES_MAX];
 };
@@ -51,15 +51,15 @@ static inline void fixture_init(struct fixture *fixture, struct scene *scene)
     struct error error = {0};
     struct scene_changes changes;
     *fixture = (struct fixture){.scene = scene ? scene : test_scene_create()};
-    scene_gpu_init(&fixture->gpu, device);
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, NULL, &changes, NULL, &error), &error);
+    gpu_scene_init(&fixture->gpu, device);
+    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, NULL, &changes, NULL, &error), &error);
     ldc_store_init(&fixture->store, device);
 }
 
 static inline void fixture_finish(struct fixture *fixture)
 {
     ldc_store_finish(&fixture->store);
-    scene_gpu_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
     for (int i = 0; i < TRACER_CUBES_MAX; i++)
         free(fixture->samples[i].list);
@@ -97,7 +97,7 @@ struct walk {
 static inline bool walk_wave(void *user, const struct wave *wave, struct error *error)
 {
     const struct walk *walk = user;
-    scene_gpu_bind(&walk->fixture->gpu);
+    gpu_scene_bind(&walk->fixture->gpu);
     return ldc_trace(&walk->fixture->store, &walk->fixture->gpu, wave, walk->options, error);
 }
 

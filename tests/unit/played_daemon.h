@@ -5,7 +5,7 @@
 
 #include "lib/scene.h"
 
-#include "protocol/sealed_link.h"
+#include "protocol/sealed/link.h"
 
 #include <poll.h>
 #include <pthread.h>

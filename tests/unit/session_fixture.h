@@ -5,7 +5,7 @@
 #define FARLIGHT_TESTS_SESSION_FIXTURE_H
 
 #include "base/sys.h"
-#include "protocol/sealed_link.h"
+#include "protocol/sealed/link.h"
 #include "session/daemon.h"
 
 #include <errno.h>

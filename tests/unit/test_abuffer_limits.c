@@ -6,8 +6,8 @@
 #include "stack_scene.h"
 
 #include "gpu/registry.h"
-#include "shared/abuffer_build.h"
-#include "trace/abuffer_build_state.h"
+#include "abuffer/layout.h"
+#include "trace/abuffer/build_state.h"
 
 #include <epoxy/gl.h>
 
@@ -158,7 +158,7 @@ static enum tracer_progress build_in_units(struct fixture *fixture, uint32_t res
             gpu_buffer_bind_texels(device, &fixture->gpu.positions, unit, GL_R32UI);
             gpu_buffer_bind_storage(&fixture->gpu.positions, unit);
         }
-        progress = abuffer_build_piece(fixture->builder, 0, &error);
+        progress = abuffer_build_step(fixture->builder, 0, &error);
     }
     expect_ok(progress != TRACER_FAILED, &error);
     return progress;
@@ -428,7 +428,7 @@ static void a_build_again_allocates_nothing(void **state)
         assert_int_equal(gpu_registry_count(device->registry, GPU_BUFFER), buffers);
     }
     /* All that it takes is told. */
-    assert_int_equal(used - before - scene_gpu_device_bytes(&fixture.gpu), own);
+    assert_int_equal(used - before - gpu_scene_device_bytes(&fixture.gpu), own);
     fixture_finish(&fixture);
     assert_int_equal(device->memory_used_bytes, before);
     assert_int_equal(gpu_registry_count(device->registry, GPU_BUFFER), buffers_before);

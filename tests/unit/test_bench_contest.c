@@ -39,7 +39,7 @@ static void liar_destroy(struct tracer *tracer)
     free(tracer);
 }
 
-static enum tracer_progress liar_update(struct tracer *tracer, struct scene_gpu *gpu,
+static enum tracer_progress liar_update(struct tracer *tracer, struct gpu_scene *gpu,
                                         const struct scene_changes *changes, struct stage_times *times,
                                         struct error *error)
 {
@@ -48,7 +48,7 @@ static enum tracer_progress liar_update(struct tracer *tracer, struct scene_gpu 
 }
 
 /* Every hundredth hit is told wrong. */
-static bool liar_trace(struct tracer *tracer, struct scene_gpu *gpu, const struct wave *wave, struct error *error)
+static bool liar_trace(struct tracer *tracer, struct gpu_scene *gpu, const struct wave *wave, struct error *error)
 {
     static struct hit hits[RAYS];
     if (!tracer_trace(honest, gpu, wave, error) || lie == LIE_NONE)

@@ -25,7 +25,7 @@ static const float centres_radii[2][4] = {{0, 0, 0, 1}, {2.5f, 0.7f, 0.4f, 0.8f}
 
 struct stage {
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct gpu_buffer rays, answers;
     struct ray *cast;
 };
@@ -89,8 +89,8 @@ static void begin(struct stage *stage)
     struct scene_changes changes;
     *stage = (struct stage){.scene = two_spheres(), .cast = malloc(RAYS * sizeof *stage->cast)};
     cast_rays(stage->cast);
-    scene_gpu_init(&stage->gpu, device);
-    must(scene_gpu_update(&stage->gpu, stage->scene, NULL, &changes, NULL, &error) &&
+    gpu_scene_init(&stage->gpu, device);
+    must(gpu_scene_update(&stage->gpu, stage->scene, NULL, &changes, NULL, &error) &&
              gpu_buffer_upload(device, &stage->rays, stage->cast, RAYS * sizeof *stage->cast, &error) &&
              gpu_buffer_reserve(device, &stage->answers, RAYS * sizeof(struct hit), &error),
          &error);
@@ -100,7 +100,7 @@ static void end(struct stage *stage)
 {
     gpu_buffer_finish(device, &stage->rays);
     gpu_buffer_finish(device, &stage->answers);
-    scene_gpu_finish(&stage->gpu);
+    gpu_scene_finish(&stage->gpu);
     scene_destroy(stage->scene);
     free(stage->cast);
 }
@@ -122,7 +122,7 @@ static void trace(struct stage *stage, struct tracer *tracer, enum wave_kind kin
                               .rays = &stage->rays,
                               .hits = &stage->answers,
                               .visibility = &stage->answers};
-    scene_gpu_bind(&stage->gpu);
+    gpu_scene_bind(&stage->gpu);
     must(tracer_trace(tracer, &stage->gpu, &wave, &error), &error);
     gpu_buffer_read(device, &stage->answers, 0, answers, bytes);
 }

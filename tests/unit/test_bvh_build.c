@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-#include "trace/bvh_build.h"
-#include "trace/bvh_build_top.h"
+#include "trace/bvh/build.h"
+#include "trace/bvh/build_top.h"
 
 #include "base/progress.h"
 
@@ -792,7 +792,7 @@ static void an_instance_that_leaves_the_grid_needs_a_new_top_tree(void **state)
     }
 }
 
-/* What overflows gets a box of all numbers (trace/bvh.c). A new tree would be no better. */
+/* What overflows gets a box of all numbers (trace/bvh/tracer.c). A new tree would be no better. */
 static void a_top_tree_over_an_endless_instance_is_not_stale_when_new(void **state)
 {
     (void)state;

@@ -6,8 +6,8 @@
 #include "gpu/device.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
-#include "trace/bvh.h"
-#include "trace/scene_gpu.h"
+#include "trace/bvh/tracer.h"
+#include "gpu_scene/scene.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -23,7 +23,7 @@ static struct gpu_device *device;
 
 struct fixture {
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct test_edits edits;
     struct tracer *tracer;
     struct scene_changes changes; /* of the last update */
@@ -40,7 +40,7 @@ static void update(struct fixture *fixture)
     struct error error = {0};
     if (fixture->edits.count > 0)
         test_commit(&fixture->edits);
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, NULL, &fixture->changes, NULL, &error), &error);
+    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, NULL, &fixture->changes, NULL, &error), &error);
     expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &fixture->changes, NULL, &error), &error);
 }
 
@@ -48,7 +48,7 @@ static void fixture_init(struct fixture *fixture, struct scene *scene, const str
 {
     struct error error = {0};
     *fixture = (struct fixture){.scene = scene, .edits = {.scene = scene}};
-    scene_gpu_init(&fixture->gpu, device);
+    gpu_scene_init(&fixture->gpu, device);
     fixture->tracer = tracer_create(&tracer_bvh_impl, device, options, &error);
     expect_ok(fixture->tracer != NULL, &error);
     update(fixture);
@@ -57,7 +57,7 @@ static void fixture_init(struct fixture *fixture, struct scene *scene, const str
 static void fixture_finish(struct fixture *fixture)
 {
     tracer_destroy(fixture->tracer);
-    scene_gpu_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
 }
 
@@ -140,7 +140,7 @@ static void *trace(struct fixture *fixture, const struct ray *rays, enum wave_ki
     expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof *rays, &error) &&
                   gpu_buffer_reserve(device, &answers, bytes, &error),
               &error);
-    scene_gpu_bind(&fixture->gpu);
+    gpu_scene_bind(&fixture->gpu);
     const struct wave wave = {
         .kind = kind, .ray_count = RAY_COUNT, .rays = &ray_buffer, .hits = &answers, .visibility = &answers};
     expect_ok(tracer_trace(fixture->tracer, &fixture->gpu, &wave, &error), &error);

@@ -6,8 +6,8 @@
 #include "gpu/device.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
-#include "trace/bvh.h"
-#include "trace/scene_gpu.h"
+#include "trace/bvh/tracer.h"
+#include "gpu_scene/scene.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -23,7 +23,7 @@ static struct gpu_device *device;
 
 struct fixture {
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct tracer *tracer;
 };
 
@@ -88,7 +88,7 @@ static void pose(struct fixture *fixture, float open, float close)
     test_motion_init(&motion, open == close ? 1 : 2);
     for (uint32_t p = 0; p < motion.pose_count; p++)
         test_pose_weights(&motion.poses[p], NODE, (const float[]){p == 0 ? open : close}, 1);
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, &motion, &changes, NULL, &error), &error);
+    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, &motion, &changes, NULL, &error), &error);
     expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &changes, NULL, &error), &error);
     scene_motion_finish(&motion);
 }
@@ -97,7 +97,7 @@ static void fixture_init(struct fixture *fixture, const struct tracer_options *o
 {
     struct error error = {0};
     *fixture = (struct fixture){.scene = scene_of_soup()};
-    scene_gpu_init(&fixture->gpu, device);
+    gpu_scene_init(&fixture->gpu, device);
     fixture->tracer = tracer_create(&tracer_bvh_impl, device, options, &error);
     expect_ok(fixture->tracer != NULL, &error);
     pose(fixture, first, first);
@@ -106,7 +106,7 @@ static void fixture_init(struct fixture *fixture, const struct tracer_options *o
 static void fixture_finish(struct fixture *fixture)
 {
     tracer_destroy(fixture->tracer);
-    scene_gpu_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
 }
 
@@ -140,7 +140,7 @@ static struct hit *trace(struct fixture *fixture, struct tracer *tracer, bool ti
                   gpu_buffer_upload(device, &times, ray_times, RAY_COUNT * sizeof *ray_times, &error) &&
                   gpu_buffer_reserve(device, &answers, RAY_COUNT * sizeof *hits, &error),
               &error);
-    scene_gpu_bind(&fixture->gpu);
+    gpu_scene_bind(&fixture->gpu);
     const struct wave wave = {
         .ray_count = RAY_COUNT, .rays = &ray_buffer, .hits = &answers, .times = timed ? &times : NULL};
     expect_ok(tracer_trace(tracer, &fixture->gpu, &wave, &error), &error);

@@ -6,8 +6,8 @@
 #include "gpu/device.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
-#include "trace/bvh.h"
-#include "trace/scene_gpu.h"
+#include "trace/bvh/tracer.h"
+#include "gpu_scene/scene.h"
 #include "trace/tracer.h"
 
 #include <setjmp.h>
@@ -22,7 +22,7 @@ static struct gpu_device *device;
 
 struct fixture {
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct test_edits edits;
     struct tracer *tracer;
 };
@@ -39,7 +39,7 @@ static void update(struct fixture *fixture)
     struct scene_changes changes;
     if (fixture->edits.count > 0)
         test_commit(&fixture->edits);
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, NULL, &changes, NULL, &error), &error);
+    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, NULL, &changes, NULL, &error), &error);
     expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &changes, NULL, &error), &error);
 }
 
@@ -47,7 +47,7 @@ static void fixture_init(struct fixture *fixture, struct scene *scene, const str
 {
     struct error error = {0};
     *fixture = (struct fixture){.scene = scene, .edits = {.scene = scene}};
-    scene_gpu_init(&fixture->gpu, device);
+    gpu_scene_init(&fixture->gpu, device);
     fixture->tracer = tracer_create(&tracer_bvh_impl, device, options, &error);
     expect_ok(fixture->tracer != NULL, &error);
     update(fixture);
@@ -56,7 +56,7 @@ static void fixture_init(struct fixture *fixture, struct scene *scene, const str
 static void fixture_finish(struct fixture *fixture)
 {
     tracer_destroy(fixture->tracer);
-    scene_gpu_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
 }
 
@@ -129,7 +129,7 @@ static void an_edit_of_something_else_costs_nothing(void **state)
 
 /* ---- against brute force ---- */
 
-static struct hit *trace(struct scene_gpu *gpu, const struct tracer_impl *impl,
+static struct hit *trace(struct gpu_scene *gpu, const struct tracer_impl *impl,
                          const struct tracer_options *options, const struct ray *rays)
 {
     struct error error = {0};
@@ -139,7 +139,7 @@ static struct hit *trace(struct scene_gpu *gpu, const struct tracer_impl *impl,
     expect_ok(tracer && tracer_update(tracer, gpu, &everything, NULL, &error), &error);
     expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(struct ray), &error), &error);
     expect_ok(gpu_buffer_reserve(device, &hit_buffer, RAY_COUNT * sizeof(struct hit), &error), &error);
-    scene_gpu_bind(gpu);
+    gpu_scene_bind(gpu);
     const struct wave wave = {.ray_count = RAY_COUNT, .rays = &ray_buffer, .hits = &hit_buffer};
     expect_ok(tracer_trace(tracer, gpu, &wave, &error), &error);
     struct hit *hits = malloc(RAY_COUNT * sizeof(struct hit));
@@ -162,11 +162,11 @@ static void expect_like_brute_force(struct scene *scene, const struct ray *rays,
         {.bvh_layout = BVH_LAYOUT_PLAIN}, {.bvh_rays_together = 3},
         {.bvh_rays_together = 4},         {.bvh_rays_together = 8},
     };
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct error error = {0};
     struct scene_changes changes;
-    scene_gpu_init(&gpu, device);
-    expect_ok(scene_gpu_update(&gpu, scene, NULL, &changes, NULL, &error), &error);
+    gpu_scene_init(&gpu, device);
+    expect_ok(gpu_scene_update(&gpu, scene, NULL, &changes, NULL, &error), &error);
     struct hit *expected = trace(&gpu, &tracer_naive_impl, NULL, rays);
     uint32_t hit_count = 0;
     for (uint32_t i = 0; i < RAY_COUNT; i++)
@@ -184,7 +184,7 @@ static void expect_like_brute_force(struct scene *scene, const struct ray *rays,
         free(hits);
     }
     free(expected);
-    scene_gpu_finish(&gpu);
+    gpu_scene_finish(&gpu);
     scene_destroy(scene);
 }
 

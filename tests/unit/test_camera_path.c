@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The camera of a frame, against what geometry says about it. */
-#include "job/shot.h"
+#include "engine/shot.h"
 
 #include <math.h>
 #include <setjmp.h>

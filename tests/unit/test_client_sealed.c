@@ -3,7 +3,7 @@
  * with another, and with somebody on the way. */
 #include "tests/unit/played_daemon.h"
 
-#include "protocol/sealed_key.h"
+#include "protocol/sealed/key.h"
 
 static char key_file[64];
 static struct sealed_key key;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Many threads encode, and still a stream is one: each picture by what is different from the one before. */
-#include "job/encode_pool.h"
+#include "engine/encode_pool.h"
 
 #include "h264_player.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The engine with the real renderer: frames of clients that take turns are those that each would get alone. */
-#include "job/backend.h"
-#include "job/view_wishes.h"
+#include "engine/backend.h"
+#include "engine/view_wishes.h"
 
 #include <poll.h>
 #include <setjmp.h>
@@ -31,7 +31,7 @@ static struct {
     atomic_bool gate;
 } watched;
 
-static enum tracer_progress watched_update(struct tracer *tracer, struct scene_gpu *scene,
+static enum tracer_progress watched_update(struct tracer *tracer, struct gpu_scene *scene,
                                            const struct scene_changes *changes, struct stage_times *times,
                                            struct error *error)
 {
@@ -41,7 +41,7 @@ static enum tracer_progress watched_update(struct tracer *tracer, struct scene_g
         while (!atomic_load(&watched.gate))
             poll(NULL, 0, 1);
     }
-    tracer->piece_end_ns = 0; /* the least that it can be cut to */
+    tracer->step_end_ns = 0; /* the least that it can be cut to */
     enum tracer_progress progress = tracer_bvh_impl.update(tracer, scene, changes, times, error);
     if (goes_on || progress == TRACER_MORE) {
         watched.building = progress == TRACER_MORE ? tracer : NULL;

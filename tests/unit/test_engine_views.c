@@ -5,7 +5,7 @@
 
 #include "base/clock.h"
 #include "encode/stream.h"
-#include "job/engine_private.h"
+#include "engine/engine_private.h"
 
 #define MS UINT64_C(1000000)
 

@@ -215,7 +215,7 @@ static void a_program_is_compiled_once_for_each_set_of_defines(void **state)
     struct error error = {0};
     const struct gpu_define closest[] = {{"TRAVERSE", "\"naive/traverse.glsl\""}, {0}};
     const struct gpu_define any[] = {{"TRAVERSE", "\"naive/traverse.glsl\""}, {"ANY_HIT", "1"}, {0}};
-    struct gpu_program_source source = {.compute = "trace.comp", .defines = closest};
+    struct gpu_program_source source = {.compute = "trace/wave.comp", .defines = closest};
     const struct gpu_program *first = gpu_program_get(device, &source, &error);
     expect_no_error(&error);
     assert_ptr_equal(gpu_program_get(device, &source, &error), first);
@@ -231,10 +231,10 @@ static void a_shader_that_does_not_compile_says_where(void **state)
     struct error error = {0};
     const struct gpu_define defines[] = {
         {"TRAVERSE", "\"naive/traverse.glsl\""}, {"trace_ray", "no such (type"}, {0}};
-    const struct gpu_program_source source = {.compute = "trace.comp", .defines = defines};
+    const struct gpu_program_source source = {.compute = "trace/wave.comp", .defines = defines};
     assert_null(gpu_program_get(device, &source, &error));
     assert_int_equal(error.kind, ERROR_INTERNAL);
-    assert_string_equal(error.field, "trace.comp");
+    assert_string_equal(error.field, "trace/wave.comp");
     assert_non_null(strstr(error.text, "common/candidate.glsl"));
     error = (struct error){0};
     assert_null(gpu_program_get(device, &(struct gpu_program_source){.compute = "no/such.comp"}, &error));
@@ -250,7 +250,7 @@ static void more_groups_than_an_axis_takes_are_all_run(void **state)
     uint32_t groups_max = device->facts.work_groups_max;
     const uint32_t count = 64 * 300 + 1;
     const struct gpu_define defines[] = {{"TRAVERSE", "\"naive/traverse.glsl\""}, {"ANY_HIT", "1"}, {0}};
-    const struct gpu_program_source source = {.compute = "trace.comp", .defines = defines};
+    const struct gpu_program_source source = {.compute = "trace/wave.comp", .defines = defines};
     const struct gpu_program *program = gpu_program_get(device, &source, &error);
     assert_non_null(program);
     assert_true(gpu_buffer_reserve(device, &rays, count * 32, &error));
@@ -352,7 +352,7 @@ static uint64_t compile_with_cache_ns(const char *home)
 {
     struct error error = {0};
     const struct gpu_define defines[] = {{"TRAVERSE", "\"naive/traverse.glsl\""}, {"HAS_CUTOUT", "1"}, {0}};
-    const struct gpu_program_source source = {.compute = "trace.comp", .defines = defines};
+    const struct gpu_program_source source = {.compute = "trace/wave.comp", .defines = defines};
     gpu_device_destroy(device);
     setenv("XDG_CACHE_HOME", home, 1);
     device = gpu_device_create(&(struct gpu_options){.index = -1, .debug = true}, &error);

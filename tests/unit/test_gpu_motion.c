@@ -7,7 +7,7 @@
 #include "scene/affine.h"
 #include "shared/light.h"
 #include "shared/material.h"
-#include "trace/scene_gpu.h"
+#include "gpu_scene/scene.h"
 #include "trace/tracer.h"
 
 #include <setjmp.h>
@@ -20,7 +20,7 @@ static struct gpu_device *device;
 
 struct fixture {
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct scene_changes changes;
     struct test_edits edits;
 };
@@ -29,7 +29,7 @@ struct fixture {
 static void update(struct fixture *fixture, struct scene_motion *motion)
 {
     struct error error = {0};
-    bool ok = scene_gpu_update(&fixture->gpu, fixture->scene, motion, &fixture->changes, NULL, &error);
+    bool ok = gpu_scene_update(&fixture->gpu, fixture->scene, motion, &fixture->changes, NULL, &error);
     assert_string_equal(error.text, "");
     assert_true(ok);
     if (motion)
@@ -39,13 +39,13 @@ static void update(struct fixture *fixture, struct scene_motion *motion)
 static void fixture_init(struct fixture *fixture, struct scene *scene)
 {
     *fixture = (struct fixture){.scene = scene, .edits = {.scene = scene}};
-    scene_gpu_init(&fixture->gpu, device);
+    gpu_scene_init(&fixture->gpu, device);
     update(fixture, NULL);
 }
 
 static void fixture_finish(struct fixture *fixture)
 {
-    scene_gpu_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
 }
 
@@ -60,7 +60,7 @@ static void expect_changes(const struct fixture *fixture, const char *expected)
     assert_string_equal(text, expected);
 }
 
-static const struct scene_gpu_geometry *geometry_of(const struct fixture *fixture, uint32_t node)
+static const struct gpu_scene_geometry *geometry_of(const struct fixture *fixture, uint32_t node)
 {
     for (uint32_t i = 0; i < fixture->gpu.instance_count; i++)
         if (fixture->gpu.instances[i].node == node)
@@ -165,7 +165,7 @@ static void expect_vertices(const struct fixture *fixture, const struct scene_po
                             bool closes)
 {
     const struct scene_node *node = scene_node(fixture->scene, node_id);
-    const struct scene_gpu_geometry *gpu_geometry = geometry_of(fixture, node_id);
+    const struct gpu_scene_geometry *gpu_geometry = geometry_of(fixture, node_id);
     const struct geometry *geometry = &gpu_geometry->device;
     size_t count = geometry->vertex_count;
     float(*positions)[4] = malloc(count * sizeof(*positions)), (*normals)[4] = malloc(count * sizeof(*normals));
@@ -342,7 +342,7 @@ static void vertices_have_a_new_revision_after_an_update_that_failed(void **stat
     test_soup_mesh(&fixture.edits, 1, 5000, 0.4f, 99);
     test_commit(&fixture.edits);
     test_motion_init(&motion, 1);
-    assert_false(scene_gpu_update(&fixture.gpu, fixture.scene, &motion, &fixture.changes, NULL, &error));
+    assert_false(gpu_scene_update(&fixture.gpu, fixture.scene, &motion, &fixture.changes, NULL, &error));
     scene_motion_finish(&motion);
     device->memory_limit_bytes = limit_bytes;
     update(&fixture, NULL);
@@ -409,7 +409,7 @@ static void an_instance_is_bounded_wherever_it_goes(void **state)
     for (uint32_t i = 0; i < fixture.gpu.instance_count; i++) {
         const struct instance *instance = &fixture.gpu.instances[i];
         float lower[3], upper[3];
-        scene_gpu_instance_bounds(&fixture.gpu, i, lower, upper);
+        gpu_scene_instance_bounds(&fixture.gpu, i, lower, upper);
         assert_int_equal(instance->flags >> INSTANCE_POSES_SHIFT & INSTANCE_POSES_MASK, 5);
         for (uint32_t p = 0; p < 5; p++) {
             const struct scene_mesh *mesh = scene_mesh(fixture.scene, 10);
@@ -476,7 +476,7 @@ static void more_moving_instances_than_the_device_holds_are_refused(void **state
     uint64_t texels_max = device->facts.texture_buffer_texels_max;
     device->facts.texture_buffer_texels_max = MANY * 5 * MOTION_TEXELS - 1;
     motion_of_many(&motion, 5, 0);
-    assert_false(scene_gpu_update(&fixture.gpu, fixture.scene, &motion, &fixture.changes, NULL, &error));
+    assert_false(gpu_scene_update(&fixture.gpu, fixture.scene, &motion, &fixture.changes, NULL, &error));
     assert_int_equal(error.kind, ERROR_LIMIT);
     device->facts.texture_buffer_texels_max++;
     update(&fixture, &motion);
@@ -526,7 +526,7 @@ static void the_reference_refuses_what_turns_flat_between_two_poses(void **state
             test_transform(m, 1, 1, 1, 1, 3.14159265f * (float)p / (float)(poses - 1), 1, 2, 3);
             test_pose_node(&motion.poses[p], 1, m);
         }
-        assert_true(scene_gpu_update(&fixture.gpu, fixture.scene, &motion, &fixture.changes, NULL, &error));
+        assert_true(gpu_scene_update(&fixture.gpu, fixture.scene, &motion, &fixture.changes, NULL, &error));
         assert_int_equal(tracer_update(reference, &fixture.gpu, &fixture.changes, NULL, &error), poses > 2);
         if (poses == 2) {
             assert_int_equal(error.kind, ERROR_UNSUPPORTED);

@@ -5,7 +5,7 @@
 #include "gpu/device.h"
 #include "shared/light.h"
 #include "shared/material.h"
-#include "trace/scene_gpu.h"
+#include "gpu_scene/scene.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -17,7 +17,7 @@ static struct gpu_device *device;
 
 struct fixture {
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct scene_changes changes;
     struct test_edits edits;
 };
@@ -25,7 +25,7 @@ struct fixture {
 static void update(struct fixture *fixture)
 {
     struct error error = {0};
-    bool ok = scene_gpu_update(&fixture->gpu, fixture->scene, NULL, &fixture->changes, NULL, &error);
+    bool ok = gpu_scene_update(&fixture->gpu, fixture->scene, NULL, &fixture->changes, NULL, &error);
     assert_string_equal(error.text, "");
     assert_true(ok);
 }
@@ -33,14 +33,14 @@ static void update(struct fixture *fixture)
 static void fixture_init(struct fixture *fixture, struct scene *scene)
 {
     *fixture = (struct fixture){.scene = scene, .edits = {.scene = scene}};
-    scene_gpu_init(&fixture->gpu, device);
+    gpu_scene_init(&fixture->gpu, device);
     update(fixture);
 }
 
 static void fixture_finish(struct fixture *fixture)
 {
-    scene_gpu_finish(&fixture->gpu);
-    scene_gpu_finish(&fixture->gpu); /* empty already */
+    gpu_scene_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu); /* empty already */
     scene_destroy(fixture->scene);
 }
 
@@ -59,7 +59,7 @@ static void the_first_update_uploads_everything_and_the_next_nothing(void **stat
     fixture_init(&fixture, test_scene_translucent());
     expect_changes(&fixture, true, true, true, true);
     assert_in_range(fixture.changes.uploaded_bytes, 60 * 16 + 180 * 16 * 3, UINT64_MAX);
-    assert_in_range(scene_gpu_device_bytes(&fixture.gpu), fixture.changes.uploaded_bytes, UINT64_MAX);
+    assert_in_range(gpu_scene_device_bytes(&fixture.gpu), fixture.changes.uploaded_bytes, UINT64_MAX);
     update(&fixture);
     expect_changes(&fixture, false, false, false, false);
     assert_int_equal(fixture.changes.uploaded_bytes, 0);
@@ -288,12 +288,12 @@ static void a_scene_beyond_the_device_is_refused_and_the_next_update_starts_anew
     test_soup_mesh(&fixture.edits, 10, 200, 0.1f, 3);
     test_commit(&fixture.edits);
     device->facts.texture_buffer_texels_max = 300;
-    assert_false(scene_gpu_update(&fixture.gpu, fixture.scene, NULL, &fixture.changes, NULL, &error));
+    assert_false(gpu_scene_update(&fixture.gpu, fixture.scene, NULL, &fixture.changes, NULL, &error));
     device->facts.texture_buffer_texels_max = max;
     assert_int_equal(error.kind, ERROR_LIMIT);
     assert_string_equal(error.text, "600 vertices; this device's texel buffers hold at most 300");
     assert_int_equal(fixture.gpu.instance_count, 0);
-    assert_int_equal(scene_gpu_device_bytes(&fixture.gpu), 0);
+    assert_int_equal(gpu_scene_device_bytes(&fixture.gpu), 0);
     update(&fixture);
     expect_changes(&fixture, true, true, true, true);
     assert_int_equal(fixture.gpu.instance_count, 4);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "job/scheduler.h"
+#include "engine/scheduler.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

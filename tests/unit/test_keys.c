@@ -9,7 +9,7 @@
 
 #include "net/attempts.h"
 #include "net/auth.h"
-#include "protocol/sealed_key.h"
+#include "protocol/sealed/key.h"
 
 #include <fcntl.h>
 #include <stdio.h>

@@ -29,7 +29,7 @@ static void expect_sample(const struct contents *contents, const struct oracle_s
     const struct geometry *g = &scene->gpu->geometries[scene->gpu->instances[expected->instance].geometry].device;
     uint32_t material = g->kind == GEOMETRY_SPHERES ? scene->sphere_materials[expected->primitive]
                                                     : scene->triangles[expected->primitive][3];
-    assert_int_equal(contents->surface[k][2] & LDC_MATERIAL_MASK, material);
+    assert_int_equal(contents->surface[k][2] & SAMPLE_MATERIAL_MASK, material);
     double colour[4] = {1, 1, 1, 1};
     if (g->flags & GEOMETRY_HAS_COLOURS)
         oracle_colour(colour, scene, expected);

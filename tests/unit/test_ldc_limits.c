@@ -5,7 +5,7 @@
 #include "stack_scene.h"
 
 #include "gpu/registry.h"
-#include "trace/ldc_build_state.h"
+#include "trace/ldc/build_state.h"
 
 #define RESOLUTION 32u
 
@@ -323,7 +323,7 @@ static void a_build_again_allocates_nothing(void **state)
             assert_int_equal(gpu_registry_count(device->registry, GPU_BUFFER), buffers);
         }
         /* All that it takes is told. */
-        uint64_t bytes = used - scene_gpu_device_bytes(&fixture.gpu);
+        uint64_t bytes = used - gpu_scene_device_bytes(&fixture.gpu);
         assert_int_equal(bytes, own);
         fixture_finish(&fixture);
         assert_int_equal(device->memory_used_bytes, 0);

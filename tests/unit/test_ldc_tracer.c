@@ -457,7 +457,7 @@ static void a_build_in_pieces_tells_what_it_takes_and_gives_it_back(void **state
             tracer_outdate(tracer);
             enum tracer_progress progress = TRACER_MORE;
             for (uint32_t i = 0; i < pieces && progress == TRACER_MORE; i++) {
-                progress = tracer_update_piece(tracer, &fixture.gpu, &all, 0, &fixture.times, &error);
+                progress = tracer_update_step(tracer, &fixture.gpu, &all, 0, &fixture.times, &error);
                 assert_int_equal(device->memory_used_bytes - others_bytes, tracer->stats.device_bytes);
             }
             expect_ok(progress != TRACER_FAILED, &error);
@@ -471,13 +471,13 @@ static void a_build_in_pieces_tells_what_it_takes_and_gives_it_back(void **state
         }
         expect_distance(distance_below(&fixture, 4, 0), 9.5);
         tracer_outdate(tracer);
-        assert_int_equal(tracer_update_piece(tracer, &fixture.gpu, &all, 0, &fixture.times, &error), TRACER_MORE);
+        assert_int_equal(tracer_update_step(tracer, &fixture.gpu, &all, 0, &fixture.times, &error), TRACER_MORE);
         uint64_t limit = device->memory_limit_bytes;
         device->memory_limit_bytes = 1;
         enum tracer_progress progress = TRACER_MORE;
         /* Buffers are there from the build before: what this one needs anew are its cells. */
         while (progress == TRACER_MORE)
-            progress = tracer_update_piece(tracer, &fixture.gpu, &all, 0, &fixture.times, &error);
+            progress = tracer_update_step(tracer, &fixture.gpu, &all, 0, &fixture.times, &error);
         device->memory_limit_bytes = limit;
         assert_int_equal(progress, TRACER_FAILED);
         assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
@@ -501,7 +501,7 @@ static void rays_that_have_times_are_refused_where_something_moves(void **state)
     expect_ok(gpu_buffer_upload(device, &times, &time, sizeof(time), &error), &error);
     expect_ok(gpu_buffer_reserve(device, &hits, sizeof(struct hit), &error), &error);
     const struct wave wave = {.ray_count = 1, .rays = &rays, .hits = &hits, .times = &times};
-    scene_gpu_bind(&fixture.gpu);
+    gpu_scene_bind(&fixture.gpu);
     expect_ok(tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error), &error); /* nothing moves */
     float m[12];
     test_motion_init(&fixture.motion, 2);
@@ -510,7 +510,7 @@ static void rays_that_have_times_are_refused_where_something_moves(void **state)
         test_pose_node(&fixture.motion.poses[p], 1, m);
     }
     update(&fixture);
-    scene_gpu_bind(&fixture.gpu);
+    gpu_scene_bind(&fixture.gpu);
     assert_false(tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error));
     assert_int_equal(error.kind, ERROR_UNSUPPORTED);
     assert_string_equal(error.field, "shutter");
@@ -531,7 +531,7 @@ static void a_tracer_that_was_away_builds_what_has_changed_meanwhile(void **stat
     struct error error = {0};
     struct scene_changes changes;
     fixture.edits.scene = fixture.scene;
-    scene_gpu_init(&fixture.gpu, device);
+    gpu_scene_init(&fixture.gpu, device);
     static const struct {
         unsigned tracer;
         bool moves, static_cube, dynamic_cube;
@@ -545,7 +545,7 @@ static void a_tracer_that_was_away_builds_what_has_changed_meanwhile(void **stat
             add_box(&fixture.edits, 1, 1, 0, 0, 0.5f * (float)i);
             test_commit(&fixture.edits);
         }
-        expect_ok(scene_gpu_update(&fixture.gpu, fixture.scene, NULL, &changes, NULL, &error), &error);
+        expect_ok(gpu_scene_update(&fixture.gpu, fixture.scene, NULL, &changes, NULL, &error), &error);
         tracer_set_note(&set, &changes);
         stage_times_begin(&fixture.times);
         fixture.tracer = tracer_set_take(&set, device, tracer_impl_by_number(frames[i].tracer), &options, &error);

@@ -13,8 +13,8 @@
 #include <cmocka.h>
 #include <sodium.h>
 
-#include "protocol/sealed.h"
-#include "protocol/sealed_link.h"
+#include "protocol/sealed/sealed.h"
+#include "protocol/sealed/link.h"
 
 #define GOLDEN_PATH "tests/unit/golden/sealed.hex"
 #define TRAFFIC_BYTES ((size_t)1 << 20)

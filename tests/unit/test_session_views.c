@@ -7,7 +7,7 @@
 
 #include "base/clock.h"
 #include "base/queue.h"
-#include "job/view_wishes.h"
+#include "engine/view_wishes.h"
 
 #define CHANNEL 5u
 #define FRAME_BYTES ((size_t)300001)        /* two pieces, the last of odd size */

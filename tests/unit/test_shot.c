@@ -3,7 +3,7 @@
 #include "engine_fake.h"
 #include "scene_drafts.h"
 
-#include "job/shot.h"
+#include "engine/shot.h"
 
 #include <math.h>
 

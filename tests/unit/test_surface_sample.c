@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The four words in which a sampled tracer stores a surface: the bits are where shaders/shared/ldc.h says, and
- * what is read back is what was stored, to their steps. */
+/* The four words in which a sampled tracer stores a surface: the bits are where shaders/shared/surface_sample.h
+ * says, and what is read back is what was stored, to their steps. */
 #include "gpu/buffer.h"
 #include "gpu/device.h"
 #include "gpu/program.h"
 #include "gpu/program_source.h"
 #include "shared/bindings.h"
-#include "shared/ldc.h"
+#include "shared/surface_sample.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -184,7 +184,7 @@ static void what_is_read_back_is_what_was_stored(void **state)
         assert_float_equal(out->transmission, in->transmission, 0.5f / 15 + 1e-6f);
         assert_float_equal(out->roughness, in->roughness, 0.5f / 255 + 1e-6f);
         assert_float_equal(out->occlusion, in->occlusion, 0.5f / 255 + 1e-6f);
-        assert_int_equal(out->material, in->material & LDC_MATERIAL_MASK);
+        assert_int_equal(out->material, in->material & SAMPLE_MATERIAL_MASK);
         assert_float_equal(out->part_alpha, out->base_colour[3], 1e-6f);
         assert_float_equal(out->part_transmission, out->transmission, 0);
         assert_int_equal(out->part_material, out->material);

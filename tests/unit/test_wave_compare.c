@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "trace/wave_compare.h"
+#include "render/compare/rays.h"
 
 #include <math.h>
 #include <stdlib.h>

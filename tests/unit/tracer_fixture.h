@@ -7,12 +7,12 @@
 #include "tests/accuracy/test_scenes.h"
 #include "tests/unit/device_fixture.h"
 
-#include "trace/scene_gpu.h"
+#include "gpu_scene/scene.h"
 #include "trace/tracer.h"
 
 struct fixture {
     struct scene *scene;
-    struct scene_gpu gpu;
+    struct gpu_scene gpu;
     struct test_edits edits;
     struct tracer *tracer;
     struct stage_times times; /* of the last update */
@@ -27,7 +27,7 @@ static inline bool try_update(struct fixture *fixture, struct error *error)
     if (fixture->edits.count > 0)
         test_commit(&fixture->edits);
     const struct scene_motion *motion = fixture->motion.pose_count ? &fixture->motion : NULL;
-    expect_ok(scene_gpu_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, error), error);
+    expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, error), error);
     stage_times_begin(&fixture->times);
     return tracer_update(fixture->tracer, &fixture->gpu, &changes, &fixture->times, error);
 }
@@ -45,7 +45,7 @@ static inline void fixture_init_by(struct fixture *fixture, unsigned number, str
     struct error error = {0};
     *fixture = (struct fixture){
         .scene = scene, .edits = {.scene = scene}, .memory_before_bytes = device->memory_used_bytes};
-    scene_gpu_init(&fixture->gpu, device);
+    gpu_scene_init(&fixture->gpu, device);
     fixture->tracer = tracer_create(tracer_impl_by_number(number), device, options, &error);
     expect_ok(fixture->tracer != NULL, &error);
     update(fixture);
@@ -55,7 +55,7 @@ static inline void fixture_init_by(struct fixture *fixture, unsigned number, str
 static inline void fixture_finish(struct fixture *fixture)
 {
     tracer_destroy(fixture->tracer);
-    scene_gpu_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu);
     scene_motion_finish(&fixture->motion);
     scene_destroy(fixture->scene);
     assert_int_equal(device->memory_used_bytes, fixture->memory_before_bytes);
@@ -64,7 +64,7 @@ static inline void fixture_finish(struct fixture *fixture)
 static inline bool trace_by_tracer(void *user, const struct wave *wave, struct error *error)
 {
     struct fixture *fixture = user;
-    scene_gpu_bind(&fixture->gpu);
+    gpu_scene_bind(&fixture->gpu);
     return tracer_trace(fixture->tracer, &fixture->gpu, wave, error);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is in a leaf: primitive and instance. Of the instances the last whose first id is not behind (shared/axes.h).
+// What is in a leaf: primitive and instance. Of the instances the last whose first id is not behind (raster/layout.h).
 #include "common/candidate.glsl"
 #include "svo/svo.h"
 

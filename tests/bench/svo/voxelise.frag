@@ -2,11 +2,11 @@
 // Cells that a primitive is in, noted in a list: the one under the middle of the texel, along the axis that the surface
 // leans to most. Such cells of a plane let no path from cell to neighbouring cell through. With planes all cells that
 // it is in under the texel, as a ray asks each for itself: up to three.
-// Defines: those of common/axes_fragment.glsl; SVO_PLANES; SVO_TILES
+// Defines: those of raster/fragment.glsl; SVO_PLANES; SVO_TILES
 
 #include "shared/bindings.h"
-#include "common/axes_fragment.glsl"
-#include "common/axes_image.glsl"
+#include "raster/fragment.glsl"
+#include "raster/image.glsl"
 #include "svo/svo.h"
 
 uniform uint fragments_max;

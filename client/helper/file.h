@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: MIT */
+/* Files in one piece: one that is written appears complete or not at all. */
+#ifndef FARLIGHT_CLIENT_HELPER_FILE_H
+#define FARLIGHT_CLIENT_HELPER_FILE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Writes under a temporary name in the path's folder and renames; on failure nothing is left and `reason` says
+ * why. An existing file is replaced. One at a time. */
+bool file_write(const char *path, const uint8_t *bytes, size_t count, char *reason, size_t reason_bytes);
+/* The same piece by piece. An empty file under a temporary name, open for reading and writing; -1, with `reason`.
+ */
+int file_begin(const char *path, char *reason, size_t reason_bytes);
+/* Without its folder; of the file that was begun last. */
+const char *file_temporary_name(void);
+/* Closes and renames it; on failure nothing is left and `reason` says why. */
+bool file_finish(int fd, const char *path, char *reason, size_t reason_bytes);
+/* Closes it and takes it away. */
+void file_abandon(int fd);
+
+/* How large a file may become: 64 GiB, or a limit of the process that is less (the sandbox would set ours over
+ * it).
+ */
+uint64_t file_bytes_limit(void);
+/* From now on SIGTERM ends the program without leaving a temporary file behind. */
+void file_clean_up_on_end(void);
+
+/* Opens an ordinary file for reading; -1, with `reason`, for anything else: a FIFO holds nobody. */
+int file_open(const char *path, char *reason, size_t reason_bytes);
+/* Reads all of it. *bytes is malloc'ed. */
+bool file_read(int fd, size_t greatest_bytes, uint8_t **bytes, size_t *count, char *reason, size_t reason_bytes);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

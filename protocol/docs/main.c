@@ -1,0 +1,348 @@
+/* SPDX-License-Identifier: MIT */
+/* Prints the document of the wire format, in Markdown: from the table, from the prose in the file that is its
+ * argument, and from the messages of docgen_example.c. */
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "protocol/describe.h"
+#include "protocol/docs/example.h"
+#include "protocol/handshake.h"
+#include "protocol/sealed/sealed.h"
+
+static void print_rules(void)
+{
+    printf("# The wire format of farlight, version %u\n\n"
+           "Written from `protocol/messages.def` and `protocol/docs/guide.md`; do not edit.\n\n"
+           "All numbers are little-endian. A connection begins with the handshake; after it both sides send\n"
+           "messages. Lengths are metres, angles radians unless a field says degrees, colours linear Rec. 709,\n"
+           "times nanoseconds. Matrices are 3x4 row-major (rows x, y, z; the fourth column is the translation).\n"
+           "Identifiers are chosen by the client, unique per scene and kind, and never 0.\n\n",
+           HANDSHAKE_VERSION_MAX);
+}
+
+static void print_limits(void)
+{
+    static const struct handshake_limits none;
+    struct handshake_limit limit;
+    unsigned offset = 48;
+    printf("The limits in force at the daemon. What is missing at the end is 0 (not told), what is more is "
+           "skipped.\n\n"
+           "| offset | type | name | limit |\n| ---: | --- | --- | --- |\n");
+    for (size_t i = 0; handshake_limit_at(&none, i, &limit); i++) {
+        printf("| %u | u%u | `%s` | %s |\n", offset, 8 * limit.bytes, limit.name, limit.what);
+        offset += limit.bytes;
+    }
+    printf("\n");
+}
+
+static void print_capabilities(void)
+{
+    printf(
+        "Capabilities are bits; others than these are 0 from who does not know them:\n\n"
+        "| bit | meaning |\n| ---: | --- |\n"
+        "| %d | of a client: it decodes the encoding h264; of a reply: the daemon encodes it, too |\n"
+        "| %d | of a reply: this client may only look, it changes nothing |\n"
+        "| %d | of a reply of version 0: only sealed connections are let in |\n"
+        "| %d | of a client: frames of views may end unfinished, as `frame_end` says; of a reply: they will |\n\n",
+        __builtin_ctzll(HANDSHAKE_CAN_H264), __builtin_ctzll(HANDSHAKE_CAN_READ_ONLY),
+        __builtin_ctzll(HANDSHAKE_NEEDS_KEY), __builtin_ctzll(HANDSHAKE_CAN_ABANDON));
+}
+
+static void print_handshake(void)
+{
+    printf("## Handshake\n\n"
+           "Its layout never changes. The client speaks first, at most %u bytes:\n\n"
+           "| offset | type | field |\n| ---: | --- | --- |\n"
+           "| 0 | 4 bytes | `FARL` |\n"
+           "| 4 | u16 | version_min, at least 1 |\n"
+           "| 6 | u16 | version_max, not below version_min |\n"
+           "| 8 | u64 | capabilities that the client understands |\n"
+           "| 16 | 16 bytes | nonce |\n"
+           "| 32 | u8, bytes | name: at most %u bytes of UTF-8 after their number |\n"
+           "| | | zeros up to a multiple of 8 |\n\n",
+           HANDSHAKE_HELLO_MAX_BYTES, HANDSHAKE_NAME_MAX_BYTES);
+    printf("The reply, at most %u bytes:\n\n"
+           "| offset | type | field |\n| ---: | --- | --- |\n"
+           "| 0 | 4 bytes | `FARL` |\n"
+           "| 4 | u16 | version chosen; 0: none in common, the connection ends |\n"
+           "| 6 | u16 | limits_bytes, at most 256 |\n"
+           "| 8 | u64 | capabilities that both understand |\n"
+           "| 16 | 16 bytes | nonce |\n"
+           "| 32 | 16 bytes | session token |\n"
+           "| 48 | limits_bytes | limits, see below |\n"
+           "| | u8, bytes | name of the daemon: at most %u bytes |\n"
+           "| | u8, bytes | text: why there is no version in common; at most %u bytes |\n"
+           "| | | zeros up to a multiple of 8 |\n\n",
+           HANDSHAKE_REPLY_MAX_BYTES, HANDSHAKE_NAME_MAX_BYTES, HANDSHAKE_TEXT_MAX_BYTES);
+    print_limits();
+    print_capabilities();
+}
+
+static void print_sealed_messages(void)
+{
+    printf(
+        "## Sealed connections\n\n"
+        "Where the daemon has a key (%u random bytes, the same at both ends), a connection may begin with four\n"
+        "messages that prove it and give the connection keys of its own; over a network it has to. Nobody on\n"
+        "the way can then read or change what is said, repeat it, or cut off the end unnoticed. The handshake\n"
+        "and all that follows travel in records as they would go over an open connection, cut anywhere.\n"
+        "Whether a connection is sealed its first byte says: `S` or, of the handshake, `F`. A daemon that lets\n"
+        "only sealed connections in answers the other handshake with version 0 and bit 2 of the capabilities.\n\n",
+        SEALED_KEY_BYTES);
+    printf("| message | from | bytes | layout |\n| ---: | --- | ---: | --- |\n"
+           "| 1 | client | 72 | `SEAL`, u8 1, u8 version (%u), u16 0, X25519 public key (32), nonce (32) |\n"
+           "| 2 | server | 72 | `SEAL`, u8 2, u8 status, u16 0, X25519 public key (32), nonce (32) |\n"
+           "| 3 | client | 64 | `SEAL`, u8 3, u8 0, u16 0, header of its stream (24), proof (32) |\n"
+           "| 4 | server | 64 | `SEAL`, u8 4, u8 status, u16 0, header of its stream (24), proof (32) |\n\n",
+           SEALED_VERSION);
+    printf("Public keys and nonces are random and made for one connection. The client may send records right\n"
+           "behind message 3; what they carry is not looked at before its proof. A status other than 0 ends its\n"
+           "message after 8 bytes, and the connection with it:\n\n| status | meaning |\n| ---: | --- |\n");
+    for (enum sealed_status status = SEALED_WRONG_KEY; status <= SEALED_OTHER_VERSION; status++) {
+        printf("| %d | %s |\n", (int)status, sealed_status_text(status));
+    }
+}
+
+static void print_sealed_keys(void)
+{
+    printf(
+        "\nBLAKE2b is that of RFC 7693, X25519 that of RFC 7748; a key of BLAKE2b is its own key parameter.\n"
+        "With `|` for one after the other:\n\n"
+        "- down | up = BLAKE2b-512(X25519 of the two keys | client's public key | server's public key), 32 bytes\n"
+        "  each (libsodium's crypto_kx). A public key that gives a secret of zeros, or is one's own, is\n"
+        "  refused.\n"
+        "- K(label) = BLAKE2b-256, keyed with the key of the connection, of label | up | down | message 1 |\n"
+        "  message 2. A label is ASCII, with zeros up to 32 bytes.\n"
+        "- Proof of message 3: BLAKE2b-256, keyed with K(`farlight sealed client proof`), of the first 32 bytes\n"
+        "  of message 3.\n"
+        "- Proof of message 4: BLAKE2b-256, keyed with K(`farlight sealed server proof`), of message 3 | the\n"
+        "  first 32 bytes of message 4.\n"
+        "- The streams: libsodium's crypto_secretstream_xchacha20poly1305, begun with the header of message 3\n"
+        "  and K(`farlight sealed client stream`), or that of message 4 and K(`farlight sealed server "
+        "stream`).\n\n");
+    printf(
+        "A record is u32 sealed_bytes and that many bytes: one push of the stream, with those 4 bytes as\n"
+        "additional data. It has 1 to %u bytes of plain text, 17 fewer than sealed, and the tag MESSAGE (0). The\n"
+        "last one of a direction, behind the goodbye, has none and the tag FINAL (3). Anything else, a record\n"
+        "that does not open, and one behind the last, end the connection. A daemon waits before it refuses a\n"
+        "wrong key, and hears no keys for a while from an address that has sent too many.\n\n",
+        SEALED_PLAIN_MAX_BYTES);
+}
+
+static void print_sealed_stream(void)
+{
+    printf(
+        "What crypto_secretstream_xchacha20poly1305 does, for who has no libsodium (ChaCha20 and Poly1305 of RFC\n"
+        "8439, HChaCha20 as in XChaCha20): k = HChaCha20 of K and bytes 0 to 15 of the header; n = its bytes 16 "
+        "to\n"
+        "23; a counter begins at 1. A push has the nonce u32 counter | n and takes, of ChaCha20 with k and it,\n"
+        "the first 32 bytes of block 0 as the key of Poly1305, block 1 for the tag with 63 zeros behind it, and\n"
+        "block 2 and on for the text. Poly1305 goes over the additional data, zeros up to a multiple of 16, the\n"
+        "64 sealed bytes of the tag, the sealed text, as many zeros as the text has bytes beyond a multiple of "
+        "16,\n"
+        "u64 bytes of additional data, u64 64 + bytes of text. The sealed bytes of the record are the first\n"
+        "sealed byte of the tag, the sealed text and those 16 bytes, of which the first 8 are then mixed into n "
+        "by\n"
+        "exclusive or; the counter goes up by 1. (After 2^32 - 1 records libsodium makes new keys.)\n\n");
+}
+
+static void print_framing(void)
+{
+    printf("## Messages in the stream\n\n"
+           "| offset | type | field |\n| ---: | --- | --- |\n"
+           "| 0 | u32 | payload_bytes, without the padding |\n"
+           "| 4 | u16 | type; the top bit marks what a peer that does not know it skips |\n"
+           "| 6 | u16 | flags, 0 |\n"
+           "| 8 | u32 | request: chosen by whoever asks, repeated by the answer; 0: none |\n"
+           "| 12 | u32 | channel |\n"
+           "| %u | | payload, then zeros up to a multiple of 8 |\n\n",
+           FRAMING_HEADER_BYTES);
+    printf("A payload has at most %u bytes, one with bulk data at most %u. An unknown type without the top bit,\n"
+           "other flags, a size outside the type's range and a message that the peer may not send end the\n"
+           "connection.\n\n",
+           CODEC_CONTROL_PAYLOAD_MAX_BYTES, CODEC_BULK_PAYLOAD_MAX_BYTES);
+    printf("## Payload\n\n"
+           "`u16 struct_bytes` (the size of the fixed fields that follow), the fixed fields, packed, then the\n"
+           "counted fields, all in the order of the tables below.\n\n"
+           "- Fixed: u8 u16 u32 u64, f32 (never NaN or infinite), enums as u32, byte arrays.\n"
+           "- string: u32 bytes, then UTF-8 without NUL. No terminator.\n"
+           "- array: u32 count, then the records, each its fixed fields and then its counted ones.\n"
+           "- bulk: u32 bytes, zeros up to a multiple of 8 from the start of the payload, the bytes.\n");
+    printf("- A shorter fixed part, cut between two fields, comes from an older peer: the rest has the value 0,\n"
+           "  or the field's minimum where that is above 0. A longer one comes from a newer peer: the rest is\n"
+           "  skipped.\n"
+           "- All counted fields are present. Bytes after the last one are an error.\n\n");
+}
+
+static void print_enum(const struct enum_desc *desc)
+{
+    printf("### %s\n\n%s\n\n| number | text | meaning |\n| ---: | --- | --- |\n", desc->name, desc->doc);
+    for (size_t i = 0; i < desc->value_count; i++) {
+        printf("| %" PRIu32 " | `%s` | %s |\n", desc->values[i].number, desc->values[i].text, desc->values[i].doc);
+    }
+    printf("\n");
+}
+
+static void print_int_range(const struct field_desc *field)
+{
+    uint64_t type_max = field->width_bytes == 8 ? UINT64_MAX : (UINT64_C(1) << (8 * field->width_bytes)) - 1;
+    if (field->min == 0 && field->max == type_max) {
+        printf("any");
+    } else {
+        printf("%" PRIu64 " .. %" PRIu64, field->min, field->max);
+    }
+}
+
+static void print_field_row(const struct field_desc *field, size_t offset)
+{
+    if (field_is_counted(field)) {
+        printf("| | `%s` | ", field->name);
+    } else {
+        printf("| %zu | `%s` | ", offset, field->name);
+    }
+    switch (field->kind) {
+    case FIELD_INT:
+        printf("u%" PRIu32 " | ", 8 * field->width_bytes);
+        print_int_range(field);
+        break;
+    case FIELD_ENUM:
+        printf("enum %s | listed", field->enumeration->name);
+        break;
+    case FIELD_REAL:
+        printf(field->count > 1 ? "f32 x %" PRIu32 " | " : "f32 | ", field->count);
+        printf("%g .. %g", (double)field->real_min, (double)field->real_max);
+        break;
+    case FIELD_BYTES:
+        printf("%" PRIu32 " bytes | any", field->count);
+        break;
+    case FIELD_STRING:
+        printf("string | at most %" PRIu64 " bytes", field->max);
+        break;
+    case FIELD_ARRAY:
+        printf("array of %s | at most %" PRIu64, field->record()->name, field->max);
+        break;
+    case FIELD_BULK:
+        printf("bulk | at most %" PRIu64 " bytes", field->max);
+        break;
+    }
+    printf(" | %s |\n", field->doc);
+}
+
+static void print_fields(const struct struct_desc *desc, size_t offset)
+{
+    if (desc->fields->name == NULL) {
+        printf("No fields.\n\n");
+        return;
+    }
+    printf("| offset | field | type | allowed | meaning |\n| ---: | --- | --- | --- | --- |\n");
+    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+        print_field_row(field, offset);
+        offset += (size_t)field->width_bytes * field->count;
+    }
+    printf("\n");
+}
+
+static const char *sender(uint32_t from)
+{
+    switch (from) {
+    case MESSAGE_FROM_CLIENT:
+        return "client to server";
+    case MESSAGE_FROM_SERVER:
+        return "server to client";
+    case MESSAGE_FROM_BOTH:
+        return "both ways";
+    default:
+        return "between a client and its helper programs";
+    }
+}
+
+static void print_message(const struct message_desc *desc)
+{
+    const struct struct_desc *body = desc->body();
+    printf("### 0x%04x %s\n\n%s.\n\n", desc->info.type, desc->info.name, desc->doc);
+    printf("From: %s. Fixed part %" PRIu32 " bytes, payload %" PRIu32 " .. %" PRIu32 " bytes.%s\n\n",
+           sender(desc->info.from), body->wire_fixed_bytes, desc->info.payload_min_bytes,
+           desc->info.payload_max_bytes,
+           (desc->info.type & MESSAGE_TYPE_IGNORABLE) != 0 ? " May be ignored by who does not know it." : "");
+    print_fields(body, 2);
+}
+
+static void print_predicted(void)
+{
+    printf(
+        "## The encoding `predicted`\n\n"
+        "One frame of Zstandard (RFC 8878). Unpacked it has as many bytes as the pixels, as planes one behind "
+        "the\n"
+        "other, of which there are as many as a pixel has bytes: plane b is for byte b of every pixel, rows from\n"
+        "the top, without gaps. Several layers are one picture of their common height.\n\n"
+        "What a plane has for a byte is that byte less its prediction, modulo 256. The prediction comes of three\n"
+        "bytes of the same plane: left of it (a), above it (b), and left of that (c); what lies outside the\n"
+        "picture is 0:\n\n"
+        "    c >= max(a, b): min(a, b)\n"
+        "    c <= min(a, b): max(a, b)\n"
+        "    else:           a + b - c\n\n"
+        "So a decoder goes through the rows from the top and from left to right, and adds what it finds to the\n"
+        "prediction that it makes of the bytes that it has restored.\n\n");
+}
+
+static void print_h264(void)
+{
+    printf(
+        "## The encoding `h264`\n\n"
+        "The frames of a view that have it are one stream, whatever others come between them: an access unit\n"
+        "each, in the byte stream format of ITU-T H.264 annex B, 4:2:0 with 8 bits, colours by BT.709 in the\n"
+        "limited range. Each gives its picture at once, as none needs a later one. A key frame is an IDR\n"
+        "picture with the parameter sets before it; the stream begins with one, one comes where frames change\n"
+        "their size, and otherwise only on request (`want_key_frame` of frame_ack). What is decoded has an even\n"
+        "width and height: where the frame's is odd, its last column or row is one too many.\n\n");
+}
+
+static bool copy_file(const char *path)
+{
+    FILE *file = fopen(path, "r");
+    if (file == NULL) {
+        perror(path);
+        return false;
+    }
+    for (int byte; (byte = getc(file)) != EOF;) {
+        putchar(byte);
+    }
+    bool ok = !ferror(file);
+    fclose(file);
+    return ok;
+}
+
+int main(int argument_count, char **arguments)
+{
+    if (argument_count != 2) {
+        fprintf(stderr, "usage: %s GUIDE\n", arguments[0]);
+        return 2;
+    }
+    print_rules();
+    if (!copy_file(arguments[1])) {
+        return 1;
+    }
+    print_handshake();
+    print_sealed_messages();
+    print_sealed_keys();
+    print_sealed_stream();
+    print_framing();
+    printf("## Enumerations\n\n");
+    for (size_t i = 0; i < protocol_enum_count; i++) {
+        print_enum(&protocol_enums[i]);
+    }
+    printf("## Records\n\nOffsets are from the start of the record.\n\n");
+    for (size_t i = 0; i < protocol_record_count; i++) {
+        const struct struct_desc *record = protocol_records[i]();
+        printf("### %s\n\n%s. At least %" PRIu32 " bytes.\n\n", record->name, record->doc, record->wire_min_bytes);
+        print_fields(record, 0);
+    }
+    printf("## Messages\n\nOffsets are from the start of the payload.\n\n");
+    for (size_t i = 0; i < protocol_message_count; i++) {
+        print_message(&protocol_messages[i]);
+    }
+    print_predicted();
+    print_h264();
+    docgen_print_example();
+    return ferror(stdout) || fflush(stdout) != 0 ? 1 : 0;
+}

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: MIT */
+/* Where a job's camera is in a frame. Pure: the same scene, job and frame give the same camera, whatever frames
+ * came before. */
+#ifndef FARLIGHT_ENGINE_ANIMATION_H
+#define FARLIGHT_ENGINE_ANIMATION_H
+
+#include "base/error.h"
+#include "engine/engine.h"
+#include "scene/pose.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define ANIMATION_TIME_MAX_S 1e9 /* what the protocol lets a frame have, to both sides of 0 */
+
+/* Seconds since `time_origin_frame`; negative before it. */
+double animation_time_s(const struct engine_job *job, uint32_t frame);
+/* Catmull-Rom through the keys in time; before the first and after the last it stands still. At least one key. */
+void animation_key_at(const struct camera_key *keys, uint32_t key_count, double time_s, struct camera_key *key);
+/* Turns a camera about an axis through a point, counterclockwise seen against the axis; false: the axis is 0. */
+bool animation_turn(struct frame_camera *camera, const float axis_world[3], const float centre_world[3],
+                    double angle);
+/* Errors that depend on neither the frame nor the scene. */
+bool animation_check(const struct engine_job *job, struct error *error);
+/* The scene's bounds at the job's time 0, which is what cameras that see all of it stand still for. They may be
+ * kept from frame to frame, as they follow from the scene's revision alone. */
+struct animation_bounds {
+    bool known;
+    uint64_t revision;
+    float lower[3], upper[3];
+};
+/* That of one key; false if its vectors do not span a view. */
+bool animation_key_camera(const struct camera_key *key, const char *field, struct frame_camera *camera,
+                          struct error *error);
+/* Along the view; 0 where the point is not in front. */
+float animation_distance(const struct frame_camera *camera, const float point_world[3]);
+struct animation_view {
+    struct frame_camera camera;
+    float focus; /* distance along the view to what is looked at, or to the middle of the scene; metres */
+};
+/* At a time of the job. `pose`: at that time, NULL: the scene as it was committed; its view counts, as far as it
+ * is given. `bounds` may be NULL. */
+bool animation_view(const struct engine_job *job, const struct scene *scene, const struct scene_pose *pose,
+                    double time_s, struct animation_bounds *bounds, struct animation_view *view,
+                    struct error *error);
+
+#endif

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT */
+#include "engine/backend.h"
+
+const struct engine_backend engine_backend_gpu = {
+    .device_create = gpu_device_create,
+    .device_destroy = gpu_device_destroy,
+    .scene_create = frame_scene_create,
+    .scene_destroy = frame_scene_destroy,
+    .scene_bytes = frame_scene_device_bytes,
+    .renderer_create = frame_renderer_create,
+    .renderer_destroy = frame_renderer_destroy,
+    .renderer_bytes = frame_renderer_device_bytes,
+    .may_begin = frame_may_begin,
+    .begin = frame_begin,
+    .step = frame_step,
+    .step_waits = frame_step_waits,
+    .abandon = frame_abandon,
+};

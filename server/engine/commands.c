@@ -1,0 +1,307 @@
+/* SPDX-License-Identifier: MIT */
+/* Commands of the clients, on the thread that owns GL. */
+#include "engine/engine_private.h"
+
+#include "base/clock.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Commands that may wait for one scene's frames; more are answered with busy. */
+#define WAITING_MAX 256
+
+void engine_command_destroy(struct engine_command *command)
+{
+    if (!command)
+        return;
+    for (size_t i = 0; i < command->edit_count; i++)
+        scene_edit_finish(&command->edits[i]);
+    free(command->edits);
+    free(command->job.keys);
+    free(command->job.clips);
+    view_wishes_unref(command->job.wishes);
+    free(command);
+}
+
+static void fail(struct engine *engine, const struct engine_command *command, const struct error *error)
+{
+    engine_post_failed(engine, command->client, command->request, error);
+}
+
+static void done(struct engine *engine, const struct engine_command *command, uint64_t revision)
+{
+    engine_post_done(engine, command->client, command->request, revision);
+}
+
+/* ---- what frames in progress keep waiting ------------------------------------------------------- */
+
+/* Blobs are limited where they are held, as scenes share them; tables here, all scenes together. Those that nobody
+ * holds give way, but not in vain: what they leave is known before. */
+static bool commit_within_limits(struct engine *engine, struct scene *scene, struct engine_command *command,
+                                 struct error *error)
+{
+    uint64_t limit_bytes = engine->options.limits.scene.host_bytes;
+    uint64_t others_bytes = engine->table_bytes - scene->table_bytes;
+    uint64_t held_bytes = others_bytes - engine_left_table_bytes(engine);
+    if (limit_bytes)
+        scene->limits.table_bytes = held_bytes < limit_bytes ? limit_bytes - held_bytes : 1;
+    bool applied = scene_commit(scene, command->edits, command->edit_count, error);
+    engine->table_bytes = others_bytes + scene->table_bytes;
+    return applied;
+}
+
+static void commit(struct engine *engine, const struct engine_reference *reference, struct engine_command *command)
+{
+    struct engine_scene *scene = reference->scene;
+    struct error error = {0};
+    uint64_t start_ns = clock_now_ns();
+    uint64_t before_bytes = scene->scene->table_bytes;
+    if (!commit_within_limits(engine, scene->scene, command, &error)) {
+        fail(engine, command, &error);
+        return;
+    }
+    if (scene->scene->table_bytes > before_bytes)
+        engine_trim_tables(engine, reference->client->principal);
+    if (!scene->apply_ns)
+        scene->apply_start_ns = start_ns;
+    scene->apply_ns += clock_now_ns() - start_ns;
+    done(engine, command, scene->scene->revision);
+    engine_scene_changed(engine, reference);
+}
+
+static void start(struct engine *engine, struct engine_reference *reference, struct engine_command *command)
+{
+    struct error error = {0};
+    if (!job_start(engine, reference, command, &error))
+        fail(engine, command, &error);
+}
+
+/* False: it stays the caller's. */
+static bool keep_waiting(struct engine_scene *scene, struct engine_command *command)
+{
+    struct engine_command **waiting = realloc(scene->waiting, (scene->waiting_count + 1) * sizeof *waiting);
+    if (!waiting)
+        return false;
+    scene->waiting = waiting;
+    waiting[scene->waiting_count++] = command;
+    return true;
+}
+
+static void wait_for_frames(struct engine *engine, struct engine_scene *scene, struct engine_command *command)
+{
+    if (scene->waiting_count < WAITING_MAX && keep_waiting(scene, command))
+        return;
+    struct error error = {0};
+    error_set(&error, ERROR_BUSY, "", "%zu requests wait for frames in progress already", scene->waiting_count);
+    fail(engine, command, &error);
+    engine_command_destroy(command);
+}
+
+static bool is_by(const struct engine_command *command, const struct engine_reference *reference)
+{
+    return command->client == reference->client->client && command->scene == reference->id;
+}
+
+static bool waits_by(const struct engine_scene *scene, const struct engine_reference *reference)
+{
+    for (size_t i = 0; i < scene->waiting_count; i++) {
+        if (is_by(scene->waiting[i], reference))
+            return true;
+    }
+    return false;
+}
+
+static struct engine_command *take_waiting(struct engine_scene *scene, size_t i)
+{
+    struct engine_command *command = scene->waiting[i];
+    memmove(&scene->waiting[i], &scene->waiting[i + 1], (--scene->waiting_count - i) * sizeof *scene->waiting);
+    return command;
+}
+
+struct engine_command *engine_take_waiting(struct engine_scene *scene, const struct engine_reference *reference)
+{
+    for (size_t i = 0; i < scene->waiting_count; i++) {
+        if (is_by(scene->waiting[i], reference))
+            return take_waiting(scene, i);
+    }
+    return NULL;
+}
+
+/* False: it has to wait for what came before it from this client, and that for another client's frame. */
+static bool scene_close(struct engine *engine, struct engine_reference *reference, struct engine_command *command)
+{
+    struct engine_scene *scene = reference->scene;
+    engine_abort_jobs(engine, reference, "its scene was closed");
+    /* What came before is answered before. */
+    engine_run_waiting(engine, scene);
+    if (waits_by(scene, reference) && keep_waiting(scene, command))
+        return false;
+    engine_scene_close(engine, reference, command);
+    return true;
+}
+
+static const char *scene_field(enum engine_command_kind kind)
+{
+    return kind == ENGINE_JOB_START        ? "render.scene"
+           : kind == ENGINE_SCENE_CLOSE    ? "scene_close.scene"
+           : kind == ENGINE_SCENE_DESCRIBE ? "scene_describe.scene"
+                                           : "edit_begin.scene";
+}
+
+/* For commands that name a scene. */
+static void handle_of_scene(struct engine *engine, struct engine_command *command)
+{
+    struct engine_reference *reference = engine_find_reference(engine, command->client, command->scene);
+    if (!reference) {
+        struct error error = {0};
+        error_set(&error, ERROR_UNKNOWN_ID, scene_field(command->kind), "there is no scene %u", command->scene);
+        fail(engine, command, &error);
+        engine_command_destroy(command);
+        return;
+    }
+    struct engine_scene *scene = reference->scene;
+    if (command->kind == ENGINE_SCENE_CLOSE) {
+        if (!scene_close(engine, reference, command))
+            return;
+    } else if ((command->kind == ENGINE_COMMIT && scene->frames) || scene->waiting_count) {
+        wait_for_frames(engine, scene, command);
+        return;
+    } else if (command->kind == ENGINE_COMMIT) {
+        commit(engine, reference, command);
+    } else if (command->kind == ENGINE_SCENE_DESCRIBE) {
+        engine_scene_describe(engine, scene, command);
+    } else {
+        start(engine, reference, command);
+    }
+    engine_command_destroy(command);
+}
+
+void engine_run_waiting(struct engine *engine, struct engine_scene *scene)
+{
+    if (scene->frames || !scene->waiting_count)
+        return;
+    /* Nothing here begins a frame, so all of them can be carried out. */
+    struct engine_command **waiting = scene->waiting;
+    size_t count = scene->waiting_count;
+    scene->waiting = NULL;
+    scene->waiting_count = 0;
+    for (size_t i = 0; i < count; i++)
+        handle_of_scene(engine, waiting[i]);
+    free(waiting);
+}
+
+/* ---- jobs --------------------------------------------------------------------------------------- */
+
+/* Where a command of that request waits for frames; false: none does. */
+static bool find_waiting(struct engine *engine, const struct engine_command *by, struct engine_scene **found,
+                         size_t *place)
+{
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        for (size_t i = 0; i < scene->waiting_count; i++) {
+            const struct engine_command *command = scene->waiting[i];
+            if (command->client != by->client || command->request != by->target_request)
+                continue;
+            *found = scene;
+            *place = i;
+            return true;
+        }
+    }
+    return false;
+}
+
+static void job_cancel(struct engine *engine, struct engine_command *command)
+{
+    uint32_t target = command->target_request;
+    struct engine_scene *waits_for;
+    size_t place;
+    struct job *job = job_find(engine, command->client, target);
+    if (job) {
+        struct engine_scene *scene = job->scene;
+        job_abort(engine, job, engine_cancelled(command->client, target, "the client cancelled it"));
+        engine_run_waiting(engine, scene);
+    } else if (find_waiting(engine, command, &waits_for, &place)) {
+        engine_command_destroy(take_waiting(waits_for, place));
+        engine_post(engine, engine_cancelled(command->client, target, "the client cancelled it"));
+    }
+    done(engine, command, 0);
+}
+
+static void give_credit(struct engine *engine, const struct engine_command *command)
+{
+    struct job *job = job_find(engine, command->client, command->target_request);
+    if (job) {
+        job_credit(job, command->credit);
+        return;
+    }
+    struct engine_scene *waits_for;
+    size_t place;
+    if (!find_waiting(engine, command, &waits_for, &place))
+        return;
+    struct engine_command *waiting = waits_for->waiting[place];
+    if (command->credit > waiting->job.credit)
+        waiting->job.credit = command->credit;
+}
+
+static void client_gone(struct engine *engine, const struct engine_command *command)
+{
+    struct engine_client *client = hashmap_get(&engine->clients, command->client);
+    if (client)
+        engine_forget_client(engine, client);
+    engine_reap_scenes(engine);
+    engine_post(engine, event_create(ENGINE_CLIENT_FORGOTTEN, command->client, command->request));
+}
+
+static void report_stats(struct engine *engine, const struct engine_command *command)
+{
+    struct engine_event *event = event_create(ENGINE_STATS_READY, command->client, command->request);
+    if (event)
+        event->stats = engine_stats_collect(engine, command->principal);
+    if (event && !event->stats) {
+        event->kind = ENGINE_FAILED;
+        error_set(&event->error, ERROR_OUT_OF_MEMORY, "stats", "no memory for an answer");
+    }
+    engine_post(engine, event);
+}
+
+void engine_handle(struct engine *engine, struct engine_command *command)
+{
+    switch (command->kind) {
+    case ENGINE_SCENE_CLOSE:
+    case ENGINE_SCENE_DESCRIBE:
+    case ENGINE_COMMIT:
+    case ENGINE_JOB_START:
+        handle_of_scene(engine, command);
+        engine_reap_scenes(engine);
+        return;
+    case ENGINE_SCENE_OPEN:
+        engine_scene_open(engine, command);
+        break;
+    case ENGINE_SCENE_ATTACH:
+        engine_scene_attach(engine, command);
+        break;
+    case ENGINE_SCENE_LIST:
+        engine_scene_list(engine, command);
+        break;
+    case ENGINE_SCENES_TRIM:
+        engine_trim_blobs(engine, command->principal, command->trim_bytes);
+        break;
+    case ENGINE_JOB_CREDIT:
+        give_credit(engine, command);
+        break;
+    case ENGINE_JOB_CANCEL:
+        job_cancel(engine, command);
+        break;
+    case ENGINE_VIEW_LOOK:
+        break; /* the view sees for itself whenever the thread is awake */
+    case ENGINE_STATS:
+        report_stats(engine, command);
+        break;
+    case ENGINE_LIMITS:
+        engine_set_limits(engine, &command->limits);
+        break;
+    case ENGINE_CLIENT_GONE:
+        client_gone(engine, command);
+        break;
+    }
+    engine_command_destroy(command);
+}

@@ -1,0 +1,291 @@
+/* SPDX-License-Identifier: MIT */
+#include "engine/encode_pool.h"
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/parallel.h"
+#include "encode/stream.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <xxhash.h>
+
+#define THREADS_MAX 64
+#define THREADS_AUTO_MAX 4
+#define QUEUE_CAPACITY 256
+#define ATTACHMENT_PIXEL_BYTES 4
+
+struct encode_task {
+    struct job_output *output;
+    struct encode_lane *lane; /* NULL: it goes its own way */
+    uint64_t position;
+    struct engine_frame *frame;
+    struct encode_task *next; /* of those that wait in the lane */
+};
+
+struct encode_pool {
+    struct encode_pool_options options;
+    struct queue *tasks;
+    unsigned thread_count;
+    pthread_t threads[THREADS_MAX];
+};
+
+/* ---- lanes -------------------------------------------------------------------------------------- */
+
+struct encode_lane {
+    atomic_uint references;
+    float frames_per_second;
+    struct encoder_stream *stream; /* that of the task in hand; NULL until the first */
+    pthread_mutex_t lock;          /* of what follows */
+    bool busy;                     /* a task of it is queued or in hand */
+    struct encode_task *first, **end;
+};
+
+struct encode_lane *encode_lane_create(float frames_per_second)
+{
+    struct encode_lane *lane = calloc(1, sizeof *lane);
+    if (!lane)
+        return NULL;
+    atomic_init(&lane->references, 1);
+    lane->frames_per_second = frames_per_second;
+    lane->end = &lane->first;
+    pthread_mutex_init(&lane->lock, NULL);
+    return lane;
+}
+
+void encode_lane_unref(struct encode_lane *lane)
+{
+    if (!lane || atomic_fetch_sub(&lane->references, 1) != 1)
+        return;
+    encoder_stream_destroy(lane->stream);
+    pthread_mutex_destroy(&lane->lock);
+    free(lane);
+}
+
+/* False: the task waits for those before it; lane_next() will give it out. */
+static bool lane_enter(struct encode_lane *lane, struct encode_task *task)
+{
+    pthread_mutex_lock(&lane->lock);
+    bool free_now = !lane->busy;
+    lane->busy = true;
+    if (!free_now) {
+        *lane->end = task;
+        lane->end = &task->next;
+    }
+    pthread_mutex_unlock(&lane->lock);
+    return free_now;
+}
+
+/* When the task in hand is done with. */
+static struct encode_task *lane_next(struct encode_lane *lane)
+{
+    pthread_mutex_lock(&lane->lock);
+    struct encode_task *task = lane->first;
+    if (task)
+        lane->first = task->next;
+    if (!lane->first)
+        lane->end = &lane->first;
+    lane->busy = task != NULL;
+    pthread_mutex_unlock(&lane->lock);
+    return task;
+}
+
+/* ---- tasks -------------------------------------------------------------------------------------- */
+
+/* The task that waited for it is the caller's; NULL: none. */
+static struct encode_task *task_end(struct encode_task *task)
+{
+    struct encode_task *next = task->lane ? lane_next(task->lane) : NULL;
+    engine_frame_destroy(task->frame);
+    job_output_unref(task->output);
+    encode_lane_unref(task->lane);
+    free(task);
+    return next;
+}
+
+static void task_destroy(void *item)
+{
+    for (struct encode_task *task = item; task;)
+        task = task_end(task);
+}
+
+static bool encode_in_stream(struct encode_lane *lane, const struct picture *picture, struct engine_frame *frame,
+                             struct error *error)
+{
+    struct encoded_picture encoded;
+    const struct encoder_wish wish = {
+        .quality = frame->quality, .bytes = frame->wanted_bytes, .key_frame = frame->wants_key};
+    if (!lane->stream)
+        lane->stream = encoder_stream_create(frame->encoding, lane->frames_per_second, error);
+    if (!lane->stream || !encoder_stream_encode(lane->stream, picture, &wish, &encoded, error))
+        return false;
+    frame->bytes = encoded.bytes;
+    frame->size_bytes = encoded.size_bytes;
+    frame->key_frame = encoded.key_frame;
+    return true;
+}
+
+static bool encode_pixels(struct encode_lane *lane, const struct picture *picture, struct engine_frame *frame,
+                          struct error *error)
+{
+    if (lane)
+        return encode_in_stream(lane, picture, frame, error);
+    frame->key_frame = true;
+    return encoder_encode(frame->encoding, picture, frame->quality, &frame->bytes, &frame->size_bytes, error);
+}
+
+/* Behind what is there. */
+static bool append_attachment(struct engine_frame *frame, enum frame_attachment which, size_t *added_bytes,
+                              struct error *error)
+{
+    const struct frame_result *result = &frame->result;
+    if (!(result->attachments & which))
+        return true;
+    const struct picture picture = {.width = result->width,
+                                    .height = result->height,
+                                    .bytes_per_pixel = ATTACHMENT_PIXEL_BYTES,
+                                    .pixels = frame_result_attachment(result, which)};
+    uint8_t *encoded;
+    if (!encoder_encode(ENCODING_PREDICTED, &picture, 1, &encoded, added_bytes, error))
+        return false;
+    uint8_t *bytes = realloc(frame->bytes, frame->size_bytes + *added_bytes);
+    if (bytes) {
+        memcpy(bytes + frame->size_bytes, encoded, *added_bytes);
+        frame->bytes = bytes;
+        frame->size_bytes += *added_bytes;
+    }
+    free(encoded);
+    return bytes || error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no memory for what is attached to a frame");
+}
+
+static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct engine_frame *frame,
+                   struct error *error)
+{
+    struct frame_result *result = &frame->result;
+    /* Layers lie one behind the other: one picture of their common height. */
+    uint32_t rows = result->height * (uint32_t)__builtin_popcount(result->layers);
+    struct picture picture = {
+        .width = result->width,
+        .height = rows,
+        .bytes_per_pixel = (uint32_t)(result->size_bytes / ((size_t)result->width * rows)),
+        .pixels = result->pixels,
+    };
+    if (result->ycbcr != YCBCR_NONE)
+        picture = (struct picture){.width = result->width,
+                                   .height = result->height,
+                                   .bytes_per_pixel = 4,
+                                   .ycbcr = result->ycbcr,
+                                   .planes = ycbcr_planes_at(result->pixels, result->width)};
+    uint64_t start_ns = clock_now_ns();
+    frame->digest = XXH3_64bits(result->pixels, result->size_bytes);
+    if (!encode_pixels(lane, &picture, frame, error) ||
+        !append_attachment(frame, ATTACHMENT_DEPTH, &frame->depth_bytes, error) ||
+        !append_attachment(frame, ATTACHMENT_NORMALS, &frame->normal_bytes, error))
+        return false;
+    if (!encoder_loses(frame->encoding))
+        frame->quality = 0; /* a level, which costs no picture */
+    free(result->pixels);
+    result->pixels = NULL;
+    frame->encoded_ns = clock_now_ns();
+    stage_times_add(&result->times, STAGE_ENCODE, STAGE_CPU, 0, start_ns, frame->encoded_ns - start_ns);
+    stage_totals_add(pool->options.totals, STAGE_ENCODE, STAGE_CPU, frame->encoded_ns - start_ns);
+    return true;
+}
+
+static void run_task(struct encode_pool *pool, struct encode_task *task)
+{
+    if (job_output_is_closed(task->output))
+        return;
+    struct error error = {0};
+    bool encoded = encode(pool, task->lane, task->frame, &error);
+    struct engine_event *event = event_create(encoded ? ENGINE_FRAME : ENGINE_FAILED, 0, 0);
+    if (!event) {
+        log_write(LOG_ERROR, "encode", "no memory for an event; a job ends without an answer");
+        job_output_close(task->output, NULL);
+        return;
+    }
+    event->error = error;
+    if (encoded) {
+        event->frame = task->frame;
+        event->output = job_output_ref(task->output);
+        task->frame = NULL;
+    }
+    job_output_put(task->output, task->position, event);
+}
+
+static void *run_thread(void *context)
+{
+    struct encode_pool *pool = context;
+    for (struct encode_task *task; (task = queue_pop(pool->tasks, UINT64_MAX));) {
+        while (task) {
+            run_task(pool, task);
+            task = task_end(task);
+            pool->options.on_done(pool->options.context);
+        }
+    }
+    return NULL;
+}
+
+struct encode_pool *encode_pool_create(const struct encode_pool_options *options, struct error *error)
+{
+    struct encode_pool *pool = calloc(1, sizeof *pool);
+    struct queue *tasks = queue_create(QUEUE_CAPACITY, false);
+    if (!pool || !tasks) {
+        free(pool);
+        queue_destroy(tasks, NULL);
+        error_set(error, ERROR_OUT_OF_MEMORY, "encode_threads", "no memory for the encoding pool");
+        return NULL;
+    }
+    pool->options = *options;
+    pool->tasks = tasks;
+    unsigned threads = options->threads, processors = parallel_processors();
+    if (!threads)
+        threads = processors > THREADS_AUTO_MAX ? THREADS_AUTO_MAX : processors;
+    threads = threads > THREADS_MAX ? THREADS_MAX : threads;
+    while (pool->thread_count < threads) {
+        if (pthread_create(&pool->threads[pool->thread_count], NULL, run_thread, pool)) {
+            error_set(error, ERROR_OUT_OF_MEMORY, "encode_threads", "could start only %u of %u threads",
+                      pool->thread_count, threads);
+            encode_pool_destroy(pool);
+            return NULL;
+        }
+        pthread_setname_np(pool->threads[pool->thread_count++], "encode");
+    }
+    return pool;
+}
+
+void encode_pool_destroy(struct encode_pool *pool)
+{
+    if (!pool)
+        return;
+    queue_close(pool->tasks);
+    for (void *task; (task = queue_try_pop(pool->tasks));)
+        task_destroy(task);
+    for (unsigned i = 0; i < pool->thread_count; i++)
+        pthread_join(pool->threads[i], NULL);
+    queue_destroy(pool->tasks, task_destroy);
+    free(pool);
+}
+
+bool encode_pool_submit(struct encode_pool *pool, struct job_output *output, struct encode_lane *lane,
+                        uint64_t position, struct engine_frame *frame)
+{
+    struct encode_task *task = calloc(1, sizeof *task);
+    if (!task) {
+        engine_frame_destroy(frame);
+        return false;
+    }
+    *task = (struct encode_task){.output = job_output_ref(output), .position = position, .frame = frame};
+    if (lane && frame->encoding == ENCODING_H264) {
+        atomic_fetch_add(&lane->references, 1);
+        task->lane = lane;
+        if (!lane_enter(lane, task))
+            return true;
+    }
+    if (queue_push(pool->tasks, task))
+        return true;
+    task_destroy(task);
+    return false;
+}

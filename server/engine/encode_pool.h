@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+/* Threads that turn rendered pixels into the bytes that travel. */
+#ifndef FARLIGHT_ENGINE_ENCODE_POOL_H
+#define FARLIGHT_ENGINE_ENCODE_POOL_H
+
+#include "engine/output.h"
+#include "engine/totals.h"
+
+struct encode_pool;
+
+struct encode_pool_options {
+    unsigned threads; /* 0: one per core, at most 4 */
+    struct stage_totals *totals;
+    void (*on_done)(void *context); /* after each frame, from a thread of the pool */
+    void *context;
+};
+
+/* The frames of one view: those that are encoded as a stream (encode/stream.h) are so one after the other, as they
+ * were submitted, whatever threads there are. Reference-counted: frames on their way hold one each. */
+struct encode_lane;
+
+struct encode_lane *encode_lane_create(float frames_per_second); /* NULL: out of memory */
+void encode_lane_unref(struct encode_lane *lane);                /* accepts NULL */
+
+struct encode_pool *encode_pool_create(const struct encode_pool_options *options, struct error *error);
+/* Ends after the frames in hand; those that wait are dropped. Accepts NULL. */
+void encode_pool_destroy(struct encode_pool *pool);
+/* Encodes a frame (its result holds the pixels) with its encoding and quality, and puts it at its position. Takes
+ * over the frame, not the output and the lane, of which it holds references of its own. `lane`: of a view; NULL
+ * where no frame is part of a stream. One thread submits the frames of a lane. May wait; false: the pool is closed
+ * or out of memory. */
+bool encode_pool_submit(struct encode_pool *pool, struct job_output *output, struct encode_lane *lane,
+                        uint64_t position, struct engine_frame *frame);
+
+#endif

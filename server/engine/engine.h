@@ -1,0 +1,249 @@
+/* SPDX-License-Identifier: MIT */
+/* The thread that owns GL and the pool that encodes, seen from outside: commands in, events out.
+ *
+ * The network thread submits commands and takes events; both go through bounded queues. Everything
+ * in a command passes to the engine when it was accepted, everything in an event to who takes it.
+ * Clients, scenes, requests and channels are the numbers that the network side chose. */
+#ifndef FARLIGHT_ENGINE_ENGINE_H
+#define FARLIGHT_ENGINE_ENGINE_H
+
+#include "base/error.h"
+#include "base/stage_times.h"
+#include "encode/encoder.h"
+#include "gpu/device.h"
+#include "render/frame.h"
+#include "scene/pose.h"
+#include "scene/scene.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct engine;
+struct engine_backend;
+struct view_wishes;
+
+#define ENGINE_LINGERING_SCENES 16u                     /* default of lingering_scenes */
+#define ENGINE_FRAME_WINDOW_BYTES ((uint64_t)512 << 20) /* default of frame_window_bytes */
+
+/* Those that may change while the engine runs. */
+struct engine_limits {
+    struct scene_limits scene; /* host_bytes is also what the tables of all scenes may take together */
+    uint64_t scene_linger_ms;  /* how long a scene that others can come to stays when nobody holds it; 0: not */
+    uint32_t lingering_scenes; /* that do so, at most: who left most loses his oldest; 0: default */
+};
+
+struct engine_options {
+    struct gpu_options gpu;
+    unsigned encode_threads;     /* 0: one per core, at most 4 */
+    size_t queue_capacity;       /* commands and events; 0: 1024 */
+    uint32_t frames_in_flight;   /* per job, rendered but not taken; 0: 3 */
+    uint64_t frame_window_bytes; /* the same in bytes of pixels, if that is fewer, but at least one; 0: default */
+    struct engine_limits limits;
+    uint64_t device_bytes_limit;          /* 0: 70 % of what the device has, or no limit if it does not tell */
+    const struct engine_backend *backend; /* NULL: the GPU; for tests */
+};
+
+/* Who can come to a scene beside the client that opened it; the protocol's numbers. */
+enum engine_sharing { SHARING_PRIVATE, SHARING_KEPT, SHARING_SHARED };
+
+/* Camera of a job over time, `time_s` and ten numbers that a spline goes through; enums have the protocol's
+ * numbers. */
+enum camera_path { CAMERA_AUTO, CAMERA_NODE, CAMERA_KEYS, CAMERA_ORBIT };
+struct camera_key {
+    float time_s;
+    float eye_world[3], look_at_world[3], up_world[3];
+    float fov_y;
+};
+
+enum job_kind { JOB_BATCH, JOB_VIEW }; /* protocol's numbers */
+
+/* What a job asks for; per frame engine/shot.h makes a request and poses of it. */
+struct engine_job {
+    enum job_kind kind;
+    uint32_t scene; /* that of the command, which is the one that counts */
+    uint32_t first_frame, last_frame, frame_step;
+    float frames_per_second;
+    uint32_t time_origin_frame;
+    struct frame_request frame; /* camera, focus and seed are filled per frame */
+    float shutter;              /* how long it is open from the frame's time on, in frames */
+    enum encoding encoding;
+    unsigned quality;
+    enum camera_path path;
+    uint32_t camera_node;
+    float orbit_turn, orbit_seconds;
+    struct camera_key *keys; /* owned */
+    uint32_t key_count;
+    struct clip_use *clips; /* owned */
+    uint32_t clip_count;
+    /* Frames that may be handed out so far, absolute. Beyond it, frames of a batch are rendered as far as
+     * frames_in_flight goes, and kept; those of a view are not begun, so that none becomes stale. */
+    uint64_t credit;
+    /* Of a view, see engine/view_wishes.h; owned: a reference. It takes the place of a view that has the same
+     * wishes, which ends with ENGINE_DONE; frame numbers, counted from first_frame on, go on. */
+    struct view_wishes *wishes;
+    uint32_t pass_samples; /* that a frame of a view adds, up to frame.samples */
+    enum encoding still_encoding;
+    unsigned weight; /* how much of the device's time it gets beside other clients' jobs, and their own; 0: 1 */
+    bool adapt;      /* view: quality and size follow the link */
+};
+
+enum engine_command_kind {
+    ENGINE_SCENE_OPEN,
+    ENGINE_SCENE_ATTACH, /* answered by ENGINE_DONE with its revision; ENGINE_SCENE_CHANGED may follow */
+    ENGINE_SCENE_CLOSE,  /* the jobs that the client has on it fail with ERROR_CANCELLED just before the answer */
+    ENGINE_SCENE_LIST,   /* answered by ENGINE_SCENES_LISTED */
+    ENGINE_SCENE_DESCRIBE, /* answered by ENGINE_SCENE_DESCRIBED */
+    ENGINE_SCENES_TRIM, /* scenes that nobody holds end, until blobs of trim_bytes are used no more; no answer */
+    ENGINE_COMMIT, /* waits for the frames of the scene that are in progress, what follows for that scene too */
+    /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, before which come the frames that were
+     * finished and have credit. A view has no last frame: it is done when another one takes its place. */
+    ENGINE_JOB_START,
+    ENGINE_JOB_CREDIT, /* no answer */
+    ENGINE_JOB_CANCEL, /* answered by ENGINE_DONE; the job's own request fails with ERROR_CANCELLED just before */
+    ENGINE_VIEW_LOOK,  /* a view's wishes have changed; no answer */
+    ENGINE_STATS,
+    ENGINE_LIMITS,      /* others from now on; a scene that is open keeps its number of nodes. No answer */
+    ENGINE_CLIENT_GONE, /* forgets its scenes and jobs; no answer, and no event for that client comes after
+                           ENGINE_CLIENT_FORGOTTEN */
+};
+
+struct engine_command {
+    struct engine_command *next; /* of who has it: the engine, once it took it, does not look at it */
+    enum engine_command_kind kind;
+    uint64_t client;
+    uint32_t request;
+    uint32_t scene;
+    char name[SCENE_NAME_MAX + 1]; /* scene_open, scene_attach */
+    enum engine_sharing sharing;   /* scene_open */
+    uint64_t principal;            /* scene_open, _attach, _list, _trim, stats: who asks, as what is kept is his */
+    uint64_t trim_bytes;           /* scenes_trim */
+    struct scene_edit *edits;      /* commit; malloc'ed array */
+    size_t edit_count;
+    struct engine_job job;
+    uint32_t target_request; /* job_cancel, job_credit: the job's request */
+    uint64_t credit;
+    struct engine_limits limits; /* limits */
+};
+void engine_command_destroy(struct engine_command *command); /* frees it with all it holds; accepts NULL */
+
+struct engine_scene_stat {
+    bool is_known; /* to who asked: his own, or one that he can come to */
+    uint64_t client;
+    uint32_t scene;
+    char name[SCENE_NAME_MAX + 1];
+    uint64_t revision, triangles, spheres, host_bytes, device_bytes;
+    uint32_t nodes, instances;
+};
+struct engine_stats {
+    struct gpu_device_info device;
+    uint64_t device_bytes, device_limit_bytes, host_bytes, frames, rays;
+    uint32_t jobs, device_objects;
+    struct engine_scene_stat *scenes; /* owned */
+    uint32_t scene_count;
+    struct {
+        uint64_t count, total_ns, greatest_ns;
+    } stages[STAGE_COUNT][2]; /* by stage and clock */
+};
+
+#define ENGINE_DESCRIPTION_MAX 256 /* cameras, and clips */
+
+struct engine_scene_entry {
+    uint64_t revision, triangles;
+    uint32_t clients;
+    enum engine_sharing sharing;
+    char name[SCENE_NAME_MAX + 1];
+};
+struct engine_scene_list {
+    size_t count;
+    struct engine_scene_entry scenes[]; /* by name */
+};
+struct engine_camera_entry {
+    uint32_t node;
+    float fov_y; /* 0: orthographic */
+    char name[SCENE_NAME_MAX + 1];
+};
+struct engine_clip_entry {
+    uint32_t clip, channels;
+    float duration_s;
+    char name[SCENE_NAME_MAX + 1];
+};
+struct engine_scene_description {
+    uint64_t revision, triangles, spheres;
+    uint32_t nodes;
+    bool empty;
+    float lower_world[3], upper_world[3]; /* finite */
+    uint32_t camera_count, clip_count;    /* the first ones, ascending */
+    struct engine_camera_entry cameras[ENGINE_DESCRIPTION_MAX];
+    struct engine_clip_entry clips[ENGINE_DESCRIPTION_MAX];
+};
+
+enum engine_event_kind {
+    ENGINE_DONE,
+    ENGINE_FAILED,
+    ENGINE_FRAME,
+    ENGINE_STATS_READY,
+    ENGINE_SCENES_LISTED,
+    ENGINE_SCENE_DESCRIBED,
+    ENGINE_SCENE_CHANGED, /* by another client; `scene` is the client's number for it */
+    ENGINE_SCENE_ENDED,   /* one that nobody held: blobs may be unused now. Client 0 */
+    ENGINE_CLIENT_FORGOTTEN,
+    /* The device is lost for good: it was too often, or cannot be made anew. All jobs have failed. Client 0 */
+    ENGINE_DEVICE_GONE
+};
+
+struct engine_frame {
+    uint32_t frame;               /* number in the job's range */
+    struct frame_request request; /* what it was rendered with, camera included */
+    struct frame_result result;   /* pixels are gone, the rest is there; times include encode */
+    enum encoding encoding;
+    uint8_t *bytes; /* owned, malloc'ed */
+    size_t size_bytes;
+    uint64_t digest; /* XXH3-64 of the pixels before encoding, as they came: see result.ycbcr */
+    float time_s, shutter_s;
+    uint64_t encoded_ns;              /* clock_now_ns() when it was ready to be sent */
+    unsigned quality;                 /* it was encoded with; 0: lossless */
+    unsigned scale_eighths;           /* of the width and height that the job asks for; 0: all of it */
+    uint64_t wanted_bytes;            /* that it may have, for an encoder that can be told; 0: not known */
+    bool wants_key;                   /* it is to be encoded so that it can be decoded without those before .. */
+    bool key_frame;                   /* .. and so it was */
+    size_t depth_bytes, normal_bytes; /* of attachments, encoded: the last ones of size_bytes, in that order */
+    /* Of a view: what it shows last of what its client wished; all 0 before the first wish. */
+    uint64_t command, received_ns;
+    bool moving;
+    uint64_t applied_ns, rendered_ns; /* clock_now_ns() when it was taken up, and read back */
+};
+
+struct engine_event {
+    enum engine_event_kind kind;
+    uint64_t client;
+    uint32_t request;
+    uint64_t revision;  /* done, for a commit or an attach; scene_changed */
+    uint32_t scene;     /* scene_changed */
+    struct error error; /* failed */
+    struct engine_frame *frame;
+    struct engine_stats *stats;
+    struct engine_scene_list *list;
+    struct engine_scene_description *description;
+    struct job_output *output; /* private to job/ */
+};
+void engine_event_destroy(struct engine_event *event); /* accepts NULL */
+
+/* Starts the threads; the device is opened before it returns, so that a missing GPU is an error here. */
+struct engine *engine_create(const struct engine_options *options, struct error *error);
+/* Stops after the slice in hand; what waits is dropped. Accepts NULL. */
+void engine_destroy(struct engine *engine);
+const struct gpu_device_info *engine_device(const struct engine *engine);
+/* Device memory that may be used, 0: no limit. For whoever has just created the engine. */
+uint64_t engine_device_limit_bytes(const struct engine *engine);
+/* False with ERROR_BUSY (retryable) when the queue is full; the command then still belongs to the caller. */
+bool engine_submit(struct engine *engine, struct engine_command *command, struct error *error);
+int engine_event_fd(const struct engine *engine);              /* readable while events wait */
+struct engine_event *engine_next_event(struct engine *engine); /* NULL: none waits */
+/* Whether the thread that owns GL has gone on since it was asked last, be it with a part of what takes long (see
+ * base/progress.h), or has nothing to do. *turns is the asker's, 0 at first. */
+bool engine_is_alive(const struct engine *engine, uint64_t *turns);
+/* Adds send and queue time of a frame to the totals, once the network side knows them. */
+void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_ns);
+
+#endif

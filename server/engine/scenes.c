@@ -1,0 +1,360 @@
+/* SPDX-License-Identifier: MIT */
+/* Scenes and who holds them, on the thread that owns GL. */
+#include "engine/engine_private.h"
+
+#include "base/clock.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- clients ------------------------------------------------------------------------------------ */
+
+static struct engine_client *need_client(struct engine *engine, const struct engine_command *command)
+{
+    struct engine_client *client = hashmap_get(&engine->clients, command->client);
+    if (client)
+        return client;
+    client = calloc(1, sizeof *client);
+    if (!client || !hashmap_put(&engine->clients, command->client, client)) {
+        free(client);
+        return NULL;
+    }
+    client->client = command->client;
+    client->principal = command->principal;
+    return client;
+}
+
+struct engine_reference *engine_find_reference(struct engine *engine, uint64_t client_number, uint32_t id)
+{
+    struct engine_client *client = hashmap_get(&engine->clients, client_number);
+    return client ? hashmap_get(&client->references, id) : NULL;
+}
+
+/* ---- references --------------------------------------------------------------------------------- */
+
+static bool reference_add(struct engine *engine, struct engine_scene *scene, const struct engine_command *command)
+{
+    struct engine_client *client = need_client(engine, command);
+    struct engine_reference *reference = client ? calloc(1, sizeof *reference) : NULL;
+    if (!reference || !hashmap_put(&client->references, command->scene, reference)) {
+        free(reference);
+        return false;
+    }
+    *reference = (struct engine_reference){.client = client, .scene = scene, .id = command->scene};
+    struct engine_reference **place = &scene->references;
+    while (*place)
+        place = &(*place)->next;
+    *place = reference;
+    return true;
+}
+
+/* Its jobs have ended, nothing that came by it waits. */
+static void reference_remove(struct engine *engine, struct engine_reference *reference)
+{
+    struct engine_reference **place = &reference->scene->references;
+    reference_drop_idle(engine, reference);
+    while (*place != reference)
+        place = &(*place)->next;
+    *place = reference->next;
+    if (!reference->scene->references)
+        reference->scene->left_ns = clock_now_ns();
+    hashmap_remove(&reference->client->references, reference->id);
+    free(reference);
+}
+
+void engine_abort_jobs(struct engine *engine, const struct engine_reference *reference, const char *why)
+{
+    for (size_t i = engine->job_count; i-- > 0;) {
+        struct job *job = engine->jobs[i];
+        if (job->reference == reference)
+            job_abort(engine, job, why ? engine_cancelled(job->client, job->request, why) : NULL);
+    }
+}
+
+void engine_scene_close(struct engine *engine, struct engine_reference *reference,
+                        const struct engine_command *command)
+{
+    struct engine_command *waiting;
+    engine_abort_jobs(engine, reference, "its scene was closed");
+    /* Only where memory was short does anything wait still. */
+    while ((waiting = engine_take_waiting(reference->scene, reference))) {
+        engine_post(engine, engine_cancelled(waiting->client, waiting->request, "its scene was closed"));
+        engine_command_destroy(waiting);
+    }
+    reference_remove(engine, reference);
+    engine_post_done(engine, command->client, command->request, 0);
+}
+
+void engine_forget_client(struct engine *engine, struct engine_client *client)
+{
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&client->references, &cursor, NULL, &value)) {
+        struct engine_reference *reference = value;
+        struct engine_scene *scene = reference->scene;
+        struct engine_command *waiting;
+        engine_abort_jobs(engine, reference, NULL);
+        while ((waiting = engine_take_waiting(scene, reference)))
+            engine_command_destroy(waiting);
+        reference_remove(engine, reference);
+        engine_run_waiting(engine, scene); /* its frame may have been in progress */
+        cursor = 0;                        /* the map has changed */
+    }
+    hashmap_remove(&engine->clients, client->client);
+    hashmap_finish(&client->references);
+    free(client);
+}
+
+/* ---- scenes ------------------------------------------------------------------------------------- */
+
+/* Jobs have ended, nothing waits, it is out of the list. */
+static void scene_free(struct engine *engine, struct engine_scene *scene)
+{
+    scene_drop_shared(engine, scene);
+    engine->table_bytes -= scene->scene->table_bytes;
+    scene_destroy(scene->scene);
+    free(scene->description);
+    free(scene->waiting);
+    free(scene);
+}
+
+/* One that nobody holds. */
+static void scene_end(struct engine *engine, struct engine_scene *scene)
+{
+    bool lingered = scene->sharing != SHARING_PRIVATE;
+    struct engine_scene **place = &engine->scenes;
+    while (*place != scene)
+        place = &(*place)->next;
+    *place = scene->next;
+    scene_free(engine, scene);
+    if (lingered)
+        engine_post(engine, event_create(ENGINE_SCENE_ENDED, 0, 0));
+}
+
+/* Until when one that nobody holds may stay; 0: no longer than now. One that holds nothing is not worth it. */
+static uint64_t lingers_until_ns(const struct engine *engine, const struct engine_scene *scene)
+{
+    if (scene->sharing == SHARING_PRIVATE || !scene->scene->revision || !engine->options.limits.scene_linger_ms)
+        return 0;
+    return scene->left_ns + engine->options.limits.scene_linger_ms * UINT64_C(1000000);
+}
+
+static size_t count_left_by(const struct engine *engine, uint64_t principal)
+{
+    size_t count = 0;
+    for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        count += !scene->references && scene->principal == principal;
+    return count;
+}
+
+/* Of those who leave too many scenes, who leaves most loses his oldest. */
+static bool goes_before(const struct engine *engine, const struct engine_scene *a, const struct engine_scene *b)
+{
+    size_t a_count = count_left_by(engine, a->principal), b_count = count_left_by(engine, b->principal);
+    return a_count != b_count ? a_count > b_count : a->left_ns < b->left_ns;
+}
+
+static struct engine_scene *first_to_go(const struct engine *engine)
+{
+    struct engine_scene *first = NULL;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        if (!scene->references && (!first || goes_before(engine, scene, first)))
+            first = scene;
+    }
+    return first;
+}
+
+/* Ends those whose time has passed. Of the rest: how many, and when the next one ends. */
+static size_t end_overdue(struct engine *engine, uint64_t *wait_ns)
+{
+    uint64_t now_ns = clock_now_ns();
+    size_t count = 0;
+    *wait_ns = UINT64_MAX;
+    for (struct engine_scene *scene = engine->scenes, *next; scene; scene = next) {
+        next = scene->next;
+        if (scene->references)
+            continue;
+        uint64_t until_ns = lingers_until_ns(engine, scene);
+        if (until_ns <= now_ns) {
+            scene_end(engine, scene);
+            continue;
+        }
+        count++;
+        *wait_ns = until_ns - now_ns < *wait_ns ? until_ns - now_ns : *wait_ns;
+    }
+    return count;
+}
+
+uint64_t engine_reap_scenes(struct engine *engine)
+{
+    uint64_t wait_ns;
+    while (end_overdue(engine, &wait_ns) > engine->options.limits.lingering_scenes)
+        scene_end(engine, first_to_go(engine));
+    return wait_ns;
+}
+
+void engine_end_left_scenes(struct engine *engine)
+{
+    for (struct engine_scene *scene; (scene = first_to_go(engine));)
+        scene_end(engine, scene);
+}
+
+/* For somebody who needs room: of his own the one that he left first; without any, as where too many linger. */
+static struct engine_scene *first_to_give_way(const struct engine *engine, uint64_t principal)
+{
+    struct engine_scene *own = NULL;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        if (!scene->references && scene->principal == principal && (!own || scene->left_ns < own->left_ns))
+            own = scene;
+    }
+    return own ? own : first_to_go(engine);
+}
+
+uint64_t engine_left_table_bytes(const struct engine *engine)
+{
+    uint64_t bytes = 0;
+    for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        bytes += scene->references ? 0 : scene->scene->table_bytes;
+    return bytes;
+}
+
+void engine_trim_tables(struct engine *engine, uint64_t principal)
+{
+    uint64_t limit_bytes = engine->options.limits.scene.host_bytes;
+    struct engine_scene *scene;
+    if (!limit_bytes || engine->table_bytes - engine_left_table_bytes(engine) > limit_bytes)
+        return;
+    while (engine->table_bytes > limit_bytes && (scene = first_to_give_way(engine, principal)))
+        scene_end(engine, scene);
+}
+
+/* At most: others may use them as well. */
+static uint64_t blob_bytes_of(const struct engine_scene *scene)
+{
+    return scene->scene->host_bytes - scene->scene->table_bytes;
+}
+
+void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes)
+{
+    uint64_t left_bytes = 0;
+    for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        left_bytes += scene->references ? 0 : blob_bytes_of(scene);
+    struct engine_scene *scene;
+    if (left_bytes < bytes)
+        return;
+    for (uint64_t freed_bytes = 0; freed_bytes < bytes && (scene = first_to_give_way(engine, principal));) {
+        freed_bytes += blob_bytes_of(scene);
+        scene_end(engine, scene);
+    }
+}
+
+/* ---- coming to a scene -------------------------------------------------------------------------- */
+
+/* By that name, what is kept for who asks before what is shared by all; NULL: there is none. */
+static struct engine_scene *find_by_name(const struct engine *engine, const struct engine_command *command)
+{
+    struct engine_scene *found = NULL;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        if (engine_scene_is_open_to(scene, command->principal) && strcmp(scene->scene->name, command->name) == 0 &&
+            (!found || scene->sharing == SHARING_KEPT))
+            found = scene;
+    }
+    return found;
+}
+
+/* Of one name: two of the same user, or two that are shared with all. What others keep is nothing to anybody. */
+static struct engine_scene *find_namesake(const struct engine *engine, const struct engine_command *command)
+{
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        bool is_own = scene->principal == command->principal && scene->sharing != SHARING_PRIVATE;
+        bool are_shared = scene->sharing == SHARING_SHARED && command->sharing == SHARING_SHARED;
+        if ((is_own || are_shared) && strcmp(scene->scene->name, command->name) == 0)
+            return scene;
+    }
+    return NULL;
+}
+
+/* One's own scene that nobody holds any more gives its name to a new one. */
+static bool name_is_free(struct engine *engine, const struct engine_command *command, struct error *error)
+{
+    if (command->sharing == SHARING_PRIVATE)
+        return true;
+    if (!command->name[0])
+        return error_set(error, ERROR_INVALID, "scene_open.name", "a scene that others can come to needs a name");
+    struct engine_scene *other;
+    while ((other = find_namesake(engine, command)) && !other->references &&
+           other->principal == command->principal)
+        scene_end(engine, other);
+    if (!other)
+        return true;
+    error_set(error, ERROR_INVALID, "scene_open.name", "there is a scene \"%s\" already", command->name);
+    return error_remedy(error, "attach to it, or choose another name");
+}
+
+static bool scene_add(struct engine *engine, const struct engine_command *command)
+{
+    struct engine_scene *scene = calloc(1, sizeof *scene);
+    if (scene)
+        scene->scene = scene_create(command->name, &engine->options.limits.scene);
+    if (!scene || !scene->scene || !reference_add(engine, scene, command)) {
+        if (scene)
+            scene_destroy(scene->scene);
+        free(scene);
+        return false;
+    }
+    scene->frames_ended = 1;
+    scene->sharing = command->sharing;
+    scene->principal = command->principal;
+    struct engine_scene **place = &engine->scenes;
+    while (*place)
+        place = &(*place)->next;
+    *place = scene;
+    return true;
+}
+
+static void answer(struct engine *engine, const struct engine_command *command, const struct error *error,
+                   uint64_t revision)
+{
+    if (error->kind)
+        engine_post_failed(engine, command->client, command->request, error);
+    else
+        engine_post_done(engine, command->client, command->request, revision);
+}
+
+void engine_scene_open(struct engine *engine, const struct engine_command *command)
+{
+    struct error error = {0};
+    if (engine_find_reference(engine, command->client, command->scene))
+        error_set(&error, ERROR_INVALID, "scene_open.scene", "scene %u is open already", command->scene);
+    else if (name_is_free(engine, command, &error) && !scene_add(engine, command))
+        error_set(&error, ERROR_OUT_OF_MEMORY, "scene_open", "no memory for a scene");
+    answer(engine, command, &error, 0);
+}
+
+void engine_scene_attach(struct engine *engine, const struct engine_command *command)
+{
+    struct error error = {0};
+    struct engine_scene *scene = find_by_name(engine, command);
+    if (engine_find_reference(engine, command->client, command->scene)) {
+        error_set(&error, ERROR_INVALID, "scene_attach.scene", "scene %u is open already", command->scene);
+    } else if (!scene) {
+        error_set(&error, ERROR_UNKNOWN_ID, "scene_attach.name", "no scene \"%s\" is shared, or kept for you",
+                  command->name);
+        error_remedy(&error, "'farlight scenes' lists those that are");
+    } else if (!reference_add(engine, scene, command)) {
+        error_set(&error, ERROR_OUT_OF_MEMORY, "scene_attach", "no memory");
+    }
+    answer(engine, command, &error, error.kind ? 0 : scene->scene->revision);
+}
+
+void engine_scene_changed(struct engine *engine, const struct engine_reference *by)
+{
+    for (const struct engine_reference *one = by->scene->references; one; one = one->next) {
+        struct engine_event *event = one == by ? NULL : event_create(ENGINE_SCENE_CHANGED, one->client->client, 0);
+        if (!event)
+            continue; /* without memory, the next change tells of this one, too */
+        event->scene = one->id;
+        event->revision = by->scene->scene->revision;
+        engine_post(engine, event);
+    }
+}

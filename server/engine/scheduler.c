@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: MIT */
+#include "engine/scheduler.h"
+
+static uint64_t at_most(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
+}
+
+static uint64_t turn_ns(uint32_t ready_count)
+{
+    return SCHEDULE_TURN_NS + ready_count * (uint64_t)SCHEDULE_TURN_EACH_NS;
+}
+
+/* How far one may be beyond the least. Turns themselves are not cut short by it, or it would give more to those
+ * who have long ones. */
+static uint64_t debt_max_ns(uint32_t ready_count)
+{
+    uint64_t waited_ns = SCHEDULE_WAIT_MAX_NS / ready_count, two_turns_ns = 2 * turn_ns(ready_count);
+    return waited_ns > two_turns_ns ? waited_ns : two_turns_ns;
+}
+
+static void group_begin(struct schedule_group *group)
+{
+    group->next_ns = UINT64_MAX;
+    group->ready_count = 0;
+}
+
+static bool was_ready(const struct scheduler *scheduler, const struct schedule_share *share)
+{
+    return share->ready_in + 1 == scheduler->picks && share->ready_in > 0;
+}
+
+/* Those who were ready and still are say how far the group is. */
+static void group_look(struct schedule_group *group, const struct scheduler *scheduler,
+                       const struct schedule_share *share)
+{
+    if (share->ready && was_ready(scheduler, share))
+        group->next_ns = at_most(group->next_ns, share->virtual_ns);
+}
+
+static void group_advance(struct schedule_group *group)
+{
+    if (group->next_ns != UINT64_MAX && group->next_ns > group->least_ns)
+        group->least_ns = group->next_ns;
+}
+
+/* More than once, if the share is a client's. */
+static void share_settle(struct schedule_share *share, const struct scheduler *scheduler,
+                         const struct schedule_group *group)
+{
+    if (!share->ready || share->ready_in == scheduler->picks)
+        return;
+    if (!was_ready(scheduler, share) && share->virtual_ns < group->least_ns)
+        share->virtual_ns = group->least_ns;
+    share->virtual_ns = at_most(share->virtual_ns, group->least_ns + debt_max_ns(group->ready_count));
+    share->ready_in = scheduler->picks;
+}
+
+static bool goes_before(const struct schedule_share *a, const struct schedule_share *b)
+{
+    return a->virtual_ns != b->virtual_ns ? a->virtual_ns < b->virtual_ns : a->turn < b->turn;
+}
+
+size_t schedule_pick(struct scheduler *scheduler, const struct schedule_entry *entries, size_t count)
+{
+    size_t best = SCHEDULE_NONE;
+    scheduler->picks++;
+    group_begin(&scheduler->clients);
+    for (size_t i = 0; i < count; i++) {
+        entries[i].client->share.ready = false;
+        group_begin(&entries[i].client->jobs);
+    }
+    for (size_t i = 0; i < count; i++) {
+        struct schedule_client *client = entries[i].client;
+        scheduler->clients.ready_count += entries[i].ready && !client->share.ready;
+        client->jobs.ready_count += entries[i].ready;
+        client->share.ready |= entries[i].ready;
+        entries[i].job->ready = entries[i].ready;
+        group_look(&client->jobs, scheduler, entries[i].job);
+    }
+    for (size_t i = 0; i < count; i++)
+        group_look(&scheduler->clients, scheduler, &entries[i].client->share);
+    group_advance(&scheduler->clients);
+    for (size_t i = 0; i < count; i++) {
+        const struct schedule_entry *entry = &entries[i];
+        group_advance(&entry->client->jobs);
+        share_settle(&entry->client->share, scheduler, &scheduler->clients);
+        share_settle(entry->job, scheduler, &entry->client->jobs);
+        if (!entry->ready)
+            continue;
+        bool same = best != SCHEDULE_NONE && entries[best].client == entry->client;
+        if (best == SCHEDULE_NONE || (same ? goes_before(entry->job, entries[best].job)
+                                           : goes_before(&entry->client->share, &entries[best].client->share)))
+            best = i;
+    }
+    scheduler->turn_ns = 0;
+    scheduler->turn_end_ns = turn_ns(scheduler->clients.ready_count);
+    return best;
+}
+
+static uint64_t without_outliers(struct schedule_client *client, uint64_t slice_ns)
+{
+    if (!client->mean_ns)
+        client->mean_ns = slice_ns;
+    uint64_t most_ns = SCHEDULE_OUTLIER * client->mean_ns;
+    client->mean_ns = client->mean_ns - client->mean_ns / 16 + slice_ns / 16;
+    return at_most(slice_ns, most_ns > SCHEDULE_OUTLIER_MIN_NS ? most_ns : SCHEDULE_OUTLIER_MIN_NS);
+}
+
+static void charge(struct schedule_share *share, uint64_t virtual_ns, uint64_t turn)
+{
+    share->virtual_ns += virtual_ns;
+    share->turn = turn;
+}
+
+void schedule_charge(struct scheduler *scheduler, struct schedule_client *client, struct schedule_share *job,
+                     uint64_t slice_ns, uint32_t weight)
+{
+    /* What took no time that the clock shows counts a little all the same, or it would have every turn. */
+    uint64_t virtual_ns = without_outliers(client, slice_ns) / weight + 1;
+    uint64_t turn = ++scheduler->turns;
+    scheduler->turn_ns += slice_ns;
+    charge(&client->share, virtual_ns, turn);
+    charge(job, virtual_ns, turn);
+}
+
+bool schedule_turn_lasts(const struct scheduler *scheduler)
+{
+    return scheduler->turn_ns < scheduler->turn_end_ns;
+}

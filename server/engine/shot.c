@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: MIT */
+#include "engine/shot.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define FOCUS_MAX 1e12f
+#define SHUTTER_MAX_S 1e6
+#define EXPOSURE_MAX_STOPS 64.0f
+
+uint64_t shot_seed(uint64_t job_seed, uint32_t frame)
+{
+    /* The finaliser of MurmurHash3 (Appleby): one to one, and 0 for 0. */
+    uint64_t mixed = frame;
+    mixed = (mixed ^ (mixed >> 33)) * 0xff51afd7ed558ccdu;
+    mixed = (mixed ^ (mixed >> 33)) * 0xc4ceb9fe1a85ec53u;
+    return job_seed ^ mixed ^ (mixed >> 33);
+}
+
+void shot_finish(struct shot *shot)
+{
+    scene_motion_finish(&shot->motion);
+}
+
+/* The lens, of the job but for what clips say. */
+static void set_lens(struct frame_request *request, const struct animation_view *view,
+                     const struct pose_view *given)
+{
+    if (given->given & POSE_VIEW_APERTURE)
+        request->aperture = given->aperture;
+    if (given->given & POSE_VIEW_FOCUS)
+        request->focus = given->focus;
+    if (given->given & POSE_VIEW_EXPOSURE)
+        request->exposure_stops =
+            fminf(fmaxf(request->exposure_stops + given->exposure_stops, -EXPOSURE_MAX_STOPS), EXPOSURE_MAX_STOPS);
+    if (!(request->focus > 0.0f))
+        request->focus = fminf(view->focus, FOCUS_MAX);
+    if (!(request->camera.fov_y > 0.0f))
+        request->aperture = 0.0f; /* parallel rays go through no lens */
+    if (!(request->aperture > 0.0f))
+        request->focus = 0.0f;
+}
+
+static bool motion_make(struct shot *shot, const struct engine_job *job, const struct scene *scene, double time_s,
+                        struct error *error)
+{
+    struct error local = {0};
+    if (!job->clip_count || scene_motion_evaluate(&shot->motion, scene, job->clips, job->clip_count, time_s,
+                                                  (double)shot->shutter_s, &local))
+        return true;
+    char field[sizeof local.field];
+    snprintf(field, sizeof field, "render.%.100s", local.field);
+    return error_set(error, local.kind, field, "%s", local.text);
+}
+
+/* The shutter and where things are while it is open. */
+static bool shot_begin(struct shot *shot, const struct engine_job *job, const struct scene *scene, double time_s,
+                       struct error *error)
+{
+    *shot = (struct shot){.request = job->frame, .time_s = (float)time_s};
+    shot->shutter_s = (float)fmin((double)job->shutter / (double)job->frames_per_second, SHUTTER_MAX_S);
+    return motion_make(shot, job, scene, time_s, error);
+}
+
+bool shot_make(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
+               struct animation_bounds *bounds, struct error *error)
+{
+    static const struct pose_view nothing = {0};
+    double time_s = animation_time_s(job, frame);
+    if (!(fabs(time_s) <= ANIMATION_TIME_MAX_S)) {
+        error_set(error, ERROR_INVALID, "render.frames_per_second", "frame %u is at %g s, beyond %g s", frame,
+                  time_s, ANIMATION_TIME_MAX_S);
+        return error_remedy(error, "use more frames a second, or smaller frame numbers");
+    }
+    if (!shot_begin(shot, job, scene, time_s, error))
+        return false;
+    const struct scene_pose *pose = shot->motion.pose_count ? &shot->motion.poses[0] : NULL;
+    struct animation_view view;
+    if (!animation_view(job, scene, pose, time_s, bounds, &view, error)) {
+        shot_finish(shot);
+        return false;
+    }
+    shot->request.camera = view.camera;
+    set_lens(&shot->request, &view, pose ? &pose->view : &nothing);
+    if (!shot->request.accumulate)
+        shot->request.seed = shot_seed(job->frame.seed, frame);
+    return true;
+}
+
+/* Where the view looks from is its client's word, whatever the clips say of the job's camera. */
+static bool look_from_key(const struct camera_key *key, struct animation_view *view, struct error *error)
+{
+    if (!animation_key_camera(key, "view_camera.up_world", &view->camera, error))
+        return false;
+    view->focus = animation_distance(&view->camera, key->look_at_world);
+    return true;
+}
+
+/* As a job along that node's path would, at that time. */
+static bool look_through_node(const struct engine_job *job, const struct scene *scene,
+                              const struct scene_pose *pose, const struct view_camera *from,
+                              struct animation_bounds *bounds, struct animation_view *view, struct error *error)
+{
+    struct engine_job along = *job;
+    along.path = CAMERA_NODE;
+    along.camera_node = from->node;
+    struct error local = {0};
+    if (animation_view(&along, scene, pose, (double)from->key.time_s, bounds, view, &local))
+        return true;
+    return error_set(error, local.kind, "view_camera.node", "%s", local.text);
+}
+
+bool shot_look(struct shot *shot, const struct engine_job *job, const struct scene *scene,
+               const struct view_camera *from, struct animation_bounds *bounds, struct error *error)
+{
+    static const struct pose_view nothing = {0};
+    if (!shot_begin(shot, job, scene, (double)from->key.time_s, error))
+        return false;
+    const struct scene_pose *pose = shot->motion.pose_count ? &shot->motion.poses[0] : NULL;
+    struct animation_view view = {0};
+    if (!(from->node ? look_through_node(job, scene, pose, from, bounds, &view, error)
+                     : look_from_key(&from->key, &view, error))) {
+        shot_finish(shot);
+        return false;
+    }
+    shot->request.camera = view.camera;
+    set_lens(&shot->request, &view, pose ? &pose->view : &nothing);
+    return true;
+}
+
+bool shot_check(const struct engine_job *job, const struct scene *scene, struct error *error)
+{
+    struct shot shot;
+    if (!animation_check(job, error) || !shot_make(&shot, job, scene, job->first_frame, NULL, error))
+        return false;
+    shot_finish(&shot);
+    return true;
+}

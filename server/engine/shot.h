@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/* What one frame of a job shows: poses, camera, lens and noise. Pure: the same scene, job and frame give the same,
+ * whichever frames came before, so that a range may be divided as one likes. */
+#ifndef FARLIGHT_ENGINE_SHOT_H
+#define FARLIGHT_ENGINE_SHOT_H
+
+#include "engine/animation.h"
+#include "engine/view_wishes.h"
+
+struct shot {
+    struct frame_request request;
+    struct scene_motion motion; /* owned; no pose: no clip plays */
+    float time_s, shutter_s;
+};
+
+/* `bounds` may be kept from frame to frame, or NULL. On failure there is nothing to finish. */
+bool shot_make(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
+               struct animation_bounds *bounds, struct error *error);
+/* The same from another place and at another time than the job's frames have: those of `from`. Noise is the job's
+ * own, so that what is seen from one place is one picture. */
+bool shot_look(struct shot *shot, const struct engine_job *job, const struct scene *scene,
+               const struct view_camera *from, struct animation_bounds *bounds, struct error *error);
+void shot_finish(struct shot *shot);
+/* The same for frame 0 as for the job; for others another noise. */
+uint64_t shot_seed(uint64_t job_seed, uint32_t frame);
+/* Whether a job can begin: what does not depend on the frame, and its first frame. */
+bool shot_check(const struct engine_job *job, const struct scene *scene, struct error *error);
+
+#endif

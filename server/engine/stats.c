@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: MIT */
+#include "engine/engine_private.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static void describe_scene(const struct engine *engine, struct engine_scene *from, uint64_t principal,
+                           struct engine_scene_stat *stat)
+{
+    const struct scene *scene = from->scene;
+    engine_count_contents(from);
+    const struct engine_reference *first = from->references;
+    *stat = (struct engine_scene_stat){
+        .is_known = from->principal == principal || engine_scene_is_open_to(from, principal),
+        .client = first ? first->client->client : 0,
+        .scene = first ? first->id : 0,
+        .revision = scene->revision,
+        .host_bytes = scene->host_bytes,
+        .device_bytes = scene_device_bytes(engine, from),
+        .nodes = (uint32_t)scene->objects[SCENE_NODE].count,
+        .instances = from->instances,
+        .triangles = from->triangles,
+        .spheres = from->spheres,
+    };
+    memcpy(stat->name, scene->name, sizeof stat->name);
+}
+
+static bool describe_scenes(const struct engine *engine, uint64_t principal, struct engine_stats *stats)
+{
+    size_t count = 0;
+    for (const struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
+        count++;
+    if (!count)
+        return true;
+    stats->scenes = calloc(count, sizeof *stats->scenes);
+    if (!stats->scenes)
+        return false;
+    for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
+        describe_scene(engine, scene, principal, &stats->scenes[stats->scene_count]);
+        stats->host_bytes += stats->scenes[stats->scene_count++].host_bytes;
+    }
+    return true;
+}
+
+struct engine_stats *engine_stats_collect(const struct engine *engine, uint64_t principal)
+{
+    struct engine_stats *stats = calloc(1, sizeof *stats);
+    if (!stats)
+        return NULL;
+    stats->device = engine->device_info;
+    stats->device_bytes = engine_device_bytes(engine);
+    stats->device_limit_bytes = engine->device_bytes_limit;
+    stats->device_objects = engine->device ? (uint32_t)gpu_device_objects(engine->device) : 0;
+    stats->frames = engine->frames;
+    stats->rays = engine->rays;
+    for (size_t i = 0; i < engine->job_count; i++)
+        stats->jobs += !job_output_is_closed(engine->jobs[i]->output);
+    for (int stage = 0; stage < STAGE_COUNT; stage++) {
+        for (int clock = 0; clock < 2; clock++) {
+            const struct stage_total *total = &engine->totals.by_stage[stage][clock];
+            stats->stages[stage][clock].count = atomic_load(&total->count);
+            stats->stages[stage][clock].total_ns = atomic_load(&total->total_ns);
+            stats->stages[stage][clock].greatest_ns = atomic_load(&total->greatest_ns);
+        }
+    }
+    if (describe_scenes(engine, principal, stats))
+        return stats;
+    free(stats);
+    return NULL;
+}

@@ -1,0 +1,177 @@
+/* SPDX-License-Identifier: MIT */
+/* Views: frames of the newest camera only, which refine while nothing moves.
+ *
+ * A frame is begun when there is something to show that was not shown, and when there is credit for it: so none
+ * waits anywhere to become stale. What moves is rendered anew each time; once it rests, frames add their samples
+ * up until there are enough. */
+#include "engine/engine_private.h"
+
+#include "base/clock.h"
+
+#define SECOND_NS 1e9
+/* A frame comes so much before the encoder is expected to be free: it is hardly older for that, and an encoder
+ * that takes less than the last time need not wait. */
+#define EARLY_NS UINT64_C(500000)
+
+void view_follow(struct job *job, const struct job *before)
+{
+    job->next_frame = before->next_frame;
+    job->view.due_ns = before->view.due_ns;
+    job->view.render_ns = before->view.render_ns;
+}
+
+/* One frame has all the samples that are wanted: it is rendered like one of a batch. */
+static bool adds_up(const struct job *job)
+{
+    return job->spec.frame.samples > job->spec.pass_samples;
+}
+
+/* Something was wished, or changed, that no frame shows. */
+static bool has_news(const struct job *job, const struct view_wish *wish)
+{
+    const struct view *view = &job->view;
+    /* A key frame that could not be finished is wished still. */
+    bool key_frame = wish->key_frame || view->wish.key_frame;
+    return !view->shown || wish->camera.command != view->shown_command || key_frame ||
+           job->scene->scene->revision != view->shown_revision;
+}
+
+bool view_has_news(const struct job *job)
+{
+    struct view_wish wish = view_wishes_see(job->spec.wishes);
+    return has_news(job, &wish);
+}
+
+static bool may_refine(const struct job *job)
+{
+    const struct view *view = &job->view;
+    return view->shown && !view->shown_moving && view->held_samples < job->spec.frame.samples;
+}
+
+/* When a frame may be begun so that it need not wait to be encoded: each is encoded while the next one is
+ * rendered, but one that came early would only be older when it is seen. */
+static uint64_t encoder_due_ns(const struct job *job)
+{
+    const struct view *view = &job->view;
+    uint32_t unfinished = job_output_unfinished(job->output);
+    if (unfinished != 1)
+        return unfinished ? UINT64_MAX : 0; /* the engine is told of each that is encoded */
+    uint64_t free_ns = view->rendered_ns + job_output_encode_ns(job->output);
+    uint64_t before_ns = view->render_ns + EARLY_NS;
+    return free_ns > before_ns ? free_ns - before_ns : 0;
+}
+
+uint64_t view_due_ns(const struct job *job)
+{
+    /* Seen in any case, or the engine would not be told of the next wish. */
+    struct view_wish wish = view_wishes_see(job->spec.wishes);
+    if (job->view.made >= job->view.credit || !(has_news(job, &wish) || may_refine(job)))
+        return UINT64_MAX;
+    uint64_t encoder_ns = encoder_due_ns(job);
+    return encoder_ns > job->view.due_ns ? encoder_ns : job->view.due_ns;
+}
+
+/* Frames are begun at even intervals where that can be, and never more of them than that. */
+static void set_due(struct job *job)
+{
+    uint64_t period_ns = (uint64_t)(SECOND_NS / (double)job->spec.frames_per_second);
+    uint64_t due_ns = job->view.due_ns + period_ns;
+    job->view.due_ns = due_ns > job->begin_ns ? due_ns : job->begin_ns + period_ns;
+}
+
+static uint32_t samples_of_next(const struct job *job)
+{
+    const struct view *view = &job->view;
+    uint32_t samples = job->spec.frame.samples;
+    uint32_t wanted = view->refining ? samples - view->held_samples : samples;
+    return wanted < job->spec.pass_samples ? wanted : job->spec.pass_samples;
+}
+
+/* Smaller while it moves, if that is what keeps up. */
+static void apply_effort(const struct job *job, struct frame_request *request)
+{
+    const struct view_wish *wish = &job->view.wish;
+    uint32_t scale = wish->effort.scale_eighths;
+    if (!job->spec.adapt || !wish->camera.moving || !scale || scale >= 8)
+        return;
+    request->width = request->width * scale >= 8 ? request->width * scale / 8 : 1;
+    request->height = request->height * scale >= 8 ? request->height * scale / 8 : 1;
+}
+
+bool view_take_up(struct job *job, struct shot *shot, struct error *error)
+{
+    struct view *view = &job->view;
+    const struct scene *scene = job->scene->scene;
+    bool key_frame = view->wish.key_frame; /* of a frame that was not finished */
+    view->wish = view_wishes_take(job->spec.wishes);
+    view->wish.key_frame |= key_frame;
+    view->refining = !has_news(job, &view->wish);
+    bool made = view->wish.camera.command
+                    ? shot_look(shot, &job->spec, scene, &view->wish.camera, &job->bounds, error)
+                    : shot_make(shot, &job->spec, scene, job->spec.first_frame, &job->bounds, error);
+    if (!made)
+        return false;
+    shot->request.seed = job->spec.frame.seed; /* the same picture of the same place */
+    shot->request.accumulate = adds_up(job);
+    shot->request.samples = samples_of_next(job);
+    shot->request.samples_most = job->spec.frame.samples; /* one that is complete may be wished again */
+    apply_effort(job, &shot->request);
+    return true;
+}
+
+/* While it moves; at rest it is the job's. */
+static unsigned quality_of(const struct job *job)
+{
+    const struct view_wish *wish = &job->view.wish;
+    bool adapts = wish->camera.moving && job->spec.adapt && wish->effort.quality;
+    return adapts ? wish->effort.quality : job->spec.quality;
+}
+
+enum ycbcr view_ycbcr(const struct job *job)
+{
+    /* At rest the samples that are held decide how the frame is encoded, once it is there. */
+    bool certain = job->view.wish.camera.moving || job->spec.still_encoding == job->spec.encoding;
+    return certain ? encoder_takes(job->spec.encoding, quality_of(job)) : YCBCR_NONE;
+}
+
+bool view_is_stale(const struct job *job)
+{
+    struct view_wish wish = view_wishes_see(job->spec.wishes);
+    return job->view.refining && (has_news(job, &wish) || job->scene->waiting_count > 0);
+}
+
+void view_done(struct job *job, struct engine_frame *frame)
+{
+    struct view *view = &job->view;
+    const struct view_camera *camera = &view->wish.camera;
+    set_due(job);
+    view->render_ns = frame->rendered_ns - frame->applied_ns;
+    view->rendered_ns = frame->rendered_ns;
+    view->made++;
+    view->shown = true;
+    view->shown_command = camera->command;
+    view->shown_revision = frame->result.revision;
+    view->shown_moving = camera->moving;
+    view->held_samples = frame->result.samples;
+    frame->command = camera->command;
+    frame->received_ns = camera->received_ns;
+    frame->moving = camera->moving;
+    view->owes_key_frame |= view->wish.key_frame;
+    view->wish.key_frame = false;
+    frame->quality = quality_of(job);
+    if (camera->moving && job->spec.adapt) {
+        const struct view_effort *effort = &view->wish.effort;
+        frame->scale_eighths = effort->scale_eighths;
+        frame->wanted_bytes = effort->bytes;
+    }
+    bool spares = job->spec.adapt && view->wish.effort.sparing && view->held_samples < job->spec.frame.samples;
+    if (!camera->moving && !spares && job->spec.still_encoding != job->spec.encoding) {
+        frame->encoding = job->spec.still_encoding;
+        if (!encoder_loses(frame->encoding))
+            frame->quality = 0; /* the other one's: the fastest level */
+    }
+    frame->wants_key = view->owes_key_frame;
+    /* One of rest may stand alone, but it helps nobody who has lost the stream. */
+    if (!view->lane || frame->encoding == ENCODING_H264)
+        view->owes_key_frame = false;
+}

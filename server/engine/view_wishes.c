@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: MIT */
+#include "engine/view_wishes.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+struct view_wishes {
+    atomic_uint references;
+    pthread_mutex_t lock; /* of what follows */
+    struct view_wish wish;
+    bool told; /* the engine has been told, and has not looked since */
+};
+
+struct view_wishes *view_wishes_create(void)
+{
+    struct view_wishes *wishes = calloc(1, sizeof *wishes);
+    if (!wishes)
+        return NULL;
+    atomic_init(&wishes->references, 1);
+    pthread_mutex_init(&wishes->lock, NULL);
+    return wishes;
+}
+
+struct view_wishes *view_wishes_ref(struct view_wishes *wishes)
+{
+    atomic_fetch_add_explicit(&wishes->references, 1, memory_order_relaxed);
+    return wishes;
+}
+
+void view_wishes_unref(struct view_wishes *wishes)
+{
+    if (!wishes || atomic_fetch_sub(&wishes->references, 1) != 1)
+        return;
+    pthread_mutex_destroy(&wishes->lock);
+    free(wishes);
+}
+
+/* Ends what the caller began by taking the lock. */
+static bool tell(struct view_wishes *wishes)
+{
+    bool told = wishes->told;
+    wishes->told = true;
+    pthread_mutex_unlock(&wishes->lock);
+    return !told;
+}
+
+bool view_wishes_look(struct view_wishes *wishes, const struct view_camera *camera)
+{
+    pthread_mutex_lock(&wishes->lock);
+    wishes->wish.camera = *camera;
+    return tell(wishes);
+}
+
+bool view_wishes_want_key_frame(struct view_wishes *wishes)
+{
+    pthread_mutex_lock(&wishes->lock);
+    wishes->wish.key_frame = true;
+    return tell(wishes);
+}
+
+void view_wishes_set_effort(struct view_wishes *wishes, const struct view_effort *effort)
+{
+    pthread_mutex_lock(&wishes->lock);
+    wishes->wish.effort = *effort;
+    pthread_mutex_unlock(&wishes->lock);
+}
+
+static struct view_wish see(struct view_wishes *wishes, bool take)
+{
+    pthread_mutex_lock(&wishes->lock);
+    struct view_wish wish = wishes->wish;
+    wishes->told = false;
+    if (take)
+        wishes->wish.key_frame = false;
+    pthread_mutex_unlock(&wishes->lock);
+    return wish;
+}
+
+struct view_wish view_wishes_see(struct view_wishes *wishes)
+{
+    return see(wishes, false);
+}
+
+struct view_wish view_wishes_take(struct view_wishes *wishes)
+{
+    return see(wishes, true);
+}

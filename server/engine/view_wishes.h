@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: MIT */
+/* What the client of a view wishes from moment to moment: where it looks from, and whether the next frame is to
+ * stand alone. Of each only the newest counts, so that nothing stale can queue however fast the wishes come.
+ *
+ * The network thread writes, the thread that owns GL reads. Reference-counted: the session holds one, each command
+ * and each job with it another. The views that follow each other on a channel share one: that is how the engine
+ * knows which view a new one replaces, and how the camera goes on. */
+#ifndef FARLIGHT_ENGINE_VIEW_WISHES_H
+#define FARLIGHT_ENGINE_VIEW_WISHES_H
+
+#include "engine/engine.h"
+
+struct view_camera {
+    uint64_t command;      /* the client's number for it; 0: none has come */
+    uint64_t received_ns;  /* clock_now_ns() when the network thread read it */
+    bool moving;           /* more will follow soon */
+    struct camera_key key; /* its time is that of the job */
+    uint32_t node;         /* that shows a camera, which counts instead of the key's, but for the time; 0: none */
+};
+
+struct view_wishes;
+
+struct view_wishes *view_wishes_create(void); /* NULL: out of memory */
+struct view_wishes *view_wishes_ref(struct view_wishes *wishes);
+void view_wishes_unref(struct view_wishes *wishes); /* accepts NULL */
+
+/* True: the engine is to be told by ENGINE_VIEW_LOOK. False: it was, and has not looked since. */
+bool view_wishes_look(struct view_wishes *wishes, const struct view_camera *camera);
+bool view_wishes_want_key_frame(struct view_wishes *wishes);
+
+/* For views that adapt. */
+struct view_effort {
+    /* Of frames while it moves. */
+    unsigned scale_eighths; /* of width and height; 0: as the job says */
+    unsigned quality;       /* 0: as the job says */
+    uint64_t bytes;         /* that a frame may have; 0: not known */
+    /* Frames in the encoding of rest would keep the link from what moves next for long: only the one that has all
+     * samples comes in it. */
+    bool sparing;
+};
+/* Nothing is to be told: it counts when the next frame is begun for another reason. */
+void view_wishes_set_effort(struct view_wishes *wishes, const struct view_effort *effort);
+
+struct view_wish {
+    struct view_camera camera;
+    bool key_frame;
+    struct view_effort effort;
+};
+/* What is wished now, which stays wished. */
+struct view_wish view_wishes_see(struct view_wishes *wishes);
+/* The same for a frame that is about to show it: a key frame is wished no longer. */
+struct view_wish view_wishes_take(struct view_wishes *wishes);
+
+#endif

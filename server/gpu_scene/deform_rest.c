@@ -1,0 +1,335 @@
+/* SPDX-License-Identifier: MIT */
+/* Which nodes deform which meshes, and those meshes at rest: in the buffers of shaders/gpu_scene/deform.comp, and
+ * in boxes from which any pose can be bounded without a look at its vertices. */
+#include "gpu_scene/state.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void drop_meshes(struct gpu_scene_deform *deform)
+{
+    for (uint32_t i = 0; i < deform->mesh_count; i++) {
+        free(deform->meshes[i].joints);
+        free(deform->meshes[i].targets);
+    }
+    free(deform->meshes);
+    deform->meshes = NULL;
+    deform->mesh_count = 0;
+}
+
+static void drop_uses(struct deform_use *uses, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        free(uses[i].open);
+        free(uses[i].close);
+    }
+    free(uses);
+}
+
+size_t gpu_scene_deform_buffers(struct gpu_scene_deform *deform, struct gpu_buffer *buffers[DEFORM_BUFFERS_MAX])
+{
+    struct gpu_buffer *all[DEFORM_BUFFERS_MAX] = {
+        &deform->positions,      &deform->normals,         &deform->tangents,
+        &deform->joints,         &deform->joint_weights,   &deform->target_positions,
+        &deform->target_normals, &deform->target_tangents, &deform->parameters,
+    };
+    memcpy(buffers, all, sizeof(all));
+    return DEFORM_BUFFERS_MAX;
+}
+
+void gpu_scene_deform_finish(struct gpu_scene_deform *deform, struct gpu_device *device)
+{
+    struct gpu_buffer *buffers[DEFORM_BUFFERS_MAX];
+    size_t count = gpu_scene_deform_buffers(deform, buffers);
+    for (size_t i = 0; i < count; i++)
+        gpu_buffer_finish(device, buffers[i]);
+    drop_meshes(deform);
+    drop_uses(deform->uses, deform->use_count);
+    *deform = (struct gpu_scene_deform){0};
+}
+
+/* ---- which nodes ---- */
+
+static bool can_deform(const struct scene *scene)
+{
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, &id, &value)) {
+        const struct scene_mesh *mesh = value;
+        if (mesh->influence_count || mesh->target_count)
+            return true;
+    }
+    return false;
+}
+
+static const struct scene_mesh *deformed_mesh(const struct scene *scene, const struct scene_node *node)
+{
+    const struct scene_mesh *mesh = node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;
+    return mesh && scene_node_deforms(node, mesh) ? mesh : NULL;
+}
+
+uint64_t gpu_scene_deform_signature(const struct scene *scene)
+{
+    uint64_t signature = 0, id;
+    size_t cursor = 0;
+    void *value;
+    if (!can_deform(scene))
+        return 0;
+    while (hashmap_next(&scene->objects[SCENE_NODE], &cursor, &id, &value)) {
+        const struct scene_node *node = value;
+        if (deformed_mesh(scene, node))
+            signature += gpu_scene_mix(gpu_scene_mix(id + 1) + ((uint64_t)node->object << 32 | node->skin));
+    }
+    return signature;
+}
+
+static int by_node(const void *a, const void *b)
+{
+    uint32_t node_a = ((const struct deform_use *)a)->node, node_b = ((const struct deform_use *)b)->node;
+    return node_a < node_b ? -1 : node_a > node_b;
+}
+
+/* A use that shows the same as before takes over what is known of it; its vertices are no longer in place. */
+static void inherit(struct deform_use *use, struct gpu_scene_deform *old)
+{
+    struct deform_use *before = NULL;
+    if (old->use_count)
+        before = bsearch(use, old->uses, old->use_count, sizeof(*use), by_node);
+    if (!before || before->mesh_id != use->mesh_id || before->mesh_revision != use->mesh_revision ||
+        before->skin != use->skin)
+        return;
+    use->open = before->open;
+    use->close = before->close;
+    use->value_count = before->value_count;
+    use->revision = before->revision;
+    use->box = before->box;
+    before->open = before->close = NULL;
+}
+
+bool gpu_scene_deform_list(struct gpu_scene_deform *deform, const struct scene *scene, struct error *error)
+{
+    const struct hashmap *nodes = &scene->objects[SCENE_NODE];
+    struct deform_use *uses = NULL;
+    uint32_t count = 0;
+    if (can_deform(scene)) {
+        size_t cursor = 0;
+        uint64_t id;
+        void *value;
+        uses = calloc(nodes->count + 1, sizeof(*uses));
+        if (!uses)
+            return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %zu nodes", nodes->count);
+        while (hashmap_next(nodes, &cursor, &id, &value)) {
+            const struct scene_node *node = value;
+            const struct scene_mesh *mesh = deformed_mesh(scene, node);
+            if (mesh)
+                uses[count++] = (struct deform_use){.node = (uint32_t)id,
+                                                    .mesh_id = node->object,
+                                                    .mesh_revision = mesh->base.revision,
+                                                    .skin = mesh->influence_count ? node->skin : 0};
+        }
+        qsort(uses, count, sizeof(*uses), by_node);
+    }
+    for (uint32_t i = 0; i < count; i++)
+        inherit(&uses[i], deform);
+    drop_uses(deform->uses, deform->use_count);
+    deform->uses = uses;
+    deform->use_count = count;
+    return true;
+}
+
+/* ---- boxes ---- */
+
+static const struct deform_box empty_box = {{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
+
+static void grow(struct deform_box *box, const float point[3])
+{
+    for (int k = 0; k < 3; k++) {
+        box->lower[k] = fminf(box->lower[k], point[k]);
+        box->upper[k] = fmaxf(box->upper[k], point[k]);
+    }
+}
+
+static const float *floats_of(const struct scene_mesh *mesh, enum mesh_array array)
+{
+    return mesh->arrays[array] ? (const float *)(const void *)mesh->arrays[array]->data : NULL;
+}
+
+static bool find_joint_boxes(struct deform_mesh *rest, const struct scene_mesh *mesh)
+{
+    const float *positions = floats_of(mesh, MESH_POSITIONS), *weights = floats_of(mesh, MESH_WEIGHTS);
+    const uint16_t *joints =
+        mesh->influence_count ? (const uint16_t *)(const void *)mesh->arrays[MESH_JOINTS]->data : NULL;
+    size_t per_vertex = mesh->influence_count;
+    for (size_t i = 0; i < mesh->vertex_count * per_vertex; i++)
+        if (joints[i] >= rest->joint_count)
+            rest->joint_count = (uint32_t)joints[i] + 1;
+    rest->joints = malloc(((size_t)rest->joint_count + 1) * sizeof(*rest->joints));
+    if (!rest->joints)
+        return false;
+    for (uint32_t joint = 0; joint < rest->joint_count; joint++)
+        rest->joints[joint] = empty_box;
+    rest->unmoved = empty_box;
+    for (size_t vertex = 0; vertex < mesh->vertex_count; vertex++) {
+        float sum = 0.0f;
+        for (size_t k = vertex * per_vertex; k < (vertex + 1) * per_vertex; k++) {
+            if (weights[k] > 0.0f)
+                grow(&rest->joints[joints[k]], &positions[3 * vertex]);
+            sum += weights[k];
+        }
+        if (!(sum > 0.0f))
+            grow(&rest->unmoved, &positions[3 * vertex]);
+    }
+    return true;
+}
+
+static bool find_target_boxes(struct deform_mesh *rest, const struct scene_mesh *mesh)
+{
+    const float *added = floats_of(mesh, MESH_TARGET_POSITIONS);
+    rest->targets = calloc((size_t)mesh->target_count + 1, sizeof(*rest->targets));
+    for (uint32_t target = 0; rest->targets && added && target < mesh->target_count; target++)
+        for (size_t vertex = 0; vertex < mesh->vertex_count; vertex++, added += 3)
+            grow(&rest->targets[target], added);
+    return rest->targets != NULL;
+}
+
+/* ---- the buffers ---- */
+
+struct rest_totals {
+    uint64_t vertices, influences, target_vertices;
+    uint32_t arrays; /* bit by mesh_array: some mesh has it */
+};
+
+static bool add_mesh(struct gpu_scene_deform *deform, const struct scene_mesh *mesh, struct rest_totals *totals)
+{
+    struct deform_mesh *rest = &deform->meshes[deform->mesh_count++];
+    *rest = (struct deform_mesh){
+        .id = mesh->base.id,
+        .first_vertex = (uint32_t)totals->vertices,
+        .first_influence = (uint32_t)totals->influences,
+        .first_target_vertex = (uint32_t)totals->target_vertices,
+    };
+    totals->vertices += mesh->vertex_count;
+    totals->influences += (uint64_t)mesh->vertex_count * mesh->influence_count;
+    totals->target_vertices += (uint64_t)mesh->vertex_count * mesh->target_count;
+    for (int array = 0; array < MESH_ARRAY_COUNT; array++)
+        totals->arrays |= mesh->arrays[array] ? 1u << array : 0;
+    return find_joint_boxes(rest, mesh) && find_target_boxes(rest, mesh);
+}
+
+static bool list_meshes(struct gpu_scene *gpu, const struct scene *scene, struct rest_totals *totals)
+{
+    struct gpu_scene_deform *deform = &gpu->state->deform;
+    struct hashmap place_by_id = {0}; /* plus 1 */
+    drop_meshes(deform);
+    deform->meshes = calloc((size_t)deform->use_count + 1, sizeof(*deform->meshes));
+    bool ok = deform->meshes != NULL;
+    for (uint32_t i = 0; ok && i < deform->use_count; i++) {
+        struct deform_use *use = &deform->uses[i];
+        uintptr_t place = (uintptr_t)hashmap_get(&place_by_id, use->mesh_id);
+        use->is_placed = false;
+        if (!place) {
+            place = (uintptr_t)deform->mesh_count + 1;
+            ok = add_mesh(deform, scene_mesh(scene, use->mesh_id), totals) &&
+                 hashmap_put(&place_by_id, use->mesh_id, (void *)place);
+        }
+        use->mesh = (uint32_t)(place - 1);
+    }
+    hashmap_finish(&place_by_id);
+    return ok;
+}
+
+static bool check_totals(const struct gpu_scene *gpu, const struct rest_totals *totals, struct error *error)
+{
+    return gpu_scene_check_texels(gpu, totals->vertices, "vertices that deform", error) &&
+           gpu_scene_check_texels(gpu, totals->influences, "weights of joints", error) &&
+           gpu_scene_check_texels(gpu, totals->target_vertices, "vertices of morph targets", error);
+}
+
+/* Where a mesh's part of a buffer begins, counted in items, and how many items there are a mesh. */
+enum rest_place { REST_VERTEX, REST_INFLUENCE, REST_TARGET };
+
+static size_t place_of(const struct deform_mesh *rest, enum rest_place place)
+{
+    return place == REST_VERTEX      ? rest->first_vertex
+           : place == REST_INFLUENCE ? rest->first_influence
+                                     : rest->first_target_vertex;
+}
+
+static size_t count_of(const struct scene_mesh *mesh, enum rest_place place)
+{
+    size_t vertices = mesh->vertex_count;
+    return place == REST_VERTEX
+               ? vertices
+               : vertices * (place == REST_INFLUENCE ? mesh->influence_count : mesh->target_count);
+}
+
+/* One array of all meshes: items of `components` 4-byte numbers, padded to four where there are three (a texel of
+ * three has no image format, and no driver keeps it so). Joints are 16 bits and go as they are. */
+static bool upload_array(struct gpu_scene *gpu, const struct scene *scene, struct gpu_buffer *buffer,
+                         enum mesh_array array, enum rest_place place, size_t total, struct scene_changes *changes,
+                         struct error *error)
+{
+    const struct gpu_scene_deform *deform = &gpu->state->deform;
+    size_t in_bytes = array == MESH_JOINTS     ? sizeof(uint16_t)
+                      : array == MESH_WEIGHTS  ? sizeof(float)
+                      : array == MESH_TANGENTS ? 4 * sizeof(float)
+                                               : 3 * sizeof(float);
+    size_t out_bytes = in_bytes == 3 * sizeof(float) ? 4 * sizeof(float) : in_bytes;
+    char *out = gpu_buffer_map(gpu->device, buffer, total * out_bytes, error);
+    if (!out)
+        return false;
+    memset(out, 0, total * out_bytes);
+    for (uint32_t m = 0; m < deform->mesh_count; m++) {
+        const struct scene_mesh *mesh = scene_mesh(scene, deform->meshes[m].id);
+        char *to = out + place_of(&deform->meshes[m], place) * out_bytes;
+        if (!mesh->arrays[array])
+            continue;
+        const char *from = (const char *)mesh->arrays[array]->data;
+        size_t count = count_of(mesh, place);
+        if (in_bytes == out_bytes)
+            memcpy(to, from, count * in_bytes);
+        else
+            for (size_t i = 0; i < count; i++)
+                memcpy(to + i * out_bytes, from + i * in_bytes, in_bytes);
+    }
+    gpu_buffer_unmap(gpu->device, buffer);
+    changes->uploaded_bytes += total * out_bytes;
+    return true;
+}
+
+bool gpu_scene_deform_upload_rest(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
+                                  struct error *error)
+{
+    struct gpu_scene_deform *deform = &gpu->state->deform;
+    struct rest_totals totals = {0};
+    if (!list_meshes(gpu, scene, &totals))
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the meshes that deform");
+    if (!check_totals(gpu, &totals, error))
+        return false;
+    const struct {
+        struct gpu_buffer *buffer;
+        enum mesh_array array;
+        enum rest_place place;
+        uint64_t total;
+    } rows[] = {
+        {&deform->positions, MESH_POSITIONS, REST_VERTEX, totals.vertices},
+        {&deform->normals, MESH_NORMALS, REST_VERTEX, totals.vertices},
+        {&deform->tangents, MESH_TANGENTS, REST_VERTEX, totals.vertices},
+        {&deform->joints, MESH_JOINTS, REST_INFLUENCE, totals.influences},
+        {&deform->joint_weights, MESH_WEIGHTS, REST_INFLUENCE, totals.influences},
+        {&deform->target_positions, MESH_TARGET_POSITIONS, REST_TARGET, totals.target_vertices},
+        {&deform->target_normals, MESH_TARGET_NORMALS, REST_TARGET, totals.target_vertices},
+        {&deform->target_tangents, MESH_TARGET_TANGENTS, REST_TARGET, totals.target_vertices},
+    };
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        bool needed = (totals.arrays >> rows[i].array & 1u) && rows[i].total > 0;
+        if (needed ? !upload_array(gpu, scene, rows[i].buffer, rows[i].array, rows[i].place, (size_t)rows[i].total,
+                                   changes, error)
+                   : !gpu_buffer_reserve(gpu->device, rows[i].buffer, 0, error))
+            return false;
+    }
+    return true;
+}

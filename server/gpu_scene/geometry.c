@@ -1,0 +1,467 @@
+/* SPDX-License-Identifier: MIT */
+/* Meshes and sphere sets into the scene-wide buffers of shared/geometry.h. */
+#include "gpu_scene/state.h"
+
+#include "shared/material.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct totals {
+    uint64_t triangles, vertices, spheres;
+    uint64_t close_vertices; /* behind the vertices: those of what deforms, as the shutter closes */
+    uint32_t flags;          /* GEOMETRY_HAS_*, of any mesh */
+};
+
+static int by_id(const void *a, const void *b)
+{
+    uint32_t id_a = ((const struct gpu_scene_geometry *)a)->id, id_b = ((const struct gpu_scene_geometry *)b)->id;
+    return id_a < id_b ? -1 : id_a > id_b;
+}
+
+static uint32_t mesh_flags(const struct scene_mesh *mesh)
+{
+    uint32_t flags = 0;
+    if (mesh->arrays[MESH_NORMALS])
+        flags |= GEOMETRY_HAS_NORMALS;
+    /* The handedness lies with the normals; and a tangent without a normal spans no frame. */
+    if (mesh->arrays[MESH_TANGENTS] && mesh->arrays[MESH_NORMALS])
+        flags |= GEOMETRY_HAS_TANGENTS;
+    if (mesh->arrays[MESH_TEXCOORDS_0])
+        flags |= GEOMETRY_HAS_TEXCOORDS_0;
+    if (mesh->arrays[MESH_TEXCOORDS_1])
+        flags |= GEOMETRY_HAS_TEXCOORDS_1;
+    if (mesh->arrays[MESH_COLOURS])
+        flags |= GEOMETRY_HAS_COLOURS;
+    if (mesh->closed)
+        flags |= GEOMETRY_CLOSED;
+    return flags;
+}
+
+/* By mesh id: those that nodes deform, and that no other node shows as they are. They have no rigid geometry
+ * beside those of the nodes. */
+static bool find_only_deformed(const struct gpu_scene *gpu, const struct scene *scene, struct hashmap *meshes)
+{
+    const struct gpu_scene_deform *deform = &gpu->state->deform;
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    bool ok = true;
+    for (uint32_t i = 0; ok && i < deform->use_count; i++)
+        ok = hashmap_put(meshes, deform->uses[i].mesh_id, &deform->uses[i]);
+    while (ok && meshes->count > 0 && hashmap_next(&scene->objects[SCENE_NODE], &cursor, &id, &value)) {
+        const struct scene_node *node = value;
+        const struct scene_mesh *mesh = node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;
+        if (mesh && !scene_node_deforms(node, mesh))
+            hashmap_remove(meshes, node->object);
+    }
+    return ok;
+}
+
+static void add_meshes(struct gpu_scene *gpu, const struct scene *scene, const struct hashmap *only_deformed)
+{
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, &id, &value)) {
+        const struct scene_mesh *mesh = value;
+        if (hashmap_get(only_deformed, id))
+            continue;
+        struct gpu_scene_geometry *geometry = &gpu->geometries[gpu->geometry_count++];
+        *geometry = (struct gpu_scene_geometry){.mesh = mesh, .id = (uint32_t)id, .revision = mesh->base.revision};
+        memcpy(geometry->lower, mesh->lower, sizeof(geometry->lower));
+        memcpy(geometry->upper, mesh->upper, sizeof(geometry->upper));
+    }
+    qsort(gpu->geometries, gpu->geometry_count, sizeof(*gpu->geometries), by_id);
+}
+
+static void add_sphere_sets(struct gpu_scene *gpu, const struct scene *scene)
+{
+    uint32_t first = gpu->geometry_count;
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    while (hashmap_next(&scene->objects[SCENE_SPHERES], &cursor, &id, &value)) {
+        const struct scene_spheres *set = value;
+        struct gpu_scene_geometry *geometry = &gpu->geometries[gpu->geometry_count++];
+        *geometry =
+            (struct gpu_scene_geometry){.spheres = set, .id = (uint32_t)id, .revision = set->base.revision};
+        memcpy(geometry->lower, set->lower, sizeof(geometry->lower));
+        memcpy(geometry->upper, set->upper, sizeof(geometry->upper));
+    }
+    qsort(gpu->geometries + first, gpu->geometry_count - first, sizeof(*gpu->geometries), by_id);
+}
+
+/* Meshes by id, then sphere sets by id, then deformed meshes by node: the same scene has the same order however it
+ * came about. */
+static bool list_geometries(struct gpu_scene *gpu, const struct scene *scene, struct error *error)
+{
+    const struct gpu_scene_deform *deform = &gpu->state->deform;
+    struct hashmap only_deformed = {0};
+    size_t total = scene->objects[SCENE_MESH].count + scene->objects[SCENE_SPHERES].count + deform->use_count;
+    free(gpu->geometries);
+    gpu->geometry_count = 0;
+    gpu->geometries = calloc(total ? total : 1, sizeof(*gpu->geometries));
+    bool ok = gpu->geometries && find_only_deformed(gpu, scene, &only_deformed);
+    if (ok) {
+        add_meshes(gpu, scene, &only_deformed);
+        add_sphere_sets(gpu, scene);
+        gpu->state->rigid_count = gpu->geometry_count;
+    }
+    hashmap_finish(&only_deformed);
+    for (uint32_t i = 0; ok && i < deform->use_count; i++)
+        gpu->geometries[gpu->geometry_count++] = (struct gpu_scene_geometry){
+            .mesh = scene_mesh(scene, deform->uses[i].mesh_id),
+            .id = deform->uses[i].mesh_id,
+            .revision = deform->uses[i].mesh_revision,
+            .node = deform->uses[i].node,
+        };
+    return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %zu geometries", total);
+}
+
+/* Where each geometry's part of the buffers begins. */
+static struct totals lay_out(struct gpu_scene *gpu)
+{
+    struct totals totals = {0};
+    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+        struct gpu_scene_geometry *geometry = &gpu->geometries[i];
+        if (geometry->mesh) {
+            geometry->device = (struct geometry){
+                .kind = GEOMETRY_MESH,
+                .first_primitive = (uint32_t)totals.triangles,
+                .primitive_count = geometry->mesh->triangle_count,
+                .first_vertex = (uint32_t)totals.vertices,
+                .vertex_count = geometry->mesh->vertex_count,
+                .flags = mesh_flags(geometry->mesh),
+            };
+            totals.triangles += geometry->mesh->triangle_count;
+            totals.vertices += geometry->mesh->vertex_count;
+            totals.close_vertices += geometry->node ? geometry->mesh->vertex_count : 0;
+            totals.flags |= geometry->device.flags;
+        } else {
+            geometry->device = (struct geometry){
+                .kind = GEOMETRY_SPHERES,
+                .first_primitive = (uint32_t)totals.spheres,
+                .primitive_count = geometry->spheres->sphere_count,
+            };
+            totals.spheres += geometry->spheres->sphere_count;
+        }
+    }
+    return totals;
+}
+
+static bool check_totals(const struct gpu_scene *gpu, const struct totals *totals, struct error *error)
+{
+    return gpu_scene_check_texels(gpu, totals->triangles, "triangles", error) &&
+           gpu_scene_check_texels(gpu, totals->vertices + totals->close_vertices, "vertices", error) &&
+           gpu_scene_check_texels(gpu, totals->spheres, "spheres", error);
+}
+
+/* Runs of primitives with one material: the ranges, and the default material in the gaps between them. */
+struct run {
+    uint32_t first, end, material_index;
+};
+
+static struct run next_run(const struct gpu_scene *gpu, const struct material_range *ranges, uint32_t range_count,
+                           uint32_t *range, uint32_t at, uint32_t count)
+{
+    while (*range < range_count && (uint64_t)ranges[*range].first + ranges[*range].count <= at)
+        ++*range;
+    if (*range == range_count)
+        return (struct run){.first = at, .end = count};
+    const struct material_range *next = &ranges[*range];
+    if (next->first > at)
+        return (struct run){.first = at, .end = next->first < count ? next->first : count};
+    uint64_t end = (uint64_t)next->first + next->count;
+    return (struct run){.first = at,
+                        .end = end < count ? (uint32_t)end : count,
+                        .material_index = gpu_scene_material_index(gpu, next->material)};
+}
+
+static void pack_triangles(const struct gpu_scene *gpu, const struct gpu_scene_geometry *geometry, uint32_t *out)
+{
+    const struct scene_mesh *mesh = geometry->mesh;
+    const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
+    uint32_t base = geometry->device.first_vertex, range = 0;
+    out += (size_t)geometry->device.first_primitive * 4;
+    for (uint32_t at = 0; at < mesh->triangle_count;) {
+        struct run run = next_run(gpu, mesh->ranges, mesh->range_count, &range, at, mesh->triangle_count);
+        for (size_t i = run.first; i < run.end; i++) {
+            out[4 * i] = base + indices[3 * i];
+            out[4 * i + 1] = base + indices[3 * i + 1];
+            out[4 * i + 2] = base + indices[3 * i + 2];
+            out[4 * i + 3] = run.material_index;
+        }
+        at = run.end;
+    }
+}
+
+/* Of what deforms the positions, and normals and tangents where it has some, are the device's to make. */
+static void pack_positions(const struct gpu_scene_geometry *geometry, float *out)
+{
+    if (geometry->node)
+        return;
+    const float *in = (const float *)(const void *)geometry->mesh->arrays[MESH_POSITIONS]->data;
+    out += (size_t)geometry->device.first_vertex * 4;
+    for (size_t i = 0; i < geometry->mesh->vertex_count; i++) {
+        memcpy(&out[4 * i], &in[3 * i], 3 * sizeof(float));
+        out[4 * i + 3] = 0.0f;
+    }
+}
+
+/* A value that is not finite would spread over everything that it is averaged with. */
+static float finite_or_zero(float x)
+{
+    return isfinite(x) ? x : 0.0f;
+}
+
+static void pack_normals(const struct gpu_scene_geometry *geometry, float *out)
+{
+    const struct scene_mesh *mesh = geometry->mesh;
+    out += (size_t)geometry->device.first_vertex * 4;
+    if (!(geometry->device.flags & GEOMETRY_HAS_NORMALS)) {
+        memset(out, 0, (size_t)mesh->vertex_count * 4 * sizeof(float));
+        return;
+    }
+    if (geometry->node)
+        return;
+    const float *in = (const float *)(const void *)mesh->arrays[MESH_NORMALS]->data;
+    const float *tangents = NULL;
+    if (geometry->device.flags & GEOMETRY_HAS_TANGENTS)
+        tangents = (const float *)(const void *)mesh->arrays[MESH_TANGENTS]->data;
+    for (size_t i = 0; i < mesh->vertex_count; i++) {
+        for (size_t k = 0; k < 3; k++)
+            out[4 * i + k] = finite_or_zero(in[3 * i + k]);
+        out[4 * i + 3] = tangents ? (tangents[4 * i + 3] < 0.0f ? -1.0f : 1.0f) : 0.0f;
+    }
+}
+
+/* The C twin of pack_unit() in shaders/common/math.glsl. */
+static uint32_t pack_unit(const float v[3])
+{
+    float sum = fabsf(v[0]) + fabsf(v[1]) + fabsf(v[2]);
+    if (!(sum > 0.0f) || !isfinite(sum))
+        return 0;
+    float p[2] = {v[0] / sum, v[1] / sum};
+    if (v[2] < 0.0f) {
+        float x = p[0], y = p[1];
+        p[0] = (1.0f - fabsf(y)) * (x >= 0.0f ? 1.0f : -1.0f);
+        p[1] = (1.0f - fabsf(x)) * (y >= 0.0f ? 1.0f : -1.0f);
+    }
+    uint32_t packed[2];
+    for (int i = 0; i < 2; i++)
+        packed[i] = (uint32_t)(int32_t)lrintf(fminf(fmaxf(p[i], -1.0f), 1.0f) * 32767.0f) & 0xffffu;
+    return packed[0] | packed[1] << 16;
+}
+
+static void pack_tangents(const struct gpu_scene_geometry *geometry, uint32_t *out)
+{
+    const struct scene_mesh *mesh = geometry->mesh;
+    out += geometry->device.first_vertex;
+    if (!(geometry->device.flags & GEOMETRY_HAS_TANGENTS)) {
+        memset(out, 0, (size_t)mesh->vertex_count * sizeof(*out));
+        return;
+    }
+    if (geometry->node)
+        return;
+    const float *in = (const float *)(const void *)mesh->arrays[MESH_TANGENTS]->data;
+    for (size_t i = 0; i < mesh->vertex_count; i++)
+        out[i] = pack_unit(&in[4 * i]);
+}
+
+static void pack_texcoords(const struct gpu_scene_geometry *geometry, float *out)
+{
+    const struct scene_mesh *mesh = geometry->mesh;
+    out += (size_t)geometry->device.first_vertex * 4;
+    for (unsigned set = 0; set < 2; set++) {
+        const struct blob *blob = mesh->arrays[MESH_TEXCOORDS_0 + set];
+        const float *in = blob ? (const float *)(const void *)blob->data : NULL;
+        for (size_t i = 0; i < mesh->vertex_count; i++) {
+            out[4 * i + 2 * set] = in ? finite_or_zero(in[2 * i]) : 0.0f;
+            out[4 * i + 2 * set + 1] = in ? finite_or_zero(in[2 * i + 1]) : 0.0f;
+        }
+    }
+}
+
+static void pack_colours(const struct gpu_scene_geometry *geometry, uint32_t *out)
+{
+    const struct scene_mesh *mesh = geometry->mesh;
+    size_t bytes = (size_t)mesh->vertex_count * sizeof(*out);
+    out += geometry->device.first_vertex;
+    if (mesh->arrays[MESH_COLOURS])
+        memcpy(out, mesh->arrays[MESH_COLOURS]->data, bytes);
+    else
+        memset(out, 0, bytes);
+}
+
+/* A buffer of `count` items is mapped, each mesh writes its part, and it is unmapped. */
+#define PACK(buffer, count, type, call)                                                                           \
+    do {                                                                                                          \
+        type *out = gpu_buffer_map(gpu->device, &gpu->buffer, (size_t)(count) * sizeof(*out), error);             \
+        if (!out)                                                                                                 \
+            return false;                                                                                         \
+        for (uint32_t i = 0; i < gpu->geometry_count; i++)                                                        \
+            if (gpu->geometries[i].mesh)                                                                          \
+                call;                                                                                             \
+        gpu_buffer_unmap(gpu->device, &gpu->buffer);                                                              \
+        changes->uploaded_bytes += (uint64_t)(count) * sizeof(*out);                                              \
+    } while (0)
+
+static bool upload_meshes(struct gpu_scene *gpu, const struct totals *totals, struct scene_changes *changes,
+                          struct error *error)
+{
+    uint64_t moving = totals->vertices + totals->close_vertices;
+    if (totals->triangles) {
+        PACK(triangles, totals->triangles * 4, uint32_t, pack_triangles(gpu, &gpu->geometries[i], out));
+        PACK(positions, moving * 4, float, pack_positions(&gpu->geometries[i], out));
+    }
+    if (totals->flags & GEOMETRY_HAS_NORMALS)
+        PACK(normals, moving * 4, float, pack_normals(&gpu->geometries[i], out));
+    if (totals->flags & GEOMETRY_HAS_TANGENTS)
+        PACK(tangents, moving, uint32_t, pack_tangents(&gpu->geometries[i], out));
+    if (totals->flags & (GEOMETRY_HAS_TEXCOORDS_0 | GEOMETRY_HAS_TEXCOORDS_1))
+        PACK(texcoords, totals->vertices * 4, float, pack_texcoords(&gpu->geometries[i], out));
+    if (totals->flags & GEOMETRY_HAS_COLOURS)
+        PACK(colours, totals->vertices, uint32_t, pack_colours(&gpu->geometries[i], out));
+    return true;
+}
+#undef PACK
+
+static bool upload_spheres(struct gpu_scene *gpu, const struct totals *totals, struct scene_changes *changes,
+                           struct error *error)
+{
+    gpu->has_spheres = totals->spheres > 0;
+    if (!gpu->has_spheres)
+        return true;
+    size_t sphere_bytes = (size_t)totals->spheres * 4 * sizeof(float);
+    size_t material_bytes = (size_t)totals->spheres * sizeof(uint32_t);
+    float *out = gpu_buffer_map(gpu->device, &gpu->spheres, sphere_bytes, error);
+    if (!out)
+        return false;
+    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+        const struct gpu_scene_geometry *geometry = &gpu->geometries[i];
+        if (geometry->spheres)
+            memcpy(out + (size_t)geometry->device.first_primitive * 4, geometry->spheres->centres_radii->data,
+                   (size_t)geometry->spheres->sphere_count * 4 * sizeof(float));
+    }
+    gpu_buffer_unmap(gpu->device, &gpu->spheres);
+    uint32_t *materials = gpu_buffer_map(gpu->device, &gpu->sphere_materials, material_bytes, error);
+    if (!materials)
+        return false;
+    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+        const struct scene_spheres *set = gpu->geometries[i].spheres;
+        uint32_t range = 0;
+        for (uint32_t at = 0; set && at < set->sphere_count;) {
+            struct run run = next_run(gpu, set->ranges, set->range_count, &range, at, set->sphere_count);
+            for (; at < run.end; at++)
+                materials[gpu->geometries[i].device.first_primitive + at] = run.material_index;
+        }
+    }
+    gpu_buffer_unmap(gpu->device, &gpu->sphere_materials);
+    changes->uploaded_bytes += sphere_bytes + material_bytes;
+    return true;
+}
+
+/* An edit of something else may have moved the objects in the host's memory. */
+static void refresh_pointers(struct gpu_scene *gpu, const struct scene *scene)
+{
+    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+        struct gpu_scene_geometry *geometry = &gpu->geometries[i];
+        if (geometry->mesh)
+            geometry->mesh = scene_mesh(scene, geometry->id);
+        else
+            geometry->spheres = scene_spheres(scene, geometry->id);
+    }
+}
+
+bool gpu_scene_upload_geometry(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
+                               struct error *error)
+{
+    uint64_t signature = gpu_scene_signature(scene, SCENE_MESH) * 3 + gpu_scene_signature(scene, SCENE_SPHERES) +
+                         gpu_scene_deform_signature(scene) * 5;
+    if (gpu->state->any_update && signature == gpu->state->shapes_signature) {
+        refresh_pointers(gpu, scene);
+        return true;
+    }
+    if (!gpu_scene_deform_list(&gpu->state->deform, scene, error) || !list_geometries(gpu, scene, error))
+        return false;
+    struct totals totals = lay_out(gpu);
+    gpu->state->close_vertex = (uint32_t)totals.vertices;
+    gpu->state->stale_geometries = true;
+    struct gpu_buffer *optional[] = {&gpu->triangles, &gpu->positions, &gpu->normals, &gpu->tangents,
+                                     &gpu->texcoords, &gpu->colours,   &gpu->spheres, &gpu->sphere_materials};
+    for (size_t i = 0; i < sizeof(optional) / sizeof(optional[0]); i++)
+        if (!gpu_buffer_reserve(gpu->device, optional[i], 0, error)) /* keeps the memory */
+            return false;
+    changes->geometry = true;
+    if (!check_totals(gpu, &totals, error) || !upload_meshes(gpu, &totals, changes, error) ||
+        !upload_spheres(gpu, &totals, changes, error) || !gpu_scene_deform_upload_rest(gpu, scene, changes, error))
+        return false;
+    gpu->state->shapes_signature = signature;
+    return true;
+}
+
+/* What a material asks of the tracers, as it is when the shutter opens. */
+static void classify_material(struct gpu_scene *gpu, const struct scene *scene, const struct scene_pose *pose,
+                              uint32_t material_id, uint32_t *geometry_flags)
+{
+    const struct scene_material *material = scene_material(scene, material_id);
+    if (!material)
+        return;
+    material = scene_pose_material(pose, material);
+    if (material->alpha_mode == ALPHA_MASK) {
+        *geometry_flags |= GEOMETRY_HAS_CUTOUT;
+        gpu->has_cutout = true;
+    }
+    if (material->alpha_mode == ALPHA_BLEND || material->transmission > 0.0f)
+        gpu->has_translucent = true;
+    gpu->has_transmission |= material->transmission > 0.0f;
+    bool varies = material->textures[MATERIAL_BASE_COLOUR].texture ||
+                  material->textures[MATERIAL_TRANSMISSION].texture || (*geometry_flags & GEOMETRY_HAS_COLOURS);
+    gpu->has_varied_alpha |= varies && (material->alpha_mode != ALPHA_OPAQUE || material->transmission > 0.0f);
+}
+
+void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scene,
+                                 const struct scene_motion *motion)
+{
+    const struct scene_pose *pose = motion ? &motion->poses[0] : NULL;
+    gpu->has_cutout = false;
+    gpu->has_translucent = false;
+    gpu->has_transmission = false;
+    gpu->has_varied_alpha = false;
+    for (uint32_t i = 0; i < gpu->geometry_count; i++) {
+        struct gpu_scene_geometry *geometry = &gpu->geometries[i];
+        const struct material_range *ranges = geometry->mesh ? geometry->mesh->ranges : geometry->spheres->ranges;
+        uint32_t range_count = geometry->mesh ? geometry->mesh->range_count : geometry->spheres->range_count;
+        uint32_t flags = geometry->device.flags & ~GEOMETRY_HAS_CUTOUT;
+        for (uint32_t k = 0; k < range_count; k++)
+            if (ranges[k].count > 0)
+                classify_material(gpu, scene, pose, ranges[k].material, &flags);
+        if (flags != geometry->device.flags)
+            gpu->state->stale_geometries = true;
+        geometry->device.flags = flags;
+    }
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    uint32_t ignored = 0;
+    while (hashmap_next(&scene->objects[SCENE_DISC], &cursor, &id, &value))
+        classify_material(gpu, scene, pose, ((const struct scene_disc *)value)->material, &ignored);
+}
+
+bool gpu_scene_upload_geometry_table(struct gpu_scene *gpu, struct scene_changes *changes, struct error *error)
+{
+    size_t bytes = gpu->geometry_count * sizeof(struct geometry);
+    if (!gpu->state->stale_geometries)
+        return true;
+    struct geometry *out = gpu_buffer_map(gpu->device, &gpu->geometry_buffer, bytes, error);
+    if (!out)
+        return false;
+    for (uint32_t i = 0; i < gpu->geometry_count; i++)
+        out[i] = gpu->geometries[i].device;
+    gpu_buffer_unmap(gpu->device, &gpu->geometry_buffer);
+    changes->uploaded_bytes += bytes;
+    gpu->state->stale_geometries = false;
+    return true;
+}

@@ -1,0 +1,223 @@
+/* SPDX-License-Identifier: MIT */
+/* Materials and their texture slots into the buffers of shared/material.h. */
+#include "gpu_scene/state.h"
+
+#include "shared/material.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* hashmap holds pointers and no NULL: an index is kept as itself plus one. */
+static void *pointer_of(uint32_t index)
+{
+    return (void *)((uintptr_t)index + 1);
+}
+
+static uint32_t index_of(const void *pointer)
+{
+    return (uint32_t)((uintptr_t)pointer - 1);
+}
+
+uint32_t gpu_scene_material_index(const struct gpu_scene *gpu, uint32_t material_id)
+{
+    const void *found = material_id ? hashmap_get(&gpu->state->material_indices.index_by_id, material_id) : NULL;
+    return found ? index_of(found) : 0;
+}
+
+static bool add_free(struct material_indices *indices, uint32_t index)
+{
+    if (indices->free_count == indices->free_capacity) {
+        uint32_t capacity = indices->free_capacity ? indices->free_capacity * 2 : 64;
+        uint32_t *larger = realloc(indices->free, capacity * sizeof(*larger));
+        if (!larger)
+            return false;
+        indices->free = larger;
+        indices->free_capacity = capacity;
+    }
+    indices->free[indices->free_count++] = index;
+    return true;
+}
+
+/* Takes back the indices of materials that are no more. */
+static bool drop_stale(struct material_indices *indices, const struct scene *scene)
+{
+    size_t cursor = 0, count = 0;
+    uint64_t id;
+    void *value;
+    uint64_t *stale = malloc((indices->index_by_id.count + 1) * sizeof(*stale));
+    if (!stale)
+        return false;
+    while (hashmap_next(&indices->index_by_id, &cursor, &id, &value))
+        if (!scene_material(scene, (uint32_t)id))
+            stale[count++] = id;
+    bool ok = true;
+    for (size_t i = 0; ok && i < count; i++)
+        ok = add_free(indices, index_of(hashmap_remove(&indices->index_by_id, stale[i])));
+    free(stale);
+    return ok;
+}
+
+bool gpu_scene_index_materials(struct gpu_scene *gpu, const struct scene *scene, struct error *error)
+{
+    struct material_indices *indices = &gpu->state->material_indices;
+    size_t cursor = 0;
+    uint64_t id;
+    void *value;
+    if (indices->count == 0)
+        indices->count = 1; /* the default material */
+    bool ok = drop_stale(indices, scene);
+    while (ok && hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value)) {
+        if (hashmap_get(&indices->index_by_id, id))
+            continue;
+        uint32_t index = indices->free_count ? indices->free[--indices->free_count] : indices->count++;
+        ok = hashmap_put(&indices->index_by_id, id, pointer_of(index));
+    }
+    return ok || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the indices of materials");
+}
+
+static uint32_t add_slot(const struct gpu_scene *gpu, const struct texture_use *use, struct texture_slot *slots,
+                         uint32_t *slot_count)
+{
+    bool found = false;
+    uint32_t texture = use->texture ? gpu_scene_texture_index(gpu, use->texture, &found) : 0;
+    if (!found)
+        return 0;
+    slots[*slot_count] = (struct texture_slot){
+        .uv_matrix = {use->uv_transform[0], use->uv_transform[1], use->uv_transform[3], use->uv_transform[4]},
+        .offset_u = use->uv_transform[2],
+        .offset_v = use->uv_transform[5],
+        .strength = use->strength,
+        .texture = texture | (use->texcoord_set == 1 ? 0x80000000u : 0),
+    };
+    return (*slot_count)++;
+}
+
+static void pack_material(const struct gpu_scene *gpu, const struct scene_material *in, struct material *out,
+                          struct texture_slot *slots, uint32_t *slot_count)
+{
+    *out = (struct material){
+        .emission_ior = {in->emission[0], in->emission[1], in->emission[2], in->ior},
+        .metallic = in->metallic,
+        .roughness = in->roughness,
+        .transmission = in->transmission,
+        .alpha_cutoff = in->alpha_cutoff,
+        .anisotropy = in->anisotropy,
+        .anisotropy_rotation = in->anisotropy_rotation,
+        .id = in->base.id,
+    };
+    memcpy(out->base_colour, in->base_colour, sizeof(out->base_colour));
+    out->flags = (in->alpha_mode == ALPHA_MASK ? MATERIAL_ALPHA_MASK : 0) |
+                 (in->alpha_mode == ALPHA_BLEND ? MATERIAL_ALPHA_BLEND : 0) |
+                 (in->double_sided ? MATERIAL_DOUBLE_SIDED : 0) | (in->unlit ? MATERIAL_UNLIT : 0);
+    uint32_t *const places[MATERIAL_TEXTURE_COUNT] = {
+        [MATERIAL_BASE_COLOUR] = &out->texture_base_colour,
+        [MATERIAL_NORMAL] = &out->texture_normal,
+        [MATERIAL_METALLIC_ROUGHNESS] = &out->texture_metallic_roughness,
+        [MATERIAL_OCCLUSION] = &out->texture_occlusion,
+        [MATERIAL_EMISSION] = &out->texture_emission,
+        [MATERIAL_TRANSMISSION] = &out->texture_transmission,
+        [MATERIAL_BUMP] = &out->texture_bump,
+    };
+    for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
+        *places[i] = add_slot(gpu, &in->textures[i], slots, slot_count);
+}
+
+static void pack_default(struct material *out)
+{
+    *out = (struct material){
+        .base_colour = {1.0f, 1.0f, 1.0f, 1.0f},
+        .emission_ior = {0.0f, 0.0f, 0.0f, 1.5f},
+        .roughness = 1.0f,
+        .flags = MATERIAL_DOUBLE_SIDED,
+    };
+}
+
+/* The items from the first that differs from the mirror to the last; all of them where the number is another. */
+static bool upload_changed(struct gpu_scene *gpu, struct gpu_buffer *buffer, const void *fresh, const void *mirror,
+                           size_t item_bytes, size_t count, struct scene_changes *changes, struct error *error)
+{
+    const char *now = fresh, *before = mirror;
+    if (!mirror || buffer->size_bytes != count * item_bytes) {
+        changes->shading = true;
+        changes->uploaded_bytes += count * item_bytes;
+        return gpu_buffer_upload(gpu->device, buffer, fresh, count * item_bytes, error);
+    }
+    size_t first = 0, end = count;
+    while (first < count && memcmp(now + first * item_bytes, before + first * item_bytes, item_bytes) == 0)
+        first++;
+    while (end > first && memcmp(now + (end - 1) * item_bytes, before + (end - 1) * item_bytes, item_bytes) == 0)
+        end--;
+    if (first == end)
+        return true;
+    changes->shading = true;
+    changes->uploaded_bytes += (end - first) * item_bytes;
+    gpu_buffer_write(gpu->device, buffer, first * item_bytes, now + first * item_bytes,
+                     (end - first) * item_bytes);
+    return true;
+}
+
+static bool same_textures(const struct material *a, const struct material *b)
+{
+    return a->texture_base_colour == b->texture_base_colour && a->texture_normal == b->texture_normal &&
+           a->texture_metallic_roughness == b->texture_metallic_roughness &&
+           a->texture_occlusion == b->texture_occlusion && a->texture_emission == b->texture_emission &&
+           a->texture_transmission == b->texture_transmission && a->texture_bump == b->texture_bump;
+}
+
+/* Whether two materials are alike but for their factors; where alpha decides what is cut out it is more than one.
+ */
+static bool same_surface(const struct material *a, const struct material *b)
+{
+    if (((a->flags ^ b->flags) & (MATERIAL_ALPHA_MASK | MATERIAL_ALPHA_BLEND)) != 0 || !same_textures(a, b))
+        return false;
+    return (a->flags & MATERIAL_ALPHA_MASK) == 0 ||
+           (a->base_colour[3] == b->base_colour[3] && a->alpha_cutoff == b->alpha_cutoff);
+}
+
+/* Against the mirrors. Materials that are new do not count: no surface that was there has one. */
+static bool same_surfaces(const struct gpu_scene *gpu, const struct material *materials, uint32_t count,
+                          const struct texture_slot *slots, uint32_t slot_count)
+{
+    const struct gpu_scene_state *state = gpu->state;
+    size_t slot_bytes = slot_count * sizeof(*slots);
+    if (!state->materials || gpu->texture_slots.size_bytes != slot_bytes ||
+        memcmp(slots, state->texture_slots, slot_bytes) != 0)
+        return false;
+    for (uint32_t i = 0; i < count && i < gpu->material_count; i++)
+        if (!same_surface(&materials[i], &state->materials[i]))
+            return false;
+    return true;
+}
+
+bool gpu_scene_upload_materials(struct gpu_scene *gpu, const struct scene *scene,
+                                const struct scene_motion *motion, struct scene_changes *changes,
+                                struct error *error)
+{
+    const struct scene_pose *pose = motion ? &motion->poses[0] : NULL;
+    struct gpu_scene_state *state = gpu->state;
+    uint32_t count = state->material_indices.count, slot_count = 1;
+    size_t slot_max = 1 + scene->objects[SCENE_MATERIAL].count * MATERIAL_TEXTURE_COUNT, cursor = 0;
+    struct material *packed = calloc(count, sizeof(*packed));
+    struct texture_slot *slots = calloc(slot_max, sizeof(*slots));
+    uint64_t id;
+    void *value;
+    bool ok = packed && slots;
+    if (!ok)
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u materials", count);
+    else
+        pack_default(&packed[0]);
+    while (ok && hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value))
+        pack_material(gpu, scene_pose_material(pose, value), &packed[gpu_scene_material_index(gpu, (uint32_t)id)],
+                      slots, &slot_count);
+    changes->surfaces |= ok && !same_surfaces(gpu, packed, count, slots, slot_count);
+    ok = ok &&
+         upload_changed(gpu, &gpu->materials, packed, state->materials, sizeof(*packed), count, changes, error) &&
+         upload_changed(gpu, &gpu->texture_slots, slots, state->texture_slots, sizeof(*slots), slot_count, changes,
+                        error);
+    free(state->materials);
+    free(state->texture_slots);
+    state->materials = packed;
+    state->texture_slots = slots;
+    gpu->material_count = count;
+    return ok;
+}

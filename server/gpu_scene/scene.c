@@ -1,0 +1,214 @@
+/* SPDX-License-Identifier: MIT */
+#include "gpu_scene/scene.h"
+
+#include "base/clock.h"
+#include "shared/bindings.h"
+#include "gpu_scene/state.h"
+
+#include <epoxy/gl.h>
+#include <stdlib.h>
+#include <string.h>
+
+void gpu_scene_init(struct gpu_scene *gpu, struct gpu_device *device)
+{
+    *gpu = (struct gpu_scene){.device = device};
+}
+
+#define BUFFERS_MAX (17 + DEFORM_BUFFERS_MAX)
+
+/* All of them; returns how many. */
+static size_t list_buffers(struct gpu_scene *gpu, struct gpu_buffer *buffers[BUFFERS_MAX])
+{
+    struct gpu_buffer *own[] = {
+        &gpu->triangles,        &gpu->positions,       &gpu->normals,     &gpu->tangents, &gpu->texcoords,
+        &gpu->colours,          &gpu->spheres,         &gpu->materials,   &gpu->textures, &gpu->texels,
+        &gpu->instance_buffer,  &gpu->geometry_buffer, &gpu->disc_buffer, &gpu->lights,   &gpu->texture_slots,
+        &gpu->sphere_materials, &gpu->motion_buffer,
+    };
+    size_t count = sizeof(own) / sizeof(own[0]);
+    memcpy(buffers, own, sizeof(own));
+    if (gpu->state)
+        count += gpu_scene_deform_buffers(&gpu->state->deform, buffers + count);
+    return count;
+}
+
+void gpu_scene_finish(struct gpu_scene *gpu)
+{
+    struct gpu_buffer *buffers[BUFFERS_MAX];
+    if (!gpu->device)
+        return;
+    size_t count = list_buffers(gpu, buffers);
+    for (size_t i = 0; i < count; i++)
+        gpu_buffer_finish(gpu->device, buffers[i]);
+    gpu_texture_finish(gpu->device, &gpu->environment);
+    if (gpu->state) {
+        gpu_scene_deform_finish(&gpu->state->deform, gpu->device);
+        hashmap_finish(&gpu->state->material_indices.index_by_id);
+        hashmap_finish(&gpu->state->texture_index_by_id);
+        free(gpu->state->material_indices.free);
+        free(gpu->state->materials);
+        free(gpu->state->texture_slots);
+        free(gpu->state->lights);
+        free(gpu->state);
+    }
+    free(gpu->geometries);
+    free(gpu->instances);
+    free(gpu->motions);
+    free(gpu->discs);
+    *gpu = (struct gpu_scene){.device = gpu->device, .deformed_revision = gpu->deformed_revision};
+}
+
+/* The finaliser of splitmix64. */
+uint64_t gpu_scene_mix(uint64_t x)
+{
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return x ^ (x >> 31);
+}
+
+uint64_t gpu_scene_signature(const struct scene *scene, enum scene_object_kind kind)
+{
+    uint64_t signature = 0, id;
+    size_t cursor = 0;
+    void *value;
+    while (hashmap_next(&scene->objects[kind], &cursor, &id, &value)) {
+        const struct scene_object *object = value;
+        signature += gpu_scene_mix(gpu_scene_mix(id + 1) + object->revision);
+    }
+    return signature;
+}
+
+bool gpu_scene_check_texels(const struct gpu_scene *gpu, uint64_t count, const char *what, struct error *error)
+{
+    uint64_t max = gpu->device->facts.texture_buffer_texels_max;
+    return count <= max ||
+           error_set(error, ERROR_LIMIT, "scene", "%llu %s; this device's texel buffers hold at most %llu",
+                     (unsigned long long)count, what, (unsigned long long)max);
+}
+
+/* What poses say anything about. */
+static unsigned posed_parts(const struct scene_motion *motion)
+{
+    unsigned parts = 0;
+    for (uint32_t p = 0; motion && p < motion->pose_count; p++) {
+        const struct scene_pose *pose = &motion->poses[p];
+        parts |= (pose->node_count ? POSED_NODES : 0) | (pose->morph_count ? POSED_MORPHS : 0) |
+                 (pose->light_count ? POSED_LIGHTS : 0) | (pose->material_count ? POSED_MATERIALS : 0);
+    }
+    return parts;
+}
+
+static bool update_shading(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
+                           bool edited, struct scene_changes *changes, struct error *error)
+{
+    changes->shading = edited;
+    return (!edited || (gpu_scene_index_materials(gpu, scene, error) &&
+                        gpu_scene_upload_textures(gpu, scene, changes, error))) &&
+           gpu_scene_upload_materials(gpu, scene, motion, changes, error);
+}
+
+/* `posed`: what poses say something about, now or in the last update, and so may be elsewhere. */
+static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
+                         unsigned posed, struct scene_changes *changes, struct error *error)
+{
+    bool fresh = !gpu->state->any_update;
+    bool shading_edited = fresh || gpu->shading_revision != scene->shading_revision;
+    bool shading = shading_edited || (posed & POSED_MATERIALS);
+    bool geometry = fresh || gpu->geometry_revision != scene->geometry_revision;
+    bool nodes = fresh || gpu->instances_revision != scene->instances_revision || (posed & POSED_NODES);
+    bool lights = fresh || gpu->lights_revision != scene->lights_revision || (posed & POSED_LIGHTS);
+    if (shading && !update_shading(gpu, scene, motion, shading_edited, changes, error))
+        return false;
+    /* Always: it finds by itself whether a shape changed, and where the shapes are now. */
+    if (!gpu_scene_upload_geometry(gpu, scene, changes, error))
+        return false;
+    if (geometry && !gpu_scene_upload_discs(gpu, scene, changes, error))
+        return false;
+    if (geometry || shading || changes->geometry)
+        gpu_scene_classify_geometry(gpu, scene, motion);
+    if ((geometry || nodes || (posed & POSED_MORPHS)) && !gpu_scene_deform(gpu, scene, motion, changes, error))
+        return false;
+    if (!gpu_scene_upload_geometry_table(gpu, changes, error))
+        return false;
+    if ((geometry || nodes) && !gpu_scene_upload_instances(gpu, scene, motion, changes, error))
+        return false;
+    /* The bounds are of geometry, instances and lights together; lights see to them last. */
+    if ((geometry || nodes || lights || changes->deformed) &&
+        !gpu_scene_upload_lights(gpu, scene, motion, changes, error))
+        return false;
+    return gpu_check(gpu->device, "scene upload", error);
+}
+
+bool gpu_scene_is_current(const struct gpu_scene *gpu, const struct scene *scene,
+                          const struct scene_motion *motion)
+{
+    return gpu->state && gpu->state->any_update && gpu->revision == scene->revision &&
+           (posed_parts(motion) | gpu->state->posed_parts) == 0;
+}
+
+bool gpu_scene_update(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
+                      struct scene_changes *changes, struct stage_times *times, struct error *error)
+{
+    uint64_t start_ns = clock_now_ns();
+    if (motion && motion->pose_count == 0)
+        motion = NULL;
+    unsigned parts = posed_parts(motion);
+    *changes = (struct scene_changes){0};
+    gpu->scene = scene;
+    gpu->motion = motion;
+    if (!gpu->state && !(gpu->state = calloc(1, sizeof(*gpu->state))))
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the device's copy of a scene");
+    if (gpu_scene_is_current(gpu, scene, motion))
+        return true;
+    unsigned posed = parts | gpu->state->posed_parts;
+    gpu_push_group(gpu->device, "scene upload");
+    bool ok = update_parts(gpu, scene, motion, posed, changes, error);
+    gpu_pop_group(gpu->device);
+    if (!ok) {
+        gpu_scene_finish(gpu);
+        return false;
+    }
+    gpu->has_motion = gpu->motion_count > 0 || gpu_scene_any_closes(gpu);
+    gpu->state->any_update = true;
+    gpu->state->posed_parts = parts;
+    gpu->revision = scene->revision;
+    gpu->geometry_revision = scene->geometry_revision;
+    gpu->instances_revision = scene->instances_revision;
+    gpu->shading_revision = scene->shading_revision;
+    gpu->lights_revision = scene->lights_revision;
+    stage_times_add(times, STAGE_UPLOAD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    return true;
+}
+
+void gpu_scene_bind(struct gpu_scene *gpu)
+{
+    struct gpu_device *device = gpu->device;
+    gpu_buffer_bind_texels(gpu->device, &gpu->instance_buffer, UNIT_INSTANCES, GL_RGBA32UI);
+    gpu_buffer_bind_texels(gpu->device, &gpu->motion_buffer, UNIT_MOTIONS, GL_RGBA32F);
+    gpu_buffer_bind_texels(gpu->device, &gpu->geometry_buffer, UNIT_GEOMETRIES, GL_RGBA32UI);
+    gpu_buffer_bind_storage(&gpu->materials, BIND_MATERIALS);
+    gpu_buffer_bind_storage(&gpu->texture_slots, BIND_TEXTURE_SLOTS);
+    gpu_buffer_bind_storage(&gpu->textures, BIND_TEXTURES);
+    gpu_buffer_bind_storage(&gpu->disc_buffer, BIND_DISCS);
+    gpu_buffer_bind_texels(device, &gpu->triangles, UNIT_TRIANGLES, GL_RGBA32UI);
+    gpu_buffer_bind_texels(device, &gpu->positions, UNIT_POSITIONS, GL_RGBA32F);
+    gpu_buffer_bind_texels(device, &gpu->normals, UNIT_NORMALS, GL_RGBA32F);
+    gpu_buffer_bind_texels(device, &gpu->tangents, UNIT_TANGENTS, GL_R32UI);
+    gpu_buffer_bind_texels(device, &gpu->texcoords, UNIT_TEXCOORDS, GL_RGBA32F);
+    gpu_buffer_bind_texels(device, &gpu->colours, UNIT_COLOURS, GL_RGBA8);
+    gpu_buffer_bind_texels(device, &gpu->spheres, UNIT_SPHERES, GL_RGBA32F);
+    gpu_buffer_bind_texels(device, &gpu->sphere_materials, UNIT_SPHERE_MATERIALS, GL_R32UI);
+    gpu_buffer_bind_texels(device, &gpu->texels, UNIT_TEXELS, GL_RGBA8);
+    gpu_texture_bind(&gpu->environment, UNIT_ENVIRONMENT);
+}
+
+uint64_t gpu_scene_device_bytes(const struct gpu_scene *gpu)
+{
+    struct gpu_scene copy = *gpu; /* the list is one for those who change the buffers too */
+    struct gpu_buffer *buffers[BUFFERS_MAX];
+    size_t count = list_buffers(&copy, buffers);
+    uint64_t bytes = gpu->environment.size_bytes;
+    for (size_t i = 0; i < count; i++)
+        bytes += buffers[i]->capacity_bytes;
+    return bytes;
+}

@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: MIT */
+/* The device's copy of a scene, by revision; shared by all tracers and integrators. */
+#ifndef FARLIGHT_GPU_SCENE_SCENE_H
+#define FARLIGHT_GPU_SCENE_SCENE_H
+
+#include "base/error.h"
+#include "base/stage_times.h"
+#include "gpu/buffer.h"
+#include "gpu/device.h"
+#include "gpu/texture.h"
+#include "scene/pose.h"
+#include "scene/scene.h"
+#include "shared/geometry.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* What one update changed; a tracer does no more than that needs. */
+struct scene_changes {
+    bool geometry;  /* primitives were added, removed or changed */
+    bool deformed;  /* vertices of deforming geometries are others; of which, their deformed_revision tells */
+    bool instances; /* transforms, or which instances there are */
+    bool shading;   /* materials, textures; alpha too */
+    bool surfaces;  /* of these: textures, how materials use them, and where they cut out; not their factors */
+    bool lights;
+    uint64_t uploaded_bytes;
+};
+
+/* Host-side mirror of the arrays that builders need, in device order. */
+struct gpu_scene_geometry {
+    struct geometry device;
+    const struct scene_mesh *mesh; /* one of these two; valid until the scene is edited */
+    const struct scene_spheres *spheres;
+    uint64_t revision; /* of the object: unchanged means the same primitives, and the same shape where node is 0 */
+    uint32_t id;       /* the object's id; unique together with `node` and which of the two is set */
+    uint32_t node; /* deforms the mesh, and is the only one that shows this geometry; 0: the mesh as it is, or a
+                      set of spheres. With a skin its vertices are in world space, and the transform of its
+                      instance is the identity */
+    uint64_t deformed_revision; /* counts up whenever its vertices, or those as the shutter closes, are others; 0:
+                                   they are those of the mesh */
+    float lower[3], upper[3];   /* bounds in object space while the shutter is open; of what deforms conservative:
+                                   from its joints and weights, to rounding */
+};
+
+struct gpu_scene {
+    struct gpu_device *device;
+    const struct scene *scene;         /* of the last update, for tracers on the host; valid until it is edited */
+    const struct scene_motion *motion; /* likewise; NULL: things are as they were committed. The caller's: valid as
+                                          long as it keeps it, which is until the tracers are up to date */
+    uint64_t revision;                 /* of the scene that is on the device */
+    struct gpu_scene_geometry *geometries;
+    uint32_t geometry_count;
+    struct instance *instances; /* mirror of the buffer */
+    uint32_t instance_count;
+    float (*motions)[12];  /* mirror of the buffer: that of instance i begin at (instances[i].motion - 1) / 3 */
+    uint32_t motion_count; /* matrices */
+    struct disc *discs;
+    uint32_t disc_count;
+    uint32_t material_count, light_count;
+    bool has_spheres;     /* some geometry is a set of spheres */
+    bool has_cutout;      /* some material in use is alpha mode mask: tracers must ask for alpha */
+    bool has_translucent; /* some material lets shadow rays pass: blend or transmission */
+    bool has_transmission;
+    bool has_varied_alpha; /* what one of these lets pass differs from place to place: texture or vertex colours */
+    bool has_motion;       /* something moves while the shutter is open: tracers must look at the rays' times */
+    bool has_environment_image;
+    float lower_world[3], upper_world[3]; /* all instances and lights with a place; discs left out */
+    float diagonal;                       /* of these bounds */
+    /* buffers as shared/geometry.h and shared/material.h describe them */
+    struct gpu_buffer triangles, positions, normals, tangents, texcoords, colours, spheres, sphere_materials;
+    struct gpu_buffer instance_buffer, motion_buffer, geometry_buffer, disc_buffer;
+    struct gpu_buffer materials, texture_slots, textures, texels, lights;
+    struct gpu_texture environment;
+    float environment_colour[3], environment_rotation;
+    uint64_t geometry_revision, instances_revision, shading_revision, lights_revision; /* of what is there */
+    uint64_t deformed_revision; /* the last one given out; goes on counting when the copy is made anew, as what a
+                                   tracer has kept is told apart by it */
+    struct gpu_scene_state *state; /* private to gpu_scene*.c: which parts need not be uploaded again */
+};
+
+void gpu_scene_init(struct gpu_scene *gpu, struct gpu_device *device);
+void gpu_scene_finish(struct gpu_scene *gpu);
+/* Brings the copy to the scene's revision and to where things are in it while the shutter is open (NULL: as they
+ * were committed); *changes says what moved. Materials and lights, also where lights are, are those of the first
+ * pose; so is which nodes are hidden. What a transform makes flat in some pose is left out. On failure the copy is
+ * empty and will be made anew by the next update. */
+bool gpu_scene_update(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
+                      struct scene_changes *changes, struct stage_times *times, struct error *error);
+/* Whether an update would change nothing. */
+bool gpu_scene_is_current(const struct gpu_scene *gpu, const struct scene *scene,
+                          const struct scene_motion *motion);
+/* Where an instance is in each pose, one if it stands still: world_from_object, borrowed from the copy. */
+const float (*gpu_scene_poses(const struct gpu_scene *gpu, const struct instance *instance,
+                              uint32_t *pose_count))[12];
+/* Of an instance in world space, wherever it goes while the shutter is open. */
+void gpu_scene_instance_bounds(const struct gpu_scene *gpu, uint32_t instance, float lower_world[3],
+                               float upper_world[3]);
+/* Binds every buffer and texture at its place of shared/bindings.h. */
+void gpu_scene_bind(struct gpu_scene *gpu);
+uint64_t gpu_scene_device_bytes(const struct gpu_scene *gpu);
+
+#endif

@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: MIT */
+/* Private to gpu_scene*.c: one file for each part of the copy, and what they keep between updates. */
+#ifndef FARLIGHT_GPU_SCENE_STATE_H
+#define FARLIGHT_GPU_SCENE_STATE_H
+
+#include "base/hashmap.h"
+#include "gpu_scene/scene.h"
+#include "gpu_scene/deform.h"
+
+/* A material keeps its index while it lives, so that an edit of one does not touch the triangles of others. */
+struct material_indices {
+    struct hashmap index_by_id; /* value: (index + 1) as a pointer */
+    uint32_t count;             /* indices given out so far, the default material's 0 included */
+    uint32_t *free;             /* indices of materials that are gone */
+    uint32_t free_count, free_capacity;
+};
+
+enum posed_part { POSED_NODES = 1, POSED_MORPHS = 2, POSED_LIGHTS = 4, POSED_MATERIALS = 8 };
+
+struct material;
+struct texture_slot;
+struct light;
+
+struct gpu_scene_state {
+    /* Mirrors of buffers. */
+    struct material *materials;
+    struct texture_slot *texture_slots;
+    struct light *lights;
+    struct material_indices material_indices;
+    uint64_t shapes_signature; /* of the meshes and sphere sets that are packed */
+    uint64_t discs_signature;
+    uint64_t textures_signature;
+    uint64_t environment_revision;
+    struct hashmap texture_index_by_id; /* value: (index + 1) as a pointer */
+    uint32_t rigid_count;               /* geometries that do not deform: the first ones */
+    uint32_t close_vertex;              /* where the deforming geometries' vertices as the shutter closes begin */
+    struct gpu_scene_deform deform;
+    bool stale_geometries; /* the table on the device is not what `geometries` says */
+    unsigned posed_parts;  /* POSED_*, by the last update: without poses they are elsewhere again */
+    bool any_update;       /* false: nothing is there yet */
+};
+
+/* Spreads an id and a revision over 64 bits. */
+uint64_t gpu_scene_mix(uint64_t x);
+/* Changes when an object of the kind is added, removed or set again; 0 for none. */
+uint64_t gpu_scene_signature(const struct scene *scene, enum scene_object_kind kind);
+
+/* What the device's texel buffers do not hold is refused: "5 `what`; this device's ..." */
+bool gpu_scene_check_texels(const struct gpu_scene *gpu, uint64_t count, const char *what, struct error *error);
+
+/* gpu_scene_material.c. Indices first: geometry is packed with them. */
+bool gpu_scene_index_materials(struct gpu_scene *gpu, const struct scene *scene, struct error *error);
+uint32_t gpu_scene_material_index(const struct gpu_scene *gpu, uint32_t material_id); /* 0: the default */
+/* What differs from the mirrors. */
+bool gpu_scene_upload_materials(struct gpu_scene *gpu, const struct scene *scene,
+                                const struct scene_motion *motion, struct scene_changes *changes,
+                                struct error *error);
+/* gpu_scene_texture.c. Does nothing where no texture changed. */
+bool gpu_scene_upload_textures(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
+                               struct error *error);
+uint32_t gpu_scene_texture_index(const struct gpu_scene *gpu, uint32_t texture_id, bool *found);
+/* gpu_scene_geometry.c */
+bool gpu_scene_upload_geometry(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
+                               struct error *error);
+/* Which geometry has cutouts, what the scene has of special materials. */
+void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scene,
+                                 const struct scene_motion *motion);
+/* The table of geometries, where it is stale. */
+bool gpu_scene_upload_geometry_table(struct gpu_scene *gpu, struct scene_changes *changes, struct error *error);
+/* gpu_scene_deform.c. Brings the vertices of what deforms to the first pose and to the last. */
+bool gpu_scene_deform(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
+                      struct scene_changes *changes, struct error *error);
+/* Whether the vertices of some geometry are others as the shutter closes. */
+bool gpu_scene_any_closes(const struct gpu_scene *gpu);
+/* gpu_scene_instance.c */
+bool gpu_scene_upload_instances(struct gpu_scene *gpu, const struct scene *scene,
+                                const struct scene_motion *motion, struct scene_changes *changes,
+                                struct error *error);
+bool gpu_scene_upload_discs(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
+                            struct error *error);
+/* Of the instances; empty (lower above upper) if there are none. */
+void gpu_scene_all_instance_bounds(const struct gpu_scene *gpu, float lower[3], float upper[3]);
+/* gpu_scene_light.c. As the shutter opens; the bounds too. */
+bool gpu_scene_upload_lights(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
+                             struct scene_changes *changes, struct error *error);
+
+#endif

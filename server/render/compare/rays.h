@@ -1,0 +1,112 @@
+/* SPDX-License-Identifier: MIT */
+/* Two tracers' answers to the same rays, compared ray by ray on the host. Pure: arrays in, statistics out.
+ *
+ * The first answer is the one under examination, the second the reference. What is added commutes: the order of
+ * rays, of slices and of samples changes no figure.
+ *
+ * Two exact tracers may differ where a ray passes within rounding of an edge, and neither is wrong. So a ray whose
+ * answers differ is not settled at once: the reference is asked again for WAVE_MOVES copies of it, moved by a few
+ * rounding steps, and if for one of them its answer is that of the first tracer, the ray was on an edge.
+ *
+ *   uint32_t n = wave_compare(tally, &settings, &answers, suspects);
+ *   for each suspect: wave_moved_rays(..), traced by the reference, wave_settle(..) */
+#ifndef FARLIGHT_RENDER_COMPARE_RAYS_H
+#define FARLIGHT_RENDER_COMPARE_RAYS_H
+
+#include "shared/hit.h"
+#include "shared/ray.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum ray_kind { RAY_PRIMARY, RAY_SECONDARY, RAY_SHADOW, RAY_KIND_COUNT }; /* protocol's numbers */
+
+/* Waves of a frame, and kinds of ray in each; what lies beyond is counted with the last wave. The wire's number.
+ */
+#define COMPARED_WAVES_MAX 64
+#define COMPARISONS_MAX (COMPARED_WAVES_MAX * 2)
+
+#define WAVE_MOVES 8
+/* Default of `far_share`: some hundred times what rounding does, and far below the distance between surfaces that
+ * a picture shows apart. */
+#define WAVE_FAR_SHARE 1e-4f
+/* Transmittances are bytes; rounding each of two layers may be a step off. */
+#define WAVE_FAR_STEPS 2
+/* Beyond this two normals are those of two surfaces. */
+#define WAVE_TURNED_DEGREES 5.0
+
+/* Errors by size, in bins of the float's upper bits: seven of the mantissa, so that a percentile is true to 0.4 %
+ * however many errors there are. Below 2^-48 counts as 0, from 2^16 on as the greatest. */
+#define ERROR_BINS (64 * 128 + 2)
+#define ERROR_GREATEST 1e30f /* in place of greater ones, and of what is no number */
+struct error_histogram {
+    uint64_t counts[ERROR_BINS];
+    uint64_t count;
+    float greatest; /* exact */
+};
+
+void error_histogram_add(struct error_histogram *histogram, float error);
+void error_histogram_merge(struct error_histogram *into, const struct error_histogram *from);
+/* The least value that at least `share` (0 to 1) of the errors do not exceed; 0 without errors. */
+float error_histogram_percentile(const struct error_histogram *histogram, double share);
+
+/* What has been counted of one wave and kind; all-zero is empty. Large: keep it on the heap. */
+struct wave_tally {
+    uint32_t wave;
+    enum ray_kind kind;
+    uint64_t rays; /* alive ones, and dead ones that something was hit by */
+    uint64_t both_hit, both_missed, only_first, only_second;
+    uint64_t far;                 /* of both_hit */
+    uint64_t edges;               /* of only_first, only_second and far */
+    uint64_t other_surface;       /* of both_hit, not far and not on an edge: another normal, material or side */
+    uint64_t first_ns, second_ns; /* tracing */
+    struct error_histogram distance, relative, normal;
+};
+
+/* Adds the counts of `from`, whatever its wave. */
+void wave_tally_merge(struct wave_tally *into, const struct wave_tally *from);
+
+/* The figures of a tally. A shadow ray hits if it is not fully lit, and is far if the transmittances of both
+ * differ by more than WAVE_FAR_STEPS of 255; it has no distance and no normal. */
+struct wave_comparison {
+    uint32_t wave;
+    enum ray_kind kind;
+    uint64_t rays, both_hit, both_missed, only_first, only_second, far, edges, other_surface;
+    uint64_t first_ns, second_ns;
+    /* Of rays that hit with both and are not on an edge: difference in world space, in scene diagonals. */
+    float distance_median, distance_p99, distance_greatest;
+    float relative_median; /* of the same, as a share of the reference's distance */
+    /* Of those that are not far either: between the shading normals, degrees. */
+    float normal_median, normal_p99, normal_greatest;
+};
+
+void wave_tally_figures(const struct wave_tally *tally, struct wave_comparison *figures);
+
+struct wave_compare_settings {
+    float diagonal;  /* of the scene, world space; above 0 */
+    float far_share; /* two hits are far from each other from this share on of the diagonal, or of the distance if
+                        that is longer than the diagonal; above 0 */
+};
+
+/* Rays 0 .. count - 1 and both answers: hits of closest-hit waves, else (NULL) visibilities of any-hit ones. */
+struct wave_answers {
+    uint32_t count;
+    const struct ray *rays;
+    const struct hit *first_hits, *second_hits;
+    const uint *first_visibility, *second_visibility;
+};
+
+/* Adds all rays. Returns how many are suspects, with their indices in `suspects` (room for `count`), ascending:
+ * their answers differ, and each must be settled. */
+uint32_t wave_compare(struct wave_tally *tally, const struct wave_compare_settings *settings,
+                      const struct wave_answers *answers, uint32_t *suspects);
+/* The corners of a cube of a few rounding steps about the origin, with the same direction. */
+void wave_moved_rays(const struct wave_compare_settings *settings, const struct wave_answers *answers,
+                     uint32_t index, struct ray moved[WAVE_MOVES]);
+/* The reference's answers to the moved rays; of hits and visibilities, one as in `answers`, the other NULL. */
+void wave_settle(struct wave_tally *tally, const struct wave_compare_settings *settings,
+                 const struct wave_answers *answers, uint32_t index, const struct hit *moved_hits,
+                 const uint *moved_visibility);
+
+#endif

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+/* The structure of the tracer `abuffer` on the device (shaders/abuffer/layout.h), filled by abuffer_build.c, its
+ * voxels by abuffer_trace.c, which also reads it. */
+#ifndef FARLIGHT_TRACE_ABUFFER_STORE_H
+#define FARLIGHT_TRACE_ABUFFER_STORE_H
+
+#include "gpu/buffer.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct abuffer_store {
+    struct gpu_device *device;
+    float lower_world[3];
+    float cell_world;
+    uint32_t resolution;   /* N; 0: the scene holds nothing that could be drawn */
+    uint32_t voxels_along; /* V */
+    uint64_t sample_count;
+    uint32_t depth_max; /* samples of the texel that has most */
+    uint32_t drawn_count;
+    struct gpu_buffer texels, samples, ids, drawn, voxels, subvoxels;
+    struct gpu_buffer sums; /* of the last build */
+};
+
+void abuffer_store_init(struct abuffer_store *store, struct gpu_device *device);
+void abuffer_store_finish(struct abuffer_store *store);        /* leaves it empty */
+bool abuffer_has_subvoxels(const struct abuffer_store *store); /* or the same ones for all voxels */
+uint64_t abuffer_store_bytes(const struct abuffer_store *store);
+
+#endif

@@ -1,0 +1,207 @@
+/* SPDX-License-Identifier: MIT */
+/* The tracer `abuffer`: voxels that say where something is, and A-buffers along three axes that say what.
+ *
+ * Hu, Huang, Zhang, Yuan, Li. Ray Tracing via GPU Rasterization. 2014. */
+#include "gpu/timer.h"
+#include "trace/abuffer/build.h"
+#include "trace/abuffer/store.h"
+#include "trace/abuffer/trace.h"
+#include "trace/raster/box.h"
+#include "trace/raster/draw.h"
+#include "trace/tracer.h"
+
+#include <epoxy/gl.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define RESOLUTION_MIN 16
+#define RESOLUTION_MAX 4096
+#define RESOLUTION_DEFAULT 1280 /* the paper's */
+#define VOXELS_MIN 16
+#define VOXELS_MAX 256
+
+struct abuffer {
+    struct tracer base;
+    struct abuffer_store store;
+    struct abuffer_builder *builder;
+    struct gpu_timer *timer;
+    uint32_t resolution, voxels_along;
+    bool had_cutout; /* when it was built last */
+};
+
+/* ---- options ---- */
+
+/* The power of two that is nearest to sqrt(3 N), within bounds: what its authors found best. Paper, section 5. */
+static uint32_t voxels_for(uint32_t resolution)
+{
+    uint32_t voxels = VOXELS_MIN;
+    /* Beyond the middle of this one and the next: 1.5 of this one, squared. */
+    while (voxels < VOXELS_MAX && 4 * 3 * resolution > 9 * voxels * voxels)
+        voxels *= 2;
+    return voxels;
+}
+
+static bool check_options(const struct tracer_options *options, struct error *error)
+{
+    uint32_t resolution = options->abuffer_resolution ? options->abuffer_resolution : RESOLUTION_DEFAULT;
+    uint32_t voxels = options->abuffer_voxels;
+    if (resolution < RESOLUTION_MIN || resolution > RESOLUTION_MAX)
+        return error_set(error, ERROR_INVALID, "options.abuffer_resolution", "%u texels; %d to %d are possible",
+                         resolution, RESOLUTION_MIN, RESOLUTION_MAX);
+    if (voxels != 0 && (voxels < VOXELS_MIN || voxels > VOXELS_MAX || (voxels & (voxels - 1)) != 0))
+        return error_set(error, ERROR_INVALID, "options.abuffer_voxels",
+                         "a grid has 16, 32, 64, 128 or 256 voxels along a side, not %u", voxels);
+    if (voxels > resolution)
+        return error_set(error, ERROR_INVALID, "options.abuffer_voxels",
+                         "%u voxels along a side are more than the %u texels", voxels, resolution);
+    if (options->abuffer_search > ABUFFER_SEARCH_LINEAR1)
+        return error_set(error, ERROR_INVALID, "options.abuffer_search", "there is no search number %u",
+                         (unsigned)options->abuffer_search);
+    return true;
+}
+
+/* ---- life ---- */
+
+static void abuffer_destroy(struct tracer *tracer)
+{
+    struct abuffer *abuffer = (struct abuffer *)tracer;
+    if (!abuffer)
+        return;
+    abuffer_builder_destroy(abuffer->builder);
+    abuffer_store_finish(&abuffer->store);
+    gpu_timer_destroy(abuffer->timer);
+    free(abuffer);
+}
+
+static struct tracer *abuffer_create(struct gpu_device *device, const struct tracer_options *options,
+                                     struct error *error)
+{
+    if (!check_options(options, error))
+        return NULL;
+    struct abuffer *abuffer = calloc(1, sizeof(*abuffer));
+    if (!abuffer) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
+        return NULL;
+    }
+    abuffer_store_init(&abuffer->store, device);
+    abuffer->resolution = options->abuffer_resolution ? options->abuffer_resolution : RESOLUTION_DEFAULT;
+    abuffer->voxels_along = options->abuffer_voxels ? options->abuffer_voxels : voxels_for(abuffer->resolution);
+    abuffer->timer = gpu_timer_create(device);
+    if (!abuffer->timer)
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer's timer");
+    abuffer->builder = abuffer->timer ? abuffer_builder_create(device, error) : NULL;
+    if (abuffer->builder)
+        return &abuffer->base;
+    abuffer_destroy(&abuffer->base);
+    return NULL;
+}
+
+/* ---- updates ---- */
+
+/* Round all that is drawn. */
+static bool place(struct abuffer *abuffer, const struct gpu_scene *scene, const uint32_t *instances,
+                  uint32_t count, struct error *error)
+{
+    struct abuffer_store *store = &abuffer->store;
+    struct axes_box box;
+    if (!axes_box_place(&box, scene, instances, count, abuffer->resolution, error))
+        return false;
+    memcpy(store->lower_world, box.lower_world, sizeof(store->lower_world));
+    store->cell_world = box.cell_world;
+    store->resolution = abuffer->resolution;
+    store->voxels_along = abuffer->voxels_along;
+    return true;
+}
+
+static bool begin(struct abuffer *abuffer, struct gpu_scene *scene, struct error *error)
+{
+    uint32_t *instances = NULL, count = 0;
+    bool begun = axes_list_instances(scene, &instances, &count, error) &&
+                 place(abuffer, scene, instances, count, error) &&
+                 abuffer_build_begin(abuffer->builder, &abuffer->store, scene, instances, count,
+                                     &abuffer->base.options, error);
+    free(instances);
+    if (!begun)
+        return false;
+    abuffer->had_cutout = scene->has_cutout;
+    abuffer->base.stats.uploaded_bytes = (uint64_t)abuffer->store.drawn_count * AXES_INSTANCE_BYTES;
+    return true;
+}
+
+static void fill_stats(struct abuffer *abuffer)
+{
+    struct tracer_stats *stats = &abuffer->base.stats;
+    const struct abuffer_store *store = &abuffer->store;
+    stats->nodes = store->sample_count;
+    stats->device_bytes = abuffer_store_bytes(store) + abuffer_builder_bytes(abuffer->builder);
+    stats->cubes[TRACER_CUBE_STATIC] = (struct tracer_cube){0};
+    if (store->resolution > 0)
+        stats->cubes[TRACER_CUBE_STATIC] = (struct tracer_cube){
+            .resolution = store->resolution,
+            .cell_metres = store->cell_world,
+            .layers_needed = store->depth_max,
+            .layers_kept = store->depth_max,
+            .samples = store->sample_count,
+            .rebuilt = true,
+        };
+}
+
+static enum tracer_progress do_step(struct abuffer *abuffer, struct gpu_scene *scene, struct stage_times *times,
+                                    struct error *error)
+{
+    enum tracer_progress progress = TRACER_FAILED;
+    gpu_timer_begin(abuffer->timer, STAGE_BUILD, 0);
+    if (abuffer_build_is_on(abuffer->builder) || begin(abuffer, scene, error))
+        progress = abuffer_build_step(abuffer->builder, abuffer->base.step_end_ns, error);
+    glFinish(); /* the time on the CPU's clock is the time until it is there */
+    gpu_timer_end(abuffer->timer);
+    gpu_timer_collect(abuffer->timer, times);
+    return progress;
+}
+
+static enum tracer_progress abuffer_update(struct tracer *tracer, struct gpu_scene *scene,
+                                           const struct scene_changes *changes, struct stage_times *times,
+                                           struct error *error)
+{
+    struct abuffer *abuffer = (struct abuffer *)tracer;
+    struct tracer_stats *stats = &tracer->stats;
+    if (!abuffer_build_is_on(abuffer->builder)) {
+        stats->uploaded_bytes = stats->nodes_rebuilt = 0;
+        stats->cubes[TRACER_CUBE_STATIC].rebuilt = false;
+        /* Of surfaces it matters only where they are cut out. */
+        bool cuts = changes->surfaces && (scene->has_cutout || abuffer->had_cutout);
+        if (!changes->geometry && !changes->deformed && !changes->instances && !cuts)
+            return TRACER_DONE;
+    }
+    enum tracer_progress progress = do_step(abuffer, scene, times, error);
+    if (progress == TRACER_FAILED)
+        abuffer_store_finish(&abuffer->store);
+    if (progress == TRACER_DONE)
+        stats->nodes_rebuilt = abuffer->store.sample_count;
+    fill_stats(abuffer);
+    return progress;
+}
+
+static void abuffer_abandon(struct tracer *tracer)
+{
+    struct abuffer *abuffer = (struct abuffer *)tracer;
+    abuffer_build_abandon(abuffer->builder);
+    fill_stats(abuffer);
+}
+
+static bool abuffer_trace_wave(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
+                               struct error *error)
+{
+    return abuffer_trace(&((struct abuffer *)tracer)->store, scene, wave, &tracer->options, error);
+}
+
+const struct tracer_impl tracer_abuffer_impl = {
+    .name = "abuffer",
+    .depends_on = TRACER_NEEDS_SCENE,
+    .still = true,
+    .create = abuffer_create,
+    .destroy = abuffer_destroy,
+    .update = abuffer_update,
+    .abandon = abuffer_abandon,
+    .trace = abuffer_trace_wave,
+};

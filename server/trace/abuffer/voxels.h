@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: MIT */
+/* From a store's `sums` to its `voxels`: which hold something, by which images a ray is to be searched for in
+ * each, and how far nothing is (shaders/abuffer/voxels.comp). */
+#ifndef FARLIGHT_TRACE_ABUFFER_VOXELS_H
+#define FARLIGHT_TRACE_ABUFFER_VOXELS_H
+
+#include "base/error.h"
+#include "trace/abuffer/store.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define ABUFFER_BLOCK_VOXELS 4u /* along a side */
+#define ABUFFER_VOXEL_PASSES 4u
+
+/* Items of each pass. */
+uint32_t abuffer_voxel_blocks(const struct abuffer_store *store);
+bool abuffer_voxels_reserve(struct abuffer_store *store, struct error *error);
+/* Blocks first .. end - 1 of a pass, before which all blocks of the passes before it are done. */
+bool abuffer_voxels_pass(struct abuffer_store *store, unsigned pass, uint32_t first, uint32_t end,
+                         struct error *error);
+
+#endif

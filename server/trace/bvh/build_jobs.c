@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+#include "trace/bvh/build.h"
+
+#include "base/clock.h"
+#include "base/parallel.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <time.h>
+
+struct bvh_run {
+    struct bvh_job *jobs;
+    uint32_t count;
+    struct bvh_settings settings;
+    atomic_bool stop;
+    pthread_t thread;
+    bool has_thread;
+    pthread_mutex_t mutex;
+    pthread_cond_t ended; /* by the monotonic clock */
+    bool has_ended;
+    uint64_t end_ns;
+};
+
+static bool is_large(const struct bvh_job *job)
+{
+    return job->shape.primitive_count >= BVH_THREADED_PRIMITIVES;
+}
+
+static void build(struct bvh_run *run, struct bvh_job *job)
+{
+    bvh_tree_build(&job->tree, &job->shape, &run->settings, &job->error);
+}
+
+static void run_small(void *context, uint32_t i)
+{
+    struct bvh_run *run = context;
+    if (!is_large(&run->jobs[i]))
+        build(run, &run->jobs[i]);
+}
+
+/* Large shapes one after the other with all threads on each, then the small ones with a thread for each. */
+static void run_all(struct bvh_run *run)
+{
+    for (uint32_t i = 0; i < run->count; i++)
+        if (is_large(&run->jobs[i]))
+            build(run, &run->jobs[i]);
+    uint64_t primitives = 0;
+    for (uint32_t i = 0; i < run->count; i++)
+        primitives += is_large(&run->jobs[i]) ? 0 : run->jobs[i].shape.primitive_count;
+    unsigned threads = primitives >= BVH_THREADED_PRIMITIVES ? run->settings.threads : 1;
+    parallel_run(threads, run->count, run_small, run);
+}
+
+static void *run_thread(void *argument)
+{
+    struct bvh_run *run = argument;
+    run_all(run);
+    pthread_mutex_lock(&run->mutex);
+    run->end_ns = clock_now_ns();
+    run->has_ended = true;
+    pthread_cond_signal(&run->ended);
+    pthread_mutex_unlock(&run->mutex);
+    return NULL;
+}
+
+static void init_ended(struct bvh_run *run)
+{
+    pthread_condattr_t attributes;
+    pthread_condattr_init(&attributes);
+    pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
+    pthread_cond_init(&run->ended, &attributes);
+    pthread_condattr_destroy(&attributes);
+    pthread_mutex_init(&run->mutex, NULL);
+}
+
+struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_settings *settings)
+{
+    uint64_t primitives = 0;
+    struct bvh_run *run = calloc(1, sizeof *run);
+    if (!run)
+        return NULL;
+    run->jobs = jobs;
+    run->count = count;
+    run->settings = *settings;
+    run->settings.stop = &run->stop;
+    for (uint32_t i = 0; i < count; i++) {
+        jobs[i].tree = (struct bvh_tree){0};
+        jobs[i].error = (struct error){0};
+        primitives += jobs[i].shape.primitive_count;
+    }
+    init_ended(run);
+    run->has_thread =
+        primitives >= BVH_THREADED_PRIMITIVES && pthread_create(&run->thread, NULL, run_thread, run) == 0;
+    if (!run->has_thread)
+        run_thread(run);
+    return run;
+}
+
+bool bvh_jobs_wait(struct bvh_run *run, uint64_t until_ns)
+{
+    const struct timespec until = {(time_t)(until_ns / 1000000000u), (long)(until_ns % 1000000000u)};
+    pthread_mutex_lock(&run->mutex);
+    int waited = 0;
+    while (!run->has_ended && waited != ETIMEDOUT)
+        waited = until_ns == UINT64_MAX ? pthread_cond_wait(&run->ended, &run->mutex)
+                                        : pthread_cond_timedwait(&run->ended, &run->mutex, &until);
+    bool has_ended = run->has_ended;
+    pthread_mutex_unlock(&run->mutex);
+    return has_ended;
+}
+
+static void destroy(struct bvh_run *run)
+{
+    if (run->has_thread)
+        pthread_join(run->thread, NULL);
+    pthread_cond_destroy(&run->ended);
+    pthread_mutex_destroy(&run->mutex);
+    free(run);
+}
+
+bool bvh_jobs_finish(struct bvh_run *run, uint64_t *end_ns, struct error *error)
+{
+    const struct bvh_job *jobs = run->jobs;
+    const uint32_t count = run->count;
+    bvh_jobs_wait(run, UINT64_MAX);
+    *end_ns = run->end_ns;
+    destroy(run);
+    for (uint32_t i = 0; i < count; i++) {
+        if (jobs[i].error.kind != ERROR_NONE) {
+            if (error)
+                *error = jobs[i].error;
+            return false;
+        }
+    }
+    return true;
+}
+
+void bvh_jobs_stop(struct bvh_run *run)
+{
+    if (!run)
+        return;
+    atomic_store(&run->stop, true);
+    destroy(run);
+}

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+/* How many rays of a wave walk together. The choice follows the rays and the scene alone, never the clock, so that
+ * a picture is the same every time: it is made for the whole wave, with its first part. */
+#include "trace/bvh/tracer.h"
+
+#include "gpu/program.h"
+#include "shared/bindings.h"
+
+#include <epoxy/gl.h>
+
+/* How many walk together on software GL where that pays. Elsewhere a SIMD group of the hardware walks together
+ * already, and several rays an invocation cost registers; not measured there. */
+#define TOGETHER_SOFTWARE 8u
+/* A walk of several rays takes as long as four of single ones (bench_bvh): it pays where it is
+ * shared by more than that. */
+#define RAYS_A_WALK_MIN 5u
+/* Rays that are farther apart than so many leaves, where the scene is, have few leaves in common. Measured: with
+ * 871K triangles in 70K pixels (4 leaves) eight camera rays together are 0.9 of one alone, with 590K in 213K (2
+ * leaves) 1.5; eight shadow rays, of which the last decides, 1.3, 1.04 and 0.87 with 147K, 590K and 1M triangles.
+ */
+#define WIDTH_TOGETHER_CLOSEST 2.5f
+#define WIDTH_TOGETHER_ANY 1.5f
+/* A share of the scene's diagonal. */
+#define REACH_TOGETHER (1.0f / 512)
+/* Groups of which the coherence of a wave is found, and the rays below which it is not worth it. */
+#define COHERENCE_GROUPS 512u
+#define COHERENCE_RAYS_MIN 1024u
+
+float bvh_reach_together(const struct gpu_scene *scene, const struct wave *wave)
+{
+    float reach = REACH_TOGETHER * scene->diagonal;
+    /* Rays of several times have several places in what moves: measured, those of a lens are 0.7 of single ones
+     * then. */
+    return wave->origin_spread > reach && !scene->has_motion ? wave->origin_spread : reach;
+}
+
+/* Of a sample of the wave: rays alive, and walks that they would take. */
+static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
+                              uint32_t counts[2], struct error *error)
+{
+    struct gpu_device *device = scene->device;
+    static const struct gpu_define defines[] = {{"RAYS_TOGETHER", "8"}, {NULL, NULL}};
+    _Static_assert(TOGETHER_SOFTWARE == 8, "the define above");
+    const struct gpu_program *program = gpu_program_get(
+        device, &(struct gpu_program_source){.compute = "bvh/coherence.comp", .defines = defines}, error);
+    if (!program || !gpu_buffer_reserve(device, &bvh->coherence, 2 * sizeof(uint32_t), error))
+        return false;
+    uint32_t groups = wave->ray_count / TOGETHER_SOFTWARE;
+    uint32_t step = groups > COHERENCE_GROUPS ? groups / COHERENCE_GROUPS : 1;
+    gpu_buffer_clear(device, &bvh->coherence, 0);
+    gpu_buffer_bind_storage(&bvh->coherence, BIND_TRACER_0);
+    gpu_buffer_bind_texels(device, wave->rays, UNIT_RAYS, GL_RGBA32F);
+    gpu_uniform_uint(program, "group_count", groups / step);
+    gpu_uniform_uint(program, "group_stride", step * TOGETHER_SOFTWARE);
+    gpu_uniform_float(program, "bvh_reach_together", bvh_reach_together(scene, wave));
+    float centre[3];
+    for (int k = 0; k < 3; k++)
+        centre[k] = 0.5f * scene->lower_world[k] + 0.5f * scene->upper_world[k];
+    gpu_uniform_vec(program, "scene_centre", 3, centre);
+    float leaves = wave->kind == WAVE_ANY ? WIDTH_TOGETHER_ANY : WIDTH_TOGETHER_CLOSEST;
+    gpu_uniform_float(program, "width_together", leaves * bvh->leaf_extent_world);
+    gpu_dispatch(device, program, groups / step);
+    gpu_buffer_read(device, &bvh->coherence, 0, counts, 2 * sizeof *counts);
+    return true;
+}
+
+uint32_t bvh_rays_together(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
+                           struct error *error)
+{
+    const struct tracer_options *options = &bvh->base.options;
+    uint32_t counts[2];
+    if (options->bvh_layout == BVH_LAYOUT_PLAIN)
+        return 1;
+    if (options->bvh_rays_together != 0)
+        return options->bvh_rays_together;
+    if (!scene->device->facts.software || wave->ray_count < COHERENCE_RAYS_MIN)
+        return 1;
+    if (wave->first_ray > 0)
+        return *wave->chosen;
+    if (!measure_coherence(bvh, scene, wave, counts, error))
+        return 0;
+    uint32_t together =
+        counts[0] >= (uint64_t)RAYS_A_WALK_MIN * counts[1] && counts[1] > 0 ? TOGETHER_SOFTWARE : 1;
+    if (wave->chosen)
+        *wave->chosen = together;
+    return together;
+}

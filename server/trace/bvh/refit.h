@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: MIT */
+/* Refitting trees of deformed geometries on the device: boxes are made anew bottom-up from where the triangles are
+ * now, order and links stay. Based on: Wald, Boulos, Shirley. Ray Tracing Deformable Scenes Using Dynamic Bounding
+ * Volume Hierarchies. ACM TOG 2007, section 5. GL thread. */
+#ifndef FARLIGHT_TRACE_BVH_REFIT_H
+#define FARLIGHT_TRACE_BVH_REFIT_H
+
+#include "base/error.h"
+#include "gpu/buffer.h"
+#include "trace/bvh/build.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* The plan of a tree, on the device. All-zero: the tree cannot be refitted. */
+struct bvh_refit {
+    struct gpu_buffer records, corners;
+    uint32_t record_count, leaf_count;
+    struct bvh_refit_step *steps;
+    uint32_t step_count;
+};
+
+/* How many times as worn as when it was built a tree may be (struct bvh_tree, wear): beyond, a new one is built. A
+ * ray then meets up to so many times the boxes, which takes longer than a frame's share of building does in scenes
+ * of any size.
+ */
+#define BVH_REFIT_WEAR_MAX 2.0f
+
+/* Takes the steps out of the plan. */
+bool bvh_refit_init(struct bvh_refit *refit, struct gpu_device *device, struct bvh_refit_plan *plan,
+                    struct error *error);
+void bvh_refit_finish(struct bvh_refit *refit, struct gpu_device *device);
+
+/* Where things lie. */
+struct bvh_refit_place {
+    struct gpu_buffer *boxes, *primitives, *elements;
+    uint32_t first_box;    /* of this tree in `boxes`, which holds BVH_REFIT_BOX_BYTES each */
+    uint32_t first_texel;  /* in `primitives` */
+    uint32_t close_texels; /* to where triangles lie as they are when the shutter closes */
+    uint32_t first_vertex; /* in the scene's positions, which are bound */
+    uint32_t close_offset; /* of vertices; 0: the shape stays while the shutter is open */
+    uint32_t first_element;
+};
+#define BVH_REFIT_BOX_BYTES (BVH_REFIT_BOX_TEXELS * 16u)
+
+/* A tree's first box as it lies in `boxes`. */
+struct bvh_refit_root {
+    float lower[3];
+    uint32_t size;
+    float upper[3];
+    uint32_t pad0;
+    float surfaces, triangle_surfaces;
+    uint32_t pad1[2];
+};
+
+/* Triangles and boxes. */
+bool bvh_refit_bounds(struct bvh_refit *refit, struct gpu_device *device, const struct bvh_refit_place *place,
+                      struct error *error);
+/* Elements from the boxes; `grid` is over the root's box. */
+bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const struct bvh_refit_place *place,
+                     const struct bvh_settings *settings, const struct bvh_grid *grid, struct error *error);
+
+#endif

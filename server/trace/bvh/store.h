@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: MIT */
+/* The trees on the device: one for each geometry, kept by (kind, id, revision), behind a room for the top tree.
+ * GL thread. */
+#ifndef FARLIGHT_TRACE_BVH_STORE_H
+#define FARLIGHT_TRACE_BVH_STORE_H
+
+#include "base/error.h"
+#include "base/stage_times.h"
+#include "gpu/buffer.h"
+#include "gpu/device.h"
+#include "trace/bvh/build.h"
+#include "trace/bvh/build_top.h"
+#include "trace/bvh/refit.h"
+#include "trace/step.h"
+#include "gpu_scene/scene.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* A tree that is on the device. */
+struct bvh_entry {
+    bool is_mesh;
+    uint32_t id;
+    uint32_t node; /* as struct gpu_scene_geometry has it */
+    uint64_t revision;
+    uint64_t deformed_revision; /* of the vertices that it was built or refitted for */
+    struct bvh_refit refit;
+    float built_wear; /* as struct bvh_tree has it */
+    bool is_wanted;   /* the scene still has it, in this revision */
+    uint32_t first_element, element_count;
+    uint32_t first_texel, texel_count;
+    float lower[3], upper[3]; /* object space, padded */
+    struct bvh_grid grid;
+    float grid_cost, leaf_extent; /* as struct bvh_tree has them */
+};
+
+/* Trees that are being built, then uploaded. */
+struct bvh_store_build {
+    struct bvh_job *jobs; /* owned; NULL: there are none */
+    uint32_t *which;      /* owned; geometry of each */
+    uint32_t count;
+    struct bvh_run *run; /* NULL: it has ended */
+    uint64_t start_ns;
+    uint32_t uploaded;       /* trees */
+    uint64_t uploaded_bytes; /* of the next one's elements and primitives */
+};
+
+struct bvh_store {
+    struct gpu_device *device;
+    struct bvh_settings settings;
+    struct bvh_entry *entries; /* as they lie on the device */
+    uint32_t entry_count;
+    uint32_t *entry_of; /* geometry of the scene to entry; BVH_NONE: without primitives */
+    uint32_t geometry_count;
+    bool deforms;            /* some geometry's vertices may move */
+    bool deforms_in_shutter; /* and do, while the shutter is open */
+    uint32_t top_capacity;   /* elements before the first entry */
+    bool top_lost;           /* the top tree has to be written again; cleared by who does */
+    struct gpu_buffer elements, primitives;
+    struct gpu_buffer boxes, roots; /* of refits */
+    struct bvh_store_build build;
+};
+
+struct bvh_store_report {
+    uint64_t built_elements, refitted_elements, uploaded_bytes;
+};
+
+void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_settings *settings);
+void bvh_store_finish(struct bvh_store *store);
+/* Trees for all geometries of the scene, building those that are new or changed: begun, then in steps that end at
+ * about that time. What the scene's arrays hold must not change meanwhile. What is kept is not uploaded
+ * again, though the device may move it. Trees of geometries whose vertices have moved are refitted on the device,
+ * and built anew from where these are now where refitting has made one worse than BVH_REFIT_WEAR_MAX; their
+ * leaf_extent and grid_cost stay those of the mesh as it is given, so that what is chosen by them does not depend
+ * on earlier poses. `all`: deformed_revision of what is there says nothing. After a failure the store is empty. */
+bool bvh_store_begin(struct bvh_store *store, const struct gpu_scene *scene, bool all, struct error *error);
+enum tracer_progress bvh_store_step(struct bvh_store *store, struct gpu_scene *scene, uint64_t step_end_ns,
+                                    struct bvh_store_report *report, struct stage_times *times,
+                                    struct error *error);
+/* Whether the next step would only wait for the builder's threads. */
+bool bvh_store_waits(struct bvh_store *store);
+/* The second half of it: trees of geometries whose vertices are others than those that they were made for. */
+bool bvh_store_deform(struct bvh_store *store, struct gpu_scene *scene, struct bvh_store_report *report,
+                      struct stage_times *times, struct error *error);
+/* Trees over the shapes of jobs[i] for the geometries which[i], in place of those that they have, all at once.
+ * Both arrays become the store's, in any case. */
+bool bvh_store_rebuild(struct bvh_store *store, const struct gpu_scene *scene, struct bvh_job *jobs,
+                       uint32_t *which, uint32_t count, struct bvh_store_report *report, struct stage_times *times,
+                       struct error *error);
+/* Room for a top tree of so many elements. */
+bool bvh_store_reserve_top(struct bvh_store *store, uint32_t element_count, struct error *error);
+/* Writes elements of the top tree: all, or those marked in `moved`. Returns the bytes. */
+uint64_t bvh_store_write_top(struct bvh_store *store, const struct bvh_top *top, bool all);
+/* The tree of a geometry, NULL if it has no primitives. */
+const struct bvh_entry *bvh_store_entry(const struct bvh_store *store, uint32_t geometry);
+uint64_t bvh_store_bytes(const struct bvh_store *store);
+
+#endif

@@ -1,0 +1,433 @@
+// SPDX-License-Identifier: MIT
+#include "trace/bvh/tracer.h"
+
+#include "base/clock.h"
+#include "base/parallel.h"
+#include "gpu/program.h"
+#include "shared/bindings.h"
+#include "trace/program.h"
+
+#include <epoxy/gl.h>
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define BUILD_THREADS_MAX 8
+/* A grid that makes boxes so much larger costs more steps than its smaller elements save. */
+#define GRID_COST_MAX 1.3f
+/* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
+#define DISPATCH_RAYS_MAX (1u << 18)
+
+static unsigned build_threads(void)
+{
+    unsigned processors = parallel_processors();
+    return processors > BUILD_THREADS_MAX ? BUILD_THREADS_MAX : processors;
+}
+
+static struct bvh_settings settings_of(const struct tracer_options *options)
+{
+    bool plain = options->bvh_layout == BVH_LAYOUT_PLAIN;
+    /* Boxes are twice as fast as spheres (bench_bvh), so `auto` is boxes. */
+    bool spheres = plain || options->bvh_bounds == BVH_BOUNDS_SPHERE;
+    return (struct bvh_settings){
+        .bounds = spheres ? BVH_BOUNDS_OF_SPHERES : BVH_BOUNDS_OF_BOXES,
+        .plain = plain,
+        .threads = build_threads(),
+    };
+}
+
+static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_options *options,
+                                 struct error *error)
+{
+    uint32_t together = options->bvh_rays_together;
+    if (together > 8 || (together > 4 && together < 8)) {
+        error_set(error, ERROR_INVALID, "options.bvh_rays_together", "1, 2, 3, 4 or 8 rays walk together, not %u",
+                  together);
+        return NULL;
+    }
+    struct bvh *bvh = calloc(1, sizeof *bvh);
+    if (!bvh) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
+        return NULL;
+    }
+    struct bvh_settings settings = settings_of(options);
+    bvh_store_init(&bvh->store, device, &settings);
+    return &bvh->base;
+}
+
+static void bvh_reset(struct bvh *bvh)
+{
+    bvh_store_finish(&bvh->store);
+    bvh_top_finish(&bvh->top);
+    gpu_buffer_finish(bvh->store.device, &bvh->transform_buffer);
+    gpu_buffer_finish(bvh->store.device, &bvh->coherence);
+    free(bvh->transforms);
+    bvh->transforms = NULL;
+    bvh->transform_count = 0;
+}
+
+static void bvh_destroy(struct tracer *tracer)
+{
+    struct bvh *bvh = (struct bvh *)tracer;
+    bvh_reset(bvh);
+    free(bvh);
+}
+
+/* ---- instances ---- */
+
+/* The tree's box in world space, with room for what taking the ray to object space rounds: a few units in the
+ * last place of everything that is summed up. Infinite where the sum overflows, which is right. */
+static struct bvh_world_box box_at_pose(const struct bvh_entry *entry, const float *world_from_object)
+{
+    struct bvh_world_box box;
+    for (int row = 0; row < 3; row++) {
+        const float *m = world_from_object + 4 * row;
+        float low = m[3], high = m[3], size = fabsf(m[3]);
+        for (int i = 0; i < 3; i++) {
+            float a = m[i] * entry->lower[i], b = m[i] * entry->upper[i];
+            low += fminf(a, b);
+            high += fmaxf(a, b);
+            size += fmaxf(fabsf(a), fabsf(b));
+        }
+        box.lower[row] = fmaxf(low - 8 * BVH_PAD_RELATIVE * size, -FLT_MAX);
+        box.upper[row] = fminf(high + 8 * BVH_PAD_RELATIVE * size, FLT_MAX);
+        if (!(box.lower[row] <= box.upper[row])) {
+            box.lower[row] = -FLT_MAX;
+            box.upper[row] = FLT_MAX;
+        }
+    }
+    return box;
+}
+
+/* Wherever it goes while the shutter is open: between two poses each point goes straight from one to the other. */
+static struct bvh_world_box world_box(const struct bvh_entry *entry, const struct gpu_scene *scene,
+                                      const struct instance *instance)
+{
+    uint32_t pose_count;
+    const float(*poses)[12] = gpu_scene_poses(scene, instance, &pose_count);
+    struct bvh_world_box box = box_at_pose(entry, poses[0]);
+    for (uint32_t p = 1; p < pose_count; p++) {
+        const struct bvh_world_box other = box_at_pose(entry, poses[p]);
+        bvh_world_box_include(&box, &other);
+    }
+    return box;
+}
+
+/* What instance i is now. The box is empty where its geometry has no primitives. */
+static struct bvh_transform describe(const struct bvh *bvh, const struct gpu_scene *scene, uint32_t i,
+                                     struct bvh_world_box *box)
+{
+    struct instance *instance = &scene->instances[i];
+    const struct bvh_entry *entry = bvh_store_entry(&bvh->store, instance->geometry);
+    struct bvh_transform transform = {0};
+    memcpy(transform.object_from_world, instance->object_from_world, sizeof transform.object_from_world);
+    *box = (struct bvh_world_box){{1, 1, 1}, {-1, -1, -1}};
+    if (!entry || !(entry->lower[0] <= entry->upper[0]))
+        return transform;
+    transform.first_element = entry->first_element;
+    transform.element_count = entry->element_count;
+    transform.first_texel = entry->first_texel;
+    transform.first_primitive = scene->geometries[instance->geometry].device.first_primitive;
+    transform.grid_lower_x = entry->grid.lower[0];
+    transform.grid_lower_y = entry->grid.lower[1];
+    transform.grid_lower_z = entry->grid.lower[2];
+    memcpy(transform.cells_per_unit, entry->grid.cells_per_unit, sizeof entry->grid.cells_per_unit);
+    if (scene->geometries[instance->geometry].device.close_offset)
+        transform.close_texels = entry->texel_count / 2;
+    *box = world_box(entry, scene, instance);
+    return transform;
+}
+
+static float scale_of(vec4 m[3])
+{
+    float determinant = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                        m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+                        m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+    return cbrtf(fabsf(determinant));
+}
+
+static void survey_leaves(struct bvh *bvh, const struct gpu_scene *scene)
+{
+    double sum = 0, count = 0;
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        struct instance *instance = &scene->instances[i];
+        const struct bvh_entry *entry = bvh_store_entry(&bvh->store, instance->geometry);
+        if (!entry)
+            continue;
+        sum += (double)(entry->leaf_extent * scale_of(instance->world_from_object)) * entry->element_count;
+        count += entry->element_count;
+    }
+    bvh->leaf_extent_world = count > 0 ? (float)(sum / count) : 0;
+}
+
+/* A new top tree and all transforms. */
+static bool rebuild_top(struct bvh *bvh, const struct gpu_scene *scene, struct error *error)
+{
+    uint32_t count = scene->instance_count;
+    struct bvh_world_box *boxes = malloc(((size_t)count + 1) * sizeof *boxes);
+    struct bvh_transform *transforms = malloc(((size_t)count + 1) * sizeof *transforms);
+    bool ok = boxes && transforms;
+    for (uint32_t i = 0; ok && i < count; i++)
+        transforms[i] = describe(bvh, scene, i, &boxes[i]);
+    bvh_top_finish(&bvh->top);
+    ok = ok && bvh_top_build(&bvh->top, boxes, count, &bvh->store.settings);
+    free(boxes);
+    if (!ok) {
+        free(transforms);
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tree over %u instances", count);
+    }
+    free(bvh->transforms);
+    bvh->transforms = transforms;
+    bvh->transform_count = count;
+    bvh->base.stats.nodes_rebuilt += bvh->top.element_count;
+    return true;
+}
+
+/* Writes the transforms that changed and moves their elements. False: the top tree has to be made anew. */
+static bool refit_top(struct bvh *bvh, const struct gpu_scene *scene)
+{
+    uint32_t first = scene->instance_count, end = 0; /* of the transforms that changed */
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        struct bvh_world_box box;
+        const struct bvh_transform transform = describe(bvh, scene, i, &box);
+        struct bvh_transform *old = &bvh->transforms[i];
+        if (!bvh_top_move(&bvh->top, i, &box))
+            return false;
+        if (memcmp(old, &transform, sizeof transform) == 0)
+            continue;
+        *old = transform;
+        first = i < first ? i : first;
+        end = i + 1;
+    }
+    if (first < end) {
+        size_t bytes = (end - first) * sizeof *bvh->transforms;
+        gpu_buffer_write(bvh->store.device, &bvh->transform_buffer, first * sizeof *bvh->transforms,
+                         &bvh->transforms[first], bytes);
+        bvh->base.stats.uploaded_bytes += bytes;
+    }
+    bvh->base.stats.nodes_refitted += bvh_top_refit(&bvh->top);
+    return !bvh_top_is_stale(&bvh->top);
+}
+
+static bool upload_top(struct bvh *bvh, bool rebuilt, struct error *error)
+{
+    struct bvh_store *store = &bvh->store;
+    struct tracer_stats *stats = &bvh->base.stats;
+    size_t transform_bytes = bvh->transform_count * sizeof *bvh->transforms;
+    if (rebuilt) {
+        if (!gpu_buffer_upload(store->device, &bvh->transform_buffer, bvh->transforms, transform_bytes, error))
+            return false;
+        stats->uploaded_bytes += transform_bytes;
+    }
+    stats->uploaded_bytes += bvh_store_write_top(store, &bvh->top, rebuilt || store->top_lost);
+    bvh_top_settle(&bvh->top);
+    store->top_lost = false;
+    return true;
+}
+
+static bool update_instances(struct bvh *bvh, const struct gpu_scene *scene, struct stage_times *times,
+                             struct error *error)
+{
+    uint64_t start_ns = clock_now_ns();
+    /* First, since it may move the trees that the transforms point to. A tree of n leaves has at most 2 n - 1. */
+    uint64_t top_max = 2 * (uint64_t)scene->instance_count;
+    if (top_max > BVH_LEAF_FIRST_MASK)
+        return error_set(error, ERROR_LIMIT, NULL, "%u instances are too many", scene->instance_count);
+    if (!bvh_store_reserve_top(&bvh->store, (uint32_t)top_max, error))
+        return false;
+    bool refitted = bvh->transforms && bvh->transform_count == scene->instance_count && refit_top(bvh, scene);
+    if (!refitted && !rebuild_top(bvh, scene, error))
+        return false;
+    survey_leaves(bvh, scene);
+    uint64_t built_ns = clock_now_ns();
+    stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, built_ns - start_ns);
+    bool ok = upload_top(bvh, !refitted, error);
+    stage_times_add(times, STAGE_UPLOAD, STAGE_CPU, 0, built_ns, clock_now_ns() - built_ns);
+    return ok;
+}
+
+static uint64_t node_count(const struct bvh *bvh)
+{
+    uint64_t nodes = bvh->top.element_count;
+    for (uint32_t i = 0; i < bvh->store.entry_count; i++)
+        nodes += bvh->store.entries[i].element_count;
+    return nodes;
+}
+
+/* A tree with more detail than its grid can tell apart, a statue in a landscape, say. */
+static bool has_coarse_grid(const struct bvh *bvh)
+{
+    for (uint32_t i = 0; i < bvh->store.entry_count; i++)
+        if (bvh->store.entries[i].grid_cost > GRID_COST_MAX)
+            return true;
+    return false;
+}
+
+/* A step of it. A scene is walked in one form however it came about: where the trees turn out to need another,
+ * all are built again, with boxes in floats or no longer. */
+static enum tracer_progress update_geometries(struct bvh *bvh, struct gpu_scene *scene, struct stage_times *times,
+                                              struct error *error)
+{
+    struct tracer_stats *stats = &bvh->base.stats;
+    struct bvh_store_report report = {0};
+    enum tracer_progress progress =
+        bvh_store_step(&bvh->store, scene, bvh->base.step_end_ns, &report, times, error);
+    stats->uploaded_bytes += report.uploaded_bytes;
+    stats->nodes_rebuilt += report.built_elements;
+    stats->nodes_refitted += report.refitted_elements;
+    if (progress != TRACER_DONE || bvh->store.settings.whole == has_coarse_grid(bvh))
+        return progress;
+    bvh_reset(bvh);
+    bvh->store.settings.whole = !bvh->store.settings.whole;
+    return bvh_store_begin(&bvh->store, scene, true, error) ? TRACER_MORE : TRACER_FAILED;
+}
+
+static enum tracer_progress go_on(struct bvh *bvh, struct gpu_scene *scene, struct stage_times *times,
+                                  struct error *error)
+{
+    enum tracer_progress progress = TRACER_MORE;
+    while (bvh->phase == BVH_TREES && progress == TRACER_MORE) {
+        progress = update_geometries(bvh, scene, times, error);
+        if (progress == TRACER_DONE)
+            bvh->phase = BVH_TOP;
+        if (progress == TRACER_FAILED || step_is_over(bvh->base.step_end_ns))
+            return progress == TRACER_FAILED ? TRACER_FAILED : TRACER_MORE;
+    }
+    return tracer_progress_of(update_instances(bvh, scene, times, error));
+}
+
+static bool begin_update(struct bvh *bvh, const struct gpu_scene *scene, const struct scene_changes *changes,
+                         struct error *error)
+{
+    bool trees = changes->geometry || changes->deformed;
+    bvh->phase = trees ? BVH_TREES : BVH_TOP;
+    return !trees || bvh_store_begin(&bvh->store, scene, changes->geometry, error);
+}
+
+static void fill_stats(struct bvh *bvh)
+{
+    bvh->base.stats.nodes = node_count(bvh);
+    bvh->base.stats.device_bytes = bvh_store_bytes(&bvh->store) + bvh->transform_buffer.capacity_bytes;
+}
+
+static enum tracer_progress bvh_update(struct tracer *tracer, struct gpu_scene *scene,
+                                       const struct scene_changes *changes, struct stage_times *times,
+                                       struct error *error)
+{
+    struct bvh *bvh = (struct bvh *)tracer;
+    struct tracer_stats *stats = &tracer->stats;
+    enum tracer_progress progress = TRACER_MORE;
+    if (bvh->phase == BVH_IDLE) {
+        stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
+        if (!changes->geometry && !changes->deformed && !changes->instances)
+            return TRACER_DONE;
+        if (!begin_update(bvh, scene, changes, error))
+            progress = TRACER_FAILED;
+    }
+    if (progress == TRACER_MORE)
+        progress = go_on(bvh, scene, times, error);
+    if (progress == TRACER_FAILED)
+        bvh_reset(bvh);
+    if (progress != TRACER_MORE)
+        bvh->phase = BVH_IDLE;
+    fill_stats(bvh);
+    return progress;
+}
+
+static void bvh_abandon(struct tracer *tracer)
+{
+    struct bvh *bvh = (struct bvh *)tracer;
+    bvh_reset(bvh);
+    bvh->phase = BVH_IDLE;
+    fill_stats(bvh);
+}
+
+static bool bvh_waits(struct tracer *tracer)
+{
+    return bvh_store_waits(&((struct bvh *)tracer)->store);
+}
+
+/* ---- waves ---- */
+
+static void bind(struct bvh *bvh)
+{
+    struct bvh_store *store = &bvh->store;
+    if (store->settings.plain) {
+        gpu_buffer_bind_storage(&store->elements, BIND_TRACER_0);
+    } else {
+        gpu_buffer_bind_texels(store->device, &store->elements, UNIT_TRACER_0, GL_RGBA32UI);
+    }
+    gpu_buffer_bind_texels(store->device, &bvh->transform_buffer, UNIT_TRACER_1, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->primitives, UNIT_TRACER_2, GL_RGBA32UI);
+}
+
+/* A tree over one instance is that instance: its transform element is entered at once. */
+static bool is_one_instance(const struct bvh *bvh)
+{
+    return bvh->top.element_count == 1;
+}
+
+static void set_uniforms(const struct bvh *bvh, const struct gpu_program *program, const struct gpu_scene *scene,
+                         const struct wave *wave)
+{
+    gpu_uniform_float(program, "bvh_reach_together", bvh_reach_together(scene, wave));
+    if (is_one_instance(bvh)) {
+        gpu_uniform_uint(program, "bvh_instance", bvh->top.leaves[0] & BVH_LEAF_FIRST_MASK);
+        return;
+    }
+    gpu_uniform_uint(program, "bvh_top_count", bvh->top.element_count);
+    if (bvh_is_packed(&bvh->store.settings)) {
+        gpu_uniform_vec(program, "bvh_top_grid_lower", 3, bvh->top.grid.lower);
+        gpu_uniform_vec(program, "bvh_top_cells_per_unit", 3, bvh->top.grid.cells_per_unit);
+    }
+}
+
+static bool bvh_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error)
+{
+    struct bvh *bvh = (struct bvh *)tracer;
+    const struct bvh_settings *settings = &bvh->store.settings;
+    uint32_t together = bvh_rays_together(bvh, scene, wave, error);
+    if (together == 0)
+        return false;
+    struct gpu_define defines[9] = {{"TRACER_BVH", "1"}};
+    size_t n = 1;
+    if (settings->bounds == BVH_BOUNDS_OF_SPHERES)
+        defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
+    if (settings->plain)
+        defines[n++] = (struct gpu_define){"BVH_PLAIN", "1"};
+    if (bvh_is_packed(settings))
+        defines[n++] = (struct gpu_define){"BVH_PACKED", "1"};
+    if (is_one_instance(bvh))
+        defines[n++] = (struct gpu_define){"BVH_ONE_INSTANCE", "1"};
+    /* One origin in the world is many in the space of what moves. */
+    if (wave->shared_origin && together > 1 && !scene->has_motion)
+        defines[n++] = (struct gpu_define){"SHARED_ORIGIN", "1"};
+    if (bvh->store.deforms)
+        defines[n++] = (struct gpu_define){"BVH_DEFORMS", "1"};
+    if (bvh->store.deforms_in_shutter && wave->times) /* else all rays see the vertices of the first pose */
+        defines[n++] = (struct gpu_define){"BVH_DEFORMS_IN_SHUTTER", "1"};
+    const struct trace_program_source source = {
+        .traverse = "bvh/traverse.glsl",
+        .defines = defines,
+        .rays_together = together,
+        .rays_a_dispatch = DISPATCH_RAYS_MAX / together * together,
+    };
+    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
+    if (!program)
+        return false;
+    bind(bvh);
+    set_uniforms(bvh, program, scene, wave);
+    return trace_program_run(program, scene, wave, &source, error);
+}
+
+const struct tracer_impl tracer_bvh_impl = {
+    .name = "bvh",
+    .depends_on = TRACER_NEEDS_SCENE,
+    .create = bvh_create,
+    .destroy = bvh_destroy,
+    .update = bvh_update,
+    .abandon = bvh_abandon,
+    .waits = bvh_waits,
+    .trace = bvh_trace,
+};

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+/* The tracer `bvh`: stackless traversal of bounding volume trees by baked links. What is on the device and how it
+ * is walked: shaders/bvh/layout.h, shaders/bvh/traverse.glsl. */
+#ifndef FARLIGHT_TRACE_BVH_TRACER_H
+#define FARLIGHT_TRACE_BVH_TRACER_H
+
+#include "trace/bvh/build_top.h"
+#include "trace/bvh/store.h"
+#include "trace/tracer.h"
+
+/* Where an update is. */
+enum bvh_phase { BVH_IDLE, BVH_TREES, BVH_TOP };
+
+struct bvh {
+    struct tracer base;
+    enum bvh_phase phase;
+    struct bvh_store store;
+    struct bvh_top top;
+    struct bvh_transform *transforms; /* mirror of the buffer, one an instance of the scene */
+    uint32_t transform_count;
+    struct gpu_buffer transform_buffer;
+    float leaf_extent_world;     /* diagonal of a leaf's box, in the mean over what the instances show */
+    struct gpu_buffer coherence; /* what bvh/coherence.comp counts */
+};
+
+/* How far apart rays that are walked together may begin, in world space. Those of a lens, all over it: they meet
+ * again where the lens is in focus. */
+float bvh_reach_together(const struct gpu_scene *scene, const struct wave *wave);
+
+/* How many rays of the wave walk together: what the options say, else what is faster for a wave as coherent as
+ * this one, of which a sample is measured. 0: failed. */
+uint32_t bvh_rays_together(struct bvh *bvh, const struct gpu_scene *scene, const struct wave *wave,
+                           struct error *error);
+
+#endif

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/* Builds a cube by rasterising instances along three axes: by depth peeling, as the paper does it (section 1.2),
+ * or in one pass with a list for each texel ("layered buffers", section 1.2.1). Both give the same samples. */
+#ifndef FARLIGHT_TRACE_LDC_BUILD_H
+#define FARLIGHT_TRACE_LDC_BUILD_H
+
+#include "base/error.h"
+#include "trace/ldc/store.h"
+#include "gpu_scene/scene.h"
+#include "trace/tracer.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Private buffers and images of the build, kept between builds; all-zero is empty. */
+struct ldc_builder;
+
+struct ldc_builder *ldc_builder_create(struct gpu_device *device, struct error *error);
+void ldc_builder_destroy(struct ldc_builder *builder); /* accepts NULL */
+uint64_t ldc_builder_bytes(const struct ldc_builder *builder);
+/* Lets go of a build that is not done, and gives everything back: it is as if it had just been made. */
+void ldc_builder_clear(struct ldc_builder *builder);
+
+/* Begins to fill cube `which` of the store, whose lower_world, cell_world and resolution are set, with the
+ * triangles and spheres of instances[0 .. count - 1] as they are when the shutter opens (gpu_scene's); texels,
+ * quads, geometry and surface are written, nodes are not. Of the other cube nothing changes but, if this is the
+ * static one, everything behind it is lost. Discs are no part of it. More layers than options->ldc_layers_max or
+ * than fit options->ldc_mebibytes_max: the nearest (least depth) of each texel are kept, and the cube says how
+ * many were needed. Never TRACER_DONE; store, scene and options must stay until the build is done. */
+enum tracer_progress ldc_build_begin(struct ldc_builder *builder, struct ldc_store *store, unsigned which,
+                                     struct gpu_scene *scene, const uint32_t *instances, uint32_t instance_count,
+                                     const struct tracer_options *options, struct error *error);
+/* After TRACER_MORE, with the scene bound: does a unit of it: some of a pass over the scene, or all where that is
+ * to be done at once, or a pass over what it gave. Queues the work; some units wait for it. On failure the cube is
+ * empty. */
+enum tracer_progress ldc_build_go_on(struct ldc_builder *builder, bool at_once, struct error *error);
+
+#endif

@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/ldc/parts.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Nodes that are not there any more are forgotten when they are more than those that are, and than this. */
+#define RECORDS_KEPT 1024
+
+/* What is remembered of a node. */
+struct ldc_record {
+    struct ldc_member last; /* as it was when it was seen last; the geometry's deformed_revision does not matter */
+    uint64_t seen, moved;   /* numbers of updates; moved 0: never */
+};
+
+static void part_finish(struct ldc_part *part)
+{
+    free(part->instances);
+    free(part->members);
+    *part = (struct ldc_part){0};
+}
+
+void ldc_parts_finish(struct ldc_parts *parts)
+{
+    for (int i = 0; i < TRACER_CUBES_MAX; i++)
+        part_finish(&parts->parts[i]);
+    free(parts->records);
+    hashmap_finish(&parts->record_by_node);
+    *parts = (struct ldc_parts){0};
+}
+
+static struct ldc_member member_of(const struct gpu_scene *scene, const struct instance *instance)
+{
+    const struct gpu_scene_geometry *geometry = &scene->geometries[instance->geometry];
+    struct ldc_member member = {
+        .revision = geometry->revision,
+        .deformed_revision = geometry->deformed_revision,
+        .geometry = geometry->id,
+        .deforming_node = geometry->node,
+        .is_mesh = geometry->mesh != NULL,
+        .node = instance->node,
+    };
+    memcpy(member.world_from_object, instance->world_from_object, sizeof(member.world_from_object));
+    return member;
+}
+
+static bool same_place_and_shape(const struct ldc_member *a, const struct ldc_member *b)
+{
+    return a->revision == b->revision && a->geometry == b->geometry && a->is_mesh == b->is_mesh &&
+           memcmp(a->world_from_object, b->world_from_object, sizeof(a->world_from_object)) == 0;
+}
+
+/* ---- what is remembered ---- */
+
+static bool index_record(struct ldc_parts *parts, uint32_t index)
+{
+    return hashmap_put(&parts->record_by_node, parts->records[index].last.node, (void *)((uintptr_t)index + 1));
+}
+
+static struct ldc_record *find_record(const struct ldc_parts *parts, uint32_t node)
+{
+    uintptr_t found = (uintptr_t)hashmap_get(&parts->record_by_node, node);
+    return found ? &parts->records[found - 1] : NULL;
+}
+
+static struct ldc_record *add_record(struct ldc_parts *parts, const struct ldc_member *member)
+{
+    if (parts->record_count == parts->record_capacity) {
+        uint32_t capacity = parts->record_capacity ? 2 * parts->record_capacity : 64;
+        struct ldc_record *larger = realloc(parts->records, capacity * sizeof(*larger));
+        if (!larger)
+            return NULL;
+        parts->records = larger;
+        parts->record_capacity = capacity;
+    }
+    uint32_t index = parts->record_count;
+    parts->records[index] = (struct ldc_record){.last = *member};
+    if (!index_record(parts, index))
+        return NULL;
+    return &parts->records[parts->record_count++];
+}
+
+/* Forgets nodes that were not there in the last update, and who moved but in the last one. */
+static bool settle(struct ldc_parts *parts)
+{
+    uint32_t kept = 0;
+    hashmap_finish(&parts->record_by_node);
+    hashmap_init(&parts->record_by_node);
+    for (uint32_t i = 0; i < parts->record_count; i++) {
+        struct ldc_record *record = &parts->records[i];
+        if (record->seen != parts->updates)
+            continue;
+        if (record->moved != parts->updates)
+            record->moved = 0;
+        parts->records[kept] = *record;
+        if (!index_record(parts, kept++))
+            return false;
+    }
+    parts->record_count = kept;
+    return true;
+}
+
+/* Notes what an instance is now; false: no memory. */
+static bool note(struct ldc_parts *parts, const struct ldc_member *member, bool *moves)
+{
+    struct ldc_record *record = find_record(parts, member->node);
+    if (!record) {
+        record = add_record(parts, member);
+        if (!record)
+            return false;
+    } else if (record->seen != parts->updates - 1 || !same_place_and_shape(&record->last, member)) {
+        record->moved = parts->updates;
+    }
+    record->last = *member;
+    record->seen = parts->updates;
+    *moves = record->moved != 0;
+    return true;
+}
+
+/* ---- parts ---- */
+
+static bool part_reserve(struct ldc_part *part, uint32_t count)
+{
+    part->instances = malloc(((size_t)count + 1) * sizeof(*part->instances));
+    part->members = malloc(((size_t)count + 1) * sizeof(*part->members));
+    return part->instances && part->members;
+}
+
+static void part_add(struct ldc_part *part, uint32_t instance, const struct ldc_member *member)
+{
+    part->instances[part->count] = instance;
+    part->members[part->count++] = *member;
+}
+
+/* Deals the instances out. Those of empty geometries belong nowhere. */
+static bool deal_out(struct ldc_parts *parts, struct ldc_part fresh[TRACER_CUBES_MAX],
+                     const struct gpu_scene *scene)
+{
+    for (int i = 0; i < TRACER_CUBES_MAX; i++)
+        if (!part_reserve(&fresh[i], scene->instance_count))
+            return false;
+    for (uint32_t i = 0; i < scene->instance_count; i++) {
+        const struct instance *instance = &scene->instances[i];
+        const struct gpu_scene_geometry *geometry = &scene->geometries[instance->geometry];
+        const struct ldc_member member = member_of(scene, instance);
+        bool moves;
+        if (!note(parts, &member, &moves))
+            return false;
+        if (geometry->device.primitive_count == 0)
+            continue;
+        bool dynamic = moves || geometry->node != 0;
+        part_add(&fresh[dynamic ? TRACER_CUBE_DYNAMIC : TRACER_CUBE_STATIC], i, &member);
+    }
+    return true;
+}
+
+static bool same_part(const struct ldc_part *a, const struct ldc_part *b)
+{
+    return a->count == b->count && memcmp(&a->box, &b->box, sizeof(a->box)) == 0 &&
+           (a->count == 0 || memcmp(a->members, b->members, a->count * sizeof(*a->members)) == 0);
+}
+
+bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene, uint32_t resolution,
+                      bool geometry_changed, bool stale[TRACER_CUBES_MAX], struct error *error)
+{
+    struct ldc_part fresh[TRACER_CUBES_MAX] = {0};
+    bool crowded = parts->record_count > RECORDS_KEPT && parts->record_count / 2 > scene->instance_count;
+    bool ok = (!geometry_changed && !crowded) || settle(parts);
+    parts->updates++;
+    if (!(ok && deal_out(parts, fresh, scene)))
+        ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the parts of a scene of %u instances",
+                       scene->instance_count);
+    for (int i = 0; i < TRACER_CUBES_MAX; i++) {
+        ok = ok && axes_box_place(&fresh[i].box, scene, fresh[i].instances, fresh[i].count, resolution, error);
+        stale[i] = !same_part(&parts->parts[i], &fresh[i]);
+        part_finish(&parts->parts[i]);
+        parts->parts[i] = fresh[i];
+    }
+    return ok;
+}

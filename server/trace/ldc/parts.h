@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: MIT */
+/* Which of a scene's instances are in which cube, where the cubes lie, and which of them must be made anew.
+ *
+ * Dynamic is what deforms, and what has been seen to move, to change its shape or to come back after it was
+ * hidden; all else is static. Once dynamic an instance stays so until the scene's geometry is another, for then
+ * cubes are built anyhow: what was still on the move stays dynamic, the rest settles. So the static cube is built
+ * once more when something begins to move, and then no longer. */
+#ifndef FARLIGHT_TRACE_LDC_PARTS_H
+#define FARLIGHT_TRACE_LDC_PARTS_H
+
+#include "base/error.h"
+#include "base/hashmap.h"
+#include "trace/raster/box.h"
+#include "gpu_scene/scene.h"
+#include "trace/tracer.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* One instance as far as a cube can tell: of equal members in equal boxes the samples are equal. */
+struct ldc_member {
+    uint64_t revision, deformed_revision; /* of the geometry */
+    uint32_t geometry, deforming_node;    /* whose id is unique with these two */
+    uint32_t is_mesh, node;
+    float world_from_object[12];
+};
+
+struct ldc_part {
+    uint32_t *instances; /* indices into the scene's, ascending */
+    struct ldc_member *members;
+    uint32_t count;
+    struct axes_box box; /* the cube's */
+};
+
+/* All-zero is empty. */
+struct ldc_parts {
+    struct ldc_part parts[TRACER_CUBES_MAX];
+    struct ldc_record *records; /* of each node that was seen */
+    uint32_t record_count, record_capacity;
+    struct hashmap record_by_node; /* value: its number, plus 1 */
+    uint64_t updates;
+};
+
+void ldc_parts_finish(struct ldc_parts *parts); /* leaves it empty */
+/* Brings the parts to the scene; `stale` says whose instances or box are others than before. On failure (no
+ * memory, or an instance is larger than numbers can tell) nothing is known of them: finish. */
+bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene, uint32_t resolution,
+                      bool geometry_changed, bool stale[TRACER_CUBES_MAX], struct error *error);
+
+#endif

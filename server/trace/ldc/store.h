@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/* Layered depth cubes on the device: buffers as ldc/layout.h has them, and where in them each cube lies. GL
+ * thread. Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary Effects. 2007, sections 1.2 and 1.3. */
+#ifndef FARLIGHT_TRACE_LDC_STORE_H
+#define FARLIGHT_TRACE_LDC_STORE_H
+
+#include "base/error.h"
+#include "gpu/buffer.h"
+#include "gpu/device.h"
+#include "trace/tracer.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Where a cube stands and where its parts begin in the buffers. */
+struct ldc_cube {
+    float lower_world[3];
+    float cell_world;    /* metres */
+    uint32_t resolution; /* texels along a side of each of the three images; 0: there is no cube */
+    uint32_t first_texel, first_sample, sample_count, first_quad, quad_count;
+    /* ldc_levels.c: nodes, entries of cells, and where the cells that have some are */
+    uint32_t first_node, node_count, first_entry, entry_count;
+    uint32_t lower_cells[3], upper_cells[3];
+    uint32_t layers_needed, layers_kept;
+    uint64_t samples_lost;
+};
+
+struct ldc_store {
+    struct gpu_device *device;
+    struct gpu_buffer texels, quads, geometry, surface, nodes, entries;
+    bool no_cells;                           /* ldc_levels.c: they were too many, and there are ranges */
+    struct ldc_cube cubes[TRACER_CUBES_MAX]; /* the static one first: what moves lies behind it */
+};
+
+void ldc_store_init(struct ldc_store *store, struct gpu_device *device);
+void ldc_store_finish(struct ldc_store *store); /* leaves it empty */
+uint64_t ldc_store_bytes(const struct ldc_store *store);
+/* What is told of a cube; all zero where there is none. */
+struct tracer_cube ldc_cube_stats(const struct ldc_cube *cube, bool rebuilt);
+/* Makes room for size_bytes; the first kept_bytes stay what they are. On failure so does all of the buffer. */
+bool ldc_store_grow(struct gpu_device *device, struct gpu_buffer *buffer, uint64_t kept_bytes, uint64_t size_bytes,
+                    struct error *error);
+
+#endif

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/ldc/trace.h"
+
+#include "gpu/program.h"
+#include "shared/bindings.h"
+#include "trace/ldc/levels.h"
+#include "trace/ldc/surface.h"
+#include "trace/program.h"
+
+#include <epoxy/gl.h>
+#include <stdio.h>
+
+/* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
+#define DISPATCH_RAYS_MAX (1u << 18)
+
+static void set_cube(const struct gpu_program *program, unsigned slot, const struct ldc_cube *cube,
+                     const struct ldc_level_layout *layout, const struct tracer_options *options)
+{
+    const struct {
+        const char *name;
+        uint32_t value;
+    } whole[] = {
+        {"ldc_resolution", cube->resolution},
+        {"ldc_first_texel", cube->first_texel},
+        {"ldc_first_node", cube->first_node},
+        {"ldc_top", layout->top},
+        {"ldc_row", layout->row},
+        {"ldc_grid", layout->grid},
+    };
+    char name[32];
+    for (size_t i = 0; i < sizeof whole / sizeof *whole; i++) {
+        snprintf(name, sizeof name, "%s[%u]", whole[i].name, slot);
+        gpu_uniform_int(program, name, (int32_t)whole[i].value);
+    }
+    const float place[4] = {cube->lower_world[0], cube->lower_world[1], cube->lower_world[2], cube->cell_world};
+    snprintf(name, sizeof name, "ldc_place[%u]", slot);
+    gpu_uniform_vec(program, name, 4, place);
+    const float lower[3] = {(float)cube->lower_cells[0], (float)cube->lower_cells[1], (float)cube->lower_cells[2]};
+    const float upper[3] = {(float)cube->upper_cells[0], (float)cube->upper_cells[1], (float)cube->upper_cells[2]};
+    snprintf(name, sizeof name, "ldc_lower[%u]", slot);
+    gpu_uniform_vec(program, name, 3, lower);
+    snprintf(name, sizeof name, "ldc_upper[%u]", slot);
+    gpu_uniform_vec(program, name, 3, upper);
+    snprintf(name, sizeof name, "ldc_tolerance[%u]", slot);
+    gpu_uniform_float(program, name, options->ldc_tolerance / cube->cell_world);
+}
+
+static void bind(struct ldc_store *store, bool cells)
+{
+    gpu_buffer_bind_texels(store->device, &store->texels, UNIT_TRACER_0, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->quads, UNIT_TRACER_1, GL_RGBA32F);
+    gpu_buffer_bind_texels(store->device, &store->geometry, UNIT_TRACER_2, GL_RG32UI);
+    gpu_buffer_bind_texels(store->device, &store->surface, UNIT_TRACER_3, GL_RGBA32UI);
+    gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_4, cells ? GL_RGBA32UI : GL_RG32F);
+    gpu_buffer_bind_texels(store->device, &store->entries, UNIT_TRACER_5, GL_RGBA32UI);
+}
+
+bool ldc_trace(struct ldc_store *store, struct gpu_scene *scene, const struct wave *wave,
+               const struct tracer_options *options, struct error *error)
+{
+    static const struct ldc_cube nothing = {.cell_world = 1};
+    const struct ldc_cube *cubes[TRACER_CUBES_MAX] = {&nothing};
+    unsigned cube_count = 0;
+    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++)
+        if (store->cubes[i].resolution)
+            cubes[cube_count++] = &store->cubes[i];
+    cube_count = cube_count ? cube_count : 1;
+    char number_of_cubes[4], bits[4];
+    snprintf(number_of_cubes, sizeof number_of_cubes, "%u", cube_count);
+    const struct ldc_level_layout layout = ldc_level_layout_of(store, cubes[0]->resolution, options);
+    snprintf(bits, sizeof bits, "%u", layout.bits);
+    struct gpu_define defines[10] = {
+        {"TRACER_LDC", "1"},
+        {"LDC_CUBES", number_of_cubes},
+        {"LDC_LEVEL_BITS", bits},
+        {"LDC_LAYERS_TOGETHER", options->ldc_layers_together == 1 ? "1" : "4"},
+    };
+    size_t n = 4;
+    if (options->ldc_count_steps && wave->kind == WAVE_CLOSEST)
+        defines[n++] = (struct gpu_define){"LDC_COUNT_STEPS", "1"};
+    if (layout.cells)
+        defines[n++] = (struct gpu_define){"LDC_CELLS", "1"};
+    if (layout.blocks)
+        defines[n++] = (struct gpu_define){"LDC_BLOCKS", "1"};
+    if (options->ldc_tolerance > 0)
+        defines[n++] = (struct gpu_define){"LDC_TOLERANCE", "1"};
+    const struct trace_program_source source = {
+        .traverse = "ldc/traverse.glsl",
+        .defines = defines,
+        .rays_together = options->ldc_rays_together ? options->ldc_rays_together : 1,
+        .rays_a_dispatch = store->device->facts.software ? 0 : DISPATCH_RAYS_MAX,
+    };
+    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
+    if (!program)
+        return false;
+    bind(store, layout.cells);
+    for (unsigned i = 0; i < cube_count; i++) {
+        const struct ldc_level_layout own = ldc_level_layout_of(store, cubes[i]->resolution, options);
+        set_cube(program, i, cubes[i], &own, options);
+    }
+    /* Crossings of samples are no matter of trace_surfaces(). */
+    struct wave walk = *wave;
+    walk.crossings_only = true;
+    return trace_program_run(program, scene, &walk, &source, error) && ldc_surfaces(store, scene, wave, error);
+}

@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: MIT */
+/* A wave through the cubes (paper, section 1.4): shaders/ldc/traverse.glsl. */
+#ifndef FARLIGHT_TRACE_LDC_TRACE_H
+#define FARLIGHT_TRACE_LDC_TRACE_H
+
+#include "base/error.h"
+#include "trace/ldc/store.h"
+#include "gpu_scene/scene.h"
+#include "trace/tracer.h"
+#include "trace/wave.h"
+
+#include <stdbool.h>
+
+/* Closest hits: crossings, of which `instance` is HIT_NO_PRIMITIVE - 1 for a sample, whose number `primitive` is,
+ * and HIT_NO_PRIMITIVE for a disc; then, unless the wave wants crossings only, hits of them (ldc/surface.comp).
+ * Any hits: transmittances. Cubes with resolution 0 are passed over. */
+bool ldc_trace(struct ldc_store *store, struct gpu_scene *scene, const struct wave *wave,
+               const struct tracer_options *options, struct error *error);
+
+#endif

@@ -1,0 +1,299 @@
+/* SPDX-License-Identifier: MIT */
+/* The tracer `ldc`: layered depth cubes. One holds what stands still, another what moves (ldc_parts.h).
+ *
+ * Bürger, Hertel, Krüger, Westermann. GPU Rendering of Secondary Effects. 2007. */
+#include "gpu/timer.h"
+#include "ldc/layout.h"
+#include "trace/raster/draw.h"
+#include "trace/ldc/build.h"
+#include "trace/ldc/levels.h"
+#include "trace/ldc/parts.h"
+#include "trace/ldc/store.h"
+#include "trace/ldc/trace.h"
+#include "trace/tracer.h"
+
+#include <epoxy/gl.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define RESOLUTION_MIN 16
+#define RESOLUTION_MAX 4096
+#define RESOLUTION_DEFAULT 1024
+
+/* What the next unit of an update does. */
+enum ldc_phase {
+    LDC_IDLE,
+    LDC_CUBE, /* begins a cube */
+    LDC_SAMPLES,
+    LDC_LEVELS,
+};
+
+struct ldc {
+    struct tracer base;
+    enum ldc_phase phase;
+    unsigned which;               /* the cube in hand */
+    bool stale[TRACER_CUBES_MAX]; /* to be built by this update */
+    struct ldc_levels levels;     /* in hand */
+    struct ldc_store store;
+    struct ldc_builder *builder;
+    struct ldc_parts parts;
+    struct gpu_timer *timer;
+    uint32_t resolution;
+};
+
+/* ---- options ---- */
+
+static bool is_one_of(uint32_t value, const uint32_t *choices, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (value == choices[i])
+            return true;
+    return false;
+}
+
+static bool check_options(const struct tracer_options *options, struct error *error)
+{
+    static const uint32_t blocks[] = {0, 2, 4, 8, 16, 32}, together[] = {0, 1, 4};
+    if (options->ldc_resolution != 0 &&
+        (options->ldc_resolution < RESOLUTION_MIN || options->ldc_resolution > RESOLUTION_MAX))
+        return error_set(error, ERROR_INVALID, "options.ldc_resolution", "%u cells; %d to %d are possible",
+                         options->ldc_resolution, RESOLUTION_MIN, RESOLUTION_MAX);
+    if (!is_one_of(options->ldc_block, blocks, sizeof(blocks) / sizeof(blocks[0])))
+        return error_set(error, ERROR_INVALID, "options.ldc_block",
+                         "a block is 2, 4, 8, 16 or 32 texels wide, not %u", options->ldc_block);
+    if (options->ldc_build > LDC_BUILD_LISTS)
+        return error_set(error, ERROR_INVALID, "options.ldc_build", "there is no way number %u to build a cube",
+                         (unsigned)options->ldc_build);
+    if (options->ldc_levels > LDC_LEVELS_CELLS)
+        return error_set(error, ERROR_INVALID, "options.ldc_levels", "there is no kind number %u of levels",
+                         (unsigned)options->ldc_levels);
+    if (options->ldc_levels == LDC_LEVELS_CELLS && options->ldc_tolerance > 0)
+        return error_set(error, ERROR_INVALID, "options.ldc_levels", "cells know planes only, no tolerance");
+    if (options->ldc_images > LDC_IMAGES_ONE)
+        return error_set(error, ERROR_INVALID, "options.ldc_images", "there is no choice number %u of images",
+                         (unsigned)options->ldc_images);
+    if (!(options->ldc_tolerance >= 0.0f && isfinite(options->ldc_tolerance)))
+        return error_set(error, ERROR_INVALID, "options.ldc_tolerance", "%g metres; 0 and more are possible",
+                         (double)options->ldc_tolerance);
+    if (!is_one_of(options->ldc_rays_together, together, sizeof(together) / sizeof(together[0])))
+        return error_set(error, ERROR_INVALID, "options.ldc_rays_together", "1 or 4 rays walk together, not %u",
+                         options->ldc_rays_together);
+    if (!is_one_of(options->ldc_layers_together, together, sizeof(together) / sizeof(together[0])))
+        return error_set(error, ERROR_INVALID, "options.ldc_layers_together",
+                         "1 or 4 layers are tested together, not %u", options->ldc_layers_together);
+    if (options->ldc_layers_max > LDC_LAYERS_MAX)
+        return error_set(error, ERROR_INVALID, "options.ldc_layers_max", "%u layers; at most %u can be kept",
+                         options->ldc_layers_max, LDC_LAYERS_MAX);
+    return true;
+}
+
+/* ---- life ---- */
+
+static void ldc_destroy(struct tracer *tracer)
+{
+    struct ldc *ldc = (struct ldc *)tracer;
+    if (!ldc)
+        return;
+    ldc_parts_finish(&ldc->parts);
+    ldc_levels_finish(&ldc->levels);
+    ldc_builder_destroy(ldc->builder);
+    ldc_store_finish(&ldc->store);
+    gpu_timer_destroy(ldc->timer);
+    free(ldc);
+}
+
+static struct tracer *ldc_create(struct gpu_device *device, const struct tracer_options *options,
+                                 struct error *error)
+{
+    if (!check_options(options, error))
+        return NULL;
+    struct ldc *ldc = calloc(1, sizeof(*ldc));
+    if (!ldc) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
+        return NULL;
+    }
+    ldc_store_init(&ldc->store, device);
+    ldc->resolution = options->ldc_resolution ? options->ldc_resolution : RESOLUTION_DEFAULT;
+    ldc->timer = gpu_timer_create(device);
+    if (!ldc->timer)
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer's timer");
+    ldc->builder = ldc->timer ? ldc_builder_create(device, error) : NULL;
+    if (ldc->builder)
+        return &ldc->base;
+    ldc_destroy(&ldc->base);
+    return NULL;
+}
+
+/* After a failure: all is forgotten, and built anew by the next update. */
+static void reset(struct ldc *ldc)
+{
+    struct gpu_device *device = ldc->store.device;
+    ldc->phase = LDC_IDLE;
+    ldc_levels_finish(&ldc->levels);
+    ldc_builder_clear(ldc->builder);
+    ldc_parts_finish(&ldc->parts);
+    ldc_store_finish(&ldc->store);
+    ldc_store_init(&ldc->store, device);
+}
+
+/* ---- updates ---- */
+
+/* Goes on to the next of the cubes that are to be built and have something in them, from ldc->which on. */
+static enum tracer_progress find_cube(struct ldc *ldc)
+{
+    for (; ldc->which < TRACER_CUBES_MAX; ldc->which++) {
+        const struct ldc_part *part = &ldc->parts.parts[ldc->which];
+        struct ldc_cube *cube = &ldc->store.cubes[ldc->which];
+        if (!ldc->stale[ldc->which])
+            continue;
+        *cube = (struct ldc_cube){.cell_world = part->box.cell_world};
+        memcpy(cube->lower_world, part->box.lower_world, sizeof(cube->lower_world));
+        if (part->count == 0)
+            continue;
+        cube->resolution = ldc->resolution;
+        ldc->phase = LDC_CUBE;
+        return TRACER_MORE;
+    }
+    return TRACER_DONE;
+}
+
+static enum tracer_progress begin_cube(struct ldc *ldc, struct gpu_scene *scene, struct error *error)
+{
+    const struct ldc_part *part = &ldc->parts.parts[ldc->which];
+    ldc->phase = LDC_SAMPLES;
+    return ldc_build_begin(ldc->builder, &ldc->store, ldc->which, scene, part->instances, part->count,
+                           &ldc->base.options, error);
+}
+
+static enum tracer_progress end_cube(struct ldc *ldc)
+{
+    struct tracer_stats *stats = &ldc->base.stats;
+    stats->nodes_rebuilt += ldc->store.cubes[ldc->which].node_count;
+    stats->uploaded_bytes += (uint64_t)ldc->parts.parts[ldc->which].count * AXES_INSTANCE_BYTES;
+    stats->cubes[ldc->which].rebuilt = true;
+    ldc->which++;
+    return find_cube(ldc);
+}
+
+static enum tracer_progress do_unit(struct ldc *ldc, struct gpu_scene *scene, struct error *error)
+{
+    if (ldc->phase == LDC_CUBE)
+        return begin_cube(ldc, scene, error);
+    const bool at_once = ldc->base.step_end_ns == STEP_WITHOUT_END;
+    enum tracer_progress progress = ldc->phase == LDC_SAMPLES ? ldc_build_go_on(ldc->builder, at_once, error)
+                                                              : ldc_levels_go_on(&ldc->levels, error);
+    if (progress != TRACER_DONE)
+        return progress;
+    if (ldc->phase == LDC_LEVELS)
+        return end_cube(ldc);
+    ldc->phase = LDC_LEVELS;
+    ldc_levels_begin(&ldc->levels, &ldc->store, ldc->which, &ldc->base.options);
+    return TRACER_MORE;
+}
+
+/* Units of one cube. The CPU's clock is to tell when the device is through with them. */
+static enum tracer_progress go_on_with_cube(struct ldc *ldc, struct gpu_scene *scene, struct error *error)
+{
+    const uint64_t step_end_ns = ldc->base.step_end_ns;
+    const unsigned which = ldc->which;
+    enum tracer_progress progress = TRACER_MORE;
+    gpu_timer_begin(ldc->timer, STAGE_BUILD, which);
+    do {
+        progress = do_unit(ldc, scene, error);
+        if (step_end_ns != STEP_WITHOUT_END || ldc->which != which)
+            glFinish();
+    } while (progress == TRACER_MORE && ldc->which == which && !step_is_over(step_end_ns));
+    gpu_timer_end(ldc->timer);
+    return progress;
+}
+
+static enum tracer_progress go_on(struct ldc *ldc, struct gpu_scene *scene, struct stage_times *times,
+                                  struct error *error)
+{
+    enum tracer_progress progress = TRACER_MORE;
+    gpu_scene_bind(scene);
+    do
+        progress = go_on_with_cube(ldc, scene, error);
+    while (progress == TRACER_MORE && !step_is_over(ldc->base.step_end_ns));
+    gpu_timer_collect(ldc->timer, times);
+    return progress;
+}
+
+static void fill_stats(struct ldc *ldc)
+{
+    struct tracer_stats *stats = &ldc->base.stats;
+    stats->nodes = 0;
+    for (int i = 0; i < TRACER_CUBES_MAX; i++) {
+        const struct ldc_cube *cube = &ldc->store.cubes[i];
+        stats->nodes += cube->resolution ? cube->node_count : 0;
+        stats->cubes[i] = ldc_cube_stats(cube, stats->cubes[i].rebuilt);
+    }
+    stats->device_bytes =
+        ldc_store_bytes(&ldc->store) + ldc_builder_bytes(ldc->builder) + ldc_levels_bytes(&ldc->levels);
+}
+
+/* Which cubes are to be built. Of materials it is known which have changed, but not where they are. */
+static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene *scene,
+                                         const struct scene_changes *changes, struct error *error)
+{
+    bool any = changes->surfaces;
+    if (!ldc_parts_update(&ldc->parts, scene, ldc->resolution, changes->geometry, ldc->stale, error))
+        return TRACER_FAILED;
+    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
+        any = any || ldc->stale[i]; /* what lies behind a cube goes with it */
+        ldc->stale[i] = any;
+    }
+    ldc->which = 0;
+    return find_cube(ldc);
+}
+
+static enum tracer_progress ldc_update(struct tracer *tracer, struct gpu_scene *scene,
+                                       const struct scene_changes *changes, struct stage_times *times,
+                                       struct error *error)
+{
+    struct ldc *ldc = (struct ldc *)tracer;
+    struct tracer_stats *stats = &tracer->stats;
+    enum tracer_progress progress = TRACER_MORE;
+    if (ldc->phase == LDC_IDLE) {
+        stats->uploaded_bytes = stats->nodes_rebuilt = 0;
+        for (int i = 0; i < TRACER_CUBES_MAX; i++)
+            stats->cubes[i].rebuilt = false;
+        if (!changes->geometry && !changes->deformed && !changes->instances && !changes->surfaces)
+            return TRACER_DONE;
+        progress = begin_update(ldc, scene, changes, error);
+    }
+    if (progress == TRACER_MORE)
+        progress = go_on(ldc, scene, times, error);
+    if (progress == TRACER_FAILED)
+        reset(ldc);
+    if (progress == TRACER_DONE)
+        ldc->phase = LDC_IDLE;
+    fill_stats(ldc);
+    return progress;
+}
+
+static void ldc_abandon(struct tracer *tracer)
+{
+    struct ldc *ldc = (struct ldc *)tracer;
+    reset(ldc);
+    fill_stats(ldc);
+}
+
+static bool ldc_trace_wave(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
+                           struct error *error)
+{
+    return ldc_trace(&((struct ldc *)tracer)->store, scene, wave, &tracer->options, error);
+}
+
+const struct tracer_impl tracer_ldc_impl = {
+    .name = "ldc",
+    .depends_on = TRACER_NEEDS_SCENE,
+    .sampled = true,
+    .still = true,
+    .create = ldc_create,
+    .destroy = ldc_destroy,
+    .update = ldc_update,
+    .abandon = ldc_abandon,
+    .trace = ldc_trace_wave,
+};

@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/program.h"
+
+#include "shared/bindings.h"
+
+#include <epoxy/gl.h>
+#include <stdio.h>
+
+#define OWN_DEFINES_MAX 12
+
+/* All rays at the time 0 see the first pose, which is what a program that knows no motion sees. */
+static bool has_motion(const struct gpu_scene *scene, const struct wave *wave)
+{
+    return scene->has_motion && wave->times;
+}
+
+static void bind_rays(const struct gpu_scene *scene, const struct wave *wave)
+{
+    gpu_buffer_bind_texels(scene->device, wave->rays, UNIT_RAYS, GL_RGBA32F);
+    if (has_motion(scene, wave))
+        gpu_buffer_bind_texels(scene->device, wave->times, UNIT_RAY_TIMES, GL_R32F);
+}
+
+const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const struct wave *wave,
+                                            const struct trace_program_source *source, struct error *error)
+{
+    struct gpu_define defines[OWN_DEFINES_MAX + 14] = {0};
+    char traverse[128], together[16];
+    size_t n = 0;
+    /* In quotes: program.c takes the file to include from it. */
+    snprintf(traverse, sizeof(traverse), "\"%s\"", source->traverse);
+    snprintf(together, sizeof(together), "%u", source->rays_together ? source->rays_together : 1);
+    defines[n++] = (struct gpu_define){"TRAVERSE", traverse};
+    defines[n++] = (struct gpu_define){"RAYS_TOGETHER", together};
+    if (wave->kind == WAVE_ANY)
+        defines[n++] = (struct gpu_define){"ANY_HIT", "1"};
+    if (scene->has_spheres)
+        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    if (scene->disc_count > 0)
+        defines[n++] = (struct gpu_define){"HAS_DISCS", "1"};
+    if (scene->has_cutout)
+        defines[n++] = (struct gpu_define){"HAS_CUTOUT", "1"};
+    if (has_motion(scene, wave))
+        defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
+    /* To a closest hit a translucent surface is one like any other: no second program for it. */
+    if (scene->has_translucent && wave->kind == WAVE_ANY)
+        defines[n++] = (struct gpu_define){"HAS_TRANSLUCENT", "1"};
+    if (scene->has_transmission && wave->kind == WAVE_ANY)
+        defines[n++] = (struct gpu_define){"HAS_TRANSMISSION", "1"};
+    if (!scene->has_varied_alpha)
+        defines[n++] = (struct gpu_define){"EVEN_ALPHA", "1"};
+    for (size_t i = 0; i < OWN_DEFINES_MAX && source->defines && source->defines[i].name; i++)
+        defines[n++] = source->defines[i];
+    struct gpu_program_source whole = {.compute = "trace/wave.comp", .defines = defines};
+    return gpu_program_get(scene->device, &whole, error);
+}
+
+bool trace_surfaces(const struct gpu_scene *scene, const struct wave *wave, struct error *error)
+{
+    if (wave->kind == WAVE_ANY || wave->crossings_only)
+        return true;
+    struct gpu_define defines[3] = {0};
+    size_t n = 0;
+    if (scene->has_spheres)
+        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    if (has_motion(scene, wave))
+        defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
+    const struct gpu_program_source source = {.compute = "trace/surface.comp", .defines = defines};
+    const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
+    if (!program)
+        return false;
+    gpu_uniform_uint(program, "first_ray", wave->first_ray);
+    gpu_uniform_uint(program, "ray_count", wave->end_ray);
+    bind_rays(scene, wave);
+    gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
+    gpu_dispatch(scene->device, program, wave->end_ray - wave->first_ray);
+    return true;
+}
+
+bool trace_program_run(const struct gpu_program *program, const struct gpu_scene *scene, const struct wave *wave,
+                       const struct trace_program_source *source, struct error *error)
+{
+    uint32_t together = source->rays_together ? source->rays_together : 1;
+    bind_rays(scene, wave);
+    if (wave->kind == WAVE_ANY)
+        gpu_buffer_bind_storage(wave->visibility, BIND_VISIBILITY);
+    else
+        gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
+    gpu_uniform_uint(program, "disc_count", scene->disc_count);
+    gpu_uniform_uint(program, "instance_count", scene->instance_count);
+    for (uint32_t first = wave->first_ray, part; first < wave->end_ray; first += part) {
+        part = wave->end_ray - first;
+        if (source->rays_a_dispatch && source->rays_a_dispatch < part)
+            part = source->rays_a_dispatch;
+        gpu_uniform_uint(program, "first_ray", first);
+        gpu_uniform_uint(program, "ray_count", first + part);
+        gpu_dispatch(scene->device, program, ((uint64_t)part + together - 1) / together);
+        if (first + part < wave->end_ray) /* a part of its own to the driver too, which may gather commands */
+            glFlush();
+    }
+    return trace_surfaces(scene, wave, error);
+}

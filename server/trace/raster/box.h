@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: MIT */
+/* The cube of cells round instances whose images along the axes are drawn. */
+#ifndef FARLIGHT_TRACE_RASTER_BOX_H
+#define FARLIGHT_TRACE_RASTER_BOX_H
+
+#include "base/error.h"
+#include "gpu_scene/scene.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* In cells that are cubes: it begins at the lower corner of the instances' bounds, less a cell, and is as long on
+ * every side as they are on the longest. It moves with them without a change of the cells, so a body that is only
+ * moved is sampled where it was sampled before. cell_world, metres, is 0 if there are no instances. */
+struct axes_box {
+    float lower_world[3], cell_world;
+};
+
+/* `resolution`: cells along a side. Fails where a place is so far off that squares of distances are no numbers. */
+bool axes_box_place(struct axes_box *box, const struct gpu_scene *scene, const uint32_t *instances, uint32_t count,
+                    uint32_t resolution, struct error *error);
+
+#endif

@@ -1,0 +1,418 @@
+/* SPDX-License-Identifier: MIT */
+/* Embree's scenes: one for each geometry, kept by (kind, id, revision), and a top scene of instances and discs.
+ *
+ * All are built in robust mode (watertight edges) and in medium quality: high quality would split triangles in
+ * space, and a filter function would then be asked twice about one crossing, and tint it twice. */
+#include "trace/reference/tracer.h"
+
+#include "base/hashmap.h"
+#include "base/parallel.h"
+#include "base/progress.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Embree builds one scene on all cores; scenes smaller than this are built several at once instead. */
+#define ALONE_PRIMITIVES_MIN 20000u
+/* Embree reads a vertex of 12 bytes as one of 16. */
+#define VERTEX_SLACK_BYTES 4u
+
+static bool no_memory(struct error *error, const struct gpu_scene *scene)
+{
+    return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries and %u instances",
+                     scene->geometry_count, scene->instance_count);
+}
+
+/* ---- entries ---- */
+
+static void entry_destroy(struct reference_entry *entry)
+{
+    if (!entry)
+        return;
+    if (entry->geometry)
+        rtcReleaseGeometry(entry->geometry);
+    if (entry->scene)
+        rtcReleaseScene(entry->scene);
+    opacity_surface_finish(&entry->surface);
+    blob_unref(entry->shape[0]);
+    blob_unref(entry->shape[1]);
+    free(entry);
+}
+
+/* Of what deforms by its node, which shows no other. */
+static uint64_t entry_key(bool is_mesh, uint32_t id, uint32_t node)
+{
+    return (uint64_t)(node ? node : id) << 2 | (node ? 2u : 0u) | is_mesh;
+}
+
+/* The array as it lies in its blob, or a copy with room behind it where Embree would read past the end. */
+static void set_buffer(RTCGeometry geometry, enum RTCBufferType type, enum RTCFormat format,
+                       const struct blob *blob, size_t item_bytes, size_t count)
+{
+    size_t slack_bytes = format == RTC_FORMAT_FLOAT3 ? VERTEX_SLACK_BYTES : 0;
+    if (blob->capacity_bytes - count * item_bytes >= slack_bytes) {
+        rtcSetSharedGeometryBuffer(geometry, type, 0, format, blob->data, 0, item_bytes, count);
+        return;
+    }
+    void *copy = rtcSetNewGeometryBuffer(geometry, type, 0, format, item_bytes, count);
+    if (copy)
+        memcpy(copy, blob->data, count * item_bytes);
+}
+
+static bool take_shape(struct reference_entry *entry, RTCDevice device, const struct gpu_scene_geometry *geometry)
+{
+    if (entry->is_mesh) {
+        const struct scene_mesh *mesh = geometry->mesh;
+        if (!entry->node)
+            entry->shape[0] = blob_ref(mesh->arrays[MESH_POSITIONS]);
+        entry->shape[1] = blob_ref(mesh->arrays[MESH_INDICES]);
+        entry->primitive_count = mesh->triangle_count;
+        entry->geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+        if (!entry->geometry)
+            return false;
+        if (!entry->node)
+            set_buffer(entry->geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, entry->shape[0],
+                       3 * sizeof(float), mesh->vertex_count);
+        set_buffer(entry->geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, entry->shape[1], 3 * sizeof(uint32_t),
+                   mesh->triangle_count);
+        return opacity_surface_init_mesh(&entry->surface, mesh);
+    }
+    entry->shape[0] = blob_ref(geometry->spheres->centres_radii);
+    entry->primitive_count = geometry->spheres->sphere_count;
+    entry->geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_SPHERE_POINT);
+    if (!entry->geometry)
+        return false;
+    set_buffer(entry->geometry, RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT4, entry->shape[0], 4 * sizeof(float),
+               geometry->spheres->sphere_count);
+    return opacity_surface_init_spheres(&entry->surface, geometry->spheres);
+}
+
+/* Embree's builder is at it. */
+static bool on_progress(void *context, double share)
+{
+    (void)context, (void)share;
+    progress_tell();
+    return true;
+}
+
+static RTCScene new_scene(RTCDevice device)
+{
+    RTCScene scene = rtcNewScene(device);
+    if (scene) {
+        rtcSetSceneProgressMonitorFunction(scene, on_progress, NULL);
+        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+        rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
+    }
+    return scene;
+}
+
+static struct reference_entry *entry_create(RTCDevice device, const struct gpu_scene_geometry *geometry)
+{
+    struct reference_entry *entry = calloc(1, sizeof(*entry));
+    if (!entry)
+        return NULL;
+    entry->is_mesh = geometry->mesh != NULL;
+    entry->id = geometry->id;
+    entry->node = geometry->node;
+    entry->revision = geometry->revision;
+    entry->is_wanted = entry->is_stale = true;
+    entry->scene = new_scene(device);
+    if (!entry->scene || !take_shape(entry, device, geometry)) {
+        entry_destroy(entry);
+        return NULL;
+    }
+    rtcSetGeometryUserData(entry->geometry, &entry->surface);
+    rtcAttachGeometry(entry->scene, entry->geometry);
+    return entry;
+}
+
+/* One step of time of a mesh that deforms, worked out here: what the device made of it is compared with this. */
+static bool take_vertices(struct reference_entry *entry, const struct gpu_scene *scene,
+                          const struct scene_pose *pose, unsigned step, struct error *error)
+{
+    const struct scene_node *node = scene_node(scene->scene, entry->node);
+    const struct scene_mesh *mesh = scene_mesh(scene->scene, entry->id);
+    float *vertices = rtcSetNewGeometryBuffer(entry->geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3,
+                                              3 * sizeof(float), mesh->vertex_count);
+    return vertices && scene_deform(scene->scene, pose, node, vertices, NULL, error);
+}
+
+/* Brings what deforms to the poses. Trees are built anew: slow rather than wrong. */
+static bool deform_entries(struct reference *reference, const struct gpu_scene *scene, struct error *error)
+{
+    const struct scene_motion *motion = scene->motion;
+    for (uint32_t g = 0; g < scene->geometry_count; g++) {
+        const struct gpu_scene_geometry *geometry = &scene->geometries[g];
+        struct reference_entry *entry = reference->entries[g];
+        if (!geometry->node || entry->deformed_revision == geometry->deformed_revision)
+            continue;
+        bool closes = geometry->device.close_offset != 0;
+        rtcSetGeometryTimeStepCount(entry->geometry, closes ? 2 : 1);
+        if (!take_vertices(entry, scene, motion ? &motion->poses[0] : NULL, 0, error) ||
+            (closes && !take_vertices(entry, scene, &motion->poses[motion->pose_count - 1], 1, error)))
+            return false;
+        entry->deformed_revision = geometry->deformed_revision;
+        entry->is_stale = true;
+    }
+    return true;
+}
+
+/* Marks the entries that the scene still has; entry_of: by geometry of the scene, NULL where there is none. */
+static bool find_kept(const struct reference *reference, const struct gpu_scene *scene,
+                      struct reference_entry **entry_of)
+{
+    struct hashmap by_key = {0};
+    bool ok = true;
+    for (uint32_t i = 0; ok && i < reference->entry_count; i++) {
+        struct reference_entry *entry = reference->entries[i];
+        entry->is_wanted = false;
+        ok = hashmap_put(&by_key, entry_key(entry->is_mesh, entry->id, entry->node), entry);
+    }
+    for (uint32_t g = 0; ok && g < scene->geometry_count; g++) {
+        const struct gpu_scene_geometry *geometry = &scene->geometries[g];
+        struct reference_entry *entry =
+            hashmap_get(&by_key, entry_key(geometry->mesh != NULL, geometry->id, geometry->node));
+        if (!entry || entry->id != geometry->id || entry->revision != geometry->revision)
+            continue;
+        entry->is_wanted = true;
+        entry_of[g] = entry;
+    }
+    hashmap_finish(&by_key);
+    return ok;
+}
+
+/* One entry for each geometry of the scene, in its order; those that it no longer has are gone. */
+static bool list_entries(struct reference *reference, const struct gpu_scene *scene)
+{
+    uint32_t count = scene->geometry_count;
+    struct reference_entry **entries = calloc((size_t)count + 1, sizeof(struct reference_entry *));
+    bool ok = entries && find_kept(reference, scene, entries);
+    for (uint32_t g = 0; ok && g < count; g++) {
+        if (!entries[g])
+            entries[g] = entry_create(reference->device, &scene->geometries[g]);
+        ok = entries[g] != NULL;
+    }
+    if (!ok) {
+        for (uint32_t g = 0; entries && g < count; g++)
+            if (entries[g] && entries[g]->is_stale)
+                entry_destroy(entries[g]);
+        free(entries);
+        return false;
+    }
+    for (uint32_t i = 0; i < reference->entry_count; i++)
+        if (!reference->entries[i]->is_wanted)
+            entry_destroy(reference->entries[i]);
+    free(reference->entries);
+    reference->entries = entries;
+    reference->entry_count = count;
+    return true;
+}
+
+/* Embree is asked to call back only where a material wants it: opaque surfaces cost nothing. It notices a change
+ * of filter functions when it builds; they change seldom. */
+static void set_filters(struct reference_entry *entry)
+{
+    bool closest = opacity_surface_has_cutout(&entry->surface);
+    bool any = opacity_surface_lets_light_pass(&entry->surface);
+    if (closest == entry->filters_closest && any == entry->filters_any)
+        return;
+    entry->filters_closest = closest;
+    entry->filters_any = any;
+    entry->is_stale = true;
+    rtcSetGeometryIntersectFilterFunction(entry->geometry, closest ? reference_filter_closest : NULL);
+    rtcSetGeometryOccludedFilterFunction(entry->geometry, any ? reference_filter_any : NULL);
+}
+
+static void commit_entry(struct reference_entry *entry)
+{
+    rtcCommitGeometry(entry->geometry);
+    rtcCommitScene(entry->scene);
+    entry->is_stale = false;
+    entry->is_fresh = true;
+}
+
+static void commit_small(void *context, uint32_t i)
+{
+    struct reference_entry *entry = ((struct reference *)context)->entries[i];
+    if (entry->is_stale && entry->primitive_count < ALONE_PRIMITIVES_MIN)
+        commit_entry(entry);
+}
+
+static void commit_entries(struct reference *reference)
+{
+    uint32_t small_count = 0;
+    uint64_t built = 0;
+    for (uint32_t i = 0; i < reference->entry_count; i++) {
+        struct reference_entry *entry = reference->entries[i];
+        if (!entry->is_stale)
+            continue;
+        built += entry->primitive_count;
+        if (entry->primitive_count >= ALONE_PRIMITIVES_MIN)
+            commit_entry(entry);
+        else
+            small_count++;
+    }
+    if (small_count > 0)
+        parallel_run(parallel_processors(), reference->entry_count, commit_small, reference);
+    reference->base.stats.nodes_rebuilt += built;
+}
+
+/* ---- discs ---- */
+
+static int by_id(const void *a, const void *b)
+{
+    uint32_t id_a = (*(const struct scene_disc *const *)a)->base.id;
+    uint32_t id_b = (*(const struct scene_disc *const *)b)->base.id;
+    return id_a < id_b ? -1 : id_a > id_b;
+}
+
+/* The materials of the discs, by their ids, in the order in which gpu_scene has the discs. */
+static uint32_t *list_disc_materials(const struct gpu_scene *scene)
+{
+    const struct hashmap *discs = &scene->scene->objects[SCENE_DISC];
+    const struct scene_disc **sorted = calloc(discs->count + 1, sizeof(const struct scene_disc *));
+    uint32_t *materials = calloc(discs->count + 1, sizeof(*materials));
+    size_t cursor = 0, count = 0;
+    uint64_t id;
+    void *value;
+    if (!sorted || !materials) {
+        free(sorted);
+        free(materials);
+        return NULL;
+    }
+    while (hashmap_next(discs, &cursor, &id, &value))
+        sorted[count++] = value;
+    qsort(sorted, count, sizeof(*sorted), by_id);
+    for (size_t i = 0; i < count; i++)
+        materials[i] = sorted[i]->material;
+    free(sorted);
+    return materials;
+}
+
+static bool same_discs(const struct reference *reference, const struct gpu_scene *scene)
+{
+    const struct opacity_surface *old = &reference->disc_surface;
+    return old->run_count == scene->disc_count &&
+           (scene->disc_count == 0 ||
+            memcmp(old->discs, scene->discs, scene->disc_count * sizeof(*scene->discs)) == 0);
+}
+
+static void drop_discs(struct reference *reference)
+{
+    if (reference->disc_geometry) {
+        if (reference->top)
+            rtcDetachGeometry(reference->top, REFERENCE_DISCS);
+        rtcReleaseGeometry(reference->disc_geometry);
+    }
+    reference->disc_geometry = NULL;
+    opacity_surface_finish(&reference->disc_surface);
+}
+
+static bool make_disc_geometry(struct reference *reference, const struct gpu_scene *scene)
+{
+    RTCGeometry geometry = rtcNewGeometry(reference->device, RTC_GEOMETRY_TYPE_ORIENTED_DISC_POINT);
+    if (!geometry)
+        return false;
+    reference->disc_geometry = geometry;
+    float(*centres)[4] = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4,
+                                                 sizeof(*centres), scene->disc_count);
+    float(*normals)[3] = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_NORMAL, 0, RTC_FORMAT_FLOAT3,
+                                                 sizeof(*normals), scene->disc_count);
+    for (uint32_t i = 0; centres && normals && i < scene->disc_count; i++) {
+        memcpy(centres[i], scene->discs[i].centre_radius, sizeof(centres[i]));
+        memcpy(normals[i], scene->discs[i].normal, sizeof(normals[i]));
+    }
+    rtcSetGeometryUserData(geometry, &reference->disc_surface);
+    rtcAttachGeometryByID(reference->top, geometry, REFERENCE_DISCS);
+    return true;
+}
+
+/* All discs anew where one changed: there are few. `shading`: their materials may let other light pass now. A disc
+ * that has got another material differs in gpu_scene's copy too. */
+static bool update_discs(struct reference *reference, const struct gpu_scene *scene, bool shading, bool *changed)
+{
+    bool same = same_discs(reference, scene);
+    if (same && (!shading || scene->disc_count == 0))
+        return true;
+    *changed = true;
+    drop_discs(reference);
+    if (scene->disc_count == 0)
+        return true;
+    uint32_t *materials = list_disc_materials(scene);
+    bool ok = materials &&
+              opacity_surface_init_discs(&reference->disc_surface, scene->discs, materials, scene->disc_count);
+    free(materials);
+    if (!ok || !make_disc_geometry(reference, scene))
+        return false;
+    opacity_surface_bind(&reference->disc_surface, &reference->materials);
+    RTCGeometry geometry = reference->disc_geometry;
+    if (opacity_surface_has_cutout(&reference->disc_surface))
+        rtcSetGeometryIntersectFilterFunction(geometry, reference_filter_closest);
+    if (opacity_surface_lets_light_pass(&reference->disc_surface))
+        rtcSetGeometryOccludedFilterFunction(geometry, reference_filter_any);
+    rtcCommitGeometry(geometry);
+    return true;
+}
+
+/* ---- all of it ---- */
+
+static bool update_materials(struct reference *reference, const struct gpu_scene *scene)
+{
+    opacity_materials_finish(&reference->materials);
+    if (!opacity_materials_init(&reference->materials, scene->scene,
+                                scene->motion ? &scene->motion->poses[0] : NULL))
+        return false;
+    for (uint32_t i = 0; i < reference->entry_count; i++) {
+        opacity_surface_bind(&reference->entries[i]->surface, &reference->materials);
+        set_filters(reference->entries[i]);
+    }
+    return true;
+}
+
+static bool update_parts(struct reference *reference, const struct gpu_scene *scene,
+                         const struct scene_changes *changes, struct error *error)
+{
+    bool changed = !reference->top, shading = changes->shading || changes->geometry;
+    if (!reference->top)
+        reference->top = new_scene(reference->device);
+    if (!reference->top || (changes->geometry && !list_entries(reference, scene)) ||
+        (shading && !update_materials(reference, scene)))
+        return false;
+    if ((changes->geometry || changes->deformed) && !deform_entries(reference, scene, error))
+        return false;
+    commit_entries(reference);
+    return update_discs(reference, scene, shading, &changed) &&
+           reference_update_instances(reference, scene, shading || changes->instances || changes->deformed,
+                                      &changed, error);
+}
+
+bool reference_scene_update(struct reference *reference, const struct gpu_scene *scene,
+                            const struct scene_changes *changes, struct error *error)
+{
+    struct tracer_stats *stats = &reference->base.stats;
+    bool ok = update_parts(reference, scene, changes, error);
+    /* What Embree says comes first: where it fails it says why. */
+    if (!reference_check(reference, "building", error) || !ok)
+        return no_memory(error, scene);
+    stats->nodes = (uint64_t)scene->instance_count + scene->disc_count;
+    for (uint32_t i = 0; i < reference->entry_count; i++) {
+        reference->entries[i]->is_fresh = false;
+        stats->nodes += reference->entries[i]->primitive_count;
+    }
+    return true;
+}
+
+void reference_scene_finish(struct reference *reference)
+{
+    reference_drop_instances(reference);
+    drop_discs(reference);
+    if (reference->top)
+        rtcReleaseScene(reference->top);
+    reference->top = NULL;
+    for (uint32_t i = 0; i < reference->entry_count; i++)
+        entry_destroy(reference->entries[i]);
+    free(reference->entries);
+    reference->entries = NULL;
+    reference->entry_count = 0;
+    opacity_materials_finish(&reference->materials);
+}

@@ -1,0 +1,221 @@
+/* SPDX-License-Identifier: MIT */
+#include "trace/reference/tracer.h"
+
+#include "base/clock.h"
+#include "shared/hit.h"
+#include "shared/ray.h"
+#include "trace/program.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+/* ---- what Embree calls ---- */
+
+static void note_failure(void *context, enum RTCError code, const char *text)
+{
+    struct reference *reference = context;
+    pthread_mutex_lock(&reference->failure_mutex);
+    if (reference->failure == RTC_ERROR_NONE) {
+        reference->failure = code;
+        snprintf(reference->failure_text, sizeof(reference->failure_text), "%s", text ? text : "");
+    }
+    pthread_mutex_unlock(&reference->failure_mutex);
+}
+
+bool reference_check(struct reference *reference, const char *what, struct error *error)
+{
+    pthread_mutex_lock(&reference->failure_mutex);
+    enum RTCError code = reference->failure;
+    reference->failure = RTC_ERROR_NONE;
+    pthread_mutex_unlock(&reference->failure_mutex);
+    if (code == RTC_ERROR_NONE)
+        return true;
+    const struct gpu_device *gpu = reference->base.device;
+    if (code == RTC_ERROR_OUT_OF_MEMORY && gpu && gpu->memory_limit_bytes > 0)
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL,
+                         "Embree's structures, %s; %llu of %llu bytes of device memory are in use without them",
+                         what, (unsigned long long)(gpu->memory_used_bytes - reference->taken_bytes),
+                         (unsigned long long)gpu->memory_limit_bytes);
+    enum error_kind kind = code == RTC_ERROR_OUT_OF_MEMORY     ? ERROR_OUT_OF_MEMORY
+                           : code == RTC_ERROR_UNSUPPORTED_CPU ? ERROR_UNSUPPORTED
+                                                               : ERROR_INTERNAL;
+    return error_set(error, kind, NULL, "Embree, %s: %s (error %d)", what, reference->failure_text, (int)code);
+}
+
+/* Embree's memory counts as the device's: it is what this tracer keeps in place of buffers. Asked before (or,
+ * `post`, told after) memory is allocated. While it is, the device's thread waits, and nobody changes its books.
+ */
+static bool count_memory(void *context, ssize_t bytes, bool post)
+{
+    struct reference *reference = context;
+    long long sum = atomic_fetch_add(&reference->device_bytes, bytes) + bytes;
+    const struct gpu_device *gpu = reference->base.device;
+    if (bytes <= 0 || !gpu || gpu->memory_limit_bytes == 0)
+        return true;
+    uint64_t of_others = gpu->memory_used_bytes - reference->taken_bytes;
+    bool fits = sum < 0 || of_others + (uint64_t)sum <= gpu->memory_limit_bytes;
+    if (!fits && !post) /* it will not be allocated */
+        atomic_fetch_sub(&reference->device_bytes, bytes);
+    return fits;
+}
+
+/* Brings the device's books to what Embree has now. */
+static bool book_memory(struct reference *reference, struct error *error)
+{
+    struct gpu_device *gpu = reference->base.device;
+    long long counted = atomic_load(&reference->device_bytes);
+    uint64_t bytes = counted > 0 ? (uint64_t)counted : 0;
+    reference->base.stats.device_bytes = bytes;
+    if (!gpu)
+        return true;
+    gpu_memory_give(gpu, reference->taken_bytes);
+    reference->taken_bytes = 0;
+    if (!gpu_memory_take(gpu, bytes, "Embree's structures", error))
+        return false;
+    reference->taken_bytes = bytes;
+    return true;
+}
+
+/* ---- life ---- */
+
+static unsigned native_width(RTCDevice device)
+{
+    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED))
+        return 16;
+    return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8 : 4;
+}
+
+/* Distributions build Embree with more or less in it. */
+static bool check_features(RTCDevice device, struct error *error)
+{
+    static const struct {
+        enum RTCDeviceProperty property;
+        const char *name;
+    } needed[] = {
+        {RTC_DEVICE_PROPERTY_TRIANGLE_GEOMETRY_SUPPORTED, "triangles"},
+        {RTC_DEVICE_PROPERTY_POINT_GEOMETRY_SUPPORTED, "spheres and discs"},
+        {RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED, "filter functions"},
+    };
+    for (size_t i = 0; i < sizeof(needed) / sizeof(needed[0]); i++)
+        if (!rtcGetDeviceProperty(device, needed[i].property))
+            return error_set(error, ERROR_UNSUPPORTED, NULL, "this Embree was built without %s", needed[i].name);
+    return true;
+}
+
+static void reference_destroy(struct tracer *tracer)
+{
+    struct reference *reference = (struct reference *)tracer;
+    reference_scene_finish(reference);
+    if (reference->base.device)
+        gpu_memory_give(reference->base.device, reference->taken_bytes);
+    if (reference->device)
+        rtcReleaseDevice(reference->device);
+    pthread_mutex_destroy(&reference->failure_mutex);
+    free(reference->rays);
+    free(reference->times);
+    free(reference->answers);
+    free(reference);
+}
+
+static struct tracer *reference_create(struct gpu_device *device, const struct tracer_options *options,
+                                       struct error *error)
+{
+    uint32_t width = options->reference_rays_a_call;
+    if (width != 0 && width != 1 && width != 4 && width != 8 && width != 16) {
+        error_set(error, ERROR_INVALID, "options.reference_rays_a_call",
+                  "1, 4, 8 or 16 rays go into a call, not %u", width);
+        return NULL;
+    }
+    struct reference *reference = calloc(1, sizeof(*reference));
+    if (!reference) {
+        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
+        return NULL;
+    }
+    pthread_mutex_init(&reference->failure_mutex, NULL);
+    reference->base.device = device;
+    reference->device = rtcNewDevice(NULL);
+    if (!reference->device) {
+        error_set(error, ERROR_UNSUPPORTED, NULL, "Embree does not start (error %d)",
+                  (int)rtcGetDeviceError(NULL));
+        reference_destroy(&reference->base);
+        return NULL;
+    }
+    rtcSetDeviceErrorFunction(reference->device, note_failure, reference);
+    rtcSetDeviceMemoryMonitorFunction(reference->device, count_memory, reference);
+    reference->width = width ? width : native_width(reference->device);
+    if (!check_features(reference->device, error)) {
+        reference_destroy(&reference->base);
+        return NULL;
+    }
+    return &reference->base;
+}
+
+static enum tracer_progress reference_update(struct tracer *tracer, struct gpu_scene *scene,
+                                             const struct scene_changes *changes, struct stage_times *times,
+                                             struct error *error)
+{
+    struct reference *reference = (struct reference *)tracer;
+    uint64_t start_ns = clock_now_ns();
+    tracer->stats.uploaded_bytes = tracer->stats.nodes_rebuilt = 0;
+    bool ok = reference_scene_update(reference, scene, changes, error) && book_memory(reference, error);
+    if (!ok) {
+        struct error second = {0}; /* says nothing that *error does not */
+        reference_scene_finish(reference);
+        book_memory(reference, &second);
+    }
+    stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    return tracer_progress_of(ok);
+}
+
+/* ---- waves ---- */
+
+static bool reserve_host(struct reference *reference, uint32_t ray_count, struct error *error)
+{
+    if (ray_count <= reference->ray_capacity)
+        return true;
+    free(reference->rays);
+    free(reference->times);
+    free(reference->answers);
+    reference->rays = malloc((size_t)ray_count * sizeof(*reference->rays));
+    reference->times = malloc((size_t)ray_count * sizeof(*reference->times));
+    reference->answers = malloc((size_t)ray_count * sizeof(struct hit));
+    reference->ray_capacity = reference->rays && reference->times && reference->answers ? ray_count : 0;
+    return reference->ray_capacity > 0 ||
+           error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a wave of %u rays", ray_count);
+}
+
+/* Unlike the others it waits, for the rays and for itself. */
+static bool reference_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
+                            struct error *error)
+{
+    struct reference *reference = (struct reference *)tracer;
+    if (!reserve_host(reference, wave->ray_count, error))
+        return false;
+    const size_t first = wave->first_ray, count = wave->end_ray - wave->first_ray;
+    gpu_buffer_read(tracer->device, wave->rays, first * sizeof(struct ray), reference->rays + first,
+                    count * sizeof(struct ray));
+    if (wave->times)
+        gpu_buffer_read(tracer->device, wave->times, first * sizeof(float), reference->times + first,
+                        count * sizeof(float));
+    uint64_t start_ns = clock_now_ns();
+    reference_walk(reference, wave);
+    tracer->stats.walk_ns = clock_now_ns() - start_ns;
+    if (!reference_check(reference, "tracing", error))
+        return false;
+    if (wave->kind == WAVE_ANY)
+        gpu_buffer_write(tracer->device, wave->visibility, first * sizeof(uint32_t),
+                         (const uint32_t *)reference->answers + first, count * sizeof(uint32_t));
+    else
+        gpu_buffer_write(tracer->device, wave->hits, first * sizeof(struct hit),
+                         (const struct hit *)reference->answers + first, count * sizeof(struct hit));
+    return trace_surfaces(scene, wave, error);
+}
+
+const struct tracer_impl tracer_reference_impl = {
+    .name = "reference",
+    .depends_on = TRACER_NEEDS_SCENE,
+    .create = reference_create,
+    .destroy = reference_destroy,
+    .update = reference_update,
+    .trace = reference_trace,
+};

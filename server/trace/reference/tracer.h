@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: MIT */
+/* The tracer `reference`: Embree on the CPU, the truth that the other tracers are compared with. Private to
+ * reference*.c, which are built only where Embree 3 is found.
+ *
+ * Of two surfaces in one place it may report the other one than bvh does.
+ *
+ * Embree: Wald, Woop, Benthin, Johnson, Ernst. Embree: A Kernel Framework for Efficient CPU Ray Tracing. 2014. */
+#ifndef FARLIGHT_TRACE_REFERENCE_TRACER_H
+#define FARLIGHT_TRACE_REFERENCE_TRACER_H
+
+#include "trace/reference/opacity.h"
+#include "trace/tracer.h"
+
+#include <embree3/rtcore.h>
+#include <pthread.h>
+#include <stdatomic.h>
+
+#define REFERENCE_RAYS_MAX 16u /* a call of Embree */
+/* A quarter of what Embree takes for a coordinate, for what its own arithmetic rounds. */
+#define REFERENCE_COORDINATE_MAX 4.6e17f
+
+/* A geometry of the scene, built; one Embree scene of one geometry, which any number of instances show. */
+struct reference_entry {
+    bool is_mesh;
+    uint32_t id;
+    uint32_t node; /* that deforms it; 0: it is rigid */
+    uint64_t revision, deformed_revision;
+    bool is_wanted; /* the scene still has it, in this revision */
+    bool is_stale;  /* its Embree scene has to be committed */
+    bool is_fresh;  /* by this update: its instances have to be committed too */
+    bool filters_closest, filters_any;
+    uint32_t primitive_count;
+    RTCScene scene;
+    RTCGeometry geometry;
+    struct blob *shape[2];          /* what Embree reads: positions (unless it deforms) and indices, or centres and
+                                       radii */
+    struct opacity_surface surface; /* what the filter functions read */
+};
+
+/* An instance of the scene, by its index; in the top scene it has the number index + 1. */
+struct reference_instance {
+    RTCGeometry geometry;                /* NULL: none yet */
+    const struct reference_entry *entry; /* what the geometry shows */
+    float (*world_from_object)[12];      /* in each pose */
+    uint32_t pose_count;
+    uint32_t first_primitive; /* scene-wide */
+};
+
+/* The discs' number in the top scene. */
+#define REFERENCE_DISCS 0u
+
+struct reference {
+    struct tracer base;
+    RTCDevice device;
+    struct reference_entry **entries; /* each by itself: Embree keeps their addresses */
+    uint32_t entry_count;
+    struct opacity_materials materials;
+    RTCScene top;
+    struct reference_instance *instances;
+    uint32_t instance_count;
+    float coordinate_max;      /* of a ray's origin and direction; what lies beyond hits nothing */
+    RTCGeometry disc_geometry; /* NULL: no discs */
+    struct opacity_surface disc_surface;
+    unsigned width;       /* rays a call */
+    uint64_t taken_bytes; /* of the device's memory, in its books */
+    /* What Embree's callbacks write, from any thread. */
+    atomic_llong device_bytes;
+    pthread_mutex_t failure_mutex;
+    enum RTCError failure; /* the first since it was last asked */
+    char failure_text[256];
+    /* A wave on the host; they grow and stay. */
+    struct ray *rays;
+    float *times; /* of those rays */
+    void *answers;
+    uint32_t ray_capacity;
+};
+
+/* True if Embree has reported nothing since the last call; else fills *error. */
+bool reference_check(struct reference *reference, const char *what, struct error *error);
+
+/* reference_scene.c: brings all of the above to the scene. After a failure reference_scene_finish is due. */
+bool reference_scene_update(struct reference *reference, const struct gpu_scene *scene,
+                            const struct scene_changes *changes, struct error *error);
+void reference_scene_finish(struct reference *reference); /* leaves it empty */
+/* reference_instance.c. `look`: some may have moved, or show what was built anew; *changed is set where they do.
+ */
+bool reference_update_instances(struct reference *reference, const struct gpu_scene *scene, bool look,
+                                bool *changed, struct error *error);
+void reference_drop_instances(struct reference *reference);
+
+/* reference_walk.c: a wave that lies in `rays` and `times`; crossings or visibilities into `answers`. */
+void reference_walk(struct reference *reference, const struct wave *wave);
+/* Embree asks these about each candidate on a geometry that has cutouts (closest), or lets light pass (any). */
+void reference_filter_closest(const struct RTCFilterFunctionNArguments *arguments);
+void reference_filter_any(const struct RTCFilterFunctionNArguments *arguments);
+
+#endif

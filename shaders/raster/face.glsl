@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// How a surface lies to the axes: FACE_* bits of raster/layout.h.
+#include "raster/layout.h"
+#include "common/math.glsl"
+
+// `unit` looks to the outside.
+uint face_of(vec3 unit)
+{
+    vec3 lean = abs(unit);
+    float most = greatest(lean);
+    uint face = pack_unit_24(unit);
+    for (int axis = 0; axis < 3; axis++) {
+        face |= lean[axis] >= AXES_OVERLAP * most ? FACE_LEANS << axis : 0u;
+        face |= lean[axis] < FACE_STEEP_BELOW ? FACE_STEEP << axis : 0u;
+    }
+    return face;
+}
+
+// The axis that it leans to most, of equal ones the first.
+int axis_of(vec3 lean)
+{
+    return lean.x >= lean.y && lean.x >= lean.z ? 0 : lean.y >= lean.z ? 1 : 2;
+}

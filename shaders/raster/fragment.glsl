@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: MIT
+// Where a primitive lies under the middle of a texel of the images along the axes: what raster/draw.geom gives to a
+// fragment shader.
+// Defines: PRIMITIVE_KIND 0 triangles, 1 spheres; HAS_CUTOUT: they may have holes; HAS_SPHERES with PRIMITIVE_KIND 1.
+#include "shared/bindings.h"
+#include "common/alpha.glsl"
+#include "raster/cube.glsl"
+
+uniform uint texels_along; // a side of the images
+
+#if PRIMITIVE_KIND == 0
+layout(location = 0) flat in vec4 plane;  // slopes of the depth along u and v; u, v of a point of it
+layout(location = 1) flat in vec3 depths; // of that point; least, greatest
+#ifdef HAS_CUTOUT
+layout(location = 3) in vec2 barycentrics;
+#endif
+#endif
+layout(location = 2) flat in uvec4 primitive; // id, instance, scene-wide number, DRAWN_* or FACE_*
+
+uint texel_number()
+{
+    return (uint(gl_Layer) * texels_along + uint(gl_FragCoord.y)) * texels_along + uint(gl_FragCoord.x);
+}
+
+// Depths of what lies on the sides of the cube may be rounded out of it.
+float depth_in_cube(float depth_cells)
+{
+    return min(max(depth_cells, 0.0), float(texels_along));
+}
+
+#if PRIMITIVE_KIND == 0
+bool is_triangle_cut_out()
+{
+#ifdef HAS_CUTOUT
+    candidate found = candidate(0.0, primitive.z, primitive.y, barycentrics);
+    return is_cut_out(found, vec3(0.0), vec3(0.0), 0.0);
+#else
+    return false;
+#endif
+}
+
+float triangle_depth_cells()
+{
+    precise float along_u = (gl_FragCoord.x - plane.z) * plane.x;
+    precise float along_v = (gl_FragCoord.y - plane.w) * plane.y;
+    precise float depth_cells = depths.x + along_u + along_v;
+    // Not behind nor before the triangle, where it is thin and its plane uncertain; and on the cube.
+    depth_cells = min(max(depth_cells, depths.y), depths.z);
+    return depth_in_cube(depth_cells);
+}
+#else
+// The line along the axis through the texel's middle, and where it crosses the sphere.
+struct sphere_chord {
+    vec3 origin, direction; // world space; depths are in cells, and so long is the direction
+    vec4 rows[3];           // object_from_world
+    float nearest, half_chord; // cells; not >= 0: the line passes the sphere
+    vec3 closest, step_object; // from its centre, object space
+};
+
+sphere_chord chord_of_sphere()
+{
+    sphere_chord c;
+    int axis = gl_Layer, u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+    vec3 origin = vec3(0.0), direction = vec3(0.0);
+    origin[u] = gl_FragCoord.x * cell_world;
+    origin[v] = gl_FragCoord.y * cell_world;
+    origin += lower_world;
+    direction[axis] = cell_world;
+    c.rows = instance_at(primitive.y).object_from_world;
+    vec4 sphere = texelFetch(spheres, int(primitive.z));
+    precise vec3 from_centre = affine_point(c.rows, origin) - sphere.xyz;
+    precise vec3 step_object = affine_vector(c.rows, direction);
+    precise float squared = dot(step_object, step_object);
+    precise float nearest = -dot(from_centre, step_object) / squared;
+    precise vec3 closest = from_centre + nearest * step_object;
+    precise float half_chord = sqrt((sphere.w * sphere.w - dot(closest, closest)) / squared);
+    c.origin = origin;
+    c.direction = direction;
+    c.nearest = nearest;
+    c.half_chord = half_chord;
+    c.closest = closest;
+    c.step_object = step_object;
+    return c;
+}
+
+// side 0: where the line enters; 1: where it leaves. The normal is of any length.
+float crossing_of(sphere_chord c, int side, out vec3 normal_world)
+{
+    precise float reach = side == 0 ? -c.half_chord : c.half_chord;
+    precise float depth_cells = c.nearest + reach;
+    normal_world = affine_covector(c.rows, c.closest + reach * c.step_object);
+    return depth_cells;
+}
+
+bool is_sphere_cut_out(sphere_chord c, float depth_cells)
+{
+#ifdef HAS_CUTOUT
+    candidate found = candidate(depth_cells, primitive.z, primitive.y, vec2(0.0));
+    return is_cut_out(found, c.origin, c.direction, 0.0);
+#else
+    return false;
+#endif
+}
+#endif

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+// Which of the images along the axes a surface is in, where it is not in all.
+#include "raster/layout.h"
+
+uniform float overlap; // AXES_OVERLAP, or 1: one image a triangle
+
+// `lean`: absolute values of its normal's components.
+bool is_in_image(vec3 lean, int axis)
+{
+    float most = max(lean.x, max(lean.y, lean.z));
+    if (overlap < 1.0)
+        return lean[axis] >= overlap * most;
+    int first = lean.x == most ? 0 : lean.y == most ? 1 : 2; // of equal ones
+    return axis == first;
+}

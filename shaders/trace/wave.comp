@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: MIT
+// One wave of rays through one acceleration structure: the entry point of every <tracer>/traverse.glsl.
+//
+// The host (trace/program.c) sets the defines:
+//   TRAVERSE             "bvh/traverse.glsl", the structure's walk
+//   TRACER_BVH, TRACER_NAIVE, ..  and others of the tracer's own choice
+//   ANY_HIT              the wave asks for transmittance, not for the closest surface
+//   HAS_SPHERES          some geometry is made of spheres
+//   HAS_DISCS            there are discs
+//   HAS_MOTION           something moves while the shutter is open, and rays have times
+//   HAS_CUTOUT           some material is alpha mode mask
+//   HAS_TRANSLUCENT      some material lets shadow rays pass
+//   HAS_TRANSMISSION     and tints them on the way
+//   EVEN_ALPHA           none of these has a texture or vertex colours
+//   RAYS_TOGETHER        how many consecutive rays one invocation walks together: 1, 2, 3, 4, 8
+//
+// A traverse.glsl defines one of these, for ANY_HIT or not, and for RAYS_TOGETHER 1 or more:
+//   void trace_closest(trace_ray r, inout candidate best);
+//   bool trace_any(trace_ray r, inout vec3 taken);
+//   void trace_closest_together(trace_ray r[RAYS_TOGETHER], inout candidate best[RAYS_TOGETHER]);
+//   void trace_any_together(trace_ray r[RAYS_TOGETHER], inout vec3 taken[RAYS_TOGETHER]);
+// It does not include this file; it includes common/candidate.glsl, whose visit_* and offer_* functions take a
+// primitive against a ray with cutouts and tints accounted for. A walk that intersects by its own means calls
+// offer_closest / offer_any with what it found, or where the scene has neither cutouts nor translucent surfaces
+// (no define) may compare distances itself. `best.distance` starts at the ray's end, or at the nearest disc.
+// `taken` is what offer_any adds to; trace_any returns true, and may stop, once offer_any did: nothing is left of the
+// light.
+//
+// This file handles all else: discs, dead rays (t_max <= t_min), rays beyond the wave's end, and writing the
+// answer: a visibility, or a crossing (shared/hit.h) of which surface.comp makes a hit. Of rays walked together some
+// may be dead: they have t_max = -1 and t_min = 0, direction (1 0 0) and can hit nothing, so a walk must not take
+// from ray 0 what another needs. Groups in which all are dead do not reach it.
+#include "shared/bindings.h"
+#include "shared/ray.h"
+#include "common/dispatch.glsl"
+#include "common/candidate.glsl"
+#include TRAVERSE
+
+#ifndef RAYS_TOGETHER
+#define RAYS_TOGETHER 1
+#endif
+
+layout(binding = UNIT_RAYS) uniform samplerBuffer rays; // two texels each: software GL fetches those faster
+#ifdef HAS_MOTION
+layout(binding = UNIT_RAY_TIMES) uniform samplerBuffer ray_times;
+#endif
+#ifdef ANY_HIT
+layout(std430, binding = BIND_VISIBILITY) writeonly buffer visibility_block { uint visibilities[]; };
+#else
+layout(binding = IMAGE_HITS, rgba32ui) writeonly uniform uimageBuffer crossings;
+#endif
+
+uniform uint first_ray; // of this dispatch
+uniform uint ray_count; // where it ends
+#ifdef HAS_DISCS
+uniform uint disc_count;
+#else
+const uint disc_count = 0u;
+#endif
+
+bool is_alive(trace_ray r)
+{
+    return r.t_max > r.t_min;
+}
+
+trace_ray load_ray(uint ray_index)
+{
+#ifdef HAS_MOTION
+    float time = ray_index < ray_count ? texelFetch(ray_times, int(ray_index)).x : 0.0;
+    trace_ray dead = trace_ray(vec3(0.0), vec3(1.0, 0.0, 0.0), 0.0, -1.0, time);
+#else
+    trace_ray dead = trace_ray(vec3(0.0), vec3(1.0, 0.0, 0.0), 0.0, -1.0);
+#endif
+    if (ray_index >= ray_count)
+        return dead;
+    vec4 origin_t_min = texelFetch(rays, int(2u * ray_index));
+    vec4 direction_t_max = texelFetch(rays, int(2u * ray_index + 1u));
+    trace_ray r = dead;
+    r.origin = origin_t_min.xyz;
+    r.direction = direction_t_max.xyz;
+    r.t_min = origin_t_min.w;
+    r.t_max = direction_t_max.w;
+    if (is_alive(r))
+        return r;
+    return dead;
+}
+
+#ifdef ANY_HIT
+
+bool discs_any(trace_ray r, inout vec3 taken)
+{
+    for (uint i = 0u; i < disc_count; i++) {
+        candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
+        disc d = discs[i];
+        if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
+                           found.distance) &&
+            offer_any(r, found, taken))
+            return true;
+    }
+    return false;
+}
+
+// A dead ray is stopped by nothing.
+void store_visibility(uint ray_index, vec3 taken)
+{
+    vec3 left = transmittance_left(taken);
+    if (ray_index < ray_count)
+        visibilities[ray_index] = packUnorm4x8(vec4(left, greatest(left) > 0.0 ? 1.0 : 0.0));
+}
+
+#else
+
+void discs_closest(trace_ray r, inout candidate best)
+{
+    for (uint i = 0u; i < disc_count; i++) {
+        candidate found = candidate(0.0, i, HIT_NO_PRIMITIVE, vec2(0.0));
+        disc d = discs[i];
+        if (intersect_disc(r.origin, r.direction, d.centre_radius.xyz, d.normal.xyz, d.centre_radius.w,
+                           found.distance))
+            offer_closest(r, found, best);
+    }
+}
+
+void store_crossing(uint ray_index, candidate best)
+{
+    if (ray_index >= ray_count)
+        return;
+    float distance_ = best.primitive == HIT_NO_PRIMITIVE ? -1.0 : best.distance;
+    imageStore(crossings, int(3u * ray_index), uvec4(floatBitsToUint(distance_), 0u, best.primitive, best.instance_index));
+}
+
+#endif
+
+#if RAYS_TOGETHER == 1
+
+void main()
+{
+    uint ray_index = first_ray + item_index();
+    if (ray_index >= ray_count)
+        return;
+    trace_ray r = load_ray(ray_index);
+#ifdef ANY_HIT
+    vec3 taken = vec3(0.0);
+    if (is_alive(r) && (discs_any(r, taken) || trace_any(r, taken)))
+        taken = vec3(TAKEN_ALL);
+    store_visibility(ray_index, taken);
+#else
+    candidate best = candidate_none(r.t_max);
+    if (is_alive(r)) {
+        discs_closest(r, best);
+        trace_closest(r, best);
+    }
+    store_crossing(ray_index, best);
+#endif
+}
+
+#else
+
+// What is done ray by ray is done in a loop that picks its ray by comparing numbers: indexing the arrays by the
+// loop's number would have the compiler lay all of it (discs, textures, surfaces) out RAYS_TOGETHER times.
+#ifdef ANY_HIT
+#define found_type vec3 // taken of the light
+#else
+#define found_type candidate
+#endif
+
+void look_at_discs(inout trace_ray r[RAYS_TOGETHER], inout found_type found[RAYS_TOGETHER])
+{
+    for (int i = 0; i < RAYS_TOGETHER; i++) {
+        trace_ray r_i = r[0];
+        found_type found_i = found[0];
+        for (int k = 1; k < RAYS_TOGETHER; k++) {
+            if (k == i) {
+                r_i = r[k];
+                found_i = found[k];
+            }
+        }
+        if (is_alive(r_i)) {
+#ifdef ANY_HIT
+            if (discs_any(r_i, found_i)) {
+                found_i = vec3(TAKEN_ALL);
+                r_i.t_max = -1.0; // nothing is left to find
+                r_i.t_min = 0.0;
+            }
+#else
+            discs_closest(r_i, found_i);
+#endif
+        }
+        for (int k = 0; k < RAYS_TOGETHER; k++) {
+            if (k == i) {
+                r[k] = r_i;
+                found[k] = found_i;
+            }
+        }
+    }
+}
+
+void main()
+{
+    uint first = first_ray + item_index() * RAYS_TOGETHER;
+    if (first >= ray_count)
+        return;
+    trace_ray r[RAYS_TOGETHER];
+    found_type found[RAYS_TOGETHER];
+    bool any_alive = false;
+    for (int k = 0; k < RAYS_TOGETHER; k++) {
+        r[k] = load_ray(first + uint(k));
+        any_alive = any_alive || is_alive(r[k]);
+#ifdef ANY_HIT
+        found[k] = vec3(0.0);
+#else
+        found[k] = candidate_none(r[k].t_max);
+#endif
+    }
+    if (disc_count > 0u)
+        look_at_discs(r, found);
+#ifdef ANY_HIT
+    if (any_alive)
+        trace_any_together(r, found);
+    for (int k = 0; k < RAYS_TOGETHER; k++)
+        store_visibility(first + uint(k), found[k]);
+#else
+    if (any_alive)
+        trace_closest_together(r, found);
+    for (int k = 0; k < RAYS_TOGETHER; k++)
+        store_crossing(first + uint(k), found[k]);
+#endif
+}
+
+#endif
