@@ -23,7 +23,7 @@ static unsigned long number_of(const char *name)
 
 size_t activation_take(void)
 {
-    /* The variables may be those of a process that started us without knowing of them. */
+    /* The variables may be meant for the parent process, which passed its environment on. */
     bool ours = number_of("LISTEN_PID") == (unsigned long)getpid();
     unsigned long count = ours ? number_of("LISTEN_FDS") : 0;
     unsetenv("LISTEN_PID");

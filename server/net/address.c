@@ -28,7 +28,7 @@ static bool parse_tcp(struct address *address, const char *text, const char *hos
 {
     const char *colon = strrchr(host_port, ':');
     if (!colon || colon == host_port || !colon[1])
-        return error_set(error, ERROR_INVALID, text, "tcp:HOST:PORT is wanted, with [..] about an IPv6 address");
+        return error_set(error, ERROR_INVALID, text, "expected tcp:HOST:PORT, with an IPv6 address in brackets");
     char host[128];
     const char *first = host_port;
     size_t bytes = (size_t)(colon - host_port);
@@ -36,7 +36,7 @@ static bool parse_tcp(struct address *address, const char *text, const char *hos
         first++;
         bytes -= 2;
     } else if (memchr(first, ':', bytes)) {
-        return error_set(error, ERROR_INVALID, text, "an IPv6 address goes in brackets: tcp:[::1]:PORT");
+        return error_set(error, ERROR_INVALID, text, "write an IPv6 address in brackets: tcp:[::1]:PORT");
     }
     if (bytes >= sizeof host)
         return error_set(error, ERROR_INVALID, text, "the host name is too long");
@@ -68,7 +68,7 @@ bool address_is_unix(const struct address *address)
     return address->storage.ss_family == AF_UNIX;
 }
 
-/* The socket's own kind of address, copied out of the storage so that no pointer is cast. */
+/* The address of the socket's own family, copied out of the storage so that no pointer is cast. */
 static struct sockaddr_in as_ipv4(const struct address *address)
 {
     struct sockaddr_in ipv4;
@@ -117,7 +117,7 @@ const char *address_path(const struct address *address)
 
 uint64_t address_network(const struct address *address)
 {
-    const uint64_t ipv4 = UINT64_C(1) << 32; /* no IPv6 network that is given to anybody begins so */
+    const uint64_t ipv4 = UINT64_C(1) << 32; /* no assigned IPv6 network begins with this prefix */
     if (address->storage.ss_family == AF_INET)
         return ipv4 | ntohl(as_ipv4(address).sin_addr.s_addr);
     if (address->storage.ss_family != AF_INET6)

@@ -16,15 +16,15 @@ struct address {
     socklen_t storage_bytes;
 };
 
-/* A host name is looked up, and the first answer is taken. Error field: the text. */
+/* Looks a host name up and uses the first answer. Error field: the text. */
 bool address_parse(struct address *address, const char *text, struct error *error);
 void address_print(const struct address *address, char text[ADDRESS_TEXT_BYTES]); /* as it is written */
 bool address_is_unix(const struct address *address);
 bool address_is_loopback(const struct address *address); /* false for unix */
 const char *address_path(const struct address *address); /* of unix */
-/* Same host (the port aside). Unix peers have no address: all are the same. */
+/* Whether the hosts are the same; ports are ignored. Unix peers have no address: all are the same. */
 bool address_same_host(const struct address *a, const struct address *b);
-/* A number for the network that one holder of addresses has: an IPv4 address, the first half of an IPv6 one. 0 for
+/* The number of the network that one owner usually has: an IPv4 address, the first half of an IPv6 address. 0 for
  * Unix. */
 uint64_t address_network(const struct address *address);
 

@@ -8,7 +8,7 @@ static uint64_t last_failed_ns(const struct attempts_network *network)
     return network->failed_ns[(network->next + ATTEMPTS_LIMIT_MAX - 1) % ATTEMPTS_LIMIT_MAX];
 }
 
-/* Its own place, or the one that is given up for it. */
+/* The network's entry, or the oldest entry, which it replaces. */
 static struct attempts_network *place_of(struct attempts *attempts, uint64_t network)
 {
     struct attempts_network *oldest = &attempts->networks[0];

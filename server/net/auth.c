@@ -28,7 +28,8 @@ bool auth_read_keys(struct auth_keys *keys, const char *key_file, const char *re
     if (!read_key(keys, key_file, false, error) || !read_key(keys, reader_key_file, true, error))
         return false;
     if (keys->count == 2 && memcmp(&keys->keys[0], &keys->keys[1], sizeof keys->keys[0]) == 0)
-        return error_set(error, ERROR_INVALID, reader_key_file, "is the same key as that of clients who may edit");
+        return error_set(error, ERROR_INVALID, reader_key_file,
+                         "is the same key as server.key_file, whose holders may edit");
     return true;
 }
 
@@ -45,7 +46,7 @@ bool auth_identify(struct auth_identity *identity, int fd, const struct address 
         struct ucred credentials = {0};
         socklen_t bytes = sizeof credentials;
         if (getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &credentials, &bytes) < 0)
-            return error_set(error, ERROR_DENIED, "peer", "the kernel does not say who it is: %s",
+            return error_set(error, ERROR_DENIED, "peer", "the kernel does not tell the peer's user: %s",
                              strerror(errno));
         identity->known = identity->has_user = true;
         identity->user = credentials.uid;

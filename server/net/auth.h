@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Who is at the other end. On a Unix socket the kernel says it, on a sealed connection the key; over TCP on
- * loopback nobody does. */
+/* The identity of a client. The kernel gives it on a Unix socket, the key on a sealed connection; plain TCP on
+ * loopback has none. */
 #ifndef FARLIGHT_NET_AUTH_H
 #define FARLIGHT_NET_AUTH_H
 
@@ -15,30 +15,30 @@
 /* The keys that the daemon knows. */
 struct auth_keys {
     struct sealed_key keys[SEALED_KEYS_MAX];
-    bool read_only[SEALED_KEYS_MAX]; /* whoever has it may look, but change nothing */
+    bool read_only[SEALED_KEYS_MAX]; /* its holder may look at scenes and not change them */
     size_t count;
 };
 
 struct auth_identity {
-    bool known;     /* it shares blobs with its other connections: by its user, or by its key */
-    bool has_user;  /* the kernel says who the peer's user is */
-    uint32_t user;  /* the number of that, if there is one */
-    bool has_key;   /* it has proved that it has a key of the daemon's */
-    uint64_t key;   /* the number of that, if there is one */
-    bool read_only; /* it may look, but change nothing */
+    bool known;     /* by user or key: it shares blobs with its other connections */
+    bool has_user;  /* the kernel told the peer's user */
+    uint32_t user;  /* the number of that user, if has_user */
+    bool has_key;   /* it has proved that it holds one of the daemon's keys */
+    uint64_t key;   /* the number of that key, if has_key */
+    bool read_only; /* it may look at scenes and not change them */
     char name[48];  /* for people: "user 1000", "tcp:127.0.0.1:40312", "key, tcp:10.0.0.7:40312" */
 };
 
-/* Reads the key files; an empty path is none. */
+/* Reads the key files; an empty path names none. */
 bool auth_read_keys(struct auth_keys *keys, const char *key_file, const char *reader_key_file,
                     struct error *error);
-/* What is known before the client has said anything. False with ERROR_DENIED: the peer may not come in.
+/* What is known before the client's first byte. False with ERROR_DENIED: the peer is refused.
  * `beyond_loopback` as for listener_open(). */
 bool auth_identify(struct auth_identity *identity, int fd, const struct address *peer, bool beyond_loopback,
                    struct error *error);
-/* The client has proved that it has the key of that index: this is who it is, from now on. */
+/* The client has proved that it holds the key of that index, which is its identity from now on. */
 void auth_identify_by_key(struct auth_identity *identity, const struct auth_keys *keys, size_t index);
-/* Whether a connection between the two, the daemon's own address first, runs beyond this host or could. */
+/* Whether a connection between the daemon's own address and the peer's leaves this host, or could. */
 bool auth_is_beyond_loopback(const struct address *own, const struct address *peer);
 
 #endif

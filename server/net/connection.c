@@ -5,7 +5,7 @@
 #include "base/log.h"
 #include "base/sys.h"
 #include "net/greeting.h"
-#include "net/patience.h"
+#include "net/timeouts.h"
 #include "net/sealing.h"
 
 #include <errno.h>
@@ -13,9 +13,9 @@
 #include <string.h>
 #include <unistd.h>
 
-/* A client that sends or takes much at once gives others their turn after so much. */
+/* Bytes that one client may send or take before other clients get their turn. */
 #define BYTES_A_TURN ((size_t)2 << 20)
-/* More bulk than this is not queued: a cancel, and another job's frame, wait behind it. */
+/* Maximum of queued bulk: a cancel, and another job's frame, wait behind it. */
 #define BULK_QUEUED_BYTES ((size_t)512 << 10)
 #define PARTS_A_CALL 64
 
@@ -92,7 +92,7 @@ void connection_finish(struct connection *connection, enum protocol_error_code c
                        const char *text)
 {
     if (connection->state == CONNECTION_HELLO || connection->state == CONNECTION_WRONG_KEY) {
-        /* Messages may not be sent yet. */
+        /* Before this state, no message may be sent. */
         connection_close(connection);
         return;
     }
@@ -122,7 +122,7 @@ bool connection_send(struct connection *connection, uint32_t request, uint32_t c
         return false;
     struct out_message *out = out_message_create(message_write_bytes(message));
     if (!out) {
-        log_write(LOG_ERROR, "net", "no memory to answer a client; it is disconnected");
+        log_write(LOG_ERROR, "net", "disconnected a client: out of memory for an answer to it");
         connection_close(connection);
         return false;
     }
@@ -144,7 +144,7 @@ void connection_send_raw(struct connection *connection, struct out_message *mess
     out_queue_push(&connection->out, message, bulk);
     loop_defer(connection->loop, &connection->turn_end);
     if (connection->out.queued_bytes > connection->limits->queued_hard_bytes) {
-        log_write(LOG_WARNING, "net", "a client does not read: %zu bytes wait for it; it is disconnected",
+        log_write(LOG_WARNING, "net", "disconnected a client that does not read: %zu bytes wait for it",
                   connection->out.queued_bytes);
         connection_close(connection);
     }
@@ -175,7 +175,7 @@ static void flush(struct connection *connection)
         if (!message.msg_iovlen || connection->state == CONNECTION_CLOSED)
             return;
         ssize_t sent = sys_sendmsg(connection->fd, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
-        connection->write_blocked = true; /* or there is more than one turn's worth */
+        connection->write_blocked = true; /* or more waits than one turn may send */
         if (sent < 0) {
             if (errno != EAGAIN && errno != EWOULDBLOCK)
                 connection_close(connection);
@@ -193,7 +193,7 @@ static void flush(struct connection *connection)
 
 /* ---- receiving -------------------------------------------------------------------------------------- */
 
-/* Cuts one message off at *offset and hands it up; false: no more for now. */
+/* Decodes the message at *offset and passes it on. False: no whole message is left. */
 static bool process_message(struct connection *connection, size_t *offset)
 {
     struct frame frame;
@@ -253,7 +253,7 @@ static void process_messages(struct connection *connection)
 void connection_hold(struct connection *connection, bool held)
 {
     if (connection->held && !held)
-        connection->message_began_ns = 0; /* the time it was held is not the client's */
+        connection->message_began_ns = 0; /* the client is not charged for the time that it was held */
     connection->held = held;
     loop_defer(connection->loop, &connection->turn_end);
 }
@@ -275,7 +275,7 @@ static bool may_read(const struct connection *connection)
     return false;
 }
 
-/* Records that came while nothing was to be read: the socket does not speak of them again. */
+/* Records that arrived while reading was off: the socket does not announce them again. */
 static bool has_waiting_records(const struct connection *connection)
 {
     return connection->link && may_read(connection) && sealed_link_has_record(connection->link);
@@ -298,7 +298,7 @@ static void receive(struct connection *connection)
 {
     size_t received_bytes = 0;
     if (has_waiting_records(connection))
-        process(connection); /* they make room */
+        process(connection); /* they release space */
     while (may_read(connection) && received_bytes < BYTES_A_TURN) {
         size_t free_bytes = connection->in_capacity - connection->in_used;
         uint8_t *space = connection->in + connection->in_used;
@@ -320,7 +320,7 @@ static void receive(struct connection *connection)
         connection->last_received_ns = clock_now_ns();
         process(connection);
         if ((size_t)got < free_bytes)
-            return; /* most likely that was all; if not, the loop says so again */
+            return; /* usually nothing is left; otherwise the loop reports it again */
     }
 }
 
@@ -330,7 +330,7 @@ static void on_ready(void *context, uint32_t epoll_events)
 {
     struct connection *connection = context;
     if (epoll_events & (EPOLLIN | EPOLLHUP | EPOLLERR)) {
-        /* A peer that is gone says so even while nothing is read from it. */
+        /* A lost peer is reported even while nothing is read from it. */
         if ((epoll_events & (EPOLLHUP | EPOLLERR)) && !may_read(connection))
             connection_close(connection);
         else
@@ -351,19 +351,19 @@ static bool has_flushed(const struct connection *connection)
     return !connection->out.queued_bytes && (!connection->link || sealing_is_done(connection));
 }
 
-/* After everything that happened to the connection in this turn: send, say what to wait for, or release it. */
+/* At the end of a turn: sends, sets what to wait for, or releases the connection. */
 static void turn_end(void *context)
 {
     struct connection *connection = context;
     bool was_held = connection->in_used && !connection->message_began_ns;
     if (connection->state == CONNECTION_OPEN && !connection->held && (was_held || has_waiting_records(connection)))
-        process(connection); /* what came before it was held */
+        process(connection); /* messages that arrived before it was held */
     flush(connection);
     if (connection->state == CONNECTION_FLUSHING && has_flushed(connection))
         linger(connection);
     if (connection->state == CONNECTION_CLOSED) {
         if (connection->turn_end.waiting)
-            return; /* closed just now, by the lines above: the next turn releases it */
+            return; /* closed by the lines above: the next turn releases it */
         connection->handler->closed(connection->context);
         destroy(connection);
         return;
@@ -374,18 +374,18 @@ static void turn_end(void *context)
     } else if (!over_soft && connection->over_soft_since_ns) {
         connection->over_soft_since_ns = 0;
         if (connection->message_began_ns)
-            connection->message_began_ns = clock_now_ns(); /* until now it could not come */
+            connection->message_began_ns = clock_now_ns(); /* it was blocked until now */
     }
     if (has_waiting_records(connection))
         loop_defer(connection->loop, &connection->turn_end);
     loop_watch_change(connection->watch, (may_read(connection) ? (uint32_t)EPOLLIN : 0) |
                                              (connection->write_blocked ? (uint32_t)EPOLLOUT : 0));
-    loop_timer_start(connection->loop, &connection->timer, patience_next_check_ns(connection, clock_now_ns()));
+    loop_timer_start(connection->loop, &connection->timer, timeouts_next_check_ns(connection, clock_now_ns()));
 }
 
 static void on_timer(void *context)
 {
     struct connection *connection = context;
-    patience_check(connection, clock_now_ns());
+    timeouts_check(connection, clock_now_ns());
     loop_defer(connection->loop, &connection->turn_end);
 }

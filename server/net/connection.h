@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One client's socket: bytes to messages, messages to bytes, sealed or not, and the limits of patience and memory.
- * Knows the protocol's framing and the handshake, not what messages mean. One thread, that of the loop.
+/* One client's socket: bytes to messages, messages to bytes, sealed or not, with limits of time and memory. It
+ * knows the protocol's framing and handshake, not what messages mean. One thread, the loop's.
  *
  * A connection is destroyed by the loop at the end of a turn, never inside a call: after connection_close()
  * it is still there, silent, until the handler's closed() has returned. */
@@ -19,40 +19,40 @@
 
 struct connection_limits {
     uint32_t handshake_ms;         /* until the hello is complete */
-    uint32_t wrong_key_ms;         /* so long a client waits for the answer to a wrong key */
-    uint32_t progress_grace_ms;    /* so long a message may take whatever its size, .. */
-    uint32_t progress_bytes_per_s; /* .. then this is the least rate */
-    uint32_t idle_ms;           /* 0: never. Silence of a client that waits for nothing, or that does not read */
-    uint32_t queued_soft_ms;    /* so long more than queued_soft_bytes may wait for it */
+    uint32_t wrong_key_ms;         /* delay of the answer to a wrong key */
+    uint32_t progress_grace_ms;    /* time that a message may take whatever its size; .. */
+    uint32_t progress_bytes_per_s; /* .. after it, the minimum rate */
+    uint32_t idle_ms;        /* silence of a client that waits for nothing, or that does not read; 0: no limit */
+    uint32_t queued_soft_ms; /* how long more than queued_soft_bytes may wait for it */
     uint64_t queued_soft_bytes; /* nothing is read from a client while more than this waits for it */
     uint64_t queued_hard_bytes;
 };
 
-/* How a client may come in. */
+/* What a client must prove before it is accepted. */
 struct connection_entry {
     const struct sealed_key *keys; /* the owner's; they stay while the connection is there */
     size_t key_count;
-    bool sealed_only; /* nobody without one of them */
+    bool sealed_only; /* a client without one of the keys is refused */
 };
 
-/* What is told to the layer above; `context` is that of connection_create(). */
+/* Calls to the layer above; `context` is that of connection_create(). */
 struct connection_handler {
-    /* A client begins a sealed connection. False: it is not to try a key now. */
+    /* A client begins a sealed connection. False: it may not try a key now. */
     bool (*key_allowed)(void *context);
     void (*key_failed)(void *context);
-    /* It has the key of that index; hello comes next. */
+    /* The client holds the key of that index; its hello is next. */
     void (*key_proved)(void *context, size_t index);
-    /* Fills the reply. False: the client is turned away, with reply->text. */
+    /* Fills the reply. False: the client is refused with reply->text. */
     bool (*hello)(void *context, const struct handshake_hello *hello, struct handshake_reply *reply);
     /* Hello was answered, messages may be sent. */
     void (*opened)(void *context);
     /* Valid in every field; gone when the call returns. */
     void (*message)(void *context, const struct framing_header *header, const struct message *message);
-    /* A message whose frame is sound, but not all of its fields. */
+    /* A message with a valid frame and an invalid field. */
     void (*invalid)(void *context, const struct framing_header *header, const struct decode_error *error);
-    /* Little bulk is queued: the time to queue more. */
+    /* Little bulk is queued: queue more now. */
     void (*room)(void *context);
-    /* Whether the client waits for something that the daemon owes it, so that its silence means nothing. */
+    /* Whether the client waits for an answer or a frame, so that its silence is no sign of a lost client. */
     bool (*owed)(const void *context);
     /* The last call. The connection is freed when it returns. */
     void (*closed)(void *context);
@@ -60,10 +60,11 @@ struct connection_handler {
 
 enum connection_state {
     CONNECTION_HELLO,     /* waits for the client's first bytes */
-    CONNECTION_WRONG_KEY, /* it will be told so in a moment; nothing is read */
+    CONNECTION_WRONG_KEY, /* its refusal is delayed; nothing is read */
     CONNECTION_OPEN,
     CONNECTION_FLUSHING,  /* goodbye is queued; nothing is read */
-    CONNECTION_LINGERING, /* goodbye is sent; what still comes is thrown away, so that the kernel delivers it */
+    CONNECTION_LINGERING, /* goodbye is sent; incoming bytes are read and dropped, so that the kernel delivers it
+                           */
     CONNECTION_CLOSED,
 };
 
@@ -84,8 +85,8 @@ struct connection {
     size_t in_capacity, in_used;
     struct scratch scratch;
     void *scratch_data;
-    bool held;                 /* the layer above wants no more messages for now */
-    bool write_blocked;        /* the kernel takes no more for now */
+    bool held;                 /* the layer above takes no messages at present */
+    bool write_blocked;        /* the kernel's buffer is full */
     uint64_t message_began_ns; /* of the incomplete message at the start of `in`; 0: none */
 
     struct out_queue out;
@@ -110,14 +111,14 @@ void connection_send_raw(struct connection *connection, struct out_message *mess
 void connection_wake(struct connection *connection);
 bool connection_wants_bulk(const struct connection *connection);
 void connection_hold(struct connection *connection, bool held);
-/* Came, and was not enough for a message so far. */
+/* Bytes of an incomplete message. */
 size_t connection_incoming_bytes(const struct connection *connection);
 
-/* Says goodbye, waits a moment until it is delivered, closes. With an error code, ERROR on request 0 goes first.
+/* Sends goodbye, waits a moment for its delivery, closes. With an error code, ERROR on request 0 goes first.
  */
 void connection_finish(struct connection *connection, enum protocol_error_code code, const char *field,
                        const char *text);
-/* Closes without a word. */
+/* Closes without goodbye. */
 void connection_close(struct connection *connection);
 
 #endif

@@ -80,7 +80,7 @@ static void begin_seal(struct connection *connection)
     }
     struct sealed_link *link = sealed_link_server(entry->keys, entry->key_count);
     if (!link) {
-        log_write(LOG_ERROR, "net", "no memory or no random numbers to let a client in");
+        log_write(LOG_ERROR, "net", "cannot accept a client: out of memory, or no random numbers");
         connection_close(connection);
         return;
     }
@@ -91,7 +91,7 @@ static void begin_seal(struct connection *connection)
     connection->link = link;
 }
 
-/* With the reason that the link has found. */
+/* With the reason that the link gives. */
 static void refuse_link(struct connection *connection)
 {
     sealed_link_refuse(connection->link);
@@ -109,7 +109,7 @@ static void go_on_with_seal(struct connection *connection)
     switch (sealed_link_handshake(connection->link, &error)) {
     case SEALED_CONSUMED:
         connection->handler->key_proved(connection->context, sealed_key_index(connection->link->sealed));
-        /* A record of any size behind the beginning of any message. */
+        /* Space for a record of any size behind the start of any message. */
         if (!make_room_for_messages(connection, FRAMING_MESSAGE_MAX_BYTES + SEALED_PLAIN_MAX_BYTES))
             connection_close(connection);
         return;
@@ -151,7 +151,7 @@ static void answer_hello(struct connection *connection)
     }
     if (!connection->link && connection->entry.sealed_only) {
         reply.capabilities = HANDSHAKE_NEEDS_KEY;
-        strncpy(reply.text, "a key is needed here: only sealed connections are let in", sizeof reply.text - 1);
+        strncpy(reply.text, "this address needs a key: it accepts sealed connections only", sizeof reply.text - 1);
         refuse_hello(connection, &reply);
         return;
     }

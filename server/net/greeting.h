@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* The first bytes of a connection: what seals it, if anything does; hello in, reply out. */
+/* The first bytes of a connection: the exchange of a sealed link, if it is one; then hello in, reply out. */
 #ifndef FARLIGHT_NET_GREETING_H
 #define FARLIGHT_NET_GREETING_H
 
 struct connection;
 
-/* Looks at what has come so far. Once the hello is whole it is answered, and the connection is open, or, where the
- * client is turned away, about to close. */
+/* Processes the bytes so far. A whole hello is answered; then the connection is open, or about to close if the
+ * client was refused. */
 void greeting_process(struct connection *connection);
-/* The client's key was wrong, and it has waited for so long that it may be told so. */
+/* Sends the refusal of a wrong key, after its delay. */
 void greeting_refuse_key(struct connection *connection);
 
 #endif

@@ -16,15 +16,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* A client's host that answers nothing for two minutes is gone. */
+/* A client whose host answers nothing for two minutes is lost. */
 #define PROBE_AFTER_S 60
 #define PROBE_EVERY_S 15
 #define PROBES 4
-/* So much of what is to be sent lies in the kernel beyond what is under way: a frame that motion overtakes waits
- * no longer there than this takes, and a link within a house is kept busy. */
+/* Unsent bytes that the kernel may hold: few, as a frame that motion overtakes cannot be taken back from there,
+ * and enough to keep a local network busy. */
 #define UNSENT_BYTES (32 << 10)
 #define BACKLOG                                                                                                   \
-    SOMAXCONN /* a farm comes all at once; a client that does not wait gets an error when it is full              \
+    SOMAXCONN /* the nodes of a farm connect at once; a non-blocking connect fails when it is full                \
                */
 
 static const struct sockaddr *raw(const struct address *address)
@@ -42,7 +42,7 @@ static bool make_folder(const char *path, struct error *error)
     return error_set(error, ERROR_INVALID, path, "cannot make the folder %s: %s", folder, strerror(errno));
 }
 
-/* Whoever is at the path answers a connect if it lives; a refusal shows that the file is a leftover. */
+/* A live daemon answers a connect; a refusal shows that the file is stale. */
 static bool clear_path(const struct address *address, struct error *error)
 {
     const char *path = address_path(address);
@@ -50,7 +50,8 @@ static bool clear_path(const struct address *address, struct error *error)
     if (lstat(path, &status) < 0)
         return errno == ENOENT || error_set(error, ERROR_INVALID, path, "%s", strerror(errno));
     if (!S_ISSOCK(status.st_mode))
-        return error_set(error, ERROR_INVALID, path, "there is a file there that is no socket; it is left alone");
+        return error_set(error, ERROR_INVALID, path,
+                         "the path names a file that is not a socket; it was left alone");
     int fd = sys.socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd < 0)
         return error_set(error, ERROR_INTERNAL, path, "socket: %s", strerror(errno));
@@ -66,9 +67,10 @@ static bool clear_path(const struct address *address, struct error *error)
     if (result < 0 && why == ENOENT)
         return true;
     if (result < 0 && why != EAGAIN && why != EINTR)
-        return error_set(error, ERROR_INVALID, path, "cannot find out who is there: %s", strerror(why));
-    error_set(error, ERROR_BUSY, path, "another daemon is listening there");
-    return error_remedy(error, "stop it, or listen at another path");
+        return error_set(error, ERROR_INVALID, path, "cannot tell whether a daemon listens there: %s",
+                         strerror(why));
+    error_set(error, ERROR_BUSY, path, "another daemon listens there");
+    return error_remedy(error, "stop it, or use another path");
 }
 
 static bool check_tcp(const struct address *address, bool beyond_loopback, struct error *error)
@@ -77,12 +79,11 @@ static bool check_tcp(const struct address *address, bool beyond_loopback, struc
         return true;
     char text[ADDRESS_TEXT_BYTES];
     address_print(address, text);
-    error_set(
-        error, ERROR_DENIED, text,
-        "beyond loopback a plain TCP connection is open to everybody who can reach it, and so is what it carries");
+    error_set(error, ERROR_DENIED, text,
+              "beyond loopback, plain TCP is open to every host that can reach it, and can be read on its way");
     return error_remedy(error,
                         "give a key with --key-file ('farlight key FILE' makes one), listen on 127.0.0.1 and "
-                        "come through ssh, or spell out --insecure");
+                        "connect through ssh, or give --insecure");
 }
 
 static bool bind_and_listen(struct listener *listener, const struct address *address, struct error *error)
@@ -94,7 +95,7 @@ static bool bind_and_listen(struct listener *listener, const struct address *add
         setsockopt(listener->fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
     if (address->storage.ss_family == AF_INET6)
         setsockopt(listener->fd, IPPROTO_IPV6, IPV6_V6ONLY, &on, sizeof on);
-    /* The file must never be open to others, not even until the chmod: the mask applies while it is made. */
+    /* Other users must never be able to connect, not even before the chmod: the mask applies at creation. */
     mode_t mask = umask(0117);
     int result = sys.bind(listener->fd, raw(address), address->storage_bytes);
     int why = errno;
@@ -147,12 +148,13 @@ bool listener_adopt(struct listener *listener, int fd, const char *name, bool be
     if (!is_listening_stream(fd) ||
         getsockname(fd, (struct sockaddr *)&address->storage, &address->storage_bytes) < 0) {
         error_set(error, ERROR_INVALID, name,
-                  "what the service manager hands over is no stream socket that listens");
+                  "the service manager passed a descriptor that is not a listening stream socket");
         return error_remedy(error, "use ListenStream= and Accept=no in the socket unit");
     }
     sa_family_t family = address->storage.ss_family;
     if (family != AF_UNIX && family != AF_INET && family != AF_INET6)
-        return error_set(error, ERROR_UNSUPPORTED, name, "sockets of family %u are not known", (unsigned)family);
+        return error_set(error, ERROR_UNSUPPORTED, name,
+                         "unsupported socket family %u; allowed are Unix, IPv4 and IPv6", (unsigned)family);
     int flags = fcntl(fd, F_GETFL);
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) < 0)
         return error_set(error, ERROR_INTERNAL, name, "%s", strerror(errno));
@@ -177,17 +179,17 @@ int listener_accept(const struct listener *listener, struct address *peer, bool 
     if (fd < 0) {
         *retry_later = errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM;
         if (*retry_later)
-            log_write(LOG_WARNING, "net", "cannot let a client in: %s", strerror(errno));
+            log_write(LOG_WARNING, "net", "cannot accept a client: %s", strerror(errno));
         return -1;
     }
-    /* A Unix peer has no name of its own; the family is what the rest asks for. */
+    /* A Unix peer has no name; callers need only the family. */
     peer->storage.ss_family = listener->address.storage.ss_family;
     if (!address_is_unix(peer)) {
-        int on = 1; /* answers are small and wanted at once; frames are large anyway */
+        int on = 1; /* answers are small and urgent; frames are large in any case */
         setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-        /* What the kernel has cannot be taken back, nor overtaken. */
+        /* Bytes in the kernel can be neither withdrawn nor overtaken. */
         setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &(int){UNSENT_BYTES}, sizeof(int));
-        /* Who waits for frames may be silent for ever, and be gone without a word. */
+        /* A client that waits for frames may be silent for ever, and vanish without notice. */
         setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
         setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &(int){PROBE_AFTER_S}, sizeof(int));
         setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &(int){PROBE_EVERY_S}, sizeof(int));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Sockets that wait for clients. */
+/* Listening sockets. */
 #ifndef FARLIGHT_NET_LISTEN_H
 #define FARLIGHT_NET_LISTEN_H
 
@@ -15,18 +15,18 @@ struct listener {
 };
 
 /* Unix: the file gets mode 0660; its folder is made with mode 0750 if it is missing (its parent must be
- * there); a file that nobody answers at is removed, a live daemon there is an error. TCP: only loopback, unless
- * `beyond_loopback` says that there is a key for those who come from there, or that none is wanted. */
+ * there); a stale socket file is removed, a live daemon there is an error. TCP: loopback only, unless
+ * `beyond_loopback` says that a key protects the address, or that none is wanted. */
 bool listener_open(struct listener *listener, const struct address *address, bool beyond_loopback,
                    struct error *error);
-/* One that listens already, handed over by the service manager, whose file stays there; `name` is for people. The
- * descriptor is the listener's if it succeeds. */
+/* Adopts a listening socket of the service manager, whose file is left in place; `name` is for messages. On
+ * success the listener owns the descriptor. */
 bool listener_adopt(struct listener *listener, int fd, const char *name, bool beyond_loopback,
                     struct error *error);
 void listener_close(struct listener *listener); /* removes the socket file */
 
-/* The next client, non-blocking; -1 if none waits. *peer: where it comes from. *retry_later: the process is out of
- * descriptors, so that the listener stays readable without anybody being let in. */
+/* The next client, non-blocking; -1 if none waits. *peer: its address. *retry_later: the process is out of
+ * descriptors, so the listener stays readable and accepts no client. */
 int listener_accept(const struct listener *listener, struct address *peer, bool *retry_later);
 
 #endif

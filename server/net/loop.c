@@ -54,7 +54,7 @@ static void free_removed(struct loop *loop)
     }
 }
 
-/* What these calls defer is for the next turn, so that descriptors and timers get theirs in between. */
+/* Work that these calls defer belongs to the next turn, so that descriptors and timers are served in between. */
 static void run_deferred(struct loop *loop)
 {
     struct loop_deferred *waiting = loop->deferred;
@@ -167,8 +167,8 @@ static struct loop_timer *first_due(const struct loop *loop)
     return first;
 }
 
-/* A call may start and stop any timer, so the list is searched anew after each; what a call starts is at the
- * earliest due in the next turn. */
+/* A call may start and stop any timer, so the list is searched again after each; a timer that a call starts is due
+ * in the next turn at the earliest. */
 static void run_timers(struct loop *loop)
 {
     uint64_t now_ns = clock_now_ns();

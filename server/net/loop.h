@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Waits for descriptors and timers, and calls who asked. Knows nothing of the product. One thread. */
+/* An event loop: waits for descriptors and timers and calls their owners. Independent of the product. One thread.
+ */
 #ifndef FARLIGHT_NET_LOOP_H
 #define FARLIGHT_NET_LOOP_H
 
@@ -23,7 +24,7 @@ struct loop_timer {
     void *context;
 };
 
-/* The owner's memory; must live until it was called. */
+/* The owner's memory; must live until the call. */
 struct loop_deferred {
     struct loop_deferred *next;
     bool waiting;
@@ -45,15 +46,14 @@ void loop_watch_remove(struct loop_watch *watch);
 void loop_timer_start(struct loop *loop, struct loop_timer *timer, uint64_t delay_ns); /* or starts anew */
 void loop_timer_stop(struct loop *loop, struct loop_timer *timer);
 
-/* Calls back once the handlers of this turn are through: the place to release what a handler may still be
- * using. Asking again while it waits changes
- * nothing; asking while it is being called means once more, in the next turn. */
+/* Calls back after the handlers of this turn: the place to release what a handler may still use. A second request
+ * while it waits changes nothing; a request during the call means one more call, in the next turn. */
 void loop_defer(struct loop *loop, struct loop_deferred *deferred);
 
 bool loop_run(struct loop *loop, struct error *error); /* until loop_stop() */
-/* Once around: waits until something is ready or due, and calls for it. */
+/* One turn: waits until a descriptor is ready or a timer due, and calls its owner. */
 bool loop_turn(struct loop *loop, struct error *error);
 void loop_stop(struct loop *loop);
-void loop_run_deferred(struct loop *loop); /* all of it now, for an orderly end outside loop_run() */
+void loop_run_deferred(struct loop *loop); /* all of them now, for an orderly end outside loop_run() */
 
 #endif

@@ -12,7 +12,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-/* A manager that does not read holds nobody up for longer: clients wait meanwhile. */
+/* Timeout for a manager that does not read: clients wait meanwhile. */
 #define WAIT_US 100000
 
 void notify_manager(const char *state)
@@ -40,7 +40,7 @@ void notify_manager(const char *state)
 uint64_t notify_watchdog_ns(void)
 {
     const char *usec = getenv("WATCHDOG_USEC"), *pid = getenv("WATCHDOG_PID");
-    /* Without a process it is meant for whoever reads it. */
+    /* Without $WATCHDOG_PID it is meant for any process. */
     if (!usec || (pid && strtoull(pid, NULL, 10) != (unsigned long long)getpid()))
         return 0;
     unsigned long long interval_us = strtoull(usec, NULL, 10);

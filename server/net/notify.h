@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* Tells the service manager how we are: one datagram to $NOTIFY_SOCKET, as sd_notify(3) describes. */
+/* Reports the daemon's state to the service manager: one datagram to $NOTIFY_SOCKET, as sd_notify(3) describes. */
 #ifndef FARLIGHT_NET_NOTIFY_H
 #define FARLIGHT_NET_NOTIFY_H
 
 #include <stdint.h>
 
-/* "READY=1", "STOPPING=1", "RELOADING=1", one assignment a line. Does nothing where nobody asked to be told. */
+/* "READY=1", "STOPPING=1", "RELOADING=1", one assignment a line. Does nothing without $NOTIFY_SOCKET. */
 void notify_manager(const char *state);
 
-/* How often the service manager wants to hear "WATCHDOG=1" from this process at least, in ns; 0: it does not. */
+/* The longest time between two "WATCHDOG=1" of this process that the service manager accepts, in ns; 0: no
+ * watchdog. */
 uint64_t notify_watchdog_ns(void);
 
 #endif

@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-/* So much is lined up for one system call; a control message waits behind at most this. */
+/* Bytes that are queued for one system call; a control message waits behind at most these. */
 #define LINED_UP_BYTES ((size_t)512 << 10)
 
 void out_chunk_ref(struct out_chunk *chunk)
@@ -94,7 +94,7 @@ void out_queue_push(struct out_queue *queue, struct out_message *message, bool b
     list_append(bulk ? &queue->bulk : &queue->control, message);
 }
 
-/* Moves messages to the line that is being sent, control first. */
+/* Moves messages to the list `sending`, control first. */
 static void line_up(struct out_queue *queue)
 {
     while (queue->sending_bytes < LINED_UP_BYTES) {
@@ -108,7 +108,7 @@ static void line_up(struct out_queue *queue)
     }
 }
 
-/* Adds what `*skip_bytes` leaves of a part. */
+/* Adds a part without its first `*skip_bytes`. */
 static size_t add_part(struct iovec *part, const uint8_t *data, size_t bytes, size_t *skip_bytes)
 {
     if (*skip_bytes >= bytes) {
@@ -151,7 +151,7 @@ void out_queue_take(struct out_queue *queue, size_t bytes)
 
 void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns, uint64_t now_ns)
 {
-    /* First the books, then the calls: what they push or drop must find the queue in order. */
+    /* Updates the queue before the calls, which may push or drop messages. */
     struct out_list complete;
     list_init(&complete);
     queue->queued_bytes -= bytes;
@@ -179,10 +179,10 @@ void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns
 enum drop {
     DROP_OF_ALL,
     DROP_OF_REQUEST,
-    DROP_UNBEGUN_OF_REQUEST, /* what was begun is not forgotten */
+    DROP_UNBEGUN_OF_REQUEST, /* a begun message is kept */
 };
 
-/* Drops from one list what is bulk (has a body or a completion) and of the request, or of any. */
+/* Drops bulk messages (those with a body or a completion) of the request, or of any request, from one list. */
 static void drop_from(struct out_queue *queue, struct out_list *list, enum drop drop, uint32_t request)
 {
     struct out_list kept;

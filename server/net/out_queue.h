@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What waits to be sent on one connection. Bodies are shared chunks of bytes with a reference count and are
- * never copied or changed; each message keeps an offset instead. Control messages go before bulk ones, but a
- * message that was begun is finished first. One thread. No system call in here. */
+/* The messages that wait to be sent on one connection. Bodies are shared chunks with a reference count and are
+ * never copied or changed; each message keeps an offset instead. Control messages go before bulk ones; a message
+ * that was begun is finished first. One thread, no system calls. */
 #ifndef FARLIGHT_NET_OUT_QUEUE_H
 #define FARLIGHT_NET_OUT_QUEUE_H
 
@@ -45,30 +45,30 @@ struct out_list {
 };
 
 struct out_queue {
-    struct out_list sending; /* in this order they go; filled from the two below */
+    struct out_list sending; /* in the order of sending; filled from the two below */
     struct out_list control, bulk;
     size_t queued_bytes;      /* not handed to the kernel yet, all lists */
     size_t queued_bulk_bytes; /* of them in `bulk` */
     size_t sending_bytes;     /* of them in `sending` */
-    size_t taken_bytes;       /* of those, from their beginning: copied, but not with the kernel yet */
+    size_t taken_bytes;       /* of those, from their start: copied, not yet with the kernel */
 };
 
 void out_queue_init(struct out_queue *queue);
 void out_queue_finish(struct out_queue *queue); /* drops everything */
 void out_queue_push(struct out_queue *queue, struct out_message *message, bool bulk);
-/* The next bytes to be sent, at most `parts_max` (at least 3) parts; the number of parts, 0: nothing waits. */
+/* Gives the next bytes to send, in at most `parts_max` (at least 3) parts. Returns the number of parts, 0: none
+ * wait. */
 size_t out_queue_gather(struct out_queue *queue, struct iovec *parts, size_t parts_max);
-/* That many of the gathered bytes were copied to be sent from elsewhere, and are not gathered again; what they
- * belong to counts as begun. out_queue_advance() follows for all of them. */
+/* Marks gathered bytes as copied: they are not gathered again, and their messages count as begun.
+ * out_queue_advance() must follow for all of them. */
 void out_queue_take(struct out_queue *queue, size_t bytes);
-/* That many of the gathered (or, where any are, taken) bytes are with the kernel, by a call that lasted from
- * `before_ns` to `now_ns`. Calls `sent` of those complete, which may push. */
+/* Marks gathered bytes (or copied ones, if there are any) as accepted by the kernel, in a call that lasted from
+ * `before_ns` to `now_ns`. Calls `sent` of completed messages, which may push. */
 void out_queue_advance(struct out_queue *queue, size_t bytes, uint64_t before_ns, uint64_t now_ns);
-/* Drops messages of a request that were not begun, and forgets the `sent` of one that was. Control
- * messages stay. */
+/* Drops the request's messages that were not begun, and the `sent` call of one that was. Control messages stay. */
 void out_queue_drop_bulk(struct out_queue *queue, uint32_t request);
 void out_queue_drop_all_bulk(struct out_queue *queue);
-/* The same of a request, but one that was begun keeps its `sent`. How many bytes were dropped. */
+/* As above, but a begun message keeps its `sent`. Returns the number of dropped bytes. */
 size_t out_queue_drop_unbegun(struct out_queue *queue, uint32_t request);
 
 #endif

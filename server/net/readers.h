@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Users of the Unix socket who may look, but change nothing. */
+/* Users of the Unix socket that may look at scenes and not change them. */
 #ifndef FARLIGHT_NET_READERS_H
 #define FARLIGHT_NET_READERS_H
 
@@ -16,8 +16,8 @@ struct readers {
     size_t count;
 };
 
-/* From names and numbers, separated by blanks. False with ERROR_INVALID: one is unknown, or there are too many;
- * `field` names what was read. */
+/* Reads names and numbers, separated by blanks. False with ERROR_INVALID: one is unknown, or there are too many;
+ * `field` is the error's field. */
 bool readers_parse(struct readers *readers, const char *text, const char *field, struct error *error);
 bool readers_have(const struct readers *readers, uint32_t user);
 

@@ -6,14 +6,15 @@
 #include <string.h>
 #include <sys/uio.h>
 
-/* Parts below this are put together into one record, which costs a copy; what is larger is sealed where it lies.
+/* Smaller parts are copied into one record; larger ones are sealed in place.
  */
 #define TOGETHER_BYTES ((size_t)16 << 10)
 #define PARTS_A_CALL 64
-/* No more than this is sealed before it can be sent: it cannot be taken back, and goes before whatever is to. */
+/* Maximum of bytes that are sealed before they can be sent: sealed bytes can be neither withdrawn nor overtaken.
+ */
 #define AHEAD_BYTES ((size_t)64 << 10)
 
-/* Copies from small parts, which shrink by what was taken, up to `most` bytes or a large part. */
+/* Copies from small parts, which shrink by the copied bytes, up to `most` bytes or the first large part. */
 static size_t put_together(uint8_t *to, size_t most, struct iovec **parts, const struct iovec *end)
 {
     size_t used_bytes = 0;
@@ -48,7 +49,7 @@ static size_t seal_parts(struct sealed_link *link, struct iovec *parts, const st
     return sealed_bytes;
 }
 
-/* What of them makes at most that many bytes; how many parts that is. */
+/* Cuts the parts to at most that many bytes. Returns their number. */
 static size_t cut_parts(struct iovec *parts, size_t count, size_t most_bytes)
 {
     size_t used = 0;
@@ -60,14 +61,14 @@ static size_t cut_parts(struct iovec *parts, size_t count, size_t most_bytes)
     return used;
 }
 
-/* Sealed, but not with the kernel. */
+/* Bytes that are sealed and not yet with the kernel. */
 static size_t waiting_bytes(const struct sealed_link *link)
 {
     size_t bytes;
     return sealed_link_waiting(link, &bytes) ? bytes : 0;
 }
 
-/* Whether the last record is to be sent: everything before it is sealed, and the client is known. */
+/* Whether the final record is due: everything before it is sealed, and the client is authenticated. */
 static bool is_to_end(const struct connection *connection)
 {
     return connection->state == CONNECTION_FLUSHING && sealed_may_seal(connection->link->sealed) &&
@@ -106,7 +107,7 @@ bool sealing_open_next(struct connection *connection)
 {
     struct decode_error error = {0};
     size_t bytes = 0;
-    /* There is room for a record of any size behind the beginning of a message of any size. */
+    /* A record of any size fits behind the start of a message of any size. */
     switch (sealed_link_open(connection->link, connection->in + connection->in_used,
                              connection->in_capacity - connection->in_used, &bytes, &error)) {
     case SEALED_CONSUMED:

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A connection's bytes by way of its link, where it is sealed. */
+/* The bytes of a sealed connection, through its link. */
 #ifndef FARLIGHT_NET_SEALING_H
 #define FARLIGHT_NET_SEALING_H
 
@@ -9,11 +9,12 @@
 struct connection;
 struct iovec;
 
-/* Seals as much of what waits as fits, and gives what is to be sent next; the number of parts, 1 or 0: nothing. */
+/* Seals as many waiting bytes as fit, and gives the next bytes to send. Returns the number of parts: 1, or 0 for
+ * none. */
 size_t sealing_gather(struct connection *connection, struct iovec *part);
-/* Nothing is left to be sent, the end included where there is to be one. */
+/* Whether everything is sent, the final record included if one is due. */
 bool sealing_is_done(const struct connection *connection);
-/* Opens the next record, behind what is in `in`. False: none has come whole, or nothing more can come. */
+/* Opens the next record and appends it to `in`. False: no whole record has arrived, or the link has ended. */
 bool sealing_open_next(struct connection *connection);
 
 #endif

@@ -207,7 +207,7 @@ static void a_file_that_is_no_socket_is_not_touched(void **state)
     assert_non_null(file);
     fclose(file);
     assert_false(listener_open(&listener, &address, false, &error));
-    assert_non_null(strstr(error.text, "no socket"));
+    assert_non_null(strstr(error.text, "not a socket"));
     assert_int_equal(access(socket_path, F_OK), 0);
 }
 

@@ -298,7 +298,7 @@ static void a_message_may_be_slow_but_not_slower_than_the_limit(void **state)
     assert_true(clock_now_ns() - begun_ns > 3 * 200 * UINT64_C(1000000));
     expect_ok(within, 2);
     expect_error(slower, 0, PROTOCOL_ERROR_CODE_TIMEOUT);
-    assert_non_null(strstr(slower->message.error.text, "slower than 300 bytes a second"));
+    assert_non_null(strstr(slower->message.error.text, "at less than 300 bytes a second"));
     expect(slower, MESSAGE_GOODBYE, 0);
     expect_served(within);
     go(slower);

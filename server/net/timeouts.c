@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "net/patience.h"
+#include "net/timeouts.h"
 
 #include "base/log.h"
 #include "net/connection.h"
@@ -9,9 +9,9 @@
 
 #define NS_PER_MS UINT64_C(1000000)
 #define NS_PER_S UINT64_C(1000000000)
-/* A goodbye that is not taken in this time is not waited for. */
+/* Timeout for the delivery of a goodbye. */
 #define GOODBYE_NS (2 * NS_PER_S)
-/* Nothing is checked more often, nor less often than once a minute. */
+/* Shortest interval between two checks; the longest is a minute. */
 #define CHECK_MIN_NS (10 * NS_PER_MS)
 #define CHECK_MAX_NS (60 * NS_PER_S)
 
@@ -20,11 +20,11 @@ static uint64_t since(uint64_t then_ns, uint64_t now_ns)
     return now_ns > then_ns ? now_ns - then_ns : 0;
 }
 
-/* Bytes of an incomplete message that should be there by now; 0 within the grace. */
+/* Bytes of an incomplete message that must have arrived by now; 0 within the grace period. */
 static uint64_t progress_due_bytes(const struct connection *connection, uint64_t now_ns)
 {
     uint64_t elapsed_ns = since(connection->message_began_ns, now_ns);
-    /* While nothing is read from it, the client cannot go on. */
+    /* A client that is not read from cannot continue its message. */
     if (!connection->message_began_ns || connection->held || connection->over_soft_since_ns ||
         elapsed_ns < connection->limits->progress_grace_ms * NS_PER_MS)
         return 0;
@@ -44,30 +44,31 @@ static void check_open(struct connection *connection, uint64_t now_ns)
     char text[128];
     if (connection->over_soft_since_ns &&
         since(connection->over_soft_since_ns, now_ns) >= limits->queued_soft_ms * NS_PER_MS) {
-        log_write(LOG_WARNING, "net", "a client reads too slowly: %zu bytes wait for it; it is disconnected",
+        log_write(LOG_WARNING, "net", "disconnected a client that reads too slowly: %zu bytes wait for it",
                   connection->out.queued_bytes);
         connection_close(connection);
         return;
     }
     if (connection_incoming_bytes(connection) < progress_due_bytes(connection, now_ns)) {
-        snprintf(text, sizeof text, "a message came slower than %u bytes a second", limits->progress_bytes_per_s);
+        snprintf(text, sizeof text, "a message arrived at less than %u bytes a second",
+                 limits->progress_bytes_per_s);
         connection_finish(connection, PROTOCOL_ERROR_CODE_TIMEOUT, "", text);
         return;
     }
-    /* What waits to be sent for that long will not be read any more. */
+    /* A client that has not read for that long will not read any more. */
     if (limits->idle_ms && connection->out.queued_bytes &&
         since(connection->last_sent_ns, now_ns) >= limits->idle_ms * NS_PER_MS) {
-        log_write(LOG_INFO, "net", "a client stopped reading; it is disconnected");
+        log_write(LOG_INFO, "net", "disconnected a client that stopped reading");
         connection_close(connection);
         return;
     }
     if (is_idle(connection, now_ns)) {
-        snprintf(text, sizeof text, "nothing came for %u seconds", limits->idle_ms / 1000);
+        snprintf(text, sizeof text, "no message for %u seconds", limits->idle_ms / 1000);
         connection_finish(connection, PROTOCOL_ERROR_CODE_TIMEOUT, "", text);
     }
 }
 
-void patience_check(struct connection *connection, uint64_t now_ns)
+void timeouts_check(struct connection *connection, uint64_t now_ns)
 {
     switch (connection->state) {
     case CONNECTION_HELLO:
@@ -99,7 +100,7 @@ static void no_later(uint64_t *wait_ns, uint64_t since_ns, uint64_t allowed_ns, 
         *wait_ns = left_ns;
 }
 
-uint64_t patience_next_check_ns(const struct connection *connection, uint64_t now_ns)
+uint64_t timeouts_next_check_ns(const struct connection *connection, uint64_t now_ns)
 {
     const struct connection_limits *limits = connection->limits;
     uint64_t wait_ns = CHECK_MAX_NS;
@@ -119,7 +120,7 @@ uint64_t patience_next_check_ns(const struct connection *connection, uint64_t no
         uint64_t idle_ns = limits->idle_ms * NS_PER_MS;
         uint64_t last_ns = connection->last_received_ns > connection->last_sent_ns ? connection->last_received_ns
                                                                                    : connection->last_sent_ns;
-        /* Once idle for long but owed something, a look once a second is often enough. */
+        /* An idle client that waits for an answer is checked once a second. */
         if (idle_ns && since(last_ns, now_ns) < idle_ns)
             no_later(&wait_ns, last_ns, idle_ns, now_ns);
         else if (idle_ns)
