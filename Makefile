@@ -63,7 +63,9 @@ sources = $(sort $(foreach ending,$(2),$(shell find $(1) -name '*.$(ending)')))
 # Sealed connections are for the daemon and the library alone: helper programs go without libsodium.
 SEALED_SRC := $(call sources,protocol/sealed,c)
 DOCS_SRC := $(call sources,protocol/docs,c)
-PROTOCOL_SRC := $(filter-out $(DOCS_SRC) $(SEALED_SRC),$(call sources,protocol,c))
+# Forms of pixels, one of them packed with libzstd: likewise.
+PIXELS_SRC := $(call sources,protocol/pixels,c)
+PROTOCOL_SRC := $(filter-out $(DOCS_SRC) $(SEALED_SRC) $(PIXELS_SRC),$(call sources,protocol,c))
 SERVER_SRC := $(filter-out server/main.c,$(call sources,server,c))
 ifneq ($(EMBREE),1)
 SERVER_SRC := $(filter-out server/trace/reference/%,$(SERVER_SRC))
@@ -88,14 +90,15 @@ endif
 obj = $(patsubst %.c,$(B)/%.o,$(patsubst %.cpp,$(B)/%.opp,$(1)))
 PROTOCOL_OBJ := $(call obj,$(PROTOCOL_SRC))
 SEALED_OBJ := $(call obj,$(SEALED_SRC))
-SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ)
-LIB_OBJ := $(call obj,$(LIB_SRC)) $(SEALED_OBJ)
+PIXELS_OBJ := $(call obj,$(PIXELS_SRC))
+SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ) $(PIXELS_OBJ)
+LIB_OBJ := $(call obj,$(LIB_SRC)) $(SEALED_OBJ) $(PIXELS_OBJ)
 CLI_OBJ := $(call obj,$(CLI_SRC))
 # What the helper programs share is linked to each of them, as an archive: each takes what it needs.
 HELPER_OBJ := $(call obj,$(call sources,client/helper,c))
 IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX)) $(B)/helper.a
 EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/helper.a
-VIDEO_OBJ := $(call obj,$(VIDEO_C) $(addprefix client/lib/,rate.c ycbcr.c)) $(B)/helper.a
+VIDEO_OBJ := $(call obj,$(VIDEO_C) client/lib/rate.c protocol/pixels/ycbcr.c) $(B)/helper.a
 
 # The viewer takes the command line as render does.
 VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interrupt.c job_complete.c job_light.c job_options.c \
@@ -103,7 +106,7 @@ VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interr
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.0
-LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC))
+LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC))
 
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
 

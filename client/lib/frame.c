@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/frame.h"
-#include "lib/predicted.h"
 #include "lib/stream.h"
+#include "protocol/pixels/predicted.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -231,17 +231,23 @@ static bool decode_zstd(const struct fl_assembly *assembly, struct fl_error *err
     return true;
 }
 
-static bool decode_predicted(const struct fl_assembly *assembly, struct fl_error *error)
+static bool decode_predicted(const struct predicted_form *form, const uint8_t *encoded, uint64_t encoded_bytes,
+                             uint8_t *pixels, struct fl_error *error)
+{
+    const struct predicted_result result = predicted_decode(form, encoded, (size_t)encoded_bytes, pixels);
+    if (result.status == PREDICTED_NO_MEMORY)
+        return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    return result.status == PREDICTED_DONE ||
+           fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "not to be decompressed: %s", result.reason);
+}
+
+static bool decode_predicted_pixels(const struct fl_assembly *assembly, struct fl_error *error)
 {
     const struct fl_frame *frame = assembly->frame;
-    const struct fl_predicted predicted = {
-        .width = frame->width,
-        .rows = frame->height * (uint32_t)__builtin_popcount(frame->layers),
-        .pixel_bytes = fl_bytes_per_pixel(frame->format),
-        .encoded = assembly->encoded,
-        .encoded_bytes = picture_bytes(assembly),
-    };
-    return fl_predicted_decode(&predicted, frame->pixels, error);
+    const struct predicted_form form = {.width = frame->width,
+                                        .rows = frame->height * (uint32_t)__builtin_popcount(frame->layers),
+                                        .pixel_bytes = fl_bytes_per_pixel(frame->format)};
+    return decode_predicted(&form, assembly->encoded, picture_bytes(assembly), frame->pixels, error);
 }
 
 /* malloc'ed; NULL on failure. */
@@ -249,17 +255,11 @@ static void *decode_attachment(const struct fl_assembly *assembly, uint64_t offs
                                struct fl_error *error)
 {
     const struct fl_frame *frame = assembly->frame;
-    const struct fl_predicted predicted = {
-        .width = frame->width,
-        .rows = frame->height,
-        .pixel_bytes = ATTACHMENT_PIXEL_BYTES,
-        .encoded = assembly->encoded + offset_bytes,
-        .encoded_bytes = (size_t)bytes,
-    };
+    const struct predicted_form form = {frame->width, frame->height, ATTACHMENT_PIXEL_BYTES};
     uint8_t *made = malloc((size_t)frame->width * frame->height * ATTACHMENT_PIXEL_BYTES);
-    if (made == NULL)
+    if (!made)
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
-    if (made != NULL && fl_predicted_decode(&predicted, made, error))
+    if (made && decode_predicted(&form, assembly->encoded + offset_bytes, bytes, made, error))
         return made;
     free(made);
     return NULL;
@@ -311,7 +311,7 @@ static bool decode_pixels(const struct fl_assembly *assembly, struct fl_error *e
         memcpy(frame->pixels, assembly->encoded, frame->pixels_bytes);
     if (frame->encoding == PROTOCOL_ENCODING_ZSTD && !decode_zstd(assembly, error))
         return false;
-    if (frame->encoding == PROTOCOL_ENCODING_PREDICTED && !decode_predicted(assembly, error))
+    if (frame->encoding == PROTOCOL_ENCODING_PREDICTED && !decode_predicted_pixels(assembly, error))
         return false;
     if (XXH3_64bits(frame->pixels, frame->pixels_bytes) != frame->digest)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame.digest",

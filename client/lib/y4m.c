@@ -3,7 +3,7 @@
  * each. */
 #include "lib/rate.h"
 #include "lib/stream.h"
-#include "lib/ycbcr.h"
+#include "protocol/pixels/ycbcr.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -20,7 +20,7 @@ static const char frame_line[] = "FRAME\n";
 
 struct fl_y4m {
     struct fl_y4m_options options;
-    struct fl_ycbcr converter;
+    struct ycbcr_converter converter;
     uint8_t *frame; /* its line and its planes; NULL: before the first */
     size_t frame_bytes;
     bool broken;       /* ends within a frame: nothing more makes sense */
@@ -87,11 +87,11 @@ static bool write_all(struct fl_y4m *y4m, const uint8_t *bytes, size_t count, st
 
 /* ---- frames ---- */
 
-static struct fl_planes planes_of(const struct fl_y4m *y4m)
+static struct ycbcr_target planes_of(const struct fl_y4m *y4m)
 {
     const uint32_t width = y4m->converter.width, height = y4m->converter.height;
     const bool half = y4m->options.chroma == FL_Y4M_420;
-    struct fl_planes planes = {.width = width, .height = height, .half_chroma = half, .y_stride_bytes = width};
+    struct ycbcr_target planes = {.width = width, .height = height, .half_chroma = half, .y_stride_bytes = width};
     planes.c_stride_bytes = half ? (width + 1) / 2 : width;
     planes.y = y4m->frame + FRAME_LINE_BYTES;
     planes.cb = planes.y + (size_t)width * height;
@@ -109,7 +109,7 @@ static bool write_header(struct fl_y4m *y4m, const struct fl_frame *frame, struc
     const float rate = y4m->options.frames_per_second;
     fl_rate_exact(rate > 0 ? rate : 24, &numerator, &denominator);
     y4m->frame_bytes = FRAME_LINE_BYTES + luma_bytes + 2 * (half ? half_bytes : luma_bytes);
-    if (!fl_ycbcr_init(&y4m->converter, frame->width, frame->height) ||
+    if (!ycbcr_converter_init(&y4m->converter, frame->width, frame->height, YCBCR_ALPHA_OVER_BLACK) ||
         (y4m->frame = malloc(y4m->frame_bytes)) == NULL)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     memcpy(y4m->frame, frame_line, FRAME_LINE_BYTES);
@@ -145,8 +145,8 @@ bool fl_y4m_write(struct fl_y4m *y4m, const struct fl_frame *frame, struct fl_er
     y4m->broken = true; /* until it is not */
     if (y4m->frame == NULL && !write_header(y4m, frame, error))
         return false;
-    const struct fl_planes planes = planes_of(y4m);
-    fl_ycbcr_convert(&y4m->converter, frame->pixels, &planes);
+    const struct ycbcr_target planes = planes_of(y4m);
+    ycbcr_convert(&y4m->converter, frame->pixels, &planes);
     if (!write_all(y4m, y4m->frame, y4m->frame_bytes, error))
         return false;
     y4m->broken = false;
@@ -157,7 +157,7 @@ void fl_y4m_end(struct fl_y4m *y4m)
 {
     if (y4m == NULL)
         return;
-    fl_ycbcr_finish(&y4m->converter);
+    ycbcr_converter_finish(&y4m->converter);
     free(y4m->frame);
     free(y4m);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "encode.h"
-#include "lib/ycbcr.h"
+#include "protocol/pixels/ycbcr.h"
 #include "log.h"
 #include "sink.h"
 
@@ -22,7 +22,7 @@
 
 struct video_encoder {
     const struct video_plan *plan;
-    struct fl_ycbcr converter;
+    struct ycbcr_converter converter;
     struct video_sink sink;
     AVFormatContext *format;
     AVStream *stream;
@@ -159,7 +159,8 @@ struct video_encoder *video_encoder_create(const struct video_plan *plan, const 
                                            struct video_failure *failure)
 {
     struct video_encoder *encoder = calloc(1, sizeof *encoder);
-    bool good = encoder != NULL && fl_ycbcr_init(&encoder->converter, source->width, source->height);
+    bool good = encoder != NULL &&
+                ycbcr_converter_init(&encoder->converter, source->width, source->height, YCBCR_ALPHA_OVER_BLACK);
     if (good) {
         encoder->plan = plan;
         encoder->sink.fd = source->fd;
@@ -181,7 +182,7 @@ static void fill_rgb(struct video_encoder *encoder, const uint8_t *pixels)
 {
     const AVFrame *picture = encoder->picture;
     for (int y = 0; y < picture->height; y++) {
-        const uint8_t *rgb = fl_ycbcr_opaque_row(&encoder->converter, pixels, (uint32_t)y);
+        const uint8_t *rgb = ycbcr_opaque_row(&encoder->converter, pixels, (uint32_t)y);
         uint8_t *to = picture->data[0] + (ptrdiff_t)y * picture->linesize[0];
         for (int x = 0; x < picture->width; x++, to += 4, rgb += 3) {
             to[0] = rgb[2];
@@ -195,15 +196,15 @@ static void fill_rgb(struct video_encoder *encoder, const uint8_t *pixels)
 static void fill_ycbcr(struct video_encoder *encoder, const uint8_t *pixels)
 {
     const AVFrame *picture = encoder->picture;
-    const struct fl_planes planes = {.y = picture->data[0],
-                                     .cb = picture->data[1],
-                                     .cr = picture->data[2],
-                                     .y_stride_bytes = (size_t)picture->linesize[0],
-                                     .c_stride_bytes = (size_t)picture->linesize[1],
-                                     .width = (uint32_t)picture->width,
-                                     .height = (uint32_t)picture->height,
-                                     .half_chroma = true};
-    fl_ycbcr_convert(&encoder->converter, pixels, &planes);
+    const struct ycbcr_target planes = {.y = picture->data[0],
+                                        .cb = picture->data[1],
+                                        .cr = picture->data[2],
+                                        .y_stride_bytes = (size_t)picture->linesize[0],
+                                        .c_stride_bytes = (size_t)picture->linesize[1],
+                                        .width = (uint32_t)picture->width,
+                                        .height = (uint32_t)picture->height,
+                                        .half_chroma = true};
+    ycbcr_convert(&encoder->converter, pixels, &planes);
 }
 
 /* Writes what the encoder has ready; with `picture` NULL all of it. */
@@ -266,6 +267,6 @@ void video_encoder_destroy(struct video_encoder *encoder)
     if (encoder->format != NULL)
         video_sink_detach(encoder->format);
     avformat_free_context(encoder->format);
-    fl_ycbcr_finish(&encoder->converter);
+    ycbcr_converter_finish(&encoder->converter);
     free(encoder);
 }

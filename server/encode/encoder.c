@@ -16,6 +16,16 @@ static bool is_known(enum encoding encoding)
     return (unsigned)encoding < ENCODING_COUNT && impls[encoding];
 }
 
+/* Width and height have at most 32 bits each, so only their product with the pixel size can overflow. */
+size_t picture_bytes(const struct picture *picture)
+{
+    size_t row_bytes, bytes;
+    if (__builtin_mul_overflow((size_t)picture->width, (size_t)picture->bytes_per_pixel, &row_bytes) ||
+        __builtin_mul_overflow(row_bytes, (size_t)picture->height, &bytes))
+        return 0;
+    return bytes;
+}
+
 bool encoder_supports(enum encoding encoding, uint32_t bytes_per_pixel)
 {
     struct picture probe = {.width = 1, .height = 1, .bytes_per_pixel = bytes_per_pixel};

@@ -29,6 +29,9 @@ struct picture {
     struct ycbcr_planes planes;
 };
 
+/* Of the pixels; 0: more than a size_t can say. */
+size_t picture_bytes(const struct picture *picture);
+
 struct encoder_impl {
     const char *name;
     /* See encoder_takes(). NULL: none, whatever the quality. */

@@ -9,7 +9,7 @@
 
 #include "base/parallel.h"
 #include "encode/libav.h"
-#include "encode/ycbcr.h"
+#include "protocol/pixels/ycbcr.h"
 
 #include <errno.h>
 #include <math.h>
@@ -44,7 +44,7 @@ struct encoder_stream {
     AVCodecContext *codec;
     AVFrame *frame;
     AVPacket *packet;
-    uint8_t *scratch;
+    struct ycbcr_converter converter;
     uint32_t width, height;
     int64_t next_picture;
 };
@@ -122,8 +122,7 @@ static void stream_close(struct encoder_stream *stream)
     stream->av->av_packet_free(&stream->packet);
     stream->av->av_frame_free(&stream->frame);
     stream->av->avcodec_free_context(&stream->codec);
-    free(stream->scratch);
-    stream->scratch = NULL;
+    ycbcr_converter_finish(&stream->converter);
 }
 
 static enum outcome outcome_of(int status)
@@ -150,8 +149,8 @@ static enum outcome open_frame(struct encoder_stream *stream)
 {
     AVFrame *frame = stream->frame = stream->av->av_frame_alloc();
     stream->packet = stream->av->av_packet_alloc();
-    stream->scratch = malloc(ycbcr_scratch_bytes(stream->width));
-    if (!frame || !stream->packet || !stream->scratch)
+    if (!frame || !stream->packet ||
+        !ycbcr_converter_init(&stream->converter, stream->width, stream->height, YCBCR_ALPHA_IGNORED))
         return OUTCOME_NO_MEMORY;
     frame->format = stream->codec->pix_fmt;
     frame->width = stream->codec->width;
@@ -217,8 +216,9 @@ static bool fill_frame(struct encoder_stream *stream, const struct picture *pict
         .c_stride_bytes = (size_t)frame->linesize[1],
         .width = (uint32_t)frame->width,
         .height = (uint32_t)frame->height,
+        .half_chroma = true,
     };
-    ycbcr_convert(picture, &planes, stream->scratch);
+    ycbcr_convert(&stream->converter, picture->pixels, &planes);
     return true;
 }
 

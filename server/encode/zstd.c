@@ -7,15 +7,6 @@
 /* Higher levels need more than a second a megapixel. */
 #define LEVEL_MAX 19
 
-static size_t picture_bytes(const struct picture *picture)
-{
-    size_t row_bytes, bytes;
-    if (__builtin_mul_overflow((size_t)picture->width, (size_t)picture->bytes_per_pixel, &row_bytes) ||
-        __builtin_mul_overflow(row_bytes, (size_t)picture->height, &bytes))
-        return 0;
-    return bytes;
-}
-
 static size_t zstd_bound(const struct picture *picture)
 {
     size_t bytes = picture_bytes(picture);

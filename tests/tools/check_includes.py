@@ -14,6 +14,8 @@ STRUCTURES = {BASE, GPU, "server/scene", "server/gpu_scene", "server/trace", "sh
 MAY_INCLUDE = {
     "protocol": set(),
     "protocol/sealed": {"protocol"},
+    "protocol/common": set(),
+    "protocol/pixels": {"protocol/common"},
     "protocol/docs": {"protocol", "protocol/sealed"},
     BASE: set(),
     "server/scene": {BASE},
@@ -27,19 +29,19 @@ MAY_INCLUDE = {
     "server/trace/naive": STRUCTURES,
     "server/trace/reference": STRUCTURES,
     "server/render": STRUCTURES,
-    "server/encode": {BASE},
+    "server/encode": {BASE, "protocol/pixels"},
     "server/engine": {BASE, GPU, "server/scene", "server/gpu_scene", "server/trace", "server/render", "server/encode"},
     "server/net": {BASE, "protocol", "protocol/sealed"},
     "server/session": {BASE, "server/net", "server/scene", "server/engine", "server/encode", "server/render",
                        "protocol", "protocol/sealed", "server"},
     "server": {BASE, GPU, "server/net", "server/session", "server/engine", "server/encode", "protocol",
                "protocol/sealed"},
-    "client/lib": {"protocol", "protocol/sealed"},
+    "client/lib": {"protocol", "protocol/sealed", "protocol/pixels"},
     "client/cli": {"client/lib", "protocol", "protocol/sealed"},
     "client/helper": {"protocol"},
     "client/import": {"client/helper", "protocol"},
     "client/output": {"client/helper", "protocol"},
-    "client/video": {"client/helper", "client/lib", "protocol"},  # of lib: ycbcr, rate
+    "client/video": {"client/helper", "client/lib", "protocol", "protocol/pixels"},  # of lib: rate
     "client/viewer": {"protocol", "client/lib", "client/cli"},  # the command line is parsed as that of render
     "shaders/shared": set(),
     "shaders/raster": {"shaders/shared"},
@@ -57,7 +59,7 @@ RESTRICTED = [
     (re.compile(r"^SDL2?/"), {"client/viewer"}),
     (re.compile(r"^OpenImageIO/"), {"client/import", "client/output"}),
     (re.compile(r"^(tiny_gltf|tiny_obj_loader)"), {"client/import"}),
-    (re.compile(r"^(turbojpeg|zstd)\.h"), {"server/encode", "client/lib"}),
+    (re.compile(r"^(turbojpeg|zstd)\.h"), {"server/encode", "client/lib", "protocol/pixels"}),
     (re.compile(r"^sodium\.h"), {"server/base", "server/session", "client/lib", "client/import", "protocol/sealed",
                                   "protocol/docs"}),
 ]

@@ -2,7 +2,7 @@
 /* Videos through the real writer, read back with ffmpeg's own programs: what is in the file, what a player is told
  * about it, and what is left of one that does not come about. */
 #include "lib/helper.h"
-#include "lib/ycbcr.h"
+#include "protocol/pixels/ycbcr.h"
 
 #include <dirent.h>
 #include <math.h>
@@ -286,7 +286,7 @@ static void a_lossless_video_gives_every_pixel_back(void **state)
     need(true);
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         const uint32_t width = sizes[i][0], height = sizes[i][1];
-        struct fl_ycbcr converter;
+        struct ycbcr_converter converter;
         struct fl_video *video =
             fl_video_start(&(struct fl_video_options){.path = path_of("a.mkv"), .lossless = true}, &error);
         assert_non_null(video);
@@ -305,12 +305,12 @@ static void a_lossless_video_gives_every_pixel_back(void **state)
         fl_video_destroy(video);
         uint8_t *decoded;
         assert_int_equal(decode(video_path, "rgb24", &decoded), (size_t)2 * width * height * 3);
-        assert_true(fl_ycbcr_init(&converter, width, height));
+        assert_true(ycbcr_converter_init(&converter, width, height, YCBCR_ALPHA_OVER_BLACK));
         for (uint32_t row = 0; row < 2 * height; row++)
             assert_memory_equal(decoded + (size_t)row * width * 3,
-                                fl_ycbcr_opaque_row(&converter, frames[row / height].pixels, row % height),
+                                ycbcr_opaque_row(&converter, frames[row / height].pixels, row % height),
                                 (size_t)width * 3);
-        fl_ycbcr_finish(&converter);
+        ycbcr_converter_finish(&converter);
         probe(video_path);
         expect("codec_name=ffv1");
         expect("color_transfer=iec61966-2-1");

@@ -3,7 +3,7 @@
  * the stream byte by byte, and what becomes of it when nobody reads it. */
 #include "lib/farlight.h"
 #include "lib/rate.h"
-#include "lib/ycbcr.h"
+#include "protocol/pixels/ycbcr.h"
 
 #include <fcntl.h>
 #include <math.h>
@@ -63,9 +63,9 @@ static void every_colour_becomes_the_nearest_luma_and_chroma(void **state)
 {
     (void)state;
     static uint8_t pixels[256 * 4], y[256], cb[256], cr[256];
-    struct fl_ycbcr converter;
-    const struct fl_planes planes = {y, cb, cr, 256, 256, 256, 1, false};
-    assert_true(fl_ycbcr_init(&converter, 256, 1));
+    struct ycbcr_converter converter;
+    const struct ycbcr_target planes = {y, cb, cr, 256, 256, 256, 1, false};
+    assert_true(ycbcr_converter_init(&converter, 256, 1, YCBCR_ALPHA_OVER_BLACK));
     double greatest = 0;
     /* Red and blue in steps of 3 that hit both ends; green, which weighs most, in all steps. */
     for (unsigned red = 0; red < 256; red += 3)
@@ -73,7 +73,7 @@ static void every_colour_becomes_the_nearest_luma_and_chroma(void **state)
             for (unsigned green = 0; green < 256; green++)
                 memcpy(pixels + (size_t)4 * green, (uint8_t[]){(uint8_t)red, (uint8_t)green, (uint8_t)blue, 255},
                        4);
-            fl_ycbcr_convert(&converter, pixels, &planes);
+            ycbcr_convert(&converter, pixels, &planes);
             for (unsigned green = 0; green < 256; green++) {
                 double wanted[3];
                 ycbcr_of((double[]){red, green, blue}, wanted);
@@ -82,7 +82,7 @@ static void every_colour_becomes_the_nearest_luma_and_chroma(void **state)
                 greatest = fmax(greatest, fabs(cr[green] - wanted[2]));
             }
         }
-    fl_ycbcr_finish(&converter);
+    ycbcr_converter_finish(&converter);
     /* The nearest is half a step away at most; fixed point adds less than 1e-3 (see ycbcr.c). */
     if (greatest > 0.501)
         fail_msg("a value is off by %.4f", greatest);
@@ -92,11 +92,11 @@ static void black_white_and_grey_have_the_levels_of_the_standard(void **state)
 {
     (void)state;
     uint8_t pixels[] = {0, 0, 0, 255, 255, 255, 255, 255, 128, 128, 128, 255}, y[3], cb[3], cr[3];
-    struct fl_ycbcr converter;
-    const struct fl_planes planes = {y, cb, cr, 3, 3, 3, 1, false};
-    assert_true(fl_ycbcr_init(&converter, 3, 1));
-    fl_ycbcr_convert(&converter, pixels, &planes);
-    fl_ycbcr_finish(&converter);
+    struct ycbcr_converter converter;
+    const struct ycbcr_target planes = {y, cb, cr, 3, 3, 3, 1, false};
+    assert_true(ycbcr_converter_init(&converter, 3, 1, YCBCR_ALPHA_OVER_BLACK));
+    ycbcr_convert(&converter, pixels, &planes);
+    ycbcr_converter_finish(&converter);
     assert_memory_equal(y, ((uint8_t[]){16, 235, 126}), 3); /* 16 + 219 * 128 / 255 = 125.9 */
     assert_memory_equal(cb, ((uint8_t[]){128, 128, 128}), 3);
     assert_memory_equal(cr, ((uint8_t[]){128, 128, 128}), 3);
@@ -106,23 +106,23 @@ static void what_is_transparent_lies_over_black_in_linear_light(void **state)
 {
     (void)state;
     uint8_t *pixels = malloc(65536 * 4);
-    struct fl_ycbcr converter;
+    struct ycbcr_converter converter;
     assert_non_null(pixels);
-    assert_true(fl_ycbcr_init(&converter, 256, 256));
+    assert_true(ycbcr_converter_init(&converter, 256, 256, YCBCR_ALPHA_OVER_BLACK));
     for (unsigned i = 0; i < 65536; i++)
         memset(pixels + (size_t)4 * i, (int)(i % 256), 3), pixels[4 * i + 3] = (uint8_t)(i / 256);
     for (uint32_t alpha = 0; alpha < 256; alpha++) {
-        const uint8_t *row = fl_ycbcr_opaque_row(&converter, pixels, alpha);
+        const uint8_t *row = ycbcr_opaque_row(&converter, pixels, alpha);
         for (unsigned value = 0; value < 256; value++)
             if (fabs(row[3 * value] - over_black(value, alpha)) > 0.5 + 1e-9)
                 fail_msg("%u with alpha %u becomes %d in place of %f", value, alpha, row[3 * value],
                          over_black(value, alpha));
     }
     /* What every reader may rely on: opaque is as it is, transparent is black, half of white is 188, not 128. */
-    assert_int_equal(fl_ycbcr_opaque_row(&converter, pixels, 255)[3 * 77], 77);
-    assert_int_equal(fl_ycbcr_opaque_row(&converter, pixels, 0)[3 * 255], 0);
-    assert_int_equal(fl_ycbcr_opaque_row(&converter, pixels, 128)[3 * 255], 188);
-    fl_ycbcr_finish(&converter);
+    assert_int_equal(ycbcr_opaque_row(&converter, pixels, 255)[3 * 77], 77);
+    assert_int_equal(ycbcr_opaque_row(&converter, pixels, 0)[3 * 255], 0);
+    assert_int_equal(ycbcr_opaque_row(&converter, pixels, 128)[3 * 255], 188);
+    ycbcr_converter_finish(&converter);
     free(pixels);
 }
 
@@ -154,11 +154,11 @@ static void half_chroma_is_filtered_and_odd_pictures_repeat_their_edges(void **s
         uint32_t *size = sizes[i];
         uint8_t *pixels = noise_pixels(size[0], size[1], true), y[1024], cb[256], cr[256];
         const uint32_t even[2] = {(size[0] + 1) & ~1u, (size[1] + 1) & ~1u};
-        const struct fl_planes planes = {y, cb, cr, even[0], even[0] / 2, even[0], even[1], true};
-        struct fl_ycbcr converter;
-        assert_true(fl_ycbcr_init(&converter, size[0], size[1]));
-        fl_ycbcr_convert(&converter, pixels, &planes);
-        fl_ycbcr_finish(&converter);
+        const struct ycbcr_target planes = {y, cb, cr, even[0], even[0] / 2, even[0], even[1], true};
+        struct ycbcr_converter converter;
+        assert_true(ycbcr_converter_init(&converter, size[0], size[1], YCBCR_ALPHA_OVER_BLACK));
+        ycbcr_convert(&converter, pixels, &planes);
+        ycbcr_converter_finish(&converter);
         for (uint32_t at = 0; at < even[0] * even[1]; at++) {
             double wanted[3];
             const uint8_t *from =
@@ -391,18 +391,18 @@ static void ffmpeg_reads_the_stream_from_a_pipe(void **state)
         /* Nothing is converted on the way: the planes come back as they are. */
         static uint8_t planes_memory[37 * 21 * 3];
         const size_t luma = (size_t)width * height, chroma = half ? (size_t)19 * 11 : luma;
-        const struct fl_planes planes = {planes_memory,
-                                         planes_memory + luma,
-                                         planes_memory + luma + chroma,
-                                         width,
-                                         half ? 19 : width,
-                                         width,
-                                         height,
-                                         half != 0};
-        struct fl_ycbcr converter;
-        assert_true(fl_ycbcr_init(&converter, width, height));
-        fl_ycbcr_convert(&converter, pixels, &planes);
-        fl_ycbcr_finish(&converter);
+        const struct ycbcr_target planes = {planes_memory,
+                                            planes_memory + luma,
+                                            planes_memory + luma + chroma,
+                                            width,
+                                            half ? 19 : width,
+                                            width,
+                                            height,
+                                            half != 0};
+        struct ycbcr_converter converter;
+        assert_true(ycbcr_converter_init(&converter, width, height, YCBCR_ALPHA_OVER_BLACK));
+        ycbcr_convert(&converter, pixels, &planes);
+        ycbcr_converter_finish(&converter);
         const size_t frame_bytes = luma + 2 * chroma;
         assert_int_equal(read(out, found, sizeof found), count * frame_bytes);
         for (uint32_t n = 0; n < count; n++)

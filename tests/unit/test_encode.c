@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What is encoded comes back: exactly from raw, zstd and predicted, close enough from JPEG. */
 #include "encode/encoder.h"
+#include "protocol/pixels/predicted.h"
 
 #include "../accuracy/ycbcr_exact.h"
 
@@ -137,6 +138,10 @@ static void predicted_gives_every_bit_back_at_every_level(void **state)
         }
         uint8_t *out = encode(ENCODING_PREDICTED, &picture, qualities[i % 5], &bytes);
         uint8_t *back = decode_predicted(out, bytes, &picture);
+        assert_memory_equal(back, picture.pixels, expected);
+        memset(back, 0xa5, expected);
+        struct predicted_form form = {picture.width, picture.height, picture.bytes_per_pixel};
+        assert_int_equal(predicted_decode(&form, out, bytes, back).status, PREDICTED_DONE);
         assert_memory_equal(back, picture.pixels, expected);
         free(back);
         free(out);

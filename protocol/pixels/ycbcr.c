@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-#include "lib/ycbcr.h"
+#include "protocol/pixels/ycbcr.h"
+
+#include "protocol/common/srgb.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,59 +13,78 @@
 
 /* ---- alpha ---- */
 
-static double linear_from_srgb(double value)
+static uint8_t (*make_over_black(void))[256]
 {
-    return value <= 0.04045 ? value / 12.92 : pow((value + 0.055) / 1.055, 2.4);
-}
-
-static double srgb_from_linear(double value)
-{
-    return value <= 0.0031308 ? value * 12.92 : 1.055 * pow(value, 1 / 2.4) - 0.055;
-}
-
-bool fl_ycbcr_init(struct fl_ycbcr *converter, uint32_t width, uint32_t height)
-{
-    const size_t row_bytes = 3 * ((size_t)width + MARGIN_BEFORE + MARGIN_AFTER);
-    for (unsigned alpha = 0; alpha < 256; alpha++)
+    uint8_t(*over_black)[256] = malloc(sizeof(*over_black) * 256);
+    for (unsigned alpha = 0; over_black && alpha < 256; alpha++)
         for (unsigned value = 0; value < 256; value++)
-            converter->over_black[alpha][value] =
+            over_black[alpha][value] =
                 (uint8_t)lround(255 * srgb_from_linear(linear_from_srgb(value / 255.0) * alpha / 255.0));
-    converter->width = width;
-    converter->height = height;
-    converter->rows[0] = malloc(row_bytes);
-    converter->rows[1] = malloc(row_bytes);
-    if (converter->rows[0] != NULL && converter->rows[1] != NULL)
+    return over_black;
+}
+
+bool ycbcr_converter_init(struct ycbcr_converter *converter, uint32_t width, uint32_t height,
+                          enum ycbcr_alpha alpha)
+{
+    size_t row_bytes = 3 * ((size_t)width + MARGIN_BEFORE + MARGIN_AFTER);
+    *converter = (struct ycbcr_converter){
+        .over_black = alpha == YCBCR_ALPHA_OVER_BLACK ? make_over_black() : NULL,
+        .width = width,
+        .height = height,
+        .rows = {malloc(row_bytes), malloc(row_bytes)},
+    };
+    if (converter->rows[0] && converter->rows[1] && (alpha == YCBCR_ALPHA_IGNORED || converter->over_black))
         return true;
-    fl_ycbcr_finish(converter);
+    ycbcr_converter_finish(converter);
     return false;
 }
 
-void fl_ycbcr_finish(struct fl_ycbcr *converter)
+void ycbcr_converter_finish(struct ycbcr_converter *converter)
 {
+    free(converter->over_black);
     free(converter->rows[0]);
     free(converter->rows[1]);
-    converter->rows[0] = converter->rows[1] = NULL;
+    *converter = (struct ycbcr_converter){0};
 }
 
-/* Makes one row of RGB with its margins; rows beyond the last are the last one. The first pixel of the picture. */
-static const uint8_t *make_row(struct fl_ycbcr *converter, unsigned which, const uint8_t *pixels, uint32_t row)
+/* Three bytes of each four. */
+static void copy_colours(uint8_t *to, const uint8_t *from, uint32_t width)
 {
-    const uint32_t width = converter->width;
-    const uint8_t *from = pixels + 4 * (size_t)width * (row < converter->height ? row : converter->height - 1);
-    uint8_t *first = converter->rows[which] + (size_t)3 * MARGIN_BEFORE, *to = first;
     for (uint32_t x = 0; x < width; x++, from += 4, to += 3) {
+        to[0] = from[0];
+        to[1] = from[1];
+        to[2] = from[2];
+    }
+}
+
+static void copy_over_black(const struct ycbcr_converter *converter, uint8_t *to, const uint8_t *from)
+{
+    for (uint32_t x = 0; x < converter->width; x++, from += 4, to += 3) {
         const uint8_t *shown = converter->over_black[from[3]];
         to[0] = shown[from[0]];
         to[1] = shown[from[1]];
         to[2] = shown[from[2]];
     }
+}
+
+/* Makes one row of RGB with its margins, and returns its first pixel; rows beyond the last are the last one. */
+static const uint8_t *make_row(struct ycbcr_converter *converter, unsigned which, const uint8_t *pixels,
+                               uint32_t row)
+{
+    const uint32_t width = converter->width;
+    const uint8_t *from = pixels + 4 * (size_t)width * (row < converter->height ? row : converter->height - 1);
+    uint8_t *first = converter->rows[which] + (size_t)3 * MARGIN_BEFORE, *to = first + 3 * (size_t)width;
+    if (converter->over_black)
+        copy_over_black(converter, first, from);
+    else
+        copy_colours(first, from, width);
     for (unsigned i = 0; i < MARGIN_AFTER; i++, to += 3)
         memcpy(to, to - 3, 3);
     memcpy(first - 3, first, 3);
     return first;
 }
 
-const uint8_t *fl_ycbcr_opaque_row(struct fl_ycbcr *converter, const uint8_t *pixels, uint32_t row)
+const uint8_t *ycbcr_opaque_row(struct ycbcr_converter *converter, const uint8_t *pixels, uint32_t row)
 {
     return make_row(converter, 0, pixels, row);
 }
@@ -71,9 +92,8 @@ const uint8_t *fl_ycbcr_opaque_row(struct fl_ycbcr *converter, const uint8_t *pi
 /* ---- Y'CbCr ---- */
 
 /* BT.709-6: E'Y = 0.2126 R + 0.7152 G + 0.0722 B, E'Cb = (B - E'Y) / 1.8556, E'Cr = (R - E'Y) / 1.5748; then 219
- * E'Y
- * + 16 and 224 E'C + 128. Fixed point: with 22 bits a luma is off by less than 1e-4 of a step; chroma is taken of
- * sums over 8 weights, so that 19 bits stay within 31 (off by less than 1e-3). */
+ * E'Y + 16 and 224 E'C + 128. Fixed point: with 22 bits a luma is off by less than 1e-4 of a step; chroma is taken
+ * of sums over 8 weights, so that 19 bits stay within 31 (off by less than 1e-3). */
 #define LUMA_BITS 22
 #define CHROMA_BITS 19
 #define FIXED(value, bits) ((int32_t)((value) * (1 << (bits)) + ((value) < 0 ? -0.5 : 0.5)))
@@ -124,7 +144,7 @@ static void convert_half_chroma(const uint8_t *upper, const uint8_t *lower, uint
     }
 }
 
-void fl_ycbcr_convert(struct fl_ycbcr *converter, const uint8_t *pixels, const struct fl_planes *planes)
+void ycbcr_convert(struct ycbcr_converter *converter, const uint8_t *pixels, const struct ycbcr_target *planes)
 {
     const uint32_t half_width = (planes->width + 1) / 2;
     for (uint32_t row = 0; row < planes->height; row += planes->half_chroma ? 2 : 1) {
