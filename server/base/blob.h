@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #define BLOB_HASH_BYTES 32
-#define BLOB_CHUNK_BYTES ((size_t)1 << 20) /* hashed piece by piece, so that a pool can share the work */
+#define BLOB_CHUNK_BYTES ((size_t)1 << 20) /* hashed chunk by chunk, so that a pool can share the work */
 
 struct blob {
     atomic_uint references;
@@ -20,9 +20,9 @@ struct blob {
 };
 
 struct blob *blob_create(size_t size_bytes); /* one reference, data not initialised; NULL: out of memory */
-/* The same with no data yet, for bytes that come piece by piece from somebody who may never send them all:
- * blob_reserve() makes `data` hold at least `needed_bytes`, keeping what is there, and may move it. Only
- * while nobody else has a reference. False: out of memory, or more than the size. */
+/* The same without data, for bytes that arrive in chunks and may never be complete: blob_reserve() grows `data` to
+ * at least `needed_bytes`, keeps its contents and may move it. Only while there is one reference. False: out of
+ * memory, or more than the size. */
 struct blob *blob_create_empty(size_t size_bytes);
 bool blob_reserve(struct blob *blob, size_t needed_bytes);
 struct blob *blob_ref(struct blob *blob); /* accepts and returns NULL */

@@ -10,7 +10,7 @@
 
 /* Pairs lie densely in `slots`; `index` finds them, by linear probing. */
 struct hashmap {
-    struct hashmap_slot *slots; /* `count` pairs, room for half of `capacity` */
+    struct hashmap_slot *slots; /* `count` pairs, at most half of `capacity` */
     uint32_t *index;            /* `capacity` positions in `slots`, plus 1; 0: free */
     size_t capacity;            /* power of two, or 0 */
     size_t count;

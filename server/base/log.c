@@ -54,7 +54,7 @@ void log_write(enum log_level level, const char *module, const char *format, ...
         used += strlen(line + used);
     make_harmless(line, used);
     line[used++] = '\n';
-    /* There is nobody left to tell when standard error fails. */
+    /* A failure of standard error cannot be reported anywhere. */
     ssize_t written = write(STDERR_FILENO, line, used);
     (void)written;
 }

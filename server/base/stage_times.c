@@ -21,7 +21,8 @@ static struct stage_span *last_of(struct stage_times *times, uint32_t count, enu
     return NULL;
 }
 
-/* Puts the last span of a kind that has several (there is one: there are few kinds) into the one before it. */
+/* Merges the last span of a repeated kind into the span before it. There is such a kind, as there are few kinds.
+ */
 static void make_room(struct stage_times *times)
 {
     for (uint32_t i = times->count; i-- > 0;) {
@@ -48,7 +49,7 @@ void stage_times_add(struct stage_times *times, enum stage_id stage, enum stage_
         }
         make_room(times);
     }
-    /* What began before the frame was taken up (the edits it waited for) starts at its origin. */
+    /* Spans from before the frame's start (edits that it waited for) begin at its origin. */
     uint64_t since_origin_ns = start_ns > times->origin_ns ? start_ns - times->origin_ns : 0;
     times->spans[times->count++] = (struct stage_span){
         .stage = stage,

@@ -41,7 +41,7 @@ struct stage_span {
 #define STAGE_SPANS_MAX 512
 
 struct stage_times {
-    uint64_t origin_ns; /* clock_now_ns() when the frame was taken up */
+    uint64_t origin_ns; /* clock_now_ns() at the frame's start */
     uint32_t count;
     struct stage_span spans[STAGE_SPANS_MAX];
 };

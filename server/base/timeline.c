@@ -171,7 +171,7 @@ static struct job_tracks *find_tracks(struct timeline *timeline, const struct ti
     return oldest;
 }
 
-/* Whether the lane goes on with such an event; then it has it. */
+/* Appends the event if the lane can hold it; false otherwise. */
 static bool lane_takes(struct lane *lane, uint64_t start_ns, uint64_t end_ns)
 {
     unsigned depth = lane->depth;
@@ -216,7 +216,7 @@ static enum track track_of(const struct stage_span *span)
                                                                                                   : TRACK_RENDER;
 }
 
-/* By start; what contains others before them. */
+/* By start; an event before those that it contains. */
 static int compare_spans(const void *a, const void *b)
 {
     const struct stage_span *first = *(const struct stage_span *const *)a;

@@ -3,7 +3,7 @@
  * form of the Trace Event Format (Google. Trace Event Format. 2016), complete events ("X"), microseconds of
  * clock_now_ns(), processes are clients, threads are tracks of a job: render, output (encoding, waiting, sending)
  * and GPU, each with more lanes where frames overlap, so that the events of one thread nest.
- * A thread of its own writes; whoever reports never waits for the disk. While the daemon runs, and after a crash,
+ * A thread of its own writes; callers never wait for the disk. While the daemon runs, and after a crash,
  * the file lacks its last line, "]", which the format allows. */
 #ifndef FARLIGHT_BASE_TIMELINE_H
 #define FARLIGHT_BASE_TIMELINE_H
@@ -26,7 +26,7 @@ struct timeline *timeline_create(const char *path, uint64_t limit_bytes, struct 
 /* Copies what it needs. From one thread. `timeline` may be NULL. A frame is left out, and counted, where the disk
  * is so slow that 8 MiB wait for it. */
 void timeline_frame(struct timeline *timeline, const struct timeline_frame *frame);
-/* Writes what waits and the end of the array. */
+/* Writes the waiting events and the end of the array. */
 void timeline_destroy(struct timeline *timeline);
 
 #endif

@@ -21,8 +21,8 @@ struct ycbcr_planes {
 };
 
 /* In one allocation, a row of luma is followed by a row of chroma: Cb in even rows, Cr in odd ones. So each plane
- * has a stride, and what a few rows have of all three lies together, as it comes from the device. Strides of luma
- * are multiples of 8: both kinds of rows are made of whole words there. */
+ * has a stride, and the bytes of some rows of all three planes are contiguous, as they come from the device.
+ * Strides of luma are multiples of 8: both kinds of rows consist of whole words there. */
 static inline size_t ycbcr_luma_bytes(uint32_t width)
 {
     return ((size_t)width + 7) & ~(size_t)7;

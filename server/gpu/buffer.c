@@ -42,13 +42,13 @@ static bool allocate(struct gpu_device *device, struct gpu_buffer *buffer, size_
         gpu_note_loss(device, error);
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no more buffer names");
     }
-    /* What stands here from before is not this allocation's fault, but must not hide it either. */
+    /* Clears older errors, which are not this allocation's and must not hide its own. */
     GLenum before = glGetError();
     glNamedBufferStorage(buffer->name, (GLsizeiptr)capacity, NULL, STORAGE_FLAGS);
     if (glGetError() != GL_NO_ERROR) {
         release(device, buffer);
         gpu_note_loss(device, error);
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a buffer of %zu bytes",
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver cannot allocate a buffer of %zu bytes",
                          capacity);
     }
     if (before != GL_NO_ERROR)
@@ -67,7 +67,7 @@ bool gpu_buffer_reserve(struct gpu_device *device, struct gpu_buffer *buffer, si
         if (!allocate(device, buffer, grown_capacity(old_bytes, size_bytes), error))
             return false;
     } else if (size_bytes != buffer->size_bytes) {
-        /* The texture over it spans what is in use; the next bind makes it anew. */
+        /* The buffer texture spans the used bytes; the next bind makes it again. */
         gpu_object_destroy(device->registry, GPU_TEXTURE_BUFFER, buffer->texture);
         buffer->texture = 0;
     }

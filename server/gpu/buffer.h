@@ -19,8 +19,8 @@ struct gpu_buffer {
     size_t capacity_bytes;
 };
 
-/* Makes room for at least size_bytes (growth is geometric; contents are lost when it grows).
- * Memory is counted in the device; fails with ERROR_OUT_OF_MEMORY before the driver would. */
+/* Reserves at least size_bytes (growth is geometric; contents are lost when it grows). The memory counts in the
+ * device; fails with ERROR_OUT_OF_MEMORY before the driver would. */
 bool gpu_buffer_reserve(struct gpu_device *device, struct gpu_buffer *buffer, size_t size_bytes,
                         struct error *error);
 /* Reserve, then write all. `data` NULL: left undefined. */
@@ -28,8 +28,8 @@ bool gpu_buffer_upload(struct gpu_device *device, struct gpu_buffer *buffer, con
                        struct error *error);
 void gpu_buffer_write(struct gpu_device *device, struct gpu_buffer *buffer, size_t offset_bytes, const void *data,
                       size_t size_bytes);
-/* Reserve, then all of it as memory to be written to, each byte once and in order where that is easy (it may be
- * write-combined). NULL and *error if there is none. unmap before the GPU uses it. */
+/* Reserves the buffer and maps all of it for writing: each byte once, in order where that is easy (the memory may
+ * be write-combined). NULL and *error on failure. Unmap it before the GPU uses it. */
 void *gpu_buffer_map(struct gpu_device *device, struct gpu_buffer *buffer, size_t size_bytes, struct error *error);
 void gpu_buffer_unmap(struct gpu_device *device, struct gpu_buffer *buffer);
 void gpu_buffer_read(struct gpu_device *device, const struct gpu_buffer *buffer, size_t offset_bytes, void *data,

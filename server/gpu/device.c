@@ -96,7 +96,8 @@ static void ask_facts(struct gpu_facts *facts, bool software, bool robust, bool 
         facts->memory_bytes = host_memory_bytes();
 }
 
-/* What the shaders use beyond what every OpenGL 4.5 has; tests/tools/check_shaders.py holds them to it. */
+/* What the shaders need beyond the minima of OpenGL 4.5; tests/tools/check_shaders.py checks that they need no
+ * more. */
 static bool has_bindings(struct error *error)
 {
     static const struct {
@@ -156,7 +157,7 @@ static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const 
             *chosen = places[i];
             if (by_index || software || !renders_in_software())
                 return true;
-            /* Mesa offers itself for hardware that it cannot drive, such as that of another driver. */
+            /* Mesa offers devices that it cannot drive, such as those of another driver. */
             places[i].software = true;
             gpu_egl_close(egl);
         }
@@ -164,16 +165,16 @@ static bool open_place(struct gpu_egl *egl, struct gpu_egl_place *chosen, const 
     if (last.kind != ERROR_NONE)
         error_set(error, last.kind, "device", "%s", last.text);
     else if (by_index)
-        error_set(error, ERROR_UNSUPPORTED, "device", "there is no device %d; EGL knows %zu", options->index,
+        error_set(error, ERROR_UNSUPPORTED, "device", "device %d does not exist; EGL lists %zu", options->index,
                   count);
     else
         error_set(error, ERROR_UNSUPPORTED, "device", "EGL knows no %sdevice",
                   options->software ? "software " : "");
-    return error_remedy(error, "farlightd --list-devices shows what there is; Mesa's software renderer is in the "
+    return error_remedy(error, "farlightd --list-devices lists the devices; Mesa's software renderer is in the "
                                "packages libegl-mesa0 and libgl1-mesa-dri");
 }
 
-/* What every pass may count on. */
+/* The state that every pass may rely on. */
 static bool create_defaults(struct gpu_device *device, struct error *error)
 {
     static const unsigned char zeros[EMPTY_BUFFER_BYTES];
@@ -215,7 +216,7 @@ struct gpu_device *gpu_device_create(const struct gpu_options *options, struct e
     }
     ask_info(&device->info, &place);
     if (options->software && !device->info.software) {
-        error_set(error, ERROR_UNSUPPORTED, "device", "there is no software device, only %s", device->info.name);
+        error_set(error, ERROR_UNSUPPORTED, "device", "no software device was found, only %s", device->info.name);
         goto fail;
     }
     ask_facts(&device->facts, device->info.software, device->egl->robust, debug);

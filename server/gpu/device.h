@@ -39,8 +39,8 @@ struct gpu_device {
     struct gpu_egl *egl;                /* private to device.c */
     struct gpu_registry *registry;      /* every GL object that lives, see registry.h */
     struct gpu_program_cache *programs; /* private to program.c */
-    unsigned empty_buffer;              /* 256 zero bytes: what an empty buffer is bound as */
-    uint64_t memory_used_bytes;         /* what gpu_memory_take counted: buffers, textures, Embree */
+    unsigned empty_buffer;              /* 256 zero bytes, bound in place of an empty buffer */
+    uint64_t memory_used_bytes;         /* counted by gpu_memory_take: buffers, textures, Embree */
     uint64_t memory_limit_bytes;        /* 0: none; facts.memory_bytes at first */
     bool lost;                          /* the context; nothing works any more, see gpu_note_loss */
 };
@@ -55,7 +55,7 @@ struct gpu_options {
  * Returns the number, at most `max`. */
 size_t gpu_device_list(struct gpu_device_info *list, size_t max);
 /* Makes a context and makes it current on this thread, with an empty vertex array bound (a pass that pulls its
- * vertices draws at once). NULL and *error when there is none. */
+ * vertices draws at once). NULL and *error on failure. */
 struct gpu_device *gpu_device_create(const struct gpu_options *options, struct error *error);
 void gpu_device_destroy(struct gpu_device *device); /* accepts NULL; on the same thread */
 /* How many GL objects live in it, programs aside: each stays once it was needed. */

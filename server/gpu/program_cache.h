@@ -16,7 +16,7 @@ struct gpu_program_cache *gpu_program_cache_create(void); /* NULL: out of memory
 void gpu_program_cache_destroy(struct gpu_program_cache *cache);
 
 /* A program's binary on the disk, under a hash of its sources and of the driver's vendor, renderer and version.
- * Both are silent where there is no cache: no binaries, a home that cannot be written, a full disk. */
+ * Both do nothing without a cache: no binaries, a home that cannot be written, a full disk. */
 struct gpu_binary_key {
     uint64_t low, high;
 };

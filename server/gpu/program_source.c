@@ -92,7 +92,7 @@ static const char *define_value(const struct gpu_define *defines, const char *na
     return NULL;
 }
 
-/* What stands between the quotes of `"path"`; NULL if it is none. */
+/* The text between the quotes of `"path"`; NULL if there are no quotes. */
 static const char *quoted(const char *at, const char *end, size_t *length)
 {
     if (at >= end || *at != '"')
@@ -127,7 +127,7 @@ static bool expand_include(struct expansion *expansion, const char *at, const ch
         return error_set(expansion->error, ERROR_INTERNAL, NULL, "%s:%u: #include names no file",
                          expansion->text->files[file], line_number);
     if (!expand_file(expansion, path, length))
-        return error_set(expansion->error, ERROR_INTERNAL, NULL, "%s:%u: there is no shader file \"%.*s\"",
+        return error_set(expansion->error, ERROR_INTERNAL, NULL, "%s:%u: the shader file \"%.*s\" does not exist",
                          expansion->text->files[file], line_number, (int)length, path);
     return append_format(expansion->text, expansion->error, "#line %u %u\n", line_number + 1, file);
 }
@@ -185,7 +185,7 @@ bool gpu_source_expand(struct gpu_source_text *text, gpu_source_lookup lookup, c
             ok = append_format(text, error, "#define %s %s\n", define->name, value);
     }
     if (ok && !expand_file(&expansion, path, strlen(path)))
-        ok = error_set(error, ERROR_INTERNAL, NULL, "there is no shader file \"%s\"", path);
+        ok = error_set(error, ERROR_INTERNAL, NULL, "the shader file \"%s\" does not exist", path);
     if (!ok)
         gpu_source_finish(text);
     return ok;

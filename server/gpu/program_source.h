@@ -19,7 +19,8 @@ struct gpu_source_text {
     unsigned file_count;
 };
 
-/* Finds a file by its path below shaders/; false: there is none. The path that is kept must outlive the text. */
+/* Finds a file by its path below shaders/; false: it does not exist. The path that is kept must outlive the text.
+ */
 typedef bool (*gpu_source_lookup)(const char *path, size_t path_length, const char **kept_path, const char **begin,
                                   const char **end);
 /* The files that are compiled into the binary. */

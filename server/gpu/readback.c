@@ -44,7 +44,7 @@ static bool reserve(struct gpu_device *device, struct gpu_readback *readback, si
         return true;
     gpu_readback_finish(device, readback);
     gpu_note_loss(device, error);
-    return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a copy of %zu bytes",
+    return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver cannot allocate a copy of %zu bytes",
                      size_bytes);
 }
 
@@ -64,7 +64,7 @@ bool gpu_readback_fence(struct gpu_readback *readback, struct error *error)
 {
     readback->fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
     glFlush();
-    return readback->fence || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a fence");
+    return readback->fence || error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver cannot allocate a fence");
 }
 
 bool gpu_readback_is_done(const struct gpu_readback *readback)

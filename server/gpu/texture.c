@@ -79,7 +79,7 @@ static bool reserve(struct gpu_device *device, struct gpu_texture *texture, unsi
     texture->layers = layers;
     texture->name = gpu_object_create(device->registry, kind_of(texture));
     if (texture->name) {
-        (void)glGetError(); /* an older error would be taken for this call's */
+        (void)glGetError(); /* an older error would be attributed to this call */
         if (layers > 0)
             glTextureStorage3D(texture->name, 1, internal_format, (GLsizei)width, (GLsizei)height,
                                (GLsizei)layers);
@@ -89,7 +89,7 @@ static bool reserve(struct gpu_device *device, struct gpu_texture *texture, unsi
     if (!texture->name || glGetError() != GL_NO_ERROR) {
         gpu_texture_finish(device, texture);
         gpu_note_loss(device, error);
-        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver has no room for a texture of %ux%u", width,
+        return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "the driver cannot allocate a texture of %ux%u", width,
                          height);
     }
     glTextureParameteri(texture->name, GL_TEXTURE_MIN_FILTER, row->filter);

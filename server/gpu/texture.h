@@ -20,7 +20,7 @@ struct gpu_texture {
 /* (Re)makes it where size or format differ. */
 bool gpu_texture_reserve(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
                          uint32_t width, uint32_t height, struct error *error);
-/* Likewise an array of as many layers, 1 and more. */
+/* The same for an array of `layers` layers, at least 1. */
 bool gpu_texture_reserve_array(struct gpu_device *device, struct gpu_texture *texture, unsigned internal_format,
                                uint32_t width, uint32_t height, uint32_t layers, struct error *error);
 void gpu_texture_write(struct gpu_texture *texture, unsigned format, unsigned type, const void *texels);
@@ -30,7 +30,7 @@ void gpu_texture_bind(const struct gpu_texture *texture, unsigned unit);
 struct gpu_framebuffer {
     unsigned name;
 };
-/* Arrays are attached with all their layers, of which all attachments then have as many. */
+/* Arrays are attached with all their layers; all attachments must have the same number. */
 bool gpu_framebuffer_create(struct gpu_device *device, struct gpu_framebuffer *framebuffer,
                             const struct gpu_texture *colours, unsigned colour_count,
                             const struct gpu_texture *depth, struct error *error);

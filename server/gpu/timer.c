@@ -127,7 +127,7 @@ void gpu_timer_collect(struct gpu_timer *timer, struct stage_times *times)
         gpu_timer_end(timer);
     if (!all_available(timer))
         glFinish();
-    /* What the GPU's clock shows now, so that its times can be told in ours. */
+    /* The GPU's clock now, to convert its times to the host's. */
     GLint64 gpu_now_ns = 0;
     glGetInteger64v(GL_TIMESTAMP, &gpu_now_ns);
     uint64_t cpu_from_gpu_ns = clock_now_ns() - (uint64_t)gpu_now_ns; /* wraps, and wraps back */

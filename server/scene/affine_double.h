@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The same 3x4 transforms in double, for chains of nodes: what is rounded once at the end does not drift. */
+/* The same 3x4 transforms in double, for chains of nodes: one rounding at the end does not drift. */
 #ifndef FARLIGHT_SCENE_AFFINE_DOUBLE_H
 #define FARLIGHT_SCENE_AFFINE_DOUBLE_H
 

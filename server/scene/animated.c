@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of what moves: weights of morph targets, skins, clips and their channels, each alone. */
+/* Checks of animated objects, each alone: weights of morph targets, skins, clips and their channels. */
 #include "scene/channel.h"
 #include "scene/edit.h"
 

@@ -7,8 +7,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Numbers that are looked at for the bounds of deformed meshes: a second or two, which nobody else is served in.
- * Devices have no room for much more; what is beyond counts as if it stood at rest. */
+/* Maximum of numbers that are read for the bounds of deformed meshes: a second or two, in which no other client is
+ * served. Device memory does not hold many more; meshes beyond it count with their rest pose. */
 #define DEFORM_NUMBERS_MAX (UINT64_C(1) << 30)
 
 static void extend(float lower[3], float upper[3], const float other_lower[3], const float other_upper[3])
@@ -47,7 +47,7 @@ static bool extend_by_deformed(const struct scene *scene, const struct scene_pos
     return found;
 }
 
-/* Takes what a mesh costs to deform from what is left; false: it is too much. */
+/* Subtracts the cost of deforming a mesh from the budget. False: the budget does not suffice. */
 static bool afford(const struct scene_mesh *mesh, uint64_t *left)
 {
     uint64_t cost = (uint64_t)mesh->vertex_count * (1 + mesh->target_count + mesh->influence_count) +

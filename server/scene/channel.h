@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What each path of a channel is. Private to scene/. */
+/* The properties of each channel path. Private to scene/. */
 #ifndef FARLIGHT_SCENE_CHANNEL_H
 #define FARLIGHT_SCENE_CHANNEL_H
 

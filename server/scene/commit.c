@@ -53,7 +53,7 @@ static bool take_edit(struct draft *draft, struct scene_edit *edit)
     if (!id)
         return edit_error(&place, ERROR_INVALID, "", "0 is no identifier: it means none");
     if (edit->kind == EDIT_REMOVE && !draft_find(draft, edit->object, id))
-        return edit_error(&place, ERROR_UNKNOWN_ID, "", "there is no %s %u to remove",
+        return edit_error(&place, ERROR_UNKNOWN_ID, "", "cannot remove %s %u: it does not exist",
                           object_kind_name(edit->object), id);
     if (edit->kind == EDIT_SET && !content_check(edit, &place))
         return false;
@@ -110,7 +110,8 @@ static struct size draft_size(const struct draft *draft)
     return size;
 }
 
-/* Host memory after the transaction, and nodes. What makes a scene smaller is allowed in any case. */
+/* Limits of host memory and nodes after the transaction. A transaction that makes the scene smaller is always
+ * allowed. */
 static bool limits_check(const struct draft *draft, const struct size *size)
 {
     const struct scene *scene = draft->scene;
@@ -175,8 +176,8 @@ static void give_room_back(struct draft *draft)
     }
 }
 
-/* Notes that a node of that kind appears, moves or goes. What moves with it is not known when others hang
- * below: then everything may have. Any node may be the joint of a skin, which moves meshes. */
+/* Notes that a node of that kind appears, moves or is removed. With children, everything counts as moved. Any node
+ * may be the joint of a skin, which moves meshes. */
 static void touch_node(struct scene *scene, const struct scene_node *node)
 {
     bool alone = node->child_count == 0;

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What goes along with what is removed. A channel without its clip, or without what it changes, has no meaning,
- * and a skin without one of its joints none either: whoever removes a model removes its nodes, and should not have
- * to know what they were animated by. */
+/* Objects that are removed together with others: a channel with its clip or its target, a skin with any of its
+ * joints. A client that removes a model removes its nodes, and need not know what animates them. */
 #include "scene/channel.h"
 #include "scene/draft.h"
 

@@ -158,8 +158,8 @@ static double dot(const double a[4], const double b[4])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
 }
 
-/* Between two unit quaternions on a sphere, along the shorter arc; half of what the rotation turns. It comes from
- * the lengths of sum and difference, which is exact for small angles too. */
+/* The angle between two unit quaternions along the shorter arc: half the angle of the rotation. Computed from the
+ * lengths of sum and difference, which is exact for small angles too. */
 static double arc_between(const double from[4], const double to[4], double sign)
 {
     double sum = 0.0, difference = 0.0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Numbers over time through keys: what channels of clips and the keys of a camera have in common. Pure. */
+/* Keyed numbers over time: shared by the channels of clips and the keys of a camera. Pure. */
 #ifndef FARLIGHT_SCENE_CURVE_H
 #define FARLIGHT_SCENE_CURVE_H
 
@@ -11,7 +11,8 @@
 #define CURVE_WIDTH_MAX 1024
 
 /* Borrowed arrays. Times ascend strictly; everything is finite. With cubic spline and bezier a key has three
- * values of `width` numbers, one after the other: what comes in, its own, what goes out. */
+ * values of `width` numbers in a row: incoming tangent or control value, the key's own value, outgoing tangent or
+ * control value. */
 struct curve {
     const float *times, *values;
     size_t time_stride, key_stride; /* floats from one key to the next */

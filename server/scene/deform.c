@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Meshes that change their shape: morph targets, then joints (glTF 2.0, sections 3.7.2.2 and 3.7.3). Sums are in
- * double; what the GPU makes of the same numbers is compared with it. */
+/* Deformation of meshes: morph targets, then joints (glTF 2.0, sections 3.7.2.2 and 3.7.3). Sums are in double;
+ * tests compare the GPU's results with these. */
 #include "scene/affine.h"
 #include "scene/pose.h"
 

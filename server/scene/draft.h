@@ -20,7 +20,7 @@ struct draft {
     size_t edit_count;
     struct hashmap last[SCENE_OBJECT_KIND_COUNT];      /* struct scene_edit *, by object id */
     struct scene_edit *last_environment;               /* NULL: unchanged */
-    struct draft_list fallen[SCENE_OBJECT_KIND_COUNT]; /* what goes along with what is removed */
+    struct draft_list fallen[SCENE_OBJECT_KIND_COUNT]; /* companions of removed objects: companions.c */
     struct hashmap fallen_nodes;                       /* the same of nodes, by id; NULL is never stored */
     struct error *error;
 };
@@ -41,8 +41,8 @@ bool draft_counts(const struct draft *draft, const struct scene_edit *edit);
 /* Where an error about this edit belongs. */
 struct edit_place draft_place(const struct draft *draft, const struct scene_edit *edit);
 
-/* Channels fall with their clip or with what they change, skins with a joint; finds them. A skin that a remaining
- * node has does not fall: then the transaction is refused. */
+/* Finds the objects that are removed together with others: channels with their clip or target, skins with a joint.
+ * A skin that a remaining node uses is not removed: the transaction is refused. */
 bool companions_check(struct draft *draft);
 /* Channels have their numbers in their clips, joints of meshes their places in skins. */
 bool links_check(struct draft *draft);

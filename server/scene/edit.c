@@ -78,7 +78,7 @@ size_t first_bad_float(const float *values, size_t count, float greatest)
 bool ranges_check(const struct material_range *ranges, uint32_t range_count, uint32_t primitive_count,
                   const struct edit_place *place)
 {
-    uint32_t done = 0; /* primitives before this one are taken */
+    uint32_t done = 0; /* primitives before this one belong to earlier ranges */
     for (uint32_t i = 0; i < range_count; i++) {
         char path[64];
         if (ranges[i].first < done) {
@@ -115,8 +115,8 @@ static uint64_t blob_bytes(const struct blob *blob)
     return blob ? blob->size_bytes : 0;
 }
 
-/* A channel counts with what it takes in the poses of a frame, which many channels may make much of: they may all
- * read the same few numbers of a clip. */
+/* A channel counts with its memory in the poses of a frame: many channels may read the same few numbers of a clip,
+ * and their poses are large all the same. */
 static uint64_t channel_pose_bytes(const struct scene_channel *channel)
 {
     const struct channel_row *row = channel_row(channel->path);

@@ -15,7 +15,7 @@ struct edit_place {
 const char *object_kind_name(enum scene_object_kind kind);
 /* Identifier of what the edit sets or removes; 0 for the environment. */
 uint32_t edit_object_id(const struct scene_edit *edit);
-/* `path` is what follows the edit: ".ranges[2].material", or "" for all of it. Returns false. */
+/* `path` names the part of the edit: ".ranges[2].material", or "" for the whole edit. Returns false. */
 bool edit_error(const struct edit_place *place, enum error_kind kind, const char *path, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
@@ -32,7 +32,7 @@ bool clip_check(const struct scene_clip *clip, const struct edit_place *place);
 bool channel_check(const struct scene_channel *channel, const struct edit_place *place);
 bool environment_check(const struct scene_environment *environment, const struct edit_place *place);
 
-/* Pieces that several of them use. */
+/* Helpers that several kinds of edits share. */
 #define COORDINATE_MAX 1e18f /* beyond it, squares leave the range of floats */
 bool ranges_check(const struct material_range *ranges, uint32_t range_count, uint32_t primitive_count,
                   const struct edit_place *place);
@@ -41,7 +41,8 @@ bool weights_check(const float *weights, uint32_t count, const struct edit_place
 /* The blob holds `count` elements of `element_bytes`, neither more nor less. */
 bool array_size_check(const struct blob *blob, uint64_t count, uint64_t element_bytes, const char *path,
                       const struct edit_place *place);
-/* Position of the first float that is not finite or beyond `greatest`; `count` if there is none. */
+/* Index of the first float that is not finite, or whose magnitude is above `greatest`; `count` if there is none.
+ */
 size_t first_bad_float(const float *values, size_t count, float greatest);
 
 /* Host memory that an object counts for. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of lights, cameras, and of what is made of texels. Single numbers have been checked where they were
- * decoded; here is what depends on more than one of them. */
+/* Checks of lights, cameras, textures and environments that depend on more than one field. The decoder has checked
+ * every field alone. */
 #include "scene/edit.h"
 
 bool light_check(const struct scene_light *light, const struct edit_place *place)

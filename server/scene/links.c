@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of what two objects have in common: the numbers of channels lie in their clips, the joints of meshes in
- * skins. Whichever of the two is set, they must fit afterwards. */
+/* Checks between two objects: the numbers of channels lie in their clips, the joints of meshes in skins. They must
+ * hold after an edit of either object. */
 #include "scene/channel.h"
 #include "scene/draft.h"
 
@@ -10,8 +10,8 @@
 
 /* ---- channels and clips ------------------------------------------------------------------------- */
 
-/* So many times of one transaction are compared one by one. Beyond, it is worked out once for a clip how far its
- * numbers ascend: any number of channels may share their times, and must not cost that many times as much. */
+/* Maximum of key times that one transaction compares one by one. Beyond it, the ascending runs of a clip's numbers
+ * are found once: many channels may share their times, and must not multiply the cost. */
 #define COMPARED_TIMES_MAX (UINT64_C(1) << 26)
 
 struct ascents {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A node's transform taken apart, so that clips can change a part of it. Private to scene/. */
+/* The decomposition of a node's transform, so that clips can change a part of it. Private to scene/. */
 #ifndef FARLIGHT_SCENE_LOCAL_TRANSFORM_H
 #define FARLIGHT_SCENE_LOCAL_TRANSFORM_H
 
@@ -10,8 +10,8 @@ struct local_transform {
     double scale[3];
 };
 
-/* Translation is the last column, scale the lengths of the others, x turned where the matrix mirrors; the turn is
- * what remains, a shear included. */
+/* Translation is the last column, scale the lengths of the others, with x negated where the matrix mirrors;
+ * rotation is the remainder, a shear included. */
 void local_transform_from_matrix(struct local_transform *transform, const float matrix[12]);
 void local_transform_set_rotation(struct local_transform *transform, const double unit_quaternion[4]);
 /* Entries beyond 1e12, which no matrix of the protocol has, become 1e12. */

@@ -6,7 +6,7 @@
 #include <float.h>
 #include <stdio.h>
 
-/* What there is a number of elements of. */
+/* The kinds of counts that arrays depend on. */
 enum array_of { PER_VERTEX, PER_TRIANGLE, PER_INFLUENCE, PER_TARGET };
 
 struct array_row {
@@ -63,7 +63,7 @@ static uint64_t element_count(const struct scene_mesh *mesh, const struct array_
     return mesh->vertex_count;
 }
 
-/* Whether arrays and counts speak of the same: joints come with their weights, targets with what they add. */
+/* Whether arrays and counts agree: joints come with weights, targets with offsets. */
 static bool company_check(const struct scene_mesh *mesh, const struct edit_place *place)
 {
     for (int i = MESH_JOINTS; i < MESH_ARRAY_COUNT; i++) {

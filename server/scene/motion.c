@@ -205,7 +205,7 @@ static bool add_poses(struct scene_motion *motion, struct player *player, double
     return true;
 }
 
-/* What is known of the turns without looking at the poses between: as if all of it were in the first interval. */
+/* An upper bound of the rotations without the poses between: all of it counts in the first interval. */
 static void bound_turns(struct player *player, uint32_t node_count, double open_s, double shutter_s,
                         double *bounds, interval_turns *turns)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the hierarchy shows: nodes with their world transforms, and the bounds of all of it. */
+/* The visible part of the hierarchy: nodes with their world transforms, and its bounds. */
 #include "scene/affine.h"
 #include "scene/affine_double.h"
 #include "scene/hierarchy.h"

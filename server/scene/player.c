@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A light that has a size keeps one: without, its area is 0 and what divides by it is no number. */
+/* The minimum size of an area light: with an area of 0, divisions by it give NaN. */
 #define LIGHT_SIZE_MIN 1e-6f
 
 /* ---- which channels play ------------------------------------------------------------------------ */
@@ -86,7 +86,7 @@ static bool uses_check(const struct scene *scene, const struct clip_use *uses, u
             continue;
         char field[48];
         snprintf(field, sizeof field, "clips[%u].clip", i);
-        return error_set(error, ERROR_UNKNOWN_ID, field, "there is no clip %u", uses[i].clip);
+        return error_set(error, ERROR_UNKNOWN_ID, field, "clip %u does not exist", uses[i].clip);
     }
     return true;
 }

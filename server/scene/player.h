@@ -18,8 +18,8 @@ struct player {
     const struct scene *scene;
     const struct clip_use *uses; /* borrowed */
     uint32_t use_count;
-    double *durations_s, *times_s; /* of each use's clip; times within the clips for the pose in hand */
-    struct player_track *tracks;   /* by target, object, use, channel: what counts comes last */
+    double *durations_s, *times_s; /* of each use's clip; times within the clips for the current pose */
+    struct player_track *tracks;   /* sorted by target, object, use, channel: the last one wins */
     size_t track_count;
     size_t target_tracks[TARGET_VIEW + 1];
     size_t weight_count; /* floats that all weights together have */
@@ -29,7 +29,7 @@ struct player {
 bool player_init(struct player *player, const struct scene *scene, const struct clip_use *uses, uint32_t use_count,
                  struct error *error);
 void player_finish(struct player *player);
-/* What a pose has of a node; NULL: nothing, or no pose. */
+/* The pose's entry of a node; NULL: none, or no pose. */
 const struct pose_node *scene_pose_node(const struct scene_pose *pose, uint32_t id);
 /* For each node that poses list, in their order: how far it turns at most, see curve_turn_bound(). */
 void player_turn_bounds(struct player *player, double from_s, double to_s, double *bounds);

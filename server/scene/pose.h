@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Where and what things are at one time, as the clips that a job plays have it: a layer over the scene, which
- * stays as it was committed. */
+/* The state of animated objects at one time, under the clips that a job plays: a layer over the scene, which stays
+ * as committed. */
 #ifndef FARLIGHT_SCENE_POSE_H
 #define FARLIGHT_SCENE_POSE_H
 
@@ -31,7 +31,7 @@ struct pose_view {
     float eye_world[3], look_at_world[3], up_world[3], fov_y, aperture, focus, exposure_stops;
 };
 
-/* Only what clips change is listed; lists ascend by identifier. */
+/* Lists only objects that clips change, ascending by identifier. */
 struct scene_pose {
     struct pose_node *nodes;
     uint32_t node_count;
@@ -68,16 +68,16 @@ struct clip_use {
  * brought into the range that the protocol allows. ERROR_OUT_OF_MEMORY, ERROR_UNKNOWN_ID ("clips[2].clip"). */
 bool scene_pose_evaluate(struct scene_pose *pose, const struct scene *scene, const struct clip_use *uses,
                          uint32_t use_count, double time_s, struct error *error);
-/* The poses from `open_s` on for `shutter_s`; 0 s: one pose. There is one too if nothing moves meanwhile, else as
- * many as keep every mesh that is not skinned, and every set of spheres, from turning by more than MOTION_TURN_MAX
- * between two, if MOTION_POSES_MAX can: 2, 3, 5 or 9. Errors as above. */
+/* The poses from `open_s` on for `shutter_s`; 0 s: one pose. One pose too if nothing moves in that time; else 2,
+ * 3, 5 or 9, so that no unskinned mesh or set of spheres rotates by more than MOTION_TURN_MAX between two poses,
+ * as far as MOTION_POSES_MAX allows. Errors as above. */
 #define MOTION_TURN_MAX 0.1745 /* radians, 10 degrees: a chord is 0.4 % of the radius inside its arc */
 bool scene_motion_evaluate(struct scene_motion *motion, const struct scene *scene, const struct clip_use *uses,
                            uint32_t use_count, double open_s, double shutter_s, struct error *error);
 /* Length of a clip in seconds: its last key. 0: no clip, or no channel. */
 double scene_clip_duration_s(const struct scene *scene, uint32_t clip);
 
-/* What a pose says, or the scene where the pose has nothing or is NULL. */
+/* The pose's value, or the scene's where the pose has none or is NULL. */
 const float *scene_pose_parent_from_node(const struct scene_pose *pose, const struct scene_node *node);
 bool scene_pose_hidden(const struct scene_pose *pose, const struct scene_node *node);
 const struct scene_light *scene_pose_light(const struct scene_pose *pose, const struct scene_light *light);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Who refers to whom: nodes to what hangs there, primitives to materials, materials to textures,
- * skins to nodes, channels to what they change. */
+/* References between objects: nodes to their objects, primitives to materials, materials to textures, skins to
+ * nodes, channels to their targets. */
 #include "scene/channel.h"
 #include "scene/draft.h"
 
@@ -141,7 +141,7 @@ static bool set_check(struct draft *draft, const struct scene_edit *edit)
         if (reference.id && draft_remaining(draft, reference.kind, reference.id))
             continue;
         const char *kind = object_kind_name(reference.kind);
-        edit_error(&place, ERROR_UNKNOWN_ID, reference.path, "there is no %s %u", kind, reference.id);
+        edit_error(&place, ERROR_UNKNOWN_ID, reference.path, "%s %u does not exist", kind, reference.id);
         return error_remedy(draft->error, "make it in this transaction or before");
     }
     return true;
@@ -152,7 +152,7 @@ static bool users_check(struct draft *draft, enum scene_object_kind user)
 {
     size_t cursor = 0;
     const struct scene_object *object;
-    /* What is set or removed itself has been looked at. */
+    /* Objects that the transaction itself sets or removes are already checked. */
     while ((object = draft_next_untouched(draft, user, &cursor))) {
         struct reference reference;
         uint32_t reference_cursor = 0;

@@ -49,7 +49,7 @@ enum mesh_array {
     MESH_COLOURS,          /* 4 u8, linear */
     MESH_JOINTS,           /* influence_count u16, places in the skin */
     MESH_WEIGHTS,          /* influence_count f32, not negative; their sum counts as 1 */
-    MESH_TARGET_POSITIONS, /* what the morph targets add: 3 f32 a vertex, target after target */
+    MESH_TARGET_POSITIONS, /* offsets of the morph targets: 3 f32 a vertex, target after target */
     MESH_TARGET_NORMALS,
     MESH_TARGET_TANGENTS,
     MESH_ARRAY_COUNT
@@ -226,8 +226,8 @@ struct scene_environment {
     struct blob *texels; /* 4 half floats a texel; NULL: constant colour */
 };
 
-/* What a transaction does, one edit a time. Pointers inside (blobs, ranges) pass to the scene with a
- * successful commit and stay with the edit otherwise; scene_edit_finish releases either way. */
+/* One edit of a transaction. Its pointers (blobs, ranges) pass to the scene with a successful commit and stay with
+ * the edit otherwise; scene_edit_finish releases them in either case. */
 enum scene_edit_kind { EDIT_SET, EDIT_REMOVE, EDIT_SET_ENVIRONMENT };
 
 struct scene_edit {
@@ -266,7 +266,7 @@ struct scene {
     struct scene_limits limits;
     uint64_t host_bytes;  /* blobs that objects hold, counted per object, and tables */
     uint64_t table_bytes; /* of them: tables */
-    /* Revision at which anything of a sort last changed, for those who keep copies. */
+    /* The revision of the last change of each kind of object, for owners of copies. */
     uint64_t geometry_revision;  /* meshes, spheres, discs: their shape */
     uint64_t instances_revision; /* nodes: which, where, hidden */
     uint64_t shading_revision;   /* materials, textures */
@@ -279,7 +279,7 @@ void scene_destroy(struct scene *scene);                                        
 /* Applies all edits, or none and sets *error, whose field names the edit: "edits[17] (mesh 3).ranges[2].material".
  * Checked: identifiers, references, array sizes, index ranges, finite positions, cycles, depth, limits. Edits are
  * looked at together: the last edit of an object counts, and an edit may refer to what a later one makes. A
- * removed node takes all along that hangs below it after the other edits. */
+ * removed node removes its subtree as it is after the other edits. */
 bool scene_commit(struct scene *scene, struct scene_edit *edits, size_t edit_count, struct error *error);
 
 /* Objects by identifier, NULL if there is none. */
@@ -301,17 +301,17 @@ struct scene_instance {
     const struct scene_node *node;
     float world_from_object[12];
     float object_from_world[12]; /* zero where `singular` */
-    bool singular;               /* the transform flattens: geometry there is skipped */
+    bool singular;               /* the transform is singular: geometry there is skipped */
 };
 /* Below, `pose` says where things are; NULL: as they were committed. */
 /* Instances of one kind in the order of node ids; an array to free(). False: out of memory. */
 bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enum scene_node_kind kind,
                    struct scene_instance **instances, size_t *count);
-/* World transform of one node (hidden or not); false if there is no such node. */
+/* World transform of one node (hidden or not); false if the node does not exist. */
 bool scene_world_from_node(const struct scene *scene, const struct scene_pose *pose, uint32_t node,
                            float world_from_node[12]);
-/* Bounds in world space of everything visible, discs left out unless there is nothing else; meshes that deform
- * count as they are in the pose, unless they are hundreds of millions of vertices. False: nothing there. */
+/* Bounds in world space of everything visible, without discs unless there is nothing else. Deforming meshes count
+ * as in the pose, unless they have hundreds of millions of vertices. False: nothing is visible. */
 bool scene_bounds(const struct scene *scene, const struct scene_pose *pose, float lower[3], float upper[3]);
 
 #endif

@@ -19,7 +19,7 @@ static const double *find(const struct placed_nodes *placed, uint32_t node)
     return place ? placed->world_from_node[place - 1] : NULL;
 }
 
-/* Room for one more; NULL: out of memory. */
+/* Appends an element; NULL: out of memory. */
 static double *add(struct placed_nodes *placed, uint32_t node)
 {
     if (placed->count == placed->capacity) {
@@ -30,7 +30,7 @@ static double *add(struct placed_nodes *placed, uint32_t node)
         placed->world_from_node = grown;
         placed->capacity = capacity;
     }
-    /* The map keeps a number where it has room for a pointer. */
+    /* The map's pointers hold numbers here. */
     if (!hashmap_put(&placed->places, node, (void *)(uintptr_t)(placed->count + 1)))
         return NULL;
     return placed->world_from_node[placed->count++];

@@ -5,14 +5,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* State of a node in the walk; above these, its depth plus FIRST_DEPTH. */
+/* State of a node in the traversal; above these, its depth plus FIRST_DEPTH. */
 enum { UNKNOWN, ON_CHAIN, FALLEN, ABOVE_ROOTS, FIRST_DEPTH };
 
 struct walk {
     struct draft *draft;
     struct hierarchy hierarchy;
     uint16_t *state;
-    uint32_t chain[SCENE_DEPTH_MAX]; /* nodes from where the walk began, upwards */
+    uint32_t chain[SCENE_DEPTH_MAX]; /* nodes from the start of the traversal upwards */
     size_t length;
     uint32_t depth_max;
 };
@@ -61,8 +61,8 @@ static bool collect(struct walk *walk)
     return hierarchy_init(&walk->hierarchy, nodes, count) && walk->state;
 }
 
-/* An error about the chain in hand. The hierarchy was sound before, so an edit in it or above is at fault: the one
- * nearest to where the walk began is named. */
+/* An error about the current chain. The hierarchy was valid before, so an edit in the chain or above is at fault:
+ * the one nearest to the start of the traversal is named. */
 static bool chain_error(struct walk *walk, enum error_kind kind, const char *what)
 {
     uint32_t position = walk->chain[0];
@@ -93,10 +93,10 @@ static bool missing_parent(struct walk *walk, const struct scene_node *node)
 {
     const struct scene_edit *edit = node_edit(walk->draft, node->base.id);
     if (!edit)
-        return true; /* untouched below a removed node: it goes along */
+        return true; /* unedited, below a removed node: it is removed too */
     struct edit_place place = draft_place(walk->draft, edit);
     if (!node_edit(walk->draft, node->parent))
-        edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "there is no node %u", node->parent);
+        edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u does not exist", node->parent);
     else
         edit_error(&place, ERROR_UNKNOWN_ID, ".parent", "node %u is removed by the same transaction",
                    node->parent);
