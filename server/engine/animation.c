@@ -8,10 +8,10 @@
 #include <stdio.h>
 #include <string.h>
 
-/* What the protocol lets a key have; a spline through keys near the ends may leave it. */
+/* The protocol's range of a key; a spline through keys near its ends may leave it. */
 #define FOV_MIN 0.001f
 #define FOV_MAX 3.1f
-/* What it lets a frame's camera have: composed transforms and splines may go beyond. */
+/* The protocol's range of a frame's camera; composed transforms and splines may leave it. */
 #define PLACE_MAX 1e12f
 
 double animation_time_s(const struct engine_job *job, uint32_t frame)
@@ -52,7 +52,7 @@ bool animation_key_camera(const struct camera_key *key, const char *field, struc
 {
     if (frame_camera_look_at(camera, key->eye_world, key->look_at_world, key->up_world, key->fov_y))
         return true;
-    error_set(error, ERROR_INVALID, field, "at %g s the eye, what it looks at and up do not span a view",
+    error_set(error, ERROR_INVALID, field, "at %g s the camera's eye, look-at point and up direction span no view",
               (double)key->time_s);
     return error_remedy(error, "eye and look_at must differ, and up must not be parallel to the view");
 }
@@ -157,7 +157,7 @@ static bool orbit_camera(const struct engine_job *job, const struct scene *scene
     double turns = job->orbit_turn != 0.0f ? time_s / (double)job->orbit_seconds : 0.0;
     if (animation_turn(camera, axis_world, centre_world, (double)job->orbit_turn * turns))
         return true;
-    return error_set(error, ERROR_INVALID, "render.keys[0].up_world", "there is no direction to turn about");
+    return error_set(error, ERROR_INVALID, "render.keys[0].up_world", "the orbit has no axis: up is zero");
 }
 
 /* ---- a camera of the scene ---------------------------------------------------------------------- */
@@ -200,7 +200,7 @@ static bool node_camera(const struct engine_job *job, const struct scene *scene,
     const char *field = "render.camera_node";
     const struct scene_node *node = scene_node(scene, job->camera_node);
     if (!node)
-        return error_set(error, ERROR_UNKNOWN_ID, field, "there is no node %u", job->camera_node);
+        return error_set(error, ERROR_UNKNOWN_ID, field, "node %u does not exist", job->camera_node);
     const struct scene_camera *shown = node->kind == NODE_CAMERA ? scene_camera(scene, node->object) : NULL;
     if (!shown)
         return error_set(error, ERROR_INVALID, field, "node %u shows no camera", job->camera_node);
@@ -237,7 +237,7 @@ bool animation_check(const struct engine_job *job, struct error *error)
     return true;
 }
 
-/* A key of the path with what clips say instead. */
+/* A key of the path, with the values that clips replace. */
 static bool keys_camera(const struct engine_job *job, const struct pose_view *given, double time_s,
                         struct frame_camera *camera, float *focus, struct error *error)
 {
@@ -322,7 +322,7 @@ bool animation_view(const struct engine_job *job, const struct scene *scene, con
             continue;
         error_set(error, ERROR_INVALID, "render.camera_path", "at %g s the camera is beyond %g m", time_s,
                   (double)PLACE_MAX);
-        return error_remedy(error, "bring the camera, or what it is to show, nearer to the origin");
+        return error_remedy(error, "move the camera and its target nearer to the origin");
     }
     return true;
 }

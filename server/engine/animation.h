@@ -11,7 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define ANIMATION_TIME_MAX_S 1e9 /* what the protocol lets a frame have, to both sides of 0 */
+#define ANIMATION_TIME_MAX_S 1e9 /* the protocol's range of a frame's time, on both sides of 0 */
 
 /* Seconds since `time_origin_frame`; negative before it. */
 double animation_time_s(const struct engine_job *job, uint32_t frame);
@@ -22,8 +22,8 @@ bool animation_turn(struct frame_camera *camera, const float axis_world[3], cons
                     double angle);
 /* Errors that depend on neither the frame nor the scene. */
 bool animation_check(const struct engine_job *job, struct error *error);
-/* The scene's bounds at the job's time 0, which is what cameras that see all of it stand still for. They may be
- * kept from frame to frame, as they follow from the scene's revision alone. */
+/* The scene's bounds at the job's time 0, for cameras that show the whole scene. They depend on the scene's
+ * revision alone and may be kept from frame to frame. */
 struct animation_bounds {
     bool known;
     uint64_t revision;
@@ -36,7 +36,7 @@ bool animation_key_camera(const struct camera_key *key, const char *field, struc
 float animation_distance(const struct frame_camera *camera, const float point_world[3]);
 struct animation_view {
     struct frame_camera camera;
-    float focus; /* distance along the view to what is looked at, or to the middle of the scene; metres */
+    float focus; /* distance along the view to the look-at point, or to the middle of the scene; metres */
 };
 /* At a time of the job. `pose`: at that time, NULL: the scene as it was committed; its view counts, as far as it
  * is given. `bounds` may be NULL. */

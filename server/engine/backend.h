@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the engine needs of gpu/ and render/, as a table: the real one, or one that a test controls. */
+/* The functions of gpu/ and render/ that the engine calls, as a table: the real ones, or those of a test. */
 #ifndef FARLIGHT_ENGINE_BACKEND_H
 #define FARLIGHT_ENGINE_BACKEND_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Jobs: their start and end, and their frames, each in slices. A batch is every frame of a range, in order; what
- * is different with views is in view.c. */
+/* Jobs: their start and end, and their frames, each in slices. A batch is every frame of a range, in order; view.c
+ * has what differs for views. */
 #include "engine/engine_private.h"
 
 #include "base/clock.h"
@@ -69,7 +69,7 @@ static bool jobs_reserve(struct engine *engine)
     return true;
 }
 
-/* Frames in flight: fewer of them where they are large, or a few jobs would fill the host's memory. */
+/* Frames in flight: fewer if they are large, or a few jobs would fill the host's memory. */
 static uint32_t window_of(const struct engine *engine, const struct frame_request *frame)
 {
     uint64_t frames = engine->options.frame_window_bytes / frame_request_bytes(frame);
@@ -78,7 +78,7 @@ static uint32_t window_of(const struct engine *engine, const struct frame_reques
                                                        : engine->options.frames_in_flight;
 }
 
-/* Whose place a view takes; NULL: nobody's. */
+/* The view that a new view replaces; NULL: none. */
 static struct job *replaced_by(struct engine *engine, const struct engine_command *command)
 {
     for (size_t i = 0; command->job.kind == JOB_VIEW && i < engine->job_count; i++) {
@@ -159,7 +159,7 @@ static void abandon_frame(struct engine *engine, struct job *job)
     job->scene->frames_ended++;
 }
 
-/* The output may outlive the job, with frames that are still encoded or not taken. */
+/* The output may outlive the job: frames may still be in the encoder or wait for the network thread. */
 static void job_remove(struct engine *engine, struct job *job)
 {
     abandon_frame(engine, job);
@@ -205,12 +205,12 @@ void jobs_reap(struct engine *engine)
         struct engine_scene *scene = job->scene;
         job_remove(engine, job);
         engine_run_waiting(engine, scene);
-        /* What waited may have ended other jobs: the list is as long as it is now. */
+        /* The deferred commands may have ended other jobs: use the list's current length. */
         i = i < engine->job_count ? i : engine->job_count;
     }
 }
 
-/* The last frame has been rendered, or no more can be; the answer comes after what is on its way. */
+/* The last frame is rendered, or no more can be rendered; the answer follows the frames that are under way. */
 static void job_finish(struct job *job, const struct error *error)
 {
     job->next_frame = (uint64_t)job->spec.last_frame + 1;
@@ -227,7 +227,7 @@ static void job_finish(struct job *job, const struct error *error)
 
 /* ---- frames ------------------------------------------------------------------------------------- */
 
-/* Whether there is a frame to begin, and a place for it. */
+/* Whether the job has a frame to begin, and a free place for it. */
 static bool wants_frame(const struct job *job)
 {
     return !job_output_is_closed(job->output) && !job->rendering && job->next_frame <= job->spec.last_frame &&
@@ -248,8 +248,8 @@ static bool is_waited_for(const struct engine_scene *scene)
     return scene->waiting_count || (scene->put_off && wants_frame(scene->put_off));
 }
 
-/* A frame of a batch may take minutes, and whoever looks at the scene would see nothing of it meanwhile: as long
- * as one keeps waiting what waits, frames of views do not make it later. */
+/* A frame of a batch may take minutes, in which views of the scene would show nothing: while such a frame delays
+ * the waiting commands anyway, frames of views may begin, as they delay them no further. */
 static bool may_begin_meanwhile(const struct engine *engine, const struct job *job)
 {
     const struct engine_scene *scene = job->scene;
@@ -261,7 +261,7 @@ static bool may_begin_meanwhile(const struct engine *engine, const struct job *j
     return batch && job->spec.kind == JOB_VIEW && view_has_news(job) && job->refused_after != scene->frames_ended;
 }
 
-/* What waits for the frames in progress to end is not kept waiting by new ones. */
+/* New frames do not delay commands that wait for the frames in progress. */
 static bool may_begin(const struct engine *engine, const struct job *job)
 {
     const struct engine_scene *scene = job->scene;
@@ -326,11 +326,11 @@ static void frame_failed(struct engine *engine, struct job *job, const struct er
     }
     if (error->kind == ERROR_OUT_OF_MEMORY && !job->evicted && engine_evict_idle(engine, job)) {
         job->evicted = true;
-        log_write(LOG_INFO, "engine", "what was idle gave up its device memory for a frame");
+        log_write(LOG_INFO, "engine", "evicted idle structures from device memory for a frame");
         return;
     }
     if (error->kind == ERROR_OUT_OF_MEMORY && any_frame(engine)) {
-        /* What they have is idle afterwards. */
+        /* Their resources are idle afterwards. */
         job->evicted = false;
         engine->needs_all = job;
         return;

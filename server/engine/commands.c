@@ -33,10 +33,10 @@ static void done(struct engine *engine, const struct engine_command *command, ui
     engine_post_done(engine, command->client, command->request, revision);
 }
 
-/* ---- what frames in progress keep waiting ------------------------------------------------------- */
+/* ---- commands that wait for frames in progress ------------------------------------------------------- */
 
-/* Blobs are limited where they are held, as scenes share them; tables here, all scenes together. Those that nobody
- * holds give way, but not in vain: what they leave is known before. */
+/* Blobs are limited by their store, as scenes share them; the tables of all scenes are limited here. Scenes
+ * without a holder are evicted only if that releases enough, which is known beforehand. */
 static bool commit_within_limits(struct engine *engine, struct scene *scene, struct engine_command *command,
                                  struct error *error)
 {
@@ -127,12 +127,12 @@ struct engine_command *engine_take_waiting(struct engine_scene *scene, const str
     return NULL;
 }
 
-/* False: it has to wait for what came before it from this client, and that for another client's frame. */
+/* False: it must wait for an earlier command of this client, which waits for another client's frame. */
 static bool scene_close(struct engine *engine, struct engine_reference *reference, struct engine_command *command)
 {
     struct engine_scene *scene = reference->scene;
     engine_abort_jobs(engine, reference, "its scene was closed");
-    /* What came before is answered before. */
+    /* Earlier commands are answered first. */
     engine_run_waiting(engine, scene);
     if (waits_by(scene, reference) && keep_waiting(scene, command))
         return false;
@@ -154,7 +154,7 @@ static void handle_of_scene(struct engine *engine, struct engine_command *comman
     struct engine_reference *reference = engine_find_reference(engine, command->client, command->scene);
     if (!reference) {
         struct error error = {0};
-        error_set(&error, ERROR_UNKNOWN_ID, scene_field(command->kind), "there is no scene %u", command->scene);
+        error_set(&error, ERROR_UNKNOWN_ID, scene_field(command->kind), "scene %u does not exist", command->scene);
         fail(engine, command, &error);
         engine_command_destroy(command);
         return;
@@ -180,7 +180,7 @@ void engine_run_waiting(struct engine *engine, struct engine_scene *scene)
 {
     if (scene->frames || !scene->waiting_count)
         return;
-    /* Nothing here begins a frame, so all of them can be carried out. */
+    /* No command here begins a frame, so all of them can run. */
     struct engine_command **waiting = scene->waiting;
     size_t count = scene->waiting_count;
     scene->waiting = NULL;

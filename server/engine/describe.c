@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* What clients are told of scenes. */
+/* Descriptions of scenes for clients. */
 #include "engine/engine_private.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* What the protocol carries. */
+/* The protocol's maximum. */
 #define COORDINATE_MAX 3e38f
 #define DURATION_MAX_S 1e9f
 

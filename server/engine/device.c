@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The device of the engine: opened at the start, lost, made anew, and shared by scenes that do not all fit. */
+/* The engine's device: opened at the start, opened again after a loss, and shared by scenes that do not all fit.
+ */
 #include "engine/engine_private.h"
 
 #include "base/clock.h"
@@ -20,7 +21,7 @@ bool engine_open_device(struct engine *engine, struct error *error)
     return true;
 }
 
-/* ---- what scenes and jobs keep ------------------------------------------------------------------ */
+/* ---- resources of scenes and jobs ------------------------------------------------------------------ */
 
 bool reference_drop_idle(struct engine *engine, struct engine_reference *reference)
 {
@@ -104,7 +105,7 @@ static void lose_scene(struct engine *engine, struct engine_scene *scene)
 
 void engine_drop_device(struct engine *engine)
 {
-    /* Frames in progress are taken up again from their beginning. */
+    /* Frames in progress start again. */
     for (size_t i = 0; i < engine->job_count; i++)
         engine->jobs[i]->rendering = false;
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next)
@@ -147,11 +148,11 @@ bool engine_need_device(struct engine *engine, struct error *error)
     }
     *oldest_ns = now_ns;
     engine->rebuilds++;
-    log_write(LOG_WARNING, "engine", "the GPU was lost; making it anew");
+    log_write(LOG_WARNING, "engine", "the GPU was lost; opening it again");
     struct error reason = {0};
     if (engine_open_device(engine, &reason))
         return true;
-    error_set(error, ERROR_DEVICE_LOST, "device", "the GPU was lost and could not be made anew: %.400s",
+    error_set(error, ERROR_DEVICE_LOST, "device", "the GPU was lost and could not be opened again: %.400s",
               reason.text);
     error->retryable = true;
     return false;

@@ -37,9 +37,9 @@ struct encode_pool {
 struct encode_lane {
     atomic_uint references;
     float frames_per_second;
-    struct encoder_stream *stream; /* that of the task in hand; NULL until the first */
+    struct encoder_stream *stream; /* that of the current task; NULL before the first */
     pthread_mutex_t lock;          /* of what follows */
-    bool busy;                     /* a task of it is queued or in hand */
+    bool busy;                     /* one of its tasks is queued or running */
     struct encode_task *first, **end;
 };
 
@@ -78,7 +78,7 @@ static bool lane_enter(struct encode_lane *lane, struct encode_task *task)
     return free_now;
 }
 
-/* When the task in hand is done with. */
+/* After the end of the current task. */
 static struct encode_task *lane_next(struct encode_lane *lane)
 {
     pthread_mutex_lock(&lane->lock);
@@ -136,7 +136,7 @@ static bool encode_pixels(struct encode_lane *lane, const struct picture *pictur
     return encoder_encode(frame->encoding, picture, frame->quality, &frame->bytes, &frame->size_bytes, error);
 }
 
-/* Behind what is there. */
+/* Appends to the queue. */
 static bool append_attachment(struct engine_frame *frame, enum frame_attachment which, size_t *added_bytes,
                               struct error *error)
 {
@@ -157,7 +157,7 @@ static bool append_attachment(struct engine_frame *frame, enum frame_attachment 
         frame->size_bytes += *added_bytes;
     }
     free(encoded);
-    return bytes || error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "no memory for what is attached to a frame");
+    return bytes || error_set(error, ERROR_OUT_OF_MEMORY, "encoding", "out of memory for a frame's attachments");
 }
 
 static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct engine_frame *frame,

@@ -23,11 +23,11 @@ struct encode_lane *encode_lane_create(float frames_per_second); /* NULL: out of
 void encode_lane_unref(struct encode_lane *lane);                /* accepts NULL */
 
 struct encode_pool *encode_pool_create(const struct encode_pool_options *options, struct error *error);
-/* Ends after the frames in hand; those that wait are dropped. Accepts NULL. */
+/* Ends after the frames that are being encoded; waiting ones are dropped. Accepts NULL. */
 void encode_pool_destroy(struct encode_pool *pool);
 /* Encodes a frame (its result holds the pixels) with its encoding and quality, and puts it at its position. Takes
- * over the frame, not the output and the lane, of which it holds references of its own. `lane`: of a view; NULL
- * where no frame is part of a stream. One thread submits the frames of a lane. May wait; false: the pool is closed
+ * over the frame, not the output and the lane, of which it holds references of its own. `lane`: the view's; NULL
+ * if no frame is part of a stream. One thread submits the frames of a lane. May block; false: the pool is closed
  * or out of memory. */
 bool encode_pool_submit(struct encode_pool *pool, struct job_output *output, struct encode_lane *lane,
                         uint64_t position, struct engine_frame *frame);

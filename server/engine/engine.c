@@ -13,7 +13,7 @@
 
 #define QUEUE_CAPACITY_DEFAULT 1024
 #define FRAMES_IN_FLIGHT_DEFAULT 3
-/* Commands carried out between two slices, so that a flood of them does not stop the frames. */
+/* Maximum of commands between two slices, so that a flood of commands does not stop the frames. */
 #define COMMANDS_AT_ONCE 256
 
 /* Wakes the thread without being a command. */
@@ -67,7 +67,7 @@ void engine_nudge(struct engine *engine)
 
 /* ---- the thread --------------------------------------------------------------------------------- */
 
-/* What a frame ended that kept it waiting; with the device all of them end. */
+/* Runs the commands that waited for a frame that has ended; with the device, all frames end. */
 static void run_all_waiting(struct engine *engine)
 {
     for (struct engine_scene *scene = engine->scenes; scene;) {
@@ -83,8 +83,8 @@ static bool waits_for_device(const struct engine *engine, const struct job *job)
     return job->rendering && engine->backend->step_waits(job->renderer);
 }
 
-/* Whose turn it is; NULL: nobody is ready. Who would only wait for the device lets others go first: it is at work
- * on that while they give it more. */
+/* The job whose turn it is; NULL: none is ready. A job that would only wait for the device yields to others, which
+ * give the device more work in that time. */
 static struct job *next_job(struct engine *engine)
 {
     struct job *before = engine->turn_of, *waiting = NULL;
@@ -106,7 +106,7 @@ static struct job *next_job(struct engine *engine)
     return engine->turn_of;
 }
 
-/* Gives the next slice to whose turn it is. False: nobody is ready. */
+/* Runs one slice of the job whose turn it is. False: no job is ready. */
 static bool serve(struct engine *engine)
 {
     struct job *job = next_job(engine);
@@ -133,7 +133,7 @@ static void take_commands(struct engine *engine, struct engine_command *first)
 static void run(struct engine *engine)
 {
     while (!atomic_load(&engine->stop)) {
-        /* Whoever changes something from here on nudges again. */
+        /* A change from here on nudges the thread again. */
         atomic_store(&engine->nudged, false);
         take_commands(engine, queue_try_pop(engine->commands));
         jobs_reap(engine);
@@ -271,7 +271,7 @@ void engine_destroy(struct engine *engine)
     if (!engine)
         return;
     atomic_store(&engine->stop, true);
-    /* Whoever waits on a queue goes on, and what they still push is dropped. */
+    /* Threads that wait on a queue continue, and what they push is dropped. */
     if (engine->commands)
         queue_close(engine->commands);
     if (engine->events)
@@ -319,7 +319,7 @@ struct engine_event *engine_next_event(struct engine *engine)
     struct engine_event *event = queue_try_pop(engine->events);
     if (event && event->output) {
         job_output_taken(event->output);
-        /* There is room for one more frame of that job. */
+        /* The job may have one more frame. */
         engine_nudge(engine);
     }
     return event;

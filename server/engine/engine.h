@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The thread that owns GL and the pool that encodes, seen from outside: commands in, events out.
  *
- * The network thread submits commands and takes events; both go through bounded queues. Everything
- * in a command passes to the engine when it was accepted, everything in an event to who takes it.
- * Clients, scenes, requests and channels are the numbers that the network side chose. */
+ * The network thread submits commands and takes events; both go through bounded queues. The engine owns the
+ * contents of an accepted command; the receiver of an event owns the event's contents. Clients, scenes, requests
+ * and channels are numbers that the network side chose. */
 #ifndef FARLIGHT_ENGINE_ENGINE_H
 #define FARLIGHT_ENGINE_ENGINE_H
 
@@ -28,23 +28,25 @@ struct view_wishes;
 
 /* Those that may change while the engine runs. */
 struct engine_limits {
-    struct scene_limits scene; /* host_bytes is also what the tables of all scenes may take together */
-    uint64_t scene_linger_ms;  /* how long a scene that others can come to stays when nobody holds it; 0: not */
-    uint32_t lingering_scenes; /* that do so, at most: who left most loses his oldest; 0: default */
+    struct scene_limits scene; /* host_bytes also limits the tables of all scenes together */
+    uint64_t scene_linger_ms;  /* how long an attachable scene lingers without a holder; 0: it ends at once */
+    uint32_t lingering_scenes; /* maximum of lingering scenes; beyond it, the client with most of them loses its
+                                  oldest; 0: default */
 };
 
 struct engine_options {
     struct gpu_options gpu;
     unsigned encode_threads;     /* 0: one per core, at most 4 */
     size_t queue_capacity;       /* commands and events; 0: 1024 */
-    uint32_t frames_in_flight;   /* per job, rendered but not taken; 0: 3 */
-    uint64_t frame_window_bytes; /* the same in bytes of pixels, if that is fewer, but at least one; 0: default */
+    uint32_t frames_in_flight;   /* per job, rendered and not yet fetched; 0: 3 */
+    uint64_t frame_window_bytes; /* the same in bytes of pixels, if that means fewer frames; at least one frame; 0:
+                                    default */
     struct engine_limits limits;
-    uint64_t device_bytes_limit;          /* 0: 70 % of what the device has, or no limit if it does not tell */
+    uint64_t device_bytes_limit; /* 0: 70 % of the device's memory, or no limit if the device does not tell it */
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
 };
 
-/* Who can come to a scene beside the client that opened it; the protocol's numbers. */
+/* Which clients may attach to a scene, beside the one that opened it. */
 enum engine_sharing { SHARING_PRIVATE, SHARING_KEPT, SHARING_SHARED };
 
 /* Camera of a job over time, `time_s` and ten numbers that a spline goes through; enums have the protocol's
@@ -58,7 +60,7 @@ struct camera_key {
 
 enum job_kind { JOB_BATCH, JOB_VIEW }; /* protocol's numbers */
 
-/* What a job asks for; per frame engine/shot.h makes a request and poses of it. */
+/* A job's terms; engine/shot.h makes the request and the poses of each frame from them. */
 struct engine_job {
     enum job_kind kind;
     uint32_t scene; /* that of the command, which is the one that counts */
@@ -84,7 +86,7 @@ struct engine_job {
     struct view_wishes *wishes;
     uint32_t pass_samples; /* that a frame of a view adds, up to frame.samples */
     enum encoding still_encoding;
-    unsigned weight; /* how much of the device's time it gets beside other clients' jobs, and their own; 0: 1 */
+    unsigned weight; /* its share of the device's time among the jobs of all clients and of its own; 0: 1 */
     bool adapt;      /* view: quality and size follow the link */
 };
 
@@ -94,8 +96,8 @@ enum engine_command_kind {
     ENGINE_SCENE_CLOSE,  /* the jobs that the client has on it fail with ERROR_CANCELLED just before the answer */
     ENGINE_SCENE_LIST,   /* answered by ENGINE_SCENES_LISTED */
     ENGINE_SCENE_DESCRIBE, /* answered by ENGINE_SCENE_DESCRIBED */
-    ENGINE_SCENES_TRIM, /* scenes that nobody holds end, until blobs of trim_bytes are used no more; no answer */
-    ENGINE_COMMIT, /* waits for the frames of the scene that are in progress, what follows for that scene too */
+    ENGINE_SCENES_TRIM,    /* ends scenes without a holder until blobs of trim_bytes are unused; no answer */
+    ENGINE_COMMIT,         /* waits for the scene's frames in progress, and so do later commands for that scene */
     /* Answered by ENGINE_DONE after the last frame, or by ENGINE_FAILED, before which come the frames that were
      * finished and have credit. A view has no last frame: it is done when another one takes its place. */
     ENGINE_JOB_START,
@@ -109,16 +111,17 @@ enum engine_command_kind {
 };
 
 struct engine_command {
-    struct engine_command *next; /* of who has it: the engine, once it took it, does not look at it */
+    struct engine_command *next; /* for its owner: the engine does not read it */
     enum engine_command_kind kind;
     uint64_t client;
     uint32_t request;
     uint32_t scene;
     char name[SCENE_NAME_MAX + 1]; /* scene_open, scene_attach */
     enum engine_sharing sharing;   /* scene_open */
-    uint64_t principal;            /* scene_open, _attach, _list, _trim, stats: who asks, as what is kept is his */
-    uint64_t trim_bytes;           /* scenes_trim */
-    struct scene_edit *edits;      /* commit; malloc'ed array */
+    uint64_t principal;  /* scene_open, _attach, _list, _trim, stats: the asking client's owner; kept scenes belong
+                            to owners */
+    uint64_t trim_bytes; /* scenes_trim */
+    struct scene_edit *edits; /* commit; malloc'ed array */
     size_t edit_count;
     struct engine_job job;
     uint32_t target_request; /* job_cancel, job_credit: the job's request */
@@ -128,7 +131,7 @@ struct engine_command {
 void engine_command_destroy(struct engine_command *command); /* frees it with all it holds; accepts NULL */
 
 struct engine_scene_stat {
-    bool is_known; /* to who asked: his own, or one that he can come to */
+    bool is_known; /* for the asking client: its own scene, or one that it may attach to */
     uint64_t client;
     uint32_t scene;
     char name[SCENE_NAME_MAX + 1];
@@ -186,15 +189,16 @@ enum engine_event_kind {
     ENGINE_SCENES_LISTED,
     ENGINE_SCENE_DESCRIBED,
     ENGINE_SCENE_CHANGED, /* by another client; `scene` is the client's number for it */
-    ENGINE_SCENE_ENDED,   /* one that nobody held: blobs may be unused now. Client 0 */
+    ENGINE_SCENE_ENDED,   /* a scene without a holder: blobs may be unused now. Client 0 */
     ENGINE_CLIENT_FORGOTTEN,
-    /* The device is lost for good: it was too often, or cannot be made anew. All jobs have failed. Client 0 */
+    /* The device is lost for good: too many losses, or it cannot be opened again. All jobs have failed. Client 0
+     */
     ENGINE_DEVICE_GONE
 };
 
 struct engine_frame {
     uint32_t frame;               /* number in the job's range */
-    struct frame_request request; /* what it was rendered with, camera included */
+    struct frame_request request; /* the request that it was rendered with, camera included */
     struct frame_result result;   /* pixels are gone, the rest is there; times include encode */
     enum encoding encoding;
     uint8_t *bytes; /* owned, malloc'ed */
@@ -208,10 +212,10 @@ struct engine_frame {
     bool wants_key;                   /* it is to be encoded so that it can be decoded without those before .. */
     bool key_frame;                   /* .. and so it was */
     size_t depth_bytes, normal_bytes; /* of attachments, encoded: the last ones of size_bytes, in that order */
-    /* Of a view: what it shows last of what its client wished; all 0 before the first wish. */
+    /* Of a view: the newest of its client's wishes that it shows; all 0 before the first wish. */
     uint64_t command, received_ns;
     bool moving;
-    uint64_t applied_ns, rendered_ns; /* clock_now_ns() when it was taken up, and read back */
+    uint64_t applied_ns, rendered_ns; /* clock_now_ns() when it began, and when it was read back */
 };
 
 struct engine_event {
@@ -231,17 +235,17 @@ void engine_event_destroy(struct engine_event *event); /* accepts NULL */
 
 /* Starts the threads; the device is opened before it returns, so that a missing GPU is an error here. */
 struct engine *engine_create(const struct engine_options *options, struct error *error);
-/* Stops after the slice in hand; what waits is dropped. Accepts NULL. */
+/* Stops after the current slice; waiting commands are dropped. Accepts NULL. */
 void engine_destroy(struct engine *engine);
 const struct gpu_device_info *engine_device(const struct engine *engine);
-/* Device memory that may be used, 0: no limit. For whoever has just created the engine. */
+/* The limit of device memory, 0: none. For the creator of the engine, right after its creation. */
 uint64_t engine_device_limit_bytes(const struct engine *engine);
 /* False with ERROR_BUSY (retryable) when the queue is full; the command then still belongs to the caller. */
 bool engine_submit(struct engine *engine, struct engine_command *command, struct error *error);
 int engine_event_fd(const struct engine *engine);              /* readable while events wait */
 struct engine_event *engine_next_event(struct engine *engine); /* NULL: none waits */
-/* Whether the thread that owns GL has gone on since it was asked last, be it with a part of what takes long (see
- * base/progress.h), or has nothing to do. *turns is the asker's, 0 at first. */
+/* Whether the thread that owns GL has made progress since the last call, within long work too (base/progress.h),
+ * or has nothing to do. *turns belongs to the caller, 0 at first. */
 bool engine_is_alive(const struct engine *engine, uint64_t *turns);
 /* Adds send and queue time of a frame to the totals, once the network side knows them. */
 void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_ns);

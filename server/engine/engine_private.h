@@ -34,38 +34,38 @@ struct engine_reference {
     struct engine_client *client;
     struct engine_scene *scene;
     uint32_t id; /* the client's number for it */
-    /* Owned: what the last job that has ended had, and the next one goes on from, its samples included; NULL:
-     * there is none, or it made room. */
+    /* Owned: the renderer of the last job that ended, from whose samples the next job continues; NULL: none, or
+     * evicted. */
     struct frame_renderer *idle;
 };
 
 struct engine_scene {
     struct engine_scene *next;           /* of the engine's, in the order of their opening */
-    struct engine_reference *references; /* NULL: nobody holds it; it ends, or lingers for a while */
-    uint64_t left_ns;                    /* since when nobody does */
+    struct engine_reference *references; /* NULL: it has no holder, and ends or lingers */
+    uint64_t left_ns;                    /* since when it has had no holder */
     enum engine_sharing sharing;
-    uint64_t principal; /* who opened it */
+    uint64_t principal; /* the owner that opened it */
     struct scene *scene;
     struct frame_scene *shared; /* NULL until the first frame, and after the device was lost */
     uint32_t frames;            /* in progress, of all jobs */
     uint64_t frames_ended;      /* and one */
-    /* Its frame may not begin beside those, and others do not keep it waiting; NULL: there is none. */
+    /* A job whose frame cannot begin beside those in progress; others do not begin before it. NULL: none. */
     struct job *put_off;
     struct engine_command **waiting; /* owned: commands for when no frame is in progress, in order */
     size_t waiting_count;
     uint64_t apply_start_ns, apply_ns; /* of the commits since the last frame */
-    /* For stats, as of that revision: a large scene is not gone through each time that somebody asks. */
+    /* For stats, as of that revision: a large scene is not traversed for each request. */
     uint64_t counted_revision, triangles, spheres;
     uint32_t instances;
-    struct engine_scene_description *description; /* as of its revision; NULL: nobody has asked */
+    struct engine_scene_description *description; /* as of its revision; NULL: not asked for yet */
 };
 
-/* What a view shows, and what it may show next; see view.c. */
+/* What a view shows now and may show next; see view.c. */
 struct view {
     uint64_t credit, made;           /* frames that may be begun, and that were made */
     uint64_t due_ns;                 /* no frame is begun before */
-    uint64_t render_ns, rendered_ns; /* of its last frame: how long it took, and until when; 0: there is none */
-    /* Of its last frame; `shown`: there is one. */
+    uint64_t render_ns, rendered_ns; /* of its last frame: its duration and end; 0: none */
+    /* Of its last frame, if `shown`. */
     bool shown;
     uint64_t shown_command, shown_revision;
     bool shown_moving;
@@ -114,7 +114,7 @@ struct engine {
     pthread_t thread;
     bool has_thread;
 
-    /* What the start came to, for engine_create. */
+    /* The result of the start, for engine_create. */
     pthread_mutex_t start_lock;
     pthread_cond_t start_changed;
     enum { START_PENDING, START_DONE, START_FAILED } start;
@@ -122,18 +122,19 @@ struct engine {
 
     struct gpu_device *device; /* NULL while it is lost */
     uint64_t device_bytes_limit;
-    uint64_t rebuilds_ns[DEVICE_REBUILDS_MAX]; /* when it was made anew, a ring */
+    uint64_t rebuilds_ns[DEVICE_REBUILDS_MAX]; /* times of its reopenings, a ring */
     unsigned rebuilds;
     struct hashmap clients;      /* struct engine_client *, by number */
     struct engine_scene *scenes; /* owned */
     struct job **jobs;           /* owned, in the order of their start */
     size_t job_count, job_capacity;
     struct scheduler scheduler;
-    struct schedule_entry *entries; /* owned; room for as many as there is for jobs */
-    /* There was no memory for its frame beside those in progress, so none begins before it; NULL: there is none.
+    struct schedule_entry *entries; /* owned; as many entries as there may be jobs */
+    /* The job that lacked memory for its frame beside those in progress: no other frame begins before its. NULL:
+     * none.
      */
     struct job *needs_all;
-    struct job *turn_of; /* who had the last slice; NULL: it has ended, or nobody was ready */
+    struct job *turn_of; /* the job of the last slice; NULL: it has ended, or none was ready */
     uint64_t frames, rays;
     uint64_t table_bytes; /* of all scenes */
 };
@@ -146,94 +147,94 @@ void engine_post_device_gone(struct engine *engine);
 void engine_set_limits(struct engine *engine, const struct engine_limits *limits);
 void engine_nudge(struct engine *engine); /* any thread: there may be something to do */
 
-/* The failure of what somebody ended; NULL: out of memory. */
+/* The error of a cancelled command; NULL: out of memory. */
 struct engine_event *engine_cancelled(uint64_t client, uint32_t request, const char *why);
 
 /* commands.c: carries a command out, or keeps it until its scene's frames are done. Takes it over. */
 void engine_handle(struct engine *engine, struct engine_command *command);
-/* Carries out what waited for a scene, if no frame of it is in progress. */
+/* Runs the commands that waited for a scene, if no frame of it is in progress. */
 void engine_run_waiting(struct engine *engine, struct engine_scene *scene);
 /* Of those that wait, the first that has come by the reference; NULL: none. Takes it out. */
 struct engine_command *engine_take_waiting(struct engine_scene *scene, const struct engine_reference *reference);
 
-/* scenes.c: scenes and who holds them. Each answers its command, and leaves it to the caller. */
+/* scenes.c: scenes and their holders. Each function answers its command; the caller keeps it. */
 void engine_scene_open(struct engine *engine, const struct engine_command *command);
 void engine_scene_attach(struct engine *engine, const struct engine_command *command);
 void engine_scene_close(struct engine *engine, struct engine_reference *reference,
                         const struct engine_command *command);
 /* NULL: the client has no scene of that number. */
 struct engine_reference *engine_find_reference(struct engine *engine, uint64_t client, uint32_t id);
-/* Ends the jobs that were started by a reference, with ERROR_CANCELLED; `why` NULL: nobody is told. */
+/* Ends the jobs that were started through a reference, with ERROR_CANCELLED; `why` NULL: without an answer. */
 void engine_abort_jobs(struct engine *engine, const struct engine_reference *reference, const char *why);
 void engine_forget_client(struct engine *engine, struct engine_client *client);
-/* Tells all who hold a scene, but for who changed it. */
+/* Notifies every holder of a scene except the one that changed it. */
 void engine_scene_changed(struct engine *engine, const struct engine_reference *by);
-/* Lets go of scenes that nobody holds, once they have lingered. The time until the next one ends, UINT64_MAX: none
- * does. */
+/* Releases scenes without a holder whose time is over. Returns the time until the next one ends, UINT64_MAX: none.
+ */
 uint64_t engine_reap_scenes(struct engine *engine);
-/* Lets go of all that nobody holds, without lingering. */
+/* Releases all scenes without a holder at once. */
 void engine_end_left_scenes(struct engine *engine);
-/* What tables of scenes take that nobody holds. */
+/* Bytes of the tables of scenes without a holder. */
 uint64_t engine_left_table_bytes(const struct engine *engine);
-/* Scenes that nobody holds give way to who asks, until the tables of all are within their limit, or so many bytes
- * of blobs are used no more; nothing ends if all of them would not do. His own go first, then those of
- * whoever left most. */
+/* Evicts scenes without a holder for an owner, until the tables of all scenes are within their limit, or that many
+ * bytes of blobs are unused; evicts none if all of them would not suffice. The owner's own go first, then those of
+ * the owner with most of them. */
 void engine_trim_tables(struct engine *engine, uint64_t principal);
 void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes);
 
-/* describe.c: what is in scenes, and which there are. */
+/* describe.c: contents of a scene, and the list of scenes. */
 void engine_count_contents(struct engine_scene *scene);
 void engine_scene_list(struct engine *engine, const struct engine_command *command);
 void engine_scene_describe(struct engine *engine, struct engine_scene *scene,
                            const struct engine_command *command);
-/* Whether who asks can come to it. */
+/* Whether the owner may attach to it. */
 bool engine_scene_is_open_to(const struct engine_scene *scene, uint64_t principal);
 
 /* batch.c: jobs. */
 bool job_start(struct engine *engine, struct engine_reference *reference, struct engine_command *command,
                struct error *error); /* takes the keys over on success */
-/* A job that is not answered yet; NULL: there is none. */
+/* A job that is not answered yet; NULL: none. */
 struct job *job_find(struct engine *engine, uint64_t client, uint32_t request);
 bool job_is_ready(const struct engine *engine, const struct job *job);
 /* How long until one is ready, if nothing happens before; UINT64_MAX: for ever. */
 uint64_t jobs_idle_ns(const struct engine *engine);
-/* One slice: takes up a frame, or goes on with it. Does not run what waits for its scene. */
+/* One slice: begins a frame, or continues it. Does not run the commands that wait for its scene. */
 void job_step(struct engine *engine, struct job *job);
-/* Ends it now; nothing comes after `final` (may be NULL). Does not run what waits for its scene. */
+/* Ends the job now; no event follows `final` (may be NULL). Does not run the commands that wait for its scene. */
 void job_abort(struct engine *engine, struct job *job, struct engine_event *final);
-/* Lets go of jobs whose last event is out. */
+/* Releases jobs whose last event is sent. */
 void jobs_reap(struct engine *engine);
 void job_credit(struct job *job, uint64_t credit); /* absolute */
 
-/* view.c: what batch.c asks where the job is a view. */
+/* view.c: what differs for views. */
 /* Goes on where the view left off that `job` takes the place of. */
 void view_follow(struct job *job, const struct job *before);
 /* When its next frame may begin; in the past: now. UINT64_MAX: not before something happens. */
 uint64_t view_due_ns(const struct job *job);
-/* Whether there is something to show that no frame has shown. */
+/* Whether the view has changed since its last frame. */
 bool view_has_news(const struct job *job);
-/* What its next frame shows. */
+/* The content of its next frame. */
 bool view_take_up(struct job *job, struct shot *shot, struct error *error);
-/* Of the frame that was taken up: which planes its encoder will take for certain. */
+/* The planes that the encoder of the frame in progress will certainly accept. */
 enum ycbcr view_ycbcr(const struct job *job);
 /* Whether the frame in progress is not worth its end any more. */
 bool view_is_stale(const struct job *job);
-/* Its frame is made: fills in what a view's frame tells. */
+/* After rendering: fills in the fields of a view's frame. */
 void view_done(struct job *job, struct engine_frame *frame);
 
-/* device.c: the device and what scenes keep on it. */
+/* device.c: the device and the scenes' resources on it. */
 bool engine_open_device(struct engine *engine, struct error *error);
-/* The device, made anew where it was lost and that is still allowed. */
+/* The device, opened again after a loss if that is still allowed. */
 bool engine_need_device(struct engine *engine, struct error *error);
 /* Notes that the device was lost over a frame of the job. False: that happens too often, it may not go on; *error
  * says so. */
 bool engine_job_may_go_on(struct job *job, struct error *error);
-/* Lets go of everything on the device and of the device. */
+/* Releases everything on the device, and the device. */
 void engine_drop_device(struct engine *engine);
-/* Lets go of what is kept on the device and no frame in progress needs, nor the next one of `keep`. False: nothing
- * was there. */
+/* Evicts resources on the device that neither a frame in progress nor the next frame of `keep` needs. False: there
+ * were none. */
 bool engine_evict_idle(struct engine *engine, const struct job *keep);
-/* A renderer for a job that has none: what its reference has, or a new one. */
+/* A renderer for a job without one: its reference's, or a new one. */
 bool job_need_renderer(struct engine *engine, struct job *job, struct error *error);
 /* Leaves it to the next job by its reference. */
 void job_leave_renderer(struct engine *engine, struct job *job);

@@ -8,12 +8,12 @@
 struct job_output {
     struct job_output_options options;
     atomic_uint references;
-    atomic_uint in_hand;    /* reserved, not taken */
+    atomic_uint in_hand;    /* reserved, not fetched */
     atomic_uint unfinished; /* reserved, not put */
     atomic_uint_fast64_t encode_ns;
     atomic_bool closed; /* written under the lock */
-    /* It is held while events are pushed, as that is what keeps them in order. A push may wait for the network
-     * thread, which never takes this lock. */
+    /* Held while events are pushed, which keeps them in order. A push may wait for the network thread, which never
+     * takes this lock. */
     pthread_mutex_t lock;
     uint64_t reserved, next; /* positions given out, and handed out */
     uint64_t credit;

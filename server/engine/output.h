@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* What a job hands out: its frames in order as far as credit goes, then one final event, then nothing.
+/* The output of a job: its frames in order as far as credit goes, then one final event, then nothing.
  *
  * Frames come from the encoding pool in any order; the thread that owns GL gives credit, ends and cancels; the
- * network thread reports what it has taken. Whoever makes the next event possible pushes it. Thread-safe,
- * reference-counted: the job, each frame on its way and each event hold one. */
+ * network thread reports what it has fetched. The call that makes the next event possible pushes it. Thread-safe,
+ * reference-counted: the job, each frame under way and each event hold a reference. */
 #ifndef FARLIGHT_ENGINE_OUTPUT_H
 #define FARLIGHT_ENGINE_OUTPUT_H
 
@@ -16,7 +16,7 @@ struct job_output_options {
     struct queue *events; /* struct engine_event *; a push may wait */
     uint64_t client;
     uint32_t request;
-    uint32_t window; /* frames given in and not taken, at most */
+    uint32_t window; /* maximum of frames that were added and not fetched */
     uint64_t credit;
 };
 
@@ -24,11 +24,11 @@ struct job_output *job_output_create(const struct job_output_options *options); 
 struct job_output *job_output_ref(struct job_output *output);
 void job_output_unref(struct job_output *output); /* accepts NULL */
 
-/* A place for one more frame; false: `window` frames are not taken yet. One thread only. */
+/* Reserves a place for one more frame; false: `window` frames are not fetched yet. One thread only. */
 bool job_output_has_room(const struct job_output *output);
 /* Takes that place; the number is the frame's position in the output. */
 uint64_t job_output_reserve(struct job_output *output);
-/* The frame for a reserved place, or what went wrong with it. Takes over the event and fills in whose it is. */
+/* Adds the frame, or its error, for a reserved place. Takes over the event and fills in its client and request. */
 void job_output_put(struct job_output *output, uint64_t position, struct engine_event *event);
 /* Frames whose place is reserved and that are not put there: those in the hands of the encoders. */
 uint32_t job_output_unfinished(const struct job_output *output);

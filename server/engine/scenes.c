@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Scenes and who holds them, on the thread that owns GL. */
+/* Scenes and their holders, on the thread that owns GL. */
 #include "engine/engine_private.h"
 
 #include "base/clock.h"
@@ -118,7 +118,7 @@ static void scene_free(struct engine *engine, struct engine_scene *scene)
     free(scene);
 }
 
-/* One that nobody holds. */
+/* A scene without a holder. */
 static void scene_end(struct engine *engine, struct engine_scene *scene)
 {
     bool lingered = scene->sharing != SHARING_PRIVATE;
@@ -131,7 +131,7 @@ static void scene_end(struct engine *engine, struct engine_scene *scene)
         engine_post(engine, event_create(ENGINE_SCENE_ENDED, 0, 0));
 }
 
-/* Until when one that nobody holds may stay; 0: no longer than now. One that holds nothing is not worth it. */
+/* The end of a scene without a holder; 0: now. An empty scene does not linger. */
 static uint64_t lingers_until_ns(const struct engine *engine, const struct engine_scene *scene)
 {
     if (scene->sharing == SHARING_PRIVATE || !scene->scene->revision || !engine->options.limits.scene_linger_ms)
@@ -147,7 +147,7 @@ static size_t count_left_by(const struct engine *engine, uint64_t principal)
     return count;
 }
 
-/* Of those who leave too many scenes, who leaves most loses his oldest. */
+/* With too many lingering scenes, the owner with most of them loses its oldest. */
 static bool goes_before(const struct engine *engine, const struct engine_scene *a, const struct engine_scene *b)
 {
     size_t a_count = count_left_by(engine, a->principal), b_count = count_left_by(engine, b->principal);
@@ -199,7 +199,7 @@ void engine_end_left_scenes(struct engine *engine)
         scene_end(engine, scene);
 }
 
-/* For somebody who needs room: of his own the one that he left first; without any, as where too many linger. */
+/* The scene to evict for an owner: its own oldest one; without one, as with too many lingering scenes. */
 static struct engine_scene *first_to_give_way(const struct engine *engine, uint64_t principal)
 {
     struct engine_scene *own = NULL;
@@ -228,7 +228,7 @@ void engine_trim_tables(struct engine *engine, uint64_t principal)
         scene_end(engine, scene);
 }
 
-/* At most: others may use them as well. */
+/* An upper bound: other scenes may use them too. */
 static uint64_t blob_bytes_of(const struct engine_scene *scene)
 {
     return scene->scene->host_bytes - scene->scene->table_bytes;
@@ -250,7 +250,7 @@ void engine_trim_blobs(struct engine *engine, uint64_t principal, uint64_t bytes
 
 /* ---- coming to a scene -------------------------------------------------------------------------- */
 
-/* By that name, what is kept for who asks before what is shared by all; NULL: there is none. */
+/* The scene of that name, the owner's kept one before a shared one; NULL: none. */
 static struct engine_scene *find_by_name(const struct engine *engine, const struct engine_command *command)
 {
     struct engine_scene *found = NULL;
@@ -262,7 +262,7 @@ static struct engine_scene *find_by_name(const struct engine *engine, const stru
     return found;
 }
 
-/* Of one name: two of the same user, or two that are shared with all. What others keep is nothing to anybody. */
+/* Whether names collide: two scenes of one owner, or two shared ones. Kept scenes of other owners do not count. */
 static struct engine_scene *find_namesake(const struct engine *engine, const struct engine_command *command)
 {
     for (struct engine_scene *scene = engine->scenes; scene; scene = scene->next) {
@@ -274,20 +274,20 @@ static struct engine_scene *find_namesake(const struct engine *engine, const str
     return NULL;
 }
 
-/* One's own scene that nobody holds any more gives its name to a new one. */
+/* An owner's scene without a holder cedes its name to a new one. */
 static bool name_is_free(struct engine *engine, const struct engine_command *command, struct error *error)
 {
     if (command->sharing == SHARING_PRIVATE)
         return true;
     if (!command->name[0])
-        return error_set(error, ERROR_INVALID, "scene_open.name", "a scene that others can come to needs a name");
+        return error_set(error, ERROR_INVALID, "scene_open.name", "a kept or shared scene needs a name");
     struct engine_scene *other;
     while ((other = find_namesake(engine, command)) && !other->references &&
            other->principal == command->principal)
         scene_end(engine, other);
     if (!other)
         return true;
-    error_set(error, ERROR_INVALID, "scene_open.name", "there is a scene \"%s\" already", command->name);
+    error_set(error, ERROR_INVALID, "scene_open.name", "a scene \"%s\" exists already", command->name);
     return error_remedy(error, "attach to it, or choose another name");
 }
 

@@ -11,8 +11,8 @@ static uint64_t turn_ns(uint32_t ready_count)
     return SCHEDULE_TURN_NS + ready_count * (uint64_t)SCHEDULE_TURN_EACH_NS;
 }
 
-/* How far one may be beyond the least. Turns themselves are not cut short by it, or it would give more to those
- * who have long ones. */
+/* How far an entry may be beyond the minimum. It does not shorten turns, or entries with long ones would get more.
+ */
 static uint64_t debt_max_ns(uint32_t ready_count)
 {
     uint64_t waited_ns = SCHEDULE_WAIT_MAX_NS / ready_count, two_turns_ns = 2 * turn_ns(ready_count);
@@ -30,7 +30,7 @@ static bool was_ready(const struct scheduler *scheduler, const struct schedule_s
     return share->ready_in + 1 == scheduler->picks && share->ready_in > 0;
 }
 
-/* Those who were ready and still are say how far the group is. */
+/* Entries that were ready and still are define the group's time. */
 static void group_look(struct schedule_group *group, const struct scheduler *scheduler,
                        const struct schedule_share *share)
 {
@@ -116,7 +116,7 @@ static void charge(struct schedule_share *share, uint64_t virtual_ns, uint64_t t
 void schedule_charge(struct scheduler *scheduler, struct schedule_client *client, struct schedule_share *job,
                      uint64_t slice_ns, uint32_t weight)
 {
-    /* What took no time that the clock shows counts a little all the same, or it would have every turn. */
+    /* A slice below the clock's resolution is charged a little, or its job would have every turn. */
     uint64_t virtual_ns = without_outliers(client, slice_ns) / weight + 1;
     uint64_t turn = ++scheduler->turns;
     scheduler->turn_ns += slice_ns;

@@ -23,7 +23,7 @@ void shot_finish(struct shot *shot)
     scene_motion_finish(&shot->motion);
 }
 
-/* The lens, of the job but for what clips say. */
+/* The job's lens, with the values that clips replace. */
 static void set_lens(struct frame_request *request, const struct animation_view *view,
                      const struct pose_view *given)
 {

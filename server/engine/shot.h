@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What one frame of a job shows: poses, camera, lens and noise. Pure: the same scene, job and frame give the same,
- * whichever frames came before, so that a range may be divided as one likes. */
+/* The content of one frame of a job: poses, camera, lens and noise. Pure: scene, job and frame number determine
+ * it, whatever frames came before, so a range may be divided anywhere. */
 #ifndef FARLIGHT_ENGINE_SHOT_H
 #define FARLIGHT_ENGINE_SHOT_H
 
@@ -16,14 +16,14 @@ struct shot {
 /* `bounds` may be kept from frame to frame, or NULL. On failure there is nothing to finish. */
 bool shot_make(struct shot *shot, const struct engine_job *job, const struct scene *scene, uint32_t frame,
                struct animation_bounds *bounds, struct error *error);
-/* The same from another place and at another time than the job's frames have: those of `from`. Noise is the job's
- * own, so that what is seen from one place is one picture. */
+/* The same, with the camera and the time of `from` in place of the job's. Noise is the job's own, so that one
+ * camera position gives one picture. */
 bool shot_look(struct shot *shot, const struct engine_job *job, const struct scene *scene,
                const struct view_camera *from, struct animation_bounds *bounds, struct error *error);
 void shot_finish(struct shot *shot);
 /* The same for frame 0 as for the job; for others another noise. */
 uint64_t shot_seed(uint64_t job_seed, uint32_t frame);
-/* Whether a job can begin: what does not depend on the frame, and its first frame. */
+/* Whether a job can begin: checks what does not depend on the frame, and the first frame. */
 bool shot_check(const struct engine_job *job, const struct scene *scene, struct error *error);
 
 #endif

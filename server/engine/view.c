@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Views: frames of the newest camera only, which refine while nothing moves.
  *
- * A frame is begun when there is something to show that was not shown, and when there is credit for it: so none
- * waits anywhere to become stale. What moves is rendered anew each time; once it rests, frames add their samples
- * up until there are enough. */
+ * A frame begins when the view has changed and has credit, so no frame waits and becomes stale. While the view
+ * moves, each frame starts from zero; at rest, frames accumulate samples until there are enough. */
 #include "engine/engine_private.h"
 
 #include "base/clock.h"
 
 #define SECOND_NS 1e9
-/* A frame comes so much before the encoder is expected to be free: it is hardly older for that, and an encoder
- * that takes less than the last time need not wait. */
+/* How long before the encoder is expected to be free a frame is finished: it is hardly older for that, and an
+ * encoder that is faster than last time need not wait. */
 #define EARLY_NS UINT64_C(500000)
 
 void view_follow(struct job *job, const struct job *before)
@@ -71,7 +70,7 @@ uint64_t view_due_ns(const struct job *job)
     return encoder_ns > job->view.due_ns ? encoder_ns : job->view.due_ns;
 }
 
-/* Frames are begun at even intervals where that can be, and never more of them than that. */
+/* Frames begin at even intervals where possible, and never more often. */
 static void set_due(struct job *job)
 {
     uint64_t period_ns = (uint64_t)(SECOND_NS / (double)job->spec.frames_per_second);
@@ -87,7 +86,7 @@ static uint32_t samples_of_next(const struct job *job)
     return wanted < job->spec.pass_samples ? wanted : job->spec.pass_samples;
 }
 
-/* Smaller while it moves, if that is what keeps up. */
+/* Smaller while it moves, if the rate requires it. */
 static void apply_effort(const struct job *job, struct frame_request *request)
 {
     const struct view_wish *wish = &job->view.wish;
@@ -171,7 +170,7 @@ void view_done(struct job *job, struct engine_frame *frame)
             frame->quality = 0; /* the other one's: the fastest level */
     }
     frame->wants_key = view->owes_key_frame;
-    /* One of rest may stand alone, but it helps nobody who has lost the stream. */
+    /* A picture at rest may stand alone, but does not help a client that has lost the stream. */
     if (!view->lane || frame->encoding == ENCODING_H264)
         view->owes_key_frame = false;
 }

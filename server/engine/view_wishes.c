@@ -36,7 +36,7 @@ void view_wishes_unref(struct view_wishes *wishes)
     free(wishes);
 }
 
-/* Ends what the caller began by taking the lock. */
+/* Releases the lock that the caller took. */
 static bool tell(struct view_wishes *wishes)
 {
     bool told = wishes->told;

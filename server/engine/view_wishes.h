@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* What the client of a view wishes from moment to moment: where it looks from, and whether the next frame is to
- * stand alone. Of each only the newest counts, so that nothing stale can queue however fast the wishes come.
+/* The newest wishes of a view's client: its camera, and whether the next frame must be a key frame. Newer wishes
+ * replace older ones, so none can queue however fast they arrive.
  *
- * The network thread writes, the thread that owns GL reads. Reference-counted: the session holds one, each command
- * and each job with it another. The views that follow each other on a channel share one: that is how the engine
- * knows which view a new one replaces, and how the camera goes on. */
+ * The network thread writes, the thread that owns GL reads. Reference-counted: the session, each command and each
+ * job hold one. Successive views of a channel share one object: by it the engine knows which view a new one
+ * replaces, and keeps the camera. */
 #ifndef FARLIGHT_ENGINE_VIEW_WISHES_H
 #define FARLIGHT_ENGINE_VIEW_WISHES_H
 
@@ -34,8 +34,8 @@ struct view_effort {
     unsigned scale_eighths; /* of width and height; 0: as the job says */
     unsigned quality;       /* 0: as the job says */
     uint64_t bytes;         /* that a frame may have; 0: not known */
-    /* Frames in the encoding of rest would keep the link from what moves next for long: only the one that has all
-     * samples comes in it. */
+    /* Frames in the encoding of rest would occupy the link when motion begins: only the frame with all samples
+     * uses it. */
     bool sparing;
 };
 /* Nothing is to be told: it counts when the next frame is begun for another reason. */
@@ -46,7 +46,7 @@ struct view_wish {
     bool key_frame;
     struct view_effort effort;
 };
-/* What is wished now, which stays wished. */
+/* The current wishes, which stay in force. */
 struct view_wish view_wishes_see(struct view_wishes *wishes);
 /* The same for a frame that is about to show it: a key frame is wished no longer. */
 struct view_wish view_wishes_take(struct view_wishes *wishes);

@@ -93,11 +93,11 @@ static void expect_error(const char *path, const char *expected)
 static void an_error_names_the_file_the_line_and_what_is_missing(void **state)
 {
     (void)state;
-    expect_error("lost.comp", "lost.comp:3: there is no shader file \"nowhere.glsl\"");
+    expect_error("lost.comp", "lost.comp:3: the shader file \"nowhere.glsl\" does not exist");
     expect_error("bare.comp", "bare.comp:1: #include names no file");
     expect_error("open.comp", "open.comp:1: #include names no file");
     expect_error("named.comp", "named.comp:2: #include names no file");
-    expect_error("none.comp", "there is no shader file \"none.comp\"");
+    expect_error("none.comp", "the shader file \"none.comp\" does not exist");
 }
 
 static void file_numbers_in_a_drivers_log_become_names(void **state)
