@@ -8,9 +8,9 @@
 
 struct entry {
     struct entry *older, *newer;
-    struct entry *same_key; /* the map's keys are short: what shares one hangs in a chain */
+    struct entry *same_key; /* the map's keys are short: blobs that share a key form a chain */
     blob_principal principal;
-    bool forgotten; /* the principal will not come back: nobody finds it, it goes with its last use */
+    bool forgotten; /* the principal will not return: the blob cannot be found and ends with its last use */
     struct blob *blob;
 };
 
@@ -125,7 +125,7 @@ struct blob *blob_store_add(struct blob_store *store, blob_principal principal, 
     return blob_ref(blob);
 }
 
-/* Nobody but the store has a reference. Uses end in other threads, but begin only here. */
+/* Only the store has a reference. Uses end in other threads and begin only here. */
 static bool is_idle(const struct entry *entry)
 {
     return atomic_load_explicit(&entry->blob->references, memory_order_acquire) == 1;
@@ -136,8 +136,8 @@ static uint64_t cost_of(const struct entry *entry)
     return entry->blob->size_bytes + BLOB_STORE_OVERHEAD_BYTES;
 }
 
-/* Drops idle blobs, those of who will not come back, and then oldest first, until no more than that many bytes of
- * them are left. */
+/* Drops idle blobs until at most that many bytes of them are left: first those of principals that will not return,
+ * then the oldest. */
 static void trim_to(struct blob_store *store, uint64_t idle_limit_bytes)
 {
     uint64_t idle_bytes = 0;

@@ -11,17 +11,17 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Whose blobs are meant: a hash must not be a key to somebody else's data. */
+/* The owner of blobs: a hash must not give access to another user's data. */
 typedef uint64_t blob_principal;
 
-/* What a blob takes beside its content: counted against the limits, as small ones may be many. */
+/* The memory of a blob beside its content: counted against the limits, as there may be many small blobs. */
 #define BLOB_STORE_OVERHEAD_BYTES 256u
 
 struct blob_store;
 
 struct blob_store *blob_store_create(uint64_t limit_bytes, uint64_t cache_limit_bytes); /* NULL: out of memory */
 void blob_store_destroy(struct blob_store *store);                                      /* accepts NULL */
-/* Other limits from now on. What is held beyond them stays until its uses end. */
+/* Sets new limits. Blobs beyond them stay until their uses end. */
 void blob_store_limit(struct blob_store *store, uint64_t limit_bytes, uint64_t cache_limit_bytes);
 
 /* A new reference, or NULL: not there. */
@@ -31,14 +31,14 @@ struct blob *blob_store_find(struct blob_store *store, blob_principal principal,
  * one that is held under this name from now on: it, or an equal one that was there. NULL: out of memory. */
 struct blob *blob_store_add(struct blob_store *store, blob_principal principal, struct blob *blob);
 
-/* Room for bytes of a blob that are about to arrive; ERROR_LIMIT if there is none even without the cache. */
+/* Reserves bytes for a blob that is about to arrive; ERROR_LIMIT if they do not fit even without the cache. */
 bool blob_store_reserve(struct blob_store *store, uint64_t size_bytes, struct error *error);
-/* What would have to go for that many bytes to be reserved; 0: nothing, or there will never be room. */
+/* Bytes that must be released before that many can be reserved; 0: none, or they can never be reserved. */
 uint64_t blob_store_lacking(const struct blob_store *store, uint64_t size_bytes);
 void blob_store_release(struct blob_store *store, uint64_t size_bytes); /* it is added now, or will not come */
 
 void blob_store_trim(struct blob_store *store); /* to be called when uses may have ended */
-/* It will never come back: what scenes still use of its is held, and counted, until they do not. */
+/* The principal will not return: its blobs that scenes still use are kept, and counted, until their uses end. */
 void blob_store_forget(struct blob_store *store, blob_principal principal);
 uint64_t blob_store_bytes(const struct blob_store *store); /* of content, held and reserved */
 size_t blob_store_count(const struct blob_store *store);

@@ -16,7 +16,7 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
-/* So few at once, so that those who came first can introduce themselves before the next are counted. */
+/* Few at once, so that the first clients can finish their handshake before the next are counted. */
 #define ACCEPTS_A_TURN 4
 /* Out of descriptors: a listener stays readable all the time, so it is not watched for this long. */
 #define ACCEPT_PAUSE_NS UINT64_C(100000000)
@@ -124,8 +124,8 @@ static bool accept_one(struct daemon *daemon, const struct listener *listener)
 static void accept_from(struct daemon *daemon, const struct listener *listener)
 {
     for (int i = 0; i < ACCEPTS_A_TURN; i++) {
-        /* Those who wait in the listener's own queue may come when others have introduced themselves, or run out
-         * of time. */
+        /* Clients in the listener's own queue are accepted when others have finished their handshake or timed out.
+         */
         if (daemon->hub.unauthenticated >= daemon->hub.options.limits.unauthenticated) {
             pause_accepting(daemon);
             return;
@@ -202,7 +202,7 @@ static void on_owner_gone(void *context)
         stop(daemon);
 }
 
-/* One who tries again may find that it works: another process has another context. */
+/* A retry may succeed: another process has another context. */
 static void on_device_gone(void *context)
 {
     struct daemon *daemon = context;

@@ -30,8 +30,8 @@ struct daemon {
     void *reload_context;
 };
 
-/* SIGTERM, SIGINT and SIGHUP are blocked in the calling thread, to be taken by the loop; before any thread starts,
- * so that all inherit it. SIGPIPE is ignored. */
+/* Blocks SIGTERM, SIGINT and SIGHUP in the calling thread, for the loop to handle; call it before any thread
+ * starts, so that all inherit the mask. SIGPIPE is ignored. */
 void daemon_block_signals(void);
 /* Zeroes it. */
 void daemon_init(struct daemon *daemon);

@@ -200,7 +200,7 @@ const struct dispatch_row *dispatch_find(uint32_t type)
     return NULL;
 }
 
-/* The request in flight that a message continues; NULL: there is none, which was seen to. */
+/* The request in flight that a message continues; NULL: none, and that is handled. */
 static struct request *continued(struct session *session, const struct dispatch_row *row, uint32_t id)
 {
     struct request *request = request_find(session, id);
@@ -227,7 +227,7 @@ static struct request *started(struct session *session, const struct dispatch_ro
     return request;
 }
 
-/* Answers a message that is not carried out; what still comes of its request is skipped. */
+/* Answers a message that is refused; later messages of its request are skipped. */
 static void refuse(struct session *session, const struct dispatch_row *row, uint32_t id, const struct error *error)
 {
     struct request *request;
@@ -259,7 +259,7 @@ static bool is_allowed(const struct session *session, enum message_type type, st
         return true;
     error_set(error, ERROR_DENIED, message_type_text(type), "this client may only look");
     return error_remedy(error,
-                        "attach to a shared scene, or ask whoever runs the daemon to let you change things");
+                        "attach to a shared scene, or ask the daemon's administrator for the right to edit");
 }
 
 void dispatch_message(void *context, const struct framing_header *header, const struct message *message)

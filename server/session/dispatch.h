@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* From a message to what is done with it: one row a message. */
+/* Dispatch: one row per message. */
 #ifndef FARLIGHT_SESSION_DISPATCH_H
 #define FARLIGHT_SESSION_DISPATCH_H
 
@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* What the header's request number must be. */
+/* The requirement on the header's request number. */
 enum dispatch_request {
     DISPATCH_ANY,       /* the handler sees to it */
     DISPATCH_STARTS,    /* a new one; the handler gets it */

@@ -11,14 +11,14 @@ struct transaction {
     uint32_t scene;
     struct scene_edit *edits;
     size_t count, capacity;
-    uint64_t bytes; /* of the edits and what they own, blobs left out */
+    uint64_t bytes; /* of the edits and their memory, without blobs */
 };
 
 void edits_begin(struct session *session, struct request *request, const struct message_edit_begin *begin);
 /* One edit, or EDIT_COMMIT, of an open transaction. */
 void edits_add(struct session *session, struct request *request, const struct message *message);
 void edits_commit(struct session *session, struct request *request);
-/* Answers the request with the error; what still comes of the transaction is skipped. */
+/* Answers the request with the error; later messages of the transaction are skipped. */
 void edits_fail(struct session *session, struct request *request, const struct error *error);
 void transaction_destroy(struct session *session, struct transaction *transaction); /* accepts NULL */
 

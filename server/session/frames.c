@@ -17,9 +17,9 @@ struct pending_frame {
     struct out_chunk chunk; /* first: release() gets its address */
     struct pending_frame *next;
     struct job *job;  /* NULL: dropped */
-    uint32_t request; /* the job's, or that of a view whose place it has taken */
+    uint32_t request; /* the job's, or that of a view that it has replaced */
     struct engine_frame *frame;
-    struct hub *counted_by; /* its bytes, beside those of jobs; NULL: they are the job's */
+    struct hub *counted_by; /* its bytes, counted apart from those of jobs; NULL: they count as the job's */
     bool begun;
     bool queued; /* all of it is with the connection */
     size_t queued_bytes;
@@ -126,8 +126,8 @@ static void put_u32(uint8_t *out, uint32_t value)
         out[i] = (uint8_t)(value >> (8 * i));
 }
 
-/* What message_write() makes of a frame_data message, up to the bytes of the frame (a test compares the two):
- * writing it here spares a copy of every frame. */
+/* The same bytes as message_write() makes of a frame_data message, up to the frame's own (a test compares the
+ * two): writing them here avoids a copy of every frame. */
 void frame_data_head(uint8_t head[FRAME_DATA_HEAD_BYTES], uint32_t request, uint32_t channel,
                      uint64_t offset_bytes, uint32_t data_bytes)
 {
@@ -388,7 +388,7 @@ static bool has_something_to_queue(const struct job *job)
         return false;
     if (pending->begun)
         return true;
-    /* A view's frame may have been made with the credit that one of the view before has used since. */
+    /* The credit of a view's frame may have been used since by a frame of the replaced view. */
     return job->frames_sent < job->client_credit && (!job->view || view_may_send(job));
 }
 

@@ -9,7 +9,7 @@
 #include <sys/epoll.h>
 
 #define RETRY_NS UINT64_C(2000000)
-/* Events of the engine that are taken before clients get their turn again. */
+/* Maximum of engine events that are handled before clients get their turn again. */
 #define EVENTS_A_TURN 64
 
 /* ---- commands ---------------------------------------------------------------------------------------- */
@@ -67,7 +67,7 @@ static void retry(void *context)
 {
     struct hub *hub = context;
     while (hub->waiting) {
-        struct engine_command *next = hub->waiting->next; /* the engine may destroy what it takes */
+        struct engine_command *next = hub->waiting->next; /* the engine may destroy the command */
         if (!try_submit(hub, hub->waiting))
             break;
         hub->waiting = next;
@@ -125,7 +125,7 @@ bool hub_add_client(struct hub *hub, int fd, const struct address *own, const st
         return error_set(error, ERROR_SHUTTING_DOWN, NULL, "the daemon stops");
     if (!auth_identify(&identity, fd, peer, hub->options.insecure || hub->options.keys.count, error))
         return false;
-    bool is_owner = hub->last_number + 1 == hub->owner; /* who does as he likes */
+    bool is_owner = hub->last_number + 1 == hub->owner; /* local clients with full rights */
     if (!is_owner && identity.has_user && readers_have(&hub->options.readers, identity.user))
         identity.read_only = true;
     if (hub->unauthenticated >= limits->unauthenticated)

@@ -29,7 +29,7 @@ struct hub_options {
     struct engine_limits engine_limits; /* as the engine has them; told to clients */
     uint64_t device_bytes;              /* likewise; 0: no limit */
     struct auth_keys keys;              /* with which clients come in sealed, from everywhere */
-    bool insecure;                      /* peers beyond loopback are let in without one as well */
+    bool insecure;                      /* peers beyond loopback are accepted without a key too */
 };
 
 struct hub {
@@ -39,18 +39,18 @@ struct hub {
     struct hashmap sessions; /* struct session *, by number */
     size_t unauthenticated;
     struct attempts attempts; /* wrong keys */
-    uint64_t frame_bytes;     /* what the frames of all jobs may take */
+    uint64_t frame_bytes;     /* maximum of the frames of all jobs */
     uint64_t last_number, started_ns;
     bool stopping;
-    uint64_t owner;                        /* number of the client for whom all this is there; 0: nobody */
+    uint64_t owner;                        /* number of the client that the daemon serves alone; 0: none */
     struct connection_limits owner_limits; /* of that one */
     loop_call_fn *owner_gone,
-        *emptied,     /* called when that one is gone, and when the last session is; may be NULL */
+        *emptied,     /* called when that client is gone, and when the last session is; may be NULL */
         *device_gone; /* the engine's device is lost for good; may be NULL */
     void *call_context;
 
     struct loop_watch *engine_watch;
-    /* Commands that the engine had no room for, in order. While one waits, no session reads on. */
+    /* Commands that did not fit the engine's queue, in order. While one waits, no session reads. */
     struct engine_command *waiting, **waiting_end;
     struct loop_timer retry_timer;
 };
@@ -61,16 +61,16 @@ void hub_finish(struct hub *hub); /* all sessions are gone */
 /* A new client, which came to our address `own`; takes over the descriptor when it succeeds. */
 bool hub_add_client(struct hub *hub, int fd, const struct address *own, const struct address *peer,
                     struct error *error);
-/* Says goodbye to everybody; `emptied` is called when they are gone, at once if there is nobody. */
+/* Says goodbye to all clients; `emptied` is called when they are gone, at once if there are none. */
 void hub_stop(struct hub *hub);
 
-/* Takes over limits, readers and keys, for what is asked for and who comes from now on; the rest stays as it is.
- * False: out of memory, nothing is changed. */
+/* Applies limits, readers and keys to new requests and new clients; everything else stays. False: out of memory,
+ * nothing is changed. */
 bool hub_reload(struct hub *hub, const struct hub_options *options, struct error *error);
 
-/* Hands a command to the engine, now or as soon as it has room. */
+/* Submits a command to the engine, now or as soon as its queue has space. */
 void hub_submit(struct hub *hub, struct engine_command *command);
-/* The principal lacks so many bytes for blobs: scenes that nobody holds shall end, its own first. */
+/* The principal lacks that many bytes for blobs: evicts scenes without a holder, its own first. */
 void hub_trim(struct hub *hub, blob_principal principal, uint64_t bytes);
 /* The same for one of a session's requests: zeroed but for kind, client and request. NULL: out of memory. */
 struct engine_command *hub_command(enum engine_command_kind kind, uint64_t client, uint32_t request);

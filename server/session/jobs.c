@@ -8,7 +8,7 @@
 
 #include <stdlib.h>
 
-/* So long nothing has come before the client is told why. */
+/* Time without a frame after which the client is told why. */
 #define BLOCKED_NS UINT64_C(100000000)
 
 struct job *jobs_find(const struct session *session, uint32_t channel)
@@ -186,7 +186,7 @@ bool job_is_owed(const struct job *job)
 
 /* ---- end --------------------------------------------------------------------------------------------- */
 
-/* Those that are not with the kernel. A view whose place the job has taken has been waiting for one of them. */
+/* Frames that the kernel has not accepted yet. A replaced view waits for one of them. */
 static void drop_frames(struct session *session, struct job *job)
 {
     uint32_t before = frames_drop(session, job);
@@ -209,7 +209,7 @@ static void destroy(struct session *session, struct job *job)
     free(job);
 }
 
-/* The engine has ended the job's request: a view that was to take its place is what there is now. */
+/* The engine has ended the job's request: a view that was to replace it is the current one now. */
 static void end(struct session *session, struct job *job)
 {
     if (!job->view || !job->view->changes) {

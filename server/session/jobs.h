@@ -23,12 +23,12 @@ struct job {
     uint64_t engine_credit; /* the part of it that the engine was told, counted in frames of `request` .. */
     uint64_t frames_gone;   /* .. as are these: sent, or dropped */
     uint64_t window;        /* frames that may wait here to be sent */
-    uint64_t frame_bytes;   /* what all its frames may take, in the engine and here */
+    uint64_t frame_bytes;   /* maximum of its frames' bytes, in the engine and here */
     struct pending_frame *first, **end; /* from the engine, in order; the first may be under way */
     bool rendered;                      /* the engine is done with it */
-    bool cancelled;                     /* what still comes from the engine is dropped */
+    bool cancelled;                     /* later frames from the engine are dropped */
     struct loop_timer blocked_timer;    /* until the client is told that nothing comes .. */
-    uint64_t blocked_told;              /* .. which it was when so many frames, and 1, had been sent */
+    uint64_t blocked_told;              /* .. the number of sent frames at that time, plus 1 */
     struct session_view *view;          /* owned; NULL: a batch */
 };
 
@@ -40,9 +40,9 @@ bool job_is_cancelled(const struct request *target);
 /* The engine's events for a job's request. */
 void job_done(struct session *session, struct request *request);
 void job_failed(struct session *session, struct request *request, const struct error *error);
-/* A frame of that request, the job's or that of a view whose place it has taken, is with the kernel. */
+/* The kernel has accepted a whole frame of that request: the job's, or a replaced view's. */
 void job_frame_sent(struct job *job, uint32_t request);
-/* The rest of one, of which a part has gone, will not go. */
+/* The rest of a partly sent frame is abandoned. */
 void job_frame_abandoned(struct job *job, uint32_t request);
 /* Something has changed that may let frames be begun, or go. */
 void job_pace(struct job *job);

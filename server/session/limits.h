@@ -27,8 +27,8 @@ struct session_limits {
     uint64_t blob_cache_bytes;  /* of them: blobs that nobody uses now */
     uint64_t transaction_bytes; /* of them: memory */
     uint64_t upload_window_bytes;
-    uint64_t frame_bytes; /* what the frames of all jobs may take before they are sent; one job may always run */
-    uint32_t frames_in_flight;   /* of one job in the engine, as it has it */
+    uint64_t frame_bytes;      /* maximum of the frames of all jobs before they are sent; one job may always run */
+    uint32_t frames_in_flight; /* of one job in the engine, as it has it */
     uint64_t frame_window_bytes; /* rendered frames of one job that wait to be sent, as far as more than one */
 };
 

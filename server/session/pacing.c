@@ -5,24 +5,24 @@
 #include <string.h>
 
 #define WINDOW_NS UINT64_C(10000000000)
-/* How much of what was learned about the link stays with each frame: eight frames count most. */
+/* Share of the link's estimate that stays with each frame: the last eight frames count most. */
 #define CARRIED_FADES 0.875
 /* A client says when frames have come, however late; this long is for ever, and still a time that can be added to
  * one. */
 #define WAIT_MAX_NS 0x1p61
 /* A local socket takes no time that could be measured; this keeps the rate finite. */
 #define CARRIED_LEAST_NS 1000.0
-/* The part of the link that frames are made to fit: what is left drains queues of others, and our own. */
+/* Share of the link that frames may fill: the rest drains other queues, and the connection's own. */
 #define LINK_SHARE 0.9
 #define LEARN_SHARE 0.25
-/* How much of what was learned about rendering stays with each frame. */
+/* Share of the rendering estimate that stays with each frame. */
 #define RENDER_FADES 0.9
 /* Frames have shown how much of rendering depends on their size when their areas deviate by this part of the mean.
  */
 #define AREA_DEVIATION 0.25
-/* A frame may take so much longer than what no size can spare. */
+/* Factor by which a frame may take longer than the time that no size can reduce. */
 #define OF_FIXED 1.5
-/* So often in a row the next better step must fit, with this room to spare. */
+/* How many times in a row the next better step must fit, with this margin. */
 #define BETTER_TIMES 8
 #define BETTER_ROOM 1.25
 
@@ -47,7 +47,7 @@ uint64_t pacing_round_trip_ns(const struct pacing *pacing)
     return !now_ns || (before_ns && before_ns < now_ns) ? before_ns : now_ns;
 }
 
-/* What the link drains in one frame time and the least round trip. */
+/* Bytes that the link drains in one frame time and the minimum round trip. */
 static double room_bytes(const struct pacing *pacing)
 {
     return pacing->carried_bytes / pacing->carried_ns *
@@ -96,9 +96,9 @@ static void learn_round_trip(struct pacing *pacing, uint64_t taken_ns, uint64_t 
         pacing->round_trip_ns = taken_ns;
 }
 
-/* The link worked on a frame from when its first bytes came until its last ones did; if it stood in line behind
- * another, since that one had come at the latest. Of a client that does not tell of the first bytes the way counts
- * too: the rate is too low then but where frames stand in line. */
+/* The link worked on a frame from the arrival of its first bytes to that of its last; behind a queued frame, from
+ * that frame's arrival at the latest. For a client that does not acknowledge the first bytes, the latency counts
+ * too: the rate is then too low unless frames queue. */
 static void learn_rate(struct pacing *pacing, const struct pacing_frame *frame, uint64_t now_ns)
 {
     uint64_t since_ns = frame->begun_ns ? frame->begun_ns : frame->sent_ns;
@@ -228,8 +228,8 @@ static double bytes_of(const struct pacing *pacing, unsigned scale_eighths, unsi
     return pacing->bytes_full * area_of(scale_eighths) * bytes_of_quality(quality);
 }
 
-/* So that the rule for sending lets one go each frame time: those that were sent before it and are not
- * acknowledged yet have to fit as well. */
+/* So that the sending rule passes one frame in each frame time: earlier frames that are not acknowledged yet must
+ * fit too. */
 static double bytes_a_frame(const struct pacing *pacing)
 {
     if (!(pacing->carried_ns > 0.0))
@@ -240,7 +240,7 @@ static double bytes_a_frame(const struct pacing *pacing)
     return fmin(of_link, of_room);
 }
 
-/* The best that fits; `room`: how many times over. */
+/* The best step that fits `room` times. */
 static struct pacing_advice best_that_fits(const struct pacing *pacing, unsigned quality_wanted, double room)
 {
     double bytes_max = bytes_a_frame(pacing) / room;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* When the next frame of a view may go to its client, and how good it can be. Pure: no clock, no socket; times
- * are what the caller says, of one clock that never goes back.
+/* When the next frame of a view may be sent, and at which quality and size. Pure: no clock, no socket; the caller
+ * passes the times of one monotonic clock.
  *
- * The link is learned from the client's acknowledgements. That of a frame's first message gives the round trip,
- * as it is small; the time from it to that of the last byte is what the link took for the frame. The rule for
- * sending is neatvnc's: a frame is skipped rather than let the bytes in flight exceed what the link drains in one
- * frame time and the least round trip, so that what a client sees is never older than that. */
+ * The link is learned from the client's acknowledgements. The acknowledgement of a frame's small first message
+ * gives the round trip; the time from it to that of the last byte is the link's time for the frame. The sending
+ * rule is neatvnc's: a frame is skipped if the bytes in flight would exceed what the link drains in one frame time
+ * and the minimum round trip, so no client sees a picture older than that. */
 #ifndef FARLIGHT_SESSION_PACING_H
 #define FARLIGHT_SESSION_PACING_H
 
@@ -30,12 +30,12 @@ struct pacing {
     uint64_t in_flight_bytes;
     bool acknowledges; /* the client has acknowledged a frame */
     uint64_t last_whole_ns;
-    /* Least round trip of this window of time and of the one before it; 0: none. */
+    /* Minimum round trip of this time window and of the one before it; 0: none. */
     uint64_t round_trip_ns, round_trip_before_ns, window_begun_ns;
     /* Bytes that came and the time that the link took for them, older ones fading. */
     double carried_bytes, carried_ns;
     uint64_t last_bytes; /* of the frame that was sent last */
-    /* What a picture of full size costs, learned from those of any size. */
+    /* The cost of a full-size picture, estimated from pictures of any size. */
     double bytes_full; /* at PACING_QUALITY_REFERENCE; 0: not known */
     /* Rendering takes a part that does not depend on the picture's size, and one that grows with its area, of
      * which the full picture has 1. Sums over the frames so far, older ones fading. */
@@ -56,8 +56,8 @@ struct pacing_advice {
 
 void pacing_init(struct pacing *pacing, uint64_t frame_ns);
 
-/* Whether the next frame may be begun. False: an acknowledgement will change that. Of a client that has never
- * acknowledged anything: one frame at a time, so its credit is what moves it on; tell pacing_forget() then. */
+/* Whether the next frame may begin. False: an acknowledgement will change that. A client that has never
+ * acknowledged a frame gets one at a time, and its credit releases the next; call pacing_forget() then. */
 bool pacing_may_send(const struct pacing *pacing);
 /* How long until the next frame may go if `coming` others of its size go before it, as far as can be told: 0: it
  * may now; UINT64_MAX: only an acknowledgement will tell. */
@@ -68,8 +68,8 @@ void pacing_sent(struct pacing *pacing, uint32_t frame, uint64_t bytes, uint64_t
 void pacing_acknowledged(struct pacing *pacing, uint32_t frame, bool whole, uint64_t now_ns);
 /* Whether the rest of a frame keeps the link for longer than the next frame should wait. */
 bool pacing_is_long(const struct pacing *pacing, uint64_t bytes);
-/* The rest of it will not be sent. What has gone of it is ahead of the next frame whenever that one goes, which
- * therefore need not wait. */
+/* The rest of the frame is abandoned. Its sent bytes are ahead of the next frame at any time, so the next need not
+ * wait. */
 void pacing_abandoned(struct pacing *pacing, uint32_t frame);
 /* Nothing is in flight any more, as far as is known: credit has come from a client that does not acknowledge. */
 void pacing_forget(struct pacing *pacing);

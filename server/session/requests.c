@@ -123,7 +123,7 @@ void request_cancel(struct session *session, struct request *cancel, uint32_t ta
     struct request *target = request_find(session, target_id);
     if (!target || target == cancel || target->cancelled_by ||
         (target->kind == REQUEST_JOB && job_is_cancelled(target))) {
-        /* Answered already, or about to be, which is what the client wanted. */
+        /* Already answered, or about to be, which serves the cancelling client. */
         request_answer_ok(session, cancel, 0);
         return;
     }

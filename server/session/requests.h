@@ -33,11 +33,11 @@ struct request {
     uint32_t scene; /* of scene open, attach and close */
     void *object;
     uint32_t cancelled_by; /* the cancel that is answered once this one is; 0: none */
-    size_t edits;          /* of a commit: what the engine holds for it until the answer */
+    size_t edits;          /* of a commit: memory that the engine holds for it until the answer */
     uint64_t edit_bytes;
 };
 
-/* Requests of several messages that failed before their last message came: what still comes is skipped. */
+/* Requests of several messages that failed before their last message: the rest of them is skipped. */
 #define REQUESTS_DEAD_MAX 64
 
 struct requests {

@@ -77,7 +77,7 @@ void scenes_open(struct session *session, struct request *request, const struct 
 {
     struct error error = {0};
     enum engine_sharing sharing = (enum engine_sharing)open->sharing;
-    /* Nobody else is ever the same user. */
+    /* No other client is ever the same user. */
     if (sharing == SHARING_KEPT && !session->identity.known)
         sharing = SHARING_PRIVATE;
     if (!add(session, open->scene, "scene_open.scene", &error)) {
@@ -97,8 +97,8 @@ void scenes_attach(struct session *session, struct request *request, const struc
     submit(session, request, ENGINE_SCENE_ATTACH, attach->scene, attach->name, SHARING_PRIVATE);
 }
 
-/* False: there is no such scene, which was answered. One that is being opened will do: the engine carries things
- * out in order. */
+/* False: the scene does not exist, and an error was sent. A scene that is being opened suffices: the engine runs
+ * commands in order. */
 static bool is_there(struct session *session, struct request *request, uint32_t scene, const char *field)
 {
     enum session_scene_state state = session_scene(session, scene);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Scenes of one session: opened, attached to, described, closed; and what is heard of them. */
+/* Scenes of one session: opened, attached to, described, closed; and notices of their changes. */
 #ifndef FARLIGHT_SESSION_SCENES_H
 #define FARLIGHT_SESSION_SCENES_H
 
@@ -16,7 +16,7 @@ void scenes_list(struct session *session, struct request *request);
 void scenes_describe(struct session *session, struct request *request,
                      const struct message_scene_describe *describe);
 
-/* State of a scene, 0 if there is none. */
+/* State of a scene, 0: it does not exist. */
 enum session_scene_state session_scene(const struct session *session, uint32_t scene);
 
 /* The engine's answers: to an open or an attach, to a close, to the others. */
@@ -25,11 +25,12 @@ void scenes_closed(struct session *session, struct request *request);
 void scenes_listed(struct session *session, struct request *request, const struct engine_scene_list *list);
 void scenes_described(struct session *session, struct request *request,
                       const struct engine_scene_description *description);
-/* A request of this kind that failed: its scene is forgotten. `submitted`: by the engine; else it was never asked,
- * and what was open stays so. Does not answer. */
+/* A request of this kind failed: its scene is removed. `submitted`: the engine refused it; otherwise the engine
+ * was not asked, and an open scene stays open. Sends no answer. */
 void scenes_failed(struct session *session, const struct request *request, bool submitted);
 
-/* Another client has changed a scene. It is told as soon as there is room, the last revision alone. */
+/* Another client has changed a scene. The notice is sent as soon as the queue has space, with the last revision
+ * only. */
 void scenes_changed(struct session *session, uint32_t scene, uint64_t revision);
 void scenes_tell_changes(struct session *session);
 void scenes_finish(struct session *session);

@@ -84,7 +84,7 @@ void session_submit(struct session *session, struct request *request, struct eng
     }
     struct error error = {0};
     error_set(&error, ERROR_OUT_OF_MEMORY, NULL, "no memory");
-    /* The engine knows nothing of it: all is as before. */
+    /* The engine has not seen it: nothing has changed. */
     scenes_failed(session, request, false);
     if (request->kind == REQUEST_JOB && request->object)
         job_failed(session, request, &error);
@@ -117,7 +117,7 @@ static void on_done(struct session *session, struct request *request, const stru
     case REQUEST_STATS:
     case REQUEST_SCENE_LIST:
     case REQUEST_SCENE_DESCRIBE:
-        return; /* the engine knows nothing of these */
+        return; /* the engine has not seen these */
     }
 }
 
@@ -192,7 +192,7 @@ static const struct connection_limits *connection_limits_of(const struct session
     return is_owner ? &hub->owner_limits : &hub->options.connection_limits;
 }
 
-/* Of a limit that is there some seconds remain, as 0 means that there is none. */
+/* A limit below a second becomes one second, as 0 means no limit. */
 static uint32_t seconds_of(uint64_t time_ms)
 {
     return (uint32_t)(time_ms && time_ms < 1000 ? 1 : time_ms / 1000);
@@ -249,8 +249,8 @@ static size_t introduced_count(const struct hub *hub)
     return hub->sessions.count - hub->unauthenticated;
 }
 
-/* Users are 32-bit numbers, sessions are counted, keys have the top bit; a client that is not known shares with
- * nobody. */
+/* Users are 32-bit numbers, sessions are counted, keys have the top bit set; an unknown client shares with no
+ * other. */
 static blob_principal principal_of(const struct session *session)
 {
     const struct auth_identity *identity = &session->identity;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One client, from its hello to its goodbye: what it holds, and what is done with each of its messages. */
+/* One client, from its hello to its goodbye: its resources and its requests. */
 #ifndef FARLIGHT_SESSION_SESSION_H
 #define FARLIGHT_SESSION_SESSION_H
 
@@ -63,6 +63,6 @@ void session_send_error(struct session *session, uint32_t request, const struct 
 /* ERROR on request 0, goodbye, end. */
 void session_fail(struct session *session, const struct error *error);
 void session_fail_for_memory(struct session *session);
-/* Hands a request's command to the engine; NULL (out of memory) is answered as well. */
+/* Submits a request's command to the engine; NULL (out of memory) is answered with an error. */
 void session_submit(struct session *session, struct request *request, struct engine_command *command);
 #endif

@@ -43,7 +43,7 @@ static void fill_client(struct record_client_stat *stat, char name[NAME_BYTES], 
     };
 }
 
-/* Who may only look hears of nobody else. */
+/* A read-only client is told of itself alone. */
 static uint32_t fill_clients(struct stats_storage *storage, const struct session *asker)
 {
     const struct hub *hub = asker->hub;
@@ -61,7 +61,7 @@ static uint32_t fill_clients(struct stats_storage *storage, const struct session
     return count;
 }
 
-/* What others keep to themselves has no name for anybody else, and is nothing to who may only look. */
+/* Scenes that other owners keep have no name for this client, and are not listed for a read-only one. */
 static uint32_t fill_scenes(struct stats_storage *storage, const struct session *asker,
                             const struct engine_stats *stats)
 {

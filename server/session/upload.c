@@ -14,7 +14,7 @@
 _Static_assert(SESSION_OFFERS_KEY_BYTES == crypto_shorthash_KEYBYTES, "the key is libsodium's");
 _Static_assert(crypto_shorthash_BYTES == sizeof(uint64_t), "a hash of a hash is a key of the map");
 
-/* What is offered is only a claim: hashes may be made up so that any plain part of them is the same for all. */
+/* An offered hash is only a claim: hashes may be invented so that any fixed part of them is equal for all. */
 static uint64_t key_of(const struct session *session, const uint8_t hash[BLOB_HASH_BYTES])
 {
     uint8_t bytes[crypto_shorthash_BYTES];
@@ -43,7 +43,7 @@ struct offer *upload_add(struct session *session, const struct record_blob_ref *
     if (session->blobs.offer_count >= session->hub->options.limits.blobs_per_client) {
         error_set(error, ERROR_LIMIT, "blob_offer.blobs", "a client may name %u blobs",
                   session->hub->options.limits.blobs_per_client);
-        error_remedy(error, "connect anew, or raise limits.blobs in the daemon's configuration");
+        error_remedy(error, "connect again, or raise limits.blobs in the daemon's configuration");
         return NULL;
     }
     struct offer *offer = calloc(1, sizeof *offer);
@@ -160,8 +160,8 @@ void upload_begin(struct session *session)
     tell_credit(session);
 }
 
-/* What has no room is refused before it comes; but room is taken piece by piece, so that nobody can keep others'
- * blobs out with a size that he only declares. */
+/* A blob that cannot fit is refused before it arrives; memory is reserved chunk by chunk, so that a declared size
+ * alone keeps no other client's blobs out. */
 static bool begin_blob(struct session *session, struct offer *offer, struct error *error)
 {
     if (!blob_store_reserve(session->hub->blobs, offer->size_bytes, error))
@@ -219,7 +219,7 @@ static bool add_piece(struct session *session, struct offer *offer, const struct
     return hash_arrived(offer, before_bytes, error);
 }
 
-/* All pieces are there: does the content bear its name? */
+/* All chunks have arrived: verifies the hash. */
 static bool complete(struct session *session, struct offer *offer, struct error *error)
 {
     if (memcmp(offer->arriving->hash, offer->hash, BLOB_HASH_BYTES) != 0) {
@@ -233,7 +233,7 @@ static bool complete(struct session *session, struct offer *offer, struct error 
     return offer->held || error_set(error, ERROR_OUT_OF_MEMORY, "blob_data", "no memory");
 }
 
-/* The request that the piece belongs to; NULL: it was answered, or refused, already. */
+/* The request of the chunk; NULL: it was already answered or refused. */
 static struct request *request_of(struct session *session, const struct framing_header *header,
                                   const struct message_blob_data *data)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Blobs of one session: offered by hash, sent piece by piece where the daemon lacks them, checked. */
+/* Blobs of one session: offered by hash, sent in chunks if the daemon lacks them, verified. */
 #ifndef FARLIGHT_SESSION_UPLOAD_H
 #define FARLIGHT_SESSION_UPLOAD_H
 
@@ -18,7 +18,7 @@ struct offer {
     uint8_t hash[BLOB_HASH_BYTES];
     uint64_t size_bytes;
     struct blob *held;     /* complete and checked */
-    struct blob *arriving; /* while its pieces come */
+    struct blob *arriving; /* while its chunks arrive */
     uint64_t arrived_bytes;
     uint8_t *chunk_hashes; /* of the complete chunks that have arrived */
 };
@@ -29,9 +29,9 @@ void upload_finish(struct session *session);
 void upload_offer(struct session *session, struct request *request, const struct message_blob_offer *offer);
 void upload_data(struct session *session, const struct framing_header *header,
                  const struct message_blob_data *data);
-/* A piece with a field that is not allowed: its request fails. */
+/* A chunk with an invalid field: its request fails. */
 void upload_invalid(struct session *session, uint32_t request_id, const struct error *error);
-void upload_abandon(struct session *session, struct offer *offer); /* forgets the pieces that have come */
+void upload_abandon(struct session *session, struct offer *offer); /* drops the chunks that have arrived */
 
 /* An offer of this session; NULL: it made none of this hash. */
 struct offer *upload_find(const struct session *session, const uint8_t hash[BLOB_HASH_BYTES]);

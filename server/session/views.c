@@ -12,9 +12,9 @@
 /* Frames of a view that are rendered, encoded or sent at once: while one is sent, the next one is encoded and the
  * one after it rendered. */
 #define IN_HAND_MAX 3
-/* Of a client that goes on whenever it has just come to rest, so many pictures in a row are given up. */
+/* For a client that moves again right after coming to rest, this many pictures in a row may be abandoned. */
 #define GIVEN_UP_MAX IN_HAND_MAX
-/* What is expected to take a while may take less than that: a frame that comes so much too early is hardly older.
+/* Expected times may be too long: a frame that is this much early is hardly older.
  */
 #define EARLY_NS UINT64_C(500000)
 /* A client that has not acknowledged its first frame by then acknowledges none. */
@@ -197,7 +197,7 @@ bool view_may_send(const struct job *job)
     return pacing_may_send(&job->view->pacing);
 }
 
-/* What the link and the renderer carry is learned from each frame; the next ones are to be as good as that allows.
+/* Updates the estimates of link and renderer from each frame, and with them the quality and size of the next.
  */
 static void adapt(struct session_view *view, const struct engine_frame *frame)
 {

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* What a session keeps of a view beside what it keeps of every job: the wishes that the engine looks at, the pace
- * at which its link takes frames, and the views that are to take its place.
+/* The state of a view beyond that of any job: the wishes that the engine reads, the pace of its link, and the
+ * views that are to replace it.
  *
- * The views that follow each other on a channel are one struct job: its credit, frame count and wishes go on. A
- * view takes the place of the one before when the engine says so, in the order in which the client asked for them;
- * frames of the one before that have not begun on the wire are dropped then, one that has is finished, and then
- * its request is answered. */
+ * The views that follow each other on a channel are one struct job: its
+ * credit, frame count and wishes continue. A view replaces the one before when the engine says so, in the order of
+ * the client's requests; frames of the old view that have not begun on the wire are dropped then, one that has is
+ * finished, and then the old request is answered. */
 #ifndef FARLIGHT_SESSION_VIEWS_H
 #define FARLIGHT_SESSION_VIEWS_H
 
@@ -16,7 +16,7 @@
 
 /* A view's terms, as its render has them. */
 struct view_terms {
-    uint64_t frame_ns; /* from one frame to the next, at least */
+    uint64_t frame_ns; /* minimum interval between frames */
     uint32_t samples;  /* that a picture is to have */
     enum encoding still_encoding;
     unsigned quality; /* of motion; 0: lossless */
@@ -42,8 +42,8 @@ struct session_view {
     struct loop_timer silence_timer;
     bool silent;               /* the client acknowledges nothing */
     struct view_effort effort; /* as the engine has it */
-    uint64_t made_ns;          /* what the last frame took from being taken up until it was encoded */
-    /* What came last of the client, and what it was shown last. */
+    uint64_t made_ns;          /* time of the last frame from its start until it was encoded */
+    /* The client's last command, and the last one that it was shown. */
     uint64_t last_command, shown_command;
     bool last_moving, shown_moving;
     unsigned given_up; /* frames dropped or abandoned since the last one that went whole */
@@ -59,9 +59,9 @@ void view_add_change(struct job *job, struct view_change *change);
 struct view_change *view_find_change(const struct job *job, uint32_t request); /* NULL: it is none */
 /* The engine refused it: the view that is there goes on. */
 void view_drop_change(struct job *job, struct view_change *change);
-/* The first change is what the job is from now on. */
+/* The first pending change becomes the job's state. */
 void view_switch(struct job *job);
-/* Frames on their way were dropped: no acknowledgement of them will come. */
+/* Frames under way were dropped: they will not be acknowledged. */
 void view_forget_frames(struct job *job);
 
 /* Frames that the engine may have begun by now, so that each comes when the link takes it. */
@@ -74,15 +74,15 @@ bool view_wants_more(const struct job *job);
 /* Nothing goes before its client acknowledges a frame. */
 bool view_is_unacknowledged(const struct job *job);
 bool view_may_send(const struct job *job);
-/* It has waited for the link so long that another one of what its client wishes now is better, and could be had.
+/* It has waited for the link so long that a new frame of the current wishes is better, and possible.
  */
 bool view_is_outdated(const struct job *job, const struct engine_frame *frame);
 /* It is a picture at rest, which nothing that follows needs, and motion goes on. */
 bool view_is_overtaken(const struct job *job, const struct engine_frame *frame);
-/* What is left of it keeps the link from the next one for long. */
+/* Its remaining bytes would occupy the link for long. */
 bool view_is_long(const struct job *job, uint64_t left_bytes);
 void view_frame_dropped(struct job *job);
-/* The rest of what was begun will not go. */
+/* The rest of a begun frame is abandoned. */
 void view_frame_abandoned(struct job *job, const struct engine_frame *frame);
 void view_frame_begun(struct job *job, const struct engine_frame *frame, uint64_t begun_ns);
 void view_frame_sent(struct job *job);

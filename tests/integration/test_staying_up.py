@@ -333,7 +333,7 @@ class LostGpu(Case):
             self.assertEqual(numbers, list(range(len(numbers))))  # none is lost, none comes twice
             self.assertEqual(client.cancel(view).code, tiny_client.CANCELLED)
             self.assertEqual(client.say_goodbye(), b"")
-            self.assertEqual(daemon.messages().count("the GPU was lost; making it anew"), 2)
+            self.assertEqual(daemon.messages().count("the GPU was lost; opening it again"), 2)
             self.assertEqual(daemon.stop(), 0)
 
     def test_who_loses_it_again_and_again_is_put_aside_and_others_go_on(self):
