@@ -65,7 +65,9 @@ SEALED_SRC := $(call sources,protocol/sealed,c)
 DOCS_SRC := $(call sources,protocol/docs,c)
 # Forms of pixels, one of them packed with libzstd: likewise.
 PIXELS_SRC := $(call sources,protocol/pixels,c)
-PROTOCOL_SRC := $(filter-out $(DOCS_SRC) $(SEALED_SRC) $(PIXELS_SRC),$(call sources,protocol,c))
+# What both sides need beside messages.
+COMMON_SRC := $(call sources,protocol/common,c)
+PROTOCOL_SRC := $(filter-out $(DOCS_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC),$(call sources,protocol,c))
 SERVER_SRC := $(filter-out server/main.c,$(call sources,server,c))
 ifneq ($(EMBREE),1)
 SERVER_SRC := $(filter-out server/trace/reference/%,$(SERVER_SRC))
@@ -91,12 +93,13 @@ obj = $(patsubst %.c,$(B)/%.o,$(patsubst %.cpp,$(B)/%.opp,$(1)))
 PROTOCOL_OBJ := $(call obj,$(PROTOCOL_SRC))
 SEALED_OBJ := $(call obj,$(SEALED_SRC))
 PIXELS_OBJ := $(call obj,$(PIXELS_SRC))
-SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ) $(PIXELS_OBJ)
-LIB_OBJ := $(call obj,$(LIB_SRC)) $(SEALED_OBJ) $(PIXELS_OBJ)
+COMMON_OBJ := $(call obj,$(COMMON_SRC))
+SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(B)/shader_sources.o $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
+LIB_OBJ := $(call obj,$(LIB_SRC)) $(SEALED_OBJ) $(PIXELS_OBJ) $(COMMON_OBJ)
 CLI_OBJ := $(call obj,$(CLI_SRC))
 # What the helper programs share is linked to each of them, as an archive: each takes what it needs.
 HELPER_OBJ := $(call obj,$(call sources,client/helper,c))
-IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX)) $(B)/helper.a
+IMPORT_OBJ := $(call obj,$(IMPORT_C) $(IMPORT_CXX)) $(COMMON_OBJ) $(B)/helper.a
 EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/helper.a
 VIDEO_OBJ := $(call obj,$(VIDEO_C) client/lib/rate.c protocol/pixels/ycbcr.c) $(B)/helper.a
 
@@ -106,7 +109,7 @@ VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interr
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.0
-LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC))
+LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
 
@@ -193,7 +196,7 @@ $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIDEO_LIBS) -o $@
 $(B)/farlight-view: $(VIEWER_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(VIEWER_LIBS) -o $@
-$(B)/protocol-docgen: $(call obj,$(DOCS_SRC)) $(PROTOCOL_OBJ) $(SEALED_OBJ)
+$(B)/protocol-docgen: $(call obj,$(DOCS_SRC)) $(PROTOCOL_OBJ) $(SEALED_OBJ) $(COMMON_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libxxhash) -o $@
 $(B)/protocol.md: $(B)/protocol-docgen protocol/docs/guide.md
 	$^ >$@.new && mv $@.new $@
@@ -278,7 +281,7 @@ BENCH_PROGRAMS :=
 endif
 
 # The yardstick of the one-shot command: reading a file and Embree's build of it.
-$(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/server/base/%,$(SERVER_OBJ))
+$(B)/tests/bench/embree_build: $(B)/tests/bench/embree_build.o $(filter $(B)/server/base/%,$(SERVER_OBJ)) $(COMMON_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -lembree3 -o $@
 
 # The generator of the bundled scenes.
@@ -421,7 +424,7 @@ FUZZ_SEED := $(B)/tests/fuzz/seed
 FUZZ_DICTIONARY := $(B)/seed/protocol.dict
 KEPT_BYTES := 1600
 KEPT_BYTES_OF_ALL := 65536
-$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(B)/server/base/blob.o $(PROTOCOL_OBJ) $(SEALED_OBJ)
+$(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(COMMON_OBJ) $(PROTOCOL_OBJ) $(SEALED_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@

@@ -1,18 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* From what the command line named to a scene on a daemon. */
 #include "cli/cli.h"
+#include "protocol/common/clock.h"
 
 #include <stdio.h>
 #include <time.h>
 
 #define NOTES_SHOWN 20u
-
-static uint64_t now_ns(void)
-{
-    struct timespec now = {0};
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
 
 static void on_note(void *user, const struct fl_note *note)
 {
@@ -38,7 +32,7 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
                                                .name = "farlight",
                                                .interrupt_fd = cli_interrupt_fd(),
                                                .daemon_arguments = loading->daemon_arguments};
-    loading->connect_begin_ns = now_ns();
+    loading->connect_begin_ns = monotonic_now_ns();
     loading->connection = fl_connect(&connect, error);
     return loading->connection != NULL;
 }
@@ -58,7 +52,7 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
                                              .user = loading,
                                              .sharing = loading->sharing,
                                              .scene_name = loading->scene_name};
-    loading->import_begin_ns = now_ns();
+    loading->import_begin_ns = monotonic_now_ns();
     loading->load.started = fl_import_start(&loading->load, error);
     if (loading->load.started == NULL)
         return false;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
+#include "protocol/common/clock.h"
 
 #include <stdio.h>
 #include <sys/ioctl.h>
@@ -9,13 +10,6 @@
 #define BAR_EVERY_NS 100000000ull
 #define LINE_EVERY_NS 1000000000ull
 
-static uint64_t now_ns(void)
-{
-    struct timespec now = {0};
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
-
 static unsigned columns(void)
 {
     struct winsize size = {0};
@@ -24,8 +18,8 @@ static unsigned columns(void)
 
 void cli_progress_begin(struct cli_progress *progress, bool silent)
 {
-    *progress =
-        (struct cli_progress){.silent = silent, .bar = cli_is_terminal(STDERR_FILENO), .begin_ns = now_ns()};
+    *progress = (struct cli_progress){
+        .silent = silent, .bar = cli_is_terminal(STDERR_FILENO), .begin_ns = monotonic_now_ns()};
 }
 
 void cli_progress_clear(struct cli_progress *progress)
@@ -47,7 +41,7 @@ void cli_progress_end(struct cli_progress *progress, bool done)
 /* Whether enough time has passed since something was shown. */
 static bool is_due(struct cli_progress *progress, bool always)
 {
-    const uint64_t now = now_ns();
+    const uint64_t now = monotonic_now_ns();
     if (!always && now - progress->shown_ns < (progress->bar ? BAR_EVERY_NS : LINE_EVERY_NS))
         return false;
     progress->shown_ns = now;
@@ -100,7 +94,7 @@ static void draw_bar(uint32_t done, uint32_t total, const char *numbers, size_t 
 
 void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t total, const char *what)
 {
-    const uint64_t now = now_ns();
+    const uint64_t now = monotonic_now_ns();
     if (progress->silent || (!progress->bar && now - progress->begin_ns < LINE_EVERY_NS))
         return;
     char text[120];
@@ -138,7 +132,7 @@ void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t
 
 void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t total)
 {
-    const uint64_t now = now_ns();
+    const uint64_t now = monotonic_now_ns();
     if (progress->total == 0)
         progress->first_ns = now;
     progress->total = total;

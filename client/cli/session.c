@@ -3,6 +3,7 @@
  * daemon: the scene is loaded again, and the first frame that is not written is the next one. */
 #include "cli/sink.h"
 #include "cli/trace_file.h"
+#include "protocol/common/clock.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -34,13 +35,6 @@ struct session {
     struct cli_progress progress;
     uint64_t begin_ns, export_ns;
 };
-
-static uint64_t now_ns(void)
-{
-    struct timespec now = {0};
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
 
 /* ---- beginning ---- */
 
@@ -80,7 +74,7 @@ static bool load_scene(struct session *session, struct fl_error *error)
         return false;
     if (session->job->scene == NULL)
         cli_trace_import(session->trace, fl_scene_import_stats(loading->scene), loading->import_begin_ns,
-                         now_ns());
+                         monotonic_now_ns());
     session->was_loaded = true;
     return cli_choose_camera(session->job, loading->scene, error) &&
            cli_settle(session->job, loading->scene, session->is_series, error);
@@ -123,14 +117,14 @@ static bool choose_frames(struct session *session, struct fl_error *error)
 
 static void add_export(struct session *session, int64_t frame, uint64_t begin_ns)
 {
-    const uint64_t duration_ns = now_ns() - begin_ns;
+    const uint64_t duration_ns = monotonic_now_ns() - begin_ns;
     session->export_ns += duration_ns;
     cli_trace_span(session->trace, CLI_TRACE_CLIENT, "export", frame, begin_ns, duration_ns);
 }
 
 static bool write_frame(struct session *session, const struct fl_frame *frame, struct fl_error *error)
 {
-    const uint64_t begin_ns = now_ns();
+    const uint64_t begin_ns = monotonic_now_ns();
     cli_trace_frame(session->trace, frame, begin_ns);
     cli_timings_frame(session->timings, frame);
     cli_cubes_warn(frame, session->warned, &session->progress);
@@ -142,7 +136,7 @@ static bool write_frame(struct session *session, const struct fl_frame *frame, s
 
 static bool finish_sinks(struct session *session, struct fl_error *error)
 {
-    const uint64_t begin_ns = now_ns();
+    const uint64_t begin_ns = monotonic_now_ns();
     session->sink_failed = !cli_sinks_finish(&session->sinks, error);
     add_export(session, -1, begin_ns);
     return !session->sink_failed;
@@ -217,14 +211,14 @@ static bool render_passes(struct session *session, struct fl_error *error)
     uint64_t pass_ns = 0;
     options.accumulate = true;
     for (uint32_t held = 0; held < total; held += options.samples) {
-        const uint64_t begin_ns = now_ns();
+        const uint64_t begin_ns = monotonic_now_ns();
         options.samples = pass_samples(job, held, total, options.samples, pass_ns);
         session->rendering = fl_render_start(session->loading.scene, &options, error);
         if (session->rendering == NULL || !take_frames(session, &still, error))
             return end_passes(session, held, error);
         fl_render_destroy(session->rendering);
         session->rendering = NULL;
-        pass_ns = now_ns() - begin_ns;
+        pass_ns = monotonic_now_ns() - begin_ns;
         cli_progress_samples(&session->progress, held + options.samples, job->endless ? 0 : total);
     }
     return true;
@@ -325,7 +319,7 @@ static bool run(struct session *session, struct fl_error *error)
 
 static void print_timings(struct session *session)
 {
-    const struct cli_client_times times = {.total_ns = now_ns() - session->begin_ns,
+    const struct cli_client_times times = {.total_ns = monotonic_now_ns() - session->begin_ns,
                                            .start_ns = fl_connection_start_ns(session->loading.connection),
                                            .export_ns = session->export_ns,
                                            .import = fl_scene_import_stats(session->loading.scene)};
@@ -342,7 +336,7 @@ static void close_session(struct session *session)
 
 int cli_run_job(struct cli_job *job, bool is_series)
 {
-    struct session session = {.job = job, .is_series = is_series, .begin_ns = now_ns()};
+    struct session session = {.job = job, .is_series = is_series, .begin_ns = monotonic_now_ns()};
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))
         return cli_report(&error);
@@ -355,7 +349,7 @@ int cli_run_job(struct cli_job *job, bool is_series)
         print_timings(&session);
     close_session(&session);
     cli_trace_span(session.trace, CLI_TRACE_COMMAND, is_series ? "animate" : "render", -1, session.begin_ns,
-                   now_ns() - session.begin_ns);
+                   monotonic_now_ns() - session.begin_ns);
     /* An interruption or failure before it is what the command ended for. */
     if (!cli_trace_file_destroy(session.trace, done ? &error : NULL))
         done = false;

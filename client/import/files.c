@@ -2,6 +2,7 @@
 #include "files.h"
 
 #include "import.h"
+#include "protocol/common/clock.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -142,14 +143,14 @@ static unsigned char *read_all(int descriptor, uint64_t room_bytes, size_t *size
 unsigned char *files_read_descriptor(struct files *files, int descriptor, size_t *size_bytes,
                                      char reason[FILES_REASON_BYTES])
 {
-    uint64_t start_ns = import_now_ns();
+    uint64_t start_ns = monotonic_now_ns();
     uint64_t room = files->read_bytes < FILES_TOTAL_MAX ? FILES_TOTAL_MAX - files->read_bytes : 0;
     unsigned char *bytes =
         read_all(descriptor, room < FILES_BYTES_MAX ? room : FILES_BYTES_MAX, size_bytes, reason);
 
     if (bytes)
         files->read_bytes += *size_bytes;
-    files->read_ns += import_now_ns() - start_ns;
+    files->read_ns += monotonic_now_ns() - start_ns;
     return bytes;
 }
 

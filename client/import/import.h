@@ -151,8 +151,6 @@ void import_texture_use_default(struct record_texture_use *use, uint32_t texture
 /* Fills the hashes, with two threads where there is much, and `same_as`. False: failed. */
 bool import_hash(struct import_scene *scene);
 
-uint64_t import_now_ns(void); /* monotonic */
-
 #ifdef __cplusplus
 }
 #endif

@@ -7,6 +7,7 @@
 #include "import.h"
 #include "helper/sandbox.h"
 #include "send.h"
+#include "protocol/common/clock.h"
 
 #include <argp.h>
 #include <errno.h>
@@ -202,10 +203,10 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
         files_finish(&files);
         return import_fail(scene, file_part(at_fault), "cannot be opened: %s", reason);
     }
-    begin_ns = import_now_ns();
+    begin_ns = monotonic_now_ns();
     silence_libraries();
     imported = enter_sandbox(scene, options) && import_all(scene, &files, sender, options);
-    parsed_ns = import_now_ns();
+    parsed_ns = monotonic_now_ns();
     files_finish(&files);
     if (!imported || !sender_notes(sender) || !sender_progress(sender, 0, scene->blob_bytes, "hashing"))
         return false;
@@ -215,10 +216,10 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
     done.parse_ns = parsed_ns > begin_ns ? parsed_ns - begin_ns : 0;
     if (!import_hash(scene))
         return false;
-    done.hash_ns = import_now_ns() - parsed_ns;
+    done.hash_ns = monotonic_now_ns() - parsed_ns;
     if (!sender_blobs(sender) || !sender_edits(sender, options->scene))
         return false;
-    done.total_ns = import_now_ns() - start_ns;
+    done.total_ns = monotonic_now_ns() - start_ns;
     return sender_done(sender, &done);
 }
 
@@ -230,7 +231,7 @@ int main(int argc, char **argv)
         NULL,        NULL,
         NULL};
     static struct import_scene scene; /* the table of notes is too large for the stack of a careful program */
-    uint64_t start_ns = import_now_ns();
+    uint64_t start_ns = monotonic_now_ns();
     struct options options = {.socket = -1, .scene = 1};
     struct sender sender;
     bool done;

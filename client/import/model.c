@@ -8,14 +8,6 @@
 #include <string.h>
 #include <time.h>
 
-uint64_t import_now_ns(void)
-{
-    struct timespec now;
-
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
-
 /* ---- text ---- */
 
 /* Length of the UTF-8 character at `text`, 0 if it is none. Overlong forms and surrogates are none. */

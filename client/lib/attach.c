@@ -2,6 +2,7 @@
 /* Scenes that are there: listed, come to, described; and what is heard of them. */
 #include "lib/scene.h"
 #include "lib/text.h"
+#include "protocol/common/clock.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +16,7 @@ static bool ask(struct fl_connection *connection, const struct message *question
 {
     const uint32_t request = fl_connection_next_request(connection);
     return fl_connection_send(connection, request, 0, question, error) &&
-           fl_connection_answer(connection, request, expected, received, fl_now_ns() + ANSWER_NS, error);
+           fl_connection_answer(connection, request, expected, received, monotonic_now_ns() + ANSWER_NS, error);
 }
 
 /* ---- the list ---- */

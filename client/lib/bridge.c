@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Bytes between two descriptors and a daemon's socket: the far end of an ssh connection. */
 #include "lib/connection.h"
+#include "protocol/common/clock.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -83,7 +84,7 @@ static bool carry(struct direction *up, struct direction *down, struct fl_error 
 bool fl_bridge(const char *address, int in_fd, int out_fd, struct fl_error *error)
 {
     bool local = false;
-    const int fd = fl_address_connect(address, fl_now_ns() + CONNECT_NS, 0, &local, error);
+    const int fd = fl_address_connect(address, monotonic_now_ns() + CONNECT_NS, 0, &local, error);
     if (fd < 0)
         return false;
     struct direction *ways = calloc(2, sizeof *ways);

@@ -2,15 +2,14 @@
 /* A clip of the client's own: one blob of times and values, and one transaction. */
 #include "lib/scene.h"
 #include "lib/text.h"
+#include "protocol/common/blob_hash.h"
+#include "protocol/common/clock.h"
 
-#include <sodium.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define ANSWER_NS 60000000000ull
-#define CHUNK_BYTES (1u << 20) /* of the hash; see blob_ref in messages.def */
 #define PIECE_BYTES 262144u
-#define HASH_BYTES 32
 /* 256 MiB: far beyond what anyone types, far below what sizes can hold. */
 #define NUMBERS_MAX (1u << 26)
 
@@ -28,7 +27,7 @@ static size_t numbers_per_key(const struct fl_channel *channel)
     return (size_t)channel->width * (has_handles ? 3 : 1);
 }
 
-/* Of each channel its times, then its values. */
+/* One blob: of each channel its times, then its values. */
 static bool gather(struct clip *clip, const struct fl_channel *channels, size_t channel_count,
                    struct fl_error *error)
 {
@@ -51,24 +50,8 @@ static bool gather(struct clip *clip, const struct fl_channel *channels, size_t 
         memcpy(clip->numbers + clip->count + channels[i].key_count, channels[i].values, values * sizeof(float));
         clip->count += channels[i].key_count + values;
     }
-    return true;
-}
-
-static bool hash(struct clip *clip, struct fl_error *error)
-{
-    const uint8_t *bytes = (const uint8_t *)clip->numbers;
-    crypto_generichash_state state;
-    uint8_t chunk[HASH_BYTES];
-    if (sodium_init() < 0)
-        return fl_error_set(error, FL_ERROR_SYSTEM, "", "libsodium could not be initialised");
     clip->blob.size_bytes = clip->count * sizeof(float);
-    crypto_generichash_init(&state, NULL, 0, HASH_BYTES);
-    for (uint64_t at = 0; at < clip->blob.size_bytes; at += CHUNK_BYTES) {
-        const uint64_t left = clip->blob.size_bytes - at;
-        crypto_generichash(chunk, HASH_BYTES, bytes + at, left < CHUNK_BYTES ? left : CHUNK_BYTES, NULL, 0);
-        crypto_generichash_update(&state, chunk, HASH_BYTES);
-    }
-    crypto_generichash_final(&state, clip->blob.hash, HASH_BYTES);
+    blob_hash(clip->blob.hash, (const uint8_t *)clip->numbers, clip->blob.size_bytes);
     return true;
 }
 
@@ -79,7 +62,7 @@ static bool send_blob(const struct clip *clip, uint64_t deadline_ns, struct fl_e
     const uint32_t request = fl_connection_next_request(connection);
     struct message message = {.type = MESSAGE_BLOB_DATA};
     struct message_blob_data *data = &message.blob_data;
-    memcpy(data->hash, clip->blob.hash, HASH_BYTES);
+    memcpy(data->hash, clip->blob.hash, BLOB_HASH_BYTES);
     for (uint64_t at = 0; at < clip->blob.size_bytes; at += data->data_bytes) {
         const uint64_t left = clip->blob.size_bytes - at;
         data->offset_bytes = at;
@@ -180,10 +163,9 @@ bool fl_scene_add_clip(struct fl_scene *scene, const char *name, const struct fl
                        size_t channel_count, uint32_t *clip, struct fl_error *error)
 {
     struct clip made = {.scene = scene};
-    const uint64_t deadline_ns = fl_now_ns() + ANSWER_NS;
+    const uint64_t deadline_ns = monotonic_now_ns() + ANSWER_NS;
     const uint32_t id = fl_scene_new_id(scene, PROTOCOL_OBJECT_KIND_CLIP);
-    const bool added = gather(&made, channels, channel_count, error) && hash(&made, error) &&
-                       upload(&made, deadline_ns, error) &&
+    const bool added = gather(&made, channels, channel_count, error) && upload(&made, deadline_ns, error) &&
                        commit(&made, name, id, channels, channel_count, deadline_ns, error);
     free(made.numbers);
     *clip = added ? id : 0;

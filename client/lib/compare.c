@@ -2,6 +2,7 @@
 /* The image program as a judge: two files in, figures and a picture of the errors out. */
 #include "lib/connection.h"
 #include "lib/text.h"
+#include "protocol/common/clock.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -189,7 +190,7 @@ bool fl_compare(const struct fl_compare_options *options, struct fl_comparison *
     struct judge judge = {.stream = {.fd = -1},
                           .process = {.talk_fd = -1},
                           .options = options,
-                          .deadline_ns = fl_now_ns() + timeout_ms * 1000000ull};
+                          .deadline_ns = monotonic_now_ns() + timeout_ms * 1000000ull};
     const float threshold = options->threshold;
     *comparison = (struct fl_comparison){.threshold = threshold < 0   ? 0
                                                       : threshold > 0 ? threshold

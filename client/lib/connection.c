@@ -2,6 +2,7 @@
 #include "lib/connection.h"
 
 #include "protocol/sealed/key.h"
+#include "protocol/common/clock.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -152,7 +153,7 @@ int fl_connection_consume(struct fl_connection *connection, const struct framing
     case MESSAGE_PING: {
         struct message pong = {.type = MESSAGE_PONG};
         pong.pong.sent_ns = message->ping.sent_ns;
-        pong.pong.received_ns = fl_now_ns();
+        pong.pong.received_ns = monotonic_now_ns();
         if (fl_stream_has_room(&connection->stream) &&
             !fl_stream_push(&connection->stream, header->request, 0, &pong, error))
             return -1;
@@ -370,7 +371,7 @@ static bool open_link(struct fl_connection *connection, const struct fl_connect_
 
 struct fl_connection *fl_connect(const struct fl_connect_options *options, struct fl_error *error)
 {
-    const uint64_t begin_ns = fl_now_ns();
+    const uint64_t begin_ns = monotonic_now_ns();
     const unsigned timeout_ms = options->timeout_ms > 0 ? options->timeout_ms : DEFAULT_TIMEOUT_MS;
     const uint64_t deadline_ns = begin_ns + timeout_ms * 1000000ull;
     struct fl_connection *connection = calloc(1, sizeof *connection);
@@ -393,7 +394,7 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
         fl_connection_destroy(connection);
         return NULL;
     }
-    connection->start_ns = fl_now_ns() - begin_ns;
+    connection->start_ns = monotonic_now_ns() - begin_ns;
     return connection;
 }
 

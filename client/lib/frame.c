@@ -2,6 +2,7 @@
 #include "lib/frame.h"
 #include "lib/stream.h"
 #include "protocol/pixels/predicted.h"
+#include "protocol/common/clock.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -359,11 +360,11 @@ struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct mess
         fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "a frame ended that is not complete");
         return NULL;
     }
-    const uint64_t decode_begin_ns = fl_now_ns();
+    const uint64_t decode_begin_ns = monotonic_now_ns();
     *error = (struct fl_error){0};
     if (!take_costs(frame, end, error) || !decode_pixels(assembly, error) || !decode_attachments(assembly, error))
         return NULL;
-    frame->whole_ns = fl_now_ns();
+    frame->whole_ns = monotonic_now_ns();
     frame->receive_ns = now_ns - frame->begun_ns;
     frame->decode_ns = frame->whole_ns - decode_begin_ns;
     if (frame->encoding == PROTOCOL_ENCODING_H264) {

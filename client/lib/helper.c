@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/helper.h"
+#include "protocol/common/clock.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -36,7 +37,7 @@ static bool serve(struct fl_helper *helper, struct fl_error *error)
     struct pollfd polled = {.fd = helper->stream.fd, .events = fl_stream_events(&helper->stream)};
     if (helper->stream.ended)
         return explain(helper, error);
-    if (!fl_wait(&polled, 1, helper->interrupt_fd, fl_now_ns() + ANSWER_NS, error))
+    if (!fl_wait(&polled, 1, helper->interrupt_fd, monotonic_now_ns() + ANSWER_NS, error))
         return false;
     return fl_stream_transfer(&helper->stream, error) || explain(helper, error);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/importer.h"
+#include "protocol/common/clock.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -26,7 +27,7 @@ static bool check_file(const char *path, struct fl_error *error)
 bool fl_importer_start(struct fl_importer *importer, const struct fl_load_options *options, struct fl_error *error)
 {
     const unsigned timeout_ms = options->timeout_ms > 0 ? options->timeout_ms : DEFAULT_TIMEOUT_MS;
-    *importer = (struct fl_importer){.options = *options, .begin_ns = fl_now_ns()};
+    *importer = (struct fl_importer){.options = *options, .begin_ns = monotonic_now_ns()};
     importer->stream.fd = -1;
     importer->process.talk_fd = -1;
     importer->deadline_ns = importer->begin_ns + timeout_ms * 1000000ull;
@@ -161,7 +162,7 @@ void fl_importer_stop(struct fl_importer *importer)
     if (importer->process.pid > 0 && (!importer->done || !fl_process_has_ended(&importer->process, 100)))
         fl_process_kill(&importer->process);
     fl_process_end(&importer->process, 2000);
-    importer->stats.load_ns = fl_now_ns() - importer->begin_ns;
+    importer->stats.load_ns = monotonic_now_ns() - importer->begin_ns;
     complete_names(importer);
 }
 

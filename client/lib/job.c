@@ -2,6 +2,7 @@
 /* A batch job: started, its frames taken one after the other, ended. */
 #include "lib/frame.h"
 #include "lib/scene.h"
+#include "protocol/common/clock.h"
 
 #include <limits.h>
 #include <stdlib.h>
@@ -156,12 +157,12 @@ static bool take(struct fl_job *job, const struct message *message, struct fl_er
     case MESSAGE_FRAME_BEGIN:
         if (job->next_frame > job->last_frame)
             return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "a frame came after the last");
-        return fl_assembly_begin(&job->assembly, &message->frame_begin, (uint32_t)job->next_frame, fl_now_ns(),
-                                 error);
+        return fl_assembly_begin(&job->assembly, &message->frame_begin, (uint32_t)job->next_frame,
+                                 monotonic_now_ns(), error);
     case MESSAGE_FRAME_DATA:
         return fl_assembly_data(&job->assembly, &message->frame_data, error);
     case MESSAGE_FRAME_END:
-        frame = fl_assembly_end(&job->assembly, &message->frame_end, fl_now_ns(), error);
+        frame = fl_assembly_end(&job->assembly, &message->frame_end, monotonic_now_ns(), error);
         job->next_frame += job->frame_step;
         return frame != NULL && fl_frame_queue_push(&job->done, frame, error);
     case MESSAGE_OK:
@@ -192,7 +193,7 @@ int fl_job_take(struct fl_job *job, const struct framing_header *header, const s
 
 struct fl_frame *fl_render_poll(struct fl_job *job, unsigned timeout_ms, bool *done, struct fl_error *error)
 {
-    const uint64_t begin_ns = fl_now_ns();
+    const uint64_t begin_ns = monotonic_now_ns();
     const uint64_t deadline_ns = timeout_ms < UINT_MAX ? begin_ns + timeout_ms * 1000000ull : UINT64_MAX;
     *error = (struct fl_error){0};
     *done = false;
@@ -211,7 +212,7 @@ struct fl_frame *fl_render_poll(struct fl_job *job, unsigned timeout_ms, bool *d
         *error = job->failure;
         return NULL;
     }
-    frame->wait_ns = fl_now_ns() - begin_ns;
+    frame->wait_ns = monotonic_now_ns() - begin_ns;
     if (job->next_frame <= job->last_frame && !job->answered && !grant(job, error)) {
         fl_frame_destroy(frame);
         return NULL;
@@ -235,7 +236,7 @@ bool fl_render_cancel(struct fl_job *job, struct fl_error *error)
     struct message cancel = {.type = MESSAGE_CANCEL};
     cancel.cancel.target_request = job->request;
     const uint32_t request = fl_connection_next_request(connection);
-    const uint64_t deadline_ns = fl_now_ns() + CANCEL_NS;
+    const uint64_t deadline_ns = monotonic_now_ns() + CANCEL_NS;
     struct fl_received received;
     job->answered = true; /* whatever still comes is dropped by request */
     fl_connection_send_late(connection, request, &cancel);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lib/process.h"
 #include "lib/stream.h"
+#include "protocol/common/clock.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -166,13 +167,13 @@ bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiri
 
 bool fl_process_has_ended(const struct fl_process *process, unsigned timeout_ms)
 {
-    const uint64_t deadline_ns = fl_now_ns() + timeout_ms * 1000000ull;
+    const uint64_t deadline_ns = monotonic_now_ns() + timeout_ms * 1000000ull;
     const int fd = pidfd_open(process->pid, 0);
     bool ended = false;
     for (;;) {
         siginfo_t info = {0};
         ended = waitid(P_PID, (id_t)process->pid, &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid != 0;
-        const uint64_t now_ns = fl_now_ns();
+        const uint64_t now_ns = monotonic_now_ns();
         if (ended || now_ns >= deadline_ns)
             break;
         /* Without a pidfd (an old kernel) this is a look every 5 ms. */

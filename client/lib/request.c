@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Requests of one message and one answer. */
 #include "lib/connection.h"
+#include "protocol/common/clock.h"
 
 #define ANSWER_NS 30000000000ull
 #define SILENCE_NS 30000000000ull
@@ -10,12 +11,12 @@ bool fl_ping(struct fl_connection *connection, uint64_t *round_trip_ns, struct f
     struct message ping = {.type = MESSAGE_PING};
     struct fl_received received;
     const uint32_t request = fl_connection_next_request(connection);
-    const uint64_t sent_ns = fl_now_ns();
+    const uint64_t sent_ns = monotonic_now_ns();
     ping.ping.sent_ns = sent_ns;
     if (!fl_connection_send(connection, request, 0, &ping, error) ||
         !fl_connection_answer(connection, request, MESSAGE_PONG, &received, sent_ns + ANSWER_NS, error))
         return false;
-    *round_trip_ns = fl_now_ns() - sent_ns;
+    *round_trip_ns = monotonic_now_ns() - sent_ns;
     return true;
 }
 
@@ -25,7 +26,8 @@ bool fl_stats(struct fl_connection *connection, const struct message_stats_reply
     struct fl_received received;
     const uint32_t request = fl_connection_next_request(connection);
     if (!fl_connection_send(connection, request, 0, &ask, error) ||
-        !fl_connection_answer(connection, request, MESSAGE_STATS_REPLY, &received, fl_now_ns() + ANSWER_NS, error))
+        !fl_connection_answer(connection, request, MESSAGE_STATS_REPLY, &received, monotonic_now_ns() + ANSWER_NS,
+                              error))
         return false;
     connection->stats = received.message.stats_reply; /* its strings and arrays stay in the stream's scratch */
     *reply = &connection->stats;
@@ -52,10 +54,10 @@ uint64_t fl_connection_silence_ns(const struct fl_connection *connection)
 
 bool fl_connection_wait(struct fl_connection *connection, unsigned timeout_ms, struct fl_error *error)
 {
-    const uint64_t end_ns = fl_now_ns() + timeout_ms * UINT64_C(1000000);
+    const uint64_t end_ns = monotonic_now_ns() + timeout_ms * UINT64_C(1000000);
     const uint64_t silence_ns = fl_connection_silence_ns(connection);
     for (;;) {
-        const uint64_t now_ns = fl_now_ns();
+        const uint64_t now_ns = monotonic_now_ns();
         if (now_ns + silence_ns >= end_ns)
             return listen_until(connection, end_ns, error);
         uint64_t round_trip_ns;

@@ -4,6 +4,7 @@
 #include "lib/importer.h"
 #include "lib/relay.h"
 #include "lib/text.h"
+#include "protocol/common/clock.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -32,11 +33,11 @@ static void count(struct load *load, const struct message *message, uint32_t req
             stats->offered_bytes += message->blob_offer.blobs[i].size_bytes;
     } else if (message->type == MESSAGE_BLOB_DATA) {
         if (load->upload_begin_ns == 0)
-            load->upload_begin_ns = fl_now_ns();
+            load->upload_begin_ns = monotonic_now_ns();
         stats->uploaded_bytes += message->blob_data.data_bytes;
         load->connection->upload_sent += message->blob_data.data_bytes;
     } else if (message->type == MESSAGE_EDIT_COMMIT) {
-        load->commit_begin_ns = fl_now_ns();
+        load->commit_begin_ns = monotonic_now_ns();
         load->commit_request = request;
     }
 }
@@ -82,7 +83,7 @@ static bool drain_importer(struct load *load, struct fl_error *error)
 static void take_answer(struct load *load, const struct frame *frame, const struct message *message)
 {
     struct fl_import_stats *stats = &load->importer->stats;
-    const uint64_t now_ns = fl_now_ns();
+    const uint64_t now_ns = monotonic_now_ns();
     if (message->type == MESSAGE_ERROR && load->refusal.code == FL_ERROR_NONE)
         fl_error_from_message(&load->refusal, &message->error);
     if (load->commit_begin_ns != 0 && frame->header.request == load->commit_request) {
@@ -138,7 +139,7 @@ static bool drain_daemon(struct load *load, struct fl_error *error)
 static bool ping_in_time(struct load *load, struct fl_error *error)
 {
     struct message ping = {.type = MESSAGE_PING};
-    const uint64_t now_ns = fl_now_ns();
+    const uint64_t now_ns = monotonic_now_ns();
     if (now_ns < load->ping_due_ns)
         return true;
     load->ping_due_ns = now_ns + fl_connection_silence_ns(load->connection);
@@ -219,7 +220,7 @@ static bool open_scene(struct fl_connection *connection, uint32_t scene, const s
     const uint32_t request = fl_connection_next_request(connection);
     struct fl_received received;
     return fl_connection_send(connection, request, 0, &open, error) &&
-           fl_connection_answer(connection, request, MESSAGE_OK, &received, fl_now_ns() + ANSWER_NS, error);
+           fl_connection_answer(connection, request, MESSAGE_OK, &received, monotonic_now_ns() + ANSWER_NS, error);
 }
 
 /* The importer reads the file while the daemon makes room for the scene. */
@@ -230,7 +231,7 @@ static bool load_with(struct fl_importer *importer, struct fl_scene *scene, stru
         return false;
     struct load load = {.connection = connection,
                         .importer = importer,
-                        .ping_due_ns = fl_now_ns() + fl_connection_silence_ns(connection)};
+                        .ping_due_ns = monotonic_now_ns() + fl_connection_silence_ns(connection)};
     load.relay = (struct fl_relay){
         .scene = scene->scene, .request_base = connection->last_request, .upload_base = connection->upload_sent};
     const bool loaded = relay_all(&load, error);
@@ -269,7 +270,7 @@ static void adopt_callbacks(struct fl_importer *importer, const struct fl_load_o
     importer->options.user = options->user;
     importer->options.sharing = options->sharing;
     importer->options.scene_name = options->scene_name;
-    importer->begin_ns = fl_now_ns(); /* `load_ns` is what the caller waits */
+    importer->begin_ns = monotonic_now_ns(); /* `load_ns` is what the caller waits */
 }
 
 struct fl_scene *fl_scene_create(struct fl_connection *connection, struct fl_error *error)

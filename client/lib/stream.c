@@ -2,6 +2,7 @@
 #include "lib/stream.h"
 
 #include "protocol/sealed/link.h"
+#include "protocol/common/clock.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -10,13 +11,6 @@
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
-
-uint64_t fl_now_ns(void)
-{
-    struct timespec now = {0};
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
 
 bool fl_stream_init(struct fl_stream *stream, int fd, uint32_t accept, const char *peer, struct fl_error *error)
 {
@@ -316,7 +310,7 @@ static int milliseconds_until(uint64_t deadline_ns)
 {
     if (deadline_ns == UINT64_MAX)
         return -1;
-    const uint64_t now = fl_now_ns();
+    const uint64_t now = monotonic_now_ns();
     const uint64_t left_ms = deadline_ns > now ? (deadline_ns - now + 999999) / 1000000 : 0;
     return left_ms > 3600000 ? 3600000 : (int)left_ms;
 }
@@ -340,7 +334,7 @@ bool fl_wait(struct pollfd *polled, size_t count, int interrupt_fd, uint64_t dea
             polled[i].revents = all[i].revents;
         if (ready > 0)
             return true;
-        if (deadline_ns != UINT64_MAX && fl_now_ns() >= deadline_ns)
+        if (deadline_ns != UINT64_MAX && monotonic_now_ns() >= deadline_ns)
             return fl_error_set(error, FL_ERROR_TIMEOUT, "", "it took too long");
     }
 }

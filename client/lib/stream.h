@@ -61,7 +61,6 @@ enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *fra
 /* Whether an incomplete message lies in the buffer. */
 bool fl_stream_has_remains(const struct fl_stream *stream);
 
-uint64_t fl_now_ns(void);
 /* poll() until something is ready, the deadline passes (UINT64_MAX: never) or the interrupt descriptor (0: none)
  * becomes readable. At most 4 entries; those with events 0 are not waited for. */
 bool fl_wait(struct pollfd *polled, size_t count, int interrupt_fd, uint64_t deadline_ns, struct fl_error *error);

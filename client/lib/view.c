@@ -2,6 +2,7 @@
 /* A view: cameras go out, frames of the newest one come in and are acknowledged. */
 #include "lib/frame.h"
 #include "lib/scene.h"
+#include "protocol/common/clock.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -137,7 +138,7 @@ static bool check(const struct fl_view *view, struct fl_error *error)
 
 bool fl_view_change(struct fl_view *view, const struct fl_view_options *options, struct fl_error *error)
 {
-    const uint64_t deadline_ns = fl_now_ns() + ANSWER_NS;
+    const uint64_t deadline_ns = monotonic_now_ns() + ANSWER_NS;
     if (!check(view, error))
         return false;
     while (view->asked_count == ASKED_MAX) {
@@ -163,7 +164,7 @@ bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uin
     memcpy(look->up_world, camera->up_world, sizeof look->up_world);
     look->fov_y = camera->fov_y;
     look->node = camera->node;
-    const uint64_t now_ns = fl_now_ns();
+    const uint64_t now_ns = monotonic_now_ns();
     if (!check(view, error) || !fl_connection_send(view->connection, 0, 0, &message, error))
         return false;
     view->last_command = look->command;
@@ -230,7 +231,7 @@ static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *erro
 
 static bool take_end(struct fl_view *view, uint64_t change, const struct message *message, struct fl_error *error)
 {
-    const uint64_t now_ns = fl_now_ns();
+    const uint64_t now_ns = monotonic_now_ns();
     const uint32_t number = message->frame_end.frame;
     if (view->assembly.frame != NULL)
         view->next_frame = number < UINT32_MAX ? number + 1 : number;
@@ -276,7 +277,8 @@ static bool take(struct fl_view *view, size_t index, const struct message *messa
             view->assembly.expected = view->asked[index].expected;
             view->assembled_request = request;
         }
-        return fl_assembly_begin(&view->assembly, &message->frame_begin, view->next_frame, fl_now_ns(), error) &&
+        return fl_assembly_begin(&view->assembly, &message->frame_begin, view->next_frame, monotonic_now_ns(),
+                                 error) &&
                acknowledge(view, message->frame_begin.frame, false, error);
     case MESSAGE_FRAME_DATA:
     case MESSAGE_FRAME_END:
@@ -313,7 +315,7 @@ int fl_view_take(struct fl_view *view, const struct framing_header *header, cons
 
 struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct fl_error *error)
 {
-    const uint64_t begin_ns = fl_now_ns(), deadline_ns = begin_ns + timeout_ms * 1000000ull;
+    const uint64_t begin_ns = monotonic_now_ns(), deadline_ns = begin_ns + timeout_ms * 1000000ull;
     *error = (struct fl_error){0};
     while (view->done.count == 0) {
         struct fl_received ignored; /* a late answer to something given up */
@@ -331,7 +333,7 @@ struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct 
         }
     }
     struct fl_frame *frame = fl_frame_queue_pop(&view->done);
-    frame->wait_ns = fl_now_ns() - begin_ns;
+    frame->wait_ns = monotonic_now_ns() - begin_ns;
     /* That the connection is lost is told by the next call. */
     struct fl_error ignored;
     view->credit++;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "viewer/viewer.h"
 #include "viewer/viewer_state.h"
+#include "protocol/common/clock.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -18,20 +19,13 @@
 #define BUSY_NS 1000000000ull
 #define REDRAW_NS 250000000ull /* figures go on while no frame comes */
 
-uint64_t viewer_now_ns(void)
-{
-    struct timespec now = {0};
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
-
 void viewer_say(struct viewer *viewer, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(viewer->notice, sizeof viewer->notice, format, arguments);
     va_end(arguments);
-    viewer->notice_ns = viewer_now_ns() + NOTICE_NS;
+    viewer->notice_ns = monotonic_now_ns() + NOTICE_NS;
     viewer->must_draw = true;
 }
 
@@ -141,19 +135,19 @@ static void draw(struct viewer *viewer)
     if (viewer->window == NULL)
         return;
     viewer->must_draw |= window_wants_drawing(viewer->window);
-    if (!viewer->must_draw && viewer_now_ns() < viewer->drawn_ns + REDRAW_NS)
+    if (!viewer->must_draw && monotonic_now_ns() < viewer->drawn_ns + REDRAW_NS)
         return;
     viewer_hud(viewer, &state);
     window_show(viewer->window, viewer_picture(viewer), &state);
-    metrics_show(&viewer->metrics, viewer_now_ns());
-    viewer->drawn_ns = viewer_now_ns();
+    metrics_show(&viewer->metrics, monotonic_now_ns());
+    viewer->drawn_ns = monotonic_now_ns();
 }
 
 static bool run(struct viewer *viewer)
 {
-    viewer->replay_ns = viewer->tick_ns = viewer_now_ns();
+    viewer->replay_ns = viewer->tick_ns = monotonic_now_ns();
     while (!viewer->quit && viewer->failure.code == FL_ERROR_NONE) {
-        const uint64_t now_ns = viewer_now_ns();
+        const uint64_t now_ns = monotonic_now_ns();
         take_input(viewer, now_ns);
         tick(viewer, now_ns);
         serve(viewer, now_ns);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What comes in, from a person or a replay, and what it does. */
 #include "viewer/viewer_state.h"
+#include "protocol/common/clock.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -15,7 +16,7 @@ void viewer_choose_clip(struct viewer *viewer, int clip)
         clip != TOUR_NONE ? fl_scene_clip(session_scene(viewer->session), (size_t)clip) : NULL;
     tour_set_duration(&viewer->tour, info != NULL ? (double)info->duration_s : 0);
     viewer->must_show = true;
-    viewer->moved_ns = viewer_now_ns();
+    viewer->moved_ns = monotonic_now_ns();
 }
 
 /* Clips that hold nothing are passed over. */
@@ -59,7 +60,7 @@ static void play(struct viewer *viewer)
         next_clip(viewer, 1);
     else
         tour_play(&viewer->tour);
-    viewer->moved_ns = viewer_now_ns();
+    viewer->moved_ns = monotonic_now_ns();
 }
 
 static void screenshot(struct viewer *viewer)
@@ -160,7 +161,7 @@ void viewer_input(struct viewer *viewer, const struct input *input)
     viewer->glide_begin_ns = 0; /* a hand is stronger */
     viewer->followed = 0;
     viewer->must_look = true;
-    viewer->moved_ns = viewer_now_ns();
+    viewer->moved_ns = monotonic_now_ns();
 }
 
 /* ---- a replay ---- */
@@ -209,7 +210,7 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
         do_event(viewer, event);
         viewer->replay_next++;
         /* What took long, such as a screenshot, is not made up for. */
-        viewer->replay_ns = event->kind == REPLAY_INPUT ? due_ns : viewer_now_ns();
+        viewer->replay_ns = event->kind == REPLAY_INPUT ? due_ns : monotonic_now_ns();
     }
     if (viewer->replay_next == viewer->replay.count)
         viewer->quit = true;

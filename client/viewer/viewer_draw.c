@@ -3,6 +3,7 @@
 #include "viewer/paint.h"
 #include "viewer/snapshot.h"
 #include "viewer/viewer_state.h"
+#include "protocol/common/clock.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -68,7 +69,7 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
                                                   viewer->settings.exposure_thirds / 3.0,
                                 .tour = &viewer->tour,
                                 .metrics = &viewer->metrics,
-                                .now_ns = viewer_now_ns(),
+                                .now_ns = monotonic_now_ns(),
                                 .picture_width = viewer->frame.width,
                                 .picture_height = viewer->frame.height,
                                 .samples = viewer->frame.samples,

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Jobs beside the view: where cameras are, what is under the pointer, what the reference says. */
 #include "viewer/viewer_state.h"
+#include "protocol/common/clock.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -27,11 +28,11 @@ void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32
     } else {
         viewer->glide_from = viewer->camera;
         viewer->glide_to = *camera;
-        viewer->glide_begin_ns = viewer_now_ns();
+        viewer->glide_begin_ns = monotonic_now_ns();
     }
     viewer->has_camera = true;
     viewer->must_look = true;
-    viewer->moved_ns = viewer_now_ns();
+    viewer->moved_ns = monotonic_now_ns();
 }
 
 /* ---- asking ---- */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The view: what the daemon is told of it, and the frames that come. */
 #include "viewer/viewer_state.h"
+#include "protocol/common/clock.h"
 
 #include <string.h>
 
@@ -106,7 +107,7 @@ static void take(struct viewer *viewer, struct fl_frame *frame)
 {
     if (!decode(viewer, frame))
         return;
-    metrics_add(&viewer->metrics, frame, viewer_now_ns());
+    metrics_add(&viewer->metrics, frame, monotonic_now_ns());
     viewer->frame = *frame;
     viewer->frame.stages = NULL;
     viewer->frame.wave_comparisons = NULL;

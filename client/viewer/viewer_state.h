@@ -75,7 +75,6 @@ struct viewer {
 
 #define HEAT_TOP 0.25 /* a quarter of white is the brightest colour of the error map */
 
-uint64_t viewer_now_ns(void);
 __attribute__((format(printf, 2, 3))) void viewer_say(struct viewer *viewer, const char *format, ...);
 
 /* ---- viewer_show.c: what the daemon is asked for ---- */

@@ -4,12 +4,12 @@
 #include "protocol/docs/example.h"
 
 #include <inttypes.h>
-#include <sodium.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
 
+#include "protocol/common/blob_hash.h"
 #include "protocol/framing.h"
 #include "protocol/handshake.h"
 #include "protocol/messages.h"
@@ -57,9 +57,7 @@ static struct message made(enum message_type type)
 static struct record_blob_ref reference_to(const void *data, size_t bytes)
 {
     struct record_blob_ref reference = {.size_bytes = bytes};
-    uint8_t chunk[32];
-    crypto_generichash(chunk, sizeof chunk, data, bytes, NULL, 0);
-    crypto_generichash(reference.hash, sizeof reference.hash, chunk, sizeof chunk, NULL, 0);
+    blob_hash(reference.hash, data, bytes);
     return reference;
 }
 

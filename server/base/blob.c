@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "base/blob.h"
 
-#include <pthread.h>
-#include <sodium.h>
 #include <stdlib.h>
 #include <sys/mman.h>
 
@@ -93,38 +91,4 @@ void blob_unref(struct blob *blob)
     else if (blob->data)
         munmap(blob->data, blob->capacity_bytes);
     free(blob);
-}
-
-static void start_sodium(void)
-{
-    /* Picks the fast implementation for this processor; hashing works without it. */
-    int result = sodium_init();
-    (void)result;
-}
-
-void blob_hash_chunk(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *data, size_t size_bytes)
-{
-    static pthread_once_t once = PTHREAD_ONCE_INIT;
-    pthread_once(&once, start_sodium);
-    crypto_generichash(hash, BLOB_HASH_BYTES, data, size_bytes, NULL, 0);
-}
-
-void blob_hash_chunks(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *chunk_hashes, size_t chunk_count)
-{
-    blob_hash_chunk(hash, chunk_hashes, chunk_count * BLOB_HASH_BYTES);
-}
-
-void blob_hash(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *data, size_t size_bytes)
-{
-    crypto_generichash_state state;
-    crypto_generichash_init(&state, NULL, 0, BLOB_HASH_BYTES);
-    while (size_bytes) {
-        size_t chunk_bytes = size_bytes < BLOB_CHUNK_BYTES ? size_bytes : BLOB_CHUNK_BYTES;
-        uint8_t chunk_hash[BLOB_HASH_BYTES];
-        blob_hash_chunk(chunk_hash, data, chunk_bytes);
-        crypto_generichash_update(&state, chunk_hash, sizeof chunk_hash);
-        data += chunk_bytes;
-        size_bytes -= chunk_bytes;
-    }
-    crypto_generichash_final(&state, hash, BLOB_HASH_BYTES);
 }

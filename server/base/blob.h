@@ -3,17 +3,16 @@
 #ifndef FARLIGHT_BASE_BLOB_H
 #define FARLIGHT_BASE_BLOB_H
 
+#include "protocol/common/blob_hash.h"
+
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-#define BLOB_HASH_BYTES 32
-#define BLOB_CHUNK_BYTES ((size_t)1 << 20) /* hashed chunk by chunk, so that a pool can share the work */
-
 struct blob {
     atomic_uint references;
-    uint8_t hash[BLOB_HASH_BYTES]; /* BLAKE2b-256 over the BLAKE2b-256 hashes of the 1 MiB chunks */
+    uint8_t hash[BLOB_HASH_BYTES]; /* blob_hash() */
     size_t size_bytes;
     uint8_t *data;         /* 64-aligned; constant once the hash has been checked */
     size_t capacity_bytes; /* of `data`: less than the size while a blob arrives */
@@ -27,9 +26,5 @@ struct blob *blob_create_empty(size_t size_bytes);
 bool blob_reserve(struct blob *blob, size_t needed_bytes);
 struct blob *blob_ref(struct blob *blob); /* accepts and returns NULL */
 void blob_unref(struct blob *blob);       /* accepts NULL */
-/* Hash of one chunk, and of the list of chunk hashes; libsodium's crypto_generichash. */
-void blob_hash_chunk(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *data, size_t size_bytes);
-void blob_hash_chunks(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *chunk_hashes, size_t chunk_count);
-void blob_hash(uint8_t hash[BLOB_HASH_BYTES], const uint8_t *data, size_t size_bytes); /* both steps */
 
 #endif

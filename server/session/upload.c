@@ -186,9 +186,8 @@ static bool hash_arrived(struct offer *offer, uint64_t before_bytes, struct erro
     offer->chunk_hashes = hashes;
     for (uint64_t chunk = first; chunk < end; chunk++) {
         uint64_t start_bytes = chunk * BLOB_CHUNK_BYTES;
-        uint64_t left_bytes = offer->arrived_bytes - start_bytes;
         blob_hash_chunk(hashes + chunk * BLOB_HASH_BYTES, offer->arriving->data + start_bytes,
-                        left_bytes < BLOB_CHUNK_BYTES ? (size_t)left_bytes : BLOB_CHUNK_BYTES);
+                        blob_chunk_bytes(offer->arrived_bytes, start_bytes));
     }
     if (complete)
         blob_hash_chunks(offer->arriving->hash, hashes, (size_t)end);

@@ -6,6 +6,7 @@
  * is far from its end. A small picture before brings the daemon the programs and the structure.
  * Prints JSON: {"cancels_ns": [..]}: from the call to the confirmed end. */
 #include "lib/farlight.h"
+#include "protocol/common/clock.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -14,13 +15,6 @@
 
 #define WAIT_NS 100000000u
 #define WAITS 10u
-
-static uint64_t now_ns(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
 
 static bool cancel_after(struct fl_scene *scene, enum protocol_tracer tracer, uint64_t wait_ns,
                          uint64_t *cancel_ns, struct fl_error *error)
@@ -31,9 +25,9 @@ static bool cancel_after(struct fl_scene *scene, enum protocol_tracer tracer, ui
     if (!job)
         return false;
     nanosleep(&(struct timespec){(time_t)(wait_ns / 1000000000u), (long)(wait_ns % 1000000000u)}, NULL);
-    const uint64_t start_ns = now_ns();
+    const uint64_t start_ns = monotonic_now_ns();
     bool cancelled = fl_render_cancel(job, error);
-    *cancel_ns = now_ns() - start_ns;
+    *cancel_ns = monotonic_now_ns() - start_ns;
     fl_render_destroy(job);
     return cancelled;
 }

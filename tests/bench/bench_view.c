@@ -11,6 +11,7 @@
 #include "lib/farlight.h"
 #include "viewer/camera.h"
 #include "viewer/decode.h"
+#include "protocol/common/clock.h"
 
 #include <dirent.h>
 #include <getopt.h>
@@ -79,13 +80,6 @@ static struct options options = {.width = 1280,
                                  .viewers = 1,
                                  .seconds = 5,
                                  .rate = 1000};
-
-static uint64_t now_ns(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * SECOND_NS + (uint64_t)now.tv_nsec;
-}
 
 /* ---- what the daemon's threads take ------------------------------------------------------------------ */
 
@@ -171,10 +165,10 @@ static bool take_frame(struct viewer *viewer, struct fl_frame *frame, json_t *ro
     uint64_t whole_ns = frame->whole_ns, decode_ns = frame->decode_ns;
     viewer->shown_command = frame->command;
     if (frame->encoded) {
-        const uint64_t begin_ns = now_ns();
+        const uint64_t begin_ns = monotonic_now_ns();
         if (!decoder_decode(viewer->decoder, frame, &viewer->picture, error))
             return false;
-        whole_ns = now_ns();
+        whole_ns = monotonic_now_ns();
         decode_ns += whole_ns - begin_ns;
     }
     if (rows && frame->command)
@@ -207,7 +201,7 @@ static bool look(struct viewer *viewer, uint64_t now, struct fl_error *error)
     struct fl_view_camera seen = {.moving = !viewer->rests};
     camera_orbit(&camera, SWAY_RADIANS * sin(phase), SWAY_RADIANS / 4 * cos(phase));
     camera_export(&camera, &seen);
-    viewer->sent_ns[(viewer->last_command + 1) % LOOKS_REMEMBERED] = now_ns();
+    viewer->sent_ns[(viewer->last_command + 1) % LOOKS_REMEMBERED] = monotonic_now_ns();
     return fl_view_look(viewer->view, &seen, &viewer->last_command, error);
 }
 
@@ -220,7 +214,7 @@ static bool serve(struct viewer *viewer, json_t *rows, struct fl_error *error)
             return false;
     if (error->code != FL_ERROR_NONE)
         return false;
-    const uint64_t now = now_ns();
+    const uint64_t now = monotonic_now_ns();
     if (options.looks ? now < viewer->next_look_ns : viewer->shown_command < viewer->last_command)
         return true;
     const uint64_t interval_ns = options.looks ? SECOND_NS / options.looks : 0;
@@ -253,19 +247,19 @@ static void wait_for_more(int batch_fd, json_t *late)
             due_ns = viewers[i].next_look_ns;
     }
     watched[options.viewers] = (struct pollfd){.fd = batch_fd, .events = POLLIN};
-    const uint64_t now = now_ns(), wait_ns = due_ns > now ? due_ns - now : 0;
+    const uint64_t now = monotonic_now_ns(), wait_ns = due_ns > now ? due_ns - now : 0;
     const struct timespec wait = {.tv_sec = wait_ns < SECOND_NS ? 0 : 1,
                                   .tv_nsec = wait_ns < SECOND_NS ? (long)wait_ns : 0};
     if (ppoll(watched, options.viewers + 1, &wait, NULL) == 0 && wait_ns > 0)
-        json_array_append_new(late, json_integer((json_int_t)(now_ns() - due_ns)));
+        json_array_append_new(late, json_integer((json_int_t)(monotonic_now_ns() - due_ns)));
 }
 
 static bool move_for(uint64_t duration_ns, struct fl_connection *beside, struct fl_job *batch, json_t *rows,
                      json_t *late, json_int_t *batch_frames, struct fl_error *error)
 {
-    const uint64_t end_ns = now_ns() + duration_ns;
+    const uint64_t end_ns = monotonic_now_ns() + duration_ns;
     *batch_frames = 0;
-    while (now_ns() < end_ns) {
+    while (monotonic_now_ns() < end_ns) {
         for (uint32_t i = 0; i < options.viewers; i++)
             if (!serve(&viewers[i], rows, error))
                 return false;

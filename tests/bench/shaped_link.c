@@ -11,6 +11,8 @@
  * The far program starts once the near one has printed a line that begins with READY; when it ends, the near one
  * is terminated. Exit status: the far one's; 125: there can be no such link here, said on standard error. Without
  * the rights for namespaces and TUN devices it tries to get them in a user namespace of its own. */
+#include "protocol/common/clock.h"
+
 #include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -58,13 +60,6 @@ static _Noreturn void give_up(const char *what)
 {
     fprintf(stderr, "shaped_link: %s: %s\n", what, strerror(errno));
     exit(EXIT_NO_LINK);
-}
-
-static uint64_t now_ns(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * SECOND_NS + (uint64_t)now.tv_nsec;
 }
 
 /* ---- the ends ---------------------------------------------------------------------------------------- */
@@ -172,7 +167,7 @@ static void take(struct direction *way)
         struct packet *packet = &way->packets[way->last % PACKETS_MAX];
         bool full = way->last - way->first == PACKETS_MAX;
         ssize_t size_bytes = read(way->from, full ? lost : packet->bytes, PACKET_BYTES);
-        uint64_t now = now_ns();
+        uint64_t now = monotonic_now_ns();
         if (size_bytes <= 0)
             return;
         if (full || buffered_bytes(way, now) + (uint64_t)size_bytes > shape.buffer_bytes)
@@ -191,10 +186,10 @@ static uint64_t give(struct direction *way)
 {
     for (; way->first < way->last; way->first++) {
         const struct packet *packet = &way->packets[way->first % PACKETS_MAX];
-        if (packet->due_ns > now_ns())
+        if (packet->due_ns > monotonic_now_ns())
             return packet->due_ns;
         if (write(way->to, packet->bytes, packet->size_bytes) < 0 && errno == EAGAIN)
-            return now_ns() + MILLISECOND_NS;
+            return monotonic_now_ns() + MILLISECOND_NS;
     }
     return UINT64_MAX;
 }
@@ -212,7 +207,7 @@ static void carry(struct direction ways[2], int process)
             uint64_t of_way_ns = give(&ways[i]);
             due_ns = of_way_ns < due_ns ? of_way_ns : due_ns;
         }
-        uint64_t now = now_ns(), wait_ns = due_ns > now ? due_ns - now : 0;
+        uint64_t now = monotonic_now_ns(), wait_ns = due_ns > now ? due_ns - now : 0;
         struct timespec wait = {.tv_sec = 0, .tv_nsec = (long)(wait_ns % SECOND_NS)};
         if (wait_ns >= SECOND_NS)
             wait = (struct timespec){.tv_sec = 1};

@@ -16,8 +16,8 @@ MAY_INCLUDE = {
     "protocol/sealed": {"protocol"},
     "protocol/common": set(),
     "protocol/pixels": {"protocol/common"},
-    "protocol/docs": {"protocol", "protocol/sealed"},
-    BASE: set(),
+    "protocol/docs": {"protocol", "protocol/sealed", "protocol/common"},
+    BASE: {"protocol/common"},
     "server/scene": {BASE},
     GPU: {BASE},
     "server/gpu_scene": {BASE, GPU, "server/scene", "shaders/shared"},
@@ -36,13 +36,13 @@ MAY_INCLUDE = {
                        "protocol", "protocol/sealed", "server"},
     "server": {BASE, GPU, "server/net", "server/session", "server/engine", "server/encode", "protocol",
                "protocol/sealed"},
-    "client/lib": {"protocol", "protocol/sealed", "protocol/pixels"},
-    "client/cli": {"client/lib", "protocol", "protocol/sealed"},
+    "client/lib": {"protocol", "protocol/common", "protocol/sealed", "protocol/pixels"},
+    "client/cli": {"client/lib", "protocol", "protocol/common", "protocol/sealed"},
     "client/helper": {"protocol"},
-    "client/import": {"client/helper", "protocol"},
-    "client/output": {"client/helper", "protocol"},
+    "client/import": {"client/helper", "protocol", "protocol/common"},
+    "client/output": {"client/helper", "protocol", "protocol/common"},
     "client/video": {"client/helper", "client/lib", "protocol", "protocol/pixels"},  # of lib: rate
-    "client/viewer": {"protocol", "client/lib", "client/cli"},  # the command line is parsed as that of render
+    "client/viewer": {"protocol", "protocol/common", "client/lib", "client/cli"},  # the command line is parsed as that of render
     "shaders/shared": set(),
     "shaders/raster": {"shaders/shared"},
     "shaders/abuffer": {"shaders/shared", "shaders/raster"},
@@ -60,8 +60,7 @@ RESTRICTED = [
     (re.compile(r"^OpenImageIO/"), {"client/import", "client/output"}),
     (re.compile(r"^(tiny_gltf|tiny_obj_loader)"), {"client/import"}),
     (re.compile(r"^(turbojpeg|zstd)\.h"), {"server/encode", "client/lib", "protocol/pixels"}),
-    (re.compile(r"^sodium\.h"), {"server/base", "server/session", "client/lib", "client/import", "protocol/sealed",
-                                  "protocol/docs"}),
+    (re.compile(r"^sodium\.h"), {"server/session", "client/lib", "protocol/common", "protocol/sealed", "protocol/docs"}),
 ]
 ROOTS = ("", "server", "shaders", "client")  # as the compiler's -I
 INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"([^"]+)"|<([^>]+)>)')
