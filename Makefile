@@ -328,7 +328,7 @@ test: test-packages
 	python3 tests/tools/run_tests.py $(B) $(TESTS)
 demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
-	tests/tools/demo.sh $(B) out
+	tests/tools/demo.sh $(B) out $(FAST)
 # The programs that are measured, and those that measure.
 BENCHED = all $(BENCHES) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(BENCH_VIEW) $(B)/tests/bench/embree_build $(B)/tests/tools/make_scenes
 bench: test-packages
@@ -397,7 +397,7 @@ clean:
 	rm -rf build out
 
 help:
-	@echo 'make demo       install what is missing, build, render the bundled scenes into out/'
+	@echo 'make demo       install what is missing, build, render the bundled scenes into out/   [FAST=1: one picture]'
 	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'

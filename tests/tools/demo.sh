@@ -1,73 +1,143 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Starts a daemon on a private socket, renders bundled scenes through it, one of them with all that moves, a lens and a
-# shutter, and stops it.
-# Usage: demo.sh BUILD_FOLDER OUT_FOLDER
+# Renders the bundled scenes through a daemon on a private socket: one picture within seconds, then the others behind a
+# line with the time left. What the commands print goes to OUT_FOLDER/demo.log.
+# Usage: demo.sh BUILD_FOLDER OUT_FOLDER [FAST]; with FAST, other than 0, it ends after the first picture.
 set -eu
+begin_s=$(date +%s)
 bin=$1
 out=$2
-mkdir -p "$out/orbit"
+fast=${3:-0}
+mkdir -p "$out"
 private=$(mktemp -d)
 daemon=
+job=
 finish() {
     status=$?
     trap - EXIT INT TERM
-    if [ -n "$daemon" ]; then
-        kill "$daemon" 2>/dev/null || true
-        wait "$daemon" 2>/dev/null || true
-    fi
+    # A command that is told to end removes what it has not finished; the daemon ends after it.
+    for process in $job $daemon; do
+        kill "$process" 2>/dev/null || true
+        wait "$process" 2>/dev/null || true
+    done
     rm -rf "$private"
     exit "$status"
 }
 trap finish EXIT
-trap 'exit 130' INT
-trap 'exit 143' TERM
+trap 'clear_line; exit 130' INT
+trap 'clear_line; exit 143' TERM
 
-"$bin/tests/tools/make_scenes" "$private/scenes"
+is_terminal=0
+[ -t 2 ] && [ "${TERM:-dumb}" != dumb ] && is_terminal=1
+clear_line() {
+    [ "$is_terminal" = 0 ] || printf '\r\033[K' >&2
+}
+
+# The time left, from the relative costs: done_cost took spent_s, and this picture has run for running_s.
+time_left() {
+    later_s=$(((all_cost - done_cost - cost) * spent_s / done_cost))
+    left_s=$(((all_cost - done_cost) * spent_s / done_cost - running_s))
+    [ "$left_s" -ge "$later_s" ] || left_s=$later_s
+    printf '%d:%02d left' $((left_s / 60)) $((left_s % 60))
+}
+
+show_progress() {
+    line="picture $number of $count, $(time_left): $name, $what"
+    if [ "$is_terminal" = 1 ]; then
+        printf '\r%.79s\033[K' "$line" >&2
+    elif [ "$announced" != "$number" ]; then
+        announced=$number
+        printf '%.79s\n' "$line" >&2
+    fi
+}
+
+fail() {
+    clear_line
+    echo "$1; the last lines of its log:" >&2
+    tail -n 20 "$2" >&2
+    exit 1
+}
+
+# picture COST NAME DESCRIPTION COMMAND..: renders OUT_FOLDER/NAME, or counts it before anything is rendered.
+picture() {
+    cost=$1 name=$2 what=$3
+    shift 3
+    if [ "$pass" = count ]; then
+        count=$((count + 1)) all_cost=$((all_cost + cost))
+        return
+    fi
+    number=$((number + 1)) running_s=0 picture_begin_s=$(date +%s)
+    printf '%s\n' "--- $name, $what" >>"$out/demo.log"
+    "$bin/farlight" "$@" --server "$server" --quiet -o "$out/$name" >>"$out/demo.log" 2>&1 &
+    job=$!
+    while kill -0 "$job" 2>/dev/null; do
+        [ "$done_cost" = 0 ] || show_progress
+        sleep 0.2
+        running_s=$(($(date +%s) - picture_begin_s))
+    done
+    wait "$job" || fail "$out/$name was not rendered" "$out/demo.log"
+    job= done_cost=$((done_cost + cost)) spent_s=$((spent_s + running_s))
+    clear_line
+    if [ "$number" = 1 ]; then
+        echo "$out/$name, $what: finished after $(($(date +%s) - begin_s)) s"
+        [ "$spent_s" -gt 0 ] || spent_s=1
+    elif [ "$is_terminal" = 1 ]; then
+        echo "$out/$name, $what"
+    fi
+}
+
+# Costs are seconds of one core, by Mesa's software renderer.
+pictures() {
+    picture 9 demo.png 'a teapot on a mirror' \
+        render "$private/scenes/fine-teapot.glb" --environment "$sky" --size 960x540 --samples 6 \
+        --integrator whitted --depth 6 --timings
+    [ "$fast" = 0 ] || return 0
+    mkdir -p "$out/orbit"
+    picture 8 demo.exr 'the same scene in linear light, without a second upload' \
+        render "$private/scenes/fine-teapot.glb" --environment "$sky" --size 960x540 --samples 6 \
+        --integrator whitted --depth 6 --timings
+    picture 4 orbit/%04d.png '24 frames once around a sphereflake' \
+        animate "$private/scenes/sphereflake-3.nff" --size 480x270 --orbit --frames 1-24 --fps 24
+    picture 7 lens.png 'a lens that is in focus on the nearest pot' \
+        render "$carousel" --environment "$dusk" --clip ride --time 0.7 --size 640x360 \
+        --samples 16 --aperture 0.3 --focus 7.4 --timings
+    picture 7 ldc.png 'layered depth cubes beside an exact tracer' \
+        compare "$teapot" --environment "$sky" --size 480x270 --tracers ldc,bvh
+    picture 5 abuffer.png 'ambient occlusion by A-buffers beside an exact tracer' \
+        compare "$private/scenes/cornell.glb" --size 320x240 --integrator ao --samples 1 --tracers abuffer,bvh
+    picture 6 path.png 'path tracing, refined in passes of 4 samples' \
+        render "$teapot" --environment "$sky" --size 400x225 --integrator path --samples 16 --progressive=4
+    picture 2 layers.exr 'albedo, normals, depth and objects as channels' \
+        render "$teapot" --environment "$sky" --size 480x270 --layers beauty,albedo,normal,depth,id
+    picture 54 shot.mp4 'a shot script that moves camera, focus and light' \
+        animate --script "$private/scenes/shot.json" --fps 8 --frames 1-24 --size 320x180 --samples 6
+    picture 104 carousel.mp4 'a clip with soft shadows, gloss and motion blur' \
+        animate "$carousel" --environment "$dusk" --clip ride --fps 12 --frames 1-36 \
+        --size 480x270 --samples 6 --shutter 0.5
+}
+
+: >"$out/demo.log"
 "$bin/farlightd" --listen "unix:$private/farlight.sock" >"$private/ready" 2>"$private/log" &
 daemon=$!
+"$bin/tests/tools/make_scenes" "$private/scenes"
+cp conf/examples/shot.json "$private/scenes/shot.json"
 tries=0
 until grep -q READY "$private/ready"; do
     if ! kill -0 "$daemon" 2>/dev/null || [ $((tries += 1)) -gt 300 ]; then
-        echo "the daemon did not start:" >&2
-        cat "$private/log" >&2
-        exit 1
+        fail 'the daemon did not start' "$private/log"
     fi
     sleep 0.1
 done
 
 server="unix:$private/farlight.sock"
-scene=$private/scenes/teapot.glb
+teapot=$private/scenes/teapot.glb
 sky=$private/scenes/sky.hdr
-echo "--- $out/demo.png, from a bundled scene, with the time of every stage"
-"$bin/farlight" render "$scene" --environment "$sky" --server "$server" --size 960x540 --samples 4 --timings -o "$out/demo.png"
-echo "--- $out/demo.exr, linear; the same scene again, so that no bulk data moves"
-"$bin/farlight" render "$scene" --environment "$sky" --server "$server" --size 960x540 --samples 4 --timings -o "$out/demo.exr"
-echo "--- $out/orbit/, 24 frames once around a sphereflake"
-"$bin/farlight" animate "$private/scenes/sphereflake-3.nff" --server "$server" --size 480x270 --orbit \
-    --frames 1-24 --fps 24 -o "$out/orbit/%04d.png"
 carousel=$private/scenes/carousel.glb
 dusk=$private/scenes/dusk.hdr
-echo "--- $out/carousel.mp4, the clip 'ride' once: soft shadows, gloss, and a shutter that is open for half of every frame"
-"$bin/farlight" animate "$carousel" --environment "$dusk" --server "$server" --clip ride --fps 12 --frames 1-36 \
-    --size 480x270 --samples 6 --shutter 0.5 -o "$out/carousel.mp4"
-echo "--- $out/shot.mp4, conf/examples/shot.json, smaller and with fewer frames: camera, focus, a lamp and a colour change"
-cp conf/examples/shot.json "$private/scenes/shot.json"
-"$bin/farlight" animate --script "$private/scenes/shot.json" --server "$server" --fps 8 --frames 1-24 \
-    --size 320x180 --samples 6 -o "$out/shot.mp4"
-echo "--- $out/lens.png, the clip at 0.7 s through a wide open lens, in focus on the nearest pot"
-"$bin/farlight" render "$carousel" --environment "$dusk" --server "$server" --clip ride --time 0.7 --size 640x360 \
-    --samples 16 --aperture 0.3 --focus 7.4 --timings -o "$out/lens.png"
-echo "--- $out/ldc.png, the first scene by layered depth cubes beside an exact tracer, and where they differ"
-"$bin/farlight" compare "$scene" --environment "$sky" --server "$server" --size 480x270 --tracers ldc,bvh -o "$out/ldc.png"
-echo "--- $out/abuffer.png, ambient occlusion in a box by voxels and A-buffers beside an exact tracer, and where they differ"
-"$bin/farlight" compare "$private/scenes/cornell.glb" --server "$server" --size 320x240 --integrator ao --samples 1 \
-    --tracers abuffer,bvh -o "$out/abuffer.png"
-echo "--- $out/path.png, the first scene by path tracing, refined in passes of 4 samples"
-"$bin/farlight" render "$scene" --environment "$sky" --server "$server" --size 400x225 --integrator path --samples 16 \
-    --progressive=4 -o "$out/path.png"
-echo "--- $out/layers.exr, the picture with albedo, normals, depth and numbers of objects as channels of one file"
-"$bin/farlight" render "$scene" --environment "$sky" --server "$server" --size 480x270 \
-    --layers beauty,albedo,normal,depth,id -o "$out/layers.exr"
-echo "--- the daemon, afterwards"
-"$bin/farlight" stats --server "$server"
+count=0 all_cost=0 number=0 announced=0 done_cost=0 spent_s=0
+pass=count
+pictures
+pass=render
+pictures
+"$bin/farlight" stats --server "$server" >>"$out/demo.log"
+echo "what the commands printed, with the time of every stage: $out/demo.log"

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "shape.h"
 
+#include <assert.h>
+
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -210,32 +212,36 @@ void shape_tube(struct shape *shape, const float (*path)[3], const float *radii,
     close_end(shape, first + last * (segments + 1), segments, path[last], forwards, true);
 }
 
+/* Rings of the body and along spout and handle, enough for facets about as long as wide. */
+#define MAX_RINGS 160
+
 void shape_teapot(struct shape *shape, uint32_t segments)
 {
-    enum { PROFILE = 40, PATH = 24 };
-    float profile[PROFILE][2];
-    for (int i = 0; i < PROFILE; i++) { /* a squashed ball with a flat foot, its lid, and a knob */
-        const float t = (float)i / (PROFILE - 1);
+    const uint32_t rings = segments > 96 ? segments * 5 / 12 : 40, steps = segments > 96 ? segments / 4 : 24;
+    float profile[MAX_RINGS][2];
+    assert(rings <= MAX_RINGS);
+    for (uint32_t i = 0; i < rings; i++) { /* a squashed ball with a flat foot, its lid, and a knob */
+        const float t = (float)i / (float)(rings - 1);
         const float body = powf(sinf(3.14159265f * (0.12f + 0.80f * t)), 0.8f);
         const float knob = t > 0.86f ? 0.13f * sqrtf(fmaxf(0, sinf(3.14159265f * (t - 0.86f) / 0.14f))) : 0;
         profile[i][0] = t > 0.86f ? knob + 0.02f * (1 - t) : body * (1 - 0.18f * t);
         profile[i][1] = t > 0.86f ? 0.98f + (t - 0.86f) * 1.6f : t * 1.14f;
     }
-    shape_lathe(shape, (const float(*)[2])profile, PROFILE, segments);
-    float path[PATH][3], radii[PATH];
-    for (int i = 0; i < PATH; i++) { /* spout */
-        const float t = (float)i / (PATH - 1);
+    shape_lathe(shape, (const float(*)[2])profile, rings, segments);
+    float path[MAX_RINGS][3], radii[MAX_RINGS];
+    for (uint32_t i = 0; i < steps; i++) { /* spout */
+        const float t = (float)i / (float)(steps - 1);
         path[i][0] = 0.75f + 0.85f * t;
         path[i][1] = 0.38f + 0.62f * t * t * (3 - 2 * t);
         path[i][2] = 0;
         radii[i] = 0.2f - 0.12f * t;
     }
-    shape_tube(shape, (const float(*)[3])path, radii, PATH, segments / 3);
-    for (int i = 0; i < PATH; i++) { /* handle */
-        const float angle = 1.0f + 3.9f * (float)i / (PATH - 1);
+    shape_tube(shape, (const float(*)[3])path, radii, steps, segments / 3);
+    for (uint32_t i = 0; i < steps; i++) { /* handle */
+        const float angle = 1.0f + 3.9f * (float)i / (float)(steps - 1);
         path[i][0] = -0.72f + 0.62f * cosf(angle);
         path[i][1] = 0.58f + 0.36f * sinf(angle);
         radii[i] = 0.07f;
     }
-    shape_tube(shape, (const float(*)[3])path, radii, PATH, segments / 3);
+    shape_tube(shape, (const float(*)[3])path, radii, steps, segments / 3);
 }
