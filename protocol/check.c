@@ -10,11 +10,11 @@
 /* Appends "parent.name[index]"; cut off where it does not fit. */
 static void path_text(const struct path *path, char *out, size_t out_bytes)
 {
-    if (path->parent != NULL) {
+    if (path->parent) {
         path_text(path->parent, out, out_bytes);
     }
     size_t used = strlen(out);
-    snprintf(out + used, out_bytes - used, "%s%s", path->parent != NULL ? "." : "", path->name);
+    snprintf(out + used, out_bytes - used, "%s%s", path->parent ? "." : "", path->name);
     used = strlen(out);
     if (path->index >= 0) {
         snprintf(out + used, out_bytes - used, "[%" PRId64 "]", path->index);
@@ -24,13 +24,13 @@ static void path_text(const struct path *path, char *out, size_t out_bytes)
 bool check_fail(struct decode_error *error, enum protocol_error_code code, const struct path *path,
                 const char *format, ...)
 {
-    char text[sizeof error->text];
-    char field[sizeof error->field] = "";
+    char text[sizeof(error->text)];
+    char field[sizeof(error->field)] = "";
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    vsnprintf(text, sizeof(text), format, arguments);
     va_end(arguments);
-    path_text(path, field, sizeof field);
+    path_text(path, field, sizeof(field));
     return decode_error_set(error, code, field, "%s", text);
 }
 
@@ -50,9 +50,9 @@ static bool check_enum(const struct field_desc *field, const void *place, const 
 {
     uint32_t value = (uint32_t)field_load_int(field, place);
     char list[96];
-    if (enum_desc_text(field->enumeration, value) == NULL) {
+    if (!enum_desc_text(field->enumeration, value)) {
         return check_fail(error, PROTOCOL_ERROR_CODE_INVALID, path, "%" PRIu32 " is none of: %s", value,
-                          protocol_enum_list(field->enumeration->name, list, sizeof list));
+                          protocol_enum_list(field->enumeration->name, list, sizeof(list)));
     }
     return true;
 }

@@ -52,7 +52,7 @@ static bool fail_truncated(struct decoder *decoder, const struct path *path, siz
 static void read_fixed(struct reader *reader, const struct field_desc *field, char *place)
 {
     const uint8_t *bytes = reader_view(reader, (size_t)field->width_bytes * field->count);
-    for (uint32_t i = 0; bytes != NULL && i < field->count; i++) {
+    for (uint32_t i = 0; bytes && i < field->count; i++) {
         uint64_t value = 0;
         for (uint32_t k = 0; k < field->width_bytes; k++) {
             value |= (uint64_t)bytes[i * field->width_bytes + k] << (8 * k);
@@ -95,7 +95,7 @@ static bool decode_string(struct decoder *decoder, const struct field_desc *fiel
     }
     size_t left = reader_left(&decoder->reader);
     const uint8_t *bytes = reader_view(&decoder->reader, count);
-    if (bytes == NULL) {
+    if (!bytes) {
         return fail_truncated(decoder, path, count, left);
     }
     if (count == 0) {
@@ -105,12 +105,12 @@ static bool decode_string(struct decoder *decoder, const struct field_desc *fiel
         return false;
     }
     char *text = scratch_alloc(decoder->scratch, (size_t)count + 1, 1);
-    if (text == NULL) {
+    if (!text) {
         return check_fail(decoder->error, PROTOCOL_ERROR_CODE_LIMIT, path, "no room to decode it");
     }
     memcpy(text, bytes, count);
     text[count] = '\0';
-    memcpy(body + field->offset, &text, sizeof text);
+    memcpy(body + field->offset, &text, sizeof(text));
     return true;
 }
 
@@ -118,7 +118,7 @@ static bool decode_record(struct decoder *decoder, const struct struct_desc *des
                           const struct path *path)
 {
     struct_defaults(desc, body);
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         bool ok = field_is_counted(field) ? decode_counted(decoder, field, body, path)
                                           : decode_fixed(decoder, &decoder->reader, field, body, path);
         if (!ok) {
@@ -147,7 +147,7 @@ static bool decode_array(struct decoder *decoder, const struct field_desc *field
                           record->wire_min_bytes, left);
     }
     char *elements = scratch_alloc(decoder->scratch, count * record->size_bytes, 8);
-    if (elements == NULL) {
+    if (!elements) {
         return check_fail(decoder->error, PROTOCOL_ERROR_CODE_LIMIT, path, "no room to decode it");
     }
     for (uint32_t i = 0; i < count; i++) {
@@ -156,8 +156,8 @@ static bool decode_array(struct decoder *decoder, const struct field_desc *field
             return false;
         }
     }
-    memcpy(body + field->offset, &elements, sizeof elements);
-    memcpy(body + field->count_offset, &count, sizeof count);
+    memcpy(body + field->offset, &elements, sizeof(elements));
+    memcpy(body + field->count_offset, &count, sizeof(count));
     return true;
 }
 
@@ -177,8 +177,8 @@ static bool decode_bulk(struct decoder *decoder, const struct field_desc *field,
         return check_fail(decoder->error, PROTOCOL_ERROR_CODE_PROTOCOL, path, "padding is not zero");
     }
     const uint8_t *bytes = reader_view(&decoder->reader, count);
-    memcpy(body + field->offset, &bytes, sizeof bytes);
-    memcpy(body + field->count_offset, &count, sizeof count);
+    memcpy(body + field->offset, &bytes, sizeof(bytes));
+    memcpy(body + field->count_offset, &count, sizeof(count));
     return true;
 }
 
@@ -208,12 +208,12 @@ static bool decode_fixed_part(struct decoder *decoder, const struct struct_desc 
     }
     left = reader_left(&decoder->reader);
     const uint8_t *bytes = reader_view(&decoder->reader, struct_bytes);
-    if (bytes == NULL) {
+    if (!bytes) {
         return fail_truncated(decoder, &path, struct_bytes, left);
     }
     struct reader fixed;
     reader_init(&fixed, bytes, struct_bytes);
-    for (const struct field_desc *field = desc->fields; field->name != NULL && !field_is_counted(field); field++) {
+    for (const struct field_desc *field = desc->fields; field->name && !field_is_counted(field); field++) {
         if (reader_left(&fixed) == 0) {
             break; /* the rest keeps its defaults */
         }
@@ -231,7 +231,7 @@ static bool decode_body(struct decoder *decoder, const struct message_desc *desc
     if (!decode_fixed_part(decoder, fields, body, &root)) {
         return false;
     }
-    for (const struct field_desc *field = fields->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = fields->fields; field->name; field++) {
         if (field_is_counted(field) && !decode_counted(decoder, field, body, &root)) {
             return false;
         }
@@ -248,11 +248,11 @@ bool message_decode(struct message *out, uint16_t type, const uint8_t *payload, 
 {
     const struct message_desc *desc = message_describe(type);
     struct decoder decoder = {.scratch = scratch, .error = error};
-    if (error != NULL) {
-        memset(error, 0, sizeof *error);
+    if (error) {
+        memset(error, 0, sizeof(*error));
     }
-    memset(out, 0, sizeof *out);
-    if (desc == NULL) {
+    memset(out, 0, sizeof(*out));
+    if (!desc) {
         return decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, NULL, "type 0x%04x is unknown", type);
     }
     if (payload_bytes > desc->info.payload_max_bytes) {
@@ -262,7 +262,7 @@ bool message_decode(struct message *out, uint16_t type, const uint8_t *payload, 
     message_init(out, (enum message_type)type);
     reader_init(&decoder.reader, payload, payload_bytes);
     if (!decode_body(&decoder, desc, (char *)out + MESSAGE_BODY_OFFSET)) {
-        memset(out, 0, sizeof *out);
+        memset(out, 0, sizeof(*out));
         return false;
     }
     return true;

@@ -7,14 +7,14 @@
 bool decode_error_set(struct decode_error *error, enum protocol_error_code code, const char *field,
                       const char *format, ...)
 {
-    if (error == NULL || error->code != PROTOCOL_ERROR_CODE_NONE) {
+    if (!error || error->code != PROTOCOL_ERROR_CODE_NONE) {
         return false;
     }
     error->code = code;
-    snprintf(error->field, sizeof error->field, "%s", field != NULL ? field : "");
+    snprintf(error->field, sizeof(error->field), "%s", field ? field : "");
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(error->text, sizeof error->text, format, arguments);
+    vsnprintf(error->text, sizeof(error->text), format, arguments);
     va_end(arguments);
     return false;
 }

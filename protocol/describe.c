@@ -145,7 +145,7 @@ const struct message_desc *message_describe(uint32_t type)
 const struct message_info *message_lookup(uint32_t type)
 {
     const struct message_desc *desc = message_describe(type);
-    return desc != NULL ? &desc->info : NULL;
+    return desc ? &desc->info : NULL;
 }
 
 bool field_is_counted(const struct field_desc *field)
@@ -178,7 +178,7 @@ void field_default(const struct field_desc *field, void *place)
         }
         break;
     case FIELD_STRING:
-        memcpy(place, &empty, sizeof empty);
+        memcpy(place, &empty, sizeof(empty));
         break;
     case FIELD_ENUM:
     case FIELD_BYTES:
@@ -234,7 +234,7 @@ void field_store_int(const struct field_desc *field, void *place, uint64_t value
 void struct_defaults(const struct struct_desc *desc, void *body)
 {
     memset(body, 0, desc->size_bytes);
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         field_default(field, (char *)body + field->offset);
     }
 }

@@ -17,14 +17,14 @@ static bool encode_struct(struct encoder *encoder, const struct struct_desc *des
 static uint32_t load_count(const struct field_desc *field, const char *body)
 {
     uint32_t count;
-    memcpy(&count, body + field->count_offset, sizeof count);
+    memcpy(&count, body + field->count_offset, sizeof(count));
     return count;
 }
 
 static const void *load_pointer(const struct field_desc *field, const char *body)
 {
     const void *pointer;
-    memcpy(&pointer, body + field->offset, sizeof pointer);
+    memcpy(&pointer, body + field->offset, sizeof(pointer));
     return pointer;
 }
 
@@ -56,7 +56,7 @@ static bool encode_string(struct encoder *encoder, const struct field_desc *fiel
 {
     struct writer *writer = encoder->writer;
     const char *text = load_pointer(field, body);
-    size_t count = text != NULL ? strnlen(text, (size_t)field->max + 1) : 0;
+    size_t count = text ? strnlen(text, (size_t)field->max + 1) : 0;
     if (!check_count(field, count, path, &writer->error) ||
         !check_text((const uint8_t *)text, count, path, &writer->error)) {
         return false;
@@ -74,7 +74,7 @@ static bool encode_array(struct encoder *encoder, const struct field_desc *field
     if (!check_count(field, count, path, &writer->error)) {
         return false;
     }
-    if (elements == NULL && count > 0) {
+    if (!elements && count > 0) {
         return check_fail(&writer->error, PROTOCOL_ERROR_CODE_INVALID, path,
                           "no elements where %" PRIu32 " are counted", count);
     }
@@ -99,7 +99,7 @@ static bool encode_bulk(struct encoder *encoder, const struct field_desc *field,
     if (!check_count(field, count, path, &writer->error)) {
         return false;
     }
-    if (bytes == NULL && count > 0) {
+    if (!bytes && count > 0) {
         return check_fail(&writer->error, PROTOCOL_ERROR_CODE_INVALID, path,
                           "no bytes where %" PRIu32 " are counted", count);
     }
@@ -111,7 +111,7 @@ static bool encode_bulk(struct encoder *encoder, const struct field_desc *field,
 static bool encode_struct(struct encoder *encoder, const struct struct_desc *desc, const char *body,
                           const struct path *path)
 {
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         struct path field_path = {path, field->name, -1};
         bool ok = false;
         switch (field->kind) {
@@ -142,7 +142,7 @@ bool message_encode(struct writer *writer, const struct message *message)
     if (writer->failed) {
         return false;
     }
-    if (desc == NULL) {
+    if (!desc) {
         writer->failed = true;
         return decode_error_set(&writer->error, PROTOCOL_ERROR_CODE_INVALID, NULL, "type 0x%04x is unknown",
                                 (unsigned)message->type);
@@ -166,17 +166,17 @@ bool message_encode(struct writer *writer, const struct message *message)
 
 static size_t struct_bytes(const struct struct_desc *desc, const char *body, size_t position)
 {
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         const char *pointer = NULL;
         switch (field->kind) {
         case FIELD_STRING:
             pointer = load_pointer(field, body);
-            position += 4 + (pointer != NULL ? strlen(pointer) : 0);
+            position += 4 + (pointer ? strlen(pointer) : 0);
             break;
         case FIELD_ARRAY:
             pointer = load_pointer(field, body);
             position += 4;
-            for (uint32_t i = 0; pointer != NULL && i < load_count(field, body); i++) {
+            for (uint32_t i = 0; pointer && i < load_count(field, body); i++) {
                 const struct struct_desc *record = field->record();
                 position = struct_bytes(record, pointer + i * record->size_bytes, position);
             }
@@ -195,5 +195,5 @@ static size_t struct_bytes(const struct struct_desc *desc, const char *body, siz
 size_t message_payload_bytes(const struct message *message)
 {
     const struct message_desc *desc = message_describe(message->type);
-    return desc != NULL ? struct_bytes(desc->body(), (const char *)message + MESSAGE_BODY_OFFSET, 2) : 0;
+    return desc ? struct_bytes(desc->body(), (const char *)message + MESSAGE_BODY_OFFSET, 2) : 0;
 }

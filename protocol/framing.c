@@ -37,10 +37,10 @@ void framing_header_decode(struct framing_header *out, const uint8_t bytes[FRAMI
 static bool header_allowed(const struct framing_header *header, const struct message_info *info, uint32_t accept,
                            struct decode_error *error)
 {
-    uint32_t max = info != NULL ? info->payload_max_bytes : CODEC_BULK_PAYLOAD_MAX_BYTES;
-    uint32_t min = info != NULL ? info->payload_min_bytes : 0;
+    uint32_t max = info ? info->payload_max_bytes : CODEC_BULK_PAYLOAD_MAX_BYTES;
+    uint32_t min = info ? info->payload_min_bytes : 0;
     const char *name = message_type_text(header->type);
-    if (info == NULL && (header->type & MESSAGE_TYPE_IGNORABLE) == 0) {
+    if (!info && (header->type & MESSAGE_TYPE_IGNORABLE) == 0) {
         return decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, "type", "type 0x%04x is unknown",
                                 header->type);
     }
@@ -53,7 +53,7 @@ static bool header_allowed(const struct framing_header *header, const struct mes
                                 "%s: %" PRIu32 " bytes are not within %" PRIu32 " .. %" PRIu32, name,
                                 header->payload_bytes, min, max);
     }
-    if (info != NULL && (info->from & accept) == 0) {
+    if (info && (info->from & accept) == 0) {
         return decode_error_set(error, PROTOCOL_ERROR_CODE_DENIED, "type", "%s is not for this peer to send",
                                 name);
     }
@@ -63,9 +63,9 @@ static bool header_allowed(const struct framing_header *header, const struct mes
 enum framing_result framing_parse(struct frame *frame, const uint8_t *bytes, size_t count, uint32_t accept,
                                   struct decode_error *error)
 {
-    memset(frame, 0, sizeof *frame);
-    if (error != NULL) {
-        memset(error, 0, sizeof *error);
+    memset(frame, 0, sizeof(*frame));
+    if (error) {
+        memset(error, 0, sizeof(*error));
     }
     if (count < FRAMING_HEADER_BYTES) {
         frame->need_bytes = FRAMING_HEADER_BYTES;

@@ -20,7 +20,7 @@ static const struct {
 #include "protocol/limits.def"
 #undef LIMIT
 };
-#define LIMIT_COUNT (sizeof limits / sizeof limits[0])
+#define LIMIT_COUNT (sizeof(limits) / sizeof(limits[0]))
 
 static const uint8_t magic[4] = {'F', 'A', 'R', 'L'};
 
@@ -34,11 +34,11 @@ bool handshake_limit_at(const struct handshake_limits *values, size_t index, str
     const uint8_t *at = (const uint8_t *)values + limits[index].offset;
     uint64_t value;
     uint32_t narrow;
-    if (limits[index].bytes == sizeof narrow) {
-        memcpy(&narrow, at, sizeof narrow);
+    if (limits[index].bytes == sizeof(narrow)) {
+        memcpy(&narrow, at, sizeof(narrow));
         value = narrow;
     } else {
-        memcpy(&value, at, sizeof value);
+        memcpy(&value, at, sizeof(value));
     }
     *out = (struct handshake_limit){limits[index].name, limits[index].what, limits[index].bytes, value};
     return true;
@@ -68,11 +68,11 @@ size_t handshake_hello_encode(uint8_t out[HANDSHAKE_HELLO_MAX_BYTES], const stru
         return 0;
     }
     writer_init(&writer, out, HANDSHAKE_HELLO_MAX_BYTES);
-    writer_put_bytes(&writer, magic, sizeof magic);
+    writer_put_bytes(&writer, magic, sizeof(magic));
     writer_put_u16(&writer, hello->version_min);
     writer_put_u16(&writer, hello->version_max);
     writer_put_u64(&writer, hello->capabilities);
-    writer_put_bytes(&writer, hello->nonce, sizeof hello->nonce);
+    writer_put_bytes(&writer, hello->nonce, sizeof(hello->nonce));
     return put_text(&writer, hello->name, HANDSHAKE_NAME_MAX_BYTES) ? finish(&writer) : 0;
 }
 
@@ -80,12 +80,12 @@ size_t handshake_reply_encode(uint8_t out[HANDSHAKE_REPLY_MAX_BYTES], const stru
 {
     struct writer writer;
     writer_init(&writer, out, HANDSHAKE_REPLY_MAX_BYTES);
-    writer_put_bytes(&writer, magic, sizeof magic);
+    writer_put_bytes(&writer, magic, sizeof(magic));
     writer_put_u16(&writer, reply->version);
     writer_put_u16(&writer, HANDSHAKE_LIMITS_BYTES);
     writer_put_u64(&writer, reply->capabilities);
-    writer_put_bytes(&writer, reply->nonce, sizeof reply->nonce);
-    writer_put_bytes(&writer, reply->session_token, sizeof reply->session_token);
+    writer_put_bytes(&writer, reply->nonce, sizeof(reply->nonce));
+    writer_put_bytes(&writer, reply->session_token, sizeof(reply->session_token));
 #define LIMIT(type, name, what) writer_put_##type(&writer, reply->limits.name);
 #include "protocol/limits.def"
 #undef LIMIT
@@ -108,12 +108,12 @@ static enum handshake_result fatal(struct decode_error *error, const char *field
  * is bounded by its length bytes, so more can never be needed than the stated maximum. */
 static enum handshake_result get_magic(struct reader *reader, struct decode_error *error)
 {
-    for (size_t i = 0; i < sizeof magic && i < reader->size_bytes; i++) {
+    for (size_t i = 0; i < sizeof(magic) && i < reader->size_bytes; i++) {
         if (reader->data[i] != magic[i]) {
             return fatal(error, "magic", "these bytes are no farlight handshake");
         }
     }
-    return reader_skip(reader, sizeof magic) ? HANDSHAKE_CONSUMED : HANDSHAKE_NEED_MORE;
+    return reader_skip(reader, sizeof(magic)) ? HANDSHAKE_CONSUMED : HANDSHAKE_NEED_MORE;
 }
 
 /* `out` holds max_bytes and the NUL. */
@@ -154,7 +154,7 @@ static enum handshake_result parse_hello(struct handshake_hello *out, struct rea
         return fatal(error, "version_min", "is 0 or above version_max");
     }
     out->capabilities = reader_u64(reader);
-    reader_bytes(reader, out->nonce, sizeof out->nonce);
+    reader_bytes(reader, out->nonce, sizeof(out->nonce));
     if (reader->failed) {
         return HANDSHAKE_NEED_MORE;
     }
@@ -185,10 +185,10 @@ static enum handshake_result parse_reply(struct handshake_reply *out, struct rea
         return fatal(error, "limits_bytes", "is above 256");
     }
     out->capabilities = reader_u64(reader);
-    reader_bytes(reader, out->nonce, sizeof out->nonce);
-    reader_bytes(reader, out->session_token, sizeof out->session_token);
+    reader_bytes(reader, out->nonce, sizeof(out->nonce));
+    reader_bytes(reader, out->session_token, sizeof(out->session_token));
     const uint8_t *told = reader_view(reader, limits_bytes);
-    if (told == NULL) {
+    if (!told) {
         return HANDSHAKE_NEED_MORE;
     }
     get_limits(&out->limits, told, limits_bytes);
@@ -203,15 +203,15 @@ enum handshake_result handshake_hello_parse(struct handshake_hello *out, const u
                                             size_t *consumed_bytes, struct decode_error *error)
 {
     struct reader reader;
-    if (error != NULL) {
-        memset(error, 0, sizeof *error);
+    if (error) {
+        memset(error, 0, sizeof(*error));
     }
-    memset(out, 0, sizeof *out);
+    memset(out, 0, sizeof(*out));
     reader_init(&reader, bytes, count);
     enum handshake_result result = parse_hello(out, &reader, error);
     *consumed_bytes = result == HANDSHAKE_CONSUMED ? reader.position : 0;
     if (result != HANDSHAKE_CONSUMED) {
-        memset(out, 0, sizeof *out);
+        memset(out, 0, sizeof(*out));
     }
     return result;
 }
@@ -220,15 +220,15 @@ enum handshake_result handshake_reply_parse(struct handshake_reply *out, const u
                                             size_t *consumed_bytes, struct decode_error *error)
 {
     struct reader reader;
-    if (error != NULL) {
-        memset(error, 0, sizeof *error);
+    if (error) {
+        memset(error, 0, sizeof(*error));
     }
-    memset(out, 0, sizeof *out);
+    memset(out, 0, sizeof(*out));
     reader_init(&reader, bytes, count);
     enum handshake_result result = parse_reply(out, &reader, error);
     *consumed_bytes = result == HANDSHAKE_CONSUMED ? reader.position : 0;
     if (result != HANDSHAKE_CONSUMED) {
-        memset(out, 0, sizeof *out);
+        memset(out, 0, sizeof(*out));
     }
     return result;
 }

@@ -19,14 +19,14 @@ static const struct enum_desc *find_enum(const char *name)
 static const char *value_text(const char *enum_name, uint32_t number)
 {
     const struct enum_desc *desc = find_enum(enum_name);
-    const char *text = desc != NULL ? enum_desc_text(desc, number) : NULL;
-    return text != NULL ? text : "?";
+    const char *text = desc ? enum_desc_text(desc, number) : NULL;
+    return text ? text : "?";
 }
 
 static const struct value_desc *find_value(const char *enum_name, const char *text)
 {
     const struct enum_desc *desc = find_enum(enum_name);
-    for (size_t i = 0; desc != NULL && text != NULL && i < desc->value_count; i++) {
+    for (size_t i = 0; desc && text && i < desc->value_count; i++) {
         if (strcmp(desc->values[i].text, text) == 0) {
             return &desc->values[i];
         }
@@ -42,7 +42,7 @@ static const struct value_desc *find_value(const char *enum_name, const char *te
     bool protocol_##name##_parse(const char *text, enum protocol_##name *out)                                     \
     {                                                                                                             \
         const struct value_desc *value = find_value(#name, text);                                                 \
-        if (value != NULL) {                                                                                      \
+        if (value) {                                                                                              \
             *out = (enum protocol_##name)value->number;                                                           \
         }                                                                                                         \
         return value != NULL;                                                                                     \
@@ -57,7 +57,7 @@ const char *protocol_enum_list(const char *enum_name, char *out, size_t out_byte
         return out;
     }
     out[0] = '\0';
-    for (size_t i = 0; desc != NULL && i < desc->value_count; i++) {
+    for (size_t i = 0; desc && i < desc->value_count; i++) {
         int written = snprintf(out + used, out_bytes - used, "%s%s", i == 0 ? "" : ", ", desc->values[i].text);
         if (written < 0 || (size_t)written >= out_bytes - used) {
             break; /* cut off, NUL-terminated */
@@ -70,9 +70,9 @@ const char *protocol_enum_list(const char *enum_name, char *out, size_t out_byte
 void message_init(struct message *message, enum message_type type)
 {
     const struct message_desc *desc = message_describe(type);
-    memset(message, 0, sizeof *message);
+    memset(message, 0, sizeof(*message));
     message->type = type;
-    if (desc != NULL) {
+    if (desc) {
         struct_defaults(desc->body(), (char *)message + MESSAGE_BODY_OFFSET);
     }
 }
@@ -80,5 +80,5 @@ void message_init(struct message *message, enum message_type type)
 const char *message_type_text(uint32_t type)
 {
     const struct message_info *info = message_lookup(type);
-    return info != NULL ? info->name : "unknown";
+    return info ? info->name : "unknown";
 }

@@ -49,7 +49,7 @@ static void print_fixed(FILE *stream, const struct field_desc *field, const char
         break;
     case FIELD_ENUM:
         text = enum_desc_text(field->enumeration, (uint32_t)field_load_int(field, place));
-        if (text != NULL) {
+        if (text) {
             fputs(text, stream);
         } else {
             fprintf(stream, "?%" PRIu64, field_load_int(field, place));
@@ -72,7 +72,7 @@ static void print_array(FILE *stream, const struct field_desc *field, const char
 {
     const struct struct_desc *record = field->record();
     fprintf(stream, "[%" PRIu32, count);
-    for (uint32_t i = 0; elements != NULL && i < count && i < ELEMENTS_SHOWN; i++) {
+    for (uint32_t i = 0; elements && i < count && i < ELEMENTS_SHOWN; i++) {
         fputs(i == 0 ? ": {" : ", {", stream);
         print_struct(stream, record, elements + i * record->size_bytes);
         fputc('}', stream);
@@ -82,7 +82,7 @@ static void print_array(FILE *stream, const struct field_desc *field, const char
 
 static void print_struct(FILE *stream, const struct struct_desc *desc, const char *body)
 {
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         const char *pointer = NULL;
         uint32_t count = 0;
         fprintf(stream, "%s%s=", field == desc->fields ? "" : " ", field->name);
@@ -90,17 +90,17 @@ static void print_struct(FILE *stream, const struct struct_desc *desc, const cha
             print_fixed(stream, field, body + field->offset);
             continue;
         }
-        memcpy(&pointer, body + field->offset, sizeof pointer);
+        memcpy(&pointer, body + field->offset, sizeof(pointer));
         if (field->kind == FIELD_STRING) {
-            print_text(stream, pointer != NULL ? pointer : "");
+            print_text(stream, pointer ? pointer : "");
             continue;
         }
-        memcpy(&count, body + field->count_offset, sizeof count);
+        memcpy(&count, body + field->count_offset, sizeof(count));
         if (field->kind == FIELD_ARRAY) {
             print_array(stream, field, pointer, count);
         } else {
             fprintf(stream, "<%" PRIu32 " bytes%s", count, count > 0 ? ": " : "");
-            print_hex(stream, (const uint8_t *)pointer, pointer != NULL ? count : 0);
+            print_hex(stream, (const uint8_t *)pointer, pointer ? count : 0);
             fputc('>', stream);
         }
     }
@@ -109,11 +109,11 @@ static void print_struct(FILE *stream, const struct struct_desc *desc, const cha
 void message_print(FILE *stream, const struct message *message)
 {
     const struct message_desc *desc = message_describe(message->type);
-    if (desc == NULL) {
+    if (!desc) {
         fprintf(stream, "unknown type=0x%04x", (unsigned)message->type);
         return;
     }
     const struct struct_desc *body = desc->body();
-    fprintf(stream, "%s%s", desc->info.name, body->fields->name != NULL ? " " : "");
+    fprintf(stream, "%s%s", desc->info.name, body->fields->name ? " " : "");
     print_struct(stream, body, (const char *)message + MESSAGE_BODY_OFFSET);
 }

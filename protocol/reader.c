@@ -29,7 +29,7 @@ static uint64_t read_little_endian(struct reader *reader, size_t count)
 {
     const uint8_t *bytes = reader_view(reader, count);
     uint64_t value = 0;
-    if (bytes == NULL) {
+    if (!bytes) {
         return 0;
     }
     for (size_t i = 0; i < count; i++) {
@@ -64,7 +64,7 @@ bool reader_bytes(struct reader *reader, void *out, size_t count)
         return !reader->failed; /* `out` may be NULL, which memcpy and memset may not be given */
     }
     const uint8_t *bytes = reader_view(reader, count);
-    if (bytes == NULL) {
+    if (!bytes) {
         memset(out, 0, count);
         return false;
     }
@@ -81,7 +81,7 @@ bool reader_skip(struct reader *reader, size_t count)
 bool reader_zeros(struct reader *reader, size_t count)
 {
     const uint8_t *bytes = reader_view(reader, count);
-    if (bytes == NULL) {
+    if (!bytes) {
         return false;
     }
     for (size_t i = 0; i < count; i++) {

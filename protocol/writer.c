@@ -5,7 +5,7 @@
 
 void writer_init(struct writer *writer, void *data, size_t capacity_bytes)
 {
-    memset(writer, 0, sizeof *writer);
+    memset(writer, 0, sizeof(*writer));
     writer->data = data;
     writer->capacity_bytes = capacity_bytes;
 }
@@ -31,7 +31,7 @@ static uint8_t *reserve(struct writer *writer, size_t count)
 static bool put_little_endian(struct writer *writer, uint64_t value, size_t count)
 {
     uint8_t *place = reserve(writer, count);
-    if (place == NULL) {
+    if (!place) {
         return false;
     }
     for (size_t i = 0; i < count; i++) {
@@ -66,7 +66,7 @@ bool writer_put_bytes(struct writer *writer, const void *bytes, size_t count)
         return !writer->failed; /* `bytes` may be NULL, which memcpy may not be given */
     }
     uint8_t *place = reserve(writer, count);
-    if (place == NULL) {
+    if (!place) {
         return false;
     }
     memcpy(place, bytes, count);
@@ -79,7 +79,7 @@ bool writer_put_zeros(struct writer *writer, size_t count)
         return !writer->failed;
     }
     uint8_t *place = reserve(writer, count);
-    if (place == NULL) {
+    if (!place) {
         return false;
     }
     memset(place, 0, count);

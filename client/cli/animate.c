@@ -61,7 +61,7 @@ static error_t named(struct cli_job *job, bool good, const char *field)
 {
     if (good)
         return 0;
-    snprintf(job->error.field, sizeof job->error.field, "%s", field);
+    snprintf(job->error.field, sizeof(job->error.field), "%s", field);
     return EINVAL;
 }
 
@@ -83,9 +83,8 @@ static error_t parse_series(struct cli_job *job, int key, const char *value)
         return status;
     case KEY_ORBIT:
         job->is_orbit = true;
-        return value == NULL
-                   ? 0
-                   : named(job, fl_text_real(value, -1e6, 1e6, &series->orbit_degrees, &job->error), "--orbit");
+        return !value ? 0
+                      : named(job, fl_text_real(value, -1e6, 1e6, &series->orbit_degrees, &job->error), "--orbit");
     case KEY_SHARD:
         return named(job, fl_text_shard(value, &series->shard_part, &series->shard_parts, &job->error), "--shard");
     case KEY_RESUME:
@@ -124,7 +123,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         job->scene = value;
         return 0;
     case ARGP_KEY_ARG:
-        if (job->model != NULL)
+        if (job->model)
             return cli_usage(job, value, "only one model can be rendered");
         job->model = value;
         return 0;
@@ -149,7 +148,7 @@ static bool complete(struct animation *animation)
 {
     struct cli_job *job = &animation->job;
     const bool has_keys = animation->keys_path != NULL;
-    if (!job->series.has_range && job->clip_count == 0 && job->script == NULL) {
+    if (!job->series.has_range && job->clip_count == 0 && !job->script) {
         cli_usage(job, "--frames", "no range of frames is given");
         return fl_error_remedy(&job->error, "such as --frames 1-120; a clip or a script need none");
     }
@@ -157,14 +156,14 @@ static bool complete(struct animation *animation)
         job->options.frames_per_second = 24;
     if (!cli_job_complete(job, true))
         return false;
-    if (has_keys && (job->is_orbit || job->camera != NULL || job->has_eye))
+    if (has_keys && (job->is_orbit || job->camera || job->has_eye))
         return cli_usage(job, "--keys", "cannot go with --orbit, --camera or --eye") == 0;
-    if (job->is_orbit && job->camera != NULL)
+    if (job->is_orbit && job->camera)
         return cli_usage(job, "--orbit", "cannot go with --camera; it can begin at --eye and --look-at") == 0;
     if (has_keys)
         return complete_keys(animation);
     /* Frames of a camera that stands still would all be alike, where nothing else moves. */
-    job->is_orbit = job->is_orbit || (job->camera == NULL && job->script == NULL && job->clip_count == 0);
+    job->is_orbit = job->is_orbit || (!job->camera && !job->script && job->clip_count == 0);
     if (job->is_orbit)
         job->options.camera_path = PROTOCOL_CAMERA_PATH_ORBIT;
     return true;
@@ -182,8 +181,8 @@ static bool begin(struct animation *animation)
 static error_t set_series(void *user, const char *name, const char *value)
 {
     struct animation *animation = user;
-    for (const struct argp_option *option = options; option->name != NULL || option->doc != NULL; option++)
-        if (option->name != NULL && strcmp(option->name, name) == 0)
+    for (const struct argp_option *option = options; option->name || option->doc; option++)
+        if (option->name && strcmp(option->name, name) == 0)
             return parse_series(&animation->job, option->key, value);
     return ARGP_ERR_UNKNOWN;
 }
@@ -192,8 +191,8 @@ static error_t set_series(void *user, const char *name, const char *value)
 static bool apply_script(struct animation *animation, const struct animation *typed)
 {
     const struct cli_job *job = &typed->job;
-    const struct cli_shot_given given = {.camera = job->camera != NULL || job->has_eye || job->has_look_at ||
-                                                   job->is_orbit || typed->keys_path != NULL,
+    const struct cli_shot_given given = {.camera = job->camera || job->has_eye || job->has_look_at ||
+                                                   job->is_orbit || typed->keys_path,
                                          .clips = job->clip_count > 0,
                                          .output = job->output != NULL,
                                          .aperture = job->has_aperture,
@@ -219,16 +218,16 @@ static bool read_all(struct animation *animation, int argc, char **argv)
         .children = children};
     struct animation typed = {0};
     bool good = begin(&typed) && argp_parse(&argp, argc, argv, 0, NULL, &typed) == 0;
-    if (!good || typed.script_path == NULL) {
+    if (!good || !typed.script_path) {
         *animation = typed;
         return good;
     }
     /* The command line once more, over the script. */
     good = begin(animation) && apply_script(animation, &typed);
-    const char *model = typed.job.scene == NULL ? animation->job.model : NULL; /* which --scene replaces */
+    const char *model = !typed.job.scene ? animation->job.model : NULL; /* which --scene replaces */
     animation->job.model = NULL;
     good = good && argp_parse(&argp, argc, argv, 0, NULL, animation) == 0;
-    if (animation->job.model == NULL)
+    if (!animation->job.model)
         animation->job.model = model;
     return good;
 }

@@ -14,7 +14,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     struct bridge_options *wanted = state->input;
     if (key != ARGP_KEY_ARG)
         return ARGP_ERR_UNKNOWN;
-    if (wanted->address != NULL)
+    if (wanted->address)
         return cli_usage(&wanted->job, value, "only one address at a time");
     wanted->address = value;
     return 0;
@@ -30,7 +30,7 @@ int cli_bridge(int argc, char **argv)
     struct bridge_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
-    if (wanted.address == NULL) {
+    if (!wanted.address) {
         cli_usage(&wanted.job, "ADDRESS", "no socket is named");
         return cli_report(&wanted.job.error);
     }

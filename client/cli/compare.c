@@ -39,7 +39,7 @@ static const struct argp_option options[] = {
 /* An error of what a function of the library read gets the option's name. */
 static error_t name_field(struct comparing *comparing, const char *field)
 {
-    snprintf(comparing->job.error.field, sizeof comparing->job.error.field, "%s", field);
+    snprintf(comparing->job.error.field, sizeof(comparing->job.error.field), "%s", field);
     return EINVAL;
 }
 
@@ -120,7 +120,7 @@ static void print_object(const struct comparing *comparing, const struct fl_comp
     json_t *object = cli_comparison_json(comparison, &comparing->limits);
     json_object_set_new(object, "a", json_string(comparing->options.a));
     json_object_set_new(object, "b", json_string(comparing->options.b));
-    json_object_set_new(object, "picture", picture != NULL ? json_string(picture) : json_null());
+    json_object_set_new(object, "picture", picture ? json_string(picture) : json_null());
     json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));
     putchar('\n');
     json_decref(object);
@@ -151,7 +151,7 @@ static bool is_about_tracers(int argc, char **argv)
     static const char option[] = "--tracers";
     for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
         const size_t length = strcspn(argv[i], "=");
-        if (length >= strlen("--tr") && length < sizeof option && strncmp(argv[i], option, length) == 0)
+        if (length >= strlen("--tr") && length < sizeof(option) && strncmp(argv[i], option, length) == 0)
             return true;
     }
     return false;

@@ -65,15 +65,15 @@ static error_t parse_tracers(struct tracer_comparison *comparison, const char *v
     struct cli_job *job = &comparison->job;
     char name[40], known[200];
     const char *comma = strchr(value, ',');
-    const size_t length = comma != NULL ? (size_t)(comma - value) : 0;
-    if (length == 0 || length >= sizeof name || strchr(comma + 1, ',') != NULL)
+    const size_t length = comma ? (size_t)(comma - value) : 0;
+    if (length == 0 || length >= sizeof(name) || strchr(comma + 1, ','))
         return cli_usage(job, "--tracers", "'%s' is not two tracers, such as bvh,reference", value);
     memcpy(name, value, length);
     name[length] = '\0';
     const bool known_first = protocol_tracer_parse(name, &comparison->tracer);
     if (!known_first || !protocol_tracer_parse(comma + 1, &comparison->reference)) {
         cli_usage(job, "--tracers", "unknown tracer '%s'", known_first ? comma + 1 : name);
-        fl_error_remedy(&job->error, "known: %s", protocol_enum_list("tracer", known, sizeof known));
+        fl_error_remedy(&job->error, "known: %s", protocol_enum_list("tracer", known, sizeof(known)));
         return EINVAL;
     }
     comparison->has_tracers = true;
@@ -82,7 +82,7 @@ static error_t parse_tracers(struct tracer_comparison *comparison, const char *v
 
 static error_t name_field(struct tracer_comparison *comparison, const char *field)
 {
-    snprintf(comparison->job.error.field, sizeof comparison->job.error.field, "%s", field);
+    snprintf(comparison->job.error.field, sizeof(comparison->job.error.field), "%s", field);
     return EINVAL;
 }
 
@@ -96,10 +96,10 @@ static error_t parse_real(struct tracer_comparison *comparison, const char *fiel
 static error_t parse_limit(struct tracer_comparison *comparison, const char *value)
 {
     static const char field[] = "--fail-above", agree[] = "agree=";
-    if (strncmp(value, agree, sizeof agree - 1) != 0)
+    if (strncmp(value, agree, sizeof(agree) - 1) != 0)
         return cli_limits_add(&comparison->limits, value, &comparison->job.error) ? 0
                                                                                   : name_field(comparison, field);
-    return cli_share_parse(value + sizeof agree - 1, &comparison->least_agreement, &comparison->job.error)
+    return cli_share_parse(value + sizeof(agree) - 1, &comparison->least_agreement, &comparison->job.error)
                ? 0
                : name_field(comparison, field);
 }
@@ -150,7 +150,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         state->child_inputs[0] = job;
         return 0;
     case ARGP_KEY_ARG:
-        if (job->model != NULL)
+        if (job->model)
             return cli_usage(job, value, "only one model can be rendered");
         job->model = value;
         return 0;
@@ -186,11 +186,11 @@ static bool prepare(struct tracer_comparison *comparison, struct fl_error *error
     const char *const inputs[] = {comparison->job.model, comparison->job.environment};
     if (!cli_check_error_picture(comparison->images.picture, inputs, 2, error))
         return false;
-    if (!cli_temporary_folder(folder, sizeof folder, error))
+    if (!cli_temporary_folder(folder, sizeof(folder), error))
         return false;
-    memcpy(comparison->folder, folder, sizeof folder);
-    snprintf(comparison->paths[0], sizeof comparison->paths[0], "%s/reference.exr", folder);
-    snprintf(comparison->paths[1], sizeof comparison->paths[1], "%s/tracer.exr", folder);
+    memcpy(comparison->folder, folder, sizeof(folder));
+    snprintf(comparison->paths[0], sizeof(comparison->paths[0]), "%s/reference.exr", folder);
+    snprintf(comparison->paths[1], sizeof(comparison->paths[1]), "%s/tracer.exr", folder);
     return true;
 }
 
@@ -201,7 +201,7 @@ static bool load(struct tracer_comparison *comparison, struct fl_error *error)
     if (!cli_loading_begin(&comparison->loading, error))
         return false;
     comparison->exporter = fl_exporter_start(&export, error);
-    return comparison->exporter != NULL && cli_loading_end(&comparison->loading, error) &&
+    return comparison->exporter && cli_loading_end(&comparison->loading, error) &&
            cli_choose_camera(&comparison->job, comparison->loading.scene, error) &&
            cli_settle(&comparison->job, comparison->loading.scene, false, error);
 }
@@ -210,8 +210,8 @@ static bool load(struct tracer_comparison *comparison, struct fl_error *error)
 static struct fl_frame *render(struct tracer_comparison *comparison, const char *path, struct fl_error *error)
 {
     struct fl_job *job = fl_render_start(comparison->loading.scene, &comparison->job.options, error);
-    struct fl_frame *frame = job != NULL ? fl_render_next(job, error) : NULL;
-    if (frame != NULL &&
+    struct fl_frame *frame = job ? fl_render_next(job, error) : NULL;
+    if (frame &&
         !fl_exporter_write(comparison->exporter, frame, &(struct fl_export_options){.path = path}, error)) {
         fl_frame_destroy(frame);
         frame = NULL;
@@ -225,25 +225,25 @@ static bool render_both(struct tracer_comparison *comparison, struct fl_error *e
     struct fl_job_options *wanted = &comparison->job.options;
     bool warned[PROTOCOL_CUBE_PART_COUNT] = {false};
     char what[100];
-    snprintf(what, sizeof what, "rays of %s and %s", protocol_tracer_text(comparison->tracer),
+    snprintf(what, sizeof(what), "rays of %s and %s", protocol_tracer_text(comparison->tracer),
              protocol_tracer_text(comparison->reference));
     cli_progress_step(&comparison->progress, 0, STEPS, what);
     wanted->compare = true;
     wanted->tracer = comparison->tracer;
     wanted->compare_with = comparison->reference;
     comparison->frame = render(comparison, comparison->paths[1], error);
-    if (comparison->frame == NULL)
+    if (!comparison->frame)
         return false;
     cli_cubes_warn(comparison->frame, warned, &comparison->progress);
-    snprintf(what, sizeof what, "picture of %s", protocol_tracer_text(comparison->reference));
+    snprintf(what, sizeof(what), "picture of %s", protocol_tracer_text(comparison->reference));
     cli_progress_step(&comparison->progress, 1, STEPS, what);
     wanted->compare = false;
     wanted->tracer = comparison->reference;
     struct fl_frame *reference = render(comparison, comparison->paths[0], error);
-    if (reference != NULL)
+    if (reference)
         cli_cubes_warn(reference, warned, &comparison->progress);
     fl_frame_destroy(reference);
-    return reference != NULL && fl_exporter_wait(comparison->exporter, error);
+    return reference && fl_exporter_wait(comparison->exporter, error);
 }
 
 static bool compare_pictures(struct tracer_comparison *comparison, struct fl_error *error)
@@ -308,9 +308,9 @@ static void print_json(const struct tracer_comparison *comparison)
         (json_int_t)frame->height, "samples", (json_int_t)frame->samples, "far_share", comparison->far_share,
         "waves", cli_waves_json(frame), "all", cli_wave_total_json(frame), "image",
         cli_comparison_json(&comparison->figures, &comparison->limits), "within", is_within(comparison) ? 1 : 0);
-    fl_text_utf8(comparison->job.model, model, sizeof model);
+    fl_text_utf8(comparison->job.model, model, sizeof(model));
     json_object_set_new(object, "model", json_string(model));
-    json_object_set_new(object, "picture", picture != NULL ? json_string(picture) : json_null());
+    json_object_set_new(object, "picture", picture ? json_string(picture) : json_null());
     if (frame->cube_count > 0)
         json_object_set_new(object, "cubes", cli_cubes_json(frame));
     json_object_set_new(object, "least_agreement",
@@ -328,7 +328,7 @@ static bool run(struct tracer_comparison *comparison, struct fl_error *error)
 
 static void finish(struct tracer_comparison *comparison)
 {
-    if (comparison->loading.connection != NULL)
+    if (comparison->loading.connection)
         fl_connection_set_interrupt(comparison->loading.connection, 0);
     fl_exporter_destroy(comparison->exporter);
     cli_loading_close(&comparison->loading);

@@ -33,7 +33,7 @@ static bool find_figure(const char *name, size_t length, enum cli_figure *found,
             return true;
         }
         const size_t used = strlen(known);
-        snprintf(known + used, sizeof known - used, "%s%s", used > 0 ? ", " : "", figures[i].name);
+        snprintf(known + used, sizeof(known) - used, "%s%s", used > 0 ? ", " : "", figures[i].name);
     }
     fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%.*s' is no figure", (int)(length < 80 ? length : 80), name);
     return fl_error_remedy(error, "known: %s", known);
@@ -43,7 +43,7 @@ bool cli_share_parse(const char *text, double *share, struct fl_error *error)
 {
     char number[64];
     const size_t length = strlen(text);
-    if (length == 0 || length >= sizeof number || text[length - 1] != '%')
+    if (length == 0 || length >= sizeof(number) || text[length - 1] != '%')
         return fl_text_real(text, 0, 1, share, error);
     memcpy(number, text, length - 1);
     number[length - 1] = '\0';
@@ -57,13 +57,13 @@ bool cli_limits_add(struct cli_limits *limits, const char *text, struct fl_error
 {
     struct cli_limit limit = {.figure = CLI_FIGURE_MAX};
     const char *equals = strchr(text, '=');
-    if (equals != NULL && !find_figure(text, (size_t)(equals - text), &limit.figure, error))
+    if (equals && !find_figure(text, (size_t)(equals - text), &limit.figure, error))
         return false;
     if (limits->count == CLI_LIMITS_MAX)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "at most %u limits", CLI_LIMITS_MAX);
     const struct figure *figure = &figures[limit.figure];
-    const char *value = equals != NULL ? equals + 1 : text;
-    if (!figure->is_share && strchr(value, '%') != NULL)
+    const char *value = equals ? equals + 1 : text;
+    if (!figure->is_share && strchr(value, '%'))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is no share of the pixels", figure->name);
     if (figure->is_share ? !cli_share_parse(value, &limit.value, error)
                          : !fl_text_real(value, figure->least, figure->greatest, &limit.value, error))

@@ -26,10 +26,10 @@ const struct argp cli_daemon_argp = {.options = options, .parser = parse};
 struct fl_connection *cli_daemon_connect(const struct cli_daemon *daemon, const char *name, bool must_be_named,
                                          struct fl_error *error)
 {
-    const char *server = daemon->server != NULL ? daemon->server : getenv("FARLIGHT_SERVER");
-    if (server != NULL && server[0] == '\0')
+    const char *server = daemon->server ? daemon->server : getenv("FARLIGHT_SERVER");
+    if (server && server[0] == '\0')
         server = NULL; /* an empty FARLIGHT_SERVER names none */
-    if (server == NULL && must_be_named) {
+    if (!server && must_be_named) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "--server", "no daemon is named");
         fl_error_remedy(error, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]");
         return NULL;

@@ -19,7 +19,7 @@ enum cli_image cli_image_by_name(const char *name)
     } known[] = {{"png", CLI_IMAGE_PNG}, {"jpg", CLI_IMAGE_JPEG}, {"jpeg", CLI_IMAGE_JPEG},
                  {"exr", CLI_IMAGE_EXR}, {"hdr", CLI_IMAGE_HDR},  {"mp4", CLI_IMAGE_MP4},
                  {"mkv", CLI_IMAGE_MKV}, {"y4m", CLI_IMAGE_Y4M}};
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+    for (size_t i = 0; i < sizeof(known) / sizeof(known[0]); i++)
         if (strcasecmp(known[i].name, name) == 0)
             return known[i].image;
     return CLI_IMAGE_UNKNOWN;
@@ -29,7 +29,7 @@ enum cli_image cli_image_by_path(const char *path)
 {
     const char *slash = strrchr(path, '/');
     const char *dot = strrchr(path, '.');
-    if (dot == NULL || (slash != NULL && dot < slash))
+    if (!dot || (slash && dot < slash))
         return CLI_IMAGE_UNKNOWN;
     return cli_image_by_name(dot + 1);
 }
@@ -49,8 +49,8 @@ bool cli_image_is_video(enum cli_image image)
 static bool try_folder(const char *path, const char *folder, struct fl_error *error)
 {
     char probe[4200];
-    const int length = snprintf(probe, sizeof probe, "%s/.farlight-XXXXXX", folder);
-    const int fd = length > 0 && (size_t)length < sizeof probe ? mkostemp(probe, O_CLOEXEC) : -1;
+    const int length = snprintf(probe, sizeof(probe), "%s/.farlight-XXXXXX", folder);
+    const int fd = length > 0 && (size_t)length < sizeof(probe) ? mkostemp(probe, O_CLOEXEC) : -1;
     if (fd < 0)
         return fl_error_set(error, FL_ERROR_FILE, path, "its folder cannot be written: %s", strerror(errno));
     close(fd);
@@ -61,14 +61,14 @@ static bool try_folder(const char *path, const char *folder, struct fl_error *er
 bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struct fl_error *error)
 {
     char plain[4097];
-    fl_text_utf8(path, plain, sizeof plain);
+    fl_text_utf8(path, plain, sizeof(plain));
     if (strcmp(path, plain) != 0)
         return fl_error_set(error, FL_ERROR_FILE, plain, "the image's path must be UTF-8 of at most 4096 bytes");
     const char *slash = strrchr(path, '/');
-    const size_t length = slash == NULL ? 1 : slash == path ? 1 : (size_t)(slash - path);
+    const size_t length = !slash ? 1 : slash == path ? 1 : (size_t)(slash - path);
     if (length >= folder_bytes)
         return fl_error_set(error, FL_ERROR_FILE, "", "the path of the image is too long");
-    memcpy(folder, slash == NULL ? "." : path, length);
+    memcpy(folder, !slash ? "." : path, length);
     folder[length] = '\0';
     struct stat status;
     if (stat(folder, &status) < 0) {
@@ -93,7 +93,7 @@ bool cli_check_not_input(const char *path, const char *option, const char *const
                          struct fl_error *error)
 {
     for (size_t i = 0; i < count; i++)
-        if (inputs[i] != NULL && is_same_file(path, inputs[i]))
+        if (inputs[i] && is_same_file(path, inputs[i]))
             return fl_error_set(error, FL_ERROR_ARGUMENT, option, "would replace '%s'", inputs[i]);
     return true;
 }
@@ -101,7 +101,7 @@ bool cli_check_not_input(const char *path, const char *option, const char *const
 bool cli_check_error_picture(const char *picture, const char *const *inputs, size_t count, struct fl_error *error)
 {
     char folder[4097];
-    if (picture == NULL)
+    if (!picture)
         return true;
     const enum cli_image image = cli_image_by_path(picture);
     if (image != CLI_IMAGE_PNG && image != CLI_IMAGE_JPEG) {
@@ -109,7 +109,7 @@ bool cli_check_error_picture(const char *picture, const char *const *inputs, siz
         return fl_error_remedy(error, "known endings: .png .jpg .jpeg");
     }
     return cli_check_not_input(picture, "--output", inputs, count, error) &&
-           cli_check_output(picture, folder, sizeof folder, error);
+           cli_check_output(picture, folder, sizeof(folder), error);
 }
 
 bool cli_check_input(const char *path, struct fl_error *error)
@@ -125,10 +125,10 @@ bool cli_check_input(const char *path, struct fl_error *error)
 bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *error)
 {
     const char *parent = getenv("TMPDIR");
-    if (parent == NULL || parent[0] == '\0')
+    if (!parent || parent[0] == '\0')
         parent = P_tmpdir;
     const int length = snprintf(folder, folder_bytes, "%s/farlight-XXXXXX", parent);
-    if (length < 0 || (size_t)length >= folder_bytes || mkdtemp(folder) == NULL)
+    if (length < 0 || (size_t)length >= folder_bytes || !mkdtemp(folder))
         return fl_error_set(error, FL_ERROR_FILE, parent, "no temporary folder can be made: %s", strerror(errno));
     return true;
 }
@@ -141,7 +141,7 @@ bool cli_copy_to_stdout(const char *path, struct fl_error *error)
         return fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %s", strerror(errno));
     ssize_t got = 0;
     bool good = true;
-    while (good && (got = read(fd, piece, sizeof piece)) > 0) {
+    while (good && (got = read(fd, piece, sizeof(piece))) > 0) {
         for (ssize_t put = 0; good && put < got;) {
             const ssize_t wrote = write(STDOUT_FILENO, piece + put, (size_t)(got - put));
             if (wrote >= 0)

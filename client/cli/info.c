@@ -29,7 +29,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         wanted->environment = value;
         return 0;
     case ARGP_KEY_ARG:
-        if (wanted->model != NULL)
+        if (wanted->model)
             return cli_usage(&wanted->job, value, "only one model at a time");
         wanted->model = value;
         return 0;
@@ -41,7 +41,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
 static json_t *string(const char *text)
 {
     json_t *made = json_string(text); /* NULL where it is not UTF-8: cut names may not be */
-    return made != NULL ? made : json_string("");
+    return made ? made : json_string("");
 }
 
 static json_t *lists(const struct fl_model_info *info)
@@ -87,8 +87,8 @@ static void print_json(const struct info_options *wanted, const struct fl_model_
                    {"parse_ns", info->import.parse_ns},
                    {"hash_ns", info->import.hash_ns},
                    {"import_ns", info->import.import_ns}};
-    json_object_set_new(object, "model", string(wanted->model != NULL ? wanted->model : ""));
-    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+    json_object_set_new(object, "model", string(wanted->model ? wanted->model : ""));
+    for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++)
         json_object_set_new(object, numbers[i].name, json_integer((json_int_t)numbers[i].value));
     json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));
     fputc('\n', stdout);
@@ -112,9 +112,9 @@ static void print_table(const struct info_options *wanted, const struct fl_model
                 {"materials", info->materials},  {"textures", info->textures}, {"lights", info->lights},
                 {"cameras", info->camera_count}, {"skins", info->skins},       {"targets", info->morph_targets},
                 {"clips", info->clip_count}};
-    print_text(wanted->model != NULL ? wanted->model : wanted->environment);
+    print_text(wanted->model ? wanted->model : wanted->environment);
     printf("\n");
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
         printf("  %-10s %12" PRIu64 "\n", rows[i].name, rows[i].value);
     printf("  %-10s %12.3f MB in files, %.3f MB to upload at most\n", "bytes",
            (double)info->import.read_bytes * 1e-6, (double)info->import.offered_bytes * 1e-6);
@@ -148,7 +148,7 @@ int cli_info(int argc, char **argv)
     struct info_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
-    if (wanted.model == NULL && wanted.environment == NULL) {
+    if (!wanted.model && !wanted.environment) {
         cli_usage(&wanted.job, "MODEL", "no model file is named");
         return cli_report(&wanted.job.error);
     }
@@ -158,7 +158,7 @@ int cli_info(int argc, char **argv)
     struct fl_model_info *info =
         fl_model_info(&(struct fl_load_options){.model = wanted.model, .environment = wanted.environment},
                       cli_interrupt_fd(), &error);
-    if (info == NULL)
+    if (!info)
         return cli_report(&error);
     if (wanted.json)
         print_json(&wanted, info);

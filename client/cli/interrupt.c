@@ -16,7 +16,7 @@ static void handle(int number)
     const uint64_t one = 1;
     received = number;
     /* Fails only when it is readable already. */
-    if (write(event_fd, &one, sizeof one) < 0)
+    if (write(event_fd, &one, sizeof(one)) < 0)
         errno = saved;
     errno = saved;
 }
@@ -30,7 +30,7 @@ bool cli_interrupt_begin(struct fl_error *error)
     /* Once only: the second signal finds the default action. */
     struct sigaction action = {.sa_handler = handle, .sa_flags = (int)SA_RESETHAND};
     sigemptyset(&action.sa_mask);
-    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+    for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++)
         sigaction(numbers[i], &action, NULL);
     signal(SIGPIPE, SIG_IGN);
     return true;

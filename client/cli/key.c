@@ -11,8 +11,8 @@
 const char *cli_key_file(const char *server, const char *given)
 {
     const char *usual = getenv("FARLIGHT_KEY");
-    const bool is_tcp = server != NULL && strncmp(server, "tcp:", 4) == 0;
-    return given == NULL && is_tcp && usual != NULL && usual[0] != '\0' ? usual : given;
+    const bool is_tcp = server && strncmp(server, "tcp:", 4) == 0;
+    return !given && is_tcp && usual && usual[0] != '\0' ? usual : given;
 }
 
 struct key_options {
@@ -25,7 +25,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     struct key_options *wanted = state->input;
     if (key != ARGP_KEY_ARG)
         return ARGP_ERR_UNKNOWN;
-    if (wanted->path != NULL)
+    if (wanted->path)
         return cli_usage(&wanted->job, value, "only one file at a time");
     wanted->path = value;
     return 0;
@@ -42,7 +42,7 @@ int cli_key(int argc, char **argv)
     struct key_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
-    if (wanted.path == NULL) {
+    if (!wanted.path) {
         cli_usage(&wanted.job, "FILE", "no file is named");
         return cli_report(&wanted.job.error);
     }

@@ -40,10 +40,10 @@ static bool connect_to(struct cli_loading *loading, struct fl_error *error)
 bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
 {
     const struct cli_job *job = loading->job;
-    if (job->scene != NULL)
+    if (job->scene)
         return connect_to(loading, error);
-    if ((job->model != NULL && !cli_check_input(job->model, error)) ||
-        (job->environment != NULL && !cli_check_input(job->environment, error)))
+    if ((job->model && !cli_check_input(job->model, error)) ||
+        (job->environment && !cli_check_input(job->environment, error)))
         return false;
     loading->load = (struct fl_load_options){.model = job->model,
                                              .environment = job->environment,
@@ -54,14 +54,14 @@ bool cli_loading_begin(struct cli_loading *loading, struct fl_error *error)
                                              .scene_name = loading->scene_name};
     loading->import_begin_ns = monotonic_now_ns();
     loading->load.started = fl_import_start(&loading->load, error);
-    if (loading->load.started == NULL)
+    if (!loading->load.started)
         return false;
     return connect_to(loading, error);
 }
 
 bool cli_loading_end(struct cli_loading *loading, struct fl_error *error)
 {
-    if (loading->job->scene != NULL) {
+    if (loading->job->scene) {
         loading->scene = fl_scene_attach(loading->connection, loading->job->scene, error);
         return loading->scene != NULL;
     }
@@ -91,12 +91,12 @@ bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct
     struct fl_job_options *options = &job->options;
     if (options->key_count > 0 || job->is_orbit)
         return true;
-    if (job->camera != NULL) {
+    if (job->camera) {
         options->camera_path = PROTOCOL_CAMERA_PATH_NODE;
         return fl_scene_find_camera(scene, job->camera, &options->camera_node, error);
     }
     const struct fl_camera_info *first = fl_scene_camera(scene, 0);
-    if (first != NULL) {
+    if (first) {
         options->camera_path = PROTOCOL_CAMERA_PATH_NODE;
         options->camera_node = first->node;
     }

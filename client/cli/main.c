@@ -22,7 +22,7 @@ static const struct subcommand {
     {"key", "farlight key", cli_key, "a new key for sealed connections"},
     {"bridge", "farlight bridge", cli_bridge, "what ssh runs on the daemon's host"},
 };
-#define SUBCOMMAND_COUNT (sizeof subcommands / sizeof subcommands[0])
+#define SUBCOMMAND_COUNT (sizeof(subcommands) / sizeof(subcommands[0]))
 
 static void print_help(FILE *out)
 {
@@ -45,8 +45,8 @@ static const struct subcommand *find(const char *name)
 
 static int run(const struct subcommand *subcommand, int argc, char **argv)
 {
-    char title[sizeof subcommand->title];
-    memcpy(title, subcommand->title, sizeof title);
+    char title[sizeof(subcommand->title)];
+    memcpy(title, subcommand->title, sizeof(title));
     argv[0] = title;
     return subcommand->run(argc, argv);
 }
@@ -55,7 +55,7 @@ static int help(int argc, char **argv)
 {
     char option[] = "--help";
     const struct subcommand *subcommand = argc > 2 ? find(argv[2]) : NULL;
-    if (subcommand == NULL) {
+    if (!subcommand) {
         print_help(stdout);
         return CLI_DONE;
     }
@@ -86,14 +86,14 @@ int main(int argc, char **argv)
     }
     const struct subcommand *subcommand = find(argv[1]);
     int status = CLI_USAGE;
-    if (subcommand != NULL)
+    if (subcommand)
         status = run(subcommand, argc - 1, argv + 1);
     else
         status = unknown(argv[1]);
     /* What was printed must have arrived, or the command has failed: a full disk shows only here. */
     if (fflush(stdout) != 0 && (status == CLI_DONE || status == CLI_FAILED)) {
         fprintf(stderr, "farlight: standard output cannot be written: %m\n");
-        status = subcommand != NULL && subcommand->run == cli_compare ? CLI_TROUBLE : CLI_FAILED;
+        status = subcommand && subcommand->run == cli_compare ? CLI_TROUBLE : CLI_FAILED;
     }
     return status;
 }

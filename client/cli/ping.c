@@ -26,7 +26,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case 'c':
         if (fl_text_integer(value, 1, 1000000, &wanted->count, &wanted->job.error))
             return 0;
-        snprintf(wanted->job.error.field, sizeof wanted->job.error.field, "--count");
+        snprintf(wanted->job.error.field, sizeof(wanted->job.error.field), "--count");
         return EINVAL;
     case ARGP_KEY_ARG:
         return cli_usage(&wanted->job, value, "is not expected");
@@ -61,7 +61,7 @@ int cli_ping(int argc, char **argv)
         return cli_report(&wanted.job.error);
     struct fl_error error = {0};
     struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight ping", false, &error);
-    const bool done = connection != NULL && ping(connection, &wanted, &error);
+    const bool done = connection && ping(connection, &wanted, &error);
     fl_connection_destroy(connection);
     return done ? CLI_DONE : cli_report(&error);
 }

@@ -56,7 +56,7 @@ void cli_progress_import(struct cli_progress *progress, uint64_t done_bytes, uin
         return;
     char plain[41];
     size_t length = 0;
-    for (; *what != '\0' && length + 1 < sizeof plain; what++)
+    for (; *what != '\0' && length + 1 < sizeof(plain); what++)
         if (*what >= 0x20 && *what < 0x7f)
             plain[length++] = *what;
     plain[length] = '\0';
@@ -98,13 +98,13 @@ void cli_progress_step(struct cli_progress *progress, uint32_t done, uint32_t to
     if (progress->silent || (!progress->bar && now - progress->begin_ns < LINE_EVERY_NS))
         return;
     char text[120];
-    int length = snprintf(text, sizeof text, "%u of %u: %s", done, total, what);
+    int length = snprintf(text, sizeof(text), "%u of %u: %s", done, total, what);
     if (!progress->bar) {
         fprintf(stderr, "%s\n", text);
         return;
     }
     cli_progress_clear(progress);
-    draw_bar(done, total, text, length > 0 && length < (int)sizeof text ? (size_t)length : sizeof text - 1);
+    draw_bar(done, total, text, length > 0 && length < (int)sizeof(text) ? (size_t)length : sizeof(text) - 1);
     progress->drawn = true;
 }
 
@@ -115,9 +115,9 @@ void cli_progress_samples(struct cli_progress *progress, uint32_t held, uint32_t
         return;
     int length = 0;
     if (total > 0)
-        length = snprintf(text, sizeof text, "%u of %u samples a pixel", held, total);
+        length = snprintf(text, sizeof(text), "%u of %u samples a pixel", held, total);
     else
-        length = snprintf(text, sizeof text, "%u sample%s a pixel; Ctrl-C ends it", held, held == 1 ? "" : "s");
+        length = snprintf(text, sizeof(text), "%u sample%s a pixel; Ctrl-C ends it", held, held == 1 ? "" : "s");
     if (!progress->bar) {
         fprintf(stderr, "%s\n", text);
         return;
@@ -142,11 +142,11 @@ void cli_progress_frames(struct cli_progress *progress, uint32_t done, uint32_t 
     const double seconds = (double)(now - progress->first_ns) * 1e-9;
     const double rate = seconds > 0 ? done / seconds : 0;
     if (done > 0 && rate > 0)
-        print_duration(left, sizeof left, (total - done) / rate);
-    int length = snprintf(numbers, sizeof numbers, "%u of %u frames", done, total);
+        print_duration(left, sizeof(left), (total - done) / rate);
+    int length = snprintf(numbers, sizeof(numbers), "%u of %u frames", done, total);
     if (left[0] != '\0')
         length +=
-            snprintf(numbers + length, sizeof numbers - (size_t)length, ", %.2f frames/s, %s left", rate, left);
+            snprintf(numbers + length, sizeof(numbers) - (size_t)length, ", %.2f frames/s, %s left", rate, left);
     if (!progress->bar) {
         fprintf(stderr, "%s\n", numbers);
         return;

@@ -33,14 +33,14 @@ static error_t parse(int key, char *value, struct argp_state *state)
         break;
     case KEY_PROGRESSIVE:
         job->progressive = true;
-        good = value == NULL || fl_text_integer(value, 1, 65536, &number, &job->error);
+        good = !value || fl_text_integer(value, 1, 65536, &number, &job->error);
         job->pass_samples = (uint32_t)number;
         break;
     case KEY_SCENE:
         job->scene = value;
         return 0;
     case ARGP_KEY_ARG:
-        if (job->model != NULL)
+        if (job->model)
             return cli_usage(job, value, "only one model can be rendered");
         job->model = value;
         return 0;
@@ -49,7 +49,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
     if (good)
         return 0;
-    snprintf(job->error.field, sizeof job->error.field, "%s", key == KEY_TIME ? "--time" : "--progressive");
+    snprintf(job->error.field, sizeof(job->error.field), "%s", key == KEY_TIME ? "--time" : "--progressive");
     return EINVAL;
 }
 

@@ -72,7 +72,7 @@ int cli_scenes(int argc, char **argv)
     struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight scenes", true, &error);
     struct fl_scene_entry *scenes = NULL;
     size_t count = 0;
-    const bool done = connection != NULL && fl_scene_list(connection, &scenes, &count, &error);
+    const bool done = connection && fl_scene_list(connection, &scenes, &count, &error);
     for (size_t i = 0; wanted.json && i < count; i++)
         print_json(&scenes[i]);
     if (!wanted.json)

@@ -56,7 +56,7 @@ static error_t take_argument(struct serving *serving, char *value, const struct 
 {
     if (state->quoted > 0 && state->next > state->quoted)
         return add_word(serving, value);
-    if (serving->job.model != NULL)
+    if (serving->job.model)
         return cli_usage(&serving->job, value, "one model at a time; options of the daemon come behind --");
     serving->job.model = value;
     return 0;
@@ -101,17 +101,17 @@ static error_t parse(int key, char *value, struct argp_state *state)
 static const char *usual_address(struct serving *serving)
 {
     const char *folder = getenv("XDG_RUNTIME_DIR");
-    if (folder == NULL || folder[0] != '/') {
-        snprintf(serving->folder, sizeof serving->folder, "%s/farlight-XXXXXX", P_tmpdir);
+    if (!folder || folder[0] != '/') {
+        snprintf(serving->folder, sizeof(serving->folder), "%s/farlight-XXXXXX", P_tmpdir);
         folder = mkdtemp(serving->folder);
     }
-    if (folder == NULL) {
+    if (!folder) {
         cli_usage(&serving->job, "--listen", "no folder for a socket can be made in %s: %s; set XDG_RUNTIME_DIR",
                   P_tmpdir, strerror(errno));
         serving->folder[0] = '\0';
         return NULL;
     }
-    snprintf(serving->usual_address, sizeof serving->usual_address, "unix:%s/farlight-%ld.sock", folder,
+    snprintf(serving->usual_address, sizeof(serving->usual_address), "unix:%s/farlight-%ld.sock", folder,
              (long)getpid());
     return serving->usual_address;
 }
@@ -131,13 +131,13 @@ static bool complete_daemon(struct serving *serving)
     const char *typed[DAEMON_WORDS_MAX];
     const size_t typed_count = serving->word_count;
     error_t status = 0;
-    memcpy(typed, serving->words, typed_count * sizeof *typed);
+    memcpy(typed, serving->words, typed_count * sizeof(*typed));
     serving->word_count = 0;
-    if (serving->listen_count == 0 && (serving->listens[serving->listen_count++] = usual_address(serving)) == NULL)
+    if (serving->listen_count == 0 && !(serving->listens[serving->listen_count++] = usual_address(serving)))
         return false;
     for (size_t i = 0; i < serving->listen_count && status == 0; i++)
         status = add_word(serving, "--listen") != 0 ? EINVAL : add_word(serving, serving->listens[i]);
-    if (serving->job.key_file != NULL && status == 0)
+    if (serving->job.key_file && status == 0)
         status = add_word(serving, "--key-file") != 0 ? EINVAL : add_word(serving, serving->job.key_file);
     /* It writes to nobody but us, who show its last line when it fails. */
     if (status == 0)
@@ -150,11 +150,11 @@ static bool complete_daemon(struct serving *serving)
 static bool complete(struct serving *serving)
 {
     struct cli_job *job = &serving->job;
-    if (job->model == NULL)
+    if (!job->model)
         return cli_usage(job, "MODEL", "no model file is named") == 0;
-    if (serving->name != NULL && serving->name[0] == '\0')
+    if (serving->name && serving->name[0] == '\0')
         return cli_usage(job, "--name", "others need a name to come by") == 0;
-    if (job->server == NULL)
+    if (!job->server)
         return complete_daemon(serving);
     if (serving->listen_count > 0)
         return cli_usage(job, "--listen", "the daemon at --server listens already") == 0;
@@ -188,9 +188,9 @@ static void print_address(const char *address)
 {
     static const char *const all[] = {"tcp:0.0.0.0:", "tcp:[::]:"};
     char host[256] = "";
-    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+    for (size_t i = 0; i < sizeof(all) / sizeof(all[0]); i++) {
         const size_t bytes = strlen(all[i]);
-        if (strncmp(address, all[i], bytes) != 0 || gethostname(host, sizeof host - 1) != 0)
+        if (strncmp(address, all[i], bytes) != 0 || gethostname(host, sizeof(host) - 1) != 0)
             continue;
         printf("tcp:%s:%s", host, address + bytes);
         return;
@@ -204,7 +204,7 @@ static void print_line(const struct serving *serving, const char *name, const ch
     print_word(name);
     fputs(" --server ", stdout);
     print_address(address);
-    if (serving->job.key_file != NULL && strncmp(address, "tcp:", 4) == 0) {
+    if (serving->job.key_file && strncmp(address, "tcp:", 4) == 0) {
         fputs(" --key ", stdout);
         print_word(serving->job.key_file);
     }
@@ -222,9 +222,9 @@ static bool announce(const struct serving *serving, const struct cli_loading *lo
     cli_print_name(name);
     printf("\", %llu triangles and %llu spheres; look at it by\n", (unsigned long long)bounds.triangles,
            (unsigned long long)bounds.spheres);
-    if (serving->job.server != NULL)
+    if (serving->job.server)
         print_line(serving, name, serving->job.server);
-    for (size_t i = 0; fl_connection_listens_at(loading->connection, i, address, sizeof address); i++)
+    for (size_t i = 0; fl_connection_listens_at(loading->connection, i, address, sizeof(address)); i++)
         print_line(serving, name, address);
     if (fflush(stdout) != 0)
         return fl_error_set(error, FL_ERROR_FILE, "standard output", "cannot be written: %s", strerror(errno));
@@ -236,7 +236,7 @@ static bool announce(const struct serving *serving, const struct cli_loading *lo
 static const char *base_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
+    return slash ? slash + 1 : path;
 }
 
 /* Until it is told to end, which is the good end, or the daemon is lost. */
@@ -283,7 +283,7 @@ static bool recover(const struct serving *serving, struct cli_loading *loading, 
 {
     unsigned failures = 0;
     loading->again = true;
-    while (serving->job.server != NULL && cli_daemon_is_lost(error)) {
+    while (serving->job.server && cli_daemon_is_lost(error)) {
         const uint32_t pause_ms = cli_retry_pause_ms(++failures, error->retry_after_ms);
         cli_progress_clear(loading->progress);
         cli_report(error);
@@ -324,14 +324,13 @@ static int serve(struct serving *serving)
     struct cli_loading loading = {.job = &serving->job,
                                   .progress = &progress,
                                   .sharing = PROTOCOL_SHARING_SHARED,
-                                  .scene_name =
-                                      serving->name != NULL ? serving->name : base_name(serving->job.model),
+                                  .scene_name = serving->name ? serving->name : base_name(serving->job.model),
                                   .daemon_arguments = serving->words};
     cli_progress_begin(&progress, serving->job.quiet);
     const bool is_up = put_up(serving, &loading, &error);
     cli_progress_end(&progress, is_up);
     const bool done = is_up && stay_and_recover(serving, &loading, &error);
-    if (loading.connection != NULL)
+    if (loading.connection)
         fl_connection_set_interrupt(loading.connection, 0); /* it is still told in order */
     cli_loading_close(&loading);
     return done ? CLI_DONE : cli_report(&error);

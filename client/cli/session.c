@@ -42,7 +42,7 @@ static bool begin_trace(struct session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
     const char *const others[] = {job->model, job->environment, job->keys_file};
-    if (job->trace_file == NULL)
+    if (!job->trace_file)
         return true;
     if (!cli_check_not_input(job->trace_file, "--trace-file", others, 3, error))
         return false;
@@ -72,7 +72,7 @@ static bool load_scene(struct session *session, struct fl_error *error)
                    fl_connection_start_ns(loading->connection));
     if (!start_sinks(session, error) || !cli_loading_end(loading, error))
         return false;
-    if (session->job->scene == NULL)
+    if (!session->job->scene)
         cli_trace_import(session->trace, fl_scene_import_stats(loading->scene), loading->import_begin_ns,
                          monotonic_now_ns());
     session->was_loaded = true;
@@ -151,7 +151,7 @@ static void show_progress(struct session *session)
 static bool take_frames(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
 {
     struct fl_frame *frame = NULL;
-    while ((frame = fl_render_next(session->rendering, error)) != NULL) {
+    while ((frame = fl_render_next(session->rendering, error))) {
         const uint64_t next = (uint64_t)frame->frame + run->step;
         const bool written = write_frame(session, frame, error);
         fl_frame_destroy(frame);
@@ -214,7 +214,7 @@ static bool render_passes(struct session *session, struct fl_error *error)
         const uint64_t begin_ns = monotonic_now_ns();
         options.samples = pass_samples(job, held, total, options.samples, pass_ns);
         session->rendering = fl_render_start(session->loading.scene, &options, error);
-        if (session->rendering == NULL || !take_frames(session, &still, error))
+        if (!session->rendering || !take_frames(session, &still, error))
             return end_passes(session, held, error);
         fl_render_destroy(session->rendering);
         session->rendering = NULL;
@@ -234,7 +234,7 @@ static bool render_run(struct session *session, const struct fl_frame_run *run, 
     options.last_frame = run->last;
     options.frame_step = run->step;
     session->rendering = fl_render_start(session->loading.scene, &options, error);
-    const bool done = session->rendering != NULL && take_frames(session, run, error);
+    const bool done = session->rendering && take_frames(session, run, error);
     if (done) {
         fl_render_destroy(session->rendering);
         session->rendering = NULL;
@@ -259,7 +259,7 @@ static bool render(struct session *session, struct fl_error *error)
 static void close_connection(struct session *session)
 {
     /* After an interruption the daemon is still told in order. */
-    if (session->loading.connection != NULL)
+    if (session->loading.connection)
         fl_connection_set_interrupt(session->loading.connection, 0);
     fl_render_destroy(session->rendering);
     session->rendering = NULL;
@@ -360,8 +360,8 @@ int cli_dry_run(struct cli_job *job)
 {
     struct session session = {.job = job, .is_series = true};
     struct fl_error error = {0};
-    const bool done = (job->model == NULL || cli_check_input(job->model, &error)) &&
-                      (job->environment == NULL || cli_check_input(job->environment, &error)) &&
+    const bool done = (!job->model || cli_check_input(job->model, &error)) &&
+                      (!job->environment || cli_check_input(job->environment, &error)) &&
                       cli_sinks_prepare(&session.sinks, job, true, &error) &&
                       (!job->series.has_range || choose_frames(&session, &error));
     if (done && session.has_set)

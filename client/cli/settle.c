@@ -25,7 +25,7 @@ static bool in_script(const struct cli_job *job, unsigned line, const char *path
 static bool in_script_at(const struct cli_job *job, const struct fl_json_place *place, struct fl_error *error)
 {
     char path[96];
-    fl_json_path(place, path, sizeof path);
+    fl_json_path(place, path, sizeof(path));
     return in_script(job, fl_json_line(job->script_json, place), path, error);
 }
 
@@ -53,7 +53,7 @@ static bool settle_clips(struct cli_job *job, struct fl_scene *scene, double *lo
 static bool settle_target(const struct cli_channel *given, struct fl_scene *scene, uint32_t *object,
                           struct fl_error *error)
 {
-    if (given->target == NULL)
+    if (!given->target)
         return true;
     if (!fl_scene_find_object(scene, given->kind, given->target, object, error))
         return false;
@@ -69,8 +69,8 @@ static bool settle_target(const struct cli_channel *given, struct fl_scene *scen
 static bool settle_channels(struct cli_job *job, struct fl_scene *scene, struct fl_error *error)
 {
     struct record_clip_use *use = &job->clip_uses[job->clip_count];
-    struct fl_channel *channels = calloc(job->channel_count + 1, sizeof *channels);
-    if (channels == NULL)
+    struct fl_channel *channels = calloc(job->channel_count + 1, sizeof(*channels));
+    if (!channels)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     bool good = true;
     for (size_t i = 0; i < job->channel_count && good; i++) {
@@ -140,7 +140,7 @@ static void settle_camera(struct cli_job *job)
         wanted->orbit_turn = (float)(series->orbit_degrees * RADIANS_PER_DEGREE);
         wanted->orbit_seconds = (float)(series->orbit_seconds > 0 ? series->orbit_seconds : frames * step_s);
     }
-    if (series->dolly_times != NULL)
+    if (series->dolly_times)
         series->dolly_times[1] = (float)(series->dolly_seconds > 0 ? series->dolly_seconds
                                          : frames > 1              ? (frames - 1) * step_s
                                                                    : step_s);

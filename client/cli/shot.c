@@ -41,29 +41,29 @@ static const struct group {
     {"materials", PROTOCOL_OBJECT_KIND_MATERIAL, material_properties},
     {"nodes", PROTOCOL_OBJECT_KIND_NODE, node_properties},
 };
-#define GROUP_COUNT (sizeof groups / sizeof groups[0])
+#define GROUP_COUNT (sizeof(groups) / sizeof(groups[0]))
 
 static bool apply_object(const struct shot_reader *reader, const struct shot_value *at, const struct group *group)
 {
     const char *known[8] = {"target"}, *target = NULL;
-    for (size_t i = 0; group->properties[i].name != NULL; i++)
+    for (size_t i = 0; group->properties[i].name; i++)
         known[i + 1] = group->properties[i].name;
     if (!shot_is_object(reader, at, known))
         return false;
     const struct shot_value name = shot_member(at, "target");
-    if (name.value == NULL)
+    if (!name.value)
         return shot_wrong(reader, at, "\"target\": a name or a number; 'farlight info' lists them",
                           "\"target\" is missing");
     if (!shot_name(reader, &name, &target))
         return false;
-    if (json_object_get(at->value, "rotation") != NULL && json_object_get(at->value, "rotation_degrees") != NULL)
+    if (json_object_get(at->value, "rotation") && json_object_get(at->value, "rotation_degrees"))
         return shot_wrong(reader, at, "leave one of them out",
                           "\"rotation\" and \"rotation_degrees\" say the same");
-    for (const struct shot_property *property = group->properties; property->name != NULL; property++) {
+    for (const struct shot_property *property = group->properties; property->name; property++) {
         const struct shot_value value = shot_member(at, property->name);
         struct fl_channel channel;
-        if (value.value != NULL && (!shot_channel(reader, &value, property, &channel) ||
-                                    !shot_add_channel(reader, &value, &channel, group->kind, target)))
+        if (value.value && (!shot_channel(reader, &value, property, &channel) ||
+                            !shot_add_channel(reader, &value, &channel, group->kind, target)))
             return false;
     }
     return true;
@@ -94,14 +94,14 @@ static bool apply_clip(const struct shot_reader *reader, const struct shot_value
         return shot_name(reader, at, &clip->which);
     if (!shot_is_object(reader, at, known))
         return false;
-    if (which.value == NULL)
+    if (!which.value)
         return shot_wrong(reader, at, "\"clip\": a name or a number; 'farlight info' lists them",
                           "\"clip\" is missing");
     if (!shot_name(reader, &which, &clip->which) ||
-        (start.value != NULL && !shot_number(reader, &start, -1e6, 1e6, &start_s)) ||
-        (speed.value != NULL && !shot_number(reader, &speed, 0.001, 1000, &factor)))
+        (start.value && !shot_number(reader, &start, -1e6, 1e6, &start_s)) ||
+        (speed.value && !shot_number(reader, &speed, 0.001, 1000, &factor)))
         return false;
-    if (loop.value != NULL && !json_is_boolean(loop.value))
+    if (loop.value && !json_is_boolean(loop.value))
         return shot_wrong(reader, &loop, "\"loop\": false", "must be true or false");
     clip->start_s = (float)start_s;
     clip->speed = (float)factor;
@@ -129,7 +129,7 @@ static bool join_pattern(const struct shot_reader *reader, const char *pattern, 
 {
     const char *folder = pattern[0] == '/' ? "" : reader->shot->folder;
     char *out = shot_allocate(reader, 2 * strlen(folder) + strlen(pattern) + 1, 1);
-    if (out == NULL)
+    if (!out)
         return false;
     *joined = out;
     for (const char *at = folder; *at != '\0'; at++) {
@@ -197,22 +197,20 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
                             about = shot_member(root, "description"), schema = shot_member(root, "$schema");
     const struct shot_value *const texts[] = {&about, &schema};
     for (size_t i = 0; i < 2; i++)
-        if (texts[i]->value != NULL && !json_is_string(texts[i]->value))
+        if (texts[i]->value && !json_is_string(texts[i]->value))
             return shot_wrong(reader, texts[i], "leave it out", "must be a string");
-    if ((model.value != NULL && !shot_path(reader, &model, &job->model)) ||
-        (environment.value != NULL && !shot_path(reader, &environment, &job->environment)) ||
-        (camera.value != NULL && !shot_camera(reader, &camera)) ||
-        (clips.value != NULL && !apply_clips(reader, &clips)))
+    if ((model.value && !shot_path(reader, &model, &job->model)) ||
+        (environment.value && !shot_path(reader, &environment, &job->environment)) ||
+        (camera.value && !shot_camera(reader, &camera)) || (clips.value && !apply_clips(reader, &clips)))
         return false;
     for (size_t i = 0; i < GROUP_COUNT; i++) {
         const struct shot_value group = shot_member(root, groups[i].name);
-        if (group.value != NULL && !apply_group(reader, &group, &groups[i]))
+        if (group.value && !apply_group(reader, &group, &groups[i]))
             return false;
     }
-    if (output.value != NULL && outputs.value != NULL)
+    if (output.value && outputs.value)
         return shot_wrong(reader, &output, "leave one of them out", "\"outputs\" is there, too");
-    if ((output.value != NULL && !apply_output(reader, &output)) ||
-        (outputs.value != NULL && !apply_outputs(reader, &outputs)))
+    if ((output.value && !apply_output(reader, &output)) || (outputs.value && !apply_outputs(reader, &outputs)))
         return false;
     /* All of the file has been read, so that every mistake in it is told. */
     if (given->output) {
@@ -230,9 +228,9 @@ bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli
                                          "lights",  "materials",   "nodes", "output",      "outputs", NULL};
     const struct shot_reader reader = {.shot = shot, .job = job, .given = given, .set = set, .user = user};
     const struct shot_value root = {.value = shot->json.root};
-    const char *known[SHOT_SETTINGS_MAX + sizeof others / sizeof others[0]];
+    const char *known[SHOT_SETTINGS_MAX + sizeof(others) / sizeof(others[0])];
     size_t count = 0;
-    for (size_t i = 0; others[i] != NULL; i++)
+    for (size_t i = 0; others[i]; i++)
         known[count++] = others[i];
     count += shot_setting_names(known + count);
     known[count] = NULL;
@@ -244,9 +242,9 @@ bool cli_shot_apply(struct cli_shot *shot, struct cli_job *job, const struct cli
 bool cli_shot_load(struct cli_shot *shot, const char *path, struct fl_error *error)
 {
     const char *slash = strrchr(path, '/');
-    const size_t folder_bytes = slash != NULL ? (size_t)(slash - path) + 1 : 0;
+    const size_t folder_bytes = slash ? (size_t)(slash - path) + 1 : 0;
     *shot = (struct cli_shot){.path = path};
-    if (folder_bytes >= sizeof shot->folder)
+    if (folder_bytes >= sizeof(shot->folder))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "--script", "the path of the script is too long");
     memcpy(shot->folder, path, folder_bytes);
     if (fl_json_load(&shot->json, path, FILE_BYTES_MAX, error))

@@ -32,7 +32,7 @@ static bool read_view(const struct shot_reader *reader, const struct shot_value 
     struct fl_channel channel;
     if (!shot_channel(reader, at, &properties[which], &channel))
         return false;
-    memcpy(first, first_value(&channel), channel.width * sizeof *first);
+    memcpy(first, first_value(&channel), channel.width * sizeof(*first));
     return (!shot_is_keyed(at) && which != EXPOSURE) ||
            shot_add_channel(reader, at, &channel, PROTOCOL_OBJECT_KIND_CAMERA, NULL);
 }
@@ -53,8 +53,8 @@ static bool read_orbit(const struct shot_reader *reader, const struct shot_value
         return shot_wrong(reader, at, "\"orbit\": {\"degrees\": 360, \"seconds\": 10}",
                           "must be true, degrees, or an object");
     return shot_is_object(reader, at, known) &&
-           (degrees.value == NULL || shot_number(reader, &degrees, -1e6, 1e6, &series->orbit_degrees)) &&
-           (seconds.value == NULL || shot_number(reader, &seconds, 1e-3, 1e6, &series->orbit_seconds));
+           (!degrees.value || shot_number(reader, &degrees, -1e6, 1e6, &series->orbit_degrees)) &&
+           (!seconds.value || shot_number(reader, &seconds, 1e-3, 1e6, &series->orbit_seconds));
 }
 
 /* Where it ends: a place, or so much nearer to what is looked at. */
@@ -63,16 +63,16 @@ static bool dolly_end(const struct shot_reader *reader, const struct shot_value 
     const struct record_camera_key *key = &reader->job->key;
     const struct shot_value place = shot_member(at, "to"), by = shot_member(at, "by");
     double metres = 0, length2 = 0;
-    if ((place.value != NULL) == (by.value != NULL))
+    if (!place.value == !by.value)
         return shot_wrong(reader, at, "\"dolly\": {\"to\": [1, 2, 3]}, or {\"by\": 2}",
                           "needs either \"to\" or \"by\"");
-    if (place.value != NULL) {
+    if (place.value) {
         struct fl_channel channel;
         if (shot_is_keyed(&place))
             return shot_wrong(reader, &place, "key \"eye\" instead", "must be one place");
         if (!shot_channel(reader, &place, &properties[EYE], &channel))
             return false;
-        memcpy(to, channel.values, 3 * sizeof *to);
+        memcpy(to, channel.values, 3 * sizeof(*to));
         return true;
     }
     if (!shot_number(reader, &by, -1e12, 1e12, &metres))
@@ -98,13 +98,13 @@ static bool read_dolly(const struct shot_reader *reader, const struct shot_value
     const struct shot_value seconds = shot_member(at, "seconds"), ease = shot_member(at, "ease");
     float to[3];
     if (!shot_is_object(reader, at, known) || !dolly_end(reader, at, to) ||
-        (seconds.value != NULL && !shot_number(reader, &seconds, 1e-3, 1e6, &series->dolly_seconds)))
+        (seconds.value && !shot_number(reader, &seconds, 1e-3, 1e6, &series->dolly_seconds)))
         return false;
-    if (ease.value != NULL && !json_is_boolean(ease.value))
+    if (ease.value && !json_is_boolean(ease.value))
         return shot_wrong(reader, &ease, "\"ease\": true", "must be true or false");
-    float *times = shot_allocate(reader, 2, sizeof *times);
-    float(*values)[3] = times != NULL ? shot_allocate(reader, 6, sizeof *values) : NULL;
-    if (values == NULL)
+    float *times = shot_allocate(reader, 2, sizeof(*times));
+    float(*values)[3] = times ? shot_allocate(reader, 6, sizeof(*values)) : NULL;
+    if (!values)
         return false;
     series->dolly_times = times;
     times[1] = 1; /* until it is settled */
@@ -112,8 +112,8 @@ static bool read_dolly(const struct shot_reader *reader, const struct shot_value
     const size_t parts =
         eases ? 3 : 1; /* of a Bezier key: before, itself, after, all alike: it stands still there */
     for (size_t i = 0; i < parts; i++) {
-        memcpy(values[i], reader->job->key.eye_world, sizeof *values);
-        memcpy(values[parts + i], to, sizeof *values);
+        memcpy(values[i], reader->job->key.eye_world, sizeof(*values));
+        memcpy(values[parts + i], to, sizeof(*values));
     }
     const struct fl_channel channel = {.path = PROTOCOL_CHANNEL_PATH_VIEW_EYE,
                                        .interpolation =
@@ -131,22 +131,21 @@ static bool check_place(const struct shot_reader *reader, const struct shot_valu
 {
     const struct shot_value name = shot_member(at, "name"), orbit = shot_member(at, "orbit"),
                             dolly = shot_member(at, "dolly");
-    const bool has_place = view[EYE].value != NULL || view[LOOK_AT].value != NULL;
-    const bool orbits = orbit.value != NULL && !json_is_false(orbit.value);
-    if (name.value != NULL &&
-        (has_place || view[UP].value != NULL || view[FOV].value != NULL || orbits || dolly.value != NULL))
+    const bool has_place = view[EYE].value || view[LOOK_AT].value;
+    const bool orbits = orbit.value && !json_is_false(orbit.value);
+    if (name.value && (has_place || view[UP].value || view[FOV].value || orbits || dolly.value))
         return shot_wrong(reader, &name, "leave \"name\" out, or eye, look_at, up, fov, orbit and dolly",
                           "a camera of the model has its own place and view");
-    if ((view[EYE].value != NULL) != (view[LOOK_AT].value != NULL))
+    if (!view[EYE].value != !view[LOOK_AT].value)
         return shot_wrong(reader, at, "\"eye\" and \"look_at\" go together", "\"%s\" is missing",
-                          view[EYE].value == NULL ? "eye" : "look_at");
-    if (!has_place && (view[UP].value != NULL || view[FOV].value != NULL || dolly.value != NULL))
+                          !view[EYE].value ? "eye" : "look_at");
+    if (!has_place && (view[UP].value || view[FOV].value || dolly.value))
         return shot_wrong(reader, at, "say where the camera is", "\"eye\" and \"look_at\" are missing");
     for (enum view which = EYE; which <= FOV; which++)
         if (orbits && shot_is_keyed(&view[which]))
             return shot_wrong(reader, &view[which], "key all of the way, or none of it",
                               "cannot change on an orbit");
-    if (dolly.value != NULL && (orbits || shot_is_keyed(&view[EYE])))
+    if (dolly.value && (orbits || shot_is_keyed(&view[EYE])))
         return shot_wrong(reader, &dolly, "leave one of them out", "cannot go with an orbit or a keyed eye");
     return true;
 }
@@ -159,20 +158,19 @@ static bool read_place(const struct shot_reader *reader, const struct shot_value
                             dolly = shot_member(at, "dolly");
     if (!check_place(reader, at, view))
         return false;
-    if (name.value != NULL && !shot_name(reader, &name, &job->camera))
+    if (name.value && !shot_name(reader, &name, &job->camera))
         return false;
-    if (view[EYE].value != NULL) {
+    if (view[EYE].value) {
         job->has_eye = job->has_look_at = true;
         if (!read_view(reader, &view[EYE], EYE, job->key.eye_world) ||
             !read_view(reader, &view[LOOK_AT], LOOK_AT, job->key.look_at_world))
             return false;
     }
-    if (view[UP].value != NULL && !read_view(reader, &view[UP], UP, job->key.up_world))
+    if (view[UP].value && !read_view(reader, &view[UP], UP, job->key.up_world))
         return false;
-    if (view[FOV].value != NULL && !read_view(reader, &view[FOV], FOV, &job->key.fov_y))
+    if (view[FOV].value && !read_view(reader, &view[FOV], FOV, &job->key.fov_y))
         return false;
-    return (orbit.value == NULL || read_orbit(reader, &orbit)) &&
-           (dolly.value == NULL || read_dolly(reader, &dolly));
+    return (!orbit.value || read_orbit(reader, &orbit)) && (!dolly.value || read_dolly(reader, &dolly));
 }
 
 /* What the command line says instead; all of the file has been read, so that every mistake in it is told. */
@@ -226,9 +224,9 @@ bool shot_camera(const struct shot_reader *reader, const struct shot_value *at)
     for (enum view which = EYE; which < VIEW_COUNT; which++)
         view[which] = shot_member(at, properties[which].name);
     if (!read_place(reader, at, view) ||
-        (view[APERTURE].value != NULL && !read_view(reader, &view[APERTURE], APERTURE, &job->options.aperture)) ||
-        (view[FOCUS].value != NULL && !read_view(reader, &view[FOCUS], FOCUS, &job->options.focus)) ||
-        (view[EXPOSURE].value != NULL && !read_view(reader, &view[EXPOSURE], EXPOSURE, &exposure)))
+        (view[APERTURE].value && !read_view(reader, &view[APERTURE], APERTURE, &job->options.aperture)) ||
+        (view[FOCUS].value && !read_view(reader, &view[FOCUS], FOCUS, &job->options.focus)) ||
+        (view[EXPOSURE].value && !read_view(reader, &view[EXPOSURE], EXPOSURE, &exposure)))
         return false;
     job->lens_changes = shot_is_keyed(&view[APERTURE]);
     override(reader, &before);

@@ -11,8 +11,7 @@
 struct shot_value shot_member(const struct shot_value *object, const char *key)
 {
     return (struct shot_value){
-        .place = {.outer = object->place.outer == NULL && object->place.key == NULL ? NULL : &object->place,
-                  .key = key},
+        .place = {.outer = !object->place.outer && !object->place.key ? NULL : &object->place, .key = key},
         .value = json_object_get(object->value, key)};
 }
 
@@ -24,7 +23,7 @@ struct shot_value shot_element(const struct shot_value *array, size_t index)
 
 static bool is_root(const struct shot_value *at)
 {
-    return at->place.outer == NULL && at->place.key == NULL;
+    return !at->place.outer && !at->place.key;
 }
 
 bool shot_wrong(const struct shot_reader *reader, const struct shot_value *at, const char *remedy,
@@ -35,13 +34,13 @@ bool shot_wrong(const struct shot_reader *reader, const struct shot_value *at, c
     const size_t length = strlen(reader->shot->path);
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    vsnprintf(text, sizeof(text), format, arguments);
     va_end(arguments);
-    fl_json_path(place, path, sizeof path);
+    fl_json_path(place, path, sizeof(path));
     fl_error_set(&reader->job->error, FL_ERROR_ARGUMENT, reader->shot->path + (length > 150 ? length - 150 : 0),
                  "line %u: %s%s%s", fl_json_line(&reader->shot->json, place), path, path[0] != '\0' ? ": " : "",
                  text);
-    return fl_error_remedy(&reader->job->error, "%s", remedy != NULL ? remedy : "see farlight-shot(5)");
+    return fl_error_remedy(&reader->job->error, "%s", remedy ? remedy : "see farlight-shot(5)");
 }
 
 /* ---- members ---- */
@@ -51,7 +50,7 @@ static unsigned distance(const char *a, const char *b)
 {
     unsigned row[32];
     const size_t columns = strlen(b);
-    if (columns + 1 > sizeof row / sizeof row[0])
+    if (columns + 1 > sizeof(row) / sizeof(row[0]))
         return 99;
     for (unsigned i = 0; i <= columns; i++)
         row[i] = i;
@@ -74,18 +73,18 @@ static bool unknown_member(const struct shot_reader *reader, const struct shot_v
     char list[560] = "", remedy[80];
     const char *nearest = NULL;
     unsigned least = 3; /* further off it is another word */
-    for (size_t i = 0; known[i] != NULL; i++) {
+    for (size_t i = 0; known[i]; i++) {
         const size_t used = strlen(list);
         const unsigned off = strlen(name) < 32 ? distance(name, known[i]) : 99;
-        snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", known[i]);
+        snprintf(list + used, sizeof(list) - used, "%s%s", i > 0 ? ", " : "", known[i]);
         if (off < least) {
             least = off;
             nearest = known[i];
         }
     }
     struct shot_value member = shot_member(object, name);
-    snprintf(remedy, sizeof remedy, "did you mean '%s'?", nearest != NULL ? nearest : "");
-    return shot_wrong(reader, &member, nearest != NULL ? remedy : NULL, "is not known; known: %s", list);
+    snprintf(remedy, sizeof(remedy), "did you mean '%s'?", nearest ? nearest : "");
+    return shot_wrong(reader, &member, nearest ? remedy : NULL, "is not known; known: %s", list);
 }
 
 bool shot_is_object(const struct shot_reader *reader, const struct shot_value *at, const char *const *known)
@@ -97,7 +96,7 @@ bool shot_is_object(const struct shot_reader *reader, const struct shot_value *a
     json_object_foreach((json_t *)(uintptr_t)at->value, name, value)
     {
         bool found = false;
-        for (size_t i = 0; known[i] != NULL && !found; i++)
+        for (size_t i = 0; known[i] && !found; i++)
             found = strcmp(name, known[i]) == 0;
         if (!found)
             return unknown_member(reader, at, name, known);
@@ -121,7 +120,7 @@ bool shot_number(const struct shot_reader *reader, const struct shot_value *at, 
     const double read = json_is_number(at->value) ? json_number_value(at->value) : NAN;
     if (!(read >= least && read <= greatest)) {
         char remedy[80];
-        snprintf(remedy, sizeof remedy, "give a number from %.7g to %.7g", least, greatest);
+        snprintf(remedy, sizeof(remedy), "give a number from %.7g to %.7g", least, greatest);
         return shot_wrong(reader, at, remedy, json_is_number(at->value) ? "is out of range" : "must be a number");
     }
     *number = read;
@@ -133,8 +132,8 @@ void *shot_allocate(const struct shot_reader *reader, size_t count, size_t item_
     struct cli_shot *shot = reader->shot;
     if (shot->owned_count == shot->owned_capacity) {
         const size_t capacity = shot->owned_capacity > 0 ? shot->owned_capacity * 2 : 32;
-        void **owned = realloc(shot->owned, capacity * sizeof *owned);
-        if (owned == NULL) {
+        void **owned = realloc(shot->owned, capacity * sizeof(*owned));
+        if (!owned) {
             fl_error_set(&reader->job->error, FL_ERROR_MEMORY, "", "out of memory");
             return NULL;
         }
@@ -142,7 +141,7 @@ void *shot_allocate(const struct shot_reader *reader, size_t count, size_t item_
         shot->owned_capacity = capacity;
     }
     void *made = calloc(count > 0 ? count : 1, item_bytes);
-    if (made == NULL) {
+    if (!made) {
         fl_error_set(&reader->job->error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
@@ -161,7 +160,7 @@ bool shot_name(const struct shot_reader *reader, const struct shot_value *at, co
         return shot_wrong(reader, at, "'farlight info' lists what a model has",
                           "must be a name, or a number counted from 0");
     char *text = shot_allocate(reader, 24, 1);
-    if (text == NULL)
+    if (!text)
         return false;
     snprintf(text, 24, "%.0f", number);
     *name = text;
@@ -171,7 +170,7 @@ bool shot_name(const struct shot_reader *reader, const struct shot_value *at, co
 bool shot_path(const struct shot_reader *reader, const struct shot_value *at, const char **path)
 {
     const char *read = json_string_value(at->value);
-    if (read == NULL || read[0] == '\0')
+    if (!read || read[0] == '\0')
         return shot_wrong(reader, at, "name a file, from the folder of this one", "must be the path of a file");
     if (read[0] == '/' || strcmp(read, "-") == 0) {
         *path = read;
@@ -179,7 +178,7 @@ bool shot_path(const struct shot_reader *reader, const struct shot_value *at, co
     }
     const size_t bytes = strlen(reader->shot->folder) + strlen(read) + 1;
     char *joined = shot_allocate(reader, bytes, 1);
-    if (joined == NULL)
+    if (!joined)
         return false;
     snprintf(joined, bytes, "%s%s", reader->shot->folder, read);
     *path = joined;

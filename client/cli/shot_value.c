@@ -38,16 +38,16 @@ static bool wrong_shape(const struct shot_reader *reader, const struct shot_valu
 {
     char remedy[160], what[64];
     if (property->kind == SHOT_FLAG)
-        snprintf(what, sizeof what, "must be true or false");
+        snprintf(what, sizeof(what), "must be true or false");
     else if (property->width == 1)
-        snprintf(what, sizeof what, "must be a number");
+        snprintf(what, sizeof(what), "must be a number");
     else
-        snprintf(what, sizeof what, "must be an array of %s%u numbers",
+        snprintf(what, sizeof(what), "must be an array of %s%u numbers",
                  property->kind == SHOT_COLOUR && property->width == 4 ? "3 or "
                  : property->kind == SHOT_SIZE                         ? "1 or "
                                                                        : "",
                  property->width);
-    snprintf(remedy, sizeof remedy, "such as \"%s\": %s", property->name, property->example);
+    snprintf(remedy, sizeof(remedy), "such as \"%s\": %s", property->name, property->example);
     return shot_wrong(reader, at, remedy, "%s", what);
 }
 
@@ -114,7 +114,7 @@ static bool read_value(const struct shot_reader *reader, const struct shot_value
     float read[4] = {0};
     if (!read_plain(reader, at, property, read))
         return false;
-    memcpy(value, read, sizeof read);
+    memcpy(value, read, sizeof(read));
     if (property->kind == SHOT_TURN) {
         const double length = sqrt((double)read[0] * (double)read[0] + (double)read[1] * (double)read[1] +
                                    (double)read[2] * (double)read[2] + (double)read[3] * (double)read[3]);
@@ -144,8 +144,7 @@ static bool allocate(const struct shot_reader *reader, struct keys *keys, size_t
     keys->count = count;
     keys->numbers = numbers_of(keys->property);
     keys->times = shot_allocate(reader, count, sizeof(float));
-    keys->values =
-        keys->times != NULL ? shot_allocate(reader, count * keys->numbers * parts, sizeof(float)) : NULL;
+    keys->values = keys->times ? shot_allocate(reader, count * keys->numbers * parts, sizeof(float)) : NULL;
     return keys->values != NULL;
 }
 
@@ -154,12 +153,12 @@ static bool read_interpolation(const struct shot_reader *reader, const struct sh
     const struct shot_value given = shot_member(at, "interpolation");
     const bool is_flag = keys->property->kind == SHOT_FLAG, is_angles = keys->property->kind == SHOT_ANGLES;
     keys->interpolation = is_flag ? PROTOCOL_INTERPOLATION_STEP : PROTOCOL_INTERPOLATION_LINEAR;
-    if (given.value == NULL)
+    if (!given.value)
         return true;
     const char *text = json_string_value(given.value);
-    if (text == NULL || !protocol_interpolation_parse(text, &keys->interpolation)) {
+    if (!text || !protocol_interpolation_parse(text, &keys->interpolation)) {
         char known[160], remedy[200];
-        snprintf(remedy, sizeof remedy, "known: %s", protocol_enum_list("interpolation", known, sizeof known));
+        snprintf(remedy, sizeof(remedy), "known: %s", protocol_enum_list("interpolation", known, sizeof(known)));
         return shot_wrong(reader, &given, remedy, "is no interpolation");
     }
     if (is_flag && keys->interpolation != PROTOCOL_INTERPOLATION_STEP)
@@ -193,7 +192,7 @@ static bool read_spline_key(const struct shot_reader *reader, const struct shot_
     float *out = keys->values + i * keys->numbers * 3, side[4];
     const bool is_bezier = keys->interpolation == PROTOCOL_INTERPOLATION_BEZIER;
     memcpy(out + keys->numbers, value, bytes);
-    if (handles->value == NULL) {
+    if (!handles->value) {
         if (is_bezier) {
             memcpy(out, value, bytes);
             memcpy(out + keys->numbers * 2, value, bytes);
@@ -240,8 +239,8 @@ static bool read_angles(const struct shot_reader *reader, const struct shot_valu
 {
     const size_t written = keys->count;
     const float *times = keys->times;
-    float(*degrees)[4] = shot_allocate(reader, written, sizeof *degrees);
-    if (degrees == NULL)
+    float(*degrees)[4] = shot_allocate(reader, written, sizeof(*degrees));
+    if (!degrees)
         return false;
     size_t total = 1;
     for (size_t i = 0; i < written; i++) {
@@ -286,8 +285,8 @@ static bool read_keys(const struct shot_reader *reader, const struct shot_value 
     if (!shot_is_object(reader, at, known) || !read_interpolation(reader, at, keys))
         return false;
     const char *remedy = "{\"times\": [0, 2], \"values\": [.., ..]}";
-    if (times.value == NULL || values.value == NULL)
-        return shot_wrong(reader, at, remedy, "\"%s\" is missing", times.value == NULL ? "times" : "values");
+    if (!times.value || !values.value)
+        return shot_wrong(reader, at, remedy, "\"%s\" is missing", !times.value ? "times" : "values");
     if (!shot_is_array(reader, &times, KEYS_MAX) || !shot_is_array(reader, &values, KEYS_MAX))
         return false;
     const size_t count = json_array_size(times.value);
@@ -296,12 +295,12 @@ static bool read_keys(const struct shot_reader *reader, const struct shot_value 
     if (json_array_size(values.value) != count)
         return shot_wrong(reader, &values, "one value for each time", "has %zu values for %zu times",
                           json_array_size(values.value), count);
-    if (handles.value != NULL && !has_handles(keys->interpolation))
+    if (handles.value && !has_handles(keys->interpolation))
         return shot_wrong(reader, &handles, "say \"interpolation\": \"bezier\" or \"cubic-spline\"",
                           "belongs to the interpolations bezier and cubic-spline");
-    if (handles.value != NULL && !shot_is_array(reader, &handles, KEYS_MAX))
+    if (handles.value && !shot_is_array(reader, &handles, KEYS_MAX))
         return false;
-    if (handles.value != NULL && json_array_size(handles.value) != count)
+    if (handles.value && json_array_size(handles.value) != count)
         return shot_wrong(reader, &handles, "one pair for each time", "has %zu pairs for %zu times",
                           json_array_size(handles.value), count);
     if (!allocate(reader, keys, count) || !read_times(reader, &times, keys->times))
@@ -343,11 +342,11 @@ bool shot_channel(const struct shot_reader *reader, const struct shot_value *at,
  * takes a walk through the file. */
 static const struct fl_json_place *keep_place(const struct shot_reader *reader, const struct fl_json_place *place)
 {
-    struct fl_json_place *kept = shot_allocate(reader, 1, sizeof *kept);
-    if (kept == NULL)
+    struct fl_json_place *kept = shot_allocate(reader, 1, sizeof(*kept));
+    if (!kept)
         return NULL;
     *kept = *place;
-    if (place->outer != NULL && (kept->outer = keep_place(reader, place->outer)) == NULL)
+    if (place->outer && !(kept->outer = keep_place(reader, place->outer)))
         return NULL;
     return kept;
 }
@@ -356,9 +355,9 @@ bool shot_add_channel(const struct shot_reader *reader, const struct shot_value 
                       const struct fl_channel *channel, enum protocol_object_kind kind, const char *target)
 {
     struct cli_job *job = reader->job;
-    if (job->channels == NULL)
-        job->channels = shot_allocate(reader, CHANNELS_MAX, sizeof *job->channels);
-    if (job->channels == NULL)
+    if (!job->channels)
+        job->channels = shot_allocate(reader, CHANNELS_MAX, sizeof(*job->channels));
+    if (!job->channels)
         return false;
     if (job->channel_count == CHANNELS_MAX)
         return shot_wrong(reader, at, "leave some out", "is one value too many: there can be %u", CHANNELS_MAX);

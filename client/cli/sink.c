@@ -24,10 +24,10 @@ static bool prepare_stdout(struct cli_sink *sink, struct fl_error *error)
     }
     if (cli_image_is_video(sink->output.image))
         return true;
-    if (!cli_temporary_folder(sink->folder, sizeof sink->folder, error))
+    if (!cli_temporary_folder(sink->folder, sizeof(sink->folder), error))
         return false;
     sink->has_temporary = true;
-    snprintf(sink->path, sizeof sink->path, "%s/image.%s", sink->folder, cli_image_name(sink->output.image));
+    snprintf(sink->path, sizeof(sink->path), "%s/image.%s", sink->folder, cli_image_name(sink->output.image));
     return true;
 }
 
@@ -37,22 +37,22 @@ static bool prepare(struct cli_sink *sink, struct fl_error *error)
     if (strcmp(path, "-") == 0)
         return prepare_stdout(sink, error);
     if (!sink->is_series || cli_image_is_video(sink->output.image))
-        return cli_check_output(path, sink->folder, sizeof sink->folder, error) &&
-               snprintf(sink->path, sizeof sink->path, "%s", path) > 0;
+        return cli_check_output(path, sink->folder, sizeof(sink->folder), error) &&
+               snprintf(sink->path, sizeof(sink->path), "%s", path) > 0;
     if (!fl_pattern_parse(path, &sink->pattern, error)) {
-        snprintf(error->field, sizeof error->field, "--output");
+        snprintf(error->field, sizeof(error->field), "--output");
         return false;
     }
     /* The greatest number that a frame can have: its path is the longest. */
-    if (!fl_pattern_path(&sink->pattern, 10000000, sink->path, sizeof sink->path))
+    if (!fl_pattern_path(&sink->pattern, 10000000, sink->path, sizeof(sink->path)))
         return fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "the path of a frame is too long");
-    return cli_check_output(sink->path, sink->folder, sizeof sink->folder, error);
+    return cli_check_output(sink->path, sink->folder, sizeof(sink->folder), error);
 }
 
 bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool is_series, struct fl_error *error)
 {
-    sinks->items = calloc(job->output_count, sizeof *sinks->items);
-    if (sinks->items == NULL)
+    sinks->items = calloc(job->output_count, sizeof(*sinks->items));
+    if (!sinks->items)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     for (size_t i = 0; i < job->output_count; i++) {
         struct cli_sink *sink = &sinks->items[sinks->count++];
@@ -68,8 +68,8 @@ bool cli_sinks_prepare(struct cli_sinks *sinks, const struct cli_job *job, bool 
 /* A .y4m file: written under a temporary name. */
 static bool open_y4m(struct cli_sink *sink, struct fl_error *error)
 {
-    const int length = snprintf(sink->path, sizeof sink->path, "%s/.farlight-XXXXXX", sink->folder);
-    sink->y4m_fd = length > 0 && (size_t)length < sizeof sink->path ? mkostemp(sink->path, O_CLOEXEC) : -1;
+    const int length = snprintf(sink->path, sizeof(sink->path), "%s/.farlight-XXXXXX", sink->folder);
+    sink->y4m_fd = length > 0 && (size_t)length < sizeof(sink->path) ? mkostemp(sink->path, O_CLOEXEC) : -1;
     if (sink->y4m_fd >= 0)
         return true;
     sink->y4m_fd = 0;
@@ -91,7 +91,7 @@ static bool start_video(struct cli_sink *sink, struct fl_error *error)
     }
     const struct fl_video_options options = {.path = sink->path,
                                              .format = cli_image_name(sink->output.image),
-                                             .model = job->model != NULL ? job->model : job->scene,
+                                             .model = job->model ? job->model : job->scene,
                                              .frames_per_second = job->options.frames_per_second,
                                              .quality = job->file_quality,
                                              .lossless = job->lossless,
@@ -107,7 +107,7 @@ static bool start(struct cli_sink *sink, struct fl_error *error)
     const struct cli_job *job = sink->job;
     /* An interruption is how progressive pictures end: a file that has begun is finished. */
     const struct fl_exporter_options options = {.folder = sink->folder,
-                                                .model = job->model != NULL ? job->model : job->scene,
+                                                .model = job->model ? job->model : job->scene,
                                                 .frames_per_second =
                                                     sink->is_series ? job->options.frames_per_second : 0,
                                                 .interrupt_fd = job->progressive ? 0 : cli_interrupt_fd()};
@@ -127,7 +127,7 @@ static bool have(struct cli_sink *sink, uint32_t frame)
 {
     const struct fl_job_options *wanted = &sink->job->options;
     uint32_t width = 0, height = 0;
-    return sink->is_series && fl_pattern_path(&sink->pattern, frame, sink->path, sizeof sink->path) &&
+    return sink->is_series && fl_pattern_path(&sink->pattern, frame, sink->path, sizeof(sink->path)) &&
            fl_image_size(sink->path, &width, &height) && width == wanted->width && height == wanted->height;
 }
 
@@ -142,7 +142,7 @@ bool cli_sinks_have(struct cli_sinks *sinks, uint32_t frame)
 static bool write_image(struct cli_sink *sink, const struct fl_frame *frame, struct fl_error *error)
 {
     const struct cli_job *job = sink->job;
-    if (sink->is_series && !fl_pattern_path(&sink->pattern, frame->frame, sink->path, sizeof sink->path))
+    if (sink->is_series && !fl_pattern_path(&sink->pattern, frame->frame, sink->path, sizeof(sink->path)))
         return fl_error_set(error, FL_ERROR_FILE, sink->output.path, "the path of frame %u is too long",
                             frame->frame);
     const struct fl_export_options options = {.path = sink->path,
@@ -157,9 +157,9 @@ bool cli_sinks_write(struct cli_sinks *sinks, const struct fl_frame *frame, stru
 {
     for (size_t i = 0; i < sinks->count; i++) {
         struct cli_sink *sink = &sinks->items[i];
-        const bool written = sink->y4m != NULL     ? fl_y4m_write(sink->y4m, frame, error)
-                             : sink->video != NULL ? fl_video_write(sink->video, frame, error)
-                                                   : write_image(sink, frame, error);
+        const bool written = sink->y4m     ? fl_y4m_write(sink->y4m, frame, error)
+                             : sink->video ? fl_video_write(sink->video, frame, error)
+                                           : write_image(sink, frame, error);
         if (!written)
             return false;
     }
@@ -184,9 +184,9 @@ static bool finish_y4m(struct cli_sink *sink, struct fl_error *error)
 
 static bool finish(struct cli_sink *sink, struct fl_error *error)
 {
-    if (sink->video != NULL)
+    if (sink->video)
         return fl_video_finish(sink->video, error);
-    if (sink->y4m != NULL)
+    if (sink->y4m)
         return sink->to_stdout || finish_y4m(sink, error);
     return fl_exporter_wait(sink->exporter, error) && (!sink->to_stdout || cli_copy_to_stdout(sink->path, error));
 }

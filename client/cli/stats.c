@@ -216,7 +216,7 @@ int cli_stats(int argc, char **argv)
     struct fl_error error = {0};
     struct fl_connection *connection = cli_daemon_connect(&wanted.daemon, "farlight stats", true, &error);
     const struct message_stats_reply *reply = NULL;
-    const bool done = connection != NULL && fl_stats(connection, &reply, &error);
+    const bool done = connection && fl_stats(connection, &reply, &error);
     if (done && wanted.json)
         print_json(connection, reply);
     else if (done)

@@ -9,20 +9,20 @@
 bool cli_is_terminal(int fd)
 {
     const char *kind = getenv("TERM");
-    return isatty(fd) == 1 && kind != NULL && kind[0] != '\0' && strcmp(kind, "dumb") != 0;
+    return isatty(fd) == 1 && kind && kind[0] != '\0' && strcmp(kind, "dumb") != 0;
 }
 
 static bool use_colour(void)
 {
     const char *refused = getenv("NO_COLOR");
-    return (refused == NULL || refused[0] == '\0') && cli_is_terminal(STDERR_FILENO);
+    return (!refused || refused[0] == '\0') && cli_is_terminal(STDERR_FILENO);
 }
 
 static void say(const char *kind, const char *colour, const struct fl_error *what)
 {
     char line[1200];
     const bool colourful = use_colour();
-    fl_error_print(what, line, sizeof line);
+    fl_error_print(what, line, sizeof(line));
     fprintf(stderr, "farlight: %s%s%s%s\n", colourful ? colour : "", kind, colourful ? "\033[0m" : "", line);
 }
 

@@ -34,8 +34,8 @@ struct cli_timings {
 
 struct cli_timings *cli_timings_create(enum cli_timings_form form, bool to_stderr)
 {
-    struct cli_timings *timings = calloc(1, sizeof *timings);
-    if (timings == NULL)
+    struct cli_timings *timings = calloc(1, sizeof(*timings));
+    if (!timings)
         return NULL;
     timings->form = form;
     timings->out = to_stderr ? stderr : stdout;
@@ -91,7 +91,7 @@ static void add_frame(struct cli_timings *timings, const struct fl_frame *frame)
     if (timings->frames == 0)
         timings->tracer = frame->tracer;
     if (timings->frames++ == 0)
-        snprintf(timings->title, sizeof timings->title, "%ux%u, %u sample%s, %s, %s, %s %s", frame->width,
+        snprintf(timings->title, sizeof(timings->title), "%ux%u, %u sample%s, %s, %s, %s %s", frame->width,
                  frame->height, frame->samples, frame->samples == 1 ? "" : "s",
                  protocol_tracer_text(frame->tracer), protocol_integrator_text(frame->integrator),
                  protocol_pixel_format_text(frame->format), protocol_encoding_text(frame->encoding));
@@ -114,7 +114,7 @@ static void add_frame(struct cli_timings *timings, const struct fl_frame *frame)
 
 static void print_object(struct cli_timings *timings, json_t *object)
 {
-    if (object != NULL && json_dumpf(object, timings->out, JSON_COMPACT | JSON_REAL_PRECISION(9)) == 0)
+    if (object && json_dumpf(object, timings->out, JSON_COMPACT | JSON_REAL_PRECISION(9)) == 0)
         fputc('\n', timings->out);
     json_decref(object);
 }
@@ -140,7 +140,7 @@ static void set(json_t *object, const char *name, uint64_t value)
 static void print_frame(struct cli_timings *timings, const struct fl_frame *frame)
 {
     char digest[20];
-    snprintf(digest, sizeof digest, "%016" PRIx64, frame->digest);
+    snprintf(digest, sizeof(digest), "%016" PRIx64, frame->digest);
     json_t *object = json_pack(
         "{s:s,s:s,s:s,s:s,s:s,s:s}", "kind", "frame", "tracer", protocol_tracer_text(frame->tracer), "integrator",
         protocol_integrator_text(frame->integrator), "format", protocol_pixel_format_text(frame->format),
@@ -234,7 +234,7 @@ static void print_stages(const struct cli_timings *timings)
             continue;
         for (unsigned wave = 0; wave < WAVES_SHOWN; wave++) {
             char name[24];
-            snprintf(name, sizeof name, "wave %u", wave);
+            snprintf(name, sizeof(name), "wave %u", wave);
             print_row(timings, "  ", name, timings->waves[stage == PROTOCOL_STAGE_TRACE ? 0 : 1][wave]);
         }
     }
@@ -287,7 +287,7 @@ static void print_part(const struct cli_timings *timings, const char *name, uint
 static void print_import(const struct cli_timings *timings, const struct fl_import_stats *import)
 {
     char upload[120];
-    snprintf(upload, sizeof upload, "%.3f MB of %.3f MB offered", (double)import->uploaded_bytes * 1e-6,
+    snprintf(upload, sizeof(upload), "%.3f MB of %.3f MB offered", (double)import->uploaded_bytes * 1e-6,
              (double)import->offered_bytes * 1e-6);
     print_part(timings, "load", import->load_ns, "waited for the scene; of that or beside it:");
     print_part(timings, "  read", import->read_ns, "importer: files");
@@ -321,7 +321,7 @@ static void print_table(struct cli_timings *timings, const struct cli_client_tim
 
 void cli_timings_frame(struct cli_timings *timings, const struct fl_frame *frame)
 {
-    if (timings == NULL)
+    if (!timings)
         return;
     add_frame(timings, frame);
     if (timings->form == CLI_TIMINGS_JSON)
@@ -330,7 +330,7 @@ void cli_timings_frame(struct cli_timings *timings, const struct fl_frame *frame
 
 void cli_timings_end(struct cli_timings *timings, const struct cli_client_times *times)
 {
-    if (timings == NULL)
+    if (!timings)
         return;
     if (timings->form == CLI_TIMINGS_JSON)
         print_client(timings, times);

@@ -51,7 +51,7 @@ static void flush(struct cli_trace_file *file)
 static void put(struct cli_trace_file *file, json_t *event)
 {
     fputs(file->begun ? ",\n" : "[\n", file->out);
-    if (event != NULL)
+    if (event)
         json_dumpf(event, file->out, JSON_COMPACT | JSON_REAL_PRECISION(15));
     file->begun = true;
     json_decref(event);
@@ -92,8 +92,8 @@ static int thread_of(struct cli_trace_file *file, enum cli_trace_track track, ui
     lane->thread = ++file->threads;
     lane_takes(lane, start_ns, end_ns);
     if (*count > 1)
-        snprintf(number, sizeof number, " (%u)", *count);
-    snprintf(name, sizeof name, "%s%s", tracks[track].name, number);
+        snprintf(number, sizeof(number), " (%u)", *count);
+    snprintf(name, sizeof(name), "%s%s", tracks[track].name, number);
     put_name(file, "thread_name", tracks[track].process, lane->thread, name);
     return lane->thread;
 }
@@ -111,7 +111,7 @@ static void put_span(struct cli_trace_file *file, enum cli_trace_track track, co
 void cli_trace_span(struct cli_trace_file *file, enum cli_trace_track track, const char *name, int64_t frame,
                     uint64_t start_ns, uint64_t duration_ns)
 {
-    if (file != NULL)
+    if (file)
         put_span(file, track, name, frame < 0 ? json_object() : json_pack("{s:I}", "frame", (json_int_t)frame),
                  start_ns, duration_ns);
 }
@@ -144,7 +144,7 @@ static void put_stages(struct cli_trace_file *file, const struct fl_frame *frame
 {
     const struct record_stage_time **spans = calloc(frame->stage_count + 1, sizeof(*spans));
     uint64_t last_ns = 0;
-    if (spans == NULL)
+    if (!spans)
         return;
     for (size_t i = 0; i < frame->stage_count; i++) {
         const struct record_stage_time *span = &frame->stages[i];
@@ -168,7 +168,7 @@ static void put_stages(struct cli_trace_file *file, const struct fl_frame *frame
 
 void cli_trace_frame(struct cli_trace_file *file, const struct fl_frame *frame, uint64_t now_ns)
 {
-    if (file == NULL)
+    if (!file)
         return;
     const uint64_t arrival_ns = now_ns - frame->decode_ns;
     cli_trace_span(file, CLI_TRACE_CLIENT, "wait", frame->frame, now_ns - frame->wait_ns, frame->wait_ns);
@@ -182,7 +182,7 @@ void cli_trace_frame(struct cli_trace_file *file, const struct fl_frame *frame, 
 void cli_trace_import(struct cli_trace_file *file, const struct fl_import_stats *stats, uint64_t import_start_ns,
                       uint64_t now_ns)
 {
-    if (file == NULL)
+    if (!file)
         return;
     const uint64_t commit_ns = now_ns - stats->commit_ns;
     put_span(file, CLI_TRACE_IMPORTER, "import",
@@ -201,10 +201,10 @@ void cli_trace_import(struct cli_trace_file *file, const struct fl_import_stats 
 
 struct cli_trace_file *cli_trace_file_create(const char *path, struct fl_error *error)
 {
-    struct cli_trace_file *file = calloc(1, sizeof *file);
+    struct cli_trace_file *file = calloc(1, sizeof(*file));
     /* Not blocking: a FIFO without a reader is an error and no endless wait. */
     const int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0666);
-    if (file == NULL || fd < 0 || (file->out = fdopen(fd, "w")) == NULL) {
+    if (!file || fd < 0 || !(file->out = fdopen(fd, "w"))) {
         fl_error_set(error, FL_ERROR_FILE, path, "the trace file cannot be written: %s", strerror(errno));
         if (fd >= 0)
             close(fd);
@@ -219,7 +219,7 @@ struct cli_trace_file *cli_trace_file_create(const char *path, struct fl_error *
 
 bool cli_trace_file_destroy(struct cli_trace_file *file, struct fl_error *error)
 {
-    if (file == NULL)
+    if (!file)
         return true;
     fputs("\n]\n", file->out);
     flush(file);

@@ -45,7 +45,7 @@ bool channel_send(const struct channel *channel, uint32_t request, const struct 
 {
     uint8_t bytes[2048];
     struct writer writer;
-    writer_init(&writer, bytes, sizeof bytes);
+    writer_init(&writer, bytes, sizeof(bytes));
     return message_write(&writer, request, 0, message) && send_all(channel->fd, bytes, writer.used_bytes);
 }
 
@@ -54,9 +54,9 @@ bool channel_send_failure(const struct channel *channel, uint32_t request, const
 {
     char short_field[FIELD_BYTES], short_reason[TEXT_BYTES], short_remedy[REMEDY_BYTES];
     struct message message = {.type = MESSAGE_ERROR};
-    copy_text(short_field, sizeof short_field, field);
-    copy_text(short_reason, sizeof short_reason, reason);
-    copy_text(short_remedy, sizeof short_remedy, remedy != NULL ? remedy : "");
+    copy_text(short_field, sizeof(short_field), field);
+    copy_text(short_reason, sizeof(short_reason), reason);
+    copy_text(short_remedy, sizeof(short_remedy), remedy ? remedy : "");
     message.error.code = PROTOCOL_ERROR_CODE_INVALID;
     message.error.field = short_field;
     message.error.text = short_reason;
@@ -113,7 +113,7 @@ static bool hand_over(struct channel *channel)
             continue;
         }
         channel->start += frame.consumed_bytes;
-        if (frame.info == NULL)
+        if (!frame.info)
             continue;
         scratch_reset(&channel->scratch);
         if (!message_decode(&message, frame.header.type, frame.payload, frame.header.payload_bytes,
@@ -129,7 +129,7 @@ bool channel_run(struct channel *channel)
     uint8_t *scratch = malloc(SCRATCH_BYTES);
     channel->buffer = malloc(BUFFER_BYTES);
     channel->start = channel->end = 0;
-    bool good = scratch != NULL && channel->buffer != NULL;
+    bool good = scratch && channel->buffer;
     if (good) {
         scratch_init(&channel->scratch, scratch, SCRATCH_BYTES);
         good = hand_over(channel);

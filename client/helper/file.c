@@ -61,9 +61,9 @@ uint64_t file_bytes_limit(void)
 int file_begin(const char *path, char *reason, size_t reason_bytes)
 {
     const char *slash = strrchr(path, '/');
-    const size_t folder_bytes = slash != NULL ? (size_t)(slash - path) + 1 : 0;
-    const int length = snprintf(unfinished, sizeof unfinished, "%.*s.farlight-XXXXXX", (int)folder_bytes, path);
-    if (length < 0 || (size_t)length >= sizeof unfinished) {
+    const size_t folder_bytes = slash ? (size_t)(slash - path) + 1 : 0;
+    const int length = snprintf(unfinished, sizeof(unfinished), "%.*s.farlight-XXXXXX", (int)folder_bytes, path);
+    if (length < 0 || (size_t)length >= sizeof(unfinished)) {
         fail(reason, reason_bytes, ENAMETOOLONG);
         return -1;
     }
@@ -93,7 +93,7 @@ int file_begin(const char *path, char *reason, size_t reason_bytes)
 const char *file_temporary_name(void)
 {
     const char *slash = strrchr(unfinished, '/');
-    return slash != NULL ? slash + 1 : unfinished;
+    return slash ? slash + 1 : unfinished;
 }
 
 bool file_finish(int fd, const char *path, char *reason, size_t reason_bytes)
@@ -174,7 +174,7 @@ bool file_read(int fd, size_t greatest_bytes, uint8_t **bytes, size_t *count, ch
     }
     /* What grows meanwhile is read as it was. */
     *bytes = malloc((size_t)status.st_size);
-    if (*bytes != NULL && read_up_to(fd, *bytes, (size_t)status.st_size, count))
+    if (*bytes && read_up_to(fd, *bytes, (size_t)status.st_size, count))
         return true;
     snprintf(reason, reason_bytes, "cannot be read: %s", strerror(errno));
     free(*bytes);

@@ -27,7 +27,7 @@ bool incoming_take(struct incoming *incoming, const struct message_frame_data *d
     if (!incoming->begun || data->offset_bytes != incoming->received_bytes ||
         data->data_bytes > incoming->begin.size_bytes - incoming->received_bytes)
         return false;
-    if (incoming->pixels != NULL && data->data_bytes > 0)
+    if (incoming->pixels && data->data_bytes > 0)
         memcpy(incoming->pixels + incoming->received_bytes, data->data, data->data_bytes);
     incoming->received_bytes += data->data_bytes;
     return true;

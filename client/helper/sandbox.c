@@ -103,7 +103,7 @@ static bool allow_folders(int ruleset, const struct sandbox_options *options, ui
     if (options->allow_rename)
         write_rights |= LANDLOCK_ACCESS_FS_REMOVE_FILE;
     write_rights &= handled;
-    for (size_t i = 0; i < sizeof system_folders / sizeof system_folders[0]; i++)
+    for (size_t i = 0; i < sizeof(system_folders) / sizeof(system_folders[0]); i++)
         if (!allow_folder(ruleset, system_folders[i], read_rights))
             return false;
     if (SANITIZED && !allow_folder(ruleset, "/proc", read_rights)) /* where the leak sanitizer finds the threads */
@@ -128,7 +128,7 @@ static int enter_landlock(const struct sandbox_options *options)
     if (abi < 1)
         return -1;
     attributes.handled_access_fs = rights_of_abi(abi);
-    ruleset = (int)syscall(SYS_landlock_create_ruleset, &attributes, sizeof attributes, 0);
+    ruleset = (int)syscall(SYS_landlock_create_ruleset, &attributes, sizeof(attributes), 0);
     if (ruleset < 0)
         return 0;
     entered = allow_folders(ruleset, options, attributes.handled_access_fs) &&
@@ -181,10 +181,10 @@ static bool allow_arguments(scmp_filter_ctx filter)
     static const unsigned fcntl_commands[] = {F_GETFD, F_SETFD, F_GETFL, F_SETFL, F_DUPFD_CLOEXEC};
     static const unsigned long ioctl_requests[] = {TCGETS, FIONREAD};
 
-    for (size_t i = 0; i < sizeof fcntl_commands / sizeof fcntl_commands[0]; i++)
+    for (size_t i = 0; i < sizeof(fcntl_commands) / sizeof(fcntl_commands[0]); i++)
         if (!allow_with_argument(filter, SCMP_SYS(fcntl), 1, fcntl_commands[i]))
             return false;
-    for (size_t i = 0; i < sizeof ioctl_requests / sizeof ioctl_requests[0]; i++)
+    for (size_t i = 0; i < sizeof(ioctl_requests) / sizeof(ioctl_requests[0]); i++)
         if (!allow_with_argument(filter, SCMP_SYS(ioctl), 1, ioctl_requests[i]))
             return false;
     /* Limits may be asked for but not changed. */
@@ -202,12 +202,12 @@ static bool enter_seccomp(const struct sandbox_options *options)
         return false;
     /* Libraries may have started threads before main(): the filter is for them, too. Landlock cannot be. */
     entered = seccomp_attr_set(filter, SCMP_FLTATR_CTL_TSYNC, 1) == 0 &&
-              allow_calls(filter, allowed_calls, sizeof allowed_calls / sizeof allowed_calls[0]) &&
+              allow_calls(filter, allowed_calls, sizeof(allowed_calls) / sizeof(allowed_calls[0])) &&
               allow_arguments(filter);
     if (entered && options->write_folder_count > 0)
-        entered = allow_calls(filter, write_calls, sizeof write_calls / sizeof write_calls[0]);
+        entered = allow_calls(filter, write_calls, sizeof(write_calls) / sizeof(write_calls[0]));
     if (entered && options->allow_rename)
-        entered = allow_calls(filter, rename_calls, sizeof rename_calls / sizeof rename_calls[0]);
+        entered = allow_calls(filter, rename_calls, sizeof(rename_calls) / sizeof(rename_calls[0]));
     entered = entered && seccomp_load(filter) == 0;
     seccomp_release(filter);
     return entered;

@@ -51,8 +51,9 @@ bool import_add_skin(struct import_scene *scene, uint32_t skin, const char *name
     edit->message.set_skin.joint_count = joint_count;
     edit->message.set_skin.name = import_copy_name(scene, name);
     edit->message.set_skin.arrays_count = joint_from_mesh ? 2 : 1;
-    edit->blobs[0] = import_add_blob(scene, joints, (uint64_t)joint_count * sizeof *joints);
-    edit->blobs[1] = import_add_blob(scene, joint_from_mesh, (uint64_t)joint_count * 12 * sizeof *joint_from_mesh);
+    edit->blobs[0] = import_add_blob(scene, joints, (uint64_t)joint_count * sizeof(*joints));
+    edit->blobs[1] =
+        import_add_blob(scene, joint_from_mesh, (uint64_t)joint_count * 12 * sizeof(*joint_from_mesh));
     return !scene->failed;
 }
 
@@ -71,7 +72,7 @@ bool import_add_clip(struct import_scene *scene, uint32_t clip, const char *name
     edit->message.set_clip.clip = clip;
     edit->message.set_clip.name = import_copy_name(scene, name);
     edit->message.set_clip.arrays_count = 1;
-    edit->blobs[0] = import_add_blob(scene, floats, (uint64_t)count * sizeof *floats);
+    edit->blobs[0] = import_add_blob(scene, floats, (uint64_t)count * sizeof(*floats));
     return !scene->failed;
 }
 
@@ -89,14 +90,14 @@ void import_list_clip(struct import_scene *scene, uint32_t clip, const char *nam
                       double duration_s)
 {
     struct import_clip *grown =
-        import_grow(scene, scene->clips, scene->clip_count, &scene->clip_capacity, sizeof *grown);
+        import_grow(scene, scene->clips, scene->clip_count, &scene->clip_capacity, sizeof(*grown));
     struct import_clip *listed;
 
     if (!grown)
         return;
     scene->clips = grown;
     listed = &grown[scene->clip_count++];
-    import_copy_text(listed->name, sizeof listed->name, name);
+    import_copy_text(listed->name, sizeof(listed->name), name);
     listed->clip = clip;
     listed->channels = channels;
     listed->duration_s = duration_s >= 0 && duration_s <= 1e9 ? (float)duration_s : 0;

@@ -28,7 +28,7 @@ static uint64_t place_of(const float *position)
     for (int i = 0; i < 3; i++) {
         float value = position[i] + 0.0f; /* -0 becomes 0 */
 
-        memcpy(&bits[i], &value, sizeof value);
+        memcpy(&bits[i], &value, sizeof(value));
     }
     return mix_two(bits[0] | (uint64_t)bits[1] << 32, bits[2]);
 }
@@ -99,7 +99,7 @@ static bool no_sheets(const float *positions, const uint32_t *indices, uint32_t 
 
     while (slots * 4 < (uint64_t)triangle_count * 5)
         slots *= 2;
-    table = calloc(slots, sizeof *table);
+    table = calloc(slots, sizeof(*table));
     if (!table)
         return false;
     for (size_t t = 0; single && t < triangle_count; t++) {

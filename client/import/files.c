@@ -165,7 +165,7 @@ static int open_by_parts(int folder, const char *name)
         bool last = name[length] == '\0';
         int next;
 
-        if (length >= sizeof part) {
+        if (length >= sizeof(part)) {
             errno = ENAMETOOLONG;
             break;
         }
@@ -199,7 +199,7 @@ static int open_by_parts(int folder, const char *name)
 static int open_beneath(int folder, const char *name)
 {
     struct open_how how = {.flags = OPEN_FLAGS, .resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS};
-    int descriptor = (int)syscall(SYS_openat2, folder, name, &how, sizeof how);
+    int descriptor = (int)syscall(SYS_openat2, folder, name, &how, sizeof(how));
 
     if (descriptor < 0 && (errno == ENOSYS || errno == EPERM)) {
         if (name[0] == '/') {

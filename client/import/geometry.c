@@ -21,7 +21,7 @@ void import_mesh_finish(struct import_mesh *mesh)
     for (int i = 0; i < 3; i++)
         free(mesh->target_offsets[i]);
     free(mesh->ranges);
-    memset(mesh, 0, sizeof *mesh);
+    memset(mesh, 0, sizeof(*mesh));
 }
 
 static bool all_finite(const float *values, size_t count)
@@ -158,7 +158,7 @@ static bool mend_normals(struct import_scene *scene, const char *where, struct i
     if (broken == 0)
         return true;
     bad = calloc(count, 1);
-    sums = calloc(count * 3, sizeof *sums);
+    sums = calloc(count * 3, sizeof(*sums));
     if (!bad || !sums) {
         free(bad);
         free(sums);
@@ -264,7 +264,7 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
         if (edit->blobs[i] != 0)
             count = i + 1;
     edit->message.set_mesh.arrays_count = count;
-    memset(mesh, 0, sizeof *mesh);
+    memset(mesh, 0, sizeof(*mesh));
     return edit->message.set_mesh.mesh = import_next_id(scene, PROTOCOL_OBJECT_KIND_MESH);
 }
 

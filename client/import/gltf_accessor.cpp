@@ -94,7 +94,7 @@ elements elements_of(reader &r, int index, const std::string &where)
 template <typename type> type load_as(const unsigned char *bytes)
 {
     type value;
-    memcpy(&value, bytes, sizeof value);
+    memcpy(&value, bytes, sizeof(value));
     return value;
 }
 

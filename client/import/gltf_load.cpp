@@ -226,7 +226,7 @@ void fail(reader &r, const std::string &where, const char *format, ...)
     va_list arguments;
 
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    vsnprintf(text, sizeof(text), format, arguments);
     va_end(arguments);
     import_fail(r.scene, where.c_str(), "%s", text);
     throw failed();

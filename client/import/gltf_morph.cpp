@@ -52,7 +52,7 @@ size_t read_targets(reader &r, const std::vector<morph_lot> &lots, import_mesh &
                     "the first %d of %zu morph targets were kept", IMPORT_TARGETS_MAX, count);
     mesh.target_count = uint32_t(std::min<size_t>(count, IMPORT_TARGETS_MAX));
     for (size_t which = 0; which < 3 && mesh.target_count > 0; which++) {
-        const bool has_base = which == 0 || (which == 1 ? mesh.normals : mesh.tangents) != nullptr;
+        const bool has_base = which == 0 || (which == 1 ? mesh.normals : mesh.tangents);
         // Positions are always there, if only as zeros; the others want something to be added to.
         if (which > 0 && (!has_base || !any_has(lots, names[which])))
             continue;

@@ -20,7 +20,7 @@ static int compare_keyed(const void *a, const void *b)
 /* Primitives in the order of their materials; NULL: out of memory. */
 static struct keyed *sort_by_material(const uint32_t *materials, uint32_t count)
 {
-    struct keyed *order = malloc(((size_t)count + 1) * sizeof *order);
+    struct keyed *order = malloc(((size_t)count + 1) * sizeof(*order));
     bool sorted = true;
 
     if (!order)
@@ -30,7 +30,7 @@ static struct keyed *sort_by_material(const uint32_t *materials, uint32_t count)
         sorted = sorted && (i == 0 || materials[i - 1] <= materials[i]);
     }
     if (!sorted)
-        qsort(order, count, sizeof *order, compare_keyed);
+        qsort(order, count, sizeof(*order), compare_keyed);
     return order;
 }
 
@@ -38,7 +38,7 @@ static struct keyed *sort_by_material(const uint32_t *materials, uint32_t count)
 static struct record_material_range *make_ranges(const struct keyed *order, uint32_t first, uint32_t count,
                                                  uint32_t *range_count, uint32_t *end)
 {
-    struct record_material_range *ranges = malloc(IMPORT_RANGES_MAX * sizeof *ranges);
+    struct record_material_range *ranges = malloc(IMPORT_RANGES_MAX * sizeof(*ranges));
     uint32_t used = 0, at = first;
 
     if (!ranges)

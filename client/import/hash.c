@@ -71,14 +71,14 @@ static int compare_hashes(const void *a, const void *b)
 
 static bool find_equal(struct import_scene *scene)
 {
-    struct hash_order *order = calloc(scene->blob_count + 1, sizeof *order);
+    struct hash_order *order = calloc(scene->blob_count + 1, sizeof(*order));
     uint32_t first = 0;
 
     if (!order)
         return import_fail(scene, NULL, "out of memory");
     for (size_t i = 0; i < scene->blob_count; i++)
         order[i] = (struct hash_order){&scene->blobs[i], (uint32_t)i};
-    qsort(order, scene->blob_count, sizeof *order, compare_hashes);
+    qsort(order, scene->blob_count, sizeof(*order), compare_hashes);
     for (size_t i = 0; i < scene->blob_count; i++) {
         if (i == 0 || memcmp(order[i].blob->hash, order[i - 1].blob->hash, BLOB_HASH_BYTES) != 0)
             first = order[i].position;

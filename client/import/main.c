@@ -124,7 +124,7 @@ static bool enter_sandbox(struct import_scene *scene, const struct options *opti
     struct sandbox_options sandbox = {
         .read_folders = folders, .read_folder_count = 1, .cpu_seconds = CPU_SECONDS_MAX};
     char reason[256];
-    bool entered = sandbox_enter(&sandbox, reason, sizeof reason);
+    bool entered = sandbox_enter(&sandbox, reason, sizeof(reason));
 
     free(folder);
     if (!entered)

@@ -64,7 +64,7 @@ static void format_text(char *out, size_t out_bytes, const char *format, va_list
 {
     char text[1024];
 
-    vsnprintf(text, sizeof text, format, arguments);
+    vsnprintf(text, sizeof(text), format, arguments);
     import_copy_text(out, out_bytes, text);
 }
 
@@ -72,8 +72,8 @@ static void format_text(char *out, size_t out_bytes, const char *format, va_list
 
 void import_scene_init(struct import_scene *scene, const char *file)
 {
-    memset(scene, 0, sizeof *scene);
-    import_copy_text(scene->file, sizeof scene->file, file);
+    memset(scene, 0, sizeof(*scene));
+    import_copy_text(scene->file, sizeof(scene->file), file);
 }
 
 static void edit_finish(struct import_edit *edit)
@@ -125,7 +125,7 @@ void import_scene_finish(struct import_scene *scene)
     free(scene->edits);
     free(scene->blobs);
     free(scene->clips);
-    memset(scene, 0, sizeof *scene);
+    memset(scene, 0, sizeof(*scene));
 }
 
 bool import_fail(struct import_scene *scene, const char *where, const char *format, ...)
@@ -137,9 +137,9 @@ bool import_fail(struct import_scene *scene, const char *where, const char *form
     scene->failed = true;
     scene->failure.severity = PROTOCOL_SEVERITY_ERROR;
     scene->failure.count = 1;
-    import_copy_text(scene->failure.where, sizeof scene->failure.where, where);
+    import_copy_text(scene->failure.where, sizeof(scene->failure.where), where);
     va_start(arguments, format);
-    format_text(scene->failure.text, sizeof scene->failure.text, format, arguments);
+    format_text(scene->failure.text, sizeof(scene->failure.text), format, arguments);
     va_end(arguments);
     return false;
 }
@@ -150,9 +150,9 @@ void import_note(struct import_scene *scene, enum protocol_severity severity, co
     struct import_notice note = {.severity = severity, .count = 1};
     va_list arguments;
 
-    import_copy_text(note.where, sizeof note.where, where);
+    import_copy_text(note.where, sizeof(note.where), where);
     va_start(arguments, format);
-    format_text(note.text, sizeof note.text, format, arguments);
+    format_text(note.text, sizeof(note.text), format, arguments);
     va_end(arguments);
     for (size_t i = 0; i < scene->note_count; i++) {
         if (strcmp(scene->notes[i].text, note.text) == 0) {
@@ -194,7 +194,7 @@ uint32_t import_add_blob(struct import_scene *scene, void *bytes, uint64_t size_
                     (unsigned long long)(IMPORT_BYTES_MAX >> 30));
         goto release;
     }
-    grown = import_grow(scene, scene->blobs, scene->blob_count, &scene->blob_capacity, sizeof *scene->blobs);
+    grown = import_grow(scene, scene->blobs, scene->blob_count, &scene->blob_capacity, sizeof(*scene->blobs));
     if (!grown)
         goto release;
     scene->blobs = grown;
@@ -212,11 +212,11 @@ struct import_edit *import_append(struct import_scene *scene, enum message_type 
 
     if (scene->failed)
         return NULL;
-    grown = import_grow(scene, scene->edits, scene->edit_count, &scene->edit_capacity, sizeof *scene->edits);
+    grown = import_grow(scene, scene->edits, scene->edit_count, &scene->edit_capacity, sizeof(*scene->edits));
     if (!grown)
         return NULL;
     scene->edits = grown;
-    memset(&grown[scene->edit_count], 0, sizeof *grown);
+    memset(&grown[scene->edit_count], 0, sizeof(*grown));
     grown[scene->edit_count].message.type = type;
     return &grown[scene->edit_count++];
 }
@@ -226,7 +226,7 @@ char *import_copy_name(struct import_scene *scene, const char *name)
     char text[IMPORT_NAME_MAX + 1];
     char *copy;
 
-    import_copy_text(text, sizeof text, name);
+    import_copy_text(text, sizeof(text), name);
     copy = strdup(text);
     if (!copy)
         import_fail(scene, NULL, "out of memory");
@@ -240,12 +240,12 @@ struct record_morph_weight *import_copy_weights(struct import_scene *scene, cons
 
     if (scene->failed || count == 0)
         return NULL;
-    copy = malloc(count * sizeof *copy);
+    copy = malloc(count * sizeof(*copy));
     if (!copy) {
         import_fail(scene, NULL, "out of memory");
         return NULL;
     }
-    memcpy(copy, from, count * sizeof *copy);
+    memcpy(copy, from, count * sizeof(*copy));
     for (uint32_t i = 0; i < count; i++) {
         if (!(fabsf(copy[i].weight) <= 1e6f)) { /* NaN, too */
             import_fail(scene, NULL, "a weight of a morph target is not finite or beyond 1e6");
@@ -314,12 +314,12 @@ uint32_t import_add_material(struct import_scene *scene, const struct message_se
     if (!edit)
         return 0;
     if (count > 0) {
-        textures = malloc(count * sizeof *textures);
+        textures = malloc(count * sizeof(*textures));
         if (!textures) {
             import_fail(scene, NULL, "out of memory");
             return 0;
         }
-        memcpy(textures, material->textures, count * sizeof *textures);
+        memcpy(textures, material->textures, count * sizeof(*textures));
     }
     edit->message.set_material = *material;
     edit->message.set_material.textures = textures;

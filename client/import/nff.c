@@ -44,7 +44,7 @@ struct nff {
 
 static const char *where(struct nff *nff)
 {
-    snprintf(nff->where, sizeof nff->where, "line %u", nff->line);
+    snprintf(nff->where, sizeof(nff->where), "line %u", nff->line);
     return nff->where;
 }
 
@@ -102,7 +102,7 @@ static bool to_number(struct word word, float *out)
     char text[64], *end;
     double value;
 
-    if (word.length == 0 || word.length >= sizeof text)
+    if (word.length == 0 || word.length >= sizeof(text))
         return false;
     memcpy(text, word.text, word.length);
     text[word.length] = '\0';
@@ -202,7 +202,7 @@ static bool grow_fills(struct nff *nff)
     size_t old_capacity = nff->fill_capacity;
 
     nff->fill_capacity = old_capacity ? old_capacity * 2 : 64;
-    nff->fills = calloc(nff->fill_capacity, sizeof *nff->fills);
+    nff->fills = calloc(nff->fill_capacity, sizeof(*nff->fills));
     if (!nff->fills) {
         nff->fills = old;
         nff->fill_capacity = old_capacity;
@@ -231,7 +231,7 @@ static bool read_fill(struct nff *nff)
     found = find_fill(nff, wanted.numbers);
     if (found->material == 0) {
         fill_to_material(wanted.numbers, &material);
-        snprintf(name, sizeof name, "fill of line %u", nff->line);
+        snprintf(name, sizeof(name), "fill of line %u", nff->line);
         material.name = name;
         wanted.material = import_add_material(nff->scene, &material);
         if (wanted.material == 0)
@@ -253,7 +253,7 @@ static bool read_light(struct nff *nff)
         return import_fail(nff->scene, where(nff), "'l' has %u numbers; it needs 3, or 6 with a colour", count);
     if (nff->light_count == LIGHTS_MAX)
         return import_fail(nff->scene, where(nff), "more than %d lights", LIGHTS_MAX);
-    grown = realloc(nff->lights, (nff->light_count + 1) * sizeof *grown);
+    grown = realloc(nff->lights, (nff->light_count + 1) * sizeof(*grown));
     if (!grown)
         return import_fail(nff->scene, NULL, "out of memory");
     nff->lights = grown;
@@ -358,9 +358,9 @@ static bool read_polygon(struct nff *nff, bool patch)
     /* Every number takes two bytes at least: more than the file could hold is not worth memory. */
     if ((uint64_t)count * floats * 2 > (uint64_t)(nff->end - nff->at) + 1)
         return import_fail(nff->scene, where(nff), "a polygon of %u corners in a file that ends before", count);
-    rows = malloc((size_t)count * floats * sizeof *rows);
-    corners = malloc((size_t)count * 3 * sizeof *corners);
-    normals = patch ? malloc((size_t)count * 3 * sizeof *normals) : NULL;
+    rows = malloc((size_t)count * floats * sizeof(*rows));
+    corners = malloc((size_t)count * 3 * sizeof(*corners));
+    normals = patch ? malloc((size_t)count * 3 * sizeof(*normals)) : NULL;
     if (!rows || !corners || (patch && !normals))
         read = import_fail(nff->scene, NULL, "out of memory");
     read = read && read_numbers(nff, rows, count * floats, patch ? "pp" : "p");
@@ -432,7 +432,7 @@ static bool show(struct nff *nff, enum protocol_node_kind kind, uint32_t object,
 {
     struct message_set_node node = {.kind = kind, .object = object, .name = name};
 
-    memcpy(node.parent_from_node, matrix, sizeof node.parent_from_node);
+    memcpy(node.parent_from_node, matrix, sizeof(node.parent_from_node));
     return object != 0 && import_add_node(nff->scene, &node) != 0;
 }
 
@@ -492,7 +492,7 @@ static bool add_lights(struct nff *nff)
         for (int c = 0; c < 3; c++)
             set.colour[c] =
                 (float)fmin((double)(light->coloured ? light->colour[c] : share) * PI * distance2, 1e12);
-        snprintf(name, sizeof name, "light %zu", i + 1);
+        snprintf(name, sizeof(name), "light %zu", i + 1);
         set.name = name;
         if (!show(nff, PROTOCOL_NODE_KIND_LIGHT, import_add_light(nff->scene, &set), matrix, name))
             return false;

@@ -143,7 +143,7 @@ static void newell(const float *corners, uint32_t count, float normal[3])
 bool nff_add_polygon(struct nff_shapes *shapes, const float *corners, const float *normals, uint32_t count,
                      const char *where)
 {
-    uint32_t *triangles = malloc((size_t)count * 3 * sizeof *triangles);
+    uint32_t *triangles = malloc((size_t)count * 3 * sizeof(*triangles));
     uint32_t first = (uint32_t)shapes->vertex_count;
     float flat[3];
 
@@ -155,9 +155,9 @@ bool nff_add_polygon(struct nff_shapes *shapes, const float *corners, const floa
     for (uint32_t i = 0; i < count; i++) {
         float normal[3];
 
-        memcpy(normal, normals ? normals + (size_t)i * 3 : flat, sizeof normal);
+        memcpy(normal, normals ? normals + (size_t)i * 3 : flat, sizeof(normal));
         if (!normalise(normal))
-            memcpy(normal, flat, sizeof normal);
+            memcpy(normal, flat, sizeof(normal));
         add_vertex(shapes, corners + (size_t)i * 3, normal);
     }
     if (!polygon_triangulate(corners, count, triangles, &shapes->polygon_budget))
@@ -300,7 +300,7 @@ bool nff_add_solid(struct nff_shapes *shapes, int faces, const float centre[3], 
                   {8, 6, octahedron, cube, 1},
                   {12, 20, dodecahedron, icosahedron, 1}};
 
-    for (size_t s = 0; s < sizeof solids / sizeof solids[0]; s++) {
+    for (size_t s = 0; s < sizeof(solids) / sizeof(solids[0]); s++) {
         double scale;
 
         if (solids[s].faces != faces)

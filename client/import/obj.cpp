@@ -34,7 +34,7 @@ class vertex_table
         }
         size_t at = hash(key) & (slots.size() - 1);
         for (; slots[at] != none; at = (at + 1) & (slots.size() - 1))
-            if (memcmp(&triples[slots[at]], &key, sizeof key) == 0)
+            if (memcmp(&triples[slots[at]], &key, sizeof(key)) == 0)
                 return slots[at];
         slots[at] = uint32_t(triples.size());
         triples.push_back(key);

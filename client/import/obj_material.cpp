@@ -63,7 +63,7 @@ void read_images(building &b, const std::set<std::string> &names)
         char reason[FILES_REASON_BYTES] = "";
         unsigned char *bytes = files_read(b.r.files, name.c_str(), &job.size_bytes, reason);
         if (!bytes)
-            snprintf(job.reason, sizeof job.reason, "%.199s", reason);
+            snprintf(job.reason, sizeof(job.reason), "%.199s", reason);
         job.bytes = bytes;
         job.srgb = true;
         files.emplace_back(bytes);

@@ -123,8 +123,8 @@ bool polygon_triangulate(const float *positions, uint32_t count, uint32_t *trian
         fan(count, triangles);
         return true;
     }
-    if (count > sizeof few / sizeof few[0])
-        corners = malloc(count * sizeof *corners);
+    if (count > sizeof(few) / sizeof(few[0]))
+        corners = malloc(count * sizeof(*corners));
     if (!corners) {
         fan(count, triangles);
         return false;

@@ -80,7 +80,7 @@ static bool handle(struct sender *sender, const struct frame *frame)
 
     if (!frame->info)
         return true;
-    scratch_init(&scratch, scratch_bytes, sizeof scratch_bytes);
+    scratch_init(&scratch, scratch_bytes, sizeof(scratch_bytes));
     if (!message_decode(&message, frame->header.type, frame->payload, frame->header.payload_bytes, &scratch,
                         &error))
         return import_fail(sender->scene, NULL, "the server sent an invalid message: %s: %s", error.field,
@@ -217,13 +217,13 @@ static bool put_note(struct sender *sender, const struct import_notice *note)
     char where[257], text[513];
 
     if (note->where[0] && strcmp(note->where, sender->scene->file) != 0)
-        snprintf(where, sizeof where, "%.120s: %.130s", sender->scene->file, note->where);
+        snprintf(where, sizeof(where), "%.120s: %.130s", sender->scene->file, note->where);
     else
-        snprintf(where, sizeof where, "%s", sender->scene->file);
+        snprintf(where, sizeof(where), "%s", sender->scene->file);
     if (note->count > 1)
-        snprintf(text, sizeof text, "%s (%u times)", note->text, note->count);
+        snprintf(text, sizeof(text), "%s (%u times)", note->text, note->count);
     else
-        snprintf(text, sizeof text, "%s", note->text);
+        snprintf(text, sizeof(text), "%s", note->text);
     message_init(&message, MESSAGE_IMPORT_NOTE);
     message.import_note.severity = note->severity;
     message.import_note.where = where;
@@ -241,7 +241,7 @@ bool sender_notes(struct sender *sender)
     if (scene->notes_lost > 0) {
         struct import_notice more = {.severity = PROTOCOL_SEVERITY_WARNING, .count = 1};
 
-        snprintf(more.text, sizeof more.text, "about %u further notes are left out", scene->notes_lost);
+        snprintf(more.text, sizeof(more.text), "about %u further notes are left out", scene->notes_lost);
         if (!put_note(sender, &more))
             return false;
     }
@@ -287,7 +287,7 @@ static bool put_piece(struct sender *sender, uint32_t request, const struct impo
         piece = sender->credit_bytes - sender->sent_bytes;
     message_init(&message, MESSAGE_BLOB_DATA);
     message.blob_data.offset_bytes = *offset;
-    memcpy(message.blob_data.hash, blob->hash, sizeof blob->hash);
+    memcpy(message.blob_data.hash, blob->hash, sizeof(blob->hash));
     message.blob_data.data = blob->bytes + *offset;
     message.blob_data.data_bytes = (uint32_t)piece;
     sender->sent_bytes += piece;
@@ -320,7 +320,7 @@ static bool send_lot(struct sender *sender, const uint32_t *positions, uint32_t 
 
     for (uint32_t i = 0; i < count; i++) {
         refs[i].size_bytes = scene->blobs[positions[i]].size_bytes;
-        memcpy(refs[i].hash, scene->blobs[positions[i]].hash, sizeof refs[i].hash);
+        memcpy(refs[i].hash, scene->blobs[positions[i]].hash, sizeof(refs[i].hash));
     }
     message_init(&message, MESSAGE_BLOB_OFFER);
     message.blob_offer.blobs = refs;
@@ -380,7 +380,7 @@ static bool put_edit(struct sender *sender, uint32_t request, const struct impor
             const struct import_blob *blob = &sender->scene->blobs[edit->blobs[i] - 1];
 
             refs[i].size_bytes = blob->size_bytes;
-            memcpy(refs[i].hash, blob->hash, sizeof refs[i].hash);
+            memcpy(refs[i].hash, blob->hash, sizeof(refs[i].hash));
         }
     }
     switch (message.type) {

@@ -226,11 +226,11 @@ void decode_one(texture_job &job) noexcept
             reason.pop_back();
         if (!decoded && reason.empty())
             reason = "cannot be decoded";
-        snprintf(job.reason, sizeof job.reason, "%s", reason.c_str());
+        snprintf(job.reason, sizeof(job.reason), "%s", reason.c_str());
     } catch (const std::exception &exception) {
-        snprintf(job.reason, sizeof job.reason, "cannot be decoded: %s", exception.what());
+        snprintf(job.reason, sizeof(job.reason), "cannot be decoded: %s", exception.what());
     } catch (...) {
-        snprintf(job.reason, sizeof job.reason, "cannot be decoded");
+        snprintf(job.reason, sizeof(job.reason), "cannot be decoded");
     }
     if (!decoded) {
         free(job.texels);
@@ -252,7 +252,7 @@ uint16_t half_of(float value)
         return 0; // NaN, too
     value = std::min(value, half_max);
     uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
+    memcpy(&bits, &value, sizeof(bits));
     if (bits < 0x38800000u) // below 2^-14: a denormal half, a multiple of 2^-24
         return uint16_t(std::nearbyint(value * 16777216.0f));
     bits += 0xfffu + ((bits >> 13) & 1u);
@@ -315,10 +315,10 @@ extern "C" void texture_decode(struct texture_job *jobs, size_t count)
 extern "C" unsigned char *texture_marker(void)
 {
     static const unsigned char texels[16] = {255, 0, 255, 255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 0, 255, 255};
-    unsigned char *copy = static_cast<unsigned char *>(malloc(sizeof texels));
+    unsigned char *copy = static_cast<unsigned char *>(malloc(sizeof(texels)));
 
     if (copy)
-        memcpy(copy, texels, sizeof texels);
+        memcpy(copy, texels, sizeof(texels));
     return copy;
 }
 

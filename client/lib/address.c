@@ -24,7 +24,7 @@ static int connect_by(int fd, const struct sockaddr *address, socklen_t address_
     if (!fl_wait(&polled, 1, interrupt_fd, deadline_ns, error))
         return -1;
     int failure = 0;
-    socklen_t failure_bytes = sizeof failure;
+    socklen_t failure_bytes = sizeof(failure);
     if (getsockopt(fd, SOL_SOCKET, SO_ERROR, &failure, &failure_bytes) < 0)
         return errno;
     return failure;
@@ -35,7 +35,7 @@ static int refuse(const char *address, int failure, struct fl_error *error)
     if (failure > 0) {
         fl_error_set(error, FL_ERROR_CONNECTION, address, "no daemon can be reached there: %s", strerror(failure));
         fl_error_remedy(error, "start one with 'farlightd --listen ADDRESS', or leave --server out");
-        if (error != NULL)
+        if (error)
             error->retryable = failure == EAGAIN || failure == ETIMEDOUT;
     }
     return -1;
@@ -45,9 +45,9 @@ static int connect_unix(const char *address, const char *path, uint64_t deadline
                         struct fl_error *error)
 {
     struct sockaddr_un name = {.sun_family = AF_UNIX};
-    if (*path == '\0' || strlen(path) >= sizeof name.sun_path) {
+    if (*path == '\0' || strlen(path) >= sizeof(name.sun_path)) {
         fl_error_set(error, FL_ERROR_ARGUMENT, address, "a socket's path has 1 to %zu characters",
-                     sizeof name.sun_path - 1);
+                     sizeof(name.sun_path) - 1);
         return -1;
     }
     memcpy(name.sun_path, path, strlen(path) + 1);
@@ -55,7 +55,7 @@ static int connect_unix(const char *address, const char *path, uint64_t deadline
     if (fd < 0)
         return refuse(address, errno, error);
     const int failure =
-        connect_by(fd, (const struct sockaddr *)&name, (socklen_t)sizeof name, deadline_ns, interrupt_fd, error);
+        connect_by(fd, (const struct sockaddr *)&name, (socklen_t)sizeof(name), deadline_ns, interrupt_fd, error);
     if (failure == 0)
         return fd;
     close(fd);
@@ -66,13 +66,13 @@ static int connect_unix(const char *address, const char *path, uint64_t deadline
 static bool split_host(const char *text, char *host, size_t host_bytes, const char **port)
 {
     const char *colon = strrchr(text, ':');
-    if (colon == NULL || colon == text || colon[1] == '\0')
+    if (!colon || colon == text || colon[1] == '\0')
         return false;
     size_t length = (size_t)(colon - text);
     if (text[0] == '[' && text[length - 1] == ']') {
         text++;
         length -= 2;
-    } else if (memchr(text, ':', length) != NULL) {
+    } else if (memchr(text, ':', length)) {
         return false;
     }
     if (length == 0 || length >= host_bytes)
@@ -89,7 +89,7 @@ static int connect_tcp(const char *address, const char *where, uint64_t deadline
     char host[256];
     const char *port = NULL;
     uint64_t number = 0;
-    if (!split_host(where, host, sizeof host, &port) || !fl_text_integer(port, 1, 65535, &number, NULL)) {
+    if (!split_host(where, host, sizeof(host), &port) || !fl_text_integer(port, 1, 65535, &number, NULL)) {
         fl_error_set(error, FL_ERROR_ARGUMENT, address, "is not tcp:HOST:PORT with a port of 1 to 65535");
         return -1;
     }
@@ -101,7 +101,7 @@ static int connect_tcp(const char *address, const char *where, uint64_t deadline
         return -1;
     }
     int failure = ECONNREFUSED, fd = -1;
-    for (const struct addrinfo *at = found; at != NULL && fd < 0 && failure >= 0; at = at->ai_next) {
+    for (const struct addrinfo *at = found; at && fd < 0 && failure >= 0; at = at->ai_next) {
         fd = socket(at->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, at->ai_protocol);
         failure = fd < 0 ? errno : connect_by(fd, at->ai_addr, at->ai_addrlen, deadline_ns, interrupt_fd, error);
         if (fd >= 0 && failure != 0) {
@@ -113,7 +113,7 @@ static int connect_tcp(const char *address, const char *where, uint64_t deadline
     if (fd < 0)
         return refuse(address, failure, error);
     const int on = 1;
-    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
     return fd;
 }
 

@@ -31,8 +31,8 @@ bool fl_scene_list(struct fl_connection *connection, struct fl_scene_entry **lis
     if (!ask(connection, &question, MESSAGE_SCENE_LIST_REPLY, &received, error))
         return false;
     const struct message_scene_list_reply *reply = &received.message.scene_list_reply;
-    struct fl_scene_entry *entries = calloc(reply->scenes_count + 1u, sizeof *entries);
-    if (entries == NULL)
+    struct fl_scene_entry *entries = calloc(reply->scenes_count + 1u, sizeof(*entries));
+    if (!entries)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     for (uint32_t i = 0; i < reply->scenes_count; i++) {
         const struct record_scene_entry *from = &reply->scenes[i];
@@ -40,7 +40,7 @@ bool fl_scene_list(struct fl_connection *connection, struct fl_scene_entry **lis
         entries[i].triangles = from->triangles;
         entries[i].clients = from->clients;
         entries[i].sharing = from->sharing;
-        snprintf(entries[i].name, sizeof entries[i].name, "%s", from->name);
+        snprintf(entries[i].name, sizeof(entries[i].name), "%s", from->name);
     }
     *list = entries;
     *count = reply->scenes_count;
@@ -67,21 +67,21 @@ static bool describe(struct fl_scene *scene, struct fl_received *received, struc
 
 static bool learn_cameras(struct fl_scene *scene, const struct message_scene_description *description)
 {
-    scene->cameras = calloc(description->cameras_count + 1u, sizeof *scene->cameras);
-    if (scene->cameras == NULL)
+    scene->cameras = calloc(description->cameras_count + 1u, sizeof(*scene->cameras));
+    if (!scene->cameras)
         return false;
     scene->camera_count = description->cameras_count;
     for (size_t i = 0; i < scene->camera_count; i++) {
         scene->cameras[i].node = description->cameras[i].node;
-        snprintf(scene->cameras[i].name, sizeof scene->cameras[i].name, "%s", description->cameras[i].name);
+        snprintf(scene->cameras[i].name, sizeof(scene->cameras[i].name), "%s", description->cameras[i].name);
     }
     return true;
 }
 
 static bool learn_clips(struct fl_catalogue *catalogue, const struct message_scene_description *description)
 {
-    catalogue->clips = calloc(description->clips_count + 1u, sizeof *catalogue->clips);
-    if (catalogue->clips == NULL)
+    catalogue->clips = calloc(description->clips_count + 1u, sizeof(*catalogue->clips));
+    if (!catalogue->clips)
         return false;
     catalogue->clip_count = catalogue->clip_capacity = description->clips_count;
     for (size_t i = 0; i < catalogue->clip_count; i++) {
@@ -90,7 +90,7 @@ static bool learn_clips(struct fl_catalogue *catalogue, const struct message_sce
         clip->clip = from->channels > 0 ? from->clip : 0; /* without channels nothing of it can be played */
         clip->channels = from->channels;
         clip->duration_s = from->duration_s;
-        snprintf(clip->name, sizeof clip->name, "%s", from->name);
+        snprintf(clip->name, sizeof(clip->name), "%s", from->name);
     }
     return true;
 }
@@ -99,7 +99,7 @@ static bool learn_clips(struct fl_catalogue *catalogue, const struct message_sce
 static bool choose_new_ids(struct fl_catalogue *catalogue)
 {
     uint32_t chance;
-    if (getrandom(&chance, sizeof chance, 0) != (ssize_t)sizeof chance)
+    if (getrandom(&chance, sizeof(chance), 0) != (ssize_t)sizeof(chance))
         return false;
     for (int kind = 0; kind < PROTOCOL_OBJECT_KIND_COUNT; kind++)
         catalogue->greatest_id[kind] = NEW_IDS_FROM + chance / 4;
@@ -111,7 +111,7 @@ static bool come_to(struct fl_scene *scene, const char *name, struct fl_error *e
     struct message question = {.type = MESSAGE_SCENE_ATTACH};
     char short_name[129];
     struct fl_received received;
-    fl_text_utf8(name, short_name, sizeof short_name);
+    fl_text_utf8(name, short_name, sizeof(short_name));
     question.scene_attach.scene = scene->scene;
     question.scene_attach.name = short_name;
     if (!ask(scene->connection, &question, MESSAGE_OK, &received, error))
@@ -131,7 +131,7 @@ struct fl_scene *fl_scene_attach(struct fl_connection *connection, const char *n
     if (!fl_connection_check(connection, error))
         return NULL;
     struct fl_scene *scene = fl_scene_create(connection, error);
-    if (scene == NULL || come_to(scene, name, error))
+    if (!scene || come_to(scene, name, error))
         return scene;
     fl_scene_destroy(scene);
     return NULL;
@@ -161,7 +161,7 @@ uint64_t fl_scene_revision(const struct fl_scene *scene)
 
 void fl_scenes_changed(struct fl_connection *connection, const struct message_scene_changed *changed)
 {
-    for (struct fl_scene *scene = connection->scenes; scene != NULL; scene = scene->next)
+    for (struct fl_scene *scene = connection->scenes; scene; scene = scene->next)
         if (scene->scene == changed->scene)
             note_revision(scene, changed->revision);
 }

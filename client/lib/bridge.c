@@ -31,7 +31,7 @@ static bool fill(struct direction *way, short revents, struct fl_error *error)
 {
     if (revents == 0 || way->source_ended || way->end > way->start)
         return true;
-    const ssize_t got = read(way->from, way->data, sizeof way->data);
+    const ssize_t got = read(way->from, way->data, sizeof(way->data));
     if (got < 0)
         return failed(errno, error);
     way->source_ended = got == 0;
@@ -87,9 +87,9 @@ bool fl_bridge(const char *address, int in_fd, int out_fd, struct fl_error *erro
     const int fd = fl_address_connect(address, monotonic_now_ns() + CONNECT_NS, 0, &local, error);
     if (fd < 0)
         return false;
-    struct direction *ways = calloc(2, sizeof *ways);
+    struct direction *ways = calloc(2, sizeof(*ways));
     bool carried = false;
-    if (ways == NULL) {
+    if (!ways) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     } else {
         ways[0].from = in_fd;

@@ -18,7 +18,7 @@ bool fl_grow(void **items, size_t *capacity, size_t count, size_t item_bytes, st
         return true;
     const size_t more = *capacity > 0 ? *capacity * 2 : 16;
     void *grown = more <= ITEMS_MAX ? realloc(*items, more * item_bytes) : NULL;
-    if (grown == NULL)
+    if (!grown)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     *items = grown;
     *capacity = more;
@@ -39,7 +39,7 @@ static bool keep_text(struct fl_catalogue *catalogue, const char *name, uint32_t
         const size_t capacity =
             catalogue->text_capacity * 2 > begin + length ? catalogue->text_capacity * 2 : 4096 + length;
         char *grown = realloc(catalogue->text, capacity);
-        if (grown == NULL)
+        if (!grown)
             return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         catalogue->text = grown;
         catalogue->text_capacity = capacity;
@@ -59,7 +59,7 @@ static bool keep(struct fl_catalogue *catalogue, enum fl_catalogue_list list, st
         return true;
     }
     if (!fl_grow((void **)&catalogue->lists[list].entries, &catalogue->lists[list].capacity,
-                 catalogue->lists[list].count, sizeof entry, error) ||
+                 catalogue->lists[list].count, sizeof(entry), error) ||
         !keep_text(catalogue, name, &entry.name, error))
         return false;
     catalogue->lists[list].entries[catalogue->lists[list].count++] = entry;
@@ -72,11 +72,11 @@ static bool keep_clip(struct fl_catalogue *catalogue, const struct message_impor
     if (catalogue->clip_count >= CLIPS_MAX)
         return true;
     if (!fl_grow((void **)&catalogue->clips, &catalogue->clip_capacity, catalogue->clip_count,
-                 sizeof *catalogue->clips, error))
+                 sizeof(*catalogue->clips), error))
         return false;
     struct fl_clip_info *made = &catalogue->clips[catalogue->clip_count++];
     *made = (struct fl_clip_info){.clip = clip->clip, .channels = clip->channels, .duration_s = clip->duration_s};
-    snprintf(made->name, sizeof made->name, "%s", clip->name);
+    snprintf(made->name, sizeof(made->name), "%s", clip->name);
     return true;
 }
 
@@ -163,22 +163,22 @@ static void begin_listing(struct listing *listing, size_t count, const char *wha
 {
     *listing = (struct listing){.used = 0};
     if (count == 0)
-        listing->used = (size_t)snprintf(listing->text, sizeof listing->text, "it has no %s at all", what);
+        listing->used = (size_t)snprintf(listing->text, sizeof(listing->text), "it has no %s at all", what);
     else
-        listing->used = (size_t)snprintf(listing->text, sizeof listing->text, "it has %zu %s%s", count, what,
+        listing->used = (size_t)snprintf(listing->text, sizeof(listing->text), "it has %zu %s%s", count, what,
                                          count == 1 ? "" : "s");
 }
 
 static void list_name(struct listing *listing, const char *name)
 {
-    const size_t room = sizeof listing->text - sizeof ", .." - listing->used;
+    const size_t room = sizeof(listing->text) - sizeof ", .." - listing->used;
     char entry[160];
-    const int length = snprintf(entry, sizeof entry, "%s '%s'", listing->listed == 0 ? ":" : ",", name);
-    if (name[0] == '\0' || room > sizeof listing->text)
+    const int length = snprintf(entry, sizeof(entry), "%s '%s'", listing->listed == 0 ? ":" : ",", name);
+    if (name[0] == '\0' || room > sizeof(listing->text))
         return;
-    if (length < 0 || (size_t)length >= sizeof entry || (size_t)length > room) {
+    if (length < 0 || (size_t)length >= sizeof(entry) || (size_t)length > room) {
         memcpy(listing->text + listing->used, ", ..", sizeof ", ..");
-        listing->used = sizeof listing->text; /* full */
+        listing->used = sizeof(listing->text); /* full */
         return;
     }
     memcpy(listing->text + listing->used, entry, (size_t)length + 1);
@@ -208,7 +208,7 @@ static bool unknown_object(const struct fl_catalogue *catalogue, enum fl_catalog
 {
     struct listing listing;
     begin_listing(&listing, catalogue->lists[list].count, what);
-    for (size_t i = 0; i < catalogue->lists[list].count && listing.used < sizeof listing.text; i++)
+    for (size_t i = 0; i < catalogue->lists[list].count && listing.used < sizeof(listing.text); i++)
         list_name(&listing, entry_name(catalogue, list, i));
     fl_error_set(error, FL_ERROR_ARGUMENT, what, "the model has no %s '%s'", what, which);
     if (catalogue->lists[list].left_out > 0)
@@ -260,10 +260,10 @@ bool fl_catalogue_find_clip(const struct fl_catalogue *catalogue, const char *wh
                             const struct fl_clip_info **info, struct fl_error *error)
 {
     const struct fl_clip_info *found = search_clip(catalogue, which);
-    if (found == NULL) {
+    if (!found) {
         struct listing listing;
         begin_listing(&listing, catalogue->clip_count, "clip");
-        for (size_t i = 0; i < catalogue->clip_count && listing.used < sizeof listing.text; i++)
+        for (size_t i = 0; i < catalogue->clip_count && listing.used < sizeof(listing.text); i++)
             list_name(&listing, catalogue->clips[i].name);
         fl_error_set(error, FL_ERROR_ARGUMENT, "--clip", "the model has no clip '%s'", which);
         return fl_error_remedy(error, "%s", listing.text);
@@ -271,7 +271,7 @@ bool fl_catalogue_find_clip(const struct fl_catalogue *catalogue, const char *wh
     if (found->clip == 0)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "--clip", "clip '%s' moves nothing that is shown", which);
     *clip = found->clip;
-    if (info != NULL)
+    if (info)
         *info = found;
     return true;
 }

@@ -41,8 +41,8 @@ static bool gather(struct clip *clip, const struct fl_channel *channels, size_t 
         if (total > NUMBERS_MAX)
             return fl_error_set(error, FL_ERROR_ARGUMENT, "clip", "it has more than %u numbers", NUMBERS_MAX);
     }
-    clip->numbers = calloc((size_t)total + 1, sizeof *clip->numbers);
-    if (clip->numbers == NULL)
+    clip->numbers = calloc((size_t)total + 1, sizeof(*clip->numbers));
+    if (!clip->numbers)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     for (size_t i = 0; i < channel_count; i++) {
         const size_t values = channels[i].key_count * numbers_per_key(&channels[i]);
@@ -131,7 +131,7 @@ static bool take_note(struct fl_scene *scene, uint32_t id, uint64_t revision)
     if (revision > scene->revision)
         scene->revision = revision;
     if (scene->attached &&
-        fl_grow((void **)&scene->clips, &scene->clip_capacity, scene->clip_count, sizeof *scene->clips, NULL))
+        fl_grow((void **)&scene->clips, &scene->clip_capacity, scene->clip_count, sizeof(*scene->clips), NULL))
         scene->clips[scene->clip_count++] = id;
     return true;
 }
@@ -146,7 +146,7 @@ static bool commit(const struct clip *clip, const char *name, uint32_t id, const
                    end = {.type = MESSAGE_EDIT_COMMIT};
     struct fl_received received;
     char short_name[129];
-    fl_text_utf8(name, short_name, sizeof short_name);
+    fl_text_utf8(name, short_name, sizeof(short_name));
     begin.edit_begin.scene = clip->scene->scene;
     set.set_clip.clip = id;
     set.set_clip.arrays = &blob;

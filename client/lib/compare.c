@@ -26,17 +26,17 @@ struct judge {
 static bool check_path(const char *path, struct fl_error *error)
 {
     char plain[4097];
-    fl_text_utf8(path, plain, sizeof plain);
+    fl_text_utf8(path, plain, sizeof(plain));
     return strcmp(path, plain) == 0 ||
            fl_error_set(error, FL_ERROR_FILE, plain, "an image's path must be UTF-8 of at most 4096 bytes");
 }
 
 static bool check_options(const struct fl_compare_options *options, struct fl_error *error)
 {
-    if (options->a == NULL || options->b == NULL)
+    if (!options->a || !options->b)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "two image files are needed");
     if (!check_path(options->a, error) || !check_path(options->b, error) ||
-        (options->picture != NULL && !check_path(options->picture, error)))
+        (options->picture && !check_path(options->picture, error)))
         return false;
     if (!isfinite(options->threshold) || options->threshold > 1e9f)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "threshold", "must be a number up to 1e9");
@@ -48,17 +48,17 @@ static bool check_options(const struct fl_compare_options *options, struct fl_er
 static const char *file_part(const char *path)
 {
     const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
+    return slash ? slash + 1 : path;
 }
 
 /* The folder of the picture, as the program's argument. */
 static bool folder_of(const char *path, char *folder, size_t folder_bytes, struct fl_error *error)
 {
     const char *slash = strrchr(path, '/');
-    const size_t length = slash == NULL || slash == path ? 1 : (size_t)(slash - path);
+    const size_t length = !slash || slash == path ? 1 : (size_t)(slash - path);
     if (length >= folder_bytes)
         return fl_error_set(error, FL_ERROR_FILE, "", "the path of the picture is too long");
-    memcpy(folder, slash == NULL ? "." : path, length);
+    memcpy(folder, !slash ? "." : path, length);
     folder[length] = '\0';
     return true;
 }
@@ -67,10 +67,10 @@ static bool start(struct judge *judge, struct fl_error *error)
 {
     const struct fl_compare_options *options = judge->options;
     char folder[4097];
-    if (options->picture != NULL && !folder_of(options->picture, folder, sizeof folder, error))
+    if (options->picture && !folder_of(options->picture, folder, sizeof(folder), error))
         return false;
     const char *const arguments[] = {
-        "--read", options->a, "--read", options->b, options->picture != NULL ? "--folder" : NULL, folder, NULL};
+        "--read", options->a, "--read", options->b, options->picture ? "--folder" : NULL, folder, NULL};
     int fd = -1;
     return fl_process_start(&judge->process, "farlight-export", FL_WIRING_DESCRIPTOR, arguments, &fd, error) &&
            fl_stream_init(&judge->stream, fd, MESSAGE_FROM_SERVER | MESSAGE_FROM_LOCAL, "the image program",
@@ -91,10 +91,10 @@ static bool send_request(struct judge *judge, struct fl_error *error)
     wanted->b = options->b;
     wanted->picture = options->picture;
     wanted->format = options->picture_format;
-    fl_text_utf8(options->label_a != NULL ? options->label_a : file_part(options->a), judge->label_a,
-                 sizeof judge->label_a);
-    fl_text_utf8(options->label_b != NULL ? options->label_b : file_part(options->b), judge->label_b,
-                 sizeof judge->label_b);
+    fl_text_utf8(options->label_a ? options->label_a : file_part(options->a), judge->label_a,
+                 sizeof(judge->label_a));
+    fl_text_utf8(options->label_b ? options->label_b : file_part(options->b), judge->label_b,
+                 sizeof(judge->label_b));
     wanted->label_a = judge->label_a;
     wanted->label_b = judge->label_b;
     return fl_stream_push(&judge->stream, 1, 0, &message, error);
@@ -107,7 +107,7 @@ static void take(struct fl_comparison *to, const struct message_images_compared 
     to->width = from->width;
     to->height = from->height;
     to->channels = from->channels;
-    snprintf(to->channel_names, sizeof to->channel_names, "%s", from->channel_names);
+    snprintf(to->channel_names, sizeof(to->channel_names), "%s", from->channel_names);
     to->space = from->space;
     to->pixels = (uint64_t)from->width * from->height;
     to->nonfinite_a = from->nonfinite_a;
@@ -147,7 +147,7 @@ static bool is_sound(const struct message_images_compared *answer)
 static bool explain(struct judge *judge, struct fl_error *error)
 {
     char words[520];
-    fl_process_last_words(&judge->process, 1000, words, sizeof words);
+    fl_process_last_words(&judge->process, 1000, words, sizeof(words));
     return fl_error_set(error, FL_ERROR_SYSTEM, "farlight-export", "the image program gave up%s%s",
                         words[0] != '\0' ? ": " : "", words);
 }

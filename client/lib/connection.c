@@ -22,7 +22,7 @@ bool fl_connection_break(struct fl_connection *connection, struct fl_error *erro
         return false;
     if (connection->process.pid > 0 && error->code == FL_ERROR_CONNECTION) {
         char words[520];
-        fl_process_last_words(&connection->process, 500, words, sizeof words);
+        fl_process_last_words(&connection->process, 500, words, sizeof(words));
         if (words[0] != '\0')
             fl_error_set(error, FL_ERROR_CONNECTION, "", "the connection is lost: %s", words);
     }
@@ -72,7 +72,7 @@ static bool fail_ended(struct fl_connection *connection, struct fl_error *error)
 
 bool fl_connection_push_late(struct fl_connection *connection, struct fl_error *error)
 {
-    while (connection->late != NULL && fl_stream_has_room(&connection->stream)) {
+    while (connection->late && fl_stream_has_room(&connection->stream)) {
         struct fl_late *first = connection->late;
         const bool pushed = fl_stream_push(&connection->stream, first->request, 0, &first->message, error);
         connection->late = first->next;
@@ -88,14 +88,14 @@ void fl_connection_send_late(struct fl_connection *connection, uint32_t request,
     struct fl_error error = {0};
     if (connection->broken.code != FL_ERROR_NONE)
         return;
-    struct fl_late *late = malloc(sizeof *late);
-    if (late == NULL) {
+    struct fl_late *late = malloc(sizeof(*late));
+    if (!late) {
         fl_error_set(&error, FL_ERROR_MEMORY, "", "out of memory");
         fl_connection_break(connection, &error);
         return;
     }
     *late = (struct fl_late){.request = request, .message = *message};
-    *(connection->late != NULL ? connection->late_end : &connection->late) = late;
+    *(connection->late ? connection->late_end : &connection->late) = late;
     connection->late_end = &late->next;
     if (fl_connection_push_late(connection, &error) && !fl_stream_transfer(&connection->stream, &error))
         fl_connection_break(connection, &error);
@@ -138,8 +138,8 @@ bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint
 static int consume_frames(struct fl_connection *connection, const struct framing_header *header,
                           const struct message *message, struct fl_error *error)
 {
-    int taken = connection->view != NULL ? fl_view_take(connection->view, header, message, error) : 0;
-    if (taken == 0 && connection->job != NULL)
+    int taken = connection->view ? fl_view_take(connection->view, header, message, error) : 0;
+    if (taken == 0 && connection->job)
         taken = fl_job_take(connection->job, header, message, error);
     if (taken < 0)
         fl_connection_break(connection, error);
@@ -275,8 +275,8 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
     struct fl_stream *stream = &connection->stream;
     struct handshake_hello hello = {.version_min = HANDSHAKE_VERSION_MIN, .version_max = HANDSHAKE_VERSION_MAX};
     hello.capabilities = HANDSHAKE_CAN_ABANDON | (connection->can_h264 ? HANDSHAKE_CAN_H264 : 0);
-    snprintf(hello.name, sizeof hello.name, "%s", name);
-    if (getrandom(hello.nonce, sizeof hello.nonce, 0) != (ssize_t)sizeof hello.nonce)
+    snprintf(hello.name, sizeof(hello.name), "%s", name);
+    if (getrandom(hello.nonce, sizeof(hello.nonce), 0) != (ssize_t)sizeof(hello.nonce))
         return fl_error_set(error, FL_ERROR_SYSTEM, "", "no random numbers");
     stream->out_end = handshake_hello_encode(stream->out, &hello);
     if (stream->out_end == 0)
@@ -287,7 +287,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
                 fl_error_set(error, FL_ERROR_TIMEOUT, connection->address,
                              "the daemon does not answer the handshake");
             else if (error->code == FL_ERROR_REFUSED || error->code == FL_ERROR_PROTOCOL)
-                snprintf(error->field, sizeof error->field, "%.*s", (int)sizeof error->field - 1,
+                snprintf(error->field, sizeof(error->field), "%.*s", (int)sizeof(error->field) - 1,
                          connection->address);
             return false;
         }
@@ -321,15 +321,15 @@ static bool start_ssh(struct fl_connection *connection, const char *where, int *
     char host[256], socket_address[300];
     const size_t host_bytes = strcspn(where, ":");
     const char *path = where[host_bytes] == ':' ? where + host_bytes + 1 : DEFAULT_REMOTE_SOCKET;
-    if (host_bytes == 0 || host_bytes >= sizeof host || where[0] == '-' || *path == '\0')
+    if (host_bytes == 0 || host_bytes >= sizeof(host) || where[0] == '-' || *path == '\0')
         return fl_error_set(error, FL_ERROR_ARGUMENT, connection->address, "is not ssh:HOST[:SOCKET]");
     /* ssh hands its words to a shell over there. */
     const char *harmless = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-+@%,=";
     if (path[strspn(path, harmless)] != '\0' ||
-        snprintf(socket_address, sizeof socket_address, "unix:%s", path) >= (int)sizeof socket_address)
+        snprintf(socket_address, sizeof(socket_address), "unix:%s", path) >= (int)sizeof(socket_address))
         return fl_error_set(error, FL_ERROR_ARGUMENT, connection->address,
                             "the socket's path has characters that a shell would read");
-    snprintf(host, sizeof host, "%.*s", (int)host_bytes, where);
+    snprintf(host, sizeof(host), "%.*s", (int)host_bytes, where);
     const char *const arguments[] = {"-T", "--", host, "farlight", "bridge", socket_address, NULL};
     return fl_process_start(&connection->process, "ssh", FL_WIRING_STANDARD, arguments, fd, error);
 }
@@ -338,9 +338,9 @@ static bool open_stream(struct fl_connection *connection, const struct fl_connec
                         uint64_t deadline_ns, struct fl_error *error)
 {
     static const char *const none[] = {NULL};
-    const char *const *arguments = options->daemon_arguments != NULL ? options->daemon_arguments : none;
+    const char *const *arguments = options->daemon_arguments ? options->daemon_arguments : none;
     int fd = -1;
-    if (options->server == NULL) {
+    if (!options->server) {
         connection->local = true;
         if (!fl_process_start(&connection->process, "farlightd", FL_WIRING_DESCRIPTOR, arguments, &fd, error))
             return false;
@@ -360,7 +360,7 @@ static bool open_link(struct fl_connection *connection, const struct fl_connect_
                       uint64_t deadline_ns, struct fl_error *error)
 {
     struct sealed_key key;
-    if (options->server == NULL || options->key_file == NULL)
+    if (!options->server || !options->key_file)
         return open_stream(connection, options, deadline_ns, error);
     const bool opened = read_key(&key, options->key_file, error) &&
                         open_stream(connection, options, deadline_ns, error) &&
@@ -374,8 +374,8 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
     const uint64_t begin_ns = monotonic_now_ns();
     const unsigned timeout_ms = options->timeout_ms > 0 ? options->timeout_ms : DEFAULT_TIMEOUT_MS;
     const uint64_t deadline_ns = begin_ns + timeout_ms * 1000000ull;
-    struct fl_connection *connection = calloc(1, sizeof *connection);
-    if (connection == NULL) {
+    struct fl_connection *connection = calloc(1, sizeof(*connection));
+    if (!connection) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
@@ -384,12 +384,13 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
     connection->interrupt_fd = options->interrupt_fd;
     connection->can_h264 = options->can_h264;
     connection->last_channel = FL_UPLOAD_CHANNEL;
-    snprintf(connection->address, sizeof connection->address, "%s",
-             options->server != NULL ? options->server : "private");
+    snprintf(connection->address, sizeof(connection->address), "%s",
+             options->server ? options->server : "private");
     if (!open_link(connection, options, deadline_ns, error) ||
-        !shake_hands(connection, options->name != NULL ? options->name : "libfarlight", deadline_ns, error)) {
+        !shake_hands(connection, options->name ? options->name : "libfarlight", deadline_ns, error)) {
         if (error->field[0] == '\0' && error->code == FL_ERROR_CONNECTION)
-            snprintf(error->field, sizeof error->field, "%.*s", (int)sizeof error->field - 1, connection->address);
+            snprintf(error->field, sizeof(error->field), "%.*s", (int)sizeof(error->field) - 1,
+                     connection->address);
         connection->broken = *error;
         fl_connection_destroy(connection);
         return NULL;
@@ -400,7 +401,7 @@ struct fl_connection *fl_connect(const struct fl_connect_options *options, struc
 
 void fl_connection_destroy(struct fl_connection *connection)
 {
-    if (connection == NULL)
+    if (!connection)
         return;
     if (connection->broken.code == FL_ERROR_NONE && connection->stream.fd >= 0) {
         struct message goodbye = {.type = MESSAGE_GOODBYE};
@@ -409,7 +410,7 @@ void fl_connection_destroy(struct fl_connection *connection)
         connection->stream.is_last = true;
         fl_connection_send(connection, 0, 0, &goodbye, &ignored);
     }
-    for (struct fl_late *late = connection->late, *next; late != NULL; late = next) {
+    for (struct fl_late *late = connection->late, *next; late; late = next) {
         next = late->next;
         free(late);
     }

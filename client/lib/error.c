@@ -7,24 +7,24 @@
 
 bool fl_error_set(struct fl_error *error, enum fl_error_code code, const char *field, const char *format, ...)
 {
-    if (error == NULL)
+    if (!error)
         return false;
     *error = (struct fl_error){.code = code};
-    snprintf(error->field, sizeof error->field, "%s", field);
+    snprintf(error->field, sizeof(error->field), "%s", field);
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(error->text, sizeof error->text, format, arguments);
+    vsnprintf(error->text, sizeof(error->text), format, arguments);
     va_end(arguments);
     return false;
 }
 
 bool fl_error_remedy(struct fl_error *error, const char *format, ...)
 {
-    if (error == NULL)
+    if (!error)
         return false;
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(error->remedy, sizeof error->remedy, format, arguments);
+    vsnprintf(error->remedy, sizeof(error->remedy), format, arguments);
     va_end(arguments);
     return false;
 }

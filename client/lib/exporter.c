@@ -16,16 +16,16 @@ struct fl_exporter {
 
 struct fl_exporter *fl_exporter_start(const struct fl_exporter_options *options, struct fl_error *error)
 {
-    struct fl_exporter *exporter = calloc(1, sizeof *exporter);
-    if (exporter == NULL) {
+    struct fl_exporter *exporter = calloc(1, sizeof(*exporter));
+    if (!exporter) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
     exporter->helper = (struct fl_helper){
         .program = "farlight-export", .what = "the image writer", .interrupt_fd = options->interrupt_fd};
-    fl_text_utf8(options->model != NULL ? options->model : "", exporter->model, sizeof exporter->model);
+    fl_text_utf8(options->model ? options->model : "", exporter->model, sizeof(exporter->model));
     char rate[32];
-    snprintf(rate, sizeof rate, "%.9g", (double)options->frames_per_second);
+    snprintf(rate, sizeof(rate), "%.9g", (double)options->frames_per_second);
     const char *const arguments[] = {"--folder", options->folder, options->frames_per_second > 0 ? "--fps" : NULL,
                                      rate, NULL};
     if (!fl_helper_start(&exporter->helper, arguments, error)) {
@@ -50,7 +50,7 @@ bool fl_exporter_wait(struct fl_exporter *exporter, struct fl_error *error)
                             message_type_text(message.type));
     fl_error_from_message(error, &message.error);
     error->code = FL_ERROR_FILE;
-    memcpy(error->field, exporter->path, sizeof error->field);
+    memcpy(error->field, exporter->path, sizeof(error->field));
     return false;
 }
 
@@ -63,9 +63,9 @@ bool fl_exporter_write(struct fl_exporter *exporter, const struct fl_frame *fram
     message.export_image.half = options->half ? 1 : 0;
     message.export_image.quality = options->quality > 0 ? options->quality : 95;
     message.export_image.path = options->path;
-    message.export_image.format = options->format != NULL ? options->format : "";
+    message.export_image.format = options->format ? options->format : "";
     message.export_image.model = exporter->model;
-    fl_shorten_path(options->path, exporter->path, sizeof exporter->path);
+    fl_shorten_path(options->path, exporter->path, sizeof(exporter->path));
     exporter->helper.request++;
     exporter->waiting = true;
     return fl_helper_send(&exporter->helper, &message, error) &&
@@ -74,7 +74,7 @@ bool fl_exporter_write(struct fl_exporter *exporter, const struct fl_frame *fram
 
 void fl_exporter_destroy(struct fl_exporter *exporter)
 {
-    if (exporter == NULL)
+    if (!exporter)
         return;
     fl_helper_finish(&exporter->helper);
     free(exporter);

@@ -6,7 +6,7 @@
  *   struct fl_scene *scene = fl_scene_load(connection, &(struct fl_load_options){.model = "a.glb"}, &error);
  *   struct fl_job *job = fl_render_start(scene, &(struct fl_job_options){.samples = 4}, &error);
  *   struct fl_frame *frame;
- *   while ((frame = fl_render_next(job, &error)) != NULL) { ... fl_frame_destroy(frame); }
+ *   while ((frame = fl_render_next(job, &error))) { ... fl_frame_destroy(frame); }
  *   fl_render_destroy(job); fl_scene_destroy(scene); fl_connection_destroy(connection);
  *
  * Zero is the default of every option. Errors are values: a function that can fail takes a struct fl_error,

@@ -39,7 +39,7 @@ static size_t pixels_bytes_of(const struct message_frame_begin *begin)
 
 void fl_frame_destroy(struct fl_frame *frame)
 {
-    if (frame == NULL)
+    if (!frame)
         return;
     free(frame->pixels);
     free(frame->stages);
@@ -52,7 +52,7 @@ void fl_frame_destroy(struct fl_frame *frame)
 
 void fl_assembly_finish(struct fl_assembly *assembly)
 {
-    if (assembly->frame != NULL && assembly->encoded != assembly->frame->pixels)
+    if (assembly->frame && assembly->encoded != assembly->frame->pixels)
         free(assembly->encoded);
     fl_frame_destroy(assembly->frame);
     assembly->frame = NULL;
@@ -107,7 +107,7 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
                         uint32_t number, struct fl_error *error)
 {
     const struct fl_frame_expected *expected = &assembly->expected;
-    if (assembly->frame != NULL)
+    if (assembly->frame)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "a frame began inside another");
     if (expected->is_view ? begin->frame < number : begin->frame != number)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.frame", "frame %u came in place of frame %u",
@@ -135,8 +135,8 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
 
 static struct fl_frame *new_frame(const struct message_frame_begin *begin)
 {
-    struct fl_frame *frame = calloc(1, sizeof *frame);
-    if (frame == NULL)
+    struct fl_frame *frame = calloc(1, sizeof(*frame));
+    if (!frame)
         return NULL;
     frame->frame = begin->frame;
     frame->width = begin->width;
@@ -149,7 +149,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
     frame->integrator = begin->integrator;
     frame->digest = begin->digest;
     frame->exposure_stops = begin->exposure_stops;
-    memcpy(frame->world_from_view, begin->world_from_view, sizeof frame->world_from_view);
+    memcpy(frame->world_from_view, begin->world_from_view, sizeof(frame->world_from_view));
     frame->fov_y = begin->fov_y;
     frame->ortho_height = begin->ortho_height;
     frame->time_s = begin->time_s;
@@ -169,7 +169,7 @@ static struct fl_frame *new_frame(const struct message_frame_begin *begin)
         return frame;
     frame->pixels_bytes = pixels_bytes_of(begin);
     frame->pixels = malloc(frame->pixels_bytes);
-    if (frame->pixels == NULL) {
+    if (!frame->pixels) {
         free(frame);
         return NULL;
     }
@@ -183,9 +183,9 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
         return false;
     const bool in_place = begin->encoding == PROTOCOL_ENCODING_RAW && begin->attachments == 0;
     assembly->frame = new_frame(begin);
-    if (assembly->frame != NULL)
+    if (assembly->frame)
         assembly->encoded = in_place ? assembly->frame->pixels : malloc((size_t)assembly->frame->wire_bytes);
-    if (assembly->frame == NULL || assembly->encoded == NULL)
+    if (!assembly->frame || !assembly->encoded)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "no memory for a picture of %ux%u", begin->width,
                             begin->height);
     assembly->encoded_bytes = assembly->frame->wire_bytes;
@@ -198,7 +198,7 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
 
 bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_data *data, struct fl_error *error)
 {
-    if (assembly->frame == NULL)
+    if (!assembly->frame)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data", "a piece came without a frame");
     if (data->offset_bytes != assembly->received_bytes ||
         data->data_bytes > assembly->encoded_bytes - assembly->received_bytes)
@@ -281,7 +281,7 @@ static bool decode_jpeg(const struct fl_assembly *assembly, struct fl_error *err
 {
     struct fl_frame *frame = assembly->frame;
     const tjhandle decoder = tjInitDecompress();
-    if (decoder == NULL)
+    if (!decoder)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     int width = 0, height = 0, subsampling = 0, colours = 0;
     const unsigned long bytes = (unsigned long)picture_bytes(assembly);
@@ -325,7 +325,7 @@ static bool decode_pixels(const struct fl_assembly *assembly, struct fl_error *e
 static void *copy(const void *data, size_t bytes)
 {
     void *made = bytes > 0 ? malloc(bytes) : NULL;
-    if (made != NULL)
+    if (made)
         memcpy(made, data, bytes);
     return made;
 }
@@ -338,10 +338,9 @@ static bool take_costs(struct fl_frame *frame, const struct message_frame_end *e
     frame->splits = end->splits;
     frame->uploaded_bytes = end->uploaded_bytes;
     frame->structure_bytes = end->structure_bytes;
-    frame->stages = copy(end->stages, end->stages_count * sizeof *frame->stages);
-    frame->wave_comparisons = copy(end->comparisons, end->comparisons_count * sizeof *frame->wave_comparisons);
-    if ((end->stages_count > 0 && frame->stages == NULL) ||
-        (end->comparisons_count > 0 && frame->wave_comparisons == NULL))
+    frame->stages = copy(end->stages, end->stages_count * sizeof(*frame->stages));
+    frame->wave_comparisons = copy(end->comparisons, end->comparisons_count * sizeof(*frame->wave_comparisons));
+    if ((end->stages_count > 0 && !frame->stages) || (end->comparisons_count > 0 && !frame->wave_comparisons))
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     frame->stage_count = end->stages_count;
     frame->wave_comparison_count = end->comparisons_count;
@@ -355,7 +354,7 @@ struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct mess
                                  uint64_t now_ns, struct fl_error *error)
 {
     struct fl_frame *frame = assembly->frame;
-    if (frame == NULL || end->frame != frame->frame || end->abandoned != 0 ||
+    if (!frame || end->frame != frame->frame || end->abandoned != 0 ||
         assembly->received_bytes != assembly->encoded_bytes) {
         fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "a frame ended that is not complete");
         return NULL;
@@ -383,7 +382,7 @@ struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct mess
 bool fl_frame_queue_init(struct fl_frame_queue *queue, size_t capacity, struct fl_error *error)
 {
     *queue = (struct fl_frame_queue){.frames = calloc(capacity, sizeof(struct fl_frame *)), .capacity = capacity};
-    return queue->frames != NULL || fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+    return queue->frames || fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
 }
 
 bool fl_frame_queue_push(struct fl_frame_queue *queue, struct fl_frame *frame, struct fl_error *error)

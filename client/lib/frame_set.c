@@ -13,9 +13,9 @@ bool fl_text_shard(const char *text, uint32_t *part, uint32_t *parts, struct fl_
     char first[16];
     uint64_t of = 0, all = 0;
     const char *slash = strchr(text, '/');
-    const size_t length = slash != NULL ? (size_t)(slash - text) : 0;
-    snprintf(first, sizeof first, "%.*s", (int)(length < sizeof first ? length : 0), text);
-    if (length == 0 || length >= sizeof first || !fl_text_integer(first, 1, PARTS_MAX, &of, NULL) ||
+    const size_t length = slash ? (size_t)(slash - text) : 0;
+    snprintf(first, sizeof(first), "%.*s", (int)(length < sizeof(first) ? length : 0), text);
+    if (length == 0 || length >= sizeof(first) || !fl_text_integer(first, 1, PARTS_MAX, &of, NULL) ||
         !fl_text_integer(slash + 1, 1, PARTS_MAX, &all, NULL)) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a part K/N, K and N from 1 to %u", text,
                      PARTS_MAX);
@@ -57,8 +57,8 @@ static bool add_run(struct fl_frame_set *set, size_t *capacity, const struct fl_
 {
     if (set->run_count == *capacity) {
         const size_t more = *capacity > 0 ? *capacity * 2 : 16;
-        struct fl_frame_run *runs = realloc(set->runs, more * sizeof *runs);
-        if (runs == NULL)
+        struct fl_frame_run *runs = realloc(set->runs, more * sizeof(*runs));
+        if (!runs)
             return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         set->runs = runs;
         *capacity = more;
@@ -75,7 +75,7 @@ bool fl_frame_set_missing(const struct fl_frame_run *range, bool (*is_there)(voi
     size_t capacity = 0;
     *set = (struct fl_frame_set){0};
     for (uint64_t frame = range->first; frame <= range->last; frame += range->step) {
-        if (is_there == NULL || !is_there(user, (uint32_t)frame)) {
+        if (!is_there || !is_there(user, (uint32_t)frame)) {
             if (run.step == 0)
                 run = (struct fl_frame_run){.first = (uint32_t)frame, .step = range->step};
             run.last = (uint32_t)frame;

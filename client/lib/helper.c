@@ -27,7 +27,7 @@ static bool explain(struct fl_helper *helper, struct fl_error *error)
 {
     char words[520];
     helper->lost = true;
-    fl_process_last_words(&helper->process, 1000, words, sizeof words);
+    fl_process_last_words(&helper->process, 1000, words, sizeof(words));
     return fl_error_set(error, FL_ERROR_SYSTEM, helper->program, "%s gave up%s%s", helper->what,
                         words[0] != '\0' ? ": " : "", words);
 }
@@ -96,7 +96,7 @@ static void describe(struct message_frame_begin *begin, const struct fl_frame *f
     begin->integrator = frame->integrator;
     begin->digest = frame->digest;
     begin->exposure_stops = frame->exposure_stops;
-    memcpy(begin->world_from_view, frame->world_from_view, sizeof begin->world_from_view);
+    memcpy(begin->world_from_view, frame->world_from_view, sizeof(begin->world_from_view));
     begin->fov_y = frame->fov_y;
     begin->ortho_height = frame->ortho_height;
     begin->time_s = frame->time_s;

@@ -60,12 +60,12 @@ static bool png_size(const struct head *head, uint32_t *width, uint32_t *height)
 {
     static const uint8_t begin[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
     static const uint8_t end[] = {0, 0, 0, 0, 'I', 'E', 'N', 'D', 0xae, 'B', '`', 0x82};
-    if (head->count < 24 || memcmp(head->bytes, begin, sizeof begin) != 0 ||
+    if (head->count < 24 || memcmp(head->bytes, begin, sizeof(begin)) != 0 ||
         memcmp(head->bytes + 12, "IHDR", 4) != 0)
         return false;
     *width = big_endian(head->bytes + 16, 4);
     *height = big_endian(head->bytes + 20, 4);
-    return ends_with(head, end, sizeof end);
+    return ends_with(head, end, sizeof(end));
 }
 
 /* Segments up to the frame header: marker, length, content. */
@@ -133,7 +133,7 @@ static bool exr_attributes(const struct head *head, struct exr_header *header)
         if (strcmp(name, "dataWindow") == 0 && (size != 16 || !exr_window(value, header)))
             return false;
         if (strcmp(name, "compression") == 0) {
-            if (size != 1 || value[0] >= sizeof chunk_lines / sizeof chunk_lines[0])
+            if (size != 1 || value[0] >= sizeof(chunk_lines) / sizeof(chunk_lines[0]))
                 return false;
             header->has_compression = true;
             header->lines = chunk_lines[value[0]];
@@ -171,10 +171,11 @@ static bool hdr_size(const struct head *head, uint32_t *width, uint32_t *height)
     if (head->count < 10 || memcmp(head->bytes, "#?", 2) != 0)
         return false;
     const uint8_t *end = memmem(head->bytes, head->count, "\n\n", 2);
-    if (end == NULL)
+    if (!end)
         return false;
     const size_t left = head->count - (size_t)(end + 2 - head->bytes);
-    snprintf(line, sizeof line, "%.*s", (int)(left < sizeof line ? left : sizeof line - 1), (const char *)end + 2);
+    snprintf(line, sizeof(line), "%.*s", (int)(left < sizeof(line) ? left : sizeof(line) - 1),
+             (const char *)end + 2);
     return sscanf(line, "-Y %9u +X %9u", height, width) == 2;
 }
 
@@ -188,7 +189,7 @@ bool fl_image_size(const char *path, uint32_t *width, uint32_t *height)
     bool known = fstat(head.fd, &status) == 0 && S_ISREG(status.st_mode);
     if (known) {
         head.file_bytes = (uint64_t)status.st_size;
-        head.count = read_at(head.fd, head.bytes, sizeof head.bytes, 0);
+        head.count = read_at(head.fd, head.bytes, sizeof(head.bytes), 0);
         known = png_size(&head, width, height) || jpeg_size(&head, width, height) ||
                 exr_size(&head, width, height) || hdr_size(&head, width, height);
     }

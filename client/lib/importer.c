@@ -31,18 +31,18 @@ bool fl_importer_start(struct fl_importer *importer, const struct fl_load_option
     importer->stream.fd = -1;
     importer->process.talk_fd = -1;
     importer->deadline_ns = importer->begin_ns + timeout_ms * 1000000ull;
-    if (options->model == NULL && options->environment == NULL)
+    if (!options->model && !options->environment)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "model", "no file is named");
-    if ((options->model != NULL && !check_file(options->model, error)) ||
-        (options->environment != NULL && !check_file(options->environment, error)))
+    if ((options->model && !check_file(options->model, error)) ||
+        (options->environment && !check_file(options->environment, error)))
         return false;
     const char *arguments[8] = {"--scene", "1"};
     size_t count = 2;
-    if (options->environment != NULL) {
+    if (options->environment) {
         arguments[count++] = "--environment";
         arguments[count++] = options->environment;
     }
-    if (options->model == NULL) {
+    if (!options->model) {
         arguments[count++] = "--no-model";
     } else {
         arguments[count++] = "--"; /* a model's name may begin with '-' */
@@ -63,15 +63,16 @@ static bool remember_camera(struct fl_importer *importer, const struct message_s
     if (importer->camera_count >= CAMERAS_MAX)
         return true;
     size_t capacity = importer->camera_capacity;
-    if (!fl_grow((void **)&importer->cameras, &capacity, importer->camera_count, sizeof *importer->cameras, error))
+    if (!fl_grow((void **)&importer->cameras, &capacity, importer->camera_count, sizeof(*importer->cameras),
+                 error))
         return false;
     if (!fl_grow((void **)&importer->camera_objects, &importer->camera_capacity, importer->camera_count,
-                 sizeof *importer->camera_objects, error))
+                 sizeof(*importer->camera_objects), error))
         return false;
     struct fl_camera_info *camera = &importer->cameras[importer->camera_count];
     importer->camera_objects[importer->camera_count++] = node->object;
     camera->node = node->node;
-    snprintf(camera->name, sizeof camera->name, "%s", node->name);
+    snprintf(camera->name, sizeof(camera->name), "%s", node->name);
     return true;
 }
 
@@ -81,11 +82,11 @@ static bool remember_object(struct fl_importer *importer, const struct message_s
     if (importer->object_count >= CAMERAS_MAX)
         return true;
     if (!fl_grow((void **)&importer->objects, &importer->object_capacity, importer->object_count,
-                 sizeof *importer->objects, error))
+                 sizeof(*importer->objects), error))
         return false;
     struct fl_camera_object *object = &importer->objects[importer->object_count++];
     object->camera = camera->camera;
-    snprintf(object->name, sizeof object->name, "%s", camera->name);
+    snprintf(object->name, sizeof(object->name), "%s", camera->name);
     return true;
 }
 
@@ -93,7 +94,7 @@ static void take_note(struct fl_importer *importer, const struct message_import_
 {
     if (note->severity == PROTOCOL_SEVERITY_ERROR)
         fl_error_set(&importer->complaint, FL_ERROR_MODEL, note->where, "%s", note->text);
-    if (importer->options.note != NULL)
+    if (importer->options.note)
         importer->options.note(
             importer->options.user,
             &(struct fl_note){.severity = note->severity, .where = note->where, .text = note->text});
@@ -113,7 +114,7 @@ bool fl_importer_observe(struct fl_importer *importer, const struct message *mes
         take_note(importer, &message->import_note);
         return true;
     case MESSAGE_IMPORT_PROGRESS:
-        if (importer->options.progress != NULL)
+        if (importer->options.progress)
             importer->options.progress(importer->options.user, message->import_progress.done_bytes,
                                        message->import_progress.total_bytes, message->import_progress.text);
         return true;
@@ -132,13 +133,13 @@ bool fl_importer_observe(struct fl_importer *importer, const struct message *mes
 
 bool fl_importer_explain(struct fl_importer *importer, struct fl_error *error)
 {
-    const char *model = importer->options.model != NULL ? importer->options.model : importer->options.environment;
+    const char *model = importer->options.model ? importer->options.model : importer->options.environment;
     if (importer->complaint.code != FL_ERROR_NONE) {
         *error = importer->complaint;
         return false;
     }
     char words[520];
-    fl_process_last_words(&importer->process, 1000, words, sizeof words);
+    fl_process_last_words(&importer->process, 1000, words, sizeof(words));
     return fl_error_set(error, FL_ERROR_MODEL, model, "the importer gave up without saying why%s%s",
                         words[0] != '\0' ? ": " : "", words);
 }
@@ -151,7 +152,7 @@ static void complete_names(struct fl_importer *importer)
             continue;
         for (size_t j = 0; j < importer->object_count; j++)
             if (importer->objects[j].camera == importer->camera_objects[i])
-                memcpy(importer->cameras[i].name, importer->objects[j].name, sizeof importer->objects[j].name);
+                memcpy(importer->cameras[i].name, importer->objects[j].name, sizeof(importer->objects[j].name));
     }
 }
 

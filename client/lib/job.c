@@ -86,7 +86,7 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_optio
                                struct fl_error *error)
 {
     struct fl_connection *connection = scene->connection;
-    if (connection->job != NULL) {
+    if (connection->job) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "", "another job runs on this connection");
         return NULL;
     }
@@ -95,8 +95,8 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_optio
         fl_error_set(error, FL_ERROR_ARGUMENT, "layers", "need the pixel format rgba32f, raw or by zstd");
         return NULL;
     }
-    struct fl_job *job = calloc(1, sizeof *job);
-    if (job == NULL) {
+    struct fl_job *job = calloc(1, sizeof(*job));
+    if (!job) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
@@ -144,7 +144,7 @@ static bool conclude(struct fl_job *job, const struct message *message, struct f
     job->answered = true;
     if (message->type == MESSAGE_ERROR)
         return fl_error_from_message(error, &message->error);
-    if (job->assembly.frame != NULL || job->next_frame <= job->last_frame)
+    if (job->assembly.frame || job->next_frame <= job->last_frame)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "the job ended before its last frame");
     return true;
 }
@@ -164,7 +164,7 @@ static bool take(struct fl_job *job, const struct message *message, struct fl_er
     case MESSAGE_FRAME_END:
         frame = fl_assembly_end(&job->assembly, &message->frame_end, monotonic_now_ns(), error);
         job->next_frame += job->frame_step;
-        return frame != NULL && fl_frame_queue_push(&job->done, frame, error);
+        return frame && fl_frame_queue_push(&job->done, frame, error);
     case MESSAGE_OK:
     case MESSAGE_ERROR:
         return conclude(job, message, error);
@@ -207,8 +207,8 @@ struct fl_frame *fl_render_poll(struct fl_job *job, unsigned timeout_ms, bool *d
         }
     }
     struct fl_frame *frame = fl_frame_queue_pop(&job->done);
-    *done = frame == NULL;
-    if (frame == NULL) {
+    *done = !frame;
+    if (!frame) {
         *error = job->failure;
         return NULL;
     }
@@ -245,7 +245,7 @@ bool fl_render_cancel(struct fl_job *job, struct fl_error *error)
 
 void fl_render_destroy(struct fl_job *job)
 {
-    if (job == NULL)
+    if (!job)
         return;
     struct fl_error ignored;
     if (!job->answered && job->connection->broken.code == FL_ERROR_NONE)

@@ -9,21 +9,21 @@ bool fl_json_load(struct fl_json *json, const char *path, size_t max_bytes, stru
 {
     *json = (struct fl_json){0};
     FILE *file = fopen(path, "rb");
-    if (file == NULL)
+    if (!file)
         return fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %m");
     json->text = malloc(max_bytes + 1);
-    json->length = json->text != NULL ? fread(json->text, 1, max_bytes + 1, file) : 0;
+    json->length = json->text ? fread(json->text, 1, max_bytes + 1, file) : 0;
     json_error_t why;
-    if (json->text == NULL)
+    if (!json->text)
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     else if (ferror(file) != 0)
         fl_error_set(error, FL_ERROR_FILE, path, "cannot be read: %m");
     else if (json->length > max_bytes)
         fl_error_set(error, FL_ERROR_FILE, path, "is larger than %zu bytes", max_bytes);
-    else if ((json->root = json_loadb(json->text, json->length, JSON_REJECT_DUPLICATES, &why)) == NULL)
+    else if (!(json->root = json_loadb(json->text, json->length, JSON_REJECT_DUPLICATES, &why)))
         fl_error_set(error, FL_ERROR_FILE, path, "line %d, column %d: %s", why.line, why.column, why.text);
     fclose(file);
-    if (json->root != NULL)
+    if (json->root)
         return true;
     fl_json_finish(json);
     return false;
@@ -45,7 +45,7 @@ struct scan {
 
 static void skip_blanks(struct scan *scan)
 {
-    while (scan->at < scan->end && strchr(" \t\r\n", *scan->at) != NULL)
+    while (scan->at < scan->end && strchr(" \t\r\n", *scan->at))
         scan->at++;
 }
 
@@ -81,10 +81,10 @@ static void skip_value(struct scan *scan)
 static bool is_key(const char *begin, const char *end, const char *key)
 {
     const size_t length = (size_t)(end - begin);
-    if (memchr(begin, '\\', length) == NULL)
+    if (!memchr(begin, '\\', length))
         return length == strlen(key) + 2 && memcmp(begin + 1, key, length - 2) == 0;
     json_t *decoded = json_loadb(begin, length, JSON_DECODE_ANY, NULL);
-    const bool equal = decoded != NULL && strcmp(json_string_value(decoded), key) == 0;
+    const bool equal = decoded && strcmp(json_string_value(decoded), key) == 0;
     json_decref(decoded);
     return equal;
 }
@@ -103,7 +103,7 @@ static bool next_entry(struct scan *scan)
 /* From the value at `scan` to the member or element; *found is where it is said to begin. */
 static bool descend(struct scan *scan, const struct fl_json_place *place, const char **found)
 {
-    const char open = place->key != NULL ? '{' : '[';
+    const char open = place->key ? '{' : '[';
     if (scan->at >= scan->end || *scan->at != open)
         return false;
     scan->at++;
@@ -113,7 +113,7 @@ static bool descend(struct scan *scan, const struct fl_json_place *place, const 
         const char *begin = scan->at;
         if (begin >= scan->end || *begin == '}' || *begin == ']')
             return false;
-        if (place->key == NULL) {
+        if (!place->key) {
             *found = begin;
             if (index++ == place->index)
                 return true;
@@ -135,7 +135,7 @@ static bool descend(struct scan *scan, const struct fl_json_place *place, const 
 /* False: the place, or one around it, is not there; *found is the last that is. */
 static bool find(struct scan *scan, const struct fl_json_place *place, const char **found)
 {
-    if (place == NULL) {
+    if (!place) {
         skip_blanks(scan);
         *found = scan->at;
         return true;
@@ -160,13 +160,13 @@ unsigned fl_json_line(const struct fl_json *json, const struct fl_json_place *pl
 
 void fl_json_path(const struct fl_json_place *place, char *path, size_t path_bytes)
 {
-    if (place == NULL) {
+    if (!place) {
         path[0] = '\0';
         return;
     }
     fl_json_path(place->outer, path, path_bytes);
     const size_t used = strlen(path);
-    if (place->key != NULL)
+    if (place->key)
         snprintf(path + used, path_bytes - used, "%s%s", used > 0 ? "." : "", place->key);
     else
         snprintf(path + used, path_bytes - used, "[%zu]", place->index);

@@ -31,12 +31,12 @@ static bool read_number(const struct place *place, const json_t *object, const c
                         double least, double greatest, double *value)
 {
     const json_t *found = json_object_get(object, field);
-    if (found == NULL)
+    if (!found)
         return needed ? wrong(place, field, "is missing") : true;
     char what[96];
     const double read = json_is_number(found) ? json_number_value(found) : NAN;
     if (!(read >= least && read <= greatest)) {
-        snprintf(what, sizeof what, "must be a number from %g to %g", least, greatest);
+        snprintf(what, sizeof(what), "must be a number from %g to %g", least, greatest);
         return wrong(place, field, what);
     }
     *value = read;
@@ -47,7 +47,7 @@ static bool read_vector(const struct place *place, const json_t *object, const c
                         double greatest, float vector[3])
 {
     const json_t *found = json_object_get(object, field);
-    if (found == NULL)
+    if (!found)
         return needed ? wrong(place, field, "is missing") : true;
     if (!json_is_array(found) || json_array_size(found) != 3)
         return wrong(place, field, "must be an array of three numbers");
@@ -69,7 +69,7 @@ static bool check_names(const struct place *place, json_t *object)
     json_object_foreach(object, name, value)
     {
         bool found = false;
-        for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        for (size_t i = 0; i < sizeof(known) / sizeof(known[0]); i++)
             found = found || strcmp(name, known[i]) == 0;
         if (!found)
             return wrong(place, name, "is not known (known: time, eye, look_at, up, fov)");
@@ -92,7 +92,7 @@ static bool read_key(const struct place *place, json_t *object, struct record_ca
         return false;
     key->time_s = (float)time_s;
     key->fov_y = (float)(fov * RADIANS_PER_DEGREE);
-    if (memcmp(key->eye_world, key->look_at_world, sizeof key->eye_world) == 0)
+    if (memcmp(key->eye_world, key->look_at_world, sizeof(key->eye_world)) == 0)
         return wrong(place, "look_at", "is where the eye is");
     return true;
 }
@@ -123,9 +123,9 @@ bool fl_camera_keys_load(const char *path, struct record_camera_key **keys, size
     if (count == 0 || count > KEYS_MAX) {
         fl_error_set(error, FL_ERROR_FILE, path, "must be an array of 1 to %u camera keys", KEYS_MAX);
     } else {
-        made = calloc(count, sizeof *made);
-        good = made != NULL ? read_all(path, &json, made, error)
-                            : fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
+        made = calloc(count, sizeof(*made));
+        good =
+            made ? read_all(path, &json, made, error) : fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     }
     fl_json_finish(&json);
     if (!good) {

@@ -24,12 +24,12 @@ static bool add_note(struct listing *listing, const struct message_import_note *
         info->notes_left_out++;
         return true;
     }
-    if (!fl_grow((void **)&info->notes, &listing->note_capacity, info->note_count, sizeof *info->notes, error))
+    if (!fl_grow((void **)&info->notes, &listing->note_capacity, info->note_count, sizeof(*info->notes), error))
         return false;
     struct fl_model_note *made = &info->notes[info->note_count++];
     made->severity = note->severity;
-    snprintf(made->where, sizeof made->where, "%s", note->where);
-    snprintf(made->text, sizeof made->text, "%s", note->text);
+    snprintf(made->where, sizeof(made->where), "%s", note->where);
+    snprintf(made->text, sizeof(made->text), "%s", note->text);
     return true;
 }
 
@@ -139,8 +139,8 @@ struct fl_model_info *fl_model_info(const struct fl_load_options *options, int i
 {
     struct fl_load_options quiet = *options;
     quiet.note = NULL; /* they are in the result */
-    struct listing listing = {.relay = {.scene = 1}, .info = calloc(1, sizeof *listing.info)};
-    if (listing.info == NULL) {
+    struct listing listing = {.relay = {.scene = 1}, .info = calloc(1, sizeof(*listing.info))};
+    if (!listing.info) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
@@ -167,7 +167,7 @@ struct fl_model_info *fl_model_info(const struct fl_load_options *options, int i
 
 void fl_model_info_destroy(struct fl_model_info *info)
 {
-    if (info == NULL)
+    if (!info)
         return;
     free(info->cameras);
     free(info->clips);

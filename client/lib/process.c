@@ -30,18 +30,18 @@ static bool is_program(const char *folder, size_t folder_bytes, const char *name
 bool fl_find_program(const char *name, char *path, size_t path_bytes, struct fl_error *error)
 {
     const char *chosen = getenv("FARLIGHT_LIBEXEC");
-    if (chosen != NULL && is_program(chosen, strlen(chosen), name, path, path_bytes))
+    if (chosen && is_program(chosen, strlen(chosen), name, path, path_bytes))
         return true;
     char self[4096];
-    const ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+    const ssize_t length = readlink("/proc/self/exe", self, sizeof(self) - 1);
     if (length > 0) {
         self[length] = '\0';
         const char *slash = strrchr(self, '/');
-        if (slash != NULL && is_program(self, (size_t)(slash - self), name, path, path_bytes))
+        if (slash && is_program(self, (size_t)(slash - self), name, path, path_bytes))
             return true;
     }
     const char *at = getenv("PATH");
-    while (at != NULL && *at != '\0') {
+    while (at && *at != '\0') {
         const size_t folder_bytes = strcspn(at, ":");
         if (folder_bytes > 0 && is_program(at, folder_bytes, name, path, path_bytes))
             return true;
@@ -122,7 +122,7 @@ static size_t fill_arguments(char *argv[ARGUMENTS_MAX], const char *path, enum f
         argv[count++] = (char *)(uintptr_t) "--fd";
         argv[count++] = (char *)(uintptr_t) "3";
     }
-    for (; *arguments != NULL && count + 1 < ARGUMENTS_MAX; arguments++)
+    for (; *arguments && count + 1 < ARGUMENTS_MAX; arguments++)
         argv[count++] = (char *)(uintptr_t)*arguments;
     argv[count] = NULL;
     return count;
@@ -132,9 +132,9 @@ bool fl_process_start(struct fl_process *process, const char *name, enum fl_wiri
                       const char *const *arguments, int *socket_fd, struct fl_error *error)
 {
     *process = (struct fl_process){.talk_fd = -1};
-    snprintf(process->name, sizeof process->name, "%s", name);
+    snprintf(process->name, sizeof(process->name), "%s", name);
     char path[4096];
-    if (!fl_find_program(name, path, sizeof path, error))
+    if (!fl_find_program(name, path, sizeof(path), error))
         return false;
     char *argv[ARGUMENTS_MAX];
     fill_arguments(argv, path, wiring, arguments);
@@ -218,8 +218,8 @@ static void last_line(int fd, char *line, size_t line_bytes)
     const off_t size = fd >= 0 ? lseek(fd, 0, SEEK_END) : 0;
     if (size <= 0)
         return;
-    const off_t from = size > (off_t)sizeof tail ? size - (off_t)sizeof tail : 0;
-    const ssize_t got = pread(fd, tail, sizeof tail, from);
+    const off_t from = size > (off_t)sizeof(tail) ? size - (off_t)sizeof(tail) : 0;
+    const ssize_t got = pread(fd, tail, sizeof(tail), from);
     size_t end = got > 0 ? (size_t)got : 0;
     while (end > 0 && (tail[end - 1] == '\n' || tail[end - 1] == ' '))
         end--;
@@ -232,15 +232,15 @@ static void last_line(int fd, char *line, size_t line_bytes)
 void fl_process_last_words(struct fl_process *process, unsigned grace_ms, char *text, size_t text_bytes)
 {
     char line[400], how[80] = "";
-    last_line(process->talk_fd, line, sizeof line);
+    last_line(process->talk_fd, line, sizeof(line));
     if (process->pid > 0 && fl_process_has_ended(process, grace_ms)) {
         siginfo_t info = {0};
         waitid(P_PID, (id_t)process->pid, &info, WEXITED | WNOHANG | WNOWAIT);
-        last_line(process->talk_fd, line, sizeof line);
+        last_line(process->talk_fd, line, sizeof(line));
         if (info.si_code == CLD_EXITED)
-            snprintf(how, sizeof how, "%s ended with status %d", process->name, info.si_status);
+            snprintf(how, sizeof(how), "%s ended with status %d", process->name, info.si_status);
         else
-            snprintf(how, sizeof how, "%s was ended by signal %d", process->name, info.si_status);
+            snprintf(how, sizeof(how), "%s was ended by signal %d", process->name, info.si_status);
     }
     snprintf(text, text_bytes, "%s%s%s", how, how[0] != '\0' && line[0] != '\0' ? ": " : "", line);
 }
@@ -249,11 +249,11 @@ bool fl_process_find_line(const struct fl_process *process, const char *start, s
                           size_t text_bytes)
 {
     char talk[8192];
-    const ssize_t got = process->talk_fd >= 0 ? pread(process->talk_fd, talk, sizeof talk - 1, 0) : 0;
+    const ssize_t got = process->talk_fd >= 0 ? pread(process->talk_fd, talk, sizeof(talk) - 1, 0) : 0;
     char *rest = talk;
     talk[got > 0 ? got : 0] = '\0';
     for (char *line; (line = strsep(&rest, "\n")) != NULL;) {
-        if (strncmp(line, start, strlen(start)) != 0 || rest == NULL || index-- > 0)
+        if (strncmp(line, start, strlen(start)) != 0 || !rest || index-- > 0)
             continue;
         snprintf(text, text_bytes, "%s", line + strlen(start));
         return true;

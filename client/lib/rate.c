@@ -8,7 +8,7 @@
 static bool is_ntsc(double rate, uint32_t *nominal)
 {
     static const uint32_t known[] = {24, 30, 48, 60, 120, 240};
-    for (unsigned i = 0; i < sizeof known / sizeof known[0]; i++) {
+    for (unsigned i = 0; i < sizeof(known) / sizeof(known[0]); i++) {
         const double exact = known[i] * 1000.0 / 1001.0;
         *nominal = known[i];
         if (fabs(rate - exact) < 2e-4 * exact)

@@ -201,7 +201,7 @@ static bool relay_all(struct load *load, struct fl_error *error)
 static const char *base_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
+    return slash ? slash + 1 : path;
 }
 
 static bool open_scene(struct fl_connection *connection, uint32_t scene, const struct fl_load_options *options,
@@ -213,7 +213,7 @@ static bool open_scene(struct fl_connection *connection, uint32_t scene, const s
                        : options->model       ? base_name(options->model)
                        : options->environment ? base_name(options->environment)
                                               : "";
-    fl_text_utf8(name, short_name, sizeof short_name);
+    fl_text_utf8(name, short_name, sizeof(short_name));
     open.scene_open.scene = scene;
     open.scene_open.sharing = options->sharing;
     open.scene_open.name = short_name;
@@ -245,8 +245,8 @@ struct fl_import {
 
 struct fl_import *fl_import_start(const struct fl_load_options *options, struct fl_error *error)
 {
-    struct fl_import *started = calloc(1, sizeof *started);
-    if (started == NULL)
+    struct fl_import *started = calloc(1, sizeof(*started));
+    if (!started)
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     else if (fl_importer_start(&started->importer, options, error))
         return started;
@@ -256,7 +256,7 @@ struct fl_import *fl_import_start(const struct fl_load_options *options, struct 
 
 void fl_import_destroy(struct fl_import *started)
 {
-    if (started == NULL)
+    if (!started)
         return;
     fl_importer_finish(&started->importer);
     free(started);
@@ -275,8 +275,8 @@ static void adopt_callbacks(struct fl_importer *importer, const struct fl_load_o
 
 struct fl_scene *fl_scene_create(struct fl_connection *connection, struct fl_error *error)
 {
-    struct fl_scene *scene = calloc(1, sizeof *scene);
-    if (scene == NULL) {
+    struct fl_scene *scene = calloc(1, sizeof(*scene));
+    if (!scene) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
@@ -291,7 +291,7 @@ static struct fl_scene *load_started(struct fl_connection *connection, struct fl
                                      struct fl_error *error)
 {
     struct fl_scene *scene = fl_scene_create(connection, error);
-    if (scene == NULL)
+    if (!scene)
         return NULL;
     const bool loaded = load_with(importer, scene, error);
     fl_importer_stop(importer);
@@ -316,9 +316,9 @@ struct fl_scene *fl_scene_load(struct fl_connection *connection, const struct fl
 {
     struct fl_scene *scene = NULL;
     struct fl_import *started = options->started;
-    if (started == NULL && fl_connection_check(connection, error))
+    if (!started && fl_connection_check(connection, error))
         started = fl_import_start(options, error);
-    if (started == NULL)
+    if (!started)
         return NULL;
     adopt_callbacks(&started->importer, options);
     if (fl_connection_check(connection, error))
@@ -346,7 +346,7 @@ static void take_clips_away(const struct fl_scene *scene)
 /* Answers are not waited for: they are dropped when they come. */
 void fl_scene_destroy(struct fl_scene *scene)
 {
-    if (scene == NULL)
+    if (!scene)
         return;
     struct message close = {.type = MESSAGE_SCENE_CLOSE};
     if (scene->clip_count > 0)

@@ -24,7 +24,7 @@ bool fl_stream_init(struct fl_stream *stream, int fd, uint32_t accept, const cha
     stream->in = malloc(FL_STREAM_BUFFER_BYTES);
     stream->out = malloc(FL_STREAM_BUFFER_BYTES);
     stream->scratch_data = malloc(SCRATCH_BYTES);
-    if (stream->in == NULL || stream->out == NULL || stream->scratch_data == NULL) {
+    if (!stream->in || !stream->out || !stream->scratch_data) {
         fl_stream_finish(stream);
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     }
@@ -35,12 +35,12 @@ bool fl_stream_init(struct fl_stream *stream, int fd, uint32_t accept, const cha
 bool fl_stream_seal(struct fl_stream *stream, const struct sealed_key *key, struct fl_error *error)
 {
     stream->link = sealed_link_client(key);
-    return stream->link != NULL || fl_error_set(error, FL_ERROR_MEMORY, "", "no memory, or no random numbers");
+    return stream->link || fl_error_set(error, FL_ERROR_MEMORY, "", "no memory, or no random numbers");
 }
 
 bool fl_stream_is_whole(const struct fl_stream *stream)
 {
-    return stream->link == NULL || sealed_has_opened_last(stream->link->sealed);
+    return !stream->link || sealed_has_opened_last(stream->link->sealed);
 }
 
 void fl_stream_finish(struct fl_stream *stream)
@@ -100,7 +100,7 @@ void fl_stream_push_payload(struct fl_stream *stream, const struct framing_heade
 
 static bool has_space_to_read(const struct fl_stream *stream)
 {
-    if (stream->link != NULL)
+    if (stream->link)
         return stream->link->in_capacity - sealed_link_unopened(stream->link) > 0;
     return stream->in_end - stream->in_start < FL_STREAM_BUFFER_BYTES;
 }
@@ -109,9 +109,9 @@ static bool has_space_to_read(const struct fl_stream *stream)
 static bool has_something_to_write(const struct fl_stream *stream)
 {
     size_t bytes = 0;
-    if (stream->link == NULL)
+    if (!stream->link)
         return fl_stream_has_output(stream);
-    return sealed_link_waiting(stream->link, &bytes) != NULL ||
+    return sealed_link_waiting(stream->link, &bytes) ||
            (fl_stream_has_output(stream) && sealed_link_room(stream->link) > 0);
 }
 
@@ -135,7 +135,7 @@ static bool lost(const struct fl_stream *stream, int number, struct fl_error *er
 static const uint8_t *next_bytes(struct fl_stream *stream, size_t *bytes)
 {
     *bytes = stream->out_end - stream->out_start;
-    if (stream->link == NULL)
+    if (!stream->link)
         return *bytes > 0 ? stream->out + stream->out_start : NULL;
     stream->out_start += sealed_link_seal(stream->link, stream->out + stream->out_start, *bytes);
     if (stream->is_last && !fl_stream_has_output(stream))
@@ -145,7 +145,7 @@ static const uint8_t *next_bytes(struct fl_stream *stream, size_t *bytes)
 
 static void advance(struct fl_stream *stream, size_t bytes)
 {
-    if (stream->link != NULL)
+    if (stream->link)
         sealed_link_sent(stream->link, bytes);
     else
         stream->out_start += bytes;
@@ -155,7 +155,7 @@ static void drop_output(struct fl_stream *stream)
 {
     size_t bytes = 0;
     stream->out_start = stream->out_end = 0;
-    if (stream->link != NULL && sealed_link_waiting(stream->link, &bytes) != NULL)
+    if (stream->link && sealed_link_waiting(stream->link, &bytes))
         sealed_link_sent(stream->link, bytes);
 }
 
@@ -163,7 +163,7 @@ bool fl_stream_write(struct fl_stream *stream, struct fl_error *error)
 {
     const uint8_t *next;
     size_t bytes;
-    while ((next = next_bytes(stream, &bytes)) != NULL) {
+    while ((next = next_bytes(stream, &bytes))) {
         const ssize_t sent = send(stream->fd, next, bytes, MSG_NOSIGNAL);
         if (sent >= 0) {
             advance(stream, (size_t)sent);
@@ -191,7 +191,7 @@ static bool tell_refusal(enum sealed_status status, struct fl_error *error)
         fl_error_remedy(error, "leave --key and FARLIGHT_KEY out, or start it with --key-file");
     else if (status == SEALED_TOO_MANY)
         fl_error_remedy(error, "try again in a minute");
-    if (error != NULL) {
+    if (error) {
         error->server_code = PROTOCOL_ERROR_CODE_DENIED;
         error->retryable = status == SEALED_TOO_MANY;
         error->retry_after_ms = status == SEALED_TOO_MANY ? 60000 : 0;
@@ -229,7 +229,7 @@ static bool open_records(struct fl_stream *stream, struct fl_error *error)
 /* Bytes that came to where they were to come. */
 static bool take(struct fl_stream *stream, size_t bytes, struct fl_error *error)
 {
-    if (stream->link == NULL) {
+    if (!stream->link) {
         stream->in_end += bytes;
         return true;
     }
@@ -244,8 +244,7 @@ bool fl_stream_transfer(struct fl_stream *stream, struct fl_error *error)
     compact(stream->in, &stream->in_start, &stream->in_end);
     while (!stream->ended && has_space_to_read(stream)) {
         size_t bytes = FL_STREAM_BUFFER_BYTES - stream->in_end;
-        uint8_t *space =
-            stream->link != NULL ? sealed_link_space(stream->link, &bytes) : stream->in + stream->in_end;
+        uint8_t *space = stream->link ? sealed_link_space(stream->link, &bytes) : stream->in + stream->in_end;
         const ssize_t got = recv(stream->fd, space, bytes, 0);
         if (got > 0 && !take(stream, (size_t)got, error))
             return false;
@@ -283,7 +282,7 @@ enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *fra
                                                          stream->in_end - stream->in_start, stream->accept, &why);
         if (result == FRAMING_FATAL)
             return broken(stream, &why, error);
-        if (result == FRAMING_NEED_MORE && stream->link != NULL && sealed_link_has_record(stream->link)) {
+        if (result == FRAMING_NEED_MORE && stream->link && sealed_link_has_record(stream->link)) {
             /* It had no room before; the descriptor will not speak of it again. */
             compact(stream->in, &stream->in_start, &stream->in_end);
             if (!open_records(stream, error))
@@ -293,10 +292,10 @@ enum fl_stream_result fl_stream_next(struct fl_stream *stream, struct frame *fra
         if (result == FRAMING_NEED_MORE)
             return FL_STREAM_NOTHING;
         stream->in_start += frame->consumed_bytes;
-        if (frame->info != NULL)
+        if (frame->info)
             break;
     }
-    if (message == NULL)
+    if (!message)
         return FL_STREAM_MESSAGE;
     scratch_reset(&stream->scratch);
     if (!message_decode(message, frame->header.type, frame->payload, frame->header.payload_bytes, &stream->scratch,

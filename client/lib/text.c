@@ -104,7 +104,7 @@ bool fl_text_vector(const char *text, float vector[3], struct fl_error *error)
         read[i] = (float)value;
         at += length + 1;
     }
-    memcpy(vector, read, sizeof read);
+    memcpy(vector, read, sizeof(read));
     return true;
 }
 
@@ -185,7 +185,7 @@ bool fl_pattern_parse(const char *text, struct fl_pattern *pattern, struct fl_er
 {
     struct fl_pattern made = {0};
     char *out = made.before;
-    size_t room = sizeof made.before;
+    size_t room = sizeof(made.before);
     for (const char *at = text; *at != '\0';) {
         char c = *at;
         size_t length = 1;
@@ -202,7 +202,7 @@ bool fl_pattern_parse(const char *text, struct fl_pattern *pattern, struct fl_er
                                         text);
                 made.digits = digits;
                 out = made.after;
-                room = sizeof made.after;
+                room = sizeof(made.after);
                 continue;
             }
         } else {

@@ -38,7 +38,7 @@ static bool take_failure(struct fl_video *video, const struct message *message, 
 static bool is_temporary_name(const char *name)
 {
     static const char prefix[] = ".farlight-";
-    return strncmp(name, prefix, sizeof prefix - 1) == 0 && strchr(name, '/') == NULL;
+    return strncmp(name, prefix, sizeof(prefix) - 1) == 0 && !strchr(name, '/');
 }
 
 static bool await_begun(struct fl_video *video, struct fl_error *error)
@@ -48,9 +48,9 @@ static bool await_begun(struct fl_video *video, struct fl_error *error)
         return false;
     if (message.type != MESSAGE_VIDEO_BEGUN)
         return take_failure(video, &message, error);
-    snprintf(video->info.encoder, sizeof video->info.encoder, "%s", message.video_begun.encoder);
+    snprintf(video->info.encoder, sizeof(video->info.encoder), "%s", message.video_begun.encoder);
     if (is_temporary_name(message.video_begun.temporary))
-        snprintf(video->temporary, sizeof video->temporary, "%s", message.video_begun.temporary);
+        snprintf(video->temporary, sizeof(video->temporary), "%s", message.video_begun.temporary);
     return true;
 }
 
@@ -72,10 +72,10 @@ static bool check(struct fl_video *video, struct fl_error *error)
 static bool set_folder(struct fl_video *video, const char *path, struct fl_error *error)
 {
     const char *slash = strrchr(path, '/');
-    const size_t length = slash == NULL || slash == path ? 1 : (size_t)(slash - path);
-    if (length >= sizeof video->folder)
+    const size_t length = !slash || slash == path ? 1 : (size_t)(slash - path);
+    if (length >= sizeof(video->folder))
         return fl_error_set(error, FL_ERROR_FILE, "", "the path of the video is too long");
-    memcpy(video->folder, slash == NULL ? "." : path, length);
+    memcpy(video->folder, !slash ? "." : path, length);
     video->folder[length] = '\0';
     return true;
 }
@@ -84,8 +84,8 @@ static bool set_folder(struct fl_video *video, const char *path, struct fl_error
 static bool name_option(struct fl_error *error)
 {
     static const char prefix[] = "video_begin.";
-    const size_t skipped = sizeof prefix - 1;
-    if (error != NULL && strncmp(error->field, prefix, skipped) == 0) {
+    const size_t skipped = sizeof(prefix) - 1;
+    if (error && strncmp(error->field, prefix, skipped) == 0) {
         memmove(error->field, error->field + skipped, strlen(error->field) - skipped + 1);
         error->code = FL_ERROR_ARGUMENT;
     }
@@ -97,13 +97,13 @@ static bool send_begin(struct fl_video *video, const struct fl_video_options *op
     char model[4096];
     struct message message = {.type = MESSAGE_VIDEO_BEGIN};
     struct message_video_begin *begin = &message.video_begin;
-    fl_text_utf8(options->model != NULL ? options->model : "", model, sizeof model);
+    fl_text_utf8(options->model ? options->model : "", model, sizeof(model));
     begin->quality = options->quality;
     begin->lossless = options->lossless ? 1 : 0;
     begin->frames_per_second = options->frames_per_second > 0 ? options->frames_per_second : 24;
     begin->path = options->path;
-    begin->format = options->format != NULL ? options->format : "";
-    begin->codec = options->codec != NULL ? options->codec : "";
+    begin->format = options->format ? options->format : "";
+    begin->codec = options->codec ? options->codec : "";
     begin->model = model;
     if (!fl_helper_send(&video->helper, &message, error))
         return name_option(error);
@@ -112,8 +112,8 @@ static bool send_begin(struct fl_video *video, const struct fl_video_options *op
 
 struct fl_video *fl_video_start(const struct fl_video_options *options, struct fl_error *error)
 {
-    struct fl_video *video = calloc(1, sizeof *video);
-    if (video == NULL) {
+    struct fl_video *video = calloc(1, sizeof(*video));
+    if (!video) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
@@ -123,7 +123,7 @@ struct fl_video *fl_video_start(const struct fl_video_options *options, struct f
                                        .what = "the video writer",
                                        .interrupt_fd = options->interrupt_fd,
                                        .request = 1};
-    fl_shorten_path(options->path, video->path, sizeof video->path);
+    fl_shorten_path(options->path, video->path, sizeof(video->path));
     const char *const arguments[] = {"--folder", video->folder, NULL};
     if (!set_folder(video, options->path, error) || !fl_helper_start(&video->helper, arguments, error) ||
         !send_begin(video, options, error)) {
@@ -186,13 +186,13 @@ void fl_video_set_interrupt(struct fl_video *video, int interrupt_fd)
 
 void fl_video_destroy(struct fl_video *video)
 {
-    if (video == NULL)
+    if (!video)
         return;
     fl_helper_finish(&video->helper);
     /* The writer takes an unfinished file away itself, unless it was killed. */
     if (video->temporary[0] != '\0') {
-        char path[sizeof video->folder + sizeof video->temporary + 1];
-        snprintf(path, sizeof path, "%s/%s", video->folder, video->temporary);
+        char path[sizeof(video->folder) + sizeof(video->temporary) + 1];
+        snprintf(path, sizeof(path), "%s/%s", video->folder, video->temporary);
         unlink(path);
     }
     free(video);

@@ -102,12 +102,12 @@ struct fl_view *fl_view_start(struct fl_scene *scene, const struct fl_view_optio
 {
     struct fl_connection *connection = scene->connection;
     const unsigned in_flight = options->job.frames_in_flight;
-    if (connection->view != NULL) {
+    if (connection->view) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "", "another view is there on this connection");
         return NULL;
     }
-    struct fl_view *view = calloc(1, sizeof *view);
-    if (view == NULL) {
+    struct fl_view *view = calloc(1, sizeof(*view));
+    if (!view) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
@@ -159,9 +159,9 @@ bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uin
     look->command = view->last_command + 1;
     look->moving = camera->moving ? 1 : 0;
     look->time_s = camera->time_s;
-    memcpy(look->eye_world, camera->eye_world, sizeof look->eye_world);
-    memcpy(look->look_at_world, camera->look_at_world, sizeof look->look_at_world);
-    memcpy(look->up_world, camera->up_world, sizeof look->up_world);
+    memcpy(look->eye_world, camera->eye_world, sizeof(look->eye_world));
+    memcpy(look->look_at_world, camera->look_at_world, sizeof(look->look_at_world));
+    memcpy(look->up_world, camera->up_world, sizeof(look->up_world));
     look->fov_y = camera->fov_y;
     look->node = camera->node;
     const uint64_t now_ns = monotonic_now_ns();
@@ -169,7 +169,7 @@ bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uin
         return false;
     view->last_command = look->command;
     view->command_sent_ns[look->command % COMMANDS_REMEMBERED] = now_ns;
-    if (command != NULL)
+    if (command)
         *command = look->command;
     return true;
 }
@@ -222,7 +222,7 @@ static bool send_owed(struct fl_view *view, struct fl_error *error)
 static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *error)
 {
     const struct fl_frame *frame = view->assembly.frame;
-    if (frame == NULL || frame->frame != number || frame->moving || frame->encoding == PROTOCOL_ENCODING_H264)
+    if (!frame || frame->frame != number || frame->moving || frame->encoding == PROTOCOL_ENCODING_H264)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end.abandoned",
                             "frame %u ended unfinished, which only a picture at rest may do", number);
     fl_assembly_finish(&view->assembly);
@@ -233,18 +233,18 @@ static bool take_end(struct fl_view *view, uint64_t change, const struct message
 {
     const uint64_t now_ns = monotonic_now_ns();
     const uint32_t number = message->frame_end.frame;
-    if (view->assembly.frame != NULL)
+    if (view->assembly.frame)
         view->next_frame = number < UINT32_MAX ? number + 1 : number;
     if (message->frame_end.abandoned != 0)
         return abandon(view, number, error);
-    if (view->assembly.frame != NULL) {
+    if (view->assembly.frame) {
         view->last_frame = number;
         view->has_frame = true;
         if (!acknowledge(view, number, true, error))
             return false;
     }
     struct fl_frame *frame = fl_assembly_end(&view->assembly, &message->frame_end, now_ns, error);
-    if (frame == NULL)
+    if (!frame)
         return false;
     frame->change = change;
     if (frame->command > 0 && frame->command <= view->last_command &&
@@ -257,9 +257,10 @@ static bool take_end(struct fl_view *view, uint64_t change, const struct message
 static bool conclude(struct fl_view *view, size_t index, const struct message *message, struct fl_error *error)
 {
     const bool is_newest = index + 1 == view->asked_count;
-    if (view->assembly.frame != NULL && view->assembled_request == view->asked[index].request)
+    if (view->assembly.frame && view->assembled_request == view->asked[index].request)
         fl_assembly_finish(&view->assembly);
-    memmove(&view->asked[index], &view->asked[index + 1], (view->asked_count - index - 1) * sizeof view->asked[0]);
+    memmove(&view->asked[index], &view->asked[index + 1],
+            (view->asked_count - index - 1) * sizeof(view->asked[0]));
     view->asked_count--;
     if (message->type == MESSAGE_ERROR && is_newest)
         fl_error_from_message(&view->failure, &message->error);
@@ -273,7 +274,7 @@ static bool take(struct fl_view *view, size_t index, const struct message *messa
     const uint32_t request = view->asked[index].request;
     switch (message->type) {
     case MESSAGE_FRAME_BEGIN:
-        if (view->assembly.frame == NULL) {
+        if (!view->assembly.frame) {
             view->assembly.expected = view->asked[index].expected;
             view->assembled_request = request;
         }
@@ -344,7 +345,7 @@ struct fl_frame *fl_view_next(struct fl_view *view, unsigned timeout_ms, struct 
 /* The answer is not waited for: what comes until then is dropped. */
 void fl_view_destroy(struct fl_view *view)
 {
-    if (view == NULL)
+    if (!view)
         return;
     struct fl_connection *connection = view->connection;
     for (size_t i = 0; i < view->asked_count; i++) {

@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 static const char frame_line[] = "FRAME\n";
-#define FRAME_LINE_BYTES (sizeof frame_line - 1)
+#define FRAME_LINE_BYTES (sizeof(frame_line) - 1)
 #define EDGE_MAX 8192u
 
 struct fl_y4m {
@@ -34,8 +34,8 @@ struct fl_y4m *fl_y4m_begin(const struct fl_y4m_options *options, struct fl_erro
         fl_error_set(error, FL_ERROR_FILE, "", "the video stream cannot be written: %s", strerror(errno));
         return NULL;
     }
-    struct fl_y4m *y4m = calloc(1, sizeof *y4m);
-    if (y4m == NULL) {
+    struct fl_y4m *y4m = calloc(1, sizeof(*y4m));
+    if (!y4m) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
@@ -110,10 +110,10 @@ static bool write_header(struct fl_y4m *y4m, const struct fl_frame *frame, struc
     fl_rate_exact(rate > 0 ? rate : 24, &numerator, &denominator);
     y4m->frame_bytes = FRAME_LINE_BYTES + luma_bytes + 2 * (half ? half_bytes : luma_bytes);
     if (!ycbcr_converter_init(&y4m->converter, frame->width, frame->height, YCBCR_ALPHA_OVER_BLACK) ||
-        (y4m->frame = malloc(y4m->frame_bytes)) == NULL)
+        !(y4m->frame = malloc(y4m->frame_bytes)))
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     memcpy(y4m->frame, frame_line, FRAME_LINE_BYTES);
-    const int length = snprintf(line, sizeof line, "YUV4MPEG2 W%u H%u F%u:%u Ip A1:1 C%s XCOLORRANGE=LIMITED\n",
+    const int length = snprintf(line, sizeof(line), "YUV4MPEG2 W%u H%u F%u:%u Ip A1:1 C%s XCOLORRANGE=LIMITED\n",
                                 frame->width, frame->height, numerator, denominator, half ? "420mpeg2" : "444");
     return write_all(y4m, (const uint8_t *)line, (size_t)length, error);
 }
@@ -131,7 +131,7 @@ static bool check_frame(const struct fl_y4m *y4m, const struct fl_frame *frame, 
         frame->pixels_bytes != (size_t)frame->width * frame->height * 4)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "size", "%ux%u pixels are not %zu bytes", frame->width,
                             frame->height, frame->pixels_bytes);
-    if (y4m->frame == NULL || (frame->width == y4m->converter.width && frame->height == y4m->converter.height))
+    if (!y4m->frame || (frame->width == y4m->converter.width && frame->height == y4m->converter.height))
         return true;
     fl_error_set(error, FL_ERROR_ARGUMENT, "size", "frame %u has %ux%u pixels, but the video has %ux%u",
                  frame->frame, frame->width, frame->height, y4m->converter.width, y4m->converter.height);
@@ -143,7 +143,7 @@ bool fl_y4m_write(struct fl_y4m *y4m, const struct fl_frame *frame, struct fl_er
     if (!check_frame(y4m, frame, error))
         return false;
     y4m->broken = true; /* until it is not */
-    if (y4m->frame == NULL && !write_header(y4m, frame, error))
+    if (!y4m->frame && !write_header(y4m, frame, error))
         return false;
     const struct ycbcr_target planes = planes_of(y4m);
     ycbcr_convert(&y4m->converter, frame->pixels, &planes);
@@ -155,7 +155,7 @@ bool fl_y4m_write(struct fl_y4m *y4m, const struct fl_frame *frame, struct fl_er
 
 void fl_y4m_end(struct fl_y4m *y4m)
 {
-    if (y4m == NULL)
+    if (!y4m)
         return;
     ycbcr_converter_finish(&y4m->converter);
     free(y4m->frame);

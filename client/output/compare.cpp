@@ -36,14 +36,14 @@ struct comparison {
 bool fail(struct compare_result &result, const char *path, const std::string &reason)
 {
     const size_t length = std::strlen(path);
-    const bool is_long = length >= sizeof result.field;
-    std::snprintf(result.field, sizeof result.field, "%s%s", is_long ? "..." : "",
-                  path + (is_long ? length - sizeof result.field + 4 : 0));
+    const bool is_long = length >= sizeof(result.field);
+    std::snprintf(result.field, sizeof(result.field), "%s%s", is_long ? "..." : "",
+                  path + (is_long ? length - sizeof(result.field) + 4 : 0));
     std::string line = reason.empty() ? "cannot be read" : reason;
     std::replace(line.begin(), line.end(), '\n', ' '); // a library's message may have several lines
     while (!line.empty() && line.back() == ' ')
         line.pop_back();
-    std::snprintf(result.reason, sizeof result.reason, "%s", line.c_str());
+    std::snprintf(result.reason, sizeof(result.reason), "%s", line.c_str());
     return false;
 }
 
@@ -54,7 +54,7 @@ bool read_picture(const struct compare_file &file, struct picture &made, struct 
     size_t count = 0;
     if (file.fd < 0)
         return fail(result, file.path, file.reason);
-    if (!file_read(file.fd, file_bytes_max, &bytes, &count, reason, sizeof reason))
+    if (!file_read(file.fd, file_bytes_max, &bytes, &count, reason, sizeof(reason)))
         return fail(result, file.path, reason);
     const std::unique_ptr<uint8_t, decltype(&std::free)> owner(bytes, std::free);
     std::string why;
@@ -149,9 +149,9 @@ bool write_picture(struct comparison &each, const ImageBuf &screen_a, const Imag
     const ImageBuf errors = algo::maxchan(algo::absdiff(each.a.pixels, each.b.pixels));
     ImageBuf shown = heat_map(errors, answer.heat_top, each.nonfinite);
     if (answer.greatest_error > 0)
-        std::snprintf(scale, sizeof scale, "error, 0 to %.4g", static_cast<double>(answer.heat_top));
+        std::snprintf(scale, sizeof(scale), "error, 0 to %.4g", static_cast<double>(answer.heat_top));
     else
-        std::snprintf(scale, sizeof scale, "no error");
+        std::snprintf(scale, sizeof(scale), "no error");
     if (wanted.layout == PROTOCOL_COMPARISON_LAYOUT_SIDE) {
         const ImageBuf heat = shown;
         shown = side_by_side({&screen_a, &screen_b, &heat}, {wanted.label_a, wanted.label_b, scale});
@@ -161,9 +161,9 @@ bool write_picture(struct comparison &each, const ImageBuf &screen_a, const Imag
     const struct plain_image image = {
         image_format_of(wanted.picture, wanted.format), static_cast<uint32_t>(shown.spec().width),
         static_cast<uint32_t>(shown.spec().height), static_cast<const float *>(shown.localpixels()), scale};
-    if (!image_encode_plain(&image, &file, &file_bytes, reason, sizeof reason))
+    if (!image_encode_plain(&image, &file, &file_bytes, reason, sizeof(reason)))
         return fail(each.result, wanted.picture, reason);
-    const bool written = file_write(wanted.picture, file, file_bytes, reason, sizeof reason);
+    const bool written = file_write(wanted.picture, file, file_bytes, reason, sizeof(reason));
     std::free(file);
     answer.picture_width = image.width;
     answer.picture_height = image.height;
@@ -189,7 +189,7 @@ bool compare(struct comparison &each)
     answer.height = static_cast<uint32_t>(each.a.height());
     answer.channels = static_cast<uint32_t>(each.a.channels());
     answer.space = each.a.linear ? PROTOCOL_COMPARISON_SPACE_LINEAR : PROTOCOL_COMPARISON_SPACE_SRGB;
-    std::snprintf(each.result.channel_names, sizeof each.result.channel_names, "%s",
+    std::snprintf(each.result.channel_names, sizeof(each.result.channel_names), "%s",
                   each.a.channel_names().c_str());
     answer.channel_names = each.result.channel_names;
     measure_errors(each);

@@ -58,7 +58,7 @@ ImageBuf heat_map(const ImageBuf &errors, float top, const std::vector<bool> &ma
     const float scale = top > 0 ? 1 / top : 0;
     const ImageBuf colours =
         algo::color_map(algo::pow(algo::clamp(algo::mul(errors, scale), 0.0f, 1.0f), 0.5f), 0, "inferno");
-    if (colours.localpixels() == nullptr)
+    if (!colours.localpixels())
         throw std::bad_alloc();
     ImageBuf made = make_plane(errors.spec().width, errors.spec().height, 3);
     const float *from = static_cast<const float *>(colours.localpixels());

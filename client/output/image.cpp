@@ -30,7 +30,7 @@ enum image_format format_by_ending(const char *ending)
 {
     for (const known_format &each : known)
         for (const char *name : each.endings)
-            if (name != nullptr && strcasecmp(name, ending) == 0)
+            if (name && strcasecmp(name, ending) == 0)
                 return each.format;
     return IMAGE_UNKNOWN;
 }
@@ -116,7 +116,7 @@ struct pixel_source {
 
 bool write_source(OIIO::ImageOutput &output, const struct pixel_source &source)
 {
-    if (source.layers != nullptr)
+    if (source.layers)
         return write_layers(output, *source.layers);
     return output.write_image(source.type, source.pixels, static_cast<OIIO::stride_t>(source.pixel_bytes));
 }
@@ -126,7 +126,7 @@ bool write_pixels(enum image_format format, const OIIO::ImageSpec &spec, const s
 {
     const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(plugin_of(format));
     OIIO::Filesystem::IOVecOutput memory(file);
-    if (output == nullptr)
+    if (!output)
         why = OIIO::geterror();
     else if (!output->set_ioproxy(&memory))
         why = "this build of OpenImageIO cannot write it to memory";
@@ -143,7 +143,7 @@ bool encode(const struct image &image, std::vector<unsigned char> &file, char *r
     const OIIO::TypeDesc type = stored_type(image.begin->format);
     const struct image *layers = has_layers(*image.begin) ? &image : nullptr;
     std::string why;
-    if (layers != nullptr && (image.format != IMAGE_EXR || image.begin->format != PROTOCOL_PIXEL_FORMAT_RGBA32F))
+    if (layers && (image.format != IMAGE_EXR || image.begin->format != PROTOCOL_PIXEL_FORMAT_RGBA32F))
         return fail(reason, reason_bytes, "only an EXR file, of 32-bit floats, takes layers");
     if (!write_pixels(image.format, make_spec(image), {type, image.pixels, 4 * type.size(), layers}, file, why))
         return fail(reason, reason_bytes, why);
@@ -177,7 +177,7 @@ bool encode_to_memory(const kind_of_image &image, uint8_t **file, size_t *file_b
         if (!encode(image, made, reason, reason_bytes))
             return false;
         *file = static_cast<uint8_t *>(std::malloc(made.size()));
-        if (*file == nullptr)
+        if (!*file)
             return fail(reason, reason_bytes, "out of memory");
         std::memcpy(*file, made.data(), made.size());
         *file_bytes = made.size();
@@ -193,7 +193,7 @@ enum image_format image_format_of(const char *path, const char *fallback)
 {
     const char *slash = std::strrchr(path, '/');
     const char *dot = std::strrchr(path, '.');
-    const bool has_ending = dot != nullptr && (slash == nullptr || dot > slash);
+    const bool has_ending = dot && (!slash || dot > slash);
     const enum image_format format = has_ending ? format_by_ending(dot + 1) : IMAGE_UNKNOWN;
     return format != IMAGE_UNKNOWN ? format : format_by_ending(fallback);
 }

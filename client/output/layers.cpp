@@ -74,12 +74,12 @@ void put_row(const float *from, size_t width, const layer_channel &channel, bool
         float value = from[4 * x + static_cast<size_t>(channel.component)];
         const uint32_t number = number_of(value);
         if (channel.content == content::number) {
-            std::memcpy(to, &number, sizeof number);
+            std::memcpy(to, &number, sizeof(number));
         } else if (half && channel.content == content::colour) {
             value = std::clamp(value, -half_max, half_max); // as the renderer does for half floats
             OIIO::convert_types(OIIO::TypeDesc::FLOAT, &value, OIIO::TypeDesc::HALF, to, 1);
         } else {
-            std::memcpy(to, &value, sizeof value);
+            std::memcpy(to, &value, sizeof(value));
         }
     }
 }

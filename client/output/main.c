@@ -55,7 +55,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
             argp_error(state, "--fps: '%s' is no rate", value);
         return 0;
     case ARGP_KEY_END:
-        if (options->serve.fd < 0 || (options->folder == NULL && options->serve.file_count == 0))
+        if (options->serve.fd < 0 || (!options->folder && options->serve.file_count == 0))
             argp_error(state, "--fd, and --folder or --read, are needed: this program is started by farlight");
         return 0;
     default:
@@ -68,7 +68,7 @@ static void open_files(struct options *options)
 {
     for (size_t i = 0; i < options->serve.file_count; i++) {
         struct compare_file *file = &options->files[i];
-        file->fd = file_open(file->path, file->reason, sizeof file->reason);
+        file->fd = file_open(file->path, file->reason, sizeof(file->reason));
     }
     if (options->serve.file_count > 0)
         compare_prepare();
@@ -88,7 +88,7 @@ static bool enter_sandbox(struct options *options)
                                             .address_space_bytes = UINT64_C(16) << 30};
     char reason[TEXT_MAX] = "";
     open_files(options);
-    if (!image_prepare(reason, sizeof reason) || !sandbox_enter(&sandbox, reason, sizeof reason)) {
+    if (!image_prepare(reason, sizeof(reason)) || !sandbox_enter(&sandbox, reason, sizeof(reason))) {
         fprintf(stderr, "farlight-export: %s\n", reason);
         return false;
     }

@@ -77,7 +77,7 @@ matrix camera_to_ndc(const struct message_frame_begin &begin)
 void add_number(std::vector<entry> &entries, const char *name, double value)
 {
     char text[40];
-    std::snprintf(text, sizeof text, "%.9g", value);
+    std::snprintf(text, sizeof(text), "%.9g", value);
     entries.push_back({name, text, true, static_cast<float>(value)});
 }
 
@@ -132,7 +132,7 @@ std::vector<entry> collect(const struct image &image)
     const struct message_frame_begin &begin = *image.begin;
     const struct message_frame_end &end = *image.end;
     char digest[20];
-    std::snprintf(digest, sizeof digest, "%016" PRIx64, begin.digest);
+    std::snprintf(digest, sizeof(digest), "%016" PRIx64, begin.digest);
     std::vector<entry> entries;
     add_text(entries, "model", image.model);
     add_count(entries, "frame", begin.frame);
@@ -185,8 +185,8 @@ std::string now_text()
     char text[32] = "";
     const std::time_t now = std::time(nullptr);
     struct tm parts = {};
-    if (localtime_r(&now, &parts) != nullptr)
-        std::strftime(text, sizeof text, "%Y:%m:%d %H:%M:%S", &parts);
+    if (localtime_r(&now, &parts))
+        std::strftime(text, sizeof(text), "%Y:%m:%d %H:%M:%S", &parts);
     return text;
 }
 

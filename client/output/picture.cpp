@@ -163,7 +163,7 @@ OIIO::ImageBuf make_plane(int width, int height, int channels)
 {
     OIIO::ImageBuf made(OIIO::ImageSpec(width, height, channels, OIIO::TypeDesc::FLOAT),
                         OIIO::InitializePixels::Yes);
-    if (made.localpixels() == nullptr)
+    if (!made.localpixels())
         throw std::bad_alloc();
     return made;
 }
@@ -171,12 +171,12 @@ OIIO::ImageBuf make_plane(int width, int height, int channels)
 bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made, std::string &reason)
 {
     const signature *kind = signature_of(file, file_bytes);
-    if (kind == nullptr)
+    if (!kind)
         return fail(reason, "is no EXR, HDR, PNG or JPEG image");
     if (is_cut_off(*kind, file, file_bytes))
         return fail(reason, "is cut off: the end of the JPEG image is missing");
     const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(kind->reader);
-    if (input == nullptr)
+    if (!input)
         return fail(reason, OIIO::geterror());
     OIIO::Filesystem::IOMemReader memory(const_cast<uint8_t *>(file), file_bytes); // only read
     OIIO::ImageSpec spec, hints;

@@ -35,11 +35,11 @@ static void start_request(struct request *request, uint32_t number, const struct
     *request = (struct request){.number = number, .named = true};
     request->half = wanted->half != 0;
     request->quality = wanted->quality;
-    snprintf(request->path, sizeof request->path, "%s", wanted->path);
-    snprintf(request->format, sizeof request->format, "%s", wanted->format);
-    snprintf(request->model, sizeof request->model, "%s", wanted->model);
+    snprintf(request->path, sizeof(request->path), "%s", wanted->path);
+    snprintf(request->format, sizeof(request->format), "%s", wanted->format);
+    snprintf(request->model, sizeof(request->model), "%s", wanted->model);
     if (image_format_of(request->path, request->format) == IMAGE_UNKNOWN)
-        snprintf(request->reason, sizeof request->reason, "the ending names no format that can be written");
+        snprintf(request->reason, sizeof(request->reason), "the ending names no format that can be written");
 }
 
 /* False: the sender breaks the protocol. */
@@ -47,8 +47,8 @@ static bool begin_frame(struct request *request, const struct message_frame_begi
 {
     if (!request->named || !incoming_begin(&request->incoming, begin, true))
         return false;
-    if (request->incoming.pixels == NULL && request->reason[0] == '\0')
-        snprintf(request->reason, sizeof request->reason, "no memory for a picture of %ux%u", begin->width,
+    if (!request->incoming.pixels && request->reason[0] == '\0')
+        snprintf(request->reason, sizeof(request->reason), "no memory for a picture of %ux%u", begin->width,
                  begin->height);
     return true;
 }
@@ -66,10 +66,10 @@ static void write_image(struct exporter *exporter, const struct message_frame_en
                                 .pixels = request->incoming.pixels};
     uint8_t *file = NULL;
     size_t file_bytes = 0;
-    if (image_encode(&image, &file, &file_bytes, request->reason, sizeof request->reason))
-        file_write(request->path, file, file_bytes, request->reason, sizeof request->reason);
+    if (image_encode(&image, &file, &file_bytes, request->reason, sizeof(request->reason)))
+        file_write(request->path, file, file_bytes, request->reason, sizeof(request->reason));
     else if (request->reason[0] == '\0')
-        snprintf(request->reason, sizeof request->reason, "cannot be encoded");
+        snprintf(request->reason, sizeof(request->reason), "cannot be encoded");
     free(file);
 }
 
@@ -109,7 +109,7 @@ static bool compare(struct exporter *exporter, uint32_t number, const struct mes
 {
     struct compare_result result = {0};
     const struct compare_file *a = find_file(exporter, wanted->a), *b = find_file(exporter, wanted->b);
-    if (a == NULL || b == NULL)
+    if (!a || !b)
         return false;
     if (!compare_images(wanted, a, b, &result))
         return channel_send_failure(&exporter->channel, number, result.field, result.reason, result.remedy);

@@ -90,13 +90,13 @@ bool similarity_butteraugli(const ImageBuf &a, const ImageBuf &b, struct buttera
     const size_t bytes = width * height * 3 * sizeof(float);
     const std::unique_ptr<JxlButteraugliApi, decltype(&JxlButteraugliApiDestroy)> api(
         JxlButteraugliApiCreate(nullptr), JxlButteraugliApiDestroy);
-    if (api == nullptr)
+    if (!api)
         return false;
     const std::unique_ptr<JxlButteraugliResult, decltype(&JxlButteraugliResultDestroy)> result(
         JxlButteraugliCompute(api.get(), static_cast<uint32_t>(width), static_cast<uint32_t>(height), &format,
                               a.localpixels(), bytes, &format, b.localpixels(), bytes),
         JxlButteraugliResultDestroy);
-    if (result == nullptr)
+    if (!result)
         return false;
     const float *distances = nullptr;
     uint32_t stride = 0;

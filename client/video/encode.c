@@ -86,8 +86,8 @@ static bool open_codec(struct video_encoder *encoder, const struct video_source 
     const struct video_plan *plan = encoder->plan;
     const AVCodec *codec = avcodec_find_encoder_by_name(plan->encoder);
     AVDictionary *options = NULL;
-    AVCodecContext *context = encoder->codec = codec != NULL ? avcodec_alloc_context3(codec) : NULL;
-    if (context == NULL)
+    AVCodecContext *context = encoder->codec = codec ? avcodec_alloc_context3(codec) : NULL;
+    if (!context)
         return video_fail_library(failure, "codec", plan->encoder, AVERROR(ENOMEM));
     describe_pictures(context, plan, source);
     const double key_frames = ceil(KEY_FRAME_SECONDS * av_q2d(context->framerate));
@@ -110,7 +110,7 @@ static bool open_picture(struct video_encoder *encoder, struct video_failure *fa
 {
     AVFrame *picture = encoder->picture = av_frame_alloc();
     encoder->packet = av_packet_alloc();
-    if (picture == NULL || encoder->packet == NULL)
+    if (!picture || !encoder->packet)
         return video_fail_library(failure, "", "a picture", AVERROR(ENOMEM));
     picture->format = encoder->codec->pix_fmt;
     picture->width = encoder->codec->width;
@@ -138,12 +138,12 @@ static bool begin_file(struct video_encoder *encoder, const struct video_source 
     char comment[4200];
     AVDictionary *options = NULL;
     encoder->stream = avformat_new_stream(encoder->format, NULL);
-    if (encoder->stream == NULL || avcodec_parameters_from_context(encoder->stream->codecpar, encoder->codec) < 0)
+    if (!encoder->stream || avcodec_parameters_from_context(encoder->stream->codecpar, encoder->codec) < 0)
         return video_fail_library(failure, "", "a video", AVERROR(ENOMEM));
     encoder->stream->time_base = encoder->codec->time_base;
     encoder->stream->avg_frame_rate = encoder->codec->framerate;
     encoder->stream->sample_aspect_ratio = encoder->codec->sample_aspect_ratio;
-    snprintf(comment, sizeof comment, "farlight " FARLIGHT_VERSION "%s%s", source->model[0] != '\0' ? ": " : "",
+    snprintf(comment, sizeof(comment), "farlight " FARLIGHT_VERSION "%s%s", source->model[0] != '\0' ? ": " : "",
              source->model);
     av_dict_set(&encoder->format->metadata, "comment", comment, 0);
     /* No time of day and no random numbers: the same frames make the same file. */
@@ -158,8 +158,8 @@ static bool begin_file(struct video_encoder *encoder, const struct video_source 
 struct video_encoder *video_encoder_create(const struct video_plan *plan, const struct video_source *source,
                                            struct video_failure *failure)
 {
-    struct video_encoder *encoder = calloc(1, sizeof *encoder);
-    bool good = encoder != NULL &&
+    struct video_encoder *encoder = calloc(1, sizeof(*encoder));
+    bool good = encoder &&
                 ycbcr_converter_init(&encoder->converter, source->width, source->height, YCBCR_ALPHA_OVER_BLACK);
     if (good) {
         encoder->plan = plan;
@@ -259,12 +259,12 @@ void video_encoder_size(const struct video_encoder *encoder, uint32_t *width, ui
 
 void video_encoder_destroy(struct video_encoder *encoder)
 {
-    if (encoder == NULL)
+    if (!encoder)
         return;
     av_packet_free(&encoder->packet);
     av_frame_free(&encoder->picture);
     avcodec_free_context(&encoder->codec);
-    if (encoder->format != NULL)
+    if (encoder->format)
         video_sink_detach(encoder->format);
     avformat_free_context(encoder->format);
     ycbcr_converter_finish(&encoder->converter);

@@ -19,7 +19,7 @@ static void keep(void *context, int level, const char *format, va_list arguments
     if (level > AV_LOG_ERROR)
         return;
     pthread_mutex_lock(&lock);
-    vsnprintf(last_line, sizeof last_line, format, arguments);
+    vsnprintf(last_line, sizeof(last_line), format, arguments);
     last_line[strcspn(last_line, "\r\n")] = '\0';
     pthread_mutex_unlock(&lock);
 }
@@ -35,7 +35,7 @@ bool video_fail(struct video_failure *failure, const char *field, const char *re
     failure->field = field;
     failure->remedy = remedy;
     va_start(arguments, format);
-    vsnprintf(failure->reason, sizeof failure->reason, format, arguments);
+    vsnprintf(failure->reason, sizeof(failure->reason), format, arguments);
     va_end(arguments);
     return false;
 }
@@ -43,7 +43,7 @@ bool video_fail(struct video_failure *failure, const char *field, const char *re
 bool video_fail_library(struct video_failure *failure, const char *field, const char *what, int number)
 {
     char words[AV_ERROR_MAX_STRING_SIZE] = "";
-    av_strerror(number, words, sizeof words);
+    av_strerror(number, words, sizeof(words));
     pthread_mutex_lock(&lock);
     video_fail(failure, field, NULL, "%s: %s%s%s%s", what, words, last_line[0] != '\0' ? " (" : "", last_line,
                last_line[0] != '\0' ? ")" : "");

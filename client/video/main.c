@@ -41,7 +41,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         options->folder = value;
         return 0;
     case ARGP_KEY_END:
-        if (options->fd < 0 || options->folder == NULL)
+        if (options->fd < 0 || !options->folder)
             argp_error(state, "--fd and --folder are needed: this program is started by farlight");
         return 0;
     default:
@@ -58,7 +58,7 @@ static bool enter_sandbox(const struct options *options)
                                             .file_bytes = file_bytes_limit(),
                                             .address_space_bytes = UINT64_C(16) << 30};
     char reason[TEXT_MAX] = "";
-    if (sandbox_enter(&sandbox, reason, sizeof reason))
+    if (sandbox_enter(&sandbox, reason, sizeof(reason)))
         return true;
     fprintf(stderr, "farlight-video: %s\n", reason);
     return false;

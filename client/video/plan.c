@@ -27,20 +27,20 @@ static const char *container_by_ending(const char *ending)
 static const char *container_of(const char *path, const char *fallback)
 {
     const char *slash = strrchr(path, '/'), *dot = strrchr(path, '.');
-    const bool has_ending = dot != NULL && (slash == NULL || dot > slash);
+    const bool has_ending = dot && (!slash || dot > slash);
     const char *container = has_ending ? container_by_ending(dot + 1) : NULL;
-    return container != NULL ? container : container_by_ending(fallback);
+    return container ? container : container_by_ending(fallback);
 }
 
 static const struct choice *choose(const struct message_video_begin *wanted, struct video_failure *failure)
 {
     bool known = wanted->codec[0] == '\0';
-    for (size_t i = 0; i < sizeof choices / sizeof choices[0]; i++) {
+    for (size_t i = 0; i < sizeof(choices) / sizeof(choices[0]); i++) {
         const struct choice *each = &choices[i];
         const bool named = strcmp(each->codec, wanted->codec) == 0;
         known = known || named;
         if ((wanted->codec[0] == '\0' || named) && each->lossless == (wanted->lossless != 0) &&
-            avcodec_find_encoder_by_name(each->encoder) != NULL)
+            avcodec_find_encoder_by_name(each->encoder))
             return each;
         if (named && each->lossless != (wanted->lossless != 0)) {
             video_fail(failure, "codec", NULL, "%s is %slossless, which is %s", each->codec,
@@ -61,11 +61,11 @@ static const struct choice *choose(const struct message_video_begin *wanted, str
 bool video_plan(struct video_plan *plan, const struct message_video_begin *wanted, struct video_failure *failure)
 {
     *plan = (struct video_plan){.container = container_of(wanted->path, wanted->format)};
-    if (plan->container == NULL)
+    if (!plan->container)
         return video_fail(failure, "path", "let it end in .mp4 or .mkv",
                           "the ending names no format of videos that can be written");
     const struct choice *chosen = choose(wanted, failure);
-    if (chosen == NULL)
+    if (!chosen)
         return false;
     if (chosen->lossless && strcmp(plan->container, "mp4") == 0)
         return video_fail(failure, "lossless", "let the file end in .mkv", "an MP4 file does not hold FFV1");

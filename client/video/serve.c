@@ -58,11 +58,11 @@ static bool begin_video(struct session *session, uint32_t number, const struct m
     session->state = STATE_OPEN;
     session->number = number;
     session->frames = 0;
-    snprintf(session->path, sizeof session->path, "%s", wanted->path);
-    snprintf(session->model, sizeof session->model, "%s", wanted->model);
+    snprintf(session->path, sizeof(session->path), "%s", wanted->path);
+    snprintf(session->model, sizeof(session->model), "%s", wanted->model);
     if (!video_plan(&session->plan, wanted, &failure))
         return fail(session, &failure);
-    session->fd = file_begin(session->path, failure.reason, sizeof failure.reason);
+    session->fd = file_begin(session->path, failure.reason, sizeof(failure.reason));
     if (session->fd < 0) {
         failure.field = "path";
         return fail(session, &failure);
@@ -97,7 +97,7 @@ static bool begin_frame(struct session *session, const struct message_frame_begi
     const bool is_good = is_open && check_frame(session, begin, &failure);
     if (!incoming_begin(&session->incoming, begin, is_good))
         return false;
-    if (is_open && is_good && session->incoming.pixels == NULL)
+    if (is_open && is_good && !session->incoming.pixels)
         video_fail(&failure, "size", "render smaller frames", "no memory for a picture of %ux%u", begin->width,
                    begin->height);
     else if (is_good || !is_open)
@@ -111,14 +111,14 @@ static bool begin_frame(struct session *session, const struct message_frame_begi
 static bool encode_frame(struct session *session, struct video_failure *failure)
 {
     const struct incoming *incoming = &session->incoming;
-    if (session->encoder == NULL) {
+    if (!session->encoder) {
         session->width = incoming->begin.width;
         session->height = incoming->begin.height;
         const struct video_source source = {
             .width = session->width, .height = session->height, .model = session->model, .fd = session->fd};
         session->encoder = video_encoder_create(&session->plan, &source, failure);
     }
-    return session->encoder != NULL && video_encoder_write(session->encoder, incoming->pixels, failure);
+    return session->encoder && video_encoder_write(session->encoder, incoming->pixels, failure);
 }
 
 static bool end_frame(struct session *session)
@@ -151,7 +151,7 @@ static bool finish_video(struct session *session, struct video_failure *failure)
     const int fd = session->fd;
     fstat(fd, &status);
     session->fd = -1;
-    if (!file_finish(fd, session->path, failure->reason, sizeof failure->reason)) {
+    if (!file_finish(fd, session->path, failure->reason, sizeof(failure->reason))) {
         failure->field = "path";
         return fail(session, failure);
     }

@@ -64,15 +64,15 @@ static int64_t on_seek(void *opaque, int64_t offset, int whence)
 
 static AVIOContext *open_at_start(struct video_sink *sink, bool writing)
 {
-    struct place *place = calloc(1, sizeof *place);
+    struct place *place = calloc(1, sizeof(*place));
     unsigned char *buffer = av_malloc(BUFFER_BYTES);
     AVIOContext *io = NULL;
-    if (place != NULL && buffer != NULL) {
+    if (place && buffer) {
         place->sink = sink;
         io = avio_alloc_context(buffer, BUFFER_BYTES, writing, place, writing ? NULL : on_read,
                                 writing ? on_write : NULL, on_seek);
     }
-    if (io == NULL) {
+    if (!io) {
         av_free(buffer);
         free(place);
     }
@@ -82,7 +82,7 @@ static AVIOContext *open_at_start(struct video_sink *sink, bool writing)
 static int close_place(AVFormatContext *format, AVIOContext *io)
 {
     (void)format;
-    if (io == NULL)
+    if (!io)
         return 0;
     free(io->opaque);
     av_freep(&io->buffer);
@@ -99,7 +99,7 @@ static int open_again(AVFormatContext *format, AVIOContext **io, const char *url
     if ((flags & AVIO_FLAG_WRITE) != 0)
         return AVERROR(EPERM);
     *io = open_at_start(format->opaque, false);
-    return *io != NULL ? 0 : AVERROR(ENOMEM);
+    return *io ? 0 : AVERROR(ENOMEM);
 }
 
 bool video_sink_attach(struct video_sink *sink, AVFormatContext *format)

@@ -17,7 +17,7 @@ static double dot(const double a[3], const double b[3])
 static void cross(const double a[3], const double b[3], double out[3])
 {
     const double made[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    memcpy(out, made, sizeof made);
+    memcpy(out, made, sizeof(made));
 }
 
 static double unit(double vector[3])
@@ -124,7 +124,7 @@ void camera_focus(struct viewer_camera *camera, const double place[3])
     cross(way, camera->up, side);
     if (!(distance > 0) || dot(side, side) < POLE_MARGIN * POLE_MARGIN / 4)
         return;
-    memcpy(camera->look_at, place, sizeof camera->look_at);
+    memcpy(camera->look_at, place, sizeof(camera->look_at));
 }
 
 void camera_ray(const struct viewer_camera *camera, double aspect, double x, double y, double direction[3])
@@ -156,7 +156,7 @@ void camera_from_frame(struct viewer_camera *camera, const struct fl_frame *fram
     /* A camera that is not tilted turns about the vertical; a tilted one keeps its horizon. */
     const bool is_upright =
         fabs(dot(right, vertical)) < 1e-3 && above[1] > 0 && fabs(dot(into, vertical)) < cos(POLE_MARGIN);
-    memcpy(camera->up, is_upright ? vertical : above, sizeof camera->up);
+    memcpy(camera->up, is_upright ? vertical : above, sizeof(camera->up));
     camera->fov_y = (double)frame->fov_y;
     if (!(camera->fov_y > 0)) {
         const double away = (double)frame->ortho_height / (2 * tan(ORTHOGRAPHIC_FOV / 2));

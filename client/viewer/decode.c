@@ -17,8 +17,8 @@ struct decoder {
 struct decoder *decoder_create(struct fl_error *error)
 {
     const AVCodec *codec = avcodec_find_decoder(AV_CODEC_ID_H264);
-    struct decoder *decoder = calloc(1, sizeof *decoder);
-    if (codec == NULL || decoder == NULL) {
+    struct decoder *decoder = calloc(1, sizeof(*decoder));
+    if (!codec || !decoder) {
         fl_error_set(error, FL_ERROR_SYSTEM, "", "libavcodec has no decoder for H.264");
         free(decoder);
         return NULL;
@@ -27,7 +27,7 @@ struct decoder *decoder_create(struct fl_error *error)
     decoder->context = avcodec_alloc_context3(codec);
     decoder->packet = av_packet_alloc();
     decoder->frame = av_frame_alloc();
-    if (decoder->context != NULL && decoder->packet != NULL && decoder->frame != NULL) {
+    if (decoder->context && decoder->packet && decoder->frame) {
         /* A frame comes out as soon as it is in: threads of whole frames would keep some back. */
         decoder->context->flags |= AV_CODEC_FLAG_LOW_DELAY;
         decoder->context->thread_type = FF_THREAD_SLICE;
@@ -49,7 +49,7 @@ static bool to_pixels(struct decoder *decoder, struct pixmap *picture, struct fl
     decoder->colours =
         sws_getCachedContext(decoder->colours, picture->width, picture->height, (enum AVPixelFormat)frame->format,
                              picture->width, picture->height, AV_PIX_FMT_RGBA, SWS_BILINEAR, NULL, NULL, NULL);
-    if (decoder->colours == NULL ||
+    if (!decoder->colours ||
         sws_setColorspaceDetails(decoder->colours, matrix, is_full, matrix, 1, 0, 1 << 16, 1 << 16) < 0)
         return fl_error_set(error, FL_ERROR_SYSTEM, "", "a frame in H.264 has colours that are not known");
     uint8_t *const planes[] = {picture->pixels};
@@ -88,7 +88,7 @@ bool decoder_decode(struct decoder *decoder, const struct fl_frame *frame, struc
 
 void decoder_destroy(struct decoder *decoder)
 {
-    if (decoder == NULL)
+    if (!decoder)
         return;
     sws_freeContext(decoder->colours);
     av_frame_free(&decoder->frame);

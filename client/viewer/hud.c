@@ -62,7 +62,7 @@ __attribute__((format(printf, 6, 0))) static struct hud_mark *add_text(struct la
                                                                        const char *format, va_list arguments)
 {
     struct hud_mark *mark = add(layout);
-    vsnprintf(mark->text, sizeof mark->text, format, arguments);
+    vsnprintf(mark->text, sizeof(mark->text), format, arguments);
     mark->x = x;
     mark->y = y;
     mark->height = layout->line;
@@ -202,7 +202,7 @@ static double draw_figures(struct layout *layout, double left)
     rows[count++].name = "input to picture";
     print_amount(summary.bits_per_second, "bit/s", rows[count].value, HUD_TEXT_MAX);
     rows[count++].name = "bandwidth";
-    print_amount((double)state->wire_bytes, "B", amount, sizeof amount);
+    print_amount((double)state->wire_bytes, "B", amount, sizeof(amount));
     if (state->quality > 0)
         snprintf(rows[count].value, HUD_TEXT_MAX, "%s, %s %u", amount, protocol_encoding_text(state->encoding),
                  state->quality);
@@ -256,7 +256,7 @@ static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct
     int64_t begin_ns = INT64_MAX, end_ns = INT64_MIN;
     for (size_t back = 0; back < TIMELINE_FRAMES; back++) {
         const struct metrics_frame *frame = metrics_frame(metrics, back);
-        for (int lane = 0; frame != NULL && lane < LANE_COUNT; lane++) {
+        for (int lane = 0; frame && lane < LANE_COUNT; lane++) {
             struct span span;
             if (!metrics_span(frame, (enum lane)lane, offset_ns, &span))
                 continue;
@@ -265,8 +265,7 @@ static bool choose_axis(const struct metrics *metrics, int64_t offset_ns, struct
         }
         /* A pause between frames is not worth its room. */
         const struct metrics_frame *before = metrics_frame(metrics, back + 1);
-        if (frame == NULL || before == NULL ||
-            (double)(begin_ns - (int64_t)before->shown_ns) > TIMELINE_LEAST_NS * 4)
+        if (!frame || !before || (double)(begin_ns - (int64_t)before->shown_ns) > TIMELINE_LEAST_NS * 4)
             break;
     }
     if (end_ns <= begin_ns)
@@ -293,7 +292,7 @@ static void draw_frames(struct layout *layout, const struct axis *axis, double t
     const double s = layout->scale;
     for (size_t back = 0; back < METRICS_FRAMES; back++) {
         const struct metrics_frame *frame = metrics_frame(metrics, back);
-        if (frame == NULL || (int64_t)frame->shown_ns < axis->begin_ns)
+        if (!frame || (int64_t)frame->shown_ns < axis->begin_ns)
             break;
         const bool is_even = frame->frame % 2 == 0;
         for (int lane = 0; lane < LANE_COUNT; lane++) {
@@ -345,9 +344,9 @@ static double draw_legend(struct layout *layout, double bottom)
     if (state->heat == HUD_HEAT_NONE)
         return bottom;
     if (state->heat == HUD_HEAT_WAITING)
-        snprintf(figures, sizeof figures, "the reference is traced ..");
+        snprintf(figures, sizeof(figures), "the reference is traced ..");
     else
-        snprintf(figures, sizeof figures, "mean %.2g, greatest %.2g; %.2g %% of the pixels beyond %g",
+        snprintf(figures, sizeof(figures), "mean %.2g, greatest %.2g; %.2g %% of the pixels beyond %g",
                  state->heat_figures.mean, state->heat_figures.greatest, state->heat_figures.beyond * 100,
                  HEAT_BEYOND);
     const double width = fmax(bar, text_width(layout, HUD_PLAIN, figures)) + 2 * inner;
@@ -380,7 +379,7 @@ static void draw_help(struct layout *layout)
     double line = fmin(usual + 3 * s, (state->height - 2 * inner) / (double)count);
     layout->line = fmin(usual, line);
     for (size_t i = 0; i < input_binding_count; i++) {
-        if (input_bindings[i].keys == NULL)
+        if (!input_bindings[i].keys)
             continue;
         keys = fmax(keys, text_width(layout, HUD_BOLD, input_bindings[i].keys));
         docs = fmax(docs, text_width(layout, HUD_PLAIN, input_bindings[i].doc));
@@ -390,7 +389,7 @@ static void draw_help(struct layout *layout)
     double at = y + inner;
     box(layout, x, y, width, height, (struct hud_colour){14, 17, 22, 235});
     for (size_t i = 0; i < input_binding_count; i++) {
-        if (input_bindings[i].keys == NULL)
+        if (!input_bindings[i].keys)
             continue;
         text(layout, x + inner, at, HUD_BOLD, accent, "%s", input_bindings[i].keys);
         text(layout, x + inner + keys + gap, at, HUD_PLAIN, ink, "%s", input_bindings[i].doc);
@@ -407,7 +406,7 @@ static void draw_status(struct layout *layout)
     const bool is_lost = state->status == HUD_LOST;
     const char *title = is_lost ? "The connection is lost" : "Loading";
     char what[HUD_TEXT_MAX];
-    snprintf(what, sizeof what, "%s", state->status_text);
+    snprintf(what, sizeof(what), "%s", state->status_text);
     const double most = state->width - 2 * inner - 2 * MARGIN * s;
     for (size_t length = strlen(what); length > 4 && text_width(layout, HUD_PLAIN, what) > most; length--)
         strcpy(what + length - 4, "..");

@@ -41,12 +41,12 @@ const struct binding input_bindings[] = {
     {"F12", "f12", ACTION_SCREENSHOT, ACTION_SCREENSHOT, "write farlight-N.png"},
     {"Escape", "escape", ACTION_QUIT, ACTION_QUIT, "close"},
 };
-const size_t input_binding_count = sizeof input_bindings / sizeof input_bindings[0];
+const size_t input_binding_count = sizeof(input_bindings) / sizeof(input_bindings[0]);
 
 enum action input_action(const struct input *input)
 {
     for (size_t i = 0; i < input_binding_count; i++)
-        if (input_bindings[i].key != NULL && strcmp(input_bindings[i].key, input->key) == 0)
+        if (input_bindings[i].key && strcmp(input_bindings[i].key, input->key) == 0)
             return input->shift ? input_bindings[i].with_shift : input_bindings[i].plain;
     return ACTION_NONE;
 }
@@ -54,7 +54,7 @@ enum action input_action(const struct input *input)
 void input_print_bindings(FILE *out)
 {
     for (size_t i = 0; i < input_binding_count; i++)
-        if (input_bindings[i].keys != NULL)
+        if (input_bindings[i].keys)
             fprintf(out, "  %-31s %s\n", input_bindings[i].keys, input_bindings[i].doc);
 }
 

@@ -66,7 +66,7 @@ static error_t name_field(struct cli_job *job, const char *field, bool good)
 {
     if (good)
         return 0;
-    snprintf(job->error.field, sizeof job->error.field, "%s", field);
+    snprintf(job->error.field, sizeof(job->error.field), "%s", field);
     return EINVAL;
 }
 
@@ -82,7 +82,7 @@ static error_t set_integer(struct cli_job *job, const char *field, const char *v
 static error_t set_scale(struct command_line *line, const char *value)
 {
     static const char *const scales[] = {"1", "2", "4", "8"};
-    for (unsigned i = 0; i < sizeof scales / sizeof scales[0]; i++)
+    for (unsigned i = 0; i < sizeof(scales) / sizeof(scales[0]); i++)
         if (strcmp(value, scales[i]) == 0) {
             line->viewer.coarser = i;
             return 0;
@@ -127,7 +127,7 @@ static error_t set_rate(struct command_line *line, const char *value)
 
 static error_t set_model(struct command_line *line, const char *value)
 {
-    if (line->job.model != NULL)
+    if (line->job.model)
         return cli_usage(&line->job, value, "only one model can be looked at");
     line->job.model = value;
     return 0;
@@ -186,7 +186,7 @@ static char *help_filter(int key, const char *text, void *input)
     char *list = NULL;
     size_t bytes = 0;
     FILE *out = key == ARGP_KEY_HELP_POST_DOC ? open_memstream(&list, &bytes) : NULL;
-    if (out == NULL)
+    if (!out)
         return (char *)(uintptr_t)text; /* argp hands it back as const */
     fprintf(out, "%s\n\nKeys:\n", text);
     input_print_bindings(out);
@@ -198,12 +198,12 @@ static bool complete(struct command_line *line)
 {
     struct cli_job *job = &line->job;
     struct viewer_options *viewer = &line->viewer;
-    if (viewer->headless && viewer->replay == NULL)
+    if (viewer->headless && !viewer->replay)
         return cli_usage(job, "--headless", "without a window there is nobody but --replay") == 0;
     if (job->clip_count > 1)
         return cli_usage(job, "--clip", "one clip is played at a time") == 0;
-    if ((job->model != NULL && !cli_check_input(job->model, &job->error)) ||
-        (job->environment != NULL && !cli_check_input(job->environment, &job->error)))
+    if ((job->model && !cli_check_input(job->model, &job->error)) ||
+        (job->environment && !cli_check_input(job->environment, &job->error)))
         return false;
     return cli_job_complete_view(job);
 }
@@ -218,7 +218,7 @@ static void fill(struct command_line *line)
 {
     const struct cli_job *job = &line->job;
     struct viewer_options *viewer = &line->viewer;
-    viewer->server = job->server != NULL && job->server[0] != '\0' ? job->server : NULL;
+    viewer->server = job->server && job->server[0] != '\0' ? job->server : NULL;
     viewer->key_file = cli_key_file(viewer->server, job->key_file);
     viewer->model = job->model;
     viewer->environment = job->environment;

@@ -153,7 +153,7 @@ void metrics_summarise(const struct metrics *metrics, uint64_t now_ns, struct me
     }
     if (latency_count == 0)
         return;
-    qsort(latencies, latency_count, sizeof latencies[0], by_value);
+    qsort(latencies, latency_count, sizeof(latencies[0]), by_value);
     summary->has_latency = true;
     summary->latency_s = latencies[latency_count / 2];
 }

@@ -47,10 +47,10 @@ static TTF_Font *open_font(enum hud_font font, int pixels)
     static const char *const folders[] = {"/usr/share/fonts/truetype/dejavu", "/usr/share/fonts/dejavu",
                                           "/usr/share/fonts/TTF", "/usr/local/share/fonts"};
     const char *chosen = getenv("FARLIGHT_FONT");
-    TTF_Font *opened = chosen != NULL && chosen[0] != '\0' ? TTF_OpenFont(chosen, pixels) : NULL;
+    TTF_Font *opened = chosen && chosen[0] != '\0' ? TTF_OpenFont(chosen, pixels) : NULL;
     char path[256];
-    for (size_t i = 0; i < sizeof folders / sizeof folders[0] && opened == NULL; i++) {
-        snprintf(path, sizeof path, "%s/%s", folders[i], names[font]);
+    for (size_t i = 0; i < sizeof(folders) / sizeof(folders[0]) && !opened; i++) {
+        snprintf(path, sizeof(path), "%s/%s", folders[i], names[font]);
         opened = TTF_OpenFont(path, pixels);
     }
     return opened;
@@ -74,7 +74,7 @@ static double measure(void *user, enum hud_font font, double height, const char 
 {
     int width = 0;
     TTF_Font *loaded = font_of(user, font, height);
-    if (loaded == NULL || TTF_SizeUTF8(loaded, text, &width, NULL) != 0)
+    if (!loaded || TTF_SizeUTF8(loaded, text, &width, NULL) != 0)
         return 0;
     return width;
 }
@@ -84,28 +84,28 @@ static struct drawn_text *find_text(struct painter *painter, TTF_Font *font, con
     struct drawn_text *oldest = &painter->texts[0];
     for (size_t i = 0; i < TEXTS_KEPT; i++) {
         struct drawn_text *drawn = &painter->texts[i];
-        if (drawn->texture != NULL && drawn->font == font && strcmp(drawn->text, text) == 0)
+        if (drawn->texture && drawn->font == font && strcmp(drawn->text, text) == 0)
             return drawn;
         if (drawn->used < oldest->used)
             oldest = drawn;
     }
     SDL_Surface *surface = TTF_RenderUTF8_Blended(font, text, (SDL_Color){255, 255, 255, 255});
-    if (surface == NULL)
+    if (!surface)
         return NULL;
-    if (oldest->texture != NULL)
+    if (oldest->texture)
         SDL_DestroyTexture(oldest->texture);
     *oldest = (struct drawn_text){.font = font, .width = surface->w, .height = surface->h};
     oldest->texture = SDL_CreateTextureFromSurface(painter->renderer, surface);
-    snprintf(oldest->text, sizeof oldest->text, "%s", text);
+    snprintf(oldest->text, sizeof(oldest->text), "%s", text);
     SDL_FreeSurface(surface);
-    return oldest->texture != NULL ? oldest : NULL;
+    return oldest->texture ? oldest : NULL;
 }
 
 static void draw_text(struct painter *painter, const struct hud_mark *mark)
 {
     TTF_Font *font = font_of(painter, mark->font, mark->height);
-    struct drawn_text *drawn = font != NULL ? find_text(painter, font, mark->text) : NULL;
-    if (drawn == NULL)
+    struct drawn_text *drawn = font ? find_text(painter, font, mark->text) : NULL;
+    if (!drawn)
         return;
     drawn->used = painter->drawn;
     const double x = mark->is_right ? mark->x - drawn->width : mark->x;
@@ -120,13 +120,13 @@ static void draw_text(struct painter *painter, const struct hud_mark *mark)
 
 static bool load_picture(struct painter *painter, const struct pixmap *picture)
 {
-    if (painter->texture == NULL || painter->texture_width != picture->width ||
+    if (!painter->texture || painter->texture_width != picture->width ||
         painter->texture_height != picture->height) {
-        if (painter->texture != NULL)
+        if (painter->texture)
             SDL_DestroyTexture(painter->texture);
         painter->texture = SDL_CreateTexture(painter->renderer, SDL_PIXELFORMAT_RGBA32,
                                              SDL_TEXTUREACCESS_STREAMING, picture->width, picture->height);
-        if (painter->texture == NULL)
+        if (!painter->texture)
             return false;
         SDL_SetTextureBlendMode(painter->texture, SDL_BLENDMODE_NONE);
         SDL_SetTextureScaleMode(painter->texture, SDL_ScaleModeLinear);
@@ -182,13 +182,13 @@ void painter_draw(struct painter *painter, int width, int height, const struct p
 
 struct painter *painter_create(SDL_Renderer *renderer, struct fl_error *error)
 {
-    struct painter *painter = calloc(1, sizeof *painter);
-    if (painter == NULL) {
+    struct painter *painter = calloc(1, sizeof(*painter));
+    if (!painter) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
     painter->renderer = renderer;
-    if (TTF_Init() == 0 && font_of(painter, HUD_PLAIN, 17) != NULL)
+    if (TTF_Init() == 0 && font_of(painter, HUD_PLAIN, 17))
         return painter;
     fl_error_set(error, FL_ERROR_FILE, "DejaVuSans.ttf", "this font is not installed");
     fl_error_remedy(error, "install the package fonts-dejavu-core, or name a font in FARLIGHT_FONT");
@@ -198,15 +198,15 @@ struct painter *painter_create(SDL_Renderer *renderer, struct fl_error *error)
 
 void painter_destroy(struct painter *painter)
 {
-    if (painter == NULL)
+    if (!painter)
         return;
     for (size_t i = 0; i < TEXTS_KEPT; i++)
-        if (painter->texts[i].texture != NULL)
+        if (painter->texts[i].texture)
             SDL_DestroyTexture(painter->texts[i].texture);
     for (size_t i = 0; i < painter->font_count; i++)
-        if (painter->fonts[i].loaded != NULL)
+        if (painter->fonts[i].loaded)
             TTF_CloseFont(painter->fonts[i].loaded);
-    if (painter->texture != NULL)
+    if (painter->texture)
         SDL_DestroyTexture(painter->texture);
     if (TTF_WasInit() > 0)
         TTF_Quit();
@@ -220,20 +220,20 @@ bool paint_in_memory(int width, int height, const struct pixmap *picture, const 
         return false;
     SDL_Surface *surface =
         SDL_CreateRGBSurfaceWithFormatFrom(made->pixels, width, height, 32, width * 4, SDL_PIXELFORMAT_RGBA32);
-    SDL_Renderer *renderer = surface != NULL ? SDL_CreateSoftwareRenderer(surface) : NULL;
+    SDL_Renderer *renderer = surface ? SDL_CreateSoftwareRenderer(surface) : NULL;
     struct painter *painter = NULL;
-    if (renderer == NULL)
+    if (!renderer)
         fl_error_set(error, FL_ERROR_SYSTEM, "", "nothing can be drawn: %s", SDL_GetError());
     else
         painter = painter_create(renderer, error);
-    if (painter != NULL) {
+    if (painter) {
         painter_draw(painter, width, height, picture, state);
         SDL_RenderFlush(renderer);
         SDL_RenderPresent(renderer);
     }
     const bool done = painter != NULL;
     painter_destroy(painter);
-    if (renderer != NULL)
+    if (renderer)
         SDL_DestroyRenderer(renderer);
     SDL_FreeSurface(surface);
     return done;

@@ -13,7 +13,7 @@ bool pixmap_resize(struct pixmap *picture, int width, int height, struct fl_erro
     pixmap_finish(picture);
     picture->version = version;
     picture->pixels = malloc((size_t)width * (size_t)height * 4);
-    if (picture->pixels == NULL)
+    if (!picture->pixels)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "no memory for a picture of %dx%d", width, height);
     picture->width = width;
     picture->height = height;

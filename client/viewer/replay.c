@@ -19,9 +19,9 @@ struct reader {
 static bool refuse(struct reader *reader, const char *key, const char *what)
 {
     const struct fl_json_place member = {.outer = &reader->event, .key = key};
-    const struct fl_json_place *place = key != NULL ? &member : &reader->event;
+    const struct fl_json_place *place = key ? &member : &reader->event;
     char name[96];
-    fl_json_path(place, name, sizeof name);
+    fl_json_path(place, name, sizeof(name));
     return fl_error_set(reader->error, FL_ERROR_FILE, reader->path, "line %u: %s: %s",
                         fl_json_line(&reader->json, place), name, what);
 }
@@ -31,7 +31,7 @@ static bool read_number(struct reader *reader, const json_t *event, const char *
                         double *value)
 {
     const json_t *found = json_object_get(event, key);
-    if (found == NULL)
+    if (!found)
         return true;
     const double number = json_number_value(found);
     if (!json_is_number(found) || !(number >= least && number <= greatest))
@@ -43,7 +43,7 @@ static bool read_number(struct reader *reader, const json_t *event, const char *
 static bool read_text(struct reader *reader, const json_t *event, const char *key, char *text, size_t text_bytes)
 {
     const char *found = json_string_value(json_object_get(event, key));
-    if (found == NULL || found[0] == '\0' || strlen(found) >= text_bytes)
+    if (!found || found[0] == '\0' || strlen(found) >= text_bytes)
         return refuse(reader, key, "is no text, or too long");
     strcpy(text, found);
     return true;
@@ -62,10 +62,10 @@ static bool read_mouse(struct reader *reader, const json_t *json, struct replay_
         !read_number(reader, json, "clicks", 1, 3, &clicks))
         return false;
     input->clicks = (unsigned)clicks;
-    for (int i = 0; i < 3 && button != NULL; i++)
+    for (int i = 0; i < 3 && button; i++)
         if (strcmp(button, buttons[i]) == 0)
             input->button = (enum input_button)i;
-    for (int i = 0; i < 3 && kind != NULL; i++)
+    for (int i = 0; i < 3 && kind; i++)
         if (strcmp(kind, kinds[i]) == 0) {
             input->kind = (enum input_kind)(INPUT_BUTTON_DOWN + i);
             return true;
@@ -82,7 +82,7 @@ static bool read_wait(struct reader *reader, const json_t *json, struct replay_e
         !read_number(reader, json, "timeout", 0, SECONDS_MAX, &event->timeout_s))
         return false;
     event->samples = (unsigned)samples;
-    for (int i = 0; i < 3 && name != NULL; i++)
+    for (int i = 0; i < 3 && name; i++)
         if (strcmp(name, names[i]) == 0) {
             event->kind = (enum replay_kind)(REPLAY_REST + i);
             return true;
@@ -106,7 +106,7 @@ static bool read_key(struct reader *reader, const json_t *json, struct replay *r
 {
     double hold_s = 0;
     event->input.kind = INPUT_KEY_DOWN;
-    if (!read_text(reader, json, "key", event->input.key, sizeof event->input.key) ||
+    if (!read_text(reader, json, "key", event->input.key, sizeof(event->input.key)) ||
         !read_number(reader, json, "hold", 0, SECONDS_MAX, &hold_s))
         return false;
     struct replay_event *release = &replay->events[++replay->count];
@@ -124,24 +124,24 @@ static bool read_event(struct reader *reader, const json_t *json, struct replay 
     if (!read_number(reader, json, "after", 0, SECONDS_MAX, &event->after_s))
         return false;
     bool good = false;
-    if (json_object_get(json, "mouse") != NULL) {
+    if (json_object_get(json, "mouse")) {
         good = read_mouse(reader, json, event);
-    } else if (json_object_get(json, "wheel") != NULL) {
+    } else if (json_object_get(json, "wheel")) {
         event->input.kind = INPUT_WHEEL;
         good = read_number(reader, json, "wheel", -1000, 1000, &event->input.wheel);
-    } else if (json_object_get(json, "key") != NULL) {
+    } else if (json_object_get(json, "key")) {
         good = read_key(reader, json, replay, event);
-    } else if (json_object_get(json, "resize") != NULL) {
+    } else if (json_object_get(json, "resize")) {
         good = read_resize(reader, json, event);
-    } else if (json_object_get(json, "wait") != NULL) {
+    } else if (json_object_get(json, "wait")) {
         good = read_wait(reader, json, event);
-    } else if (json_object_get(json, "screenshot") != NULL) {
+    } else if (json_object_get(json, "screenshot")) {
         event->kind = REPLAY_SCREENSHOT;
-        good = read_text(reader, json, "screenshot", event->path, sizeof event->path);
-    } else if (json_object_get(json, "state") != NULL) {
+        good = read_text(reader, json, "screenshot", event->path, sizeof(event->path));
+    } else if (json_object_get(json, "state")) {
         event->kind = REPLAY_STATE;
         good = read_text(reader, json, "state", event->path, 100);
-    } else if (json_object_get(json, "after") != NULL) { /* a pause */
+    } else if (json_object_get(json, "after")) { /* a pause */
         event->kind = REPLAY_INPUT;
         event->input.kind = INPUT_KEY_UP;
         good = true;
@@ -162,8 +162,8 @@ bool replay_load(struct replay *replay, const char *path, struct fl_error *error
     bool good = json_is_array(reader.json.root);
     if (!good)
         fl_error_set(error, FL_ERROR_FILE, path, "is no list of events");
-    replay->events = calloc(2 * count + 1, sizeof *replay->events);
-    if (good && replay->events == NULL)
+    replay->events = calloc(2 * count + 1, sizeof(*replay->events));
+    if (good && !replay->events)
         good = fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     for (size_t i = 0; i < count && good; i++) {
         reader.event = (struct fl_json_place){.index = i};

@@ -44,7 +44,7 @@ struct session {
 static void set_progress(struct session *session, const char *what, double share)
 {
     pthread_mutex_lock(&session->lock);
-    snprintf(session->doing, sizeof session->doing, "%s", what);
+    snprintf(session->doing, sizeof(session->doing), "%s", what);
     session->share = share;
     pthread_mutex_unlock(&session->lock);
 }
@@ -57,7 +57,7 @@ static void on_progress(void *user, uint64_t done_bytes, uint64_t total_bytes, c
 static void on_note(void *user, const struct fl_note *note)
 {
     struct session *session = user;
-    if (session->options.note != NULL && session->times_live == 0)
+    if (session->options.note && session->times_live == 0)
         session->options.note(session->options.user, note);
 }
 
@@ -65,12 +65,12 @@ static void on_note(void *user, const struct fl_note *note)
 static struct fl_scene *come_to_scene(struct session *session, struct fl_error *error)
 {
     const struct session_options *options = &session->options;
-    if (options->scene_name != NULL)
+    if (options->scene_name)
         return fl_scene_attach(session->connection, options->scene_name, error);
     struct fl_scene *scene = NULL;
-    if (session->times_live > 0 && options->server != NULL)
+    if (session->times_live > 0 && options->server)
         scene = fl_scene_attach(session->connection, session->kept_name, error);
-    if (scene != NULL || error->code == FL_ERROR_CONNECTION || error->code == FL_ERROR_INTERRUPTED)
+    if (scene || error->code == FL_ERROR_CONNECTION || error->code == FL_ERROR_INTERRUPTED)
         return scene;
     *error = (struct fl_error){0};
     /* A private daemon ends with its connection, and its scenes with it. */
@@ -79,9 +79,9 @@ static struct fl_scene *come_to_scene(struct session *session, struct fl_error *
                                          .note = on_note,
                                          .progress = on_progress,
                                          .user = session,
-                                         .sharing = options->server != NULL ? PROTOCOL_SHARING_KEPT
-                                                                            : PROTOCOL_SHARING_PRIVATE,
-                                         .scene_name = options->server != NULL ? session->kept_name : NULL};
+                                         .sharing =
+                                             options->server ? PROTOCOL_SHARING_KEPT : PROTOCOL_SHARING_PRIVATE,
+                                         .scene_name = options->server ? session->kept_name : NULL};
     return fl_scene_load(session->connection, &load, error);
 }
 
@@ -95,9 +95,9 @@ static void *open_all(void *argument)
                                                .can_h264 = true,
                                                .interrupt_fd = options->interrupt_fd,
                                                .timeout_ms = session->times_live > 0 ? AGAIN_TIMEOUT_MS : 0};
-    set_progress(session, options->server != NULL ? options->server : "a daemon is started", 0);
+    set_progress(session, options->server ? options->server : "a daemon is started", 0);
     session->connection = fl_connect(&connect, &session->open_error);
-    if (session->connection != NULL)
+    if (session->connection)
         session->scene = come_to_scene(session, &session->open_error);
     atomic_store(&session->opened, true);
     return NULL;
@@ -143,7 +143,7 @@ static void end_opening(struct session *session, uint64_t now_ns)
 {
     pthread_join(session->thread, NULL);
     session->has_thread = false;
-    if (session->scene == NULL) {
+    if (!session->scene) {
         const struct fl_error error = session->open_error;
         lose(session, &error, now_ns);
         return;
@@ -171,16 +171,16 @@ enum session_state session_step(struct session *session, uint64_t now_ns)
 
 struct session *session_create(const struct session_options *options, struct fl_error *error)
 {
-    struct session *session = calloc(1, sizeof *session);
+    struct session *session = calloc(1, sizeof(*session));
     uint64_t number = 0;
-    if (session == NULL || getrandom(&number, sizeof number, 0) != (ssize_t)sizeof number) {
+    if (!session || getrandom(&number, sizeof(number), 0) != (ssize_t)sizeof(number)) {
         fl_error_set(error, FL_ERROR_SYSTEM, "", "no memory, or no random numbers");
         free(session);
         return NULL;
     }
     session->options = *options;
     session->pause_ns = FIRST_PAUSE_NS;
-    snprintf(session->kept_name, sizeof session->kept_name, "view-%016" PRIx64, number);
+    snprintf(session->kept_name, sizeof(session->kept_name), "view-%016" PRIx64, number);
     pthread_mutex_init(&session->lock, NULL);
     if (begin_opening(session))
         return session;
@@ -192,11 +192,11 @@ struct session *session_create(const struct session_options *options, struct fl_
 /* Without waiting for a daemon that does not answer: the interruption descriptor is readable by then. */
 void session_destroy(struct session *session)
 {
-    if (session == NULL)
+    if (!session)
         return;
     if (session->has_thread)
         pthread_join(session->thread, NULL);
-    if (session->connection != NULL)
+    if (session->connection)
         fl_connection_set_interrupt(session->connection, 0);
     close_all(session);
     pthread_mutex_destroy(&session->lock);
@@ -211,7 +211,7 @@ unsigned session_times_live(const struct session *session)
 const char *session_progress(struct session *session, double *share)
 {
     pthread_mutex_lock(&session->lock);
-    memcpy(session->doing_copy, session->doing, sizeof session->doing);
+    memcpy(session->doing_copy, session->doing, sizeof(session->doing));
     *share = session->share;
     pthread_mutex_unlock(&session->lock);
     return session->doing_copy;
@@ -266,22 +266,22 @@ static bool fail(struct session *session, const struct fl_error *error, struct f
 bool session_show(struct session *session, const struct fl_view_options *options, uint64_t *change)
 {
     struct fl_error error = {0}, ignored;
-    if (session->view != NULL && fl_view_change(session->view, options, &error)) {
+    if (session->view && fl_view_change(session->view, options, &error)) {
         *change = ++session->changes;
         return true;
     }
-    if (session->view != NULL && error.code != FL_ERROR_REFUSED)
+    if (session->view && error.code != FL_ERROR_REFUSED)
         return fail(session, &error, &ignored);
     fl_view_destroy(session->view); /* it was refused from the beginning */
     session->changes = *change = 0;
     session->view = fl_view_start(session->scene, options, &error);
-    return session->view != NULL || fail(session, &error, &ignored);
+    return session->view || fail(session, &error, &ignored);
 }
 
 bool session_look(struct session *session, const struct fl_view_camera *camera, uint64_t *command)
 {
     struct fl_error error = {0}, ignored;
-    if (session->view == NULL)
+    if (!session->view)
         return false;
     return fl_view_look(session->view, camera, command, &error) || fail(session, &error, &ignored);
 }
@@ -289,7 +289,7 @@ bool session_look(struct session *session, const struct fl_view_camera *camera, 
 void session_want_key_frame(struct session *session)
 {
     struct fl_error error = {0}, ignored;
-    if (session->view != NULL && !fl_view_want_key_frame(session->view, &error))
+    if (session->view && !fl_view_want_key_frame(session->view, &error))
         fail(session, &error, &ignored);
 }
 
@@ -297,10 +297,10 @@ struct fl_frame *session_next(struct session *session, unsigned timeout_ms, stru
 {
     struct fl_error error = {0};
     *refusal = (struct fl_error){0};
-    if (session->view == NULL)
+    if (!session->view)
         return NULL;
     struct fl_frame *frame = fl_view_next(session->view, timeout_ms, &error);
-    if (frame == NULL && error.code != FL_ERROR_NONE)
+    if (!frame && error.code != FL_ERROR_NONE)
         fail(session, &error, refusal);
     return frame;
 }
@@ -312,7 +312,7 @@ bool session_ask(struct session *session, const struct fl_job_options *options, 
     struct fl_error error = {0};
     session_give_up(session);
     session->job = fl_render_start(session->scene, options, &error);
-    return session->job != NULL || fail(session, &error, refusal);
+    return session->job || fail(session, &error, refusal);
 }
 
 struct fl_frame *session_answer(struct session *session, struct fl_error *refusal)
@@ -320,12 +320,12 @@ struct fl_frame *session_answer(struct session *session, struct fl_error *refusa
     struct fl_error error = {0};
     bool done = false;
     *refusal = (struct fl_error){0};
-    if (session->job == NULL)
+    if (!session->job)
         return NULL;
     struct fl_frame *frame = fl_render_poll(session->job, 0, &done, &error);
-    if (frame == NULL && error.code != FL_ERROR_NONE)
+    if (!frame && error.code != FL_ERROR_NONE)
         fail(session, &error, refusal);
-    if (frame != NULL || refusal->code != FL_ERROR_NONE) {
+    if (frame || refusal->code != FL_ERROR_NONE) {
         fl_render_destroy(session->job);
         session->job = NULL;
     }

@@ -8,8 +8,8 @@ bool snapshot_write(const char *path, const struct pixmap *picture, struct fl_er
 {
     char folder[4096] = ".";
     const char *slash = strrchr(path, '/');
-    if (slash != NULL)
-        snprintf(folder, sizeof folder, "%.*s", slash == path ? 1 : (int)(slash - path), path);
+    if (slash)
+        snprintf(folder, sizeof(folder), "%.*s", slash == path ? 1 : (int)(slash - path), path);
     const struct fl_frame frame = {.width = (uint32_t)picture->width,
                                    .height = (uint32_t)picture->height,
                                    .samples = 1,
@@ -19,7 +19,7 @@ bool snapshot_write(const char *path, const struct pixmap *picture, struct fl_er
                                    .pixels_bytes = (size_t)picture->width * (size_t)picture->height * 4};
     struct fl_exporter *exporter = fl_exporter_start(&(struct fl_exporter_options){.folder = folder}, error);
     const bool done =
-        exporter != NULL &&
+        exporter &&
         fl_exporter_write(exporter, &frame, &(struct fl_export_options){.path = path, .format = "png"}, error) &&
         fl_exporter_wait(exporter, error);
     fl_exporter_destroy(exporter);

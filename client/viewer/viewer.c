@@ -23,7 +23,7 @@ void viewer_say(struct viewer *viewer, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(viewer->notice, sizeof viewer->notice, format, arguments);
+    vsnprintf(viewer->notice, sizeof(viewer->notice), format, arguments);
     va_end(arguments);
     viewer->notice_ns = monotonic_now_ns() + NOTICE_NS;
     viewer->must_draw = true;
@@ -41,15 +41,15 @@ static bool settle(struct viewer *viewer, struct fl_error *error)
     uint32_t clip = 0;
     tour_begin(&viewer->tour, fl_scene_camera_count(scene), fl_scene_clip_count(scene));
     viewer->tour.speed = options->speed;
-    if (options->camera != NULL) {
+    if (options->camera) {
         job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
         if (!fl_scene_find_camera(scene, options->camera, &job->camera_node, error))
             return false;
-    } else if (job->key_count == 0 && first != NULL) {
+    } else if (job->key_count == 0 && first) {
         job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
         job->camera_node = first->node;
     }
-    if (options->clip == NULL)
+    if (!options->clip)
         return true;
     if (!fl_scene_find_clip(scene, options->clip, &clip, NULL, error))
         return false;
@@ -99,11 +99,11 @@ static void tick(struct viewer *viewer, uint64_t now_ns)
 static void take_input(struct viewer *viewer, uint64_t now_ns)
 {
     struct input input;
-    while (viewer->window != NULL && window_poll(viewer->window, &input))
+    while (viewer->window && window_poll(viewer->window, &input))
         /* A replay is not disturbed but by the end. */
-        if (viewer->options->replay == NULL || input.kind == INPUT_QUIT || input.kind == INPUT_RESIZE)
+        if (!viewer->options->replay || input.kind == INPUT_QUIT || input.kind == INPUT_RESIZE)
             viewer_input(viewer, &input);
-    if (viewer->options->replay != NULL)
+    if (viewer->options->replay)
         viewer_replay(viewer, now_ns);
 }
 
@@ -132,7 +132,7 @@ static void serve(struct viewer *viewer, uint64_t now_ns)
 static void draw(struct viewer *viewer)
 {
     struct hud_state state;
-    if (viewer->window == NULL)
+    if (!viewer->window)
         return;
     viewer->must_draw |= window_wants_drawing(viewer->window);
     if (!viewer->must_draw && monotonic_now_ns() < viewer->drawn_ns + REDRAW_NS)
@@ -171,12 +171,12 @@ static bool open_viewer(struct viewer *viewer, struct fl_error *error)
                                             .scene_name = options->scene_name,
                                             .interrupt_fd = options->interrupt_fd,
                                             .note = options->note};
-    if (options->replay != NULL && !replay_load(&viewer->replay, options->replay, error))
+    if (options->replay && !replay_load(&viewer->replay, options->replay, error))
         return false;
     if (!options->headless) {
-        viewer->window = window_create(options->scene_name != NULL ? options->scene_name : options->model,
-                                       viewer->width, viewer->height, error);
-        if (viewer->window == NULL)
+        viewer->window = window_create(options->scene_name ? options->scene_name : options->model, viewer->width,
+                                       viewer->height, error);
+        if (!viewer->window)
             return false;
         window_size(viewer->window, &viewer->width, &viewer->height, &viewer->scale);
     }
@@ -190,7 +190,7 @@ static void close_viewer(struct viewer *viewer)
 {
     const uint64_t one = 1;
     /* Whoever still opens a connection in the other thread gives up. */
-    if (write(viewer->options->interrupt_fd, &one, sizeof one) < 0)
+    if (write(viewer->options->interrupt_fd, &one, sizeof(one)) < 0)
         errno = 0; /* it is readable already */
     window_destroy(viewer->window);
     session_destroy(viewer->session);
@@ -203,8 +203,8 @@ static void close_viewer(struct viewer *viewer)
 
 bool viewer_run(const struct viewer_options *options, struct fl_error *error)
 {
-    struct viewer *viewer = calloc(1, sizeof *viewer);
-    if (viewer == NULL)
+    struct viewer *viewer = calloc(1, sizeof(*viewer));
+    if (!viewer)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     viewer->options = options;
     viewer->view = options->view;

@@ -14,7 +14,7 @@ void viewer_choose_clip(struct viewer *viewer, int clip)
 {
     const struct fl_clip_info *info =
         clip != TOUR_NONE ? fl_scene_clip(session_scene(viewer->session), (size_t)clip) : NULL;
-    tour_set_duration(&viewer->tour, info != NULL ? (double)info->duration_s : 0);
+    tour_set_duration(&viewer->tour, info ? (double)info->duration_s : 0);
     viewer->must_show = true;
     viewer->moved_ns = monotonic_now_ns();
 }
@@ -67,7 +67,7 @@ static void screenshot(struct viewer *viewer)
 {
     char path[64];
     struct fl_error error = {0};
-    snprintf(path, sizeof path, "farlight-%u.png", ++viewer->screenshots);
+    snprintf(path, sizeof(path), "farlight-%u.png", ++viewer->screenshots);
     if (viewer_screenshot(viewer, path, &error))
         viewer_say(viewer, "%s is written", path);
     else
@@ -122,9 +122,9 @@ static void act(struct viewer *viewer, enum action action)
         viewer->quit = true;
     else if (action == ACTION_SCREENSHOT)
         screenshot(viewer);
-    else if (action == ACTION_FULL_SCREEN && viewer->window != NULL)
+    else if (action == ACTION_FULL_SCREEN && viewer->window)
         window_toggle_full_screen(viewer->window);
-    else if (session_scene(viewer->session) != NULL)
+    else if (session_scene(viewer->session))
         act_on_scene(viewer, action);
 }
 
@@ -177,7 +177,7 @@ static bool has_come(const struct viewer *viewer, const struct replay_event *eve
     case REPLAY_LIVE:
         return is_live && viewer->has_camera && viewer->frames > 0;
     case REPLAY_LOST:
-        return viewer->times_live > 0 && session_scene(viewer->session) == NULL;
+        return viewer->times_live > 0 && !session_scene(viewer->session);
     default:
         return true;
     }

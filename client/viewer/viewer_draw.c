@@ -18,7 +18,7 @@ const struct pixmap *viewer_picture(const struct viewer *viewer)
 static const char *file_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
+    return slash ? slash + 1 : path;
 }
 
 static void fill_names(struct viewer *viewer, struct hud_state *state)
@@ -26,12 +26,12 @@ static void fill_names(struct viewer *viewer, struct hud_state *state)
     const struct viewer_options *options = viewer->options;
     struct fl_scene *scene = session_scene(viewer->session);
     const struct tour *tour = &viewer->tour;
-    state->scene = options->scene_name != NULL ? options->scene_name : file_name(options->model);
-    state->server = options->server != NULL ? options->server : "";
+    state->scene = options->scene_name ? options->scene_name : file_name(options->model);
+    state->server = options->server ? options->server : "";
     state->camera = state->clip = "";
-    if (scene != NULL && tour->camera != TOUR_NONE)
+    if (scene && tour->camera != TOUR_NONE)
         state->camera = fl_scene_camera(scene, (size_t)tour->camera)->name;
-    if (scene != NULL && tour->clip != TOUR_NONE)
+    if (scene && tour->clip != TOUR_NONE)
         state->clip = fl_scene_clip(scene, (size_t)tour->clip)->name;
 }
 
@@ -41,9 +41,9 @@ static void fill_status(struct viewer *viewer, struct hud_state *state)
     const bool was_live = viewer->times_live > 0;
     text[0] = '\0';
     state->status_text = text;
-    if (session_scene(viewer->session) != NULL) {
+    if (session_scene(viewer->session)) {
         state->status = viewer->frames > 0 ? HUD_LIVE : HUD_LOADING;
-        snprintf(text, sizeof text, "the first picture is made");
+        snprintf(text, sizeof(text), "the first picture is made");
         return;
     }
     state->status = was_live ? HUD_LOST : HUD_LOADING;
@@ -51,11 +51,11 @@ static void fill_status(struct viewer *viewer, struct hud_state *state)
     if (was_live && error->code != FL_ERROR_NONE) {
         const uint64_t retry_ns = session_retry_ns(viewer->session), now_ns = state->now_ns;
         const double left_s = retry_ns > now_ns ? (double)(retry_ns - now_ns) * 1e-9 : 0;
-        snprintf(text, sizeof text, "%.80s; trying again in %.1f s", error->text, left_s);
+        snprintf(text, sizeof(text), "%.80s; trying again in %.1f s", error->text, left_s);
         return;
     }
     const char *what = session_progress(viewer->session, &state->progress);
-    snprintf(text, sizeof text, "%s%.100s", was_live ? "trying again: " : "", what);
+    snprintf(text, sizeof(text), "%s%.100s", was_live ? "trying again: " : "", what);
 }
 
 void viewer_hud(struct viewer *viewer, struct hud_state *state)
@@ -130,14 +130,14 @@ void viewer_print_state(struct viewer *viewer, const char *name)
         (int)viewer->tour.playing, "eye", vector_json(viewer->camera.eye), "look_at",
         vector_json(viewer->camera.look_at), "fov_y", viewer->camera.fov_y, "frames_per_second",
         summary.frames_per_second, "latency_s", summary.latency_s);
-    if (line != NULL && viewer->has_heat)
+    if (line && viewer->has_heat)
         json_object_set_new(line, "errors",
                             json_pack("{s:f, s:f, s:f}", "mean", viewer->heat_figures.mean, "greatest",
                                       viewer->heat_figures.greatest, "beyond", viewer->heat_figures.beyond));
-    if (line != NULL && viewer->notice_ns > state.now_ns)
+    if (line && viewer->notice_ns > state.now_ns)
         json_object_set_new(line, "notice", json_string(viewer->notice));
     char *text = json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(9));
-    if (text != NULL)
+    if (text)
         puts(text);
     fflush(stdout);
     free(text);

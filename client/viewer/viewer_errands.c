@@ -22,7 +22,7 @@ uint32_t viewer_home_node(const struct viewer *viewer)
 void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32_t node)
 {
     viewer->followed = node;
-    if (!viewer->has_camera || viewer->options->replay != NULL) {
+    if (!viewer->has_camera || viewer->options->replay) {
         viewer->camera = *camera;
         viewer->glide_begin_ns = 0;
     } else {
@@ -56,9 +56,9 @@ static void fill_key(const struct viewer_camera *camera, struct record_camera_ke
 {
     struct fl_view_camera out;
     camera_export(camera, &out);
-    memcpy(key->eye_world, out.eye_world, sizeof key->eye_world);
-    memcpy(key->look_at_world, out.look_at_world, sizeof key->look_at_world);
-    memcpy(key->up_world, out.up_world, sizeof key->up_world);
+    memcpy(key->eye_world, out.eye_world, sizeof(key->eye_world));
+    memcpy(key->look_at_world, out.look_at_world, sizeof(key->look_at_world));
+    memcpy(key->up_world, out.up_world, sizeof(key->up_world));
     key->fov_y = out.fov_y;
 }
 
@@ -81,7 +81,7 @@ static void use_clip(const struct viewer *viewer, struct fl_job_options *job, st
     const struct tour *tour = &viewer->tour;
     const struct fl_clip_info *clip =
         tour->clip != TOUR_NONE ? fl_scene_clip(session_scene(viewer->session), (size_t)tour->clip) : NULL;
-    if (clip == NULL || clip->clip == 0)
+    if (!clip || clip->clip == 0)
         return;
     *use = (struct record_clip_use){.clip = clip->clip, .start_s = -(float)tour->time_s, .speed = 1, .loop = 1};
     job->clips = use;
@@ -156,7 +156,7 @@ static bool ask(struct viewer *viewer, enum errand errand, struct fl_error *refu
 static bool met(const struct fl_frame *frame, double place[3])
 {
     float values[4];
-    memcpy(values, frame->pixels, sizeof values);
+    memcpy(values, frame->pixels, sizeof(values));
     for (int i = 0; i < 3; i++)
         place[i] = (double)values[i];
     return values[3] > 0;
@@ -285,7 +285,7 @@ void viewer_errands(struct viewer *viewer)
             refuse(viewer, next, &refusal);
     }
     struct fl_frame *frame = session_answer(viewer->session, &refusal);
-    if (frame != NULL)
+    if (frame)
         take(viewer, frame);
     else if (refusal.code != FL_ERROR_NONE)
         refuse(viewer, viewer->errand, &refusal);

@@ -51,7 +51,7 @@ static void show(struct viewer *viewer)
     /* Else most of the "truth" would be the rasteriser's. */
     if (!viewer->options->has_primary && settings->tracer == PROTOCOL_TRACER_REFERENCE)
         view.job.primary = PROTOCOL_PRIMARY_TRACE;
-    if (clip != NULL && clip->clip != 0) {
+    if (clip && clip->clip != 0) {
         use.clip = clip->clip;
         view.job.clips = &use;
         view.job.clip_count = 1;
@@ -91,13 +91,13 @@ void viewer_tell(struct viewer *viewer, uint64_t now_ns)
 static bool decode(struct viewer *viewer, struct fl_frame *frame)
 {
     struct fl_error error = {0};
-    if (frame->encoded == NULL) {
+    if (!frame->encoded) {
         pixmap_take(&viewer->live, frame);
         return true;
     }
-    if (viewer->decoder == NULL)
+    if (!viewer->decoder)
         viewer->decoder = decoder_create(&viewer->failure);
-    if (viewer->decoder != NULL && decoder_decode(viewer->decoder, frame, &viewer->live, &error))
+    if (viewer->decoder && decoder_decode(viewer->decoder, frame, &viewer->live, &error))
         return true;
     session_want_key_frame(viewer->session);
     return false;
@@ -139,7 +139,7 @@ void viewer_receive(struct viewer *viewer, unsigned timeout_ms)
 {
     struct fl_error refusal = {0};
     struct fl_frame *frame = session_next(viewer->session, timeout_ms, &refusal);
-    for (unsigned count = 1; frame != NULL; count++) {
+    for (unsigned count = 1; frame; count++) {
         take(viewer, frame);
         fl_frame_destroy(frame);
         frame = count < FRAMES_AT_ONCE ? session_next(viewer->session, 0, &refusal) : NULL;

@@ -18,14 +18,14 @@ struct window {
 static bool is_seen(const char *driver)
 {
     const char *asked = getenv("SDL_VIDEODRIVER");
-    return (asked != NULL && asked[0] != '\0') || (driver != NULL && strcmp(driver, "offscreen") != 0 &&
-                                                   strcmp(driver, "dummy") != 0 && strcmp(driver, "evdev") != 0);
+    return (asked && asked[0] != '\0') || (driver && strcmp(driver, "offscreen") != 0 &&
+                                           strcmp(driver, "dummy") != 0 && strcmp(driver, "evdev") != 0);
 }
 
 struct window *window_create(const char *title, int width, int height, struct fl_error *error)
 {
-    struct window *made = calloc(1, sizeof *made);
-    if (made == NULL) {
+    struct window *made = calloc(1, sizeof(*made));
+    if (!made) {
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
@@ -40,13 +40,13 @@ struct window *window_create(const char *title, int width, int height, struct fl
     SDL_EnableScreenSaver();
     made->window = SDL_CreateWindow(title, SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
                                     SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
-    if (made->window != NULL)
+    if (made->window)
         made->renderer = SDL_CreateRenderer(made->window, -1, SDL_RENDERER_PRESENTVSYNC);
-    if (made->renderer == NULL)
+    if (!made->renderer)
         fl_error_set(error, FL_ERROR_SYSTEM, "", "the window cannot be made: %s", SDL_GetError());
     else
         made->painter = painter_create(made->renderer, error);
-    if (made->painter == NULL) {
+    if (!made->painter) {
         window_destroy(made);
         return NULL;
     }
@@ -71,7 +71,7 @@ static void take_key(const SDL_Event *event, struct input *input)
 {
     const char *name = SDL_GetKeyName(event->key.keysym.sym);
     size_t length = 0;
-    for (; name[length] != '\0' && length + 1 < sizeof input->key; length++)
+    for (; name[length] != '\0' && length + 1 < sizeof(input->key); length++)
         input->key[length] = (char)tolower((unsigned char)name[length]);
     input->kind = event->type == SDL_KEYDOWN ? INPUT_KEY_DOWN : INPUT_KEY_UP;
 }
@@ -176,12 +176,12 @@ void window_toggle_full_screen(struct window *window)
 
 void window_destroy(struct window *window)
 {
-    if (window == NULL)
+    if (!window)
         return;
     painter_destroy(window->painter);
-    if (window->renderer != NULL)
+    if (window->renderer)
         SDL_DestroyRenderer(window->renderer);
-    if (window->window != NULL)
+    if (window->window)
         SDL_DestroyWindow(window->window);
     SDL_Quit();
     free(window);

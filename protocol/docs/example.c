@@ -37,13 +37,13 @@ static void show(const char *what, uint32_t request, uint32_t channel, const str
 {
     static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
     struct writer writer;
-    writer_init(&writer, bytes, sizeof bytes);
+    writer_init(&writer, bytes, sizeof(bytes));
     if (!message_write(&writer, request, channel, message)) {
         fprintf(stderr, "%s: %s: %s\n", what, writer.error.field, writer.error.text);
         exit(1);
     }
     char title[128];
-    snprintf(title, sizeof title, "%s, `%s`", what, message_type_text(message->type));
+    snprintf(title, sizeof(title), "%s, `%s`", what, message_type_text(message->type));
     print_bytes(title, bytes, writer.used_bytes);
 }
 
@@ -74,7 +74,7 @@ static void print_hello(void)
 {
     uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
     struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "example"};
-    for (uint8_t i = 0; i < sizeof hello.nonce; i++) {
+    for (uint8_t i = 0; i < sizeof(hello.nonce); i++) {
         hello.nonce[i] = i;
     }
     print_bytes("Client, hello", bytes, handshake_hello_encode(bytes, &hello));
@@ -90,7 +90,7 @@ static void print_hello(void)
 static void print_blob(uint32_t request, const struct record_blob_ref *reference, const void *data)
 {
     struct message message = made(MESSAGE_BLOB_DATA);
-    memcpy(message.blob_data.hash, reference->hash, sizeof reference->hash);
+    memcpy(message.blob_data.hash, reference->hash, sizeof(reference->hash));
     message.blob_data.data = data;
     message.blob_data.data_bytes = (uint32_t)reference->size_bytes;
     show("Client", request, 1, &message);
@@ -137,7 +137,7 @@ static void print_transaction(struct record_blob_ref references[2])
     message = made(MESSAGE_SET_MATERIAL);
     message.set_material.material = 1;
     static const float base_colour[] = {0.8f, 0.4f, 0.2f, 1};
-    memcpy(message.set_material.base_colour, base_colour, sizeof base_colour);
+    memcpy(message.set_material.base_colour, base_colour, sizeof(base_colour));
     message.set_material.roughness = 1;
     message.set_material.ior = 1.5f;
     show("Client", 5, 0, &message);
@@ -191,8 +191,8 @@ static void print_frame(void)
     begin->width = begin->height = 2;
     begin->samples = 1;
     begin->revision = 1;
-    begin->size_bytes = sizeof pixels;
-    begin->digest = XXH3_64bits(pixels, sizeof pixels);
+    begin->size_bytes = sizeof(pixels);
+    begin->digest = XXH3_64bits(pixels, sizeof(pixels));
     begin->world_from_view[0] = begin->world_from_view[5] = begin->world_from_view[10] = 1;
     begin->world_from_view[11] = 2;
     begin->fov_y = 0.5f;
@@ -201,7 +201,7 @@ static void print_frame(void)
     show("Daemon, of request 6", 6, 2, &message);
     message = made(MESSAGE_FRAME_DATA);
     message.frame_data.data = pixels;
-    message.frame_data.data_bytes = sizeof pixels;
+    message.frame_data.data_bytes = sizeof(pixels);
     show("Daemon, of request 6", 6, 2, &message);
     printf("Behind it comes `frame_end`, which says what the frame has cost.\n\n");
     print_ok(ANSWER_TO(6), 6, 0);
@@ -209,8 +209,8 @@ static void print_frame(void)
 
 void docgen_print_example(void)
 {
-    struct record_blob_ref references[] = {reference_to(positions, sizeof positions),
-                                           reference_to(indices, sizeof indices)};
+    struct record_blob_ref references[] = {reference_to(positions, sizeof(positions)),
+                                           reference_to(indices, sizeof(indices))};
     printf(
         "## A session, byte by byte\n\n"
         "A triangle in front of the camera, a light from where the camera is, and a picture of 2 x 2 pixels.\n\n");

@@ -230,12 +230,12 @@ static void print_field_row(const struct field_desc *field, size_t offset)
 
 static void print_fields(const struct struct_desc *desc, size_t offset)
 {
-    if (desc->fields->name == NULL) {
+    if (!desc->fields->name) {
         printf("No fields.\n\n");
         return;
     }
     printf("| offset | field | type | allowed | meaning |\n| ---: | --- | --- | --- | --- |\n");
-    for (const struct field_desc *field = desc->fields; field->name != NULL; field++) {
+    for (const struct field_desc *field = desc->fields; field->name; field++) {
         print_field_row(field, offset);
         offset += (size_t)field->width_bytes * field->count;
     }
@@ -300,7 +300,7 @@ static void print_h264(void)
 static bool copy_file(const char *path)
 {
     FILE *file = fopen(path, "r");
-    if (file == NULL) {
+    if (!file) {
         perror(path);
         return false;
     }

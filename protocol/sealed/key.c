@@ -46,8 +46,8 @@ static bool check(int fd, const char *path, struct decode_error *error)
 static bool read_whole(int fd, struct sealed_key *key)
 {
     size_t used = 0;
-    while (used < sizeof key->bytes) {
-        const ssize_t got = read(fd, key->bytes + used, sizeof key->bytes - used);
+    while (used < sizeof(key->bytes)) {
+        const ssize_t got = read(fd, key->bytes + used, sizeof(key->bytes) - used);
         if (got > 0) {
             used += (size_t)got;
         } else if (got == 0 || errno != EINTR) {
@@ -59,7 +59,7 @@ static bool read_whole(int fd, struct sealed_key *key)
 
 bool sealed_key_read(struct sealed_key *key, const char *path, struct decode_error *error)
 {
-    memset(key, 0, sizeof *key);
+    memset(key, 0, sizeof(*key));
     /* Without waiting for whoever writes to a pipe. */
     const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
     if (fd < 0) {
@@ -79,8 +79,8 @@ bool sealed_key_read(struct sealed_key *key, const char *path, struct decode_err
 static bool write_whole(int fd, const struct sealed_key *key)
 {
     size_t used = 0;
-    while (used < sizeof key->bytes) {
-        const ssize_t put = write(fd, key->bytes + used, sizeof key->bytes - used);
+    while (used < sizeof(key->bytes)) {
+        const ssize_t put = write(fd, key->bytes + used, sizeof(key->bytes) - used);
         if (put >= 0) {
             used += (size_t)put;
         } else if (errno != EINTR) {
@@ -100,7 +100,7 @@ bool sealed_key_create(const char *path, struct decode_error *error)
         return invalid(error, path, errno == EEXIST ? "is there already, and is left alone" : strerror(errno));
     }
     struct sealed_key key;
-    randombytes_buf(key.bytes, sizeof key.bytes);
+    randombytes_buf(key.bytes, sizeof(key.bytes));
     bool ok = fchmod(fd, S_IRUSR | S_IWUSR) == 0 && write_whole(fd, &key);
     const int why = errno;
     sealed_key_wipe(&key);
@@ -113,5 +113,5 @@ bool sealed_key_create(const char *path, struct decode_error *error)
 
 void sealed_key_wipe(struct sealed_key *key)
 {
-    sodium_memzero(key, sizeof *key);
+    sodium_memzero(key, sizeof(*key));
 }

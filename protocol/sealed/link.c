@@ -13,9 +13,9 @@
 
 static struct sealed_link *create(struct sealed *sealed)
 {
-    struct sealed_link *link = calloc(1, sizeof *link);
+    struct sealed_link *link = calloc(1, sizeof(*link));
     uint8_t *in = malloc(CLOSED_BYTES), *out = malloc(CLOSED_BYTES);
-    if (sealed == NULL || link == NULL || in == NULL || out == NULL) {
+    if (!sealed || !link || !in || !out) {
         sealed_destroy(sealed);
         free(link);
         free(in);
@@ -32,7 +32,7 @@ static struct sealed_link *create(struct sealed *sealed)
 struct sealed_link *sealed_link_client(const struct sealed_key *key)
 {
     struct sealed_link *link = create(sealed_client(key));
-    if (link != NULL) {
+    if (link) {
         link->out_end = sealed_begin(link->sealed, link->out);
     }
     return link;
@@ -45,7 +45,7 @@ struct sealed_link *sealed_link_server(const struct sealed_key *keys, size_t key
 
 void sealed_link_destroy(struct sealed_link *link)
 {
-    if (link != NULL) {
+    if (link) {
         sealed_destroy(link->sealed);
         free(link->in);
         free(link->out);
@@ -57,9 +57,9 @@ void sealed_link_destroy(struct sealed_link *link)
 static bool widen(struct sealed_link *link)
 {
     uint8_t *in = realloc(link->in, OPEN_BYTES);
-    link->in = in != NULL ? in : link->in;
-    uint8_t *out = in != NULL ? realloc(link->out, OPEN_BYTES) : NULL;
-    if (out == NULL) {
+    link->in = in ? in : link->in;
+    uint8_t *out = in ? realloc(link->out, OPEN_BYTES) : NULL;
+    if (!out) {
         return false;
     }
     link->out = out;

@@ -44,8 +44,8 @@ enum sealed_result sealed_open(struct sealed *sealed, const uint8_t *bytes, size
                                uint8_t *plain, size_t plain_capacity, size_t *plain_bytes,
                                struct decode_error *error)
 {
-    if (error != NULL) {
-        memset(error, 0, sizeof *error);
+    if (error) {
+        memset(error, 0, sizeof(*error));
     }
     *consumed_bytes = *plain_bytes = 0;
     if (sealed->stage != STAGE_OPEN || (sealed->opened_last && count > 0)) {

@@ -32,11 +32,11 @@ static struct sealed *create(const struct sealed_key *keys, size_t key_count, bo
     if (sodium_init() < 0 || key_count < 1 || key_count > SEALED_KEYS_MAX) {
         return NULL;
     }
-    struct sealed *sealed = calloc(1, sizeof *sealed);
-    if (sealed != NULL) {
+    struct sealed *sealed = calloc(1, sizeof(*sealed));
+    if (sealed) {
         sealed->is_client = is_client;
         sealed->key_count = key_count;
-        memcpy(sealed->keys, keys, key_count * sizeof *keys);
+        memcpy(sealed->keys, keys, key_count * sizeof(*keys));
     }
     return sealed;
 }
@@ -53,8 +53,8 @@ struct sealed *sealed_server(const struct sealed_key *keys, size_t key_count)
 
 void sealed_destroy(struct sealed *sealed)
 {
-    if (sealed != NULL) {
-        sodium_memzero(sealed, sizeof *sealed);
+    if (sealed) {
+        sodium_memzero(sealed, sizeof(*sealed));
         free(sealed);
     }
 }
@@ -321,8 +321,8 @@ enum sealed_result sealed_handshake(struct sealed *sealed, const uint8_t *bytes,
                                     size_t *consumed_bytes, uint8_t out[SEALED_MESSAGE_MAX_BYTES],
                                     size_t *out_bytes, struct decode_error *error)
 {
-    if (error != NULL) {
-        memset(error, 0, sizeof *error);
+    if (error) {
+        memset(error, 0, sizeof(*error));
     }
     const size_t size = sealed->stage == STAGE_HELLO ? HELLO_BYTES : PROVING_BYTES;
     *consumed_bytes = *out_bytes = 0;
