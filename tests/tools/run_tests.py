@@ -3,7 +3,7 @@
 """Runs every test and prints one closing line: N passed, N failed, N skipped.
 
 Usage: run_tests.py BUILD_FOLDER [PART_OF_A_NAME ..]
-Unit and accuracy tests are cmocka programs below BUILD_FOLDER/tests; integration tests are unittest modules
+Unit, accuracy and tracer tests are cmocka programs below BUILD_FOLDER/tests; integration tests are unittest modules
 in tests/integration, which find the programs through FARLIGHT_BIN. The rules of the sources are checked first.
 Programs and modules run side by side, as most of them leave processors idle: FARLIGHT_TEST_JOBS at a time (default:
 as many as there are processors, at most 4).
@@ -97,7 +97,8 @@ def tasks(build, names):
     for path in sorted(pathlib.Path("tests/integration").glob("test_*.py")):  # first: some take longest
         if is_asked(path.stem):
             yield lambda name=path.stem: run_module(name)
-    for program in sorted(build.glob("tests/unit/test_*")) + sorted(build.glob("tests/accuracy/test_*")):
+    for program in (path for folder in ("tracers", "unit", "accuracy")
+                    for path in sorted(build.glob(f"tests/{folder}/test_*"))):
         if program.suffix == "" and is_asked(program.name):
             yield lambda program=program: run_cmocka(program)
 

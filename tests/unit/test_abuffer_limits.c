@@ -408,34 +408,6 @@ static void what_lies_on_a_side_is_there(void **state)
     fixture_finish(&fixture);
 }
 
-/* What moves is built with every frame. */
-static void a_build_again_allocates_nothing(void **state)
-{
-    (void)state;
-    struct fixture fixture;
-    uint64_t before = device->memory_used_bytes;
-    size_t buffers_before = gpu_registry_count(device->registry, GPU_BUFFER);
-    size_t arrays_before = gpu_registry_count(device->registry, GPU_VERTEX_ARRAY);
-    fixture_init(&fixture, test_scene_spheres());
-    for (int i = 0; i < 3; i++)
-        build(&fixture, RESOLUTION, VOXELS);
-    uint64_t used = device->memory_used_bytes;
-    uint64_t own = abuffer_builder_bytes(fixture.builder) + abuffer_store_bytes(&fixture.store);
-    size_t buffers = gpu_registry_count(device->registry, GPU_BUFFER);
-    for (int i = 0; i < 5; i++) {
-        build(&fixture, RESOLUTION, VOXELS);
-        assert_int_equal(device->memory_used_bytes, used);
-        assert_int_equal(gpu_registry_count(device->registry, GPU_BUFFER), buffers);
-    }
-    /* All that it takes is told. */
-    assert_int_equal(used - before - gpu_scene_device_bytes(&fixture.gpu), own);
-    fixture_finish(&fixture);
-    assert_int_equal(device->memory_used_bytes, before);
-    assert_int_equal(gpu_registry_count(device->registry, GPU_BUFFER), buffers_before);
-    assert_int_equal(gpu_registry_count(device->registry, GPU_FRAMEBUFFER), 0);
-    assert_int_equal(gpu_registry_count(device->registry, GPU_VERTEX_ARRAY), arrays_before);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -452,7 +424,6 @@ int main(void)
         cmocka_unit_test(what_a_device_cannot_hold_is_refused),
         cmocka_unit_test(a_scene_may_hold_nothing),
         cmocka_unit_test(what_lies_on_a_side_is_there),
-        cmocka_unit_test(a_build_again_allocates_nothing),
     };
     RUN_ON_A_DEVICE(tests);
 }

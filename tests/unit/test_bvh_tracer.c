@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What only the tracer `bvh` promises: edits cost what they change, and its bounds lose no hit that brute force
- * finds. That its answers are right is shown by tests/accuracy/test_tracer_conformance.c. */
+ * finds. That its answers are right is shown by tests/tracers. */
 #include "../accuracy/test_scenes.h"
 
 #include "gpu/device.h"
@@ -110,20 +110,6 @@ static void a_changed_mesh_rebuilds_its_own_tree(void **state)
     assert_in_range(stats->nodes_rebuilt, 1, 79);
     assert_in_range(stats->nodes, 100, nodes - 1);
     assert_in_range(stats->uploaded_bytes, 1, first_upload / 4);
-    fixture_finish(&fixture);
-}
-
-static void an_edit_of_something_else_costs_nothing(void **state)
-{
-    (void)state;
-    struct fixture fixture;
-    fixture_init(&fixture, scene_of_instances(), NULL);
-    const struct tracer_stats *stats = &fixture.tracer->stats;
-    test_material(&fixture.edits, 77, 0.5f, 0.5f, 0.5f);
-    update(&fixture);
-    assert_int_equal(stats->uploaded_bytes, 0);
-    assert_int_equal(stats->nodes_rebuilt, 0);
-    assert_int_equal(stats->nodes_refitted, 0);
     fixture_finish(&fixture);
 }
 
@@ -405,7 +391,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_moved_node_costs_its_path_in_the_top_tree),
         cmocka_unit_test(a_changed_mesh_rebuilds_its_own_tree),
-        cmocka_unit_test(an_edit_of_something_else_costs_nothing),
         cmocka_unit_test(rays_along_axes_through_edges_and_corners_hit_as_by_brute_force),
         cmocka_unit_test(grazing_rays_hit_as_by_brute_force),
         cmocka_unit_test(rays_from_far_away_hit_as_by_brute_force),

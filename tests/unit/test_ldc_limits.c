@@ -301,35 +301,6 @@ static void what_lies_on_a_side_is_there(void **state)
     fixture_finish(&fixture);
 }
 
-/* What moves is built with every frame. */
-static void a_build_again_allocates_nothing(void **state)
-{
-    (void)state;
-    for (int form = 0; form < 2; form++) {
-        struct fixture fixture;
-        fixture_init(&fixture, test_scene_spheres());
-        fixture.options.ldc_build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
-        for (int i = 0; i < 6; i++) {
-            place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
-            build(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
-        }
-        uint64_t used = device->memory_used_bytes;
-        uint64_t own = ldc_builder_bytes(fixture.builder) + ldc_store_bytes(&fixture.store);
-        size_t buffers = gpu_registry_count(device->registry, GPU_BUFFER);
-        for (int i = 0; i < 5; i++) {
-            place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
-            build(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
-            assert_int_equal(device->memory_used_bytes, used);
-            assert_int_equal(gpu_registry_count(device->registry, GPU_BUFFER), buffers);
-        }
-        /* All that it takes is told. */
-        uint64_t bytes = used - gpu_scene_device_bytes(&fixture.gpu);
-        assert_int_equal(bytes, own);
-        fixture_finish(&fixture);
-        assert_int_equal(device->memory_used_bytes, 0);
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -343,7 +314,6 @@ int main(void)
         cmocka_unit_test(cubes_leave_each_other_alone),
         cmocka_unit_test(a_cube_may_be_empty),
         cmocka_unit_test(what_lies_on_a_side_is_there),
-        cmocka_unit_test(a_build_again_allocates_nothing),
     };
     RUN_ON_A_DEVICE(tests);
 }

@@ -143,28 +143,6 @@ static void the_size_of_a_cell_is_that_of_the_longest_side(void **state)
     fixture_finish(&fixture);
 }
 
-static void without_a_change_nothing_is_built(void **state)
-{
-    (void)state;
-    struct fixture fixture;
-    fixture_init(&fixture, scene_of_boxes(3), &small);
-    update(&fixture);
-    expect_built(&fixture, false, false);
-    struct scene_light *light = &test_add(&fixture.edits, SCENE_LIGHT)->set.light;
-    light->base.id = 50;
-    light->colour[0] = 1.0f;
-    test_node(&fixture.edits, 50, 0, NODE_LIGHT, 50, NULL);
-    test_material(&fixture.edits, 77, 0.5f, 0.5f, 0.5f);
-    update(&fixture);
-    expect_built(&fixture, false, false);
-    test_material(&fixture.edits, 77, 0.9f, 0.1f, 0.5f)->roughness = 0.1f;
-    add_box(&fixture.edits, 2, 1, 2, 0, 0); /* to where it is */
-    update(&fixture);
-    expect_built(&fixture, false, false);
-    expect_distance(distance_below(&fixture, 2, 0), 9.5);
-    fixture_finish(&fixture);
-}
-
 static void what_begins_to_move_leaves_the_static_cube_once(void **state)
 {
     (void)state;
@@ -317,30 +295,6 @@ static void an_edit_of_a_texture_builds_all_and_a_factor_nothing(void **state)
     fixture_finish(&fixture);
 }
 
-static void an_empty_scene_is_missed(void **state)
-{
-    (void)state;
-    struct fixture fixture;
-    fixture_init(&fixture, test_scene_create(), &small);
-    expect_built(&fixture, false, false);
-    assert_int_equal(fixture.tracer->stats.nodes, 0);
-    assert_true(distance_below(&fixture, 0, 0) < 0);
-    struct scene_disc *disc = &test_add(&fixture.edits, SCENE_DISC)->set.disc;
-    disc->base.id = 1;
-    disc->centre_world[2] = -2;
-    disc->normal_world[2] = 1;
-    disc->radius = 3;
-    update(&fixture);
-    expect_distance(distance_below(&fixture, 0, 0), 12);
-    add_box_mesh(&fixture.edits, 10);
-    add_box(&fixture.edits, 1, 1, 0, 0, 0);
-    update(&fixture);
-    expect_built(&fixture, true, false);
-    expect_distance(distance_below(&fixture, 0, 0), 9.5);
-    expect_distance(distance_below(&fixture, 1, 0), 12);
-    fixture_finish(&fixture);
-}
-
 /* As flat as can be, one point wide, far away and of any size: boxes stay boxes. */
 static void flat_and_tiny_and_huge_scenes_have_cells(void **state)
 {
@@ -366,13 +320,6 @@ static void flat_and_tiny_and_huge_scenes_have_cells(void **state)
         fixture_init(&fixture, edits.scene, &small);
         float cell = cube(&fixture, TRACER_CUBE_STATIC)->cell_metres;
         assert_float_equal(cell / rows[i].longest, 1.0f / (RESOLUTION - MARGIN_CELLS), 1e-5f);
-        /* In its middle, from a size above it: cells that hold a sample there are no wider than the box. */
-        float above = rows[i].longest, middle = 0.01f;
-        struct ray ray = {{place[0] + middle * size[0], place[1] + middle * size[1], place[2] + above, 0},
-                          {0, 0, -1, 10 * above}};
-        float expected = above - 0.5f * size[2];
-        if (size[0] > cell && size[1] > cell)
-            assert_float_equal(trace_one(&fixture, ray).distance / expected, 1.0f, 1e-4f);
         fixture_finish(&fixture);
     }
 }
@@ -426,98 +373,6 @@ static void after_a_failure_the_next_update_starts_anew(void **state)
     update(&fixture);
     expect_built(&fixture, true, false);
     expect_distance(distance_below(&fixture, 4, 0), 9.5);
-    /* And when there is no memory for what is to be built. */
-    uint64_t limit = device->memory_limit_bytes;
-    device->memory_limit_bytes = device->memory_used_bytes; /* a second cube needs more */
-    add_box(&fixture.edits, 1, 1, 0, 0, 1);
-    error = (struct error){0};
-    assert_false(try_update(&fixture, &error));
-    device->memory_limit_bytes = limit;
-    assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
-    update(&fixture);
-    expect_distance(distance_below(&fixture, 0, 0), 8.5);
-    expect_distance(distance_below(&fixture, 4, 0), 9.5);
-    fixture_finish(&fixture);
-}
-
-/* What of the device's memory is not the scene's is the structure's, in the middle of an update too, and nothing
- * is left of one that is abandoned, wherever that was or where it failed. */
-static void a_build_in_pieces_tells_what_it_takes_and_gives_it_back(void **state)
-{
-    (void)state;
-    static const struct scene_changes all = {.geometry = true, .instances = true, .surfaces = true};
-    struct tracer_options options = small;
-    for (options.ldc_build = LDC_BUILD_PEEL; options.ldc_build <= LDC_BUILD_LISTS; options.ldc_build++) {
-        struct fixture fixture;
-        struct error error = {0};
-        fixture_init(&fixture, scene_of_boxes(3), &options);
-        struct tracer *tracer = fixture.tracer;
-        uint64_t others_bytes = device->memory_used_bytes - tracer->stats.device_bytes;
-        for (uint32_t pieces = 1;; pieces++) {
-            tracer_outdate(tracer);
-            enum tracer_progress progress = TRACER_MORE;
-            for (uint32_t i = 0; i < pieces && progress == TRACER_MORE; i++) {
-                progress = tracer_update_step(tracer, &fixture.gpu, &all, 0, &fixture.times, &error);
-                assert_int_equal(device->memory_used_bytes - others_bytes, tracer->stats.device_bytes);
-            }
-            expect_ok(progress != TRACER_FAILED, &error);
-            if (progress == TRACER_DONE) {
-                assert_true(pieces > 10);
-                break;
-            }
-            tracer_update_abandon(tracer);
-            assert_int_equal(tracer->stats.device_bytes, 0);
-            assert_int_equal(device->memory_used_bytes, others_bytes);
-        }
-        expect_distance(distance_below(&fixture, 4, 0), 9.5);
-        tracer_outdate(tracer);
-        assert_int_equal(tracer_update_step(tracer, &fixture.gpu, &all, 0, &fixture.times, &error), TRACER_MORE);
-        uint64_t limit = device->memory_limit_bytes;
-        device->memory_limit_bytes = 1;
-        enum tracer_progress progress = TRACER_MORE;
-        /* Buffers are there from the build before: what this one needs anew are its cells. */
-        while (progress == TRACER_MORE)
-            progress = tracer_update_step(tracer, &fixture.gpu, &all, 0, &fixture.times, &error);
-        device->memory_limit_bytes = limit;
-        assert_int_equal(progress, TRACER_FAILED);
-        assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
-        assert_int_equal(device->memory_used_bytes, others_bytes);
-        update(&fixture);
-        expect_distance(distance_below(&fixture, 4, 0), 9.5);
-        fixture_finish(&fixture);
-    }
-}
-
-static void rays_that_have_times_are_refused_where_something_moves(void **state)
-{
-    (void)state;
-    struct fixture fixture;
-    struct error error = {0};
-    struct gpu_buffer rays = {0}, times = {0}, hits = {0};
-    const struct ray ray = {{0.013f, 0.017f, 10, 0}, {0, 0, -1, 1e9f}};
-    const float time = 0.5f;
-    fixture_init(&fixture, scene_of_boxes(2), &small);
-    expect_ok(gpu_buffer_upload(device, &rays, &ray, sizeof(ray), &error), &error);
-    expect_ok(gpu_buffer_upload(device, &times, &time, sizeof(time), &error), &error);
-    expect_ok(gpu_buffer_reserve(device, &hits, sizeof(struct hit), &error), &error);
-    const struct wave wave = {.ray_count = 1, .rays = &rays, .hits = &hits, .times = &times};
-    gpu_scene_bind(&fixture.gpu);
-    expect_ok(tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error), &error); /* nothing moves */
-    float m[12];
-    test_motion_init(&fixture.motion, 2);
-    for (int p = 0; p < 2; p++) {
-        test_transform(m, 1, 1, 1, 0, 0, 0, 0, (float)p);
-        test_pose_node(&fixture.motion.poses[p], 1, m);
-    }
-    update(&fixture);
-    gpu_scene_bind(&fixture.gpu);
-    assert_false(tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error));
-    assert_int_equal(error.kind, ERROR_UNSUPPORTED);
-    assert_string_equal(error.field, "shutter");
-    expect_distance(distance_below(&fixture, 0, 0), 9.5); /* without times: as the shutter opens */
-    gpu_buffer_finish(device, &rays);
-    gpu_buffer_finish(device, &times);
-    gpu_buffer_finish(device, &hits);
     fixture_finish(&fixture);
 }
 
@@ -569,7 +424,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(options_out_of_range_are_refused_by_name),
         cmocka_unit_test(the_size_of_a_cell_is_that_of_the_longest_side),
-        cmocka_unit_test(without_a_change_nothing_is_built),
         cmocka_unit_test(what_begins_to_move_leaves_the_static_cube_once),
         cmocka_unit_test(what_has_moved_back_stays_dynamic),
         cmocka_unit_test(what_was_hidden_and_comes_back_is_dynamic),
@@ -577,12 +431,9 @@ int main(void)
         cmocka_unit_test(a_mesh_that_is_set_again_is_dynamic),
         cmocka_unit_test(a_skinned_mesh_is_dynamic_from_the_first),
         cmocka_unit_test(an_edit_of_a_texture_builds_all_and_a_factor_nothing),
-        cmocka_unit_test(an_empty_scene_is_missed),
         cmocka_unit_test(flat_and_tiny_and_huge_scenes_have_cells),
         cmocka_unit_test(more_layers_than_may_be_kept_are_reported_and_the_nearest_stay),
         cmocka_unit_test(after_a_failure_the_next_update_starts_anew),
-        cmocka_unit_test(a_build_in_pieces_tells_what_it_takes_and_gives_it_back),
-        cmocka_unit_test(rays_that_have_times_are_refused_where_something_moves),
         cmocka_unit_test(a_tracer_that_was_away_builds_what_has_changed_meanwhile),
     };
     RUN_ON_A_DEVICE(tests);

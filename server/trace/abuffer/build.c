@@ -31,16 +31,23 @@ static void list_buffers(struct abuffer_builder *builder, struct gpu_buffer *buf
         buffers[i] = all[i];
 }
 
-void abuffer_builder_destroy(struct abuffer_builder *builder)
+void abuffer_builder_clear(struct abuffer_builder *builder)
 {
-    if (!builder)
-        return;
-    abuffer_deep_end(&builder->task);
     struct gpu_buffer *buffers[BUFFER_COUNT];
     list_buffers(builder, buffers);
     for (int i = 0; i < BUFFER_COUNT; i++)
         gpu_buffer_finish(builder->device, buffers[i]);
     axes_draw_finish(&builder->draw);
+    axes_draw_init(&builder->draw, builder->device);
+    builder->nodes_max = 0;
+}
+
+void abuffer_builder_destroy(struct abuffer_builder *builder)
+{
+    if (!builder)
+        return;
+    abuffer_deep_end(&builder->task);
+    abuffer_builder_clear(builder);
     free(builder);
 }
 

@@ -16,6 +16,8 @@ struct abuffer_builder;
 
 struct abuffer_builder *abuffer_builder_create(struct gpu_device *device, struct error *error);
 void abuffer_builder_destroy(struct abuffer_builder *builder); /* accepts NULL */
+/* Gives back what it keeps from build to build. None is on. */
+void abuffer_builder_clear(struct abuffer_builder *builder);
 uint64_t abuffer_builder_bytes(const struct abuffer_builder *builder);
 
 /* Begins to fill the store with instances[0 .. instance_count - 1] (gpu_scene's, which need not ascend); the

@@ -174,8 +174,10 @@ static enum tracer_progress abuffer_update(struct tracer *tracer, struct gpu_sce
             return TRACER_DONE;
     }
     enum tracer_progress progress = do_step(abuffer, scene, times, error);
-    if (progress == TRACER_FAILED)
+    if (progress == TRACER_FAILED) {
         abuffer_store_finish(&abuffer->store);
+        abuffer_builder_clear(abuffer->builder);
+    }
     if (progress == TRACER_DONE)
         stats->nodes_rebuilt = abuffer->store.sample_count;
     fill_stats(abuffer);
@@ -186,6 +188,7 @@ static void abuffer_abandon(struct tracer *tracer)
 {
     struct abuffer *abuffer = (struct abuffer *)tracer;
     abuffer_build_abandon(abuffer->builder);
+    abuffer_builder_clear(abuffer->builder);
     fill_stats(abuffer);
 }
 

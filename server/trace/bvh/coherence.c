@@ -43,8 +43,10 @@ static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, co
     _Static_assert(TOGETHER_SOFTWARE == 8, "the define above");
     const struct gpu_program *program = gpu_program_get(
         device, &(struct gpu_program_source){.compute = "bvh/coherence.comp", .defines = defines}, error);
+    const uint64_t bytes_before = bvh->coherence.capacity_bytes;
     if (!program || !gpu_buffer_reserve(device, &bvh->coherence, 2 * sizeof(uint32_t), error))
         return false;
+    bvh->base.stats.device_bytes += bvh->coherence.capacity_bytes - bytes_before;
     uint32_t groups = wave->ray_count / TOGETHER_SOFTWARE;
     uint32_t step = groups > COHERENCE_GROUPS ? groups / COHERENCE_GROUPS : 1;
     gpu_buffer_clear(device, &bvh->coherence, 0);

@@ -308,7 +308,8 @@ static bool begin_update(struct bvh *bvh, const struct gpu_scene *scene, const s
 static void fill_stats(struct bvh *bvh)
 {
     bvh->base.stats.nodes = node_count(bvh);
-    bvh->base.stats.device_bytes = bvh_store_bytes(&bvh->store) + bvh->transform_buffer.capacity_bytes;
+    bvh->base.stats.device_bytes =
+        bvh_store_bytes(&bvh->store) + bvh->transform_buffer.capacity_bytes + bvh->coherence.capacity_bytes;
 }
 
 static enum tracer_progress bvh_update(struct tracer *tracer, struct gpu_scene *scene,

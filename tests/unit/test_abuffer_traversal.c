@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* The walk through A-buffers made on the CPU, against the triangles that they were made of. */
-#include "tests/unit/abuffer_walk_fixture.h"
+/* Traversal of A-buffers made on the CPU, against the triangles that they were made of. */
+#include "tests/unit/abuffer_traversal_fixture.h"
 
 #define CELLS 240u
 #define VOXELS 16u
 
 /* Of rays that the triangles' own answer is known of. */
 struct outcome {
-    uint32_t both, only_exact, only_walk; /* hit */
-    uint32_t far;                         /* of both: farther than half a cell from where it is */
-    uint32_t any_wrong;                   /* of the any-hit wave */
+    uint32_t both, only_exact, only_samples; /* hit */
+    uint32_t far;                            /* of both: farther than half a cell from where it is */
+    uint32_t any_wrong;                      /* of the any-hit wave */
 };
 
 static struct outcome compare(struct fixture *fixture, int form, const struct ray *rays, uint32_t count)
@@ -31,7 +31,7 @@ static struct outcome compare(struct fixture *fixture, int form, const struct ra
         const bool hit = hits[i].distance >= 0, exact_hit = exact.distance < INFINITY;
         o.any_wrong += (visibility[i] == 0) != exact_hit;
         o.only_exact += exact_hit && !hit;
-        o.only_walk += hit && !exact_hit;
+        o.only_samples += hit && !exact_hit;
         o.both += hit && exact_hit;
         o.far += hit && exact_hit && fabs((double)hits[i].distance - exact.distance) * size > 0.5;
         if (hit) {
@@ -55,11 +55,11 @@ static void expect_near(struct fixture *fixture, const char *name, const struct 
 {
     for (int f = 0; f < FORM_COUNT; f++) {
         const struct outcome o = compare(fixture, f, rays, count);
-        const double each = 1000.0 / count, hit = (o.only_exact + o.only_walk) * each, far = o.far * each,
+        const double each = 1000.0 / count, hit = (o.only_exact + o.only_samples) * each, far = o.far * each,
                      any = o.any_wrong * each;
         printf("%s, %s: of %u rays hit %u both, %u the shape alone, %u the samples alone; %u farther than half a "
                "cell; any-hit: %u wrong\n",
-               name, forms[f].name, count, o.both, o.only_exact, o.only_walk, o.far, o.any_wrong);
+               name, forms[f].name, count, o.both, o.only_exact, o.only_samples, o.far, o.any_wrong);
         assert_true(o.both > count / 8); /* else little was tested */
         if (!(hit <= limits[f].hit && far <= limits[f].far && any <= limits[f].any))
             fail_msg("%s, %s: %.2f, %.2f, %.2f of a thousand rays are wrong, at most %.2f, %.2f, %.2f may be",
@@ -223,126 +223,13 @@ static void deep_columns_are_searched_at_their_depth(void **state)
         }
         for (int f = 0; f < FORM_COUNT; f++) {
             const struct outcome o = compare(&fixture, f, rays, RAY_COUNT);
-            if (o.both < RAY_COUNT / 2 || o.only_exact + o.only_walk + o.far + o.any_wrong > 0)
+            if (o.both < RAY_COUNT / 2 || o.only_exact + o.only_samples + o.far + o.any_wrong > 0)
                 fail_msg("%s, body %d: %u missed, %u where nothing is, %u elsewhere, %u any-hit rays wrong",
-                         forms[f].name, body, o.only_exact, o.only_walk, o.far, o.any_wrong);
+                         forms[f].name, body, o.only_exact, o.only_samples, o.far, o.any_wrong);
         }
         fixture_finish(&fixture);
     }
     free(rays);
-}
-
-/* What is small is met by rays that begin millions of its cells away, but for what the floats round that tell
- * where the ray begins, which is up to half a cell. */
-static void rays_from_afar_meet_what_is_small(void **state)
-{
-    (void)state;
-    const double centre[3] = {121.3, 118.1, 122.7}, radius = 80.2;
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
-    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
-    struct fixture fixture;
-    uint64_t seed = 41;
-    fixture_init(&fixture, NULL, CELLS, VOXELS);
-    add_ball(&fixture.samples, centre, radius, 100, true);
-    fixture_build(&fixture);
-    for (uint32_t i = 0; i < RAY_COUNT; i++) {
-        double o[3], d[3], length = 0;
-        for (int k = 0; k < 3; k++) {
-            o[k] = (double)test_uniform(&seed, -1, 1);
-            length = fmax(length, fabs(o[k]));
-        }
-        for (int k = 0; k < 3; k++) {
-            o[k] = (double)(float)(o[k] * 2e6 / length);
-            d[k] = centre[k] + radius * (double)test_uniform(&seed, -0.5f, 0.5f) - o[k];
-        }
-        rays[i] = ray_from(o, d, 0, FAR);
-    }
-    for (int f = 0; f < FORM_COUNT; f++) {
-        uint32_t wrong = 0;
-        trace(&fixture, &forms[f].options, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
-        for (uint32_t i = 0; i < RAY_COUNT; i++) {
-            double from_centre = 0, along = 0;
-            for (int k = 0; k < 3; k++) {
-                const double off = (double)rays[i].origin_t_min[k] +
-                                   (double)hits[i].distance * (double)rays[i].direction_t_max[k] - centre[k];
-                from_centre += off * off;
-                along += off * (double)rays[i].direction_t_max[k];
-            }
-            /* On the side that is turned to the ray. */
-            wrong += (uint32_t)(hits[i].distance < 0 || fabs(sqrt(from_centre) - radius) > 1 || along > 0);
-        }
-        /* Cracks where images meet are passed by a few rays in ten thousand. */
-        if (wrong > RAY_COUNT / 1000)
-            fail_msg("%s: %u of %u rays do not meet it where it is", forms[f].name, wrong, RAY_COUNT);
-    }
-    free(rays);
-    free(hits);
-    fixture_finish(&fixture);
-}
-
-static void directions_that_are_none_and_dead_rays_hit_nothing(void **state)
-{
-    (void)state;
-    const double bad[] = {NAN, INFINITY, -INFINITY, 0, 1e-42, (double)FLT_MAX};
-    const double middle[3] = {120.1, 120.2, 120.3}, right[3] = {1, 0, 0};
-    struct ray rays[64];
-    struct hit hits[64];
-    uint32_t count = 0;
-    struct fixture fixture;
-    fixture_init(&fixture, NULL, CELLS, VOXELS);
-    add_ball(&fixture.samples, middle, 80.2, 30, true);
-    fixture_build(&fixture);
-    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        rays[count++] = ray_from(middle, (const double[3]){bad[i], bad[i], bad[i]}, 0, FAR);
-    for (int k = 0; k < 3; k++) {
-        double origin[3] = {120.1, 120.2, 120.3}, direction[3] = {0.5, 0.6, 0.7};
-        direction[k] = NAN;
-        rays[count++] = ray_from(middle, direction, 0, FAR);
-        direction[k] = 0.5;
-        origin[k] = NAN;
-        rays[count++] = ray_from(origin, direction, 0, FAR);
-        origin[k] = INFINITY;
-        rays[count++] = ray_from(origin, direction, 0, FAR);
-    }
-    /* From where a float's step is larger than the cube. */
-    rays[count++] = ray_from((const double[3]){-1e20, -1e20, -1e20}, (const double[3]){1, 0.9, 1.1}, 0, FAR);
-    rays[count++] = ray_from((const double[3]){3e11, 0.1, 0.2}, (const double[3]){-1, 0.2, 0.1}, 0, FAR);
-    rays[count++] = ray_from(middle, right, 1, 1);
-    rays[count++] = ray_from(middle, right, 0, -1);
-    rays[count++] = ray_from(middle, right, 0, NAN);
-    rays[count++] = ray_from(middle, right, NAN, FAR);
-    const uint32_t living = count;
-    rays[count++] = ray_from(middle, right, 0, FAR); /* beside them */
-    rays[count++] = ray_from(middle, right, 0, INFINITY);
-    for (int f = 0; f < FORM_COUNT; f++) {
-        trace(&fixture, &forms[f].options, WAVE_CLOSEST, rays, count, hits, NULL);
-        for (uint32_t i = 0; i < count; i++)
-            if ((hits[i].distance < 0) != (i < living))
-                fail_msg("%s: ray %u: %g", forms[f].name, i, (double)hits[i].distance);
-    }
-    fixture_finish(&fixture);
-}
-
-static void where_there_is_nothing_nothing_is_hit(void **state)
-{
-    (void)state;
-    struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
-    struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
-    random_rays(rays, RAY_COUNT, 51);
-    for (int with_cube = 0; with_cube < 2; with_cube++) {
-        struct fixture fixture;
-        fixture_init(&fixture, NULL, CELLS, VOXELS);
-        if (with_cube) /* without a sample in it */
-            fixture_build(&fixture);
-        for (int f = 0; f < FORM_COUNT; f++) {
-            trace(&fixture, &forms[f].options, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
-            for (uint32_t i = 0; i < RAY_COUNT; i++)
-                assert_true(hits[i].distance < 0);
-        }
-        fixture_finish(&fixture);
-    }
-    free(rays);
-    free(hits);
 }
 
 int main(void)
@@ -351,9 +238,6 @@ int main(void)
         cmocka_unit_test(rays_meet_shapes_where_they_are),
         cmocka_unit_test(voxels_of_any_size_lead_to_the_same),
         cmocka_unit_test(deep_columns_are_searched_at_their_depth),
-        cmocka_unit_test(rays_from_afar_meet_what_is_small),
-        cmocka_unit_test(directions_that_are_none_and_dead_rays_hit_nothing),
-        cmocka_unit_test(where_there_is_nothing_nothing_is_hit),
     };
     RUN_ON_A_DEVICE(tests);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The naive tracer a second time, in C and in double, from the scene and not from its copy on the device.
  * As simple as can be: what it says is what the tracers are compared with. Small scenes only. */
-#ifndef FARLIGHT_TESTS_NAIVE_TWIN_H
-#define FARLIGHT_TESTS_NAIVE_TWIN_H
+#ifndef FARLIGHT_TESTS_TRACERS_NAIVE_TWIN_H
+#define FARLIGHT_TESTS_TRACERS_NAIVE_TWIN_H
 
 #include "scene/affine.h"
 #include "scene/pose.h"
@@ -40,8 +40,17 @@ struct twin_shape {
     bool changes; /* between the two */
 };
 
+/* What a tracer that samples cannot tell: all 0 for an exact one. */
+struct twin_blur {
+    double near_world; /* metres: edges, the ends of rays and surfaces one behind the other are a close call so
+                          near */
+    double slope;      /* cosine of ray and normal below which a surface is seen edge-on */
+    double alpha;      /* how far alpha is from the cutoff */
+};
+
 struct twin {
     const struct scene *scene;
+    struct twin_blur blur;
     struct scene_instance *instances[2]; /* of meshes, of spheres */
     size_t instance_counts[2];
     struct twin_shape *shapes; /* by mesh instance */
@@ -50,17 +59,25 @@ struct twin {
     struct scene_instance *posed[2][MOTION_POSES_MAX];
 };
 
-/* What a walk over everything gathers. */
-struct twin_walk {
+#define TWIN_SURFACES_MAX 128
+
+/* What is gathered from everything on a ray. */
+struct twin_answer {
     const struct twin *twin;
-    double origin[3], direction[3], t_min, t_max, time;
+    double origin[3], direction[3], length, t_min, t_max, time;
     const struct twin_shape *shape; /* of the instance in hand */
     struct twin_hit closest;
     double second_distance; /* of what is there behind (or just before) the closest */
     double transmittance[3];
-    /* Some test was so close (to an edge, to the ray's ends, to the cutoff) that a float may decide it the other
-     * way. */
-    bool close_call;
+    /* Some test was so close (to an edge, to the ray's ends, to the cutoff) that a float, or a cell, may decide it
+     * the other way: for the closest hit, and for transmittance, where what is behind the closest hit counts as
+     * well. */
+    bool close_call, close_any;
+    double close_distance;              /* of the nearest such test that a cell may decide */
+    bool is_close;                      /* the surface in hand is such a test */
+    bool is_opaque;                     /* some surface surely stops all light */
+    double surfaces[TWIN_SURFACES_MAX]; /* distances; with blur only */
+    uint32_t surface_count;
 };
 
 static inline const struct scene_pose *twin_pose(const struct scene_motion *motion, uint32_t pose)
@@ -218,10 +235,20 @@ static inline bool twin_sample(const struct scene *scene, const struct texture_u
     return true;
 }
 
-/* Alpha, tint and cutout of a surface, from its material. */
-static inline void twin_material(struct twin_walk *walk, struct twin_crossing *crossing)
+/* A cell may decide a test at this distance the other way. */
+static inline void twin_is_close(struct twin_answer *answer, double distance)
 {
-    const struct scene *scene = walk->twin->scene;
+    double near = answer->twin->blur.near_world / answer->length;
+    if (distance > answer->t_min - near && distance < answer->t_max + near) {
+        answer->close_distance = fmin(answer->close_distance, distance);
+        answer->is_close = true;
+    }
+}
+
+/* Alpha, tint and cutout of a surface, from its material. */
+static inline void twin_material(struct twin_answer *answer, struct twin_crossing *crossing)
+{
+    const struct scene *scene = answer->twin->scene;
     const struct scene_material *material = scene_material(scene, crossing->hit.material);
     memset(crossing->transmittance, 0, sizeof(crossing->transmittance));
     crossing->cut_out = false;
@@ -236,7 +263,9 @@ static inline void twin_material(struct twin_walk *walk, struct twin_crossing *c
     crossing->alpha = colour[3];
     if (material->alpha_mode == ALPHA_MASK) {
         crossing->cut_out = colour[3] < material->alpha_cutoff;
-        walk->close_call |= fabs(colour[3] - material->alpha_cutoff) < 1e-3;
+        answer->close_call |= fabs(colour[3] - material->alpha_cutoff) < 1e-3;
+        if (fabs(colour[3] - material->alpha_cutoff) < answer->twin->blur.alpha)
+            twin_is_close(answer, crossing->hit.distance);
     }
     double transmission = material->transmission * (1 - material->metallic);
     if (twin_sample(scene, &material->textures[MATERIAL_TRANSMISSION], crossing->hit.uv, texel))
@@ -250,26 +279,33 @@ static inline void twin_material(struct twin_walk *walk, struct twin_crossing *c
     }
 }
 
-static inline void twin_cross_surface(struct twin_walk *walk, struct twin_crossing *crossing)
+static inline void twin_cross_surface(struct twin_answer *answer, struct twin_crossing *crossing)
 {
     struct twin_hit *hit = &crossing->hit;
     /* Around the ray's ends a float may fall on either side. */
-    walk->close_call |= fabs(hit->distance - walk->t_min) < 1e-4 * (1 + fabs(walk->t_min));
-    walk->close_call |= fabs(hit->distance - walk->t_max) < 1e-4 * (1 + fabs(walk->t_max));
-    if (!(hit->distance > walk->t_min && hit->distance < walk->t_max))
+    answer->close_call |= fabs(hit->distance - answer->t_min) < 1e-4 * (1 + fabs(answer->t_min));
+    answer->close_call |= fabs(hit->distance - answer->t_max) < 1e-4 * (1 + fabs(answer->t_max));
+    double near = answer->twin->blur.near_world / answer->length;
+    if (fabs(hit->distance - answer->t_min) < near || fabs(hit->distance - answer->t_max) < near)
+        twin_is_close(answer, hit->distance);
+    if (!(hit->distance > answer->t_min && hit->distance < answer->t_max))
         return;
-    twin_material(walk, crossing);
+    twin_material(answer, crossing);
     for (int k = 0; k < 3; k++)
-        walk->transmittance[k] *= crossing->transmittance[k];
+        answer->transmittance[k] *= crossing->transmittance[k];
+    if (near > 0 && answer->surface_count < TWIN_SURFACES_MAX)
+        answer->surfaces[answer->surface_count++] = hit->distance;
     if (crossing->cut_out)
         return;
-    hit->back_face = twin_dot(walk->direction, hit->normal_geometric) > 0;
-    if (walk->closest.distance < 0 || hit->distance < walk->closest.distance) {
-        if (walk->closest.distance >= 0)
-            walk->second_distance = walk->closest.distance;
-        walk->closest = *hit;
-    } else if (hit->distance < walk->second_distance) {
-        walk->second_distance = hit->distance;
+    answer->is_opaque |= !answer->is_close && crossing->transmittance[0] == 0 && crossing->transmittance[1] == 0 &&
+                         crossing->transmittance[2] == 0;
+    hit->back_face = twin_dot(answer->direction, hit->normal_geometric) > 0;
+    if (answer->closest.distance < 0 || hit->distance < answer->closest.distance) {
+        if (answer->closest.distance >= 0)
+            answer->second_distance = answer->closest.distance;
+        answer->closest = *hit;
+    } else if (hit->distance < answer->second_distance) {
+        answer->second_distance = hit->distance;
     }
 }
 
@@ -289,25 +325,25 @@ static inline void twin_vertex(const struct scene_mesh *mesh, enum mesh_array ar
         out[k] = (double)data[(size_t)vertex * (size_t)components + (size_t)k];
 }
 
-/* A position or a normal at the walk's time. */
-static inline void twin_moving_vertex(const struct twin_walk *walk, const struct scene_mesh *mesh,
+/* A position or a normal at the ray's time. */
+static inline void twin_moving_vertex(const struct twin_answer *answer, const struct scene_mesh *mesh,
                                       enum mesh_array array, uint32_t vertex, double out[3])
 {
-    float *const *ends = array == MESH_POSITIONS ? walk->shape->positions : walk->shape->normals;
+    float *const *ends = array == MESH_POSITIONS ? answer->shape->positions : answer->shape->normals;
     if (!ends[0]) {
         twin_vertex(mesh, array, vertex, 3, out);
         return;
     }
     for (size_t k = 0; k < 3; k++) {
         size_t at = (size_t)vertex * 3 + k;
-        out[k] = ends[0][at] + walk->time * ((double)ends[1][at] - ends[0][at]);
+        out[k] = ends[0][at] + answer->time * ((double)ends[1][at] - ends[0][at]);
     }
-    if (array == MESH_NORMALS && walk->shape->changes)
+    if (array == MESH_NORMALS && answer->shape->changes)
         twin_normalize(out);
 }
 
 /* Attributes of a point in a triangle. */
-static inline void twin_attributes(const struct twin_walk *walk, const struct scene_mesh *mesh,
+static inline void twin_attributes(const struct twin_answer *answer, const struct scene_mesh *mesh,
                                    const uint32_t index[3], const double weight[3],
                                    const float object_from_world[12], struct twin_hit *hit)
 {
@@ -317,7 +353,7 @@ static inline void twin_attributes(const struct twin_walk *walk, const struct sc
     if (mesh->arrays[MESH_NORMALS]) {
         double normal[3] = {0}, one[3];
         for (int v = 0; v < 3; v++) {
-            twin_moving_vertex(walk, mesh, MESH_NORMALS, index[v], one);
+            twin_moving_vertex(answer, mesh, MESH_NORMALS, index[v], one);
             for (int k = 0; k < 3; k++)
                 normal[k] += weight[v] * one[k];
         }
@@ -338,7 +374,7 @@ static inline void twin_attributes(const struct twin_walk *walk, const struct sc
     }
 }
 
-static inline void twin_triangle(struct twin_walk *walk, const struct scene_instance *instance,
+static inline void twin_triangle(struct twin_answer *answer, const struct scene_instance *instance,
                                  const struct scene_mesh *mesh, uint32_t primitive)
 {
     const uint32_t *indices = (const uint32_t *)(const void *)mesh->arrays[MESH_INDICES]->data;
@@ -346,27 +382,37 @@ static inline void twin_triangle(struct twin_walk *walk, const struct scene_inst
                          indices[3 * (size_t)primitive + 2]};
     double corner[3][3], corner_world[3][3], e1[3], e2[3], from[3], p[3], q[3];
     for (int v = 0; v < 3; v++) {
-        twin_moving_vertex(walk, mesh, MESH_POSITIONS, index[v], corner[v]);
+        twin_moving_vertex(answer, mesh, MESH_POSITIONS, index[v], corner[v]);
         twin_transform(corner_world[v], instance->world_from_object, corner[v], 1);
     }
     /* In world space, and by another method than the shaders': Moeller and Trumbore's. */
     for (int k = 0; k < 3; k++) {
         e1[k] = corner_world[1][k] - corner_world[0][k];
         e2[k] = corner_world[2][k] - corner_world[0][k];
-        from[k] = walk->origin[k] - corner_world[0][k];
+        from[k] = answer->origin[k] - corner_world[0][k];
     }
-    twin_cross(p, walk->direction, e2);
+    twin_cross(p, answer->direction, e2);
     twin_cross(q, from, e1);
     double determinant = twin_dot(e1, p);
     if (determinant == 0)
         return;
-    double u = twin_dot(from, p) / determinant, v = twin_dot(walk->direction, q) / determinant;
+    double u = twin_dot(from, p) / determinant, v = twin_dot(answer->direction, q) / determinant;
     double inside = fmin(fmin(u, v), 1 - u - v);
-    double slope =
-        fabs(determinant) / sqrt(twin_dot(e1, e1) * twin_dot(e2, e2) * twin_dot(walk->direction, walk->direction));
+    double slope = fabs(determinant) /
+                   sqrt(twin_dot(e1, e1) * twin_dot(e2, e2) * twin_dot(answer->direction, answer->direction));
     double distance = twin_dot(e2, q) / determinant;
     /* Nearly on edge, everything is a close call. */
-    walk->close_call |= fabs(inside) < 1e-4 || (slope < 1e-3 && inside > -1);
+    answer->close_call |= fabs(inside) < 1e-4 || (slope < 1e-3 && inside > -1);
+    if (answer->twin->blur.near_world > 0) {
+        double e3[3] = {e2[0] - e1[0], e2[1] - e1[1], e2[2] - e1[2]}, area[3];
+        twin_cross(area, e1, e2);
+        double height = sqrt(twin_dot(area, area)), beside = INFINITY;
+        beside = fmin(beside, v * height / sqrt(twin_dot(e1, e1)));
+        beside = fmin(beside, u * height / sqrt(twin_dot(e2, e2)));
+        beside = fmin(beside, (1 - u - v) * height / sqrt(twin_dot(e3, e3)));
+        if (fabs(beside) < answer->twin->blur.near_world || (slope < answer->twin->blur.slope && inside > -1))
+            twin_is_close(answer, distance);
+    }
     if (inside < 0)
         return;
     struct twin_crossing crossing = {.hit = {.distance = distance, .node = instance->node->base.id}};
@@ -377,25 +423,34 @@ static inline void twin_triangle(struct twin_walk *walk, const struct scene_inst
     }
     twin_cross(crossing.hit.normal_geometric, a, b);
     twin_normal_to_world(crossing.hit.normal_geometric, instance->object_from_world);
-    twin_attributes(walk, mesh, index, (const double[3]){1 - u - v, u, v}, instance->object_from_world,
+    twin_attributes(answer, mesh, index, (const double[3]){1 - u - v, u, v}, instance->object_from_world,
                     &crossing.hit);
     crossing.hit.material = twin_range_material(mesh->ranges, mesh->range_count, primitive);
-    twin_cross_surface(walk, &crossing);
+    twin_cross_surface(answer, &crossing);
 }
 
-static inline void twin_sphere(struct twin_walk *walk, const struct scene_instance *instance,
+static inline void twin_sphere(struct twin_answer *answer, const struct scene_instance *instance,
                                const struct scene_spheres *set, uint32_t primitive)
 {
     const float *sphere = (const float *)(const void *)set->centres_radii->data + 4 * (size_t)primitive;
     double origin[3], direction[3], from[3];
-    twin_transform(origin, instance->object_from_world, walk->origin, 1);
-    twin_transform(direction, instance->object_from_world, walk->direction, 0);
+    twin_transform(origin, instance->object_from_world, answer->origin, 1);
+    twin_transform(direction, instance->object_from_world, answer->direction, 0);
     for (int k = 0; k < 3; k++)
         from[k] = origin[k] - sphere[k];
     double a = twin_dot(direction, direction), b = twin_dot(from, direction);
     double c = twin_dot(from, from) - (double)sphere[3] * sphere[3];
     double discriminant = b * b - a * c;
-    walk->close_call |= fabs(discriminant) < 1e-3 * a * sphere[3] * sphere[3];
+    answer->close_call |= fabs(discriminant) < 1e-3 * a * sphere[3] * sphere[3];
+    double shrink = 0; /* of what is nearest to the silhouette, from world to object */
+    for (int k = 0; k < 3; k++) {
+        const float *m = instance->object_from_world;
+        shrink =
+            fmax(shrink, sqrt((double)m[k] * m[k] + (double)m[4 + k] * m[4 + k] + (double)m[8 + k] * m[8 + k]));
+    }
+    double beside = sqrt(fmax(twin_dot(from, from) - b * b / a, 0)) - sphere[3];
+    if (fabs(beside) < answer->twin->blur.near_world * shrink)
+        twin_is_close(answer, fmin(fmax(-b / a, answer->t_min), answer->t_max));
     if (discriminant < 0)
         return;
     for (int side = -1; side <= 1; side += 2) {
@@ -409,52 +464,74 @@ static inline void twin_sphere(struct twin_walk *walk, const struct scene_instan
         twin_normal_to_world(hit->normal_geometric, instance->object_from_world);
         memcpy(hit->normal_shading, hit->normal_geometric, sizeof(hit->normal_shading));
         hit->material = twin_range_material(set->ranges, set->range_count, primitive);
-        twin_cross_surface(walk, &crossing);
+        twin_cross_surface(answer, &crossing);
     }
 }
 
-static inline void twin_discs(struct twin_walk *walk)
+static inline void twin_discs(struct twin_answer *answer)
 {
     size_t cursor = 0;
     uint64_t id;
     void *value;
-    while (hashmap_next(&walk->twin->scene->objects[SCENE_DISC], &cursor, &id, &value)) {
+    while (hashmap_next(&answer->twin->scene->objects[SCENE_DISC], &cursor, &id, &value)) {
         const struct scene_disc *disc = value;
         struct twin_crossing crossing = {.hit = {.material = disc->material, .colour = {1, 1, 1, 1}}};
         double slope = 0, height = 0, squared = 0;
         for (int k = 0; k < 3; k++) {
             crossing.hit.normal_geometric[k] = crossing.hit.normal_shading[k] = disc->normal_world[k];
-            slope += disc->normal_world[k] * walk->direction[k];
-            height += disc->normal_world[k] * (disc->centre_world[k] - walk->origin[k]);
+            slope += disc->normal_world[k] * answer->direction[k];
+            height += disc->normal_world[k] * (disc->centre_world[k] - answer->origin[k]);
         }
         crossing.hit.distance = height / slope;
+        answer->is_close = false;
         for (int k = 0; k < 3; k++) {
-            double d = walk->origin[k] + crossing.hit.distance * walk->direction[k] - disc->centre_world[k];
+            double d = answer->origin[k] + crossing.hit.distance * answer->direction[k] - disc->centre_world[k];
             squared += d * d;
         }
         double radius = sqrt(squared) / disc->radius;
-        walk->close_call |= fabs(radius - 1) < 1e-3;
+        answer->close_call |= fabs(radius - 1) < 1e-3;
         if (slope != 0 && radius <= 1)
-            twin_cross_surface(walk, &crossing);
+            twin_cross_surface(answer, &crossing);
     }
 }
 
+static inline int twin_by_size(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Where a cell decides: what is near an edge, and surfaces so close that it cannot tell which comes first. */
+static inline void twin_judge_blur(struct twin_answer *answer)
+{
+    double near = answer->twin->blur.near_world / answer->length;
+    qsort(answer->surfaces, answer->surface_count, sizeof(answer->surfaces[0]), twin_by_size);
+    for (uint32_t i = 1; i < answer->surface_count; i++)
+        if (answer->surfaces[i] - answer->surfaces[i - 1] < near)
+            answer->close_distance = fmin(answer->close_distance, answer->surfaces[i]);
+    double closest = answer->closest.distance;
+    answer->close_call |= answer->close_distance < (closest < 0 ? INFINITY : closest + near);
+    answer->close_any |= answer->close_distance < INFINITY && !answer->is_opaque;
+}
+
 /* All that lies on the ray. A dead ray (t_max <= t_min) finds nothing. */
-static inline void twin_trace_at(struct twin_walk *walk, const struct twin *twin, const struct ray *ray,
+static inline void twin_trace_at(struct twin_answer *answer, const struct twin *twin, const struct ray *ray,
                                  double time)
 {
-    *walk = (struct twin_walk){.twin = twin,
-                               .time = time,
-                               .t_min = ray->origin_t_min[3],
-                               .t_max = ray->direction_t_max[3],
-                               .closest = {.distance = -1},
-                               .second_distance = INFINITY,
-                               .transmittance = {1, 1, 1}};
+    *answer = (struct twin_answer){.twin = twin,
+                                   .time = time,
+                                   .t_min = ray->origin_t_min[3],
+                                   .t_max = ray->direction_t_max[3],
+                                   .closest = {.distance = -1},
+                                   .second_distance = INFINITY,
+                                   .close_distance = INFINITY,
+                                   .transmittance = {1, 1, 1}};
     for (int k = 0; k < 3; k++) {
-        walk->origin[k] = ray->origin_t_min[k];
-        walk->direction[k] = ray->direction_t_max[k];
+        answer->origin[k] = ray->origin_t_min[k];
+        answer->direction[k] = ray->direction_t_max[k];
     }
-    if (walk->t_max <= walk->t_min)
+    answer->length = sqrt(twin_dot(answer->direction, answer->direction));
+    if (answer->t_max <= answer->t_min)
         return;
     for (int kind = 0; kind < 2; kind++) {
         for (size_t i = 0; i < twin->instance_counts[kind]; i++) {
@@ -463,22 +540,31 @@ static inline void twin_trace_at(struct twin_walk *walk, const struct twin *twin
             const struct scene_spheres *set = kind == 1 ? scene_spheres(twin->scene, instance.node->object) : NULL;
             if (instance.singular)
                 continue;
-            walk->shape = kind == 0 ? &twin->shapes[i] : NULL;
-            for (uint32_t p = 0; mesh && p < mesh->triangle_count; p++)
-                twin_triangle(walk, &instance, mesh, p);
-            for (uint32_t p = 0; set && p < set->sphere_count; p++)
-                twin_sphere(walk, &instance, set, p);
+            answer->shape = kind == 0 ? &twin->shapes[i] : NULL;
+            for (uint32_t p = 0; mesh && p < mesh->triangle_count; p++) {
+                answer->is_close = false;
+                twin_triangle(answer, &instance, mesh, p);
+            }
+            for (uint32_t p = 0; set && p < set->sphere_count; p++) {
+                answer->is_close = false;
+                twin_sphere(answer, &instance, set, p);
+            }
         }
     }
-    twin_discs(walk);
+    twin_discs(answer);
     /* Two surfaces in one place: either may win. */
-    if (walk->closest.distance >= 0)
-        walk->close_call |= walk->second_distance - walk->closest.distance < 1e-4 * (1 + walk->closest.distance);
+    if (answer->closest.distance >= 0)
+        answer->close_call |=
+            answer->second_distance - answer->closest.distance < 1e-4 * (1 + answer->closest.distance);
+    if (twin->blur.near_world > 0)
+        twin_judge_blur(answer);
+    else
+        answer->close_any = answer->close_call;
 }
 
-static inline void twin_trace(struct twin_walk *walk, const struct twin *twin, const struct ray *ray)
+static inline void twin_trace(struct twin_answer *answer, const struct twin *twin, const struct ray *ray)
 {
-    twin_trace_at(walk, twin, ray, 0);
+    twin_trace_at(answer, twin, ray, 0);
 }
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Cubes of samples, every form in which they are walked, and waves through them: for the tests of the walk. */
-#ifndef FARLIGHT_TESTS_LDC_WALK_FIXTURE_H
-#define FARLIGHT_TESTS_LDC_WALK_FIXTURE_H
+/* Cubes of samples, every form in which they are traversed, and waves through them: for the tests of traversal. */
+#ifndef FARLIGHT_TESTS_LDC_TRAVERSAL_FIXTURE_H
+#define FARLIGHT_TESTS_LDC_TRAVERSAL_FIXTURE_H
 
 #include "tests/accuracy/test_scenes.h"
 #include "tests/unit/device_fixture.h"
@@ -32,7 +32,7 @@ static const struct form {
 };
 #define FORM_COUNT (sizeof forms / sizeof *forms)
 
-/* ---- what is walked ---- */
+/* ---- what is traversed ---- */
 
 struct fixture {
     struct scene *scene;
@@ -89,22 +89,22 @@ static inline void build(struct fixture *fixture, const struct tracer_options *o
         build_levels(fixture, i, options);
 }
 
-struct walk {
+struct traversal {
     struct fixture *fixture;
     const struct tracer_options *options;
 };
 
-static inline bool walk_wave(void *user, const struct wave *wave, struct error *error)
+static inline bool traverse_wave(void *user, const struct wave *wave, struct error *error)
 {
-    const struct walk *walk = user;
-    gpu_scene_bind(&walk->fixture->gpu);
-    return ldc_trace(&walk->fixture->store, &walk->fixture->gpu, wave, walk->options, error);
+    const struct traversal *traversal = user;
+    gpu_scene_bind(&traversal->fixture->gpu);
+    return ldc_trace(&traversal->fixture->store, &traversal->fixture->gpu, wave, traversal->options, error);
 }
 
 static inline void trace(struct fixture *fixture, const struct tracer_options *options, enum wave_kind kind,
                          const struct ray *rays, uint32_t count, struct hit *hits, uint32_t *visibility)
 {
-    trace_rays(walk_wave, &(struct walk){fixture, options}, kind, true, rays, count, hits, visibility);
+    trace_rays(traverse_wave, &(struct traversal){fixture, options}, kind, true, rays, count, hits, visibility);
 }
 
 static inline void add_quad(struct ldc_samples *s, const float a[3], const float b[3], const float c[3],

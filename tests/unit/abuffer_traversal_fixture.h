@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* A-buffers of shapes, every way in which they are searched, and waves through them: for the tests of the walk.
+/* A-buffers of shapes, every way in which they are searched, and waves through them: for the tests of traversal.
  * All is in cells, which are as wide as the world's unit. */
-#ifndef FARLIGHT_TESTS_ABUFFER_WALK_FIXTURE_H
-#define FARLIGHT_TESTS_ABUFFER_WALK_FIXTURE_H
+#ifndef FARLIGHT_TESTS_ABUFFER_TRAVERSAL_FIXTURE_H
+#define FARLIGHT_TESTS_ABUFFER_TRAVERSAL_FIXTURE_H
 
 #include "tests/accuracy/test_scenes.h"
 #include "tests/unit/device_fixture.h"
@@ -63,22 +63,22 @@ static inline void fixture_finish(struct fixture *fixture)
     abuffer_free(&fixture->samples);
 }
 
-struct walk {
+struct traversal {
     struct fixture *fixture;
     const struct tracer_options *options;
 };
 
-static inline bool walk_wave(void *user, const struct wave *wave, struct error *error)
+static inline bool traverse_wave(void *user, const struct wave *wave, struct error *error)
 {
-    const struct walk *walk = user;
-    gpu_scene_bind(&walk->fixture->gpu);
-    return abuffer_trace(&walk->fixture->store, &walk->fixture->gpu, wave, walk->options, error);
+    const struct traversal *traversal = user;
+    gpu_scene_bind(&traversal->fixture->gpu);
+    return abuffer_trace(&traversal->fixture->store, &traversal->fixture->gpu, wave, traversal->options, error);
 }
 
 static inline void trace(struct fixture *fixture, const struct tracer_options *options, enum wave_kind kind,
                          const struct ray *rays, uint32_t count, struct hit *hits, uint32_t *visibility)
 {
-    trace_rays(walk_wave, &(struct walk){fixture, options}, kind, true, rays, count, hits, visibility);
+    trace_rays(traverse_wave, &(struct traversal){fixture, options}, kind, true, rays, count, hits, visibility);
 }
 
 /* ---- shapes ---- */

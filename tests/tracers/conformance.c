@@ -1,0 +1,344 @@
+/* SPDX-License-Identifier: MIT */
+/* Ray by ray, a tracer's answers are those of a plain C tracer in double precision: at first, and after every kind
+ * of edit. */
+#include "tests/tracers/contract.h"
+
+/* Rays whose answer hangs on a rounding are left out; more of them than this and the test would say nothing. Of a
+ * soup of small triangles most rays pass some edge within a few cells. */
+#define CLOSE_CALLS_MAX (RAY_COUNT / 10)
+#define CLOSE_CALLS_MAX_SAMPLED (RAY_COUNT * 4 / 5)
+
+/* ---- edits ---- */
+
+static void moves_hides_and_changes_a_material(struct fixture *fixture)
+{
+    struct test_edits *edits = &fixture->edits;
+    const struct scene_node *second = scene_node(fixture->scene, 2), *third = scene_node(fixture->scene, 3);
+    float m[12];
+    test_transform(m, 0.8f, -0.9f, 1.1f, 0, 0.3f, 0.4f, 0.1f, -0.7f);
+    test_node(edits, 2, second->parent, second->kind, second->object, m);
+    test_node(edits, 3, third->parent, third->kind, third->object, third->parent_from_node)->hidden = true;
+    struct scene_material *material = test_material(edits, 2, 0.35f, 0.45f, 0.55f);
+    material->alpha_mode = ALPHA_BLEND;
+    material->base_colour[3] = 0.5f;
+}
+
+static void replaces_a_mesh_and_adds_an_instance(struct fixture *fixture)
+{
+    test_soup_mesh(&fixture->edits, 10, 70, 0.4f, 99);
+    test_soup_mesh(&fixture->edits, 5, 10, 0.5f, 98); /* sorts before, so that all primitives get other numbers */
+    test_node(&fixture->edits, 100, 0, NODE_MESH, 5, NULL);
+}
+
+/* What was there is a hole now, and what was a hole is there. */
+static void invert_alpha(struct test_edits *edits, const struct scene_texture *texture)
+{
+    size_t bytes = (size_t)texture->width * texture->height * 4;
+    uint8_t *texels = malloc(bytes);
+    for (size_t i = 0; i < bytes; i++)
+        texels[i] = i % 4 == 3 ? (uint8_t)(255 - texture->texels->data[i]) : texture->texels->data[i];
+    struct scene_texture *inverted = &test_add(edits, SCENE_TEXTURE)->set.texture;
+    *inverted = *texture;
+    inverted->texels = test_blob(texels, bytes);
+    free(texels);
+}
+
+static void removes_an_instance_shows_another_and_adds_a_disc(struct fixture *fixture)
+{
+    struct test_edits *edits = &fixture->edits;
+    const struct scene_node *third = scene_node(fixture->scene, 3);
+    const struct scene_texture *texture = scene_texture(fixture->scene, 1);
+    struct scene_edit *edit = test_add(edits, SCENE_NODE);
+    edit->kind = EDIT_REMOVE;
+    edit->id = 100;
+    test_node(edits, 3, third->parent, third->kind, third->object, third->parent_from_node);
+    if (texture)
+        invert_alpha(edits, texture);
+    struct scene_material *cut_away = test_material(edits, 2, 0.35f, 0.45f, 0.55f);
+    cut_away->alpha_mode = ALPHA_MASK;
+    cut_away->base_colour[3] = 0.2f;
+    struct scene_disc *disc = &test_add(edits, SCENE_DISC)->set.disc;
+    disc->base.id = 9;
+    disc->centre_world[1] = -0.4f;
+    disc->normal_world[1] = 1.0f;
+    disc->radius = 1.0f;
+}
+
+static const struct phase {
+    const char *name;
+    void (*edit)(struct fixture *fixture); /* NULL: a pose, where there is one */
+} phases[] = {
+    {"as it was committed", NULL},
+    {"posed", NULL},
+    {"moved, hidden, of another material", moves_hides_and_changes_a_material},
+    {"of another shape, with a new instance", replaces_a_mesh_and_adds_an_instance},
+    {"without that instance, with other holes and a disc", removes_an_instance_shows_another_and_adds_a_disc},
+};
+#define PHASE_COUNT (sizeof(phases) / sizeof(phases[0]))
+enum { PHASE_POSED = 1 };
+
+/* ---- what is true ---- */
+
+/* Brute force's answers to the rays of a scene in a phase; the same for all tracers that are as exact. */
+struct truth {
+    const struct scene_row *scene;
+    size_t phase;
+    struct twin_blur blur;
+    bool still;
+    struct twin_answer answers[RAY_COUNT];
+    struct truth *next;
+};
+
+static struct truth *truths;
+
+static const struct truth *truth_of(const struct fixture *fixture, const struct scene_row *scene, size_t phase)
+{
+    const double cell = fixture_cell_metres(fixture);
+    const struct twin_blur blur = {
+        .near_world = BLUR_CELLS * cell, .slope = cell > 0 ? 0.02 : 0, .alpha = cell > 0 ? 0.15 : 0};
+    const bool still = fixture->row->refuses_motion != NULL;
+    for (struct truth *truth = truths; truth; truth = truth->next)
+        if (truth->scene == scene && truth->phase == phase && truth->still == still &&
+            truth->blur.near_world == blur.near_world)
+            return truth;
+    struct truth *truth = malloc(sizeof(*truth));
+    struct twin twin;
+    assert_non_null(truth);
+    truth->scene = scene;
+    truth->phase = phase;
+    truth->blur = blur;
+    truth->still = still;
+    twin_init_moving(&twin, fixture->scene, fixture->motion.pose_count ? &fixture->motion : NULL);
+    twin.blur = blur;
+    for (uint32_t i = 0; i < RAY_COUNT; i++)
+        twin_trace_at(&truth->answers[i], &twin, &fixture->host_rays[i], (double)fixture->host_times[i]);
+    twin_finish(&twin);
+    truth->next = truths;
+    truths = truth;
+    return truth;
+}
+
+/* ---- comparing ---- */
+
+/* What of an answer is wrong; empty: nothing. */
+struct fault {
+    char text[200];
+};
+
+static void expect_near(struct fault *fault, const char *what, double got, double expected, double tolerance)
+{
+    if (fault->text[0] == 0 && !(fabs(got - expected) <= tolerance))
+        snprintf(fault->text, sizeof(fault->text), "%s is %.9g, expected %.9g (tolerance %g)", what, got, expected,
+                 tolerance);
+}
+
+static void unpack_unit(double out[3], uint32_t bits)
+{
+    double x = fmax((int16_t)(bits & 0xffff) / 32767.0, -1), y = fmax((int16_t)(bits >> 16) / 32767.0, -1);
+    out[0] = x;
+    out[1] = y;
+    out[2] = 1 - fabs(x) - fabs(y);
+    if (out[2] < 0) {
+        out[0] = (1 - fabs(y)) * (x >= 0 ? 1 : -1);
+        out[1] = (1 - fabs(x)) * (y >= 0 ? 1 : -1);
+    }
+    twin_normalize(out);
+}
+
+static void expect_unit(struct fault *fault, const char *what, uint32_t got, const double expected[3],
+                        double cosine_min)
+{
+    double unit[3];
+    unpack_unit(unit, got);
+    if (fault->text[0] == 0 && !(twin_dot(unit, expected) > cosine_min))
+        snprintf(fault->text, sizeof(fault->text), "%s is %.6f %.6f %.6f, expected %.6f %.6f %.6f", what, unit[0],
+                 unit[1], unit[2], expected[0], expected[1], expected[2]);
+}
+
+/* A sphere's u jumps from 1 to 0. */
+static double beside_seam(double u, double expected)
+{
+    return fabs(u - expected) > 0.5 ? u + (u < expected ? 1 : -1) : u;
+}
+
+static double linear(double srgb)
+{
+    return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
+}
+
+/* The stored sample of a hit says what is there: vertex colour times texture. */
+static void expect_sample(struct fault *fault, const struct fixture *fixture, const struct hit *got,
+                          const struct twin_hit *expected)
+{
+    const struct scene_material *material = scene_material(fixture->scene, expected->material);
+    double colour[4] = {expected->colour[0], expected->colour[1], expected->colour[2], expected->colour[3]},
+           texel[4];
+    uint32_t words;
+    memcpy(&words, &got->u0, sizeof(words));
+    if (material && twin_sample(fixture->scene, &material->textures[MATERIAL_BASE_COLOUR], expected->uv, texel))
+        for (int k = 0; k < 4; k++)
+            colour[k] *= texel[k];
+    for (int k = 0; k < 4; k++) {
+        double stored = (words >> (8 * k) & 255) / 255.0;
+        expect_near(fault, "stored colour", k < 3 ? linear(stored) : stored, colour[k], 0.2);
+    }
+}
+
+static void judge_hit(struct fault *fault, const struct fixture *fixture, const struct ray *ray,
+                      const struct hit *got, const struct twin_hit *expected)
+{
+    double length = sqrt((double)ray->direction_t_max[0] * (double)ray->direction_t_max[0] +
+                         (double)ray->direction_t_max[1] * (double)ray->direction_t_max[1] +
+                         (double)ray->direction_t_max[2] * (double)ray->direction_t_max[2]);
+    const double cell = fixture_cell_metres(fixture) / length;
+    const bool is_sampled = fixture->row->sampled.resolution > 0;
+    if (expected->distance < 0 || got->distance < 0) {
+        expect_near(fault, "distance", (double)got->distance, expected->distance < 0 ? -1 : expected->distance, 0);
+        return;
+    }
+    expect_near(fault, "distance", (double)got->distance, expected->distance,
+                1e-4 * (1 + expected->distance) + fixture->row->sampled.cells * cell);
+    /* 0.1 degrees; of samples of what is curved what it turns by within a cell, of interpolated ones much more. */
+    expect_unit(fault, "geometric normal", got->normal_geometric, expected->normal_geometric,
+                is_sampled ? 0.9 : 1 - 2e-6);
+    expect_unit(fault, "shading normal", got->normal_shading, expected->normal_shading,
+                is_sampled ? 0.5 : 1 - 2e-6);
+    expect_near(fault, "back face", (got->material & HIT_BACK_FACE) != 0, expected->back_face, 0);
+    if (got->material & HIT_SAMPLED) {
+        expect_near(fault, "whether it may be a sample", is_sampled && expected->node, 1, 0);
+        expect_near(fault, "primitive of a sample", got->primitive, HIT_NO_PRIMITIVE, 0);
+        expect_sample(fault, fixture, got, expected);
+    } else if (expected->node) { /* a disc's texture coordinates are its own affair */
+        if (got->instance >= fixture->gpu.instance_count)
+            fail_msg("instance %u of %u", got->instance, fixture->gpu.instance_count);
+        expect_near(fault, "node", fixture->gpu.instances[got->instance].node, expected->node, 0);
+        const double uv = is_sampled ? 0.3 : 5e-3, colour = is_sampled ? 0.2 : 5e-3;
+        expect_near(fault, "u", beside_seam((double)got->u0, expected->uv[0]), expected->uv[0], uv);
+        expect_near(fault, "v", (double)got->v0, expected->uv[1], uv);
+        for (int k = 0; k < 4; k++)
+            expect_near(fault, "colour", (got->colour >> (8 * k) & 255) / 255.0, expected->colour[k], colour);
+    } else {
+        expect_near(fault, "instance of a disc", got->instance, HIT_NO_PRIMITIVE, 0);
+    }
+    static const float white[4] = {1, 1, 1, 1};
+    const struct scene_material *material = scene_material(fixture->scene, expected->material);
+    const float *base_colour = material ? material->base_colour : white;
+    uint32_t index = got->material & HIT_MATERIAL_MASK;
+    assert_in_range(index, 0, fixture->gpu.material_count - 1);
+    for (int k = 0; k < 4; k++)
+        expect_near(fault, "base colour of the material", (double)fixture->materials[index].base_colour[k],
+                    (double)base_colour[k], 0);
+}
+
+/* Counts rays and their faults, and fails at the first that is one too many. */
+struct tally {
+    const char *phase;
+    uint32_t judged, wrong;
+    double wrong_max;
+};
+
+static void count_fault(struct tally *tally, uint32_t ray, const struct fault *fault)
+{
+    tally->judged++;
+    if (fault->text[0] == 0)
+        return;
+    tally->wrong++;
+    if (tally->wrong > tally->wrong_max * RAY_COUNT)
+        fail_msg("%s: ray %u: %s; %u rays are wrong up to it", tally->phase, ray, fault->text, tally->wrong);
+}
+
+static void expect_answers(struct fixture *fixture, const struct scene_row *scene, size_t phase)
+{
+    const struct truth *truth = truth_of(fixture, scene, phase);
+    const bool is_sampled = fixture->row->sampled.resolution > 0;
+    struct hit *hits = fixture_trace(fixture, WAVE_CLOSEST, RAY_COUNT);
+    uint32_t *visibilities = fixture_trace(fixture, WAVE_ANY, RAY_COUNT), hit_count = 0;
+    struct tally closest = {phases[phase].name, 0, 0, fixture->row->sampled.wrong_max}, any = closest;
+    for (uint32_t i = 0; i < RAY_COUNT; i++) {
+        const struct twin_answer *answer = &truth->answers[i];
+        struct fault of_closest = {""}, of_any = {""};
+        hit_count += answer->closest.distance >= 0;
+        if (!answer->close_call) {
+            judge_hit(&of_closest, fixture, &fixture->host_rays[i], &hits[i], &answer->closest);
+            count_fault(&closest, i, &of_closest);
+        }
+        if (answer->close_any)
+            continue;
+        for (int k = 0; k < 3; k++)
+            expect_near(&of_any, "transmittance", (visibilities[i] >> (8 * k) & 255) / 255.0,
+                        answer->transmittance[k], is_sampled ? 0.1 : 6e-3);
+        count_fault(&any, i, &of_any);
+    }
+    free(hits);
+    free(visibilities);
+    if (is_sampled)
+        print_message("  %s: closest %u of %u wrong, any %u of %u\n", phases[phase].name, closest.wrong,
+                      closest.judged, any.wrong, any.judged);
+    const uint32_t close_max = is_sampled ? CLOSE_CALLS_MAX_SAMPLED : CLOSE_CALLS_MAX;
+    assert_in_range(closest.judged, RAY_COUNT - close_max, RAY_COUNT);
+    assert_in_range(any.judged, RAY_COUNT - close_max, RAY_COUNT);
+    assert_in_range(hit_count, RAY_COUNT / 10, RAY_COUNT); /* else the rays test nothing */
+}
+
+CHECK(answers_are_those_of_brute_force_and_follow_every_edit, CHECK_EACH_SCENE | CHECK_FORMS)
+{
+    const struct contract_case *of = *state;
+    struct fixture fixture;
+    fixture_init_moving(&fixture, of->tracer, of->scene);
+    for (size_t phase = 0; phase < PHASE_COUNT; phase++) {
+        if (phase == PHASE_POSED) {
+            if (of->scene->pose_count > 0)
+                continue;
+            of->scene->move(&fixture.motion, 1);
+        }
+        if (phases[phase].edit)
+            phases[phase].edit(&fixture);
+        if (phase > 0)
+            fixture_update(&fixture);
+        expect_answers(&fixture, of->scene, phase);
+    }
+    fixture_finish(&fixture);
+}
+
+/* ---- while the shutter is open ---- */
+
+/* Rays without times are all at the first pose, also where things move while the shutter is open. */
+CHECK(a_wave_without_times_sees_the_first_pose, CHECK_FORMS)
+{
+    const struct contract_case *of = *state;
+    struct tracer_row still = *of->tracer; /* its waves have no times */
+    static const struct scene_row moving[] = {{"soup", test_scene_soup, test_motion_of_soup, 4, false},
+                                              {"skins", test_scene_deformed, test_motion_of_deformed, 4, false}};
+    still.refuses_motion = "this test asks for none";
+    for (size_t i = 0; i < sizeof(moving) / sizeof(moving[0]); i++) {
+        struct fixture fixture;
+        fixture_init_moving(&fixture, &still, &moving[i]);
+        assert_true(fixture.gpu.has_motion);
+        expect_answers(&fixture, &moving[i], 0);
+        fixture_finish(&fixture);
+    }
+}
+
+CHECK(rays_at_times_are_refused_by_tracers_that_refuse_motion, 0)
+{
+    const struct contract_case *of = *state;
+    static const struct scene_row moving = {"soup", test_scene_soup, test_motion_of_soup, 2, false};
+    struct fixture fixture;
+    struct error error = {0};
+    fixture_init(&fixture, of->tracer, test_scene_soup());
+    struct hit *hits = fixture_trace(&fixture, WAVE_CLOSEST, RAY_COUNT);
+    free(hits);
+    struct wave wave = {
+        .ray_count = RAY_COUNT, .rays = &fixture.rays, .hits = &fixture.answers, .times = &fixture.ray_times};
+    expect_ok(tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error), &error); /* nothing moves */
+    moving.move(&fixture.motion, moving.pose_count);
+    fixture_update(&fixture);
+    gpu_scene_bind(&fixture.gpu);
+    bool ok = tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error);
+    assert_int_equal(ok, of->tracer->refuses_motion == NULL);
+    if (!ok) {
+        assert_int_equal(error.kind, ERROR_UNSUPPORTED);
+        assert_string_equal(error.field, "shutter");
+    }
+    fixture_finish(&fixture);
+}

@@ -1,0 +1,170 @@
+/* SPDX-License-Identifier: MIT */
+/* What every tracer promises, checked for each row of a table (rows.c). To add a tracer, add its row; to add a
+ * scene, a row of scenes.c; to add a promise, a CHECK to a file of this folder.
+ *
+ * All run on one device, and brute force in double precision (naive_twin.h) answers each scene once for all
+ * tracers. */
+#ifndef FARLIGHT_TESTS_TRACERS_CONTRACT_H
+#define FARLIGHT_TESTS_TRACERS_CONTRACT_H
+
+#include "tests/tracers/naive_twin.h"
+
+#include "tests/accuracy/motion_scenes.h"
+#include "tests/accuracy/test_scenes.h"
+
+#include "gpu/device.h"
+#include "gpu_scene/scene.h"
+#include "shared/hit.h"
+#include "shared/material.h"
+#include "trace/tracer.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+/* ---- rows ---- */
+
+struct tracer_row {
+    const char *name;
+    unsigned number; /* the protocol's */
+    struct tracer_options options;
+    /* Another form of the tracer, with a row of its own: checked where forms may differ, that is in its answers.
+     */
+    bool is_form;
+    /* A tracer that samples, and how far from brute force its answers may be. 0: it is exact. */
+    struct {
+        uint32_t resolution; /* cells along the longest side, as its options say */
+        double cells;        /* distances agree to so many cells ... */
+        double wrong_max;    /* ... but for this share of the rays that pass no edge within BLUR_CELLS */
+        const char *reason;
+    } sampled;
+    /* What it refuses with an error, and why; NULL: it does not. */
+    const char *refuses_motion; /* while the shutter is open */
+    const char *refuses_sizes;  /* scenes of extreme ones */
+};
+
+/* A sampled tracer is not asked for more than this of what a ray passes. */
+#define BLUR_CELLS 2.0
+
+/* Rows of a file, by its constructor. */
+void tracer_rows_add(const struct tracer_row *rows, size_t count);
+#define TRACER_ROWS(rows)                                                                                         \
+    __attribute__((constructor)) static void add_##rows(void)                                                     \
+    {                                                                                                             \
+        tracer_rows_add(rows, sizeof(rows) / sizeof((rows)[0]));                                                  \
+    }
+
+struct scene_row {
+    const char *name;
+    struct scene *(*create)(void);
+    /* Where things are while the shutter is open, or in a pose; may be NULL. */
+    void (*move)(struct scene_motion *motion, uint32_t pose_count);
+    uint32_t pose_count;      /* of the open shutter; 0: it is closed, and the pose comes as a later edit */
+    bool is_finer_than_cells; /* of textures: for exact tracers alone */
+};
+extern const struct scene_row scene_rows[];
+extern const size_t scene_row_count;
+
+/* ---- checks ---- */
+
+struct contract_case {
+    const struct tracer_row *tracer;
+    const struct scene_row *scene; /* NULL: the check has its own */
+};
+
+enum check_scope {
+    CHECK_EACH_SCENE = 1, /* of scene_rows */
+    CHECK_FORMS = 2,      /* of forms, too */
+};
+
+struct check {
+    const char *name;
+    CMUnitTestFunction run; /* *state: struct contract_case */
+    unsigned scope;
+};
+void check_add(const struct check *check);
+/* A test that registers itself. */
+#define CHECK(name, scope)                                                                                        \
+    static void name(void **state);                                                                               \
+    __attribute__((constructor)) static void add_##name(void)                                                     \
+    {                                                                                                             \
+        static const struct check check = {#name, name, scope};                                                   \
+        check_add(&check);                                                                                        \
+    }                                                                                                             \
+    static void name(void **state)
+
+/* ---- a scene with one tracer on it ---- */
+
+#define RAY_COUNT 2000u
+
+extern struct gpu_device *device; /* of all tests */
+
+struct fixture {
+    const struct tracer_row *row;
+    struct scene *scene;
+    struct test_edits edits;
+    struct scene_motion motion;
+    struct gpu_scene gpu;
+    struct tracer *tracer;
+    struct stage_times times; /* of the last update */
+    struct gpu_buffer rays, ray_times, answers;
+    struct ray *host_rays;       /* RAY_COUNT */
+    float host_times[RAY_COUNT]; /* 0 where nothing moves, and for tracers that refuse what moves */
+    struct material *materials;  /* of the device, read back */
+    uint64_t memory_before_bytes,
+        others_bytes;          /* of the device: before anything was there, and without the tracer */
+    size_t objects_before[16]; /* of the device, by kind */
+};
+
+void expect_ok(bool ok, const struct error *error);
+
+/* Owns the scene. Brings the tracer to it; makes RAY_COUNT rays. */
+void fixture_init(struct fixture *fixture, const struct tracer_row *row, struct scene *scene);
+/* As above, with what moves while the shutter is open. */
+void fixture_init_moving(struct fixture *fixture, const struct tracer_row *row, const struct scene_row *scene);
+/* Nothing of it is left on the device. */
+void fixture_finish(struct fixture *fixture);
+
+/* Commits the edits and brings the copy on the device to them, and to the motion if there is one. */
+void fixture_commit(struct fixture *fixture, struct scene_changes *changes);
+/* That and the tracer. */
+bool fixture_try_update(struct fixture *fixture, struct error *error);
+void fixture_update(struct fixture *fixture);
+/* The tracer alone, from nothing, in steps as short as can be; stops after `steps_max`. `steps`: those made; may
+ * be NULL. */
+enum tracer_progress fixture_update_in_steps(struct fixture *fixture, uint32_t steps_max, uint32_t *steps,
+                                             struct error *error);
+
+/* What no answer looks like: shows that an answer was written, and that none was where none is due. */
+#define UNTOUCHED 0xdeadbeefu
+
+/* Answers to the fixture's rays, of which the wave has `count`; the caller frees RAY_COUNT of them: struct hit, or
+ * of WAVE_ANY uint32_t. */
+void *fixture_trace(struct fixture *fixture, enum wave_kind kind, uint32_t count);
+/* The same by parts of so many rays. */
+void *fixture_trace_in_parts(struct fixture *fixture, enum wave_kind kind, uint32_t count, uint32_t part_rays);
+/* Answers to rays of a test's own, at most RAY_COUNT. */
+void fixture_trace_rays(struct fixture *fixture, enum wave_kind kind, const struct ray *rays, uint32_t count,
+                        void *answers);
+
+/* Of a tracer that samples; 0: an exact one. */
+double fixture_cell_metres(const struct fixture *fixture);
+
+static inline struct ray ray_from(const float origin[3], const float direction[3], float t_min, float t_max)
+{
+    return (struct ray){.origin_t_min = {origin[0], origin[1], origin[2], t_min},
+                        .direction_t_max = {direction[0], direction[1], direction[2], t_max}};
+}
+
+/* How far something is below a point at a height of 10, a little askew so that no ray lies on an edge between
+ * cells; negative where nothing is. */
+float distance_below(struct fixture *fixture, float x, float y);
+
+/* A box of one unit round the origin; boxes of it, shown by node i + 1 at x = 2 i. */
+void add_box_mesh(struct test_edits *edits, uint32_t id);
+struct scene *scene_of_boxes(uint32_t count);
+void add_box(struct test_edits *edits, uint32_t node, float x, float y, float z);
+
+#endif
