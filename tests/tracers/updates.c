@@ -136,12 +136,12 @@ CHECK(at_a_limit_of_memory_an_update_fails_alone, CHECK_FORMS)
     fixture_finish(&other);
 }
 
-static void expect_nothing_built(const struct fixture *fixture)
+static void expect_nothing_built(const struct fixture *fixture, uint64_t uploaded_bytes_max)
 {
     assert_int_equal(fixture->tracer->stats.nodes_rebuilt, 0);
     assert_int_equal(fixture->tracer->stats.nodes_refitted, 0);
-    assert_int_equal(fixture->tracer->stats.uploaded_bytes, 0);
-    for (uint32_t i = 0; i < fixture->times.count; i++)
+    assert_in_range(fixture->tracer->stats.uploaded_bytes, 0, uploaded_bytes_max);
+    for (uint32_t i = 0; uploaded_bytes_max == 0 && i < fixture->times.count; i++)
         assert_int_equal(fixture->times.spans[i].duration_ns, 0);
 }
 
@@ -151,20 +151,23 @@ CHECK(without_a_change_nothing_is_built, 0)
     struct fixture fixture;
     fixture_init(&fixture, of->tracer, scene_of_boxes(3));
     fixture_update(&fixture);
-    expect_nothing_built(&fixture);
+    expect_nothing_built(&fixture, 0);
+    add_box(&fixture.edits, 2, 2, 0, 0); /* to where it is */
+    fixture_update(&fixture);
+    expect_nothing_built(&fixture, 0);
     struct scene_light *light = &test_add(&fixture.edits, SCENE_LIGHT)->set.light;
     light->base.id = 50;
     light->colour[0] = 1.0f;
     test_node(&fixture.edits, 50, 0, NODE_LIGHT, 50, NULL);
-    test_material(&fixture.edits, 77, 0.5f, 0.5f, 0.5f); /* that nothing is of */
     fixture_update(&fixture);
-    expect_nothing_built(&fixture);
+    expect_nothing_built(&fixture, 0);
+    /* Materials that nothing is of: a tracer may have a copy of all. */
+    test_material(&fixture.edits, 77, 0.5f, 0.5f, 0.5f);
+    fixture_update(&fixture);
+    expect_nothing_built(&fixture, fixture.gpu.materials.size_bytes);
     test_material(&fixture.edits, 77, 0.9f, 0.1f, 0.5f)->roughness = 0.1f;
     fixture_update(&fixture);
-    expect_nothing_built(&fixture);
-    add_box(&fixture.edits, 2, 2, 0, 0); /* to where it is */
-    fixture_update(&fixture);
-    expect_nothing_built(&fixture);
+    expect_nothing_built(&fixture, fixture.gpu.materials.size_bytes);
     expect_distance(&fixture, distance_below(&fixture, 2, 0), 9.5);
     fixture_finish(&fixture);
 }
