@@ -205,10 +205,25 @@ $(B)/protocol.md: $(B)/protocol-docgen protocol/docs/guide.md
 # What has shaders of its own has them in place of the daemon's alone.
 RIVAL_SOURCES := $(B)/tests/bench/shader_sources.o
 LINKED = $(if $(filter $(RIVAL_SOURCES),$^),$(filter-out $(B)/shader_sources.o,$^),$^)
-# A unit or accuracy test is one file with a main(); it may use everything but the programs' main().
-UNIT_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accuracy/test_*.c))
+# Tests register themselves (tests/harness/test.h). Those that need neither libraries nor functions replaced for them alone are
+# one program; run_tests.py runs each of its files in a process of its own.
+MEDIA_TEST_SRC := $(call sources,tests/unit/encode tests/unit/viewer,c)
+FAULT_TEST_SRC := $(call sources,tests/unit/fuzz,c)
+UNIT_TEST_SRC := $(filter-out tests/unit/test_% tests/accuracy/test_% $(MEDIA_TEST_SRC) $(FAULT_TEST_SRC),$(call sources,tests/unit tests/accuracy,c))
+ifneq ($(EMBREE),1)
+UNIT_TEST_SRC := $(filter-out tests/unit/bench/contest.c,$(UNIT_TEST_SRC))
+endif
+TEST_PROGRAMS := $(addprefix $(B)/tests/unit/,unit_tests media_tests fault_tests)
+# A test with a main() of its own.
+LONE_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accuracy/test_*.c))
+UNIT_TESTS := $(TEST_PROGRAMS) $(LONE_TESTS)
 TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) $(EMBREE_LIBS) -lm
-$(UNIT_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+$(TEST_PROGRAMS): $(B)/tests/harness/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
+	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -o $@
+$(B)/tests/unit/unit_tests: $(call obj,$(UNIT_TEST_SRC))
+$(B)/tests/unit/media_tests: $(call obj,$(MEDIA_TEST_SRC))
+$(B)/tests/unit/fault_tests: $(call obj,$(FAULT_TEST_SRC))
+$(LONE_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -o $@
 # What every tracer promises: one program of a folder, with the rows of all tracers.
 CONTRACT := $(B)/tests/tracers/test_contract
@@ -222,7 +237,7 @@ $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 MODEL_OBJ := $(B)/tests/bench/load_model.o
 RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIVAL_SOURCES)
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
-$(B)/tests/unit/test_load_model $(B)/tests/accuracy/test_abuffer_against_reference: $(MODEL_OBJ)
+$(B)/tests/accuracy/test_abuffer_against_reference: $(MODEL_OBJ)
 # Sessions live in a time of their own.
 SERVING_OBJ := $(call obj,$(addprefix tests/fuzz/,engine_recorder.c serving.c))
 SERVING_WRAP := -Wl,--wrap=clock_now_ns
@@ -234,29 +249,18 @@ $(B)/tests/fuzz/kept_%.o: tests/fuzz/fuzz_%.c
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 # The importer without its main() and its sandbox.
 READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o sandbox.o send.o),$(IMPORT_OBJ))
-$(B)/tests/unit/test_fuzz_corpus: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ)
-$(B)/tests/unit/test_fuzz_corpus: TEST_LIBS += $(SERVING_WRAP) $(IMPORT_LIBS) -lstdc++
-$(B)/tests/unit/test_session_faults: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
-$(B)/tests/unit/test_session_faults: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
-$(B)/tests/unit/test_import_closed: $(B)/client/import/closed.o
+# Sessions that begin, break and end, with memory that runs out; and the fuzzers' inputs.
+$(B)/tests/unit/fault_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o $(READERS_OBJ)
+$(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc $(IMPORT_LIBS) -lstdc++
 # What the daemon encodes is decoded by the library itself.
-$(addprefix $(B)/tests/unit/test_encode_,pool stream): TEST_LIBS += $(call pkg_libs,libavcodec libavutil)
-$(B)/tests/unit/test_encode_refused: TEST_LIBS += $(call pkg_libs,libavcodec libavutil) -Wl,--wrap=libav_load
-$(B)/tests/unit/test_viewer_camera: $(call obj,$(addprefix client/viewer/,camera.c input.c settings.c tour.c))
-$(B)/tests/unit/test_viewer_figures: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c))
-$(B)/tests/unit/test_viewer_replay: $(B)/client/viewer/replay.o
-$(B)/tests/unit/test_viewer_decode: $(call obj,$(addprefix client/viewer/,decode.c pixmap.c))
-$(B)/tests/unit/test_viewer_window: $(call obj,$(addprefix client/viewer/,camera.c heat.c hud.c input.c metrics.c paint.c \
-    pixmap.c window.c))
-$(B)/tests/unit/test_viewer_decode $(B)/tests/unit/test_viewer_window: TEST_LIBS += $(VIEWER_LIBS)
-$(B)/tests/unit/test_bench_contest: $(CONTEST_OBJ)
-$(B)/tests/unit/test_bench_svo: $(RIVAL_OBJ)
+$(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint pixmap replay settings tour window)
+$(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
+$(B)/tests/unit/unit_tests: $(B)/client/import/closed.o $(MODEL_OBJ) $(RIVAL_OBJ) $(if $(filter 1,$(EMBREE)),$(CONTEST_OBJ))
 $(B)/tests/bench/bench_tracers: $(CONTEST_OBJ) $(B)/tests/bench/bench_options.o
 $(B)/tests/bench/bench_changes: $(B)/tests/bench/bench_stats.o
 $(B)/tests/bench/bench_forms: $(CONTEST_OBJ) $(RIVAL_OBJ) $(call obj,$(addprefix tests/bench/bench_,forms_frames.c forms_parse.c forms_rays.c forms_samples.c options.c) tests/bench/plain_pass.c)
 $(B)/tests/bench/bench_parallel: $(CONTEST_OBJ)
 $(B)/tests/bench/bench_bvh: $(MODEL_OBJ) $(B)/tests/bench/bench_scene.o $(B)/tests/bench/bench_sheets.o $(B)/tests/bench/bench_waves.o
-$(B)/tests/unit/test_bench_contest: TEST_LIBS += -lembree3
 BENCH_PROGRAMS := $(BENCHES) $(B)/tests/bench/embree_build
 # Whole frames, beside nothing of Embree's.
 BENCH_DISTRIBUTED := $(B)/tests/bench/bench_distributed
@@ -281,7 +285,6 @@ $(B)/tests/bench/shaped_link: $(B)/tests/bench/shaped_link.o
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ -o $@
 # EMBREE=0 leaves out what cannot be built without it.
 ifeq ($(EMBREE),0)
-UNIT_TESTS := $(filter-out $(B)/tests/unit/test_bench_contest,$(UNIT_TESTS))
 BENCH_PROGRAMS :=
 endif
 
@@ -307,20 +310,17 @@ $(LOSING_DAEMON): $(B)/tests/tools/lost_gpu.o $(B)/server/main.o $(SERVER_OBJ) $
 BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libcglm-dev libturbojpeg0-dev libzstd-dev \
     libsodium-dev libxxhash-dev libinih-dev libjansson-dev libseccomp-dev libopenimageio-dev libjxl-dev libtinygltf-dev \
     libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
-TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb
-PLOT_PACKAGES := gnuplot-nox
+TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 
-.PHONY: tests build-packages test-packages plot-packages lint-packages fuzz-packages test demo bench soak bench-plot check-headers lint format install uninstall clean help
+.PHONY: tests build-packages test-packages lint-packages fuzz-packages test demo bench soak bench-plot check-headers lint format install uninstall clean help
 tests: $(UNIT_TESTS) $(CONTRACT) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(BENCH_VIEW) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
 test-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES)
-plot-packages:
-	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(PLOT_PACKAGES)
 lint-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(LINT_PACKAGES)
 fuzz-packages:
@@ -345,7 +345,7 @@ soak: test-packages
 	$(MAKE) -j$(JOBS) all
 	python3 tests/soak/soak.py $(B) $(ROUNDS)
 # Measures what the curves need where out/bench.json does not have it yet.
-bench-plot: plot-packages
+bench-plot: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench_plot.py $(B)
 

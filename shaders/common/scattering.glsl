@@ -6,7 +6,7 @@
 // mirror direction, and one ray cannot blur: as the roughness grows, its mirror ray is faded out and what it
 // carried is replaced by the irradiance about that direction, and Fresnel's rise at grazing angles is faded out
 // too. What is reflected, refracted and scattered never adds up to more than what arrives, be it from all around
-// (struct split) or from a lamp (brdf); tests/accuracy/test_shading_energy.c holds both to it.
+// (struct split) or from a lamp (brdf); tests/accuracy/shading_energy.c holds both to it.
 //
 // Defines: those of common/material.glsl.
 

@@ -4,7 +4,7 @@
 #ifndef FARLIGHT_TESTS_AGAINST_REFERENCE_H
 #define FARLIGHT_TESTS_AGAINST_REFERENCE_H
 
-#include "ldc_scenes.h"
+#include "tests/accuracy/ldc_scenes.h"
 
 #include "trace/tracer.h"
 

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_TESTS_LDC_SCENES_H
 #define FARLIGHT_TESTS_LDC_SCENES_H
 
-#include "render_fixture.h"
+#include "tests/accuracy/render_fixture.h"
 
 /* ---- shapes: closed, with smooth normals and texture coordinates ---- */
 

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_TESTS_MOTION_SCENES_H
 #define FARLIGHT_TESTS_MOTION_SCENES_H
 
-#include "test_scenes.h"
+#include "tests/accuracy/test_scenes.h"
 
 #include "scene/pose.h"
 

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_TESTS_PATH_FIXTURE_H
 #define FARLIGHT_TESTS_PATH_FIXTURE_H
 
-#include "render_fixture.h"
+#include "tests/accuracy/render_fixture.h"
 
 #define TRACER_BVH 0
 #define TRACER_REFERENCE 2

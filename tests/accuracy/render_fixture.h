@@ -3,16 +3,10 @@
 #ifndef FARLIGHT_TESTS_RENDER_FIXTURE_H
 #define FARLIGHT_TESTS_RENDER_FIXTURE_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
 #include "base/blob.h"
-#include "gpu/device.h"
 #include "render/frame.h"
 #include "scene/scene.h"
+#include "tests/fixtures/device.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -59,15 +53,10 @@ static inline void fixture_look(struct fixture *fixture, float x, float y, float
 
 static inline int fixture_setup(void **state)
 {
-    struct fixture *fixture = calloc(1, sizeof(*fixture));
-    struct error error = {0};
-    assert_non_null(fixture);
-    fixture->device = gpu_device_create(&(struct gpu_options){.index = -1, .debug = true}, &error);
-    if (!fixture->device) {
-        print_message("no device: %s\n", error.text);
-        return -1;
-    }
-    *state = fixture;
+    static struct fixture fixture;
+    open_device(state);
+    fixture.device = device;
+    *state = &fixture;
     return 0;
 }
 
@@ -77,9 +66,7 @@ static inline int fixture_teardown(void **state)
     scene_destroy(fixture->scene);
     frame_renderer_destroy(fixture->renderer);
     frame_scene_destroy(fixture->shared);
-    gpu_device_destroy(fixture->device);
-    free(fixture);
-    return 0;
+    return close_device(state);
 }
 
 /* An empty scene and the default request; before each test. */

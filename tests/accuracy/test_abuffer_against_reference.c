@@ -5,7 +5,7 @@
  *
  * Models are those of the folder FARLIGHT_SCENES. Each test prints what it measured. FARLIGHT_TEST_PICTURES=folder
  * keeps the pictures. */
-#include "against_reference.h"
+#include "tests/accuracy/against_reference.h"
 
 #include "tests/bench/load_model.h"
 

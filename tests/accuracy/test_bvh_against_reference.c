@@ -7,7 +7,7 @@
  * tracer is right. It counts as one if the reference itself gives bvh's answer to the ray moved by a few rounding
  * steps. Both tracers take a ray to object space, by three products and three sums a coordinate, each of which
  * rounds by half a step, and by matrices that round by half a step; EDGE_STEPS is the sum of that. */
-#include "test_scenes.h"
+#include "tests/accuracy/test_scenes.h"
 
 #include "gpu/device.h"
 #include "shared/hit.h"

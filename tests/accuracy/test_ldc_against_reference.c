@@ -4,7 +4,7 @@
  * rounding. What is primary is rasterised in both pictures, as in every frame without a lens.
  *
  * Each test prints what it measured. FARLIGHT_TEST_PICTURES=folder keeps the pictures. */
-#include "against_reference.h"
+#include "tests/accuracy/against_reference.h"
 
 #define LDC 3
 #define RESOLUTION 1024u

@@ -2,7 +2,7 @@
 /* Any payload of any type: what decodes must encode, decode to the same and encode to the same bytes.
  * Input: u16 position in the table (modulo its length), then the payload. */
 #include "tests/fuzz/fuzz.h"
-#include "tests/unit/protocol_cases.h"
+#include "tests/unit/protocol/cases.h"
 
 #define ROOM_BYTES (CODEC_BULK_PAYLOAD_MAX_BYTES + 1024u)
 

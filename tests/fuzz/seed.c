@@ -10,7 +10,7 @@
 #include "protocol/handshake.h"
 #include "tests/fuzz/recorded_session.h"
 #include "tests/fuzz/sealed_random.h"
-#include "tests/unit/protocol_cases.h"
+#include "tests/unit/protocol/cases.h"
 
 static struct case_maker maker;
 static struct plain_bytes plain;

@@ -14,7 +14,7 @@ import sealed_link
 from farlight_test import Case, Daemon, bundled_scenes, farlight
 from test_daemon import PING, PONG, hello, message
 
-GOLDEN = farlight_test.ROOT / "tests/unit/golden/sealed.hex"
+GOLDEN = farlight_test.ROOT / "tests/unit/protocol/golden/sealed.hex"
 
 
 class Golden(Case):

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_TESTS_ABUFFER_SCENES_H
 #define FARLIGHT_TESTS_ABUFFER_SCENES_H
 
-#include "../accuracy/motion_scenes.h"
+#include "tests/accuracy/motion_scenes.h"
 
 /* A ball (or a torus) of steps x steps quadrilaterals, vertices shared, the outside out; no attributes. */
 static inline struct scene_mesh *add_round_mesh(struct test_edits *edits, uint32_t id, uint32_t steps, bool torus)

@@ -3,19 +3,12 @@
 #ifndef FARLIGHT_TESTS_DEVICE_FIXTURE_H
 #define FARLIGHT_TESTS_DEVICE_FIXTURE_H
 
-#include "gpu/device.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
+#include "tests/fixtures/device.h"
 #include "trace/wave.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
-
-#include <cmocka.h>
-
-static struct gpu_device *device;
 
 static inline void expect_ok(bool ok, const struct error *error)
 {

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_TESTS_STACK_SCENE_H
 #define FARLIGHT_TESTS_STACK_SCENE_H
 
-#include "../accuracy/test_scenes.h"
+#include "tests/accuracy/test_scenes.h"
 
 enum stack_order { FRONT_TO_BACK, BACK_TO_FRONT, SHUFFLED };
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* That the tracer `bvh` answers the same to the bit however its scene came about: frames of an animation must not
  * depend on which frames were rendered before. And what instances that all move cost. */
-#include "../accuracy/test_scenes.h"
+#include "tests/accuracy/test_scenes.h"
 
 #include "gpu/device.h"
 #include "shared/hit.h"

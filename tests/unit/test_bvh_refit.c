@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Trees of meshes that deform: refitted where that is enough, built anew where it is not, and right in either
  * case. */
-#include "../accuracy/motion_scenes.h"
+#include "tests/accuracy/motion_scenes.h"
 
 #include "gpu/device.h"
 #include "shared/hit.h"

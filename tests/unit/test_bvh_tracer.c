@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What only the tracer `bvh` promises: edits cost what they change, and its bounds lose no hit that brute force
  * finds. That its answers are right is shown by tests/tracers. */
-#include "../accuracy/test_scenes.h"
+#include "tests/accuracy/test_scenes.h"
 
 #include "gpu/device.h"
 #include "shared/hit.h"

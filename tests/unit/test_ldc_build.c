@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Layered depth cubes hold what is in the scene: each texel of the three images against the triangles and spheres
  * under its middle, found without a rasteriser (axes_oracle.h); and both builds give the same samples. */
-#include "../accuracy/motion_scenes.h"
-#include "../accuracy/test_scenes.h"
+#include "tests/accuracy/motion_scenes.h"
+#include "tests/accuracy/test_scenes.h"
 #include "axes_oracle.h"
 #include "ldc_fixture.h"
 

@@ -1,0 +1,270 @@
+/* SPDX-License-Identifier: MIT */
+/* The integrator `ao` against closed forms of how open a place is, with and without falloff, and how its rays are
+ * cut into batches, frames and requests that are refused. */
+#include "tests/accuracy/render_fixture.h"
+#include "tests/harness/test.h"
+
+#define TRACER_BVH 0
+#define TRACER_REFERENCE 2
+#define FAR_AWAY 1000.0f
+static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_REFERENCE};
+#define COUNT(array) (sizeof(array) / sizeof((array)[0]))
+
+enum { EDGE = 32 };
+
+static void begin(struct fixture *fixture, unsigned tracer)
+{
+    fixture_clear((void **)&fixture);
+    fixture->request.width = fixture->request.height = EDGE;
+    fixture->request.integrator = INTEGRATOR_AO;
+    fixture->request.filter = FILTER_BOX;
+    fixture->request.tracer = tracer;
+    fixture->request.primary = PRIMARY_TRACE;
+    fixture->request.ao_distance = FAR_AWAY;
+}
+
+/* Looks down at the plane z = 0, of which `height` metres are seen. */
+static void look_down(struct fixture *fixture, float height)
+{
+    fixture->request.camera.fov_y = 0.0f;
+    fixture->request.camera.ortho_height = height;
+}
+
+static double mean_of_columns(const struct frame_result *result, uint32_t first, uint32_t end)
+{
+    double sum = 0.0;
+    for (uint32_t y = 0; y < result->height; y++)
+        for (uint32_t x = first; x < end; x++)
+            sum += (double)fixture_pixel(result, x, y)[0];
+    return sum / ((end - first) * result->height);
+}
+
+/* A ray is closed or it is not: so the error of n of them, if they were independent; they are stratified. Five
+ * times that is exceeded once in two million. */
+static double five_errors(double open, double rays)
+{
+    return 5.0 * sqrt(open * (1.0 - open) / rays);
+}
+
+ALL_TESTS(fixture_setup, fixture_teardown)
+EACH_TEST(fixture_clear, NULL)
+
+TEST(an_open_plane_is_wholly_open_and_so_is_what_leaves_the_scene)
+{
+    struct fixture *fixture = *state;
+    for (size_t t = 0; t < COUNT(tracers); t++) {
+        begin(fixture, tracers[t]);
+        fixture_square(fixture, 1.0f, fixture_material(fixture)->base.id, NULL);
+        fixture->request.samples = 2;
+        struct frame_result result = fixture_render(fixture);
+        for (uint32_t i = 0; i < EDGE * EDGE; i++)
+            for (int c = 0; c < 3; c++) /* sums of eighths and halves */
+                assert_near(fixture_pixel(&result, i % EDGE, i / EDGE)[c], 1.0, 1e-6);
+        assert_int_equal(result.shadow_rays % 8, 0); /* the default */
+        assert_true(result.shadow_rays > 0);
+        frame_result_finish(&result);
+    }
+}
+
+/* A wall 1 m high beside a plane closes (1 - x / sqrt(x^2 + 1)) / 2 of the sky of a place x from it: in the plane
+ * across a wall without ends, directions count as the sine of their height. Over a pixel that is integrated. */
+TEST(a_wall_hides_its_share_of_the_sky)
+{
+    struct fixture *fixture = *state;
+    const float wall[12] = {0, 0, 1, -2.0f, 0, 1, 0, 0, -1, 0, 0, 0}; /* the square's x is -z here */
+    enum { SAMPLES = 16, RAYS = 16 };
+    for (size_t t = 1; t < COUNT(tracers); t++) {
+        begin(fixture, tracers[t]);
+        uint32_t material = fixture_material(fixture)->base.id;
+        fixture_square(fixture, 10.0f, material, NULL);
+        struct scene_mesh *mesh = fixture_square(fixture, 1.0f, material, wall);
+        float *corners = (float *)(void *)mesh->arrays[MESH_POSITIONS]->data;
+        for (int i = 0; i < 4; i++)
+            corners[3 * i + 1] *= 400.0f; /* of a wall 800 m long, the ends hide less than (1 / 400)^2 */
+        look_down(fixture, 4.0f);
+        fixture->request.samples = SAMPLES;
+        fixture->request.ao_rays = RAYS;
+        struct frame_result result = fixture_render(fixture);
+        double worst = 0.0;
+        for (uint32_t column = 0; column < EDGE; column++) {
+            double from = column * 4.0 / EDGE, to = (column + 1) * 4.0 / EDGE;
+            double open = 0.5 + 0.5 * (sqrt(to * to + 1.0) - sqrt(from * from + 1.0)) / (to - from);
+            double mean = mean_of_columns(&result, column, column + 1);
+            assert_near(mean, open, five_errors(open, SAMPLES * RAYS * EDGE) + 1e-5);
+            worst = fmax(worst, fabs(mean - open));
+        }
+        print_message("tracer %u, beside a wall: off by %.1e at most\n", tracers[t], worst);
+        frame_result_finish(&result);
+    }
+}
+
+/* Inside of a ball of radius 1 a direction at cosine c to the normal ends at 2 c, and c^2 is uniform. */
+static double open_in_a_ball(double reach, double falloff)
+{
+    enum { STEPS = 20000 };
+    double closed = 0.0;
+    for (int i = 0; i < STEPS; i++) {
+        double near = 1.0 - 2.0 * sqrt((i + 0.5) / STEPS) / reach;
+        closed += near > 0.0 ? pow(near, falloff) / STEPS : 0.0;
+    }
+    return 1.0 - closed;
+}
+
+TEST(what_is_nearer_closes_more)
+{
+    struct fixture *fixture = *state;
+    static const float reaches[] = {FAR_AWAY, 3.0f, 2.0f, 1.2f, 0.5f}, falloffs[] = {0.0f, 0.5f, 1.0f, 2.0f, 8.0f};
+    enum { SAMPLES = 2, RAYS = 16 };
+    begin(fixture, TRACER_REFERENCE);
+    fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, fixture_material(fixture)->base.id);
+    fixture_look(fixture, 0.0f, 0.0f, 0.3f, 1.0f);
+    fixture->request.samples = SAMPLES;
+    fixture->request.ao_rays = RAYS;
+    for (size_t r = 0; r < COUNT(reaches); r++)
+        for (size_t f = 0; f < COUNT(falloffs); f++) {
+            fixture->request.ao_distance = reaches[r];
+            fixture->request.ao_falloff = falloffs[f];
+            struct frame_result result = fixture_render(fixture);
+            double open = open_in_a_ball((double)reaches[r], (double)falloffs[f]);
+            double mean = mean_of_columns(&result, 0, EDGE);
+            print_message("reach %4g, falloff %3g: %.5f, should be %.5f\n", (double)reaches[r],
+                          (double)falloffs[f], mean, open);
+            /* The integral's steps, and rays that start a little before the surface: 1e-4. */
+            assert_near(mean, open, five_errors(open, EDGE * EDGE * SAMPLES * RAYS) + 1e-4);
+            if (reaches[r] == FAR_AWAY && falloffs[f] == 0.0f)
+                assert_near(mean, 0.0, 0.0); /* closed is closed */
+            frame_result_finish(&result);
+        }
+}
+
+/* Of a plane 1 m below a pane that is half open, half the eye's ray sees the pane and half what the pane lets the
+ * plane have. A pane of 400 m hides all but its edge's (1 / 400)^2. */
+TEST(blended_panes_count_by_half)
+{
+    struct fixture *fixture = *state;
+    const float above[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.0f};
+    begin(fixture, TRACER_REFERENCE);
+    struct scene_material *pane = fixture_material(fixture);
+    pane->alpha_mode = ALPHA_BLEND;
+    pane->base_colour[3] = 0.5f;
+    fixture_square(fixture, 10.0f, fixture_material(fixture)->base.id, NULL);
+    fixture_square(fixture, 400.0f, pane->base.id, above);
+    look_down(fixture, 1.0f);
+    struct frame_result result = fixture_render(fixture);
+    for (uint32_t i = 0; i < EDGE * EDGE; i++) {
+        /* alpha and transmittance are in 255 steps */
+        assert_near(fixture_pixel(&result, i % EDGE, i / EDGE)[0], 0.75, 0.5 / 255.0);
+        assert_near(fixture_pixel(&result, i % EDGE, i / EDGE)[3], 1.0, 1e-6);
+    }
+    frame_result_finish(&result);
+}
+
+/* ---- batches, frames, requests ---- */
+
+static void a_corner(struct fixture *fixture)
+{
+    const float wall[12] = {0, 0, 1, -1.0f, 0, 1, 0, 0, -1, 0, 0, 0};
+    uint32_t material = fixture_material(fixture)->base.id;
+    fixture_square(fixture, 2.0f, material, NULL);
+    fixture_square(fixture, 2.0f, material, wall);
+    fixture_sphere(fixture, 0.3f, 0.2f, 0.4f, 0.4f, material);
+    fixture->request.ao_falloff = 1.0f;
+    fixture->request.ao_distance = 0.0f;
+}
+
+static void assert_same(const struct frame_result *a, const struct frame_result *b)
+{
+    assert_int_equal(a->size_bytes, b->size_bytes);
+    assert_memory_equal(a->pixels, b->pixels, a->size_bytes);
+}
+
+TEST(the_picture_is_the_same_however_its_rays_are_batched)
+{
+    struct fixture *fixture = *state;
+    begin(fixture, TRACER_NAIVE);
+    a_corner(fixture);
+    fixture->request.samples = 4;
+    fixture->request.ao_rays = 33;
+    struct frame_result large = fixture_render(fixture);
+    frame_renderer_set_capacity(fixture->renderer, 200, 300);
+    struct frame_result small = fixture_render(fixture);
+    assert_same(&large, &small);
+    assert_int_equal(large.shadow_rays, small.shadow_rays);
+    frame_result_finish(&large);
+    frame_result_finish(&small);
+    frame_renderer_set_capacity(fixture->renderer, 0, 0);
+}
+
+TEST(frames_of_few_samples_add_up_to_one_of_many)
+{
+    struct fixture *fixture = *state;
+    struct frame_result parts = {0};
+    begin(fixture, TRACER_NAIVE);
+    a_corner(fixture);
+    fixture->request.accumulate = true;
+    fixture->request.samples = 6;
+    struct frame_result whole = fixture_render(fixture);
+    fixture->request.ao_rays = 9; /* another picture: begins from new */
+    parts = fixture_render(fixture);
+    assert_int_equal(parts.samples, 6);
+    frame_result_finish(&parts);
+    fixture->request.ao_rays = 0;
+    fixture->request.samples = 2;
+    for (uint32_t i = 1; i <= 3; i++) {
+        frame_result_finish(&parts);
+        parts = fixture_render(fixture);
+        assert_int_equal(parts.samples, 2 * i);
+    }
+    assert_same(&whole, &parts);
+    frame_result_finish(&whole);
+    frame_result_finish(&parts);
+}
+
+TEST(a_tenth_of_the_diagonal_is_the_default_distance)
+{
+    struct fixture *fixture = *state;
+    begin(fixture, TRACER_REFERENCE);
+    fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 1.0f, fixture_material(fixture)->base.id);
+    fixture_look(fixture, 0.0f, 0.0f, 0.3f, 1.0f);
+    fixture->request.ao_rays = 64;
+    fixture->request.ao_distance = 0.0f;
+    struct frame_result result = fixture_render(fixture);
+    double open = open_in_a_ball(sqrt(12.0) / 10.0, 0.0);
+    assert_near(mean_of_columns(&result, 0, EDGE), open, five_errors(open, EDGE * EDGE * 64) + 1e-4);
+    frame_result_finish(&result);
+}
+
+static void refuse(struct fixture *fixture, const char *field)
+{
+    struct error error = {0};
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_string_equal(error.field, field);
+    fixture->request.ao_distance = fixture->request.ao_falloff = fixture->request.layer_opacity = 0.0f;
+    fixture->request.ao_rays = 0;
+    fixture->request.brdf = FRAME_BRDF_GGX;
+    fixture->request.integrator = INTEGRATOR_AO;
+}
+
+TEST(impossible_requests_are_refused_with_the_field)
+{
+    struct fixture *fixture = *state;
+    begin(fixture, TRACER_NAIVE);
+    fixture_commit(fixture);
+    static const float wrong[] = {-1.0f, NAN, INFINITY};
+    for (size_t i = 0; i < COUNT(wrong); i++) {
+        fixture->request.ao_distance = wrong[i];
+        refuse(fixture, "ao_distance");
+        fixture->request.ao_falloff = wrong[i];
+        refuse(fixture, "ao_falloff");
+        fixture->request.layer_opacity = wrong[i];
+        refuse(fixture, "layer_opacity");
+    }
+    fixture->request.layer_opacity = 1.01f;
+    refuse(fixture, "layer_opacity");
+    fixture->request.ao_rays = 1u << 20;
+    refuse(fixture, "ao_rays");
+    fixture->request.brdf = (enum frame_brdf)2;
+    refuse(fixture, "brdf");
+    fixture->request.integrator = (enum frame_integrator)5;
+    refuse(fixture, "integrator");
+}

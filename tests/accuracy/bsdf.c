@@ -1,0 +1,311 @@
+/* SPDX-License-Identifier: MIT */
+/* What the path integrator takes a surface to be: the directions that it chooses are as probable as it says,
+ * integrate to 1, and bring back no more than arrives, with GGX and with Ward's lobe, along a grain and without
+ * one. */
+#include "tests/accuracy/bsdf_probe.h"
+
+#include "render/sequence.h"
+#include "tests/fixtures/device.h"
+#include "tests/harness/test.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#define PI 3.14159265358979323846
+#define COUNT(array) (sizeof(array) / sizeof((array)[0]))
+
+enum { SCATTERED, MIRRORED, REFRACTED }; /* BSDF_* */
+enum {
+    NUMBERS = 1 << 15,
+    ACROSS = 768,
+    ABOUT = 512,
+    DIRECTIONS = ACROSS * ABOUT,
+    CELLS_ACROSS = 8,
+    CELLS_ABOUT = 16
+};
+
+static struct bsdf_question questions[DIRECTIONS];
+static struct bsdf_answer answers[DIRECTIONS];
+
+/* Numbers to choose by, stratified: what their means are off is at most as with independent ones. */
+static void ask_numbers(struct bsdf_probe *probe)
+{
+    for (uint32_t i = 0; i < NUMBERS; i++) {
+        sequence_pair(questions[i].v, sequence_seed(1, 7), 1, i);
+        questions[i].v[2] = sequence_number(sequence_seed(1, 7), 2, i);
+    }
+    bsdf_probe_ask(probe, questions, NUMBERS);
+}
+
+/* Equal steps of the cosine and of the angle about the normal: cells of one solid angle. */
+static double cosine_at(double across)
+{
+    return across / ACROSS;
+}
+
+static void ask_directions(struct bsdf_probe *probe)
+{
+    for (int a = 0; a < ACROSS; a++)
+        for (int b = 0; b < ABOUT; b++) {
+            double z = cosine_at(a + 0.5), sine = sqrt(1.0 - z * z), phi = (b + 0.5) * 2.0 * PI / ABOUT;
+            float *v = questions[a * ABOUT + b].v;
+            v[0] = (float)(sine * cos(phi));
+            v[1] = (float)(sine * sin(phi));
+            v[2] = (float)z;
+        }
+    bsdf_probe_ask(probe, questions, DIRECTIONS);
+}
+
+static const char *case_name(const struct bsdf_case *c, bool ward)
+{
+    static char name[200];
+    snprintf(name, sizeof(name),
+             "%s, roughness %g, metallic %g, transmission %g, ior %g, %s, anisotropy %g, NoV %.3g",
+             ward ? "ward" : "ggx", (double)c->roughness, (double)c->metallic, (double)c->transmission,
+             (double)c->ior, c->inside > 0.0f ? "inside" : "outside", (double)c->anisotropy, (double)c->view[2]);
+    return name;
+}
+
+static void look_from(struct bsdf_case *c, double cosine)
+{
+    double sine = sqrt(1.0 - cosine * cosine);
+    c->view[0] = (float)(sine * cos(0.7)); /* neither along the grain nor across it */
+    c->view[1] = (float)(sine * sin(0.7));
+    c->view[2] = (float)cosine;
+}
+
+/* A walk over white materials. */
+typedef void look(struct bsdf_probe *probe, const struct bsdf_case *c, bool ward, void *seen);
+static void walk(struct bsdf_probe probes[2], const float *roughnesses, size_t roughness_count, look *look_at,
+                 void *seen)
+{
+    static const struct bsdf_case kinds[] = {
+        {.metallic = 1.0f, .ior = 1.5f},
+        {.ior = 1.5f},
+        {.ior = 1.0f},
+        {.metallic = 0.5f, .ior = 1.5f},
+        {.ior = 4.0f},
+        {.transmission = 1.0f, .ior = 1.5f},
+        {.transmission = 0.5f, .ior = 1.5f},
+        {.transmission = 1.0f, .ior = 1.5f, .inside = 1.0f},
+        {.transmission = 0.5f, .ior = 1.5f, .inside = 1.0f},
+    };
+    static const float anisotropies[] = {0.0f, 0.6f};
+    static const double cosines[] = {1.0, 0.7, 0.3, 0.08};
+    for (int ward = 0; ward < 2; ward++)
+        for (size_t r = 0; r < roughness_count; r++)
+            for (size_t k = 0; k < COUNT(kinds); k++)
+                for (size_t a = 0; a < COUNT(anisotropies); a++)
+                    for (size_t v = 0; v < COUNT(cosines); v++) {
+                        struct bsdf_case c = kinds[k];
+                        c.roughness = roughnesses[r];
+                        c.anisotropy = anisotropies[a];
+                        c.base = 1.0f;
+                        look_from(&c, cosines[v]);
+                        look_at(&probes[ward], &c, ward, seen);
+                    }
+}
+
+/* ---- what is chosen ---- */
+
+/* Of the choices that say how probable they were, how many go to each cell of the hemisphere; in all. */
+static double counts_of(const struct bsdf_answer *chosen, double cells[CELLS_ACROSS * CELLS_ABOUT])
+{
+    double all = 0.0;
+    memset(cells, 0, CELLS_ACROSS * CELLS_ABOUT * sizeof(*cells));
+    for (int i = 0; i < NUMBERS; i++) {
+        if (!(chosen[i].probability > 0.0f) || !(chosen[i].direction[2] > 0.0f))
+            continue;
+        double phi = atan2((double)chosen[i].direction[1], (double)chosen[i].direction[0]) / (2.0 * PI);
+        int across = (int)((double)chosen[i].direction[2] * CELLS_ACROSS),
+            about = (int)((phi < 0.0 ? phi + 1.0 : phi) * CELLS_ABOUT);
+        across = across < CELLS_ACROSS ? across : CELLS_ACROSS - 1;
+        about = about < CELLS_ABOUT ? about : CELLS_ABOUT - 1;
+        cells[across * CELLS_ABOUT + about] += 1.0;
+        all += 1.0;
+    }
+    return all;
+}
+
+struct densities {
+    double greatest_z, sum_off, greatest_weight_off;
+    size_t cases;
+    char where[200];
+};
+
+static void hold_against_its_density(struct bsdf_probe *probe, const struct bsdf_case *c, bool ward, void *seen)
+{
+    struct densities *densities = seen;
+    static struct bsdf_answer chosen[NUMBERS];
+    static double counts[CELLS_ACROSS * CELLS_ABOUT], expected[CELLS_ACROSS * CELLS_ABOUT];
+    memset(expected, 0, sizeof(expected));
+    ask_numbers(probe);
+    bsdf_probe_run(probe, c, true, NUMBERS, chosen);
+    double all = counts_of(chosen, counts), sum = 0.0;
+    ask_directions(probe);
+    bsdf_probe_run(probe, c, false, DIRECTIONS, answers);
+    for (int a = 0; a < ACROSS; a++)
+        for (int b = 0; b < ABOUT; b++) {
+            double share = (double)answers[a * ABOUT + b].probability * (2.0 * PI / DIRECTIONS);
+            expected[a * CELLS_ACROSS / ACROSS * CELLS_ABOUT + b * CELLS_ABOUT / ABOUT] += share * NUMBERS;
+            sum += share;
+        }
+    densities->cases++;
+    /* A choice of the lobe is one number, stratified on its own; the share below the horizon is one of two more.
+     */
+    double off = fabs(sum - all / NUMBERS);
+    densities->sum_off = fmax(densities->sum_off, off);
+    if (off > 5.0 * sqrt(0.25 / NUMBERS) + 2e-3)
+        fail_msg("%s: chosen %.5f, its density integrates to %.5f", case_name(c, ward), all / NUMBERS, sum);
+    for (int i = 0; i < CELLS_ACROSS * CELLS_ABOUT; i++) {
+        /* Poisson's deviation, and 1 % for the quadrature where a lobe is steep across a cell's edge */
+        double z = fabs(counts[i] - expected[i]) / (sqrt(expected[i] + 1.0) + 0.01 * expected[i]);
+        if (z > densities->greatest_z) {
+            densities->greatest_z = z;
+            snprintf(densities->where, sizeof(densities->where), "%s", case_name(c, ward));
+        }
+    }
+    for (int i = 0; i < NUMBERS; i++)
+        if (chosen[i].probability > 0.0f && chosen[i].sent > 0.0f)
+            densities->greatest_weight_off =
+                fmax(densities->greatest_weight_off,
+                     fabs((double)(chosen[i].weight * chosen[i].probability / chosen[i].sent) - 1.0));
+}
+
+TEST(directions_are_as_probable_as_is_said)
+{
+    static const float roughnesses[] = {0.45f, 0.7f, 1.0f};
+    struct densities densities = {0};
+    walk(*state, roughnesses, COUNT(roughnesses), hold_against_its_density, &densities);
+    print_message("%zu cases: of a cell's count %.1f deviations off at most (%s), of all %.1e\n", densities.cases,
+                  densities.greatest_z, densities.where, densities.sum_off);
+    /* 432 cases of 128 cells: independent counts are beyond 5.5 deviations once in 500 such tests */
+    assert_true(densities.greatest_z < 5.5);
+    assert_true(densities.greatest_weight_off < 1e-4); /* roundings */
+}
+
+/* ---- how much comes back ---- */
+
+struct albedos {
+    double greatest, least_metal[2], least_scattering[2], least_glass[2];
+    char where[200];
+};
+
+static void sum_up(struct bsdf_probe *probe, const struct bsdf_case *c, bool ward, void *seen)
+{
+    struct albedos *albedos = seen;
+    double sum = 0.0, squares = 0.0;
+    ask_numbers(probe);
+    bsdf_probe_run(probe, c, true, NUMBERS, answers);
+    for (int i = 0; i < NUMBERS; i++) {
+        double weight = (double)answers[i].weight;
+        sum += weight;
+        squares += weight * weight;
+    }
+    double albedo = sum / NUMBERS, error = sqrt(fmax(squares / NUMBERS - albedo * albedo, 0.0) / NUMBERS);
+    if (albedo - 5.0 * error > albedos->greatest) {
+        albedos->greatest = albedo - 5.0 * error;
+        snprintf(albedos->where, sizeof(albedos->where), "%s", case_name(c, ward));
+    }
+    double *least = c->metallic == 1.0f       ? albedos->least_metal
+                    : c->transmission == 0.0f ? albedos->least_scattering
+                                              : albedos->least_glass;
+    least[ward] = fmin(least[ward], albedo);
+}
+
+TEST(no_white_material_sends_on_more_than_arrives)
+{
+    static const float roughnesses[] = {0.0f, 0.05f, 0.15f, 0.3f, 0.5f, 0.7f, 0.85f, 1.0f};
+    struct albedos albedos = {.least_metal = {1, 1}, .least_scattering = {1, 1}, .least_glass = {1, 1}};
+    walk(*state, roughnesses, COUNT(roughnesses), sum_up, &albedos);
+    print_message("greatest albedo, less five standard errors: %.5f (%s)\n", albedos.greatest, albedos.where);
+    for (int ward = 0; ward < 2; ward++)
+        print_message("%s, least albedo of a white metal %.3f, of what scatters %.3f, of glass %.3f\n",
+                      ward ? "ward" : "ggx", albedos.least_metal[ward], albedos.least_scattering[ward],
+                      albedos.least_glass[ward]);
+    assert_true(albedos.greatest <= 1.0 + 1e-4); /* sums of 2^15 weights in double, each rounded to 6e-8 */
+}
+
+/* ---- light and view in each other's place ---- */
+
+TEST(reflectance_is_the_same_both_ways)
+{
+    struct bsdf_probe *probes = *state;
+    static const float roughnesses[] = {0.2f, 0.5f, 0.9f}, metallics[] = {0.0f, 0.5f, 1.0f};
+    enum { VIEWS = 12 };
+    double off = 0.0;
+    for (int ward = 0; ward < 2; ward++)
+        for (size_t r = 0; r < COUNT(roughnesses); r++)
+            for (size_t m = 0; m < COUNT(metallics); m++) {
+                struct bsdf_question directions[VIEWS] = {0};
+                struct bsdf_answer there[VIEWS][VIEWS];
+                for (int i = 0; i < VIEWS; i++) {
+                    double z = 0.1 + 0.88 * i / (VIEWS - 1), phi = 2.4 * i;
+                    directions[i].v[0] = (float)(sqrt(1.0 - z * z) * cos(phi));
+                    directions[i].v[1] = (float)(sqrt(1.0 - z * z) * sin(phi));
+                    directions[i].v[2] = (float)z;
+                }
+                bsdf_probe_ask(&probes[ward], directions, VIEWS);
+                for (int i = 0; i < VIEWS; i++) {
+                    struct bsdf_case c = {.roughness = roughnesses[r],
+                                          .metallic = metallics[m],
+                                          .ior = 1.5f,
+                                          .base = 0.8f,
+                                          .anisotropy = 0.5f};
+                    memcpy(c.view, directions[i].v, sizeof(c.view));
+                    bsdf_probe_run(&probes[ward], &c, false, VIEWS, there[i]);
+                }
+                for (int i = 0; i < VIEWS; i++)
+                    for (int j = 0; j < i; j++) {
+                        double one = (double)(there[i][j].sent / directions[j].v[2]);
+                        double other = (double)(there[j][i].sent / directions[i].v[2]);
+                        off = fmax(off, fabs(one - other) / fmax(fmax(one, other), 1e-3));
+                    }
+            }
+    print_message("off by %.1e at most\n", off);
+    assert_true(off < 1e-3); /* slopes of facets are differences of directions: their roundings by alpha of 0.04 */
+}
+
+TEST(without_a_grain_ggx_is_that_of_the_other_integrators)
+{
+    struct bsdf_probe *probes = *state;
+    double off = 0.0;
+    static const float roughnesses[] = {0.3f, 0.6f, 1.0f};
+    static const double cosines[] = {0.95, 0.5, 0.15};
+    ask_directions(&probes[0]);
+    for (size_t r = 0; r < COUNT(roughnesses); r++)
+        for (int metal = 0; metal < 2; metal++)
+            for (size_t v = 0; v < COUNT(cosines); v++) {
+                struct bsdf_case c = {
+                    .roughness = roughnesses[r], .metallic = (float)metal, .ior = 1.5f, .base = 0.7f};
+                look_from(&c, cosines[v]);
+                bsdf_probe_run(&probes[0], &c, false, DIRECTIONS, answers);
+                for (int i = 0; i < DIRECTIONS; i++)
+                    off = fmax(off, fabs((double)(answers[i].sent - answers[i].of)) /
+                                        fmax((double)answers[i].of, 1e-2));
+            }
+    print_message("off by %.1e at most\n", off);
+    assert_true(off < 1e-4);
+}
+
+static int setup(void **state)
+{
+    static struct bsdf_probe probes[2];
+    open_device(state);
+    if (!device)
+        return 0;
+    for (int ward = 0; ward < 2; ward++)
+        bsdf_probe_init(&probes[ward], device, ward);
+    *state = probes;
+    return 0;
+}
+
+static int teardown(void **state)
+{
+    struct bsdf_probe *probes = *state;
+    for (int ward = 0; ward < 2; ward++)
+        bsdf_probe_finish(&probes[ward]);
+    return close_device(state);
+}
+ALL_TESTS(setup, teardown)

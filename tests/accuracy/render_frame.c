@@ -1,0 +1,363 @@
+/* SPDX-License-Identifier: MIT */
+/* The order of a frame: both ways to the primary hits, slices and their splits, seeds, formats, cameras. */
+#include "tests/accuracy/render_fixture.h"
+#include "tests/harness/test.h"
+
+/* Mirrors, glass, blend, cutout, shadows, area light, discs: something of everything. */
+static void build_mixture(struct fixture *fixture)
+{
+    struct scene_material *glass = fixture_material(fixture);
+    glass->transmission = 1.0f;
+    glass->roughness = 0.0f;
+    glass->ior = 1.5f;
+    struct scene_material *mirror = fixture_material(fixture);
+    mirror->metallic = 1.0f;
+    mirror->roughness = 0.05f;
+    mirror->base_colour[2] = 0.6f;
+    struct scene_material *veil = fixture_material(fixture);
+    veil->alpha_mode = ALPHA_BLEND;
+    veil->base_colour[3] = 0.4f;
+    veil->base_colour[0] = 0.1f;
+    struct scene_material *plain = fixture_material(fixture);
+    plain->ior = 1.5f;
+    plain->roughness = 0.4f;
+    plain->base_colour[1] = 0.5f;
+    fixture_sphere(fixture, -0.7f, 0.1f, 0.3f, 0.5f, glass->base.id);
+    fixture_sphere(fixture, 0.6f, 0.0f, -0.2f, 0.6f, mirror->base.id);
+    fixture_sphere(fixture, 0.1f, -0.3f, 0.9f, 0.2f, plain->base.id);
+    const float floor_transform[12] = {1, 0, 0, 0, 0, 0, 1, -0.6f, 0, -1, 0, 0};
+    fixture_square(fixture, 3.0f, plain->base.id, floor_transform);
+    const float veil_transform[12] = {1, 0, 0, 0.9f, 0, 1, 0, 0.2f, 0, 0, 1, 0.8f};
+    fixture_square(fixture, 0.4f, veil->base.id, veil_transform);
+    struct scene_disc *disc = &fixture_edit(fixture, SCENE_DISC)->set.disc;
+    disc->base.id = fixture->next_id++;
+    disc->material = plain->base.id;
+    disc->normal_world[2] = 1.0f;
+    disc->centre_world[2] = -3.0f;
+    disc->radius = 1.2f;
+    fixture_environment(fixture, 0.3f, 0.4f, 0.5f);
+    fixture_light(fixture, LIGHT_POINT, -2.0f, 3.0f, 3.0f, 20.0f);
+    struct scene_light *sphere = fixture_light(fixture, LIGHT_SPHERE, 2.0f, 2.0f, 2.0f, 10.0f);
+    sphere->size[0] = 0.4f;
+    fixture->request.width = 96;
+    fixture->request.height = 72;
+    fixture_look(fixture, 0.5f, 0.6f, 4.0f, 0.7f);
+}
+
+static void primary_hits_agree_however_they_are_found(struct fixture *fixture, double share_allowed)
+{
+    fixture->request.primary = PRIMARY_RASTER;
+    struct frame_result raster = fixture_render(fixture);
+    fixture->request.primary = PRIMARY_TRACE;
+    struct frame_result trace = fixture_render(fixture);
+    uint32_t differing = 0, pixels = raster.width * raster.height;
+    for (uint32_t i = 0; i < pixels; i++) {
+        const float *a = fixture_pixel(&raster, i % raster.width, i / raster.width);
+        const float *b = fixture_pixel(&trace, i % raster.width, i / raster.width);
+        for (int c = 0; c < 4; c++)
+            if (fabsf(a[c] - b[c]) > 1e-4f * (1.0f + fabsf(a[c]))) {
+                differing++;
+                break;
+            }
+    }
+    if (differing > share_allowed * pixels)
+        fail_msg("%u of %u pixels differ, allowed are %g", differing, pixels, share_allowed * pixels);
+    frame_result_finish(&raster);
+    frame_result_finish(&trace);
+}
+
+ALL_TESTS(fixture_setup, fixture_teardown)
+EACH_TEST(fixture_clear, NULL)
+
+TEST(rasterised_and_traced_primary_hits_agree_but_for_edges)
+{
+    build_mixture(*state);
+    primary_hits_agree_however_they_are_found(*state, 0.002);
+}
+
+TEST(they_agree_in_an_orthographic_view)
+{
+    struct fixture *fixture = *state;
+    build_mixture(fixture);
+    fixture->request.camera.fov_y = 0.0f;
+    fixture->request.camera.ortho_height = 3.0f;
+    primary_hits_agree_however_they_are_found(fixture, 0.002);
+    fixture->request.camera.near = 3.2f; /* cuts the glass sphere open */
+    primary_hits_agree_however_they_are_found(fixture, 0.002);
+}
+
+TEST(they_agree_inside_a_sphere_and_beyond_the_near_plane)
+{
+    struct fixture *fixture = *state;
+    build_mixture(fixture);
+    fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 20.0f, 0); /* the eye is in it */
+    primary_hits_agree_however_they_are_found(fixture, 0.002);
+    fixture->request.camera.near = 3.5f;
+    primary_hits_agree_however_they_are_found(fixture, 0.002);
+}
+
+TEST(they_agree_where_transforms_mirror_and_stretch)
+{
+    struct fixture *fixture = *state;
+    build_mixture(fixture);
+    fixture_commit(fixture);
+    const float transform[12] = {-1.5f, 0, 0, -0.2f, 0, 0.5f, 0.2f, 0.4f, 0, 0, 1, 0.5f};
+    const float centre_radius[8] = {0.0f, 0.0f, 0.0f, 0.3f, 0.4f, 0.2f, 0.1f, 0.1f};
+    struct scene_spheres *spheres = &fixture_edit(fixture, SCENE_SPHERES)->set.spheres;
+    spheres->base.id = fixture->next_id++;
+    spheres->sphere_count = 2;
+    spheres->centres_radii = fixture_blob(centre_radius, sizeof(centre_radius));
+    fixture_node(fixture, NODE_SPHERES, spheres->base.id, transform);
+    primary_hits_agree_however_they_are_found(fixture, 0.002);
+}
+
+TEST(holes_are_cut_out_of_rasterised_triangles_too)
+{
+    struct fixture *fixture = *state;
+    /* a chessboard of 4x4 texels, every second one open */
+    uint8_t texels[4 * 4 * 4];
+    for (int i = 0; i < 16; i++)
+        memset(texels + i * 4, (i + i / 4) % 2 ? 255 : 0, 4);
+    struct scene_texture *texture = &fixture_edit(fixture, SCENE_TEXTURE)->set.texture;
+    texture->base.id = fixture->next_id++;
+    texture->width = texture->height = 4;
+    texture->nearest = true;
+    texture->texels = fixture_blob(texels, sizeof(texels));
+    struct scene_material *material = fixture_material(fixture);
+    material->alpha_mode = ALPHA_MASK;
+    material->unlit = true;
+    material->textures[MATERIAL_BASE_COLOUR] =
+        (struct texture_use){.texture = texture->base.id, .uv_transform = {1, 0, 0, 0, 1, 0}, .strength = 1.0f};
+    fixture_square(fixture, 1.0f, material->base.id, NULL);
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 5.0f, 1.0f);
+    primary_hits_agree_however_they_are_found(fixture, 0.0);
+    struct frame_result result = fixture_render(fixture);
+    /* 32 pixels show 3.09 units; texel 0,0 (upper left) is open, the one to its right is not */
+    assert_near(fixture_pixel(&result, 8, 8)[3], 0.0, 0.0);
+    assert_near(fixture_pixel(&result, 13, 8)[3], 1.0, 0.0);
+    frame_result_finish(&result);
+}
+
+static void assert_same_bytes(const struct frame_result *a, const struct frame_result *b)
+{
+    assert_int_equal(a->size_bytes, b->size_bytes);
+    for (size_t i = 0; i < a->size_bytes; i++)
+        if (a->pixels[i] != b->pixels[i])
+            fail_msg("byte %zu of %zu is %u in one and %u in the other", i, a->size_bytes, a->pixels[i],
+                     b->pixels[i]);
+}
+
+TEST(the_same_seed_gives_the_same_bytes)
+{
+    struct fixture *fixture = *state;
+    build_mixture(fixture);
+    fixture->request.samples = 3;
+    fixture->request.seed = 77;
+    struct frame_result first = fixture_render(fixture);
+    struct frame_result second = fixture_render(fixture);
+    assert_same_bytes(&first, &second);
+    frame_result_finish(&second);
+    fixture->request.seed = 78;
+    second = fixture_render(fixture);
+    assert_memory_not_equal(first.pixels, second.pixels, first.size_bytes);
+    frame_result_finish(&first);
+    frame_result_finish(&second);
+}
+
+TEST(a_wave_that_overflows_splits_its_slice_and_loses_nothing)
+{
+    struct fixture *fixture = *state;
+    build_mixture(fixture);
+    fixture->request.depth = 6;
+    struct frame_result large = fixture_render(fixture);
+    assert_int_equal(large.splits, 0);
+    frame_renderer_set_capacity(fixture->renderer, 512, 512);
+    struct frame_result small = fixture_render(fixture);
+    assert_true(small.splits > 0);
+    assert_same_bytes(&large, &small);
+    assert_int_equal(large.secondary_rays, small.secondary_rays);
+    assert_int_equal(large.shadow_rays, small.shadow_rays);
+    frame_result_finish(&small);
+    frame_renderer_set_capacity(fixture->renderer, 1, 1); /* less than one pixel needs: the wave must grow */
+    fixture->request.width = 8;
+    fixture->request.height = 6;
+    small = fixture_render(fixture);
+    assert_true(small.splits > 0);
+    frame_result_finish(&large);
+    frame_renderer_set_capacity(fixture->renderer, 0, 0);
+    large = fixture_render(fixture);
+    assert_same_bytes(&large, &small);
+    frame_result_finish(&large);
+    frame_result_finish(&small);
+}
+
+TEST(formats_say_the_same)
+{
+    struct fixture *fixture = *state;
+    build_mixture(fixture);
+    fixture->request.exposure_stops = 1.0f;
+    struct frame_result floats = fixture_render(fixture);
+    fixture->request.format = FRAME_RGBA16F;
+    struct frame_result halves = fixture_render(fixture);
+    fixture->request.format = FRAME_RGBA8;
+    fixture->request.tone_map = TONE_NONE;
+    struct frame_result bytes = fixture_render(fixture);
+    fixture_keep(&bytes, "mixture");
+    assert_int_equal(floats.size_bytes, 96 * 72 * 16);
+    assert_int_equal(halves.size_bytes, 96 * 72 * 8);
+    assert_int_equal(bytes.size_bytes, 96 * 72 * 4);
+    for (uint32_t i = 0; i < 96 * 72; i++) {
+        const float *pixel = fixture_pixel(&floats, i % 96, i / 96);
+        uint16_t half;
+        memcpy(&half, halves.pixels + i * 8, 2);
+        double mantissa = (half & 1023) + ((half >> 10) ? 1024 : 0);
+        double value = ldexp(mantissa, ((half >> 10) ? (half >> 10) : 1) - 25);
+        assert_near(value, pixel[0], 1e-3 * pixel[0] + 1e-6);
+        double clamped = pixel[0] > 1.0f ? 1.0 : (double)pixel[0];
+        double srgb = clamped <= 0.0031308 ? 12.92 * clamped : 1.055 * pow(clamped, 1 / 2.4) - 0.055;
+        assert_near(bytes.pixels[i * 4], srgb * 255.0, 0.6);
+    }
+    fixture->request.format = FRAME_RGBA32F;
+    fixture->request.exposure_stops = 0.0f;
+    struct frame_result plain = fixture_render(fixture);
+    assert_near(fixture_pixel(&floats, 50, 40)[1], 2.0f * fixture_pixel(&plain, 50, 40)[1], 1e-6);
+    frame_result_finish(&plain);
+    frame_result_finish(&floats);
+    frame_result_finish(&halves);
+    frame_result_finish(&bytes);
+}
+
+TEST(an_edit_between_two_frames_is_seen_by_the_second)
+{
+    struct fixture *fixture = *state;
+    struct scene_material *material = fixture_material(fixture);
+    material->unlit = true;
+    uint32_t id = material->base.id;
+    fixture_sphere(fixture, 0.0f, 0.0f, 0.0f, 0.5f, id);
+    uint32_t node = fixture->next_id - 1;
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 5.0f, 1.0f);
+    struct frame_result result = fixture_render(fixture);
+    assert_near(fixture_pixel(&result, 16, 16)[0], 1.0, 1e-6);
+    uint64_t revision = result.revision;
+    frame_result_finish(&result);
+    struct scene_node *moved = &fixture_edit(fixture, SCENE_NODE)->set.node;
+    *moved = *scene_node(fixture->scene, node);
+    moved->parent_from_node[3] = 1.0f;
+    result = fixture_render(fixture);
+    assert_near(fixture_pixel(&result, 16, 16)[3], 0.0, 0.0);
+    assert_near(fixture_pixel(&result, 26, 16)[0], 1.0, 1e-6);
+    assert_int_equal(result.revision, revision + 1);
+    frame_result_finish(&result);
+}
+
+TEST(an_abandoned_frame_leaves_the_next_one_whole)
+{
+    struct fixture *fixture = *state;
+    struct error error = {0};
+    struct frame_result dropped = {0};
+    build_mixture(fixture);
+    struct frame_result expected = fixture_render(fixture);
+    assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(frame_step(fixture->renderer, &dropped, &error), FRAME_MORE);
+    frame_abandon(fixture->renderer);
+    assert_int_equal(frame_step(fixture->renderer, &dropped, &error), FRAME_FAILED);
+    struct frame_result result = fixture_render(fixture);
+    assert_same_bytes(&expected, &result);
+    frame_result_finish(&expected);
+    frame_result_finish(&result);
+}
+
+TEST(every_stage_of_the_frame_is_timed)
+{
+    struct fixture *fixture = *state;
+    build_mixture(fixture);
+    struct frame_result result = fixture_render(fixture);
+    static const enum stage_id stages[] = {STAGE_PRIMARY, STAGE_TRACE,    STAGE_SHADE,
+                                           STAGE_RESOLVE, STAGE_READBACK, STAGE_FRAME};
+    for (size_t i = 0; i < sizeof(stages) / sizeof(stages[0]); i++)
+        if (stage_times_sum_ns(&result.times, stages[i], STAGE_CPU) == 0)
+            fail_msg("stage %s took no time", stage_name(stages[i]));
+    assert_true(stage_times_sum_ns(&result.times, STAGE_TRACE, STAGE_GPU) > 0);
+    assert_int_equal(result.primary_rays, 96 * 72);
+    assert_true(result.shadow_rays > 0 && result.secondary_rays > 0);
+    assert_true(frame_renderer_device_bytes(fixture->renderer) > 96 * 72 * 16);
+    frame_result_finish(&result);
+}
+
+TEST(an_empty_scene_and_a_single_pixel_are_pictures_too)
+{
+    struct fixture *fixture = *state;
+    for (uint32_t width = 1; width <= 17; width += 8) {
+        fixture->request.width = width;
+        fixture->request.height = 18 - width;
+        struct frame_result result = fixture_render(fixture);
+        assert_int_equal(result.size_bytes, width * (18 - width) * 16);
+        assert_true(fixture_pixel(&result, width - 1, 17 - width)[2] > 0.1f); /* the default sky or ground */
+        frame_result_finish(&result);
+    }
+}
+
+TEST(a_picture_of_several_bands_has_no_seam)
+{
+    struct fixture *fixture = *state;
+    fixture->request.width = 4096;
+    fixture->request.height = 1040; /* bands hold 256 Ki pixels: 64 rows, and the rest */
+    fixture->request.format = FRAME_RGBA8;
+    fixture->request.camera.fov_y = 2.0f;
+    struct frame_result result = fixture_render(fixture);
+    assert_int_equal(result.size_bytes, 4096 * 1040 * 4);
+    for (uint32_t y = 1; y < 1040; y++)
+        for (uint32_t x = 0; x < 4096; x += 1023) {
+            const uint8_t *pixel = result.pixels + ((size_t)y * 4096 + x) * 4;
+            if (abs(pixel[1] - pixel[1 - 4096 * 4]) > 2 || pixel[3] != 255)
+                fail_msg("pixel %u,%u is %u with alpha %u, the one above %u", x, y, pixel[1], pixel[3],
+                         pixel[1 - 4096 * 4]);
+        }
+    frame_result_finish(&result);
+}
+
+TEST(impossible_requests_are_refused_with_the_field)
+{
+    struct fixture *fixture = *state;
+    const struct frame_request good = fixture->request;
+    struct error error = {0};
+    fixture->request.width = 0;
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_string_equal(error.field, "width");
+    error = (struct error){0};
+    fixture->request = good;
+    fixture->request.tracer = 4711;
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_string_equal(error.field, "tracer");
+    error = (struct error){0};
+    fixture->request = good;
+    fixture->request.camera.world_from_view[3] = NAN;
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_string_equal(error.field, "camera");
+}
+
+TEST(the_automatic_camera_sees_all_corners_and_wastes_little)
+{
+    const float lower[3] = {-3.0f, 1.0f, 2.0f}, upper[3] = {5.0f, 2.0f, 40.0f}, aspect = 1.5f;
+    struct frame_camera camera;
+    frame_camera_auto(&camera, lower, upper, aspect);
+    float greatest = 0.0f;
+    for (int corner = 0; corner < 8; corner++) {
+        float d[3], v[3];
+        for (int i = 0; i < 3; i++)
+            d[i] = ((corner >> i & 1) ? upper[i] : lower[i]) - camera.world_from_view[i * 4 + 3];
+        for (int i = 0; i < 3; i++)
+            v[i] = d[0] * camera.world_from_view[i] + d[1] * camera.world_from_view[4 + i] +
+                   d[2] * camera.world_from_view[8 + i];
+        assert_true(v[2] < 0.0f);
+        float tangent = tanf(camera.fov_y / 2.0f);
+        greatest = fmaxf(greatest, fmaxf(fabsf(v[0] / -v[2]) / (tangent * aspect), fabsf(v[1] / -v[2]) / tangent));
+    }
+    assert_true(greatest <= 1.0f);
+    assert_true(greatest > 0.6f);
+    const float eye[3] = {1, 2, 3}, up[3] = {0, 0, 2};
+    assert_false(frame_camera_look_at(&camera, eye, eye, up, 1.0f));
+    const float above[3] = {1, 2, 9};
+    assert_false(frame_camera_look_at(&camera, eye, above, up, 1.0f));
+}

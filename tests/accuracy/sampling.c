@@ -1,0 +1,396 @@
+/* SPDX-License-Identifier: MIT */
+/* Where samples lie and how they add up: the pixel filter against its formula, the device's numbers against the
+ * host's, and that a picture does not depend on how its samples were grouped, cut into slices or spread over
+ * frames. */
+#include "tests/accuracy/render_fixture.h"
+
+#include "gpu/buffer.h"
+#include "gpu/program_source.h"
+#include "render/pixel_filter.h"
+#include "render/sequence.h"
+#include "shared/bindings.h"
+#include "shared/frame.h"
+#include "tests/harness/test.h"
+
+#include <epoxy/gl.h>
+
+enum { WIDTH = 48, HEIGHT = 32 };
+
+/* ---- numbers ---- */
+
+static const char twin_text[] =
+    "#include \"shared/bindings.h\"\n"
+    "#include \"common/dispatch.glsl\"\n"
+    "#include \"common/sequence.glsl\"\n"
+    "uniform uint count;\n"
+    "layout(std430, binding = BIND_PASS_0) writeonly buffer b { vec4 values[]; };\n"
+    "void main()\n"
+    "{\n"
+    "    uint i = item_index();\n"
+    "    if (i >= count)\n"
+    "        return;\n"
+    "    uint seed = sequence_seed(i * 77u, i >> 3), index = i * 2654435761u >> (i & 31u);\n"
+    "    values[i] = vec4(sequence_pair(seed, i & 15u, index),\n"
+    "                     sequence_number(seed, i >> 4, index), 0.0);\n"
+    "}\n";
+
+static bool twin_lookup(const char *path, size_t length, const char **kept, const char **begin, const char **end)
+{
+    static const char own[] = "twin.comp";
+    if (length != strlen(own) || memcmp(path, own, length) != 0)
+        return gpu_source_lookup_embedded(path, length, kept, begin, end);
+    *kept = own;
+    *begin = twin_text;
+    *end = twin_text + strlen(twin_text);
+    return true;
+}
+
+ALL_TESTS(fixture_setup, fixture_teardown)
+EACH_TEST(fixture_clear, NULL)
+
+TEST(the_device_has_the_hosts_numbers_to_the_bit)
+{
+    struct fixture *fixture = *state;
+    enum { COUNT = 4096 };
+    static float values[COUNT][4];
+    struct error error = {0};
+    struct gpu_source_text text = {0};
+    struct gpu_buffer buffer = {0};
+    assert_true(gpu_source_expand(&text, twin_lookup, "twin.comp", NULL, &error));
+    const GLchar *source = text.text;
+    const struct gpu_program program = {glCreateShaderProgramv(GL_COMPUTE_SHADER, 1, &source), 64};
+    gpu_source_finish(&text);
+    assert_true(gpu_buffer_reserve(fixture->device, &buffer, sizeof(values), &error));
+    glUseProgram(program.name);
+    gpu_uniform_uint(&program, "count", COUNT);
+    gpu_buffer_bind_storage(&buffer, BIND_PASS_0);
+    gpu_dispatch(fixture->device, &program, COUNT);
+    gpu_buffer_read(fixture->device, &buffer, 0, values, sizeof(values));
+    assert_true(gpu_check(fixture->device, "twin", &error));
+    for (uint32_t i = 0; i < COUNT; i++) {
+        uint32_t seed = sequence_seed(i * 77u, i >> 3), index = i * 2654435761u >> (i & 31u);
+        float expected[3];
+        sequence_pair(expected, seed, i & 15u, index);
+        expected[2] = sequence_number(seed, i >> 4, index);
+        assert_memory_equal(values[i], expected, sizeof(expected));
+    }
+    gpu_buffer_finish(fixture->device, &buffer);
+    glDeleteProgram(program.name);
+}
+
+/* ---- the pixel filter ---- */
+
+/* The left half is black and the right one white, seen straight on; pixels are `step` wide. */
+static double an_edge(struct fixture *fixture)
+{
+    struct scene_material *material = fixture_material(fixture);
+    material->unlit = true;
+    const float right[12] = {1, 0, 0, 50, 0, 1, 0, 0, 0, 0, 1, 0};
+    fixture_square(fixture, 50.0f, material->base.id, right);
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 3.0f, 1.0f); /* so that there is no default sky */
+    fixture->request.width = 16;
+    fixture->request.height = 64;
+    fixture->request.camera.fov_y = 0.0f;
+    fixture->request.camera.ortho_height = 64.0f * 0.1f;
+    return 0.1;
+}
+
+/* What a pixel with its centre `distance` pixels right of the edge is. */
+static double edge_value(enum frame_filter filter, double distance)
+{
+    double share = pixel_filter_share(filter, fabs(distance)) / 2.0;
+    return distance < 0.0 ? 0.5 - share : 0.5 + share;
+}
+
+TEST(samples_are_as_dense_as_the_filter_is_high)
+{
+    struct fixture *fixture = *state;
+    an_edge(fixture);
+    for (enum frame_filter filter = FILTER_BLACKMAN_HARRIS; filter <= FILTER_BOX; filter++)
+        for (int traced = 0; traced < 2; traced++) {
+            fixture->request.filter = filter;
+            fixture->request.primary = traced ? PRIMARY_TRACE : PRIMARY_RASTER;
+            fixture->request.samples = 256;
+            struct frame_result result = fixture_render(fixture);
+            double greatest = 0.0;
+            for (uint32_t x = 0; x < 16; x++) {
+                double mean = 0.0;
+                for (uint32_t y = 0; y < 64; y++)
+                    mean += (double)fixture_pixel(&result, x, y)[0] / 64.0;
+                greatest = fmax(greatest, fabs(mean - edge_value(filter, (double)x - 7.5)));
+            }
+            print_message("filter %d, %s: off by %.1e at most\n", (int)filter, traced ? "traced" : "rasterised",
+                          greatest);
+            /* One in each 256th by x: a mean is off by a sample at most; the table's places by 1/1000 of a pixel,
+             * which is as dense as the filter is high, twice a sample at most. */
+            assert_true(greatest <= 1.0 / 256.0 + 0.002);
+            frame_result_finish(&result);
+        }
+}
+
+/* Filters as the protocol describes them, by the formulas, not by pixel_filter.c. */
+static double height_of(enum frame_filter filter, double x)
+{
+    const double pi = 3.14159265358979;
+    if (fabs(x) > pixel_filter_radius(filter))
+        return 0.0;
+    switch (filter) {
+    case FILTER_BLACKMAN_HARRIS: {
+        double t = 2.0 * pi * (x + 1.5) / 3.0;
+        return 0.35875 - 0.48829 * cos(t) + 0.14128 * cos(2.0 * t) - 0.01168 * cos(3.0 * t);
+    }
+    case FILTER_GAUSSIAN:
+        return exp(-x * x / (2.0 * 0.5 * 0.5));
+    case FILTER_TENT:
+        return 1.0 - fabs(x);
+    case FILTER_BOX:
+        break;
+    }
+    return 1.0;
+}
+
+TEST(the_filters_are_those_of_the_protocol)
+{
+    static const double radii[] = {1.5, 1.5, 1.0, 0.5};
+    for (enum frame_filter filter = FILTER_BLACKMAN_HARRIS; filter <= FILTER_BOX; filter++) {
+        enum { STEPS = 20000 };
+        double radius = radii[filter], whole = 0.0, sum = 0.0;
+        float places[PIXEL_FILTER_INTERVALS + 1];
+        assert_near(pixel_filter_radius(filter), radius, 0.0);
+        pixel_filter_places(places, filter);
+        for (int i = 0; i < STEPS; i++)
+            whole += height_of(filter, radius * (i + 0.5) / STEPS);
+        for (int i = 0; i < STEPS; i++) {
+            /* the midpoint rule is true to 1e-9 */
+            assert_near(pixel_filter_share(filter, radius * i / STEPS), sum / whole, 1e-6);
+            /* as the header says */
+            double number = 0.5 + 0.5 * sum / whole, place = radius * i / STEPS;
+            double tolerance = sum / whole < 0.99 ? 1e-3 : sum / whole < 1.0 - 1.0 / 4096.0 ? 5e-3 : radius;
+            assert_near(pixel_filter_offset(places, (float)number), place, tolerance);
+            assert_near(pixel_filter_offset(places, (float)(1.0 - number)), -place, tolerance);
+            sum += height_of(filter, radius * (i + 0.5) / STEPS);
+        }
+    }
+}
+
+/* ---- how samples add up ---- */
+
+/* Glass, gloss, a blended pane and two lamps that have a size. */
+static void a_mixture(struct fixture *fixture)
+{
+    struct scene_material *gloss = fixture_material(fixture), *glass = fixture_material(fixture),
+                          *pane = fixture_material(fixture), *ground = fixture_material(fixture);
+    gloss->metallic = 1.0f;
+    gloss->roughness = 0.3f;
+    glass->transmission = 1.0f;
+    glass->ior = 1.5f;
+    glass->roughness = 0.1f;
+    pane->alpha_mode = ALPHA_BLEND;
+    pane->base_colour[3] = 0.4f;
+    pane->base_colour[0] = 0.2f;
+    fixture_sphere(fixture, -0.7f, 0.0f, 0.0f, 0.5f, gloss->base.id);
+    fixture_sphere(fixture, 0.7f, 0.0f, 0.2f, 0.5f, glass->base.id);
+    const float before[12] = {1, 0, 0, 0, 0, 1, 0, 0.2f, 0, 0, 1, 1.0f},
+                behind[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -1.5f};
+    fixture_square(fixture, 0.4f, pane->base.id, before);
+    fixture_square(fixture, 3.0f, ground->base.id, behind);
+    fixture_light(fixture, LIGHT_SPHERE, 1.0f, 2.0f, 3.0f, 5.0f);
+    fixture_light(fixture, LIGHT_RECTANGLE, -2.0f, 1.0f, 3.0f, 4.0f);
+    fixture_environment(fixture, 0.2f, 0.3f, 0.4f);
+    fixture->request.width = WIDTH;
+    fixture->request.height = HEIGHT;
+    fixture->request.samples = 21; /* together: 16, 4, 1 */
+    fixture->request.seed = 5;
+}
+
+static void assert_same_floats(const struct frame_result *a, const struct frame_result *b)
+{
+    assert_int_equal(a->size_bytes, b->size_bytes);
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+        for (int c = 0; c < 4; c++)
+            if (fixture_pixel(a, i % WIDTH, i / WIDTH)[c] != fixture_pixel(b, i % WIDTH, i / WIDTH)[c])
+                fail_msg("pixel %u,%u channel %d: %.9g and %.9g", i % WIDTH, i / WIDTH, c,
+                         (double)fixture_pixel(a, i % WIDTH, i / WIDTH)[c],
+                         (double)fixture_pixel(b, i % WIDTH, i / WIDTH)[c]);
+}
+
+TEST(a_picture_is_the_same_to_the_bit_however_its_samples_are_grouped)
+{
+    struct fixture *fixture = *state;
+    a_mixture(fixture);
+    for (int i = 0; i < 3; i++) {
+        fixture->request.integrator = i == 0 ? INTEGRATOR_WHITTED : INTEGRATOR_DISTRIBUTED;
+        fixture->request.primary = i == 1 ? PRIMARY_RASTER : PRIMARY_TRACE;
+        fixture->request.aperture = i == 2 ? 0.1f : 0.0f;
+        frame_renderer_set_capacity(fixture->renderer, 0, 0);
+        struct frame_result whole = fixture_render(fixture);
+        assert_int_equal(whole.samples, 21);
+        assert_int_equal(whole.primary_rays, 21 * WIDTH * HEIGHT);
+        assert_int_equal(whole.splits, 0);
+        static const uint32_t slices[] = {1u << 14, 1000, 100};
+        for (size_t k = 0; k < sizeof(slices) / sizeof(slices[0]); k++) {
+            frame_renderer_set_capacity(fixture->renderer, slices[k], slices[k]);
+            struct frame_result cut = fixture_render(fixture);
+            assert_same_floats(&whole, &cut);
+            assert_int_equal(whole.shadow_rays, cut.shadow_rays);
+            assert_int_equal(whole.secondary_rays, cut.secondary_rays);
+            /* whitted may have more children than parents, distributed never has */
+            assert_true(i == 0 || cut.splits == 0);
+            frame_result_finish(&cut);
+        }
+        frame_result_finish(&whole);
+    }
+}
+
+TEST(a_slice_of_less_than_a_pixels_samples_is_the_same_picture_too)
+{
+    struct fixture *fixture = *state;
+    a_mixture(fixture);
+    fixture->request.aperture = 0.1f;
+    fixture->request.width = fixture->request.height = 8;
+    for (int i = 0; i < 2; i++) {
+        fixture->request.integrator = i ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_WHITTED;
+        frame_renderer_set_capacity(fixture->renderer, 0, 0);
+        struct frame_result whole = fixture_render(fixture);
+        frame_renderer_set_capacity(fixture->renderer, 3, 3); /* two samples of one pixel, one of three */
+        struct frame_result cut = fixture_render(fixture);
+        assert_memory_equal(whole.pixels, cut.pixels, whole.size_bytes);
+        frame_result_finish(&whole);
+        frame_result_finish(&cut);
+    }
+}
+
+TEST(frames_of_few_samples_add_up_to_one_of_many)
+{
+    struct fixture *fixture = *state;
+    a_mixture(fixture);
+    fixture->request.accumulate = true;
+    for (int i = 0; i < 3; i++) {
+        fixture->request.integrator = i == 0 ? INTEGRATOR_WHITTED : INTEGRATOR_DISTRIBUTED;
+        fixture->request.primary = i == 1 ? PRIMARY_TRACE : PRIMARY_RASTER;
+        fixture->request.aperture = i == 2 ? 0.1f : 0.0f;
+        fixture->request.samples = 21;
+        struct frame_result whole = fixture_render(fixture);
+        assert_int_equal(whole.samples, 21);
+        fixture->request.seed++; /* something else in between */
+        fixture->request.samples = 1;
+        struct frame_result other = fixture_render(fixture);
+        assert_int_equal(other.samples, 1);
+        frame_result_finish(&other);
+        fixture->request.seed--;
+        uint32_t sum = 0;
+        for (uint32_t samples = 1; samples <= 6; samples++) {
+            fixture->request.samples = samples;
+            struct frame_result part = fixture_render(fixture);
+            sum += samples;
+            assert_int_equal(part.samples, sum);
+            assert_int_equal(part.primary_rays, samples * WIDTH * HEIGHT);
+            if (sum == 21)
+                assert_same_floats(&whole, &part);
+            frame_result_finish(&part);
+        }
+        frame_result_finish(&whole);
+    }
+}
+
+TEST(a_picture_that_has_all_its_samples_is_handed_out_again)
+{
+    struct fixture *fixture = *state;
+    a_mixture(fixture);
+    fixture->request.accumulate = true;
+    fixture->request.samples = 3;
+    fixture->request.samples_most = 5;
+    static const uint32_t held[] = {3, 5, 5};
+    static const uint64_t traced[] = {3, 2, 0};
+    struct frame_result results[3];
+    for (int i = 0; i < 3; i++) {
+        results[i] = fixture_render(fixture);
+        assert_int_equal(results[i].samples, held[i]);
+        assert_int_equal(results[i].primary_rays, traced[i] * WIDTH * HEIGHT);
+    }
+    assert_same_floats(&results[1], &results[2]);
+    fixture->request.samples_most = 4; /* more are there than are wanted now */
+    struct frame_result fewer = fixture_render(fixture);
+    assert_int_equal(fewer.samples, 5);
+    assert_same_floats(&results[1], &fewer);
+    for (int i = 0; i < 3; i++)
+        frame_result_finish(&results[i]);
+    frame_result_finish(&fewer);
+}
+
+/* What the next frame holds after `change`d has been undone again: it begins from new each time. */
+static void expect_from_new(struct fixture *fixture, uint32_t samples, const char *what)
+{
+    struct frame_result result = fixture_render(fixture);
+    if (result.samples != samples)
+        fail_msg("%s: %u samples, expected %u", what, result.samples, samples);
+    frame_result_finish(&result);
+}
+
+TEST(what_shows_something_else_begins_from_new)
+{
+    struct fixture *fixture = *state;
+    a_mixture(fixture);
+    fixture->request.accumulate = true;
+    fixture->request.samples = 2;
+    const struct frame_request first = fixture->request;
+    expect_from_new(fixture, 2, "the first frame");
+    expect_from_new(fixture, 4, "the second");
+    fixture->request.exposure_stops = 1.0f; /* of what is done with the sum */
+    expect_from_new(fixture, 6, "another exposure");
+    fixture->request.camera.world_from_view[3] += 0.01f;
+    expect_from_new(fixture, 2, "another camera");
+    fixture->request = first;
+    expect_from_new(fixture, 2, "back again");
+    fixture->request.filter = FILTER_BOX;
+    expect_from_new(fixture, 2, "another filter");
+    fixture->request.aperture = 0.1f;
+    expect_from_new(fixture, 2, "another lens");
+    fixture->request.depth = 2;
+    expect_from_new(fixture, 2, "another depth");
+    expect_from_new(fixture, 4, "the same");
+    fixture_environment(fixture, 0.5f, 0.3f, 0.4f); /* an edit */
+    expect_from_new(fixture, 2, "another environment");
+    fixture->request.accumulate = false;
+    expect_from_new(fixture, 2, "not asked to go on");
+    fixture->request.accumulate = true;
+    expect_from_new(fixture, 2, "after one that was not asked to");
+}
+
+TEST(an_abandoned_frame_is_not_gone_on_from)
+{
+    struct fixture *fixture = *state;
+    struct error error = {0};
+    struct frame_result dropped = {0};
+    a_mixture(fixture);
+    fixture->request.accumulate = true;
+    fixture->request.samples = 2;
+    expect_from_new(fixture, 2, "the first frame");
+    assert_true(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(frame_step(fixture->renderer, &dropped, &error), FRAME_MORE);
+    frame_abandon(fixture->renderer);
+    expect_from_new(fixture, 2, "the one after it");
+}
+
+TEST(impossible_lenses_and_filters_are_refused_with_the_field)
+{
+    struct fixture *fixture = *state;
+    struct error error = {0};
+    a_mixture(fixture);
+    fixture_commit(fixture);
+    const struct frame_request good = fixture->request;
+    fixture->request.aperture = -1.0f;
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_string_equal(error.field, "aperture");
+    fixture->request = good;
+    fixture->request.focus = INFINITY;
+    error = (struct error){0};
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_string_equal(error.field, "focus");
+    fixture->request = good;
+    fixture->request.filter = (enum frame_filter)17;
+    error = (struct error){0};
+    assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
+    assert_string_equal(error.field, "pixel_filter");
+}

@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: MIT */
+/* Smooth glass: what it mirrors, where it sends what it refracts, and how the two go on. */
+#include "tests/accuracy/render_fixture.h"
+#include "tests/harness/test.h"
+
+#define PI 3.14159265358979
+/* 16-bit normals are off by up to 3e-5; float arithmetic is far below that. */
+#define NORMAL_TOLERANCE 2e-4
+
+static double fresnel(double cosine, double n)
+{
+    double sine = sqrt(1.0 - cosine * cosine), bent = sqrt(1.0 - sine * sine / (n * n));
+    double s = (cosine - n * bent) / (cosine + n * bent), p = (n * cosine - bent) / (n * cosine + bent);
+    return (s * s + p * p) / 2.0;
+}
+
+static struct scene_material *clear_glass(struct fixture *fixture, double ior)
+{
+    struct scene_material *glass = fixture_material(fixture);
+    glass->ior = (float)ior;
+    glass->roughness = 0.0f;
+    glass->transmission = 1.0f;
+    return glass;
+}
+
+static uint32_t lamp_material(struct fixture *fixture)
+{
+    struct scene_material *lamp = fixture_material(fixture);
+    lamp->unlit = true;
+    return lamp->base.id;
+}
+
+ALL_TESTS(fixture_setup, fixture_teardown)
+EACH_TEST(fixture_clear, NULL)
+
+TEST(glass_reflects_four_percent_at_normal_incidence)
+{
+    struct fixture *fixture = *state;
+    struct scene_material *glass = clear_glass(fixture, 1.5);
+    /* refracts nothing, so that all that arrives is what it reflects */
+    glass->base_colour[0] = glass->base_colour[1] = glass->base_colour[2] = 0.0f;
+    fixture_square(fixture, 10.0f, glass->base.id, NULL);
+    fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
+    fixture->request.camera.fov_y = 0.01f;
+    struct frame_result result = fixture_render(fixture);
+    assert_near(fixture_pixel(&result, 16, 16)[0], 0.04, 1e-5);
+    frame_result_finish(&result);
+}
+
+TEST(glass_at_a_slant_follows_fresnels_equations)
+{
+    struct fixture *fixture = *state;
+    struct scene_material *glass = clear_glass(fixture, 1.5);
+    glass->base_colour[0] = glass->base_colour[1] = glass->base_colour[2] = 0.0f;
+    fixture_square(fixture, 100.0f, glass->base.id, NULL);
+    fixture_environment(fixture, 1.0f, 1.0f, 1.0f);
+    fixture->request.width = fixture->request.height = 9;
+    fixture_look(fixture, 5.0f * (float)sin(1.2), 0.0f, 5.0f * (float)cos(1.2), 0.01f);
+    struct frame_result result = fixture_render(fixture);
+    assert_near(fixture_pixel(&result, 4, 4)[0], fresnel(cos(1.2), 1.5), NORMAL_TOLERANCE);
+    frame_result_finish(&result);
+}
+
+TEST(light_is_totally_reflected_inside_glass)
+{
+    struct fixture *fixture = *state;
+    struct scene_material *glass = clear_glass(fixture, 1.5);
+    fixture_square(fixture, 100.0f, glass->base.id, NULL);
+    fixture_environment(fixture, 1.0f, 0.5f, 0.25f);
+    fixture->request.width = fixture->request.height = 9;
+    /* from behind the square, which is inside; the critical angle is 41.8 degrees */
+    fixture_look(fixture, 5.0f * (float)sin(0.9), 0.0f, -5.0f * (float)cos(0.9), 0.01f);
+    struct frame_result result = fixture_render(fixture);
+    assert_int_equal(result.secondary_rays, 9 * 9);
+    assert_near(fixture_pixel(&result, 4, 4)[1], 0.5, 1e-5);
+    frame_result_finish(&result);
+    fixture_look(fixture, 5.0f * (float)sin(0.5), 0.0f, -5.0f * (float)cos(0.5), 0.01f);
+    result = fixture_render(fixture);
+    assert_int_equal(result.secondary_rays, 2 * 9 * 9);
+    frame_result_finish(&result);
+}
+
+/* A scene in which nothing shines gets a sky; this is far too little to be seen. */
+static void no_sky(struct fixture *fixture)
+{
+    fixture_light(fixture, LIGHT_POINT, 0.0f, 0.0f, 900.0f, 1e-9f);
+}
+
+/* The eye looks at the boundary under `before`; a lamp of 0.1 degrees stands where the ray should go, and nothing
+ * else shines. `side`: of the eye, -1 inside. What the lamp brings is what the boundary lets through. */
+static void expect_bent(struct fixture *fixture, double n, double before, double after, int side)
+{
+    fixture_clear((void **)&fixture);
+    fixture_square(fixture, 100.0f, clear_glass(fixture, n)->base.id, NULL);
+    double x = -2.0 * sin(after), z = -2.0 * side * cos(after);
+    fixture_sphere(fixture, (float)x, 0.0f, (float)z, 0.0035f, lamp_material(fixture));
+    no_sky(fixture);
+    fixture->request.width = fixture->request.height = 9;
+    fixture_look(fixture, (float)(4.0 * sin(before)), 0.0f, (float)(4.0 * side * cos(before)), 0.001f);
+    struct frame_result result = fixture_render(fixture);
+    double share = 1.0 - fresnel(cos(side > 0 ? before : after), n);
+    assert_near(fixture_pixel(&result, 4, 4)[0], share, 1e-5); /* float, at slopes of Fresnel's curve up to 10 */
+    frame_result_finish(&result);
+}
+
+TEST(refraction_obeys_snells_law)
+{
+    static const double indices[] = {1.1, 1.33, 1.5, 2.4};
+    for (int i = 0; i < 4; i++)
+        for (double outside = 0.1; outside < 1.5; outside += 0.2) {
+            double inside = asin(sin(outside) / indices[i]);
+            expect_bent(*state, indices[i], outside, inside, 1);
+            expect_bent(*state, indices[i], inside, outside, -1);
+        }
+}
+
+/* What a pane of clear glass lets through (bounces = 2, 4, ..) or sends back (1, 3, ..) of a lamp's radiance of 1,
+ * its walls mirroring the share f each time; so far as the bounces are followed and a path carries enough. */
+static double pane_series(double f, uint32_t depth, bool through)
+{
+    const double weight_min = 1.0 / 1024.0; /* WEIGHT_MIN of whitted.comp */
+    double sum = !through && depth > 0 && f >= weight_min ? f : 0.0, inside = 1.0 - f;
+    for (uint32_t bounces = 2; bounces <= depth && inside >= weight_min; bounces++) {
+        bool behind = bounces % 2 == 0;
+        if (behind == through && inside * (1.0 - f) >= weight_min)
+            sum += inside * (1.0 - f);
+        inside *= f;
+    }
+    return sum;
+}
+
+TEST(a_pane_of_glass_shares_light_out_as_the_series_of_its_reflections)
+{
+    static const float turned[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, -0.5f};
+    struct fixture *fixture = *state;
+    double worst = 0.0;
+    for (int through = 0; through < 2; through++)
+        for (int slant = 0; slant < 90; slant += 20)
+            for (uint32_t depth = 0; depth <= 8; depth++) {
+                fixture_clear(state);
+                uint32_t glass = clear_glass(fixture, 2.4)->base.id;
+                const float lamp[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, through ? -2.0f : 7.0f};
+                fixture_square(fixture, 1000.0f, glass, NULL);
+                fixture_square(fixture, 1000.0f, glass, turned);
+                fixture_square(fixture, 1000.0f, lamp_material(fixture), lamp);
+                no_sky(fixture);
+                fixture->request.width = fixture->request.height = 3;
+                fixture->request.depth = depth;
+                double angle = slant * PI / 180.0;
+                fixture_look(fixture, (float)(5.0 * sin(angle)), 0.0f, (float)(5.0 * cos(angle)), 0.001f);
+                struct frame_result result = fixture_render(fixture);
+                double expected = pane_series(fresnel(cos(angle), 2.4), depth, through);
+                worst = fmax(worst, fabs((double)fixture_pixel(&result, 1, 1)[0] - expected));
+                frame_result_finish(&result);
+            }
+    print_message("a pane of glass, up to 8 bounces: off by %.1e\n", worst);
+    assert_true(worst < 1e-5); /* a few roundings at each wall */
+}

@@ -1,0 +1,479 @@
+/* SPDX-License-Identifier: MIT */
+/* What a hostile or broken daemon can say about a frame. */
+#include "lib/frame.h"
+
+#include "encode/encoder.h"
+#include "tests/harness/test.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <turbojpeg.h>
+#include <xxhash.h>
+#include <zstd.h>
+
+#define WIDTH 40u
+#define HEIGHT 24u
+#define PIXELS_BYTES (WIDTH * HEIGHT * 4u)
+
+static struct fl_error error;
+static uint8_t pixels[PIXELS_BYTES];
+
+static int fill_pixels(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof pixels; i++)
+        pixels[i] = i % 4 == 3 ? 255 : (uint8_t)(i / 64);
+    return 0;
+}
+
+static struct fl_assembly some_assembly(enum protocol_encoding encoding)
+{
+    error = (struct fl_error){0};
+    return (struct fl_assembly){
+        .expected = {.width = WIDTH, .height = HEIGHT, .encoding = encoding, .layers = FL_LAYERS_PICTURE}};
+}
+
+static struct message_frame_begin some_begin(enum protocol_encoding encoding, uint64_t size_bytes)
+{
+    return (struct message_frame_begin){.frame = 3,
+                                        .width = WIDTH,
+                                        .height = HEIGHT,
+                                        .samples = 1,
+                                        .layers = 1,
+                                        .size_bytes = size_bytes,
+                                        .encoding = encoding,
+                                        .digest = XXH3_64bits(pixels, sizeof pixels)};
+}
+
+static bool begin(struct fl_assembly *assembly, const struct message_frame_begin *message)
+{
+    return fl_assembly_begin(assembly, message, 3, 1, &error);
+}
+
+static bool give(struct fl_assembly *assembly, const uint8_t *bytes, size_t count, uint64_t offset)
+{
+    const struct message_frame_data data = {.offset_bytes = offset, .data = bytes, .data_bytes = (uint32_t)count};
+    return fl_assembly_data(assembly, &data, &error);
+}
+
+static struct fl_frame *end(struct fl_assembly *assembly)
+{
+    struct record_stage_time stage = {.stage = PROTOCOL_STAGE_TRACE, .duration_ns = 5};
+    const struct message_frame_end message = {
+        .frame = 3, .primary_rays = 960, .stages = &stage, .stages_count = 1};
+    return fl_assembly_end(assembly, &message, 2, &error);
+}
+
+/* The whole way of one frame. */
+static struct fl_frame *receive(enum protocol_encoding encoding, const uint8_t *bytes, size_t count)
+{
+    struct fl_assembly assembly = some_assembly(encoding);
+    const struct message_frame_begin message = some_begin(encoding, count);
+    struct fl_frame *frame = NULL;
+    if (begin(&assembly, &message) && give(&assembly, bytes, count / 2, 0) &&
+        give(&assembly, bytes + count / 2, count - count / 2, count / 2))
+        frame = end(&assembly);
+    fl_assembly_finish(&assembly);
+    return frame;
+}
+
+ALL_TESTS(fill_pixels, NULL)
+
+TEST(a_raw_frame_arrives)
+{
+    struct fl_frame *frame = receive(PROTOCOL_ENCODING_RAW, pixels, sizeof pixels);
+    assert_non_null(frame);
+    assert_true(frame->digest_checked);
+    assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+    assert_int_equal(frame->frame, 3);
+    assert_int_equal(frame->primary_rays, 960);
+    assert_int_equal(frame->stage_count, 1);
+    assert_int_equal(frame->stages[0].duration_ns, 5);
+    fl_frame_destroy(frame);
+}
+
+TEST(a_zstd_frame_arrives)
+{
+    uint8_t packed[2 * PIXELS_BYTES];
+    const size_t count = ZSTD_compress(packed, sizeof packed, pixels, sizeof pixels, 1);
+    assert_false(ZSTD_isError(count));
+    struct fl_frame *frame = receive(PROTOCOL_ENCODING_ZSTD, packed, count);
+    assert_non_null(frame);
+    assert_true(frame->digest_checked);
+    assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+    fl_frame_destroy(frame);
+}
+
+static struct picture picture_of(const uint8_t *bytes)
+{
+    return (struct picture){.width = WIDTH, .height = HEIGHT, .bytes_per_pixel = 4, .pixels = bytes};
+}
+
+static size_t make_predicted(const struct picture *picture, uint8_t **packed)
+{
+    struct error failure = {0};
+    size_t count;
+    assert_true(encoder_encode(ENCODING_PREDICTED, picture, 1, packed, &count, &failure));
+    return count;
+}
+
+TEST(a_predicted_frame_arrives_in_every_pixel_format)
+{
+    for (enum protocol_pixel_format format = 0; format < PROTOCOL_PIXEL_FORMAT_COUNT; format++) {
+        /* The same bytes, as a picture that has fewer rows the larger its pixels are. */
+        const uint32_t pixel_bytes = fl_bytes_per_pixel(format);
+        const struct picture picture = {
+            .width = WIDTH, .height = HEIGHT * 4 / pixel_bytes, .bytes_per_pixel = pixel_bytes, .pixels = pixels};
+        struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_PREDICTED);
+        uint8_t *packed;
+        const size_t count = make_predicted(&picture, &packed);
+        struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_PREDICTED, count);
+        message.height = assembly.expected.height = picture.height;
+        message.format = assembly.expected.format = format;
+        assert_true(begin(&assembly, &message) && give(&assembly, packed, count, 0));
+        struct fl_frame *frame = end(&assembly);
+        assert_non_null(frame);
+        assert_true(frame->digest_checked);
+        assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+        fl_frame_destroy(frame);
+        free(packed);
+    }
+}
+
+TEST(a_damaged_predicted_frame_is_refused)
+{
+    const struct picture picture = picture_of(pixels);
+    struct picture smaller = picture;
+    smaller.height--;
+    uint8_t *packed;
+    size_t count = make_predicted(&picture, &packed);
+    assert_null(receive(PROTOCOL_ENCODING_PREDICTED, packed, count - 1));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    free(packed);
+    count = make_predicted(&smaller, &packed);
+    assert_null(receive(PROTOCOL_ENCODING_PREDICTED, packed, count));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    free(packed);
+    uint8_t other[PIXELS_BYTES];
+    memcpy(other, pixels, sizeof other);
+    other[77] ^= 1;
+    struct picture changed = picture_of(other);
+    count = make_predicted(&changed, &packed);
+    assert_null(receive(PROTOCOL_ENCODING_PREDICTED, packed, count));
+    assert_string_equal(error.field, "frame.digest");
+    free(packed);
+}
+
+/* A frame with what is attached: *bytes is malloc'ed. */
+static struct message_frame_begin make_attached(enum protocol_encoding encoding, unsigned attachments,
+                                                const uint8_t *depth, const uint8_t *normals, uint8_t **bytes)
+{
+    const enum encoding numbers[] = {ENCODING_RAW, ENCODING_ZSTD, ENCODING_JPEG, ENCODING_RAW, ENCODING_PREDICTED};
+    const struct picture parts[3] = {picture_of(pixels), picture_of(depth), picture_of(normals)};
+    size_t counts[3] = {0}, used = 0;
+    *bytes = malloc(4 * PIXELS_BYTES);
+    assert_non_null(*bytes);
+    for (unsigned i = 0; i < 3; i++) {
+        uint8_t *encoded = NULL;
+        struct error failure = {0};
+        if (i > 0 && (attachments & i) == 0)
+            continue;
+        assert_true(encoder_encode(i == 0 ? numbers[encoding] : ENCODING_PREDICTED, &parts[i], 1, &encoded,
+                                   &counts[i], &failure));
+        memcpy(*bytes + used, encoded, counts[i]);
+        used += counts[i];
+        free(encoded);
+    }
+    struct message_frame_begin message = some_begin(encoding, counts[0]);
+    message.attachments = attachments;
+    message.depth_bytes = counts[1];
+    message.normal_bytes = counts[2];
+    return message;
+}
+
+TEST(what_is_attached_arrives_beside_any_encoding)
+{
+    float depth[WIDTH * HEIGHT];
+    uint8_t normals[PIXELS_BYTES];
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++)
+        depth[i] = 1.5f + (float)(i % WIDTH) / 7;
+    for (size_t i = 0; i < sizeof normals; i++)
+        normals[i] = (uint8_t)(i * 3);
+    for (unsigned i = 0; i < 4 * PROTOCOL_ENCODING_COUNT; i++) {
+        const enum protocol_encoding encoding = (enum protocol_encoding)(i / 4);
+        struct fl_assembly assembly = some_assembly(encoding);
+        assembly.expected.attachments = i % 4;
+        uint8_t *bytes;
+        const struct message_frame_begin message =
+            make_attached(encoding, i % 4, (const uint8_t *)depth, normals, &bytes);
+        const size_t count = (size_t)(message.size_bytes + message.depth_bytes + message.normal_bytes);
+        assert_true(begin(&assembly, &message) && give(&assembly, bytes, count, 0));
+        struct fl_frame *frame = end(&assembly);
+        assert_non_null(frame);
+        assert_int_equal(frame->wire_bytes, count);
+        assert_int_equal(frame->depth != NULL, (i & FL_ATTACH_DEPTH) != 0);
+        assert_int_equal(frame->normals != NULL, (i & FL_ATTACH_NORMALS) != 0);
+        if (frame->depth != NULL)
+            assert_memory_equal(frame->depth, depth, sizeof depth);
+        if (frame->normals != NULL)
+            assert_memory_equal(frame->normals, normals, sizeof normals);
+        if (encoding == PROTOCOL_ENCODING_H264)
+            assert_true(frame->encoded_bytes == sizeof pixels && frame->pixels == NULL);
+        else if (encoding != PROTOCOL_ENCODING_JPEG)
+            assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+        fl_frame_destroy(frame);
+        fl_assembly_finish(&assembly);
+        free(bytes);
+    }
+}
+
+TEST(attachments_that_cannot_be_are_refused)
+{
+    for (unsigned i = 0; i < 6; i++) {
+        struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+        assembly.expected.attachments = FL_ATTACH_DEPTH;
+        uint8_t *bytes;
+        struct message_frame_begin message =
+            make_attached(PROTOCOL_ENCODING_RAW, FL_ATTACH_DEPTH, pixels, pixels, &bytes);
+        message.attachments = i == 0 ? 0 : i == 1 ? 3 : message.attachments;
+        message.depth_bytes = i == 2 ? 0 : i == 3 ? 4 * PIXELS_BYTES : message.depth_bytes;
+        message.normal_bytes = i == 4 ? 10 : 0;
+        if (i == 5) { /* damaged on the way */
+            bytes[PIXELS_BYTES + 4] ^= 0xff;
+            assert_true(begin(&assembly, &message));
+            assert_true(give(&assembly, bytes, PIXELS_BYTES + (size_t)message.depth_bytes, 0));
+            assert_null(end(&assembly));
+        } else if (begin(&assembly, &message)) {
+            fail_msg("change %u was not noticed", i);
+        }
+        assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+        fl_assembly_finish(&assembly);
+        free(bytes);
+    }
+}
+
+static unsigned long make_jpeg(unsigned width, unsigned height, uint8_t **packed)
+{
+    unsigned long count = 0;
+    *packed = NULL;
+    const tjhandle encoder = tjInitCompress();
+    assert_int_equal(
+        tjCompress2(encoder, pixels, (int)width, 0, (int)height, TJPF_RGBA, packed, &count, TJSAMP_420, 90, 0), 0);
+    tjDestroy(encoder);
+    return count;
+}
+
+TEST(a_jpeg_frame_arrives_with_an_opaque_alpha)
+{
+    uint8_t *packed = NULL;
+    const unsigned long count = make_jpeg(WIDTH, HEIGHT, &packed);
+    struct fl_frame *frame = receive(PROTOCOL_ENCODING_JPEG, packed, count);
+    assert_non_null(frame);
+    assert_false(frame->digest_checked);
+    for (size_t i = 3; i < sizeof pixels; i += 4)
+        assert_int_equal(frame->pixels[i], 255);
+    fl_frame_destroy(frame);
+    tjFree(packed);
+}
+
+TEST(a_jpeg_of_another_size_is_refused)
+{
+    uint8_t *packed = NULL;
+    const unsigned long count = make_jpeg(WIDTH, HEIGHT - 8, &packed);
+    assert_null(receive(PROTOCOL_ENCODING_JPEG, packed, count));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    tjFree(packed);
+}
+
+TEST(a_damaged_jpeg_is_refused)
+{
+    uint8_t *packed = NULL;
+    const unsigned long count = make_jpeg(WIDTH, HEIGHT, &packed);
+    assert_null(receive(PROTOCOL_ENCODING_JPEG, packed, count - 20));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    assert_null(receive(PROTOCOL_ENCODING_JPEG, pixels, 100));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    tjFree(packed);
+}
+
+TEST(changed_pixels_do_not_pass_the_digest)
+{
+    uint8_t changed[PIXELS_BYTES];
+    memcpy(changed, pixels, sizeof changed);
+    changed[PIXELS_BYTES - 1] ^= 1;
+    assert_null(receive(PROTOCOL_ENCODING_RAW, changed, sizeof changed));
+    assert_string_equal(error.field, "frame.digest");
+}
+
+TEST(a_zstd_frame_that_unpacks_to_more_or_less_is_refused)
+{
+    uint8_t *large = calloc(1, 100 * PIXELS_BYTES), packed[2 * PIXELS_BYTES];
+    assert_non_null(large);
+    size_t count = ZSTD_compress(packed, sizeof packed, large, 100 * PIXELS_BYTES, 1);
+    assert_null(receive(PROTOCOL_ENCODING_ZSTD, packed, count));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    count = ZSTD_compress(packed, sizeof packed, large, PIXELS_BYTES - 1, 1);
+    assert_null(receive(PROTOCOL_ENCODING_ZSTD, packed, count));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    assert_null(receive(PROTOCOL_ENCODING_ZSTD, large, 50));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    free(large);
+}
+
+TEST(a_frame_that_was_not_asked_for_is_refused)
+{
+    for (unsigned i = 0; i < 7; i++) {
+        struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+        struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+        message.width += i == 0;
+        message.height -= i == 1;
+        message.frame += i == 2;
+        message.format = i == 3 ? PROTOCOL_PIXEL_FORMAT_RGBA32F : message.format;
+        message.encoding = i == 4 ? PROTOCOL_ENCODING_ZSTD : message.encoding;
+        message.size_bytes -= i == 5;
+        message.size_bytes += i == 6;
+        if (begin(&assembly, &message))
+            fail_msg("change %u was not noticed", i);
+        assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+        fl_assembly_finish(&assembly);
+    }
+}
+
+TEST(declared_sizes_beyond_all_reason_are_refused_before_memory_is_taken)
+{
+    static const enum protocol_encoding encodings[] = {PROTOCOL_ENCODING_RAW, PROTOCOL_ENCODING_ZSTD,
+                                                       PROTOCOL_ENCODING_JPEG};
+    static const uint64_t sizes[] = {0, 4294967296u, UINT64_MAX};
+    for (size_t i = 0; i < 3; i++) {
+        for (size_t j = 0; j < 3; j++) {
+            struct fl_assembly assembly = some_assembly(encodings[i]);
+            const struct message_frame_begin message = some_begin(encodings[i], sizes[j]);
+            assert_false(begin(&assembly, &message));
+            assert_null(assembly.frame);
+        }
+    }
+}
+
+/* Beauty and albedo, in one piece after zstd. */
+TEST(layers_arrive_one_behind_the_other_under_one_digest)
+{
+    static uint8_t both[2 * PIXELS_BYTES], packed[2 * PIXELS_BYTES + 4096];
+    memcpy(both, pixels, PIXELS_BYTES);
+    for (size_t i = 0; i < PIXELS_BYTES; i++)
+        both[PIXELS_BYTES + i] = (uint8_t)(pixels[i] ^ 0x5a);
+    const size_t packed_bytes = ZSTD_compress(packed, sizeof packed, both, sizeof both, 1);
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_ZSTD);
+    struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_ZSTD, packed_bytes);
+    assembly.expected.layers = message.layers = 3;
+    message.digest = XXH3_64bits(both, sizeof both);
+    assert_true(begin(&assembly, &message));
+    assert_true(give(&assembly, packed, packed_bytes, 0));
+    struct fl_frame *frame = end(&assembly);
+    assert_non_null(frame);
+    assert_int_equal(frame->layers, 3);
+    assert_int_equal(frame->pixels_bytes, sizeof both);
+    assert_memory_equal(frame->pixels, both, sizeof both);
+    assert_true(frame->digest_checked);
+    fl_frame_destroy(frame);
+}
+
+TEST(other_layers_than_were_asked_for_are_refused_before_memory_is_taken)
+{
+    static const unsigned came[] = {2, 3, 127};
+    for (size_t i = 0; i < sizeof came / sizeof came[0]; i++) {
+        struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+        struct message_frame_begin message =
+            some_begin(PROTOCOL_ENCODING_RAW, (uint64_t)__builtin_popcount(came[i]) * PIXELS_BYTES);
+        message.layers = came[i];
+        assert_false(begin(&assembly, &message));
+        assert_null(assembly.frame);
+        assert_string_equal(error.field, "frame_begin.layers");
+    }
+    /* The bytes of one layer in place of those of two. */
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+    struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+    assembly.expected.layers = message.layers = 5;
+    assert_false(begin(&assembly, &message));
+    assert_null(assembly.frame);
+}
+
+TEST(pieces_out_of_place_are_refused)
+{
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+    const struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+    assert_false(give(&assembly, pixels, 10, 0)); /* no frame */
+    assert_true(begin(&assembly, &message));
+    assert_false(begin(&assembly, &message)); /* inside another */
+    assert_false(give(&assembly, pixels, 10, 10));
+    assert_true(give(&assembly, pixels, 10, 0));
+    assert_false(give(&assembly, pixels, 10, 0));
+    assert_false(give(&assembly, pixels, PIXELS_BYTES, 10));
+    assert_false(give(&assembly, pixels, 10, UINT64_MAX));
+    assert_null(end(&assembly)); /* not complete */
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    fl_assembly_finish(&assembly);
+}
+
+TEST(comparisons_of_waves_arrive)
+{
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+    const struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+    struct record_wave_comparison waves[2] = {{.rays = 960, .both_hit = 960},
+                                              {.kind = PROTOCOL_RAY_KIND_SHADOW, .rays = 7, .both_missed = 7}};
+    const struct message_frame_end last = {.frame = 3, .comparisons = waves, .comparisons_count = 2};
+    assert_true(begin(&assembly, &message));
+    assert_true(give(&assembly, pixels, PIXELS_BYTES, 0));
+    struct fl_frame *frame = fl_assembly_end(&assembly, &last, 2, &error);
+    assert_non_null(frame);
+    assert_int_equal(frame->wave_comparison_count, 2);
+    assert_int_equal(frame->wave_comparisons[0].both_hit, 960);
+    assert_int_equal(frame->wave_comparisons[1].kind, PROTOCOL_RAY_KIND_SHADOW);
+    assert_int_equal(frame->stage_count, 0);
+    fl_frame_destroy(frame);
+}
+
+TEST(cubes_arrive_and_no_more_than_there_is_room_for)
+{
+    struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
+    const struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
+    struct record_layered_cube cubes[3] = {
+        {.resolution = 1024, .cell_metres = 0.5f, .layers_needed = 9, .layers_kept = 8, .samples_lost = 4},
+        {.part = PROTOCOL_CUBE_PART_DYNAMIC, .rebuilt = 1}};
+    const struct message_frame_end last = {.frame = 3, .cubes = cubes, .cubes_count = 3};
+    assert_true(begin(&assembly, &message));
+    assert_true(give(&assembly, pixels, PIXELS_BYTES, 0));
+    struct fl_frame *frame = fl_assembly_end(&assembly, &last, 2, &error);
+    assert_non_null(frame);
+    assert_int_equal(frame->cube_count, 2);
+    assert_true(frame->cubes[0].resolution == 1024 && frame->cubes[0].cell_metres == 0.5f);
+    assert_true(frame->cubes[0].layers_needed == 9 && frame->cubes[0].layers_kept == 8);
+    assert_int_equal(frame->cubes[0].samples_lost, 4);
+    assert_int_equal(frame->cubes[1].part, PROTOCOL_CUBE_PART_DYNAMIC);
+    assert_int_equal(frame->cubes[1].rebuilt, 1);
+    fl_frame_destroy(frame);
+}
+
+TEST(agreement_leaves_edges_aside_and_stays_a_share_whatever_a_daemon_says)
+{
+    struct record_wave_comparison wave = {.rays = 1000,
+                                          .both_hit = 900,
+                                          .both_missed = 90,
+                                          .only_tracer = 4,
+                                          .only_reference = 6,
+                                          .far = 5,
+                                          .edges = 5};
+    assert_true(fl_wave_agreement(&wave) == 1 - 10.0 / 995);
+    struct record_wave_comparison sum = {0};
+    assert_true(fl_wave_agreement(&sum) == 1);
+    wave.distance_greatest = 0.5f;
+    fl_wave_add(&sum, &wave);
+    wave.distance_greatest = 0.25f;
+    fl_wave_add(&sum, &wave);
+    assert_int_equal(sum.rays, 2000);
+    assert_true(sum.distance_greatest == 0.5f);
+    assert_true(fl_wave_agreement(&sum) == fl_wave_agreement(&wave));
+    struct record_wave_comparison lie = {.rays = 1, .only_tracer = UINT64_MAX, .far = UINT64_MAX};
+    assert_true(fl_wave_agreement(&lie) == 0);
+    lie.edges = UINT64_MAX;
+    assert_true(fl_wave_agreement(&lie) >= 0 && fl_wave_agreement(&lie) <= 1);
+}

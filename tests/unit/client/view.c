@@ -1,0 +1,687 @@
+/* SPDX-License-Identifier: MIT */
+/* Views of the library against a daemon that a thread of the test plays: cameras, frames, acknowledgements and
+ * credit, a view that another takes the place of, a job beside it, and what a hostile daemon may try. */
+#include "tests/unit/client/played_daemon.h"
+#include "protocol/common/clock.h"
+#include "tests/harness/test.h"
+
+#include <semaphore.h>
+#include <xxhash.h>
+
+#define EDGE 16u
+#define IN_FLIGHT 3u
+
+#define FRAME_BYTES ((size_t)EDGE * EDGE * 4)
+static uint8_t pixels[(EDGE + 1) * EDGE * 4]; /* one column more than a frame has: for one that is too wide */
+
+/* What the daemon saw of the client; read once its thread has ended. */
+static struct {
+    unsigned renders, cameras, acks, begun_acks, key_frames, cancels;
+    uint64_t credit, last_command;
+    uint32_t last_acked;
+    struct message_render first, last;
+    bool was_moving, closed_after_cancel;
+    uint32_t node;
+} seen;
+
+static int begin(void **state)
+{
+    (void)state;
+    memset(&seen, 0, sizeof seen);
+    for (size_t i = 0; i < sizeof pixels; i++)
+        pixels[i] = (uint8_t)i;
+    return 0;
+}
+
+static struct message_frame_begin some_frame(uint32_t number, uint64_t command)
+{
+    return (struct message_frame_begin){.frame = number,
+                                        .width = EDGE,
+                                        .height = EDGE,
+                                        .samples = 1,
+                                        .layers = 1,
+                                        .command = command,
+                                        .received_ns = 5,
+                                        .applied_ns = 6,
+                                        .rendered_ns = 7,
+                                        .key_frame = 1,
+                                        .size_bytes = FRAME_BYTES,
+                                        .digest = XXH3_64bits(pixels, FRAME_BYTES)};
+}
+
+static void tell_begin(struct daemon *daemon, uint32_t request, const struct message_frame_begin *frame)
+{
+    struct message message = {.type = MESSAGE_FRAME_BEGIN, .frame_begin = *frame};
+    tell(daemon, request, &message);
+}
+
+static void tell_rest(struct daemon *daemon, uint32_t request, const struct message_frame_begin *frame)
+{
+    struct message message = {.type = MESSAGE_FRAME_DATA};
+    message.frame_data.data = pixels;
+    message.frame_data.data_bytes = (uint32_t)frame->size_bytes;
+    tell(daemon, request, &message);
+    message = (struct message){.type = MESSAGE_FRAME_END};
+    message.frame_end.frame = frame->frame;
+    tell(daemon, request, &message);
+}
+
+static void tell_frame(struct daemon *daemon, uint32_t request, const struct message_frame_begin *frame)
+{
+    tell_begin(daemon, request, frame);
+    tell_rest(daemon, request, frame);
+}
+
+/* Notes what it sees of the client's next message; false at the end. */
+static bool look(struct daemon *daemon, struct framing_header *header, struct message *message)
+{
+    if (!take(daemon, header, message))
+        return false;
+    switch (message->type) {
+    case MESSAGE_RENDER:
+        seen.last = message->render;
+        if (seen.renders++ == 0)
+            seen.first = message->render;
+        break;
+    case MESSAGE_VIEW_CAMERA:
+        seen.cameras++;
+        seen.last_command = message->view_camera.command;
+        seen.was_moving = message->view_camera.moving != 0;
+        seen.node = message->view_camera.node;
+        break;
+    case MESSAGE_FRAME_ACK:
+        seen.acks += message->frame_ack.want_key_frame == 0 && message->frame_ack.whole;
+        seen.begun_acks += !message->frame_ack.whole;
+        seen.key_frames += message->frame_ack.want_key_frame;
+        seen.last_acked = message->frame_ack.frame;
+        break;
+    case MESSAGE_CREDIT:
+        seen.credit = message->credit.total;
+        break;
+    case MESSAGE_CANCEL:
+        seen.cancels++;
+        break;
+    default:
+        break;
+    }
+    return true;
+}
+
+static void tell_ok(struct daemon *daemon, uint32_t request)
+{
+    const struct message done = {.type = MESSAGE_OK};
+    tell(daemon, request, &done);
+}
+
+/* A frame for each camera, as a daemon does it that is never behind; another render takes the view's place. */
+static void play_view(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    uint32_t request = 0, number = 0;
+    greet(daemon);
+    while (look(daemon, &header, &message)) {
+        if (message.type == MESSAGE_RENDER && message.render.kind == PROTOCOL_JOB_KIND_VIEW) {
+            const struct message_frame_begin frame = some_frame(number++, seen.last_command);
+            if (request != 0)
+                tell_ok(daemon, request);
+            request = header.request;
+            tell_frame(daemon, request, &frame);
+        } else if (message.type == MESSAGE_RENDER) {
+            const struct message_frame_begin frame = some_frame(message.render.first_frame, 0);
+            tell_frame(daemon, header.request, &frame);
+            tell_ok(daemon, header.request);
+        } else if (message.type == MESSAGE_VIEW_CAMERA) {
+            const struct message_frame_begin frame = some_frame(number++, message.view_camera.command);
+            tell_frame(daemon, request, &frame);
+        } else if (message.type == MESSAGE_PING) {
+            const struct message pong = {.type = MESSAGE_PONG};
+            tell(daemon, header.request, &pong);
+        }
+    }
+}
+
+static const struct fl_view_options some_options = {
+    .job = {.width = EDGE, .height = EDGE, .frames_in_flight = IN_FLIGHT, .exposure_stops = 1},
+    .still_encoding = PROTOCOL_ENCODING_ZSTD,
+    .pass_samples = 2,
+    .weight = 5,
+    .adapt = true};
+static const struct fl_view_camera some_camera = {
+    .eye_world = {0, 0, 5}, .up_world = {0, 1, 0}, .fov_y = 0.7f, .time_s = 1.5f, .moving = true, .node = 9};
+
+static struct fl_view *start_view(struct fl_scene *scene)
+{
+    error = (struct fl_error){0};
+    struct fl_view *view = fl_view_start(scene, &some_options, &error);
+    if (view == NULL)
+        fail_msg("%s", error.text);
+    return view;
+}
+
+/* What a view is seen over: a played daemon, and a connection to it. */
+struct viewing {
+    struct daemon *daemon;
+    struct fl_scene scene;
+};
+
+static struct fl_view *begin_view(struct viewing *viewing, void (*play)(struct daemon *daemon))
+{
+    viewing->daemon = start(play);
+    viewing->scene = (struct fl_scene){.connection = connect_to(viewing->daemon), .scene = 1};
+    return start_view(&viewing->scene);
+}
+
+/* From then on `seen` is all that the daemon saw. */
+static void end_view(struct viewing *viewing, struct fl_view *view)
+{
+    fl_view_destroy(view);
+    fl_connection_destroy(viewing->scene.connection);
+    stop(viewing->daemon);
+}
+
+static struct fl_frame *next_frame(struct fl_view *view)
+{
+    struct fl_frame *frame = fl_view_next(view, 10000, &error);
+    if (frame == NULL)
+        fail_msg("no frame: %s", error.text);
+    return frame;
+}
+
+EACH_TEST(begin, NULL)
+
+TEST(cameras_are_sent_and_frames_name_them_with_their_times)
+{
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_view);
+    assert_null(fl_view_start(&viewing.scene, &some_options, &error)); /* one at a time */
+    fl_frame_destroy(next_frame(view));
+    for (uint64_t i = 1; i <= 5; i++) {
+        uint64_t command = 0;
+        const uint64_t before_ns = monotonic_now_ns();
+        assert_true(fl_view_look(view, &some_camera, &command, &error));
+        assert_int_equal(command, i);
+        struct fl_frame *frame = next_frame(view);
+        assert_int_equal(frame->frame, i);
+        assert_int_equal(frame->command, i);
+        assert_in_range(frame->command_sent_ns, before_ns, frame->begun_ns);
+        assert_in_range(frame->whole_ns, frame->begun_ns, monotonic_now_ns());
+        assert_int_equal(frame->command_received_ns, 5);
+        assert_int_equal(frame->command_applied_ns, 6);
+        assert_int_equal(frame->rendered_ns, 7);
+        assert_true(frame->key_frame);
+        assert_memory_equal(frame->pixels, pixels, FRAME_BYTES);
+        fl_frame_destroy(frame);
+    }
+    end_view(&viewing, view);
+    assert_int_equal(seen.first.kind, PROTOCOL_JOB_KIND_VIEW);
+    assert_int_equal(seen.first.samples, 64);
+    assert_int_equal(seen.first.frames_per_second, 60);
+    assert_int_equal(seen.first.still_encoding, PROTOCOL_ENCODING_ZSTD);
+    assert_int_equal(seen.first.pass_samples, 2);
+    assert_int_equal(seen.first.weight, 5);
+    assert_int_equal(seen.first.adapt, 1);
+    assert_int_equal(seen.first.credit, IN_FLIGHT);
+    assert_true(seen.first.exposure_stops == 1);
+    assert_true(seen.was_moving);
+    assert_int_equal(seen.node, 9);
+    assert_int_equal(seen.cancels, 1);
+}
+
+/* Every frame is acknowledged once it is whole, and makes room for another once it is taken. */
+TEST(frames_are_acknowledged_and_credit_follows_those_that_are_taken)
+{
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_view);
+    assert_true(fl_view_want_key_frame(view, &error)); /* the first one stands alone anyway */
+    fl_frame_destroy(next_frame(view));
+    for (unsigned i = 0; i < 2; i++)
+        assert_true(fl_view_look(view, &some_camera, NULL, &error));
+    fl_frame_destroy(next_frame(view));
+    uint64_t ns = 0;
+    assert_true(fl_ping(viewing.scene.connection, &ns, &error)); /* the third frame comes meanwhile and is kept */
+    assert_true(fl_view_want_key_frame(view, &error));
+    fl_frame_destroy(next_frame(view));
+    assert_null(fl_view_next(view, 0, &error));
+    assert_int_equal(error.code, FL_ERROR_NONE);
+    end_view(&viewing, view);
+    assert_int_equal(seen.begun_acks, 3);
+    assert_int_equal(seen.acks, 3);
+    assert_int_equal(seen.last_acked, 2);
+    assert_int_equal(seen.key_frames, 1);
+    assert_int_equal(seen.credit, IN_FLIGHT + 3);
+}
+
+/* One more frame of the old size comes before a new render takes its place, if the new one is wide. */
+static void play_changes(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    uint32_t request = 0, number = 0;
+    greet(daemon);
+    while (look(daemon, &header, &message)) {
+        const struct message_frame_begin frame = some_frame(number, seen.last_command);
+        if (message.type == MESSAGE_RENDER) {
+            if (request != 0 && message.render.width > EDGE)
+                tell_frame(daemon, request, &frame);
+            number += request != 0 && message.render.width > EDGE;
+            if (request != 0)
+                tell_ok(daemon, request);
+            request = header.request;
+        } else if (message.type == MESSAGE_VIEW_CAMERA) {
+            tell_frame(daemon, request, &frame); /* smaller than what was asked for, as one that adapts */
+            number++;
+        }
+    }
+}
+
+TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
+{
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_changes);
+    struct fl_view_options options = some_options;
+    uint32_t number = 0;
+    options.job.tracer = PROTOCOL_TRACER_LDC;
+    for (unsigned i = 0; i < 40; i++) {
+        options.job.width = i >= 20 ? 2 * EDGE : EDGE;
+        if (!fl_view_change(view, &options, &error) || !fl_view_look(view, &some_camera, NULL, &error))
+            fail_msg("%s", error.text);
+        for (unsigned frames = i >= 20 ? 2 : 1; frames > 0; frames--) {
+            struct fl_frame *frame = next_frame(view);
+            assert_int_equal(frame->frame, number++);
+            assert_int_equal(frame->change,
+                             frames == 2 ? i : i + 1); /* the first of two is still the old view's */
+            fl_frame_destroy(frame);
+        }
+    }
+    for (unsigned i = 0; i < 20; i++) { /* faster than anything is answered */
+        options.job.width = EDGE;
+        assert_true(fl_view_change(view, &options, &error));
+    }
+    assert_true(fl_view_look(view, &some_camera, NULL, &error));
+    fl_frame_destroy(next_frame(view));
+    end_view(&viewing, view);
+    assert_int_equal(seen.renders, 61);
+    assert_int_equal(seen.last.channel, seen.first.channel);
+    assert_int_equal(seen.last.tracer, PROTOCOL_TRACER_LDC);
+    assert_int_equal(seen.cameras, 41);
+}
+
+TEST(a_job_runs_beside_a_view_and_each_gets_its_own_frames)
+{
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_view);
+    const struct fl_job_options options = {.width = EDGE, .height = EDGE, .first_frame = 77, .last_frame = 77};
+    for (unsigned i = 0; i < 3; i++) {
+        bool done = false;
+        struct fl_job *job = fl_render_start(&viewing.scene, &options, &error);
+        assert_non_null(job);
+        struct fl_frame *frame = NULL;
+        for (unsigned tries = 0; frame == NULL && tries < 1000; tries++) {
+            frame = fl_render_poll(job, 10, &done, &error);
+            assert_int_equal(error.code, FL_ERROR_NONE);
+        }
+        assert_non_null(frame);
+        assert_false(done);
+        assert_int_equal(frame->frame, 77);
+        fl_frame_destroy(frame);
+        assert_null(fl_render_next(job, &error));
+        assert_int_equal(error.code, FL_ERROR_NONE);
+        assert_null(fl_render_poll(job, 0, &done, &error));
+        assert_true(done);
+        fl_render_destroy(job);
+    }
+    struct fl_frame *frame = next_frame(view);
+    assert_int_equal(frame->frame, 0);
+    fl_frame_destroy(frame);
+    end_view(&viewing, view);
+}
+
+/* ---- what a daemon may say ---- */
+
+static void tell_refusal(struct daemon *daemon, uint32_t request)
+{
+    struct message refusal = {.type = MESSAGE_ERROR};
+    refusal.error.code = PROTOCOL_ERROR_CODE_UNSUPPORTED;
+    refusal.error.field = "tracer";
+    refusal.error.text = "not in this build";
+    tell(daemon, request, &refusal);
+}
+
+/* The first render is good, each after it refused. */
+static void play_refused_change(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    uint32_t request = 0, number = 0;
+    greet(daemon);
+    while (look(daemon, &header, &message)) {
+        const struct message_frame_begin frame = some_frame(number, seen.last_command);
+        if (message.type == MESSAGE_RENDER && request != 0)
+            tell_refusal(daemon, header.request);
+        if (message.type == MESSAGE_RENDER && request == 0)
+            request = header.request;
+        if (message.type == MESSAGE_VIEW_CAMERA) {
+            tell_frame(daemon, request, &frame);
+            number++;
+        }
+    }
+}
+
+TEST(a_refused_change_is_told_once_and_the_view_goes_on_as_it_was)
+{
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_refused_change);
+    assert_true(fl_view_change(view, &some_options, &error));
+    assert_null(fl_view_next(view, 10000, &error));
+    check_error(FL_ERROR_REFUSED, "not in this build");
+    assert_true(fl_view_look(view, &some_camera, NULL, &error));
+    fl_frame_destroy(next_frame(view));
+    end_view(&viewing, view);
+    assert_int_equal(seen.cancels, 1);
+}
+
+static void play_refused_view(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    greet(daemon);
+    while (look(daemon, &header, &message))
+        if (message.type == MESSAGE_RENDER)
+            tell_refusal(daemon, header.request);
+}
+
+TEST(a_refused_view_stays_refused_and_the_connection_can_be_used)
+{
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_refused_view);
+    for (unsigned i = 0; i < 2; i++) {
+        assert_null(fl_view_next(view, 10000, &error));
+        check_error(FL_ERROR_REFUSED, "not in this build");
+    }
+    assert_false(fl_view_look(view, &some_camera, NULL, &error));
+    fl_view_destroy(view);
+    view = start_view(&viewing.scene);
+    assert_null(fl_view_next(view, 10000, &error));
+    check_error(FL_ERROR_REFUSED, "not in this build");
+    end_view(&viewing, view);
+    assert_int_equal(seen.cancels, 0);
+}
+
+/* `made` says what is wrong with the second of two frames. */
+static struct message_frame_begin wrong_frame;
+static unsigned wrong_count;
+
+static void play_wrong(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    const struct message_frame_begin good = some_frame(4, 0);
+    greet(daemon);
+    while (look(daemon, &header, &message)) {
+        if (message.type != MESSAGE_RENDER)
+            continue;
+        tell_frame(daemon, header.request, &good);
+        for (unsigned i = 0; i < wrong_count; i++)
+            tell_frame(daemon, header.request, &wrong_frame);
+    }
+}
+
+static void expect_broken(const struct message_frame_begin *frame, unsigned count, const char *part)
+{
+    wrong_frame = *frame;
+    wrong_count = count;
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_wrong);
+    struct fl_frame *whole = NULL;
+    while ((whole = fl_view_next(view, 10000, &error)) != NULL)
+        fl_frame_destroy(whole);
+    check_error(FL_ERROR_PROTOCOL, part);
+    assert_false(fl_view_look(view, &some_camera, NULL, &error));
+    assert_int_equal(error.code, FL_ERROR_PROTOCOL);
+    end_view(&viewing, view);
+}
+
+TEST(frames_that_nothing_allows_break_the_connection)
+{
+    struct message_frame_begin frame = some_frame(4, 0);
+    expect_broken(&frame, 1, "frame 4 came in place of frame 5");
+    frame = some_frame(9, 0); /* numbers may be left out */
+    frame.width = EDGE + 1;
+    frame.size_bytes = (uint64_t)(EDGE + 1) * EDGE * 4;
+    expect_broken(&frame, 1, "17x16");
+    frame = some_frame(5, 0);
+    frame.encoding = PROTOCOL_ENCODING_JPEG;
+    expect_broken(&frame, 1, "jpeg");
+    frame = some_frame(5, 0);
+    frame.digest++;
+    expect_broken(&frame, 1, "not those rendered");
+    frame = some_frame(5, 0);
+    frame.layers = 3;
+    expect_broken(&frame, 1, "layers");
+}
+
+/* Many more frames than the client gave credit for, while it takes none. */
+static void play_flood(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    greet(daemon);
+    while (look(daemon, &header, &message)) {
+        if (message.type == MESSAGE_RENDER)
+            for (uint32_t i = 0; i <= IN_FLIGHT; i++) {
+                const struct message_frame_begin frame = some_frame(i, 0);
+                tell_frame(daemon, header.request, &frame);
+            }
+        if (message.type == MESSAGE_PING)
+            tell(daemon, header.request, &(struct message){.type = MESSAGE_PONG});
+    }
+}
+
+TEST(more_frames_than_credit_break_the_connection)
+{
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_flood);
+    uint64_t ns = 0;
+    assert_false(fl_ping(viewing.scene.connection, &ns, &error));
+    check_error(FL_ERROR_PROTOCOL, "more frames came than were asked for");
+    end_view(&viewing, view);
+}
+
+/* An access unit goes to the caller as it came. */
+static void play_h264(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    struct message_frame_begin frame = some_frame(0, 0);
+    frame.encoding = PROTOCOL_ENCODING_H264;
+    frame.size_bytes = 100;
+    greet(daemon);
+    while (look(daemon, &header, &message))
+        if (message.type == MESSAGE_RENDER)
+            tell_frame(daemon, header.request, &frame);
+}
+
+TEST(a_frame_in_h264_is_left_to_the_caller)
+{
+    struct daemon *daemon = start(play_h264);
+    struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
+    struct fl_view_options options = some_options;
+    options.job.encoding = PROTOCOL_ENCODING_H264;
+    assert_false(fl_connection_can_h264(scene.connection)); /* the played daemon has not said so */
+    struct fl_view *view = fl_view_start(&scene, &options, &error);
+    struct fl_frame *frame = next_frame(view);
+    assert_null(frame->pixels);
+    assert_int_equal(frame->encoded_bytes, 100);
+    assert_memory_equal(frame->encoded, pixels, 100);
+    fl_frame_destroy(frame);
+    fl_view_destroy(view);
+    fl_connection_destroy(scene.connection);
+    stop(daemon);
+    assert_int_equal(seen.first.quality, 80); /* where nothing is said: no worse than x264's own default */
+}
+
+/* The first frame ends unfinished; the next one is whole. */
+static void play_abandoned(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    const struct message_frame_begin next = some_frame(5, 0);
+    greet(daemon);
+    while (look(daemon, &header, &message)) {
+        if (message.type != MESSAGE_RENDER)
+            continue;
+        tell_begin(daemon, header.request, &wrong_frame);
+        struct message part = {.type = MESSAGE_FRAME_DATA};
+        part.frame_data.data = pixels;
+        part.frame_data.data_bytes = (uint32_t)wrong_frame.size_bytes / 2;
+        tell(daemon, header.request, &part);
+        part = (struct message){.type = MESSAGE_FRAME_END};
+        part.frame_end.frame = wrong_frame.frame;
+        part.frame_end.abandoned = 1;
+        tell(daemon, header.request, &part);
+        tell_frame(daemon, header.request, &next);
+    }
+}
+
+TEST(a_frame_that_is_abandoned_is_not_seen_and_not_acknowledged)
+{
+    wrong_frame = some_frame(4, 0);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_abandoned);
+    struct fl_frame *frame = fl_view_next(view, 10000, &error);
+    assert_non_null(frame);
+    assert_int_equal(frame->frame, 5);
+    fl_frame_destroy(frame);
+    end_view(&viewing, view);
+    assert_int_equal(seen.acks, 1);
+    assert_int_equal(seen.begun_acks, 2);
+    assert_int_equal(seen.credit, seen.first.credit + 1); /* for the one that was seen */
+}
+
+TEST(a_frame_of_motion_that_is_abandoned_breaks_the_connection)
+{
+    wrong_frame = some_frame(4, 0);
+    wrong_frame.moving = 1;
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_abandoned);
+    assert_null(fl_view_next(view, 10000, &error));
+    check_error(FL_ERROR_PROTOCOL, "which only a picture at rest may do");
+    end_view(&viewing, view);
+}
+
+/* Half a frame, then nothing. */
+static void play_half(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    const struct message_frame_begin frame = some_frame(0, 0);
+    greet(daemon);
+    while (look(daemon, &header, &message)) {
+        if (message.type == MESSAGE_RENDER)
+            tell_begin(daemon, header.request, &frame);
+        if (message.type == MESSAGE_VIEW_CAMERA)
+            return;
+    }
+}
+
+TEST(a_connection_that_is_lost_within_a_frame_is_told_and_nothing_waits_for_ever)
+{
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_half);
+    assert_null(fl_view_next(view, 20, &error));
+    assert_int_equal(error.code, FL_ERROR_NONE);
+    assert_true(fl_view_look(view, &some_camera, NULL, &error));
+    assert_null(fl_view_next(view, 10000, &error));
+    check_error(FL_ERROR_CONNECTION, "closed");
+    assert_false(fl_view_change(view, &some_options, &error));
+    end_view(&viewing, view);
+    assert_int_equal(seen.acks, 0);
+}
+
+/* Reads nothing from its first frame on until it is told to, and sends the next one once both the acknowledgement
+ * and the credit for it have come. */
+static sem_t may_read;
+
+static void play_busy(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    uint32_t number = 0;
+    struct message_frame_begin frame = some_frame(number++, 0);
+    greet(daemon);
+    if (!look(daemon, &header, &message))
+        return;
+    const uint32_t request = header.request;
+    tell_frame(daemon, request, &frame);
+    sem_wait(&may_read);
+    while (look(daemon, &header, &message)) {
+        if (number > 1 || seen.acks == 0 || seen.credit <= IN_FLIGHT)
+            continue;
+        frame = some_frame(number++, 0);
+        tell_frame(daemon, request, &frame);
+    }
+}
+
+TEST(what_had_no_room_beside_much_else_is_acknowledged_later)
+{
+    sem_init(&may_read, 0, 0);
+    struct viewing viewing;
+    struct fl_view *view = begin_view(&viewing, play_busy);
+    /* Sending ends where there is no room for a message of any size. */
+    while (fl_view_look(view, &some_camera, NULL, &error))
+        continue;
+    check_error(FL_ERROR_TIMEOUT, "nothing more");
+    fl_frame_destroy(next_frame(view));
+    sem_post(&may_read);
+    fl_frame_destroy(next_frame(view));
+    end_view(&viewing, view);
+    sem_destroy(&may_read);
+    assert_int_equal(seen.acks, 2);
+    assert_int_equal(seen.credit, IN_FLIGHT + 2);
+}
+
+/* Reads nothing until it is told to; then it answers what it has no frames for. */
+static void play_busy_until_the_end(struct daemon *daemon)
+{
+    struct framing_header header;
+    struct message message;
+    greet(daemon);
+    sem_wait(&may_read);
+    while (look(daemon, &header, &message)) {
+        seen.closed_after_cancel |= message.type == MESSAGE_SCENE_CLOSE && seen.cancels == 1;
+        if (message.type == MESSAGE_CANCEL || message.type == MESSAGE_SCENE_CLOSE)
+            tell_ok(daemon, header.request);
+        if (message.type != MESSAGE_PING)
+            continue;
+        const struct message pong = {.type = MESSAGE_PONG};
+        tell(daemon, header.request, &pong);
+    }
+}
+
+TEST(what_ends_beside_much_else_is_given_back_later)
+{
+    sem_init(&may_read, 0, 0);
+    struct daemon *daemon = start(play_busy_until_the_end);
+    struct fl_connection *connection = connect_to(daemon);
+    struct fl_scene *scene = fl_scene_create(connection, &error);
+    assert_non_null(scene);
+    struct fl_view *view = start_view(scene);
+    while (fl_view_look(view, &some_camera, NULL, &error))
+        continue;
+    check_error(FL_ERROR_TIMEOUT, "nothing more");
+    fl_view_destroy(view);
+    fl_scene_destroy(scene);
+    uint64_t ping_ns;
+    assert_false(fl_ping(connection, &ping_ns, &error)); /* still nothing has room */
+    check_error(FL_ERROR_TIMEOUT, "nothing more");
+    sem_post(&may_read);
+    /* What asks next goes behind. */
+    while (!fl_ping(connection, &ping_ns, &error))
+        check_error(FL_ERROR_TIMEOUT, "nothing more");
+    fl_connection_destroy(connection);
+    stop(daemon);
+    sem_destroy(&may_read);
+    assert_int_equal(seen.cancels, 1);
+    assert_true(seen.closed_after_cancel);
+}

@@ -1,0 +1,206 @@
+/* SPDX-License-Identifier: MIT */
+/* Many threads encode, and still a stream is one: each picture by what is different from the one before. */
+#include "engine/encode_pool.h"
+
+#include "tests/unit/encode/h264_player.h"
+#include "tests/harness/test.h"
+
+#define WIDTH 64u
+#define HEIGHT 48u
+#define FRAMES 40u
+
+static void on_done(void *context)
+{
+    (void)context;
+}
+
+/* Of one grey that tells its number; the pool's. */
+static struct engine_frame *new_frame(enum encoding encoding, uint32_t number)
+{
+    struct engine_frame *frame = calloc(1, sizeof *frame);
+    assert_non_null(frame);
+    frame->frame = number;
+    frame->encoding = encoding;
+    frame->quality = 90;
+    frame->result = (struct frame_result){.width = WIDTH, .height = HEIGHT, .layers = 1};
+    frame->result.size_bytes = (size_t)4 * WIDTH * HEIGHT;
+    frame->result.pixels = malloc(frame->result.size_bytes);
+    assert_non_null(frame->result.pixels);
+    memset(frame->result.pixels, (int)(40 + 4 * number), frame->result.size_bytes);
+    return frame;
+}
+
+struct fixture {
+    struct queue *events;
+    struct stage_totals totals;
+    struct encode_pool *pool;
+    struct job_output *output;
+    struct encode_lane *lane;
+};
+
+static void begin(struct fixture *fixture, unsigned threads)
+{
+    struct error error = {0};
+    *fixture = (struct fixture){.events = queue_create(2 * FRAMES, false), .lane = encode_lane_create(30)};
+    fixture->pool = encode_pool_create(
+        &(struct encode_pool_options){.threads = threads, .totals = &fixture->totals, .on_done = on_done}, &error);
+    fixture->output = job_output_create(
+        &(struct job_output_options){.events = fixture->events, .window = 2 * FRAMES, .credit = UINT64_MAX});
+    assert_true(fixture->events && fixture->pool && fixture->output && fixture->lane);
+}
+
+static void submit(struct fixture *fixture, enum encoding encoding, uint32_t number)
+{
+    uint64_t position = job_output_reserve(fixture->output);
+    assert_true(
+        encode_pool_submit(fixture->pool, fixture->output, fixture->lane, position, new_frame(encoding, number)));
+}
+
+static void drop_event(void *item)
+{
+    engine_event_destroy(item);
+}
+
+static void end(struct fixture *fixture)
+{
+    encode_pool_destroy(fixture->pool);
+    encode_lane_unref(fixture->lane);
+    job_output_unref(fixture->output);
+    queue_destroy(fixture->events, drop_event);
+}
+
+static struct engine_event *next(struct fixture *fixture)
+{
+    struct engine_event *event = queue_pop(fixture->events, 10000000000);
+    assert_non_null(event);
+    if (event->kind != ENGINE_FRAME)
+        fail_msg("%s", event->error.text);
+    return event;
+}
+
+ALL_TESTS(skip_without_h264, NULL)
+
+TEST(a_stream_is_encoded_in_order_by_however_many_threads)
+{
+    struct fixture fixture;
+    struct player player = player_begin();
+    begin(&fixture, 8);
+    for (uint32_t i = 0; i < FRAMES; i++)
+        submit(&fixture, ENCODING_H264, i);
+    for (uint32_t i = 0; i < FRAMES; i++) {
+        struct engine_event *event = next(&fixture);
+        const struct engine_frame *frame = event->frame;
+        assert_int_equal(frame->frame, i);
+        assert_int_equal(frame->key_frame, i == 0);
+        assert_int_equal(frame->quality, 90);
+        assert_true(play(&player, frame->bytes, frame->size_bytes));
+        double shown = (player.frame->data[0][0] - 16) * 255 / 219.0;
+        if (fabs(shown - (40 + 4.0 * i)) > 1.9) /* half of what is between two, less rounding */
+            fail_msg("frame %u shows %.1f", i, shown);
+        engine_event_destroy(event);
+    }
+    player_end(&player);
+    end(&fixture);
+}
+
+TEST(frames_that_stand_alone_do_not_wait_for_the_stream)
+{
+    struct fixture fixture;
+    begin(&fixture, 2);
+    for (uint32_t i = 0; i < FRAMES; i++)
+        submit(&fixture, i % 2 ? ENCODING_PREDICTED : ENCODING_H264, i);
+    for (uint32_t i = 0; i < FRAMES; i++) {
+        struct engine_event *event = next(&fixture);
+        assert_int_equal(event->frame->frame, i);
+        assert_int_equal(event->frame->key_frame, i == 0 || i % 2);
+        assert_int_equal(event->frame->quality, i % 2 ? 0 : 90);
+        engine_event_destroy(event);
+    }
+    end(&fixture);
+}
+
+TEST(what_is_attached_lies_behind_the_picture)
+{
+    struct fixture fixture;
+    begin(&fixture, 2);
+    for (uint32_t attachments = 0; attachments <= 3; attachments++) {
+        struct engine_frame *made = new_frame(attachments % 2 ? ENCODING_H264 : ENCODING_RAW, attachments);
+        const size_t plane_bytes = (size_t)4 * WIDTH * HEIGHT;
+        made->result.attachments = attachments;
+        made->result.pixels = realloc(made->result.pixels, 3 * plane_bytes);
+        assert_non_null(made->result.pixels);
+        memset(made->result.pixels + plane_bytes, 3, 2 * plane_bytes);
+        uint64_t position = job_output_reserve(fixture.output);
+        assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
+        struct engine_event *event = next(&fixture);
+        const struct engine_frame *frame = event->frame;
+        assert_int_equal(frame->depth_bytes > 0, (attachments & ATTACHMENT_DEPTH) != 0);
+        assert_int_equal(frame->normal_bytes > 0, (attachments & ATTACHMENT_NORMALS) != 0);
+        assert_true(frame->depth_bytes < 200 && frame->normal_bytes < 200); /* planes that are the same all over */
+        size_t picture_bytes = frame->size_bytes - frame->depth_bytes - frame->normal_bytes;
+        if (frame->encoding == ENCODING_RAW)
+            assert_int_equal(picture_bytes, plane_bytes);
+        const uint8_t *behind = frame->bytes + picture_bytes, magic[] = {0x28, 0xb5, 0x2f, 0xfd}; /* Zstandard's */
+        if (frame->depth_bytes)
+            assert_memory_equal(behind, magic, sizeof magic);
+        if (frame->normal_bytes)
+            assert_memory_equal(behind + frame->depth_bytes, magic, sizeof magic);
+        engine_event_destroy(event);
+    }
+    end(&fixture);
+}
+
+/* Other planes than an encoder takes are an error of that frame. */
+TEST(planes_come_to_the_encoder_as_they_are)
+{
+    struct fixture fixture;
+    struct player player = player_begin();
+    begin(&fixture, 2);
+    struct engine_frame *made = new_frame(ENCODING_H264, 0);
+    const size_t row_bytes = ycbcr_row_bytes(WIDTH), luma_bytes = ycbcr_luma_bytes(WIDTH);
+    made->result.ycbcr = YCBCR_VIDEO;
+    made->result.size_bytes = row_bytes * HEIGHT;
+    for (uint32_t y = 0; y < HEIGHT; y++) {
+        memset(made->result.pixels + y * row_bytes, 80, luma_bytes);
+        memset(made->result.pixels + y * row_bytes + luma_bytes, y % 2 ? 170 : 100, luma_bytes / 2);
+    }
+    uint64_t position = job_output_reserve(fixture.output);
+    assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
+    struct engine_event *event = next(&fixture);
+    assert_true(play(&player, event->frame->bytes, event->frame->size_bytes));
+    assert_in_range(player.frame->data[0][0], 79, 81);
+    assert_in_range(player.frame->data[1][0], 99, 101);
+    assert_in_range(player.frame->data[2][0], 169, 171);
+    engine_event_destroy(event);
+    made = new_frame(ENCODING_RAW, 1);
+    made->result.ycbcr = YCBCR_VIDEO;
+    position = job_output_reserve(fixture.output);
+    assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
+    event = queue_pop(fixture.events, 10000000000);
+    assert_non_null(event);
+    assert_int_equal(event->kind, ENGINE_FAILED);
+    assert_int_equal(event->error.kind, ERROR_UNSUPPORTED);
+    engine_event_destroy(event);
+    player_end(&player);
+    end(&fixture);
+}
+
+/* What is left over, under the address sanitizer. */
+TEST(a_pool_that_ends_drops_what_waits_in_a_lane)
+{
+    struct fixture fixture;
+    begin(&fixture, 1);
+    for (uint32_t i = 0; i < FRAMES; i++)
+        submit(&fixture, ENCODING_H264, i);
+    end(&fixture);
+}
+
+TEST(frames_of_a_closed_output_are_not_encoded)
+{
+    struct fixture fixture;
+    begin(&fixture, 2);
+    job_output_close(fixture.output, NULL);
+    for (uint32_t i = 0; i < FRAMES; i++)
+        submit(&fixture, ENCODING_H264, i);
+    end(&fixture);
+}

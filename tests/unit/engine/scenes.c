@@ -1,0 +1,697 @@
+/* SPDX-License-Identifier: MIT */
+/* Scenes that several clients share, and scenes that outlive those who hold them. */
+#include "tests/unit/engine/engine_fake.h"
+
+#include "tests/unit/scene/drafts.h"
+#include "tests/harness/test.h"
+
+#define LONG_MS 600000u /* no test takes so long */
+#define SHORT_MS 50u
+
+/* Principals have other numbers than clients, so that neither is taken for the other. */
+static uint64_t principal_of(uint64_t client)
+{
+    return client + 100;
+}
+
+static void submit_open(struct engine *engine, uint64_t client, uint32_t request, const char *name,
+                        enum engine_sharing sharing)
+{
+    struct engine_command *made = command(ENGINE_SCENE_OPEN, client, request);
+    made->scene = request;
+    made->sharing = sharing;
+    made->principal = principal_of(client);
+    strcpy(made->name, name);
+    submit(engine, made);
+}
+
+/* A scene has the number of the request that opened it. */
+static void open_as(struct engine *engine, uint64_t client, uint32_t request, const char *name,
+                    enum engine_sharing sharing)
+{
+    submit_open(engine, client, request, name, sharing);
+    assert_int_equal(expect_done(engine, client, request), 0);
+}
+
+static void submit_attach(struct engine *engine, uint64_t client, uint32_t request, const char *name,
+                          uint64_t principal)
+{
+    struct engine_command *made = command(ENGINE_SCENE_ATTACH, client, request);
+    made->scene = request;
+    made->principal = principal;
+    strcpy(made->name, name);
+    submit(engine, made);
+}
+
+static uint64_t attach(struct engine *engine, uint64_t client, uint32_t request, const char *name)
+{
+    submit_attach(engine, client, request, name, principal_of(client));
+    return expect_done(engine, client, request);
+}
+
+static void attach_fails(struct engine *engine, uint64_t client, uint32_t request, const char *name)
+{
+    submit_attach(engine, client, request, name, principal_of(client));
+    expect_failed(engine, client, request, ERROR_UNKNOWN_ID, "scene_attach.name");
+}
+
+static void expect_changed(struct engine *engine, uint64_t client, uint32_t scene, uint64_t revision)
+{
+    struct engine_event *event = expect_event(engine, ENGINE_SCENE_CHANGED, client, 0);
+    assert_int_equal(event->scene, scene);
+    assert_int_equal(event->revision, revision);
+    engine_event_destroy(event);
+}
+
+static void close_scene(struct engine *engine, uint64_t client, uint32_t request, uint32_t scene)
+{
+    struct engine_command *made = command(ENGINE_SCENE_CLOSE, client, request);
+    made->scene = scene;
+    submit(engine, made);
+}
+
+static void client_goes(struct engine *engine, uint64_t client)
+{
+    submit(engine, command(ENGINE_CLIENT_GONE, client, 0));
+    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, client, 0));
+}
+
+static void expect_ended(struct engine *engine)
+{
+    engine_event_destroy(expect_event(engine, ENGINE_SCENE_ENDED, 0, 0));
+}
+
+static struct engine_command *render_scene(uint64_t client, uint32_t request, uint32_t scene, uint32_t last_frame)
+{
+    struct engine_command *made = render(client, request, 0, last_frame);
+    made->scene = scene;
+    return made;
+}
+
+/* ---- names ------------------------------------------------------------------------------------------- */
+
+TEST(a_shared_scene_is_rendered_by_all_who_come_to_it)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 5, "a", SHARING_SHARED);
+    submit_commit(engine, 1, 6, 5);
+    expect_done(engine, 1, 6);
+    assert_int_equal(attach(engine, 2, 3, "a"), 1);
+    submit(engine, render_scene(2, 4, 3, 0));
+    struct engine_event *event = expect_frame(engine, 2, 4, 0);
+    assert_int_equal(event->frame->result.revision, 1);
+    engine_event_destroy(event);
+    expect_done(engine, 2, 4);
+    submit(engine, render_scene(1, 7, 5, 0));
+    take_frame(engine, 1, 7, 0);
+    expect_done(engine, 1, 7);
+    assert_int_equal(atomic_load(&fake.scenes), 1); /* on the device once */
+    /* The other's number for it is no number of one's own. */
+    submit(engine, render_scene(2, 8, 5, 0));
+    expect_failed(engine, 2, 8, ERROR_UNKNOWN_ID, "render.scene");
+    stop(engine);
+}
+
+TEST(who_may_come_depends_on_how_it_is_shared)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 1, "private", SHARING_PRIVATE);
+    open_as(engine, 1, 2, "kept", SHARING_KEPT);
+    open_as(engine, 1, 3, "shared", SHARING_SHARED);
+    attach_fails(engine, 1, 4, "private");
+    attach_fails(engine, 2, 4, "private");
+    attach_fails(engine, 2, 5, "kept");
+    attach(engine, 1, 5, "kept");                         /* a second time, under another number */
+    submit_attach(engine, 3, 5, "kept", principal_of(1)); /* another connection of the same user */
+    expect_done(engine, 3, 5);
+    attach(engine, 2, 6, "shared");
+    attach_fails(engine, 2, 7, "");
+    attach_fails(engine, 2, 8, "Shared");
+    submit_attach(engine, 2, 6, "shared", 0);
+    expect_failed(engine, 2, 6, ERROR_INVALID, "scene_attach.scene");
+    stop(engine);
+}
+
+TEST(a_name_names_one_scene_for_each)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 1, "", SHARING_PRIVATE);
+    submit_open(engine, 1, 2, "", SHARING_KEPT);
+    expect_failed(engine, 1, 2, ERROR_INVALID, "scene_open.name");
+    submit_open(engine, 1, 2, "", SHARING_SHARED);
+    expect_failed(engine, 1, 2, ERROR_INVALID, "scene_open.name");
+    open_as(engine, 1, 2, "a", SHARING_KEPT);
+    submit_open(engine, 1, 3, "a", SHARING_KEPT);
+    expect_failed(engine, 1, 3, ERROR_INVALID, "scene_open.name");
+    submit_open(engine, 1, 3, "a", SHARING_SHARED);
+    expect_failed(engine, 1, 3, ERROR_INVALID, "scene_open.name");
+    /* What is kept for one is nothing to another. */
+    open_as(engine, 2, 1, "a", SHARING_KEPT);
+    open_as(engine, 3, 1, "a", SHARING_SHARED);
+    submit_open(engine, 4, 1, "a", SHARING_SHARED);
+    expect_failed(engine, 4, 1, ERROR_INVALID, "scene_open.name");
+    open_as(engine, 4, 1, "a", SHARING_PRIVATE); /* for people only */
+    /* Nobody can take a name from what others keep. */
+    open_as(engine, 5, 1, "a", SHARING_KEPT);
+    submit_commit(engine, 5, 2, 1);
+    expect_done(engine, 5, 2);
+    assert_int_equal(attach(engine, 5, 3, "a"), 1);
+    /* One's own goes before what is shared. */
+    submit_commit(engine, 2, 2, 1);
+    expect_done(engine, 2, 2);
+    assert_int_equal(attach(engine, 2, 3, "a"), 1);
+    assert_int_equal(attach(engine, 4, 3, "a"), 0);
+    stop(engine);
+}
+
+/* ---- changes ----------------------------------------------------------------------------------------- */
+
+TEST(a_commit_is_told_to_all_others)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 5, "a", SHARING_SHARED);
+    attach(engine, 2, 6, "a");
+    attach(engine, 3, 7, "a");
+    attach(engine, 2, 8, "a");
+    submit_commit(engine, 2, 9, 6);
+    assert_int_equal(expect_done(engine, 2, 9), 1);
+    expect_changed(engine, 1, 5, 1);
+    expect_changed(engine, 3, 7, 1);
+    expect_changed(engine, 2, 8, 1);
+    struct engine_command *wrong = command(ENGINE_COMMIT, 1, 10);
+    wrong->scene = 5;
+    wrong->edits = calloc(1, sizeof *wrong->edits);
+    wrong->edit_count = 1;
+    wrong->edits[0].set.node.base.id = 3;
+    wrong->edits[0].set.node.parent = 9;
+    submit(engine, wrong);
+    expect_failed(engine, 1, 10, ERROR_UNKNOWN_ID, "edits[0] (node 3).parent");
+    close_scene(engine, 3, 11, 7);
+    expect_done(engine, 3, 11);
+    submit_commit(engine, 1, 12, 5);
+    assert_int_equal(expect_done(engine, 1, 12), 2);
+    expect_changed(engine, 2, 6, 2);
+    expect_changed(engine, 2, 8, 2);
+    expect_silence(engine);
+    stop(engine);
+}
+
+/* ---- ends -------------------------------------------------------------------------------------------- */
+
+TEST(closing_ends_the_jobs_of_who_closes)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 5, "a", SHARING_SHARED);
+    attach(engine, 2, 6, "a");
+    submit(engine, gated(render_scene(1, 7, 5, 9)));
+    submit(engine, gated(render_scene(2, 7, 6, 0)));
+    wait_until(&fake.frames_begun, 2);
+    close_scene(engine, 1, 8, 5);
+    expect_failed(engine, 1, 7, ERROR_CANCELLED, "");
+    expect_done(engine, 1, 8);
+    assert_int_equal(atomic_load(&fake.in_progress), 1);
+    atomic_store(&fake.gate_open, true);
+    take_frame(engine, 2, 7, 0);
+    expect_done(engine, 2, 7);
+    submit_commit(engine, 1, 9, 5);
+    expect_failed(engine, 1, 9, ERROR_UNKNOWN_ID, "edit_begin.scene");
+    stop(engine);
+}
+
+TEST(edits_that_came_before_a_close_are_applied)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 5, "a", SHARING_SHARED);
+    attach(engine, 2, 6, "a");
+    submit(engine, gated(render_scene(2, 7, 6, 0)));
+    wait_until(&fake.frames_begun, 1);
+    /* They wait for the other's frame, and the close waits for them. */
+    submit_commit(engine, 1, 8, 5);
+    close_scene(engine, 1, 9, 5);
+    expect_silence(engine);
+    atomic_store(&fake.gate_open, true);
+    bool framed = false;
+    uint32_t next = 8;
+    while (!framed || next < 10) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        if (event->client == 1) {
+            assert_int_equal(event->kind, ENGINE_DONE);
+            assert_int_equal(event->request, next);
+            assert_int_equal(event->revision, next == 8);
+            next++;
+        }
+        framed = framed || event->kind == ENGINE_DONE;
+        engine_event_destroy(event);
+    }
+    stop(engine);
+}
+
+TEST(a_client_that_goes_leaves_the_scene_to_the_others)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 5, "a", SHARING_SHARED);
+    attach(engine, 2, 6, "a");
+    submit(engine, gated(render_scene(1, 7, 5, 9)));
+    wait_until(&fake.frames_begun, 1);
+    submit_commit(engine, 1, 8, 5); /* waits for the frame, and goes with its client */
+    submit_commit(engine, 2, 9, 6); /* waits, and is applied as soon as the frame is given up */
+    submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));
+    assert_int_equal(expect_done(engine, 2, 9), 1);
+    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 1, 0));
+    attach(engine, 3, 1, "a");
+    submit(engine, render_scene(2, 10, 6, 0));
+    take_frame(engine, 2, 10, 0);
+    expect_done(engine, 2, 10);
+    stop(engine);
+}
+
+TEST(a_cancel_ends_only_what_its_client_waits_for)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 5, "a", SHARING_SHARED);
+    attach(engine, 2, 6, "a");
+    submit(engine, gated(render_scene(1, 7, 5, 0)));
+    wait_until(&fake.frames_begun, 1);
+    submit_commit(engine, 2, 8, 6);
+    submit(engine, render_scene(2, 9, 6, 0));
+    submit(engine, render_scene(1, 9, 5, 0)); /* of the same number */
+    submit_target(engine, ENGINE_JOB_CANCEL, 1, 10, 9, 0);
+    expect_failed(engine, 1, 9, ERROR_CANCELLED, "");
+    expect_done(engine, 1, 10);
+    atomic_store(&fake.gate_open, true);
+    unsigned ends = 0;
+    while (ends != 7) {
+        struct engine_event *event = event_within(engine, 10000);
+        assert_non_null(event);
+        if (event->kind == ENGINE_DONE)
+            ends |= 1u << (event->request - 7);
+        engine_event_destroy(event);
+    }
+    stop(engine);
+}
+
+/* ---- lingering --------------------------------------------------------------------------------------- */
+
+/* Opens it, changes it once, and goes. */
+static void leave(struct engine *engine, uint64_t client, const char *name, enum engine_sharing sharing)
+{
+    open_as(engine, client, 1, name, sharing);
+    submit_commit(engine, client, 2, 1);
+    expect_done(engine, client, 2);
+    client_goes(engine, client);
+}
+
+TEST(a_scene_that_nobody_holds_can_be_come_back_to)
+{
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
+    leave(engine, 1, "kept", SHARING_KEPT);
+    leave(engine, 1, "shared", SHARING_SHARED);
+    leave(engine, 1, "private", SHARING_PRIVATE);
+    assert_int_equal(attach(engine, 1, 3, "kept"), 1);
+    assert_int_equal(attach(engine, 2, 3, "shared"), 1);
+    attach_fails(engine, 2, 4, "kept");
+    attach_fails(engine, 1, 4, "private");
+    submit(engine, render_scene(2, 5, 3, 0));
+    take_frame(engine, 2, 5, 0);
+    expect_done(engine, 2, 5);
+    close_scene(engine, 2, 6, 3);
+    expect_done(engine, 2, 6);
+    assert_int_equal(attach(engine, 1, 5, "shared"), 1);
+    stop(engine);
+}
+
+TEST(its_time_is_limited_and_begins_when_the_last_one_goes)
+{
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = SHORT_MS});
+    open_as(engine, 1, 1, "a", SHARING_SHARED);
+    submit_commit(engine, 1, 2, 1);
+    expect_done(engine, 1, 2);
+    attach(engine, 2, 1, "a");
+    client_goes(engine, 1);
+    expect_silence(engine); /* longer than it would linger, but it is held */
+    client_goes(engine, 2);
+    expect_ended(engine);
+    attach_fails(engine, 1, 3, "a");
+    stop(engine);
+}
+
+TEST(nothing_lingers_where_that_is_not_wanted)
+{
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = 0});
+    open_as(engine, 1, 1, "a", SHARING_SHARED);
+    submit_commit(engine, 1, 2, 1);
+    expect_done(engine, 1, 2);
+    submit(engine, command(ENGINE_CLIENT_GONE, 1, 0));
+    expect_ended(engine);
+    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 1, 0));
+    stop(engine);
+    /* Nor does one that holds nothing. */
+    engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
+    open_as(engine, 1, 1, "a", SHARING_KEPT);
+    close_scene(engine, 1, 2, 1);
+    expect_done(engine, 1, 2);
+    expect_ended(engine);
+    attach_fails(engine, 1, 3, "a");
+    stop(engine);
+}
+
+TEST(of_too_many_the_one_that_was_left_first_ends)
+{
+    struct engine *engine =
+        start((struct engine_options){.limits.scene_linger_ms = LONG_MS, .limits.lingering_scenes = 2});
+    leave(engine, 1, "a", SHARING_KEPT);
+    leave(engine, 2, "b", SHARING_SHARED);
+    attach(engine, 1, 1, "a"); /* "b" has been left for longer now */
+    client_goes(engine, 1);
+    open_as(engine, 3, 1, "c", SHARING_SHARED);
+    submit_commit(engine, 3, 2, 1);
+    expect_done(engine, 3, 2);
+    submit(engine, command(ENGINE_CLIENT_GONE, 3, 0));
+    expect_ended(engine);
+    engine_event_destroy(expect_event(engine, ENGINE_CLIENT_FORGOTTEN, 3, 0));
+    attach_fails(engine, 1, 2, "b");
+    attach(engine, 1, 2, "a");
+    attach(engine, 1, 3, "c");
+    stop(engine);
+}
+
+TEST(who_leaves_many_scenes_loses_his_own)
+{
+    struct engine *engine =
+        start((struct engine_options){.limits.scene_linger_ms = LONG_MS, .limits.lingering_scenes = 3});
+    leave(engine, 1, "first", SHARING_SHARED);
+    static const char *const names[] = {"a", "b", "c", "d"};
+    for (uint32_t i = 0; i < 4; i++) {
+        open_as(engine, 2, 1 + i, names[i], SHARING_SHARED);
+        submit_commit(engine, 2, 10 + i, 1 + i);
+        expect_done(engine, 2, 10 + i);
+    }
+    for (uint32_t i = 0; i < 4; i++) {
+        close_scene(engine, 2, 20 + i, 1 + i);
+        expect_done(engine, 2, 20 + i);
+        if (i >= 2)
+            expect_ended(engine);
+    }
+    attach_fails(engine, 3, 1, "a");
+    attach_fails(engine, 3, 2, "b");
+    attach(engine, 3, 3, "first");
+    attach(engine, 3, 4, "c");
+    attach(engine, 3, 5, "d");
+    stop(engine);
+}
+
+TEST(a_left_scene_gives_its_name_to_a_new_one_of_the_same_user)
+{
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
+    leave(engine, 1, "a", SHARING_SHARED);
+    submit_open(engine, 2, 1, "a", SHARING_SHARED);
+    expect_failed(engine, 2, 1, ERROR_INVALID, "scene_open.name");
+    submit_open(engine, 1, 1, "a", SHARING_SHARED);
+    expect_ended(engine);
+    expect_done(engine, 1, 1);
+    assert_int_equal(attach(engine, 2, 1, "a"), 0);
+    stop(engine);
+}
+
+TEST(left_scenes_give_way_where_memory_is_short)
+{
+    /* Room for about 100 nodes. */
+    uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
+    struct engine *engine = start((struct engine_options){
+        .limits.scene_linger_ms = LONG_MS, .limits.scene = {.host_bytes = limit_bytes, .nodes = 100}});
+    open_as(engine, 1, 1, "a", SHARING_SHARED);
+    submit(engine, commit_of_nodes(1, 2, 1, 60));
+    expect_done(engine, 1, 2);
+    open_as(engine, 2, 1, "b", SHARING_PRIVATE);
+    submit(engine, commit_of_nodes(2, 2, 1, 60));
+    expect_failed(engine, 2, 2, ERROR_LIMIT, "edits"); /* it is held */
+    client_goes(engine, 1);
+    submit(engine, commit_of_nodes(2, 3, 1, 60));
+    expect_ended(engine);
+    assert_int_equal(expect_done(engine, 2, 3), 1);
+    leave(engine, 1, "c", SHARING_SHARED);
+    submit(engine, commit_of_nodes(2, 4, 1, 101)); /* more than any scene may have: they need not give way */
+    expect_failed(engine, 2, 4, ERROR_LIMIT, "edits");
+    attach(engine, 1, 4, "c");
+    stop(engine);
+}
+
+/* `nodes` in one commit. */
+static void leave_nodes(struct engine *engine, uint64_t client, const char *name, uint32_t nodes)
+{
+    open_as(engine, client, 1, name, SHARING_SHARED);
+    submit(engine, commit_of_nodes(client, 2, 1, nodes));
+    expect_done(engine, client, 2);
+    client_goes(engine, client);
+}
+
+TEST(who_needs_room_loses_his_own_left_scenes_before_others_lose_theirs)
+{
+    uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
+    struct engine *engine = start((struct engine_options){
+        .limits.scene_linger_ms = LONG_MS, .limits.scene = {.host_bytes = limit_bytes, .nodes = 100}});
+    leave_nodes(engine, 1, "theirs", 30); /* the oldest */
+    leave_nodes(engine, 2, "mine", 30);
+    open_as(engine, 2, 3, "new", SHARING_PRIVATE);
+    submit(engine, commit_of_nodes(2, 4, 3, 60));
+    expect_ended(engine);
+    expect_done(engine, 2, 4);
+    attach_fails(engine, 2, 5, "mine");
+    attach(engine, 3, 1, "theirs"); /* it is held now */
+    open_as(engine, 2, 6, "newer", SHARING_PRIVATE);
+    submit(engine, commit_of_nodes(2, 7, 6, 30));
+    expect_failed(engine, 2, 7, ERROR_LIMIT, "edits");
+    client_goes(engine, 3);
+    submit(engine, commit_of_nodes(2, 8, 6, 60)); /* it would end in vain */
+    expect_failed(engine, 2, 8, ERROR_LIMIT, "edits");
+    attach(engine, 3, 1, "theirs");
+    client_goes(engine, 3);
+    submit(engine, commit_of_nodes(2, 9, 6, 30)); /* the limit of all is reached */
+    expect_ended(engine);
+    expect_done(engine, 2, 9);
+    attach_fails(engine, 3, 1, "theirs");
+    stop(engine);
+}
+
+static void submit_trim(struct engine *engine, uint64_t client, uint64_t bytes)
+{
+    struct engine_command *made = command(ENGINE_SCENES_TRIM, 0, 0);
+    made->principal = principal_of(client);
+    made->trim_bytes = bytes;
+    submit(engine, made);
+}
+
+#define SPHERES 4u
+#define SPHERES_BYTES (SPHERES * 16u)
+
+/* With one blob. */
+static void leave_spheres(struct engine *engine, uint64_t client, const char *name)
+{
+    static const float numbers[SPHERES * 4] = {0, 0, 0, 1, 1, 0, 0, 1, 2, 0, 0, 1, 3, 0, 0, 1};
+    struct draft_list list = {0};
+    add_spheres(&list, 1, numbers, SPHERES);
+    open_as(engine, client, 1, name, SHARING_SHARED);
+    struct engine_command *made = command(ENGINE_COMMIT, client, 2);
+    made->scene = 1;
+    made->edits = malloc(sizeof *made->edits);
+    assert_non_null(made->edits);
+    *made->edits = list.edits[0];
+    made->edit_count = 1;
+    submit(engine, made);
+    expect_done(engine, client, 2);
+    client_goes(engine, client);
+}
+
+TEST(left_scenes_give_way_to_as_many_bytes_of_blobs_as_are_lacking)
+{
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
+    leave_spheres(engine, 1, "theirs");
+    leave_spheres(engine, 2, "mine");
+    leave_spheres(engine, 2, "mine, too");
+    submit_trim(engine, 2, 3 * SPHERES_BYTES + 1); /* nobody can help */
+    submit_trim(engine, 2, 0);
+    attach(engine, 3, 1, "mine");
+    client_goes(engine, 3);
+    submit_trim(engine, 2, SPHERES_BYTES);
+    expect_ended(engine);
+    attach_fails(engine, 3, 1, "mine, too"); /* "mine" was left later */
+    submit_trim(engine, 2, SPHERES_BYTES + 1);
+    expect_ended(engine);
+    expect_ended(engine);
+    attach_fails(engine, 3, 2, "mine");
+    attach_fails(engine, 3, 3, "theirs");
+    stop(engine);
+}
+
+/* ---- what is told ------------------------------------------------------------------------------------ */
+
+TEST(a_list_has_what_its_reader_may_come_to)
+{
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
+    open_as(engine, 1, 1, "m", SHARING_SHARED);
+    open_as(engine, 1, 2, "k", SHARING_KEPT);
+    open_as(engine, 1, 3, "p", SHARING_PRIVATE);
+    open_as(engine, 2, 1, "o", SHARING_KEPT);
+    attach(engine, 2, 2, "m");
+    leave(engine, 3, "b", SHARING_SHARED);
+    static const struct {
+        uint64_t client;
+        const char *names[3];
+        uint32_t clients[3];
+    } wanted[] = {{1, {"b", "k", "m"}, {0, 1, 2}}, {2, {"b", "m", "o"}, {0, 2, 1}}};
+    for (int i = 0; i < 2; i++) {
+        struct engine_command *made = command(ENGINE_SCENE_LIST, wanted[i].client, 9);
+        made->principal = principal_of(wanted[i].client);
+        submit(engine, made);
+        struct engine_event *event = expect_event(engine, ENGINE_SCENES_LISTED, wanted[i].client, 9);
+        assert_int_equal(event->list->count, 3);
+        for (int k = 0; k < 3; k++) {
+            assert_string_equal(event->list->scenes[k].name, wanted[i].names[k]);
+            assert_int_equal(event->list->scenes[k].clients, wanted[i].clients[k]);
+            assert_int_equal(event->list->scenes[k].revision, wanted[i].clients[k] == 0);
+        }
+        assert_int_equal(event->list->scenes[0].sharing, SHARING_SHARED);
+        assert_int_equal(event->list->scenes[i ? 2 : 1].sharing, SHARING_KEPT);
+        engine_event_destroy(event);
+    }
+    stop(engine);
+}
+
+TEST(stats_have_each_scene_once)
+{
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
+    open_as(engine, 1, 5, "a", SHARING_SHARED);
+    attach(engine, 2, 6, "a");
+    leave(engine, 3, "b", SHARING_SHARED);
+    submit(engine, command(ENGINE_STATS, 1, 7));
+    struct engine_event *event = expect_event(engine, ENGINE_STATS_READY, 1, 7);
+    assert_int_equal(event->stats->scene_count, 2);
+    assert_int_equal(event->stats->scenes[0].client, 1);
+    assert_int_equal(event->stats->scenes[0].scene, 5);
+    assert_int_equal(event->stats->scenes[1].client, 0); /* nobody has it */
+    assert_string_equal(event->stats->scenes[1].name, "b");
+    engine_event_destroy(event);
+    stop(engine);
+}
+
+static void submit_edits(struct engine *engine, uint32_t request, const struct draft_list *list)
+{
+    struct engine_command *made = command(ENGINE_COMMIT, 1, request);
+    made->edits = malloc(list->count * sizeof *made->edits);
+    assert_non_null(made->edits);
+    memcpy(made->edits, list->edits, list->count * sizeof *made->edits);
+    made->edit_count = list->count;
+    submit(engine, made);
+    expect_done(engine, 1, request);
+}
+
+static struct engine_event *describe(struct engine *engine, uint32_t request)
+{
+    submit(engine, command(ENGINE_SCENE_DESCRIBE, 1, request));
+    return expect_event(engine, ENGINE_SCENE_DESCRIBED, 1, request);
+}
+
+TEST(a_description_names_cameras_and_clips)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 1, "a", SHARING_PRIVATE);
+    struct engine_event *event = describe(engine, 2);
+    assert_true(event->description->empty);
+    assert_int_equal(event->description->revision, 0);
+    assert_int_equal(event->description->camera_count + event->description->clip_count, 0);
+    engine_event_destroy(event);
+
+    struct draft_list list = {0};
+    add_set(&list, SCENE_CAMERA, 4)->set.camera =
+        (struct scene_camera){.base = {.id = 4, .name = "lens"}, .fov_y = 0.75f};
+    strcpy(add_shown(&list, 9, NODE_CAMERA, 4)->base.name, "tower");
+    add_shown(&list, 7, NODE_CAMERA, 4);
+    static const float sphere[4] = {1, 2, 3, 0.5f};
+    add_spheres(&list, 1, sphere, 1);
+    add_shown(&list, 3, NODE_SPHERES, 1);
+    static const float floats[8] = {0, 1.5f, 0, 0, 0, 1, 1, 1};
+    strcpy(add_clip(&list, 5, floats, 8)->base.name, "walk");
+    add_clip(&list, 2, floats, 8);
+    add_channel(&list, 1, 5, CHANNEL_NODE_TRANSLATION, 3, 3, 2);
+    add_channel(&list, 2, 5, CHANNEL_NODE_SCALE, 3, 3, 1)->first_value = 2;
+    submit_edits(engine, 3, &list);
+    event = describe(engine, 4);
+    const struct engine_scene_description *told = event->description;
+    assert_int_equal(told->revision, 1);
+    assert_false(told->empty);
+    for (int axis = 0; axis < 3; axis++) {
+        assert_true(told->lower_world[axis] == sphere[axis] - 0.5f);
+        assert_true(told->upper_world[axis] == sphere[axis] + 0.5f);
+    }
+    assert_int_equal(told->spheres, 1);
+    assert_int_equal(told->triangles, 0);
+    assert_int_equal(told->nodes, 3);
+    /* Ascending, whatever the order in which they were made; without a name of the node's it is the camera's. */
+    assert_int_equal(told->camera_count, 2);
+    assert_int_equal(told->cameras[0].node, 7);
+    assert_string_equal(told->cameras[0].name, "lens");
+    assert_int_equal(told->cameras[1].node, 9);
+    assert_string_equal(told->cameras[1].name, "tower");
+    assert_true(told->cameras[1].fov_y == 0.75f);
+    assert_int_equal(told->clip_count, 2);
+    assert_int_equal(told->clips[0].clip, 2);
+    assert_int_equal(told->clips[0].channels, 0);
+    assert_true(told->clips[0].duration_s == 0);
+    assert_int_equal(told->clips[1].clip, 5);
+    assert_int_equal(told->clips[1].channels, 2);
+    assert_true(told->clips[1].duration_s == 1.5f);
+    assert_string_equal(told->clips[1].name, "walk");
+    engine_event_destroy(event);
+
+    /* After a change it is another. */
+    struct draft_list removal = {0};
+    add_remove(&removal, SCENE_NODE, 9);
+    submit_edits(engine, 5, &removal);
+    event = describe(engine, 6);
+    assert_int_equal(event->description->revision, 2);
+    assert_int_equal(event->description->camera_count, 1);
+    engine_event_destroy(event);
+    stop(engine);
+}
+
+TEST(of_many_cameras_the_first_are_told)
+{
+    struct engine *engine = start((struct engine_options){0});
+    open_as(engine, 1, 1, "a", SHARING_PRIVATE);
+    /* From the greatest number down, a few at a time. */
+    uint32_t next = ENGINE_DESCRIPTION_MAX + 40, request = 2;
+    bool has_camera = false;
+    while (next > 0) {
+        struct draft_list list = {0};
+        if (!has_camera)
+            add_set(&list, SCENE_CAMERA, 1)->set.camera = (struct scene_camera){.base.id = 1, .fov_y = 1};
+        has_camera = true;
+        while (next > 0 && list.count < EDITS_MAX)
+            add_shown(&list, next--, NODE_CAMERA, 1);
+        submit_edits(engine, request++, &list);
+    }
+    struct engine_event *event = describe(engine, request);
+    assert_int_equal(event->description->camera_count, ENGINE_DESCRIPTION_MAX);
+    for (uint32_t i = 0; i < ENGINE_DESCRIPTION_MAX; i++)
+        assert_int_equal(event->description->cameras[i].node, i + 1);
+    engine_event_destroy(event);
+    stop(engine);
+}
+
+TEST(what_a_left_scene_uses_stays)
+{
+    struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
+    open_as(engine, 1, 1, "a", SHARING_SHARED);
+    struct draft_list list = {0};
+    static const float sphere[4] = {0, 0, 0, 1};
+    struct blob *blob = blob_ref(add_spheres(&list, 1, sphere, 1)->centres_radii);
+    submit_edits(engine, 2, &list);
+    client_goes(engine, 1);
+    assert_int_equal(atomic_load(&blob->references), 2);
+    submit_trim(engine, 1, sizeof sphere);
+    expect_ended(engine);
+    assert_int_equal(atomic_load(&blob->references), 1);
+    blob_unref(blob);
+    stop(engine);
+}

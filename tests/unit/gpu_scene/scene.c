@@ -1,0 +1,302 @@
+/* SPDX-License-Identifier: MIT */
+/* The device's copy of a scene: what is there, and that an edit uploads no more than it changed. */
+#include "tests/accuracy/test_scenes.h"
+
+#include "shared/light.h"
+#include "shared/material.h"
+#include "gpu_scene/scene.h"
+#include "tests/fixtures/device.h"
+#include "tests/harness/test.h"
+
+#include <stddef.h>
+
+struct fixture {
+    struct scene *scene;
+    struct gpu_scene gpu;
+    struct scene_changes changes;
+    struct test_edits edits;
+};
+
+static void update(struct fixture *fixture)
+{
+    struct error error = {0};
+    bool ok = gpu_scene_update(&fixture->gpu, fixture->scene, NULL, &fixture->changes, NULL, &error);
+    assert_string_equal(error.text, "");
+    assert_true(ok);
+}
+
+static void fixture_init(struct fixture *fixture, struct scene *scene)
+{
+    *fixture = (struct fixture){.scene = scene, .edits = {.scene = scene}};
+    gpu_scene_init(&fixture->gpu, device);
+    update(fixture);
+}
+
+static void fixture_finish(struct fixture *fixture)
+{
+    gpu_scene_finish(&fixture->gpu);
+    gpu_scene_finish(&fixture->gpu); /* empty already */
+    scene_destroy(fixture->scene);
+}
+
+static void expect_changes(const struct fixture *fixture, bool geometry, bool instances, bool shading, bool lights)
+{
+    assert_int_equal(fixture->changes.geometry, geometry);
+    assert_int_equal(fixture->changes.instances, instances);
+    assert_int_equal(fixture->changes.shading, shading);
+    assert_int_equal(fixture->changes.lights, lights);
+}
+
+ALL_TESTS(open_device, close_device)
+
+TEST(the_first_update_uploads_everything_and_the_next_nothing)
+{
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_translucent());
+    expect_changes(&fixture, true, true, true, true);
+    assert_in_range(fixture.changes.uploaded_bytes, 60 * 16 + 180 * 16 * 3, UINT64_MAX);
+    assert_in_range(gpu_scene_device_bytes(&fixture.gpu), fixture.changes.uploaded_bytes, UINT64_MAX);
+    update(&fixture);
+    expect_changes(&fixture, false, false, false, false);
+    assert_int_equal(fixture.changes.uploaded_bytes, 0);
+    assert_true(fixture.gpu.has_spheres && fixture.gpu.has_cutout && fixture.gpu.has_translucent);
+    assert_int_equal(fixture.gpu.disc_count, 1);
+    fixture_finish(&fixture);
+}
+
+TEST(a_moved_node_uploads_its_instance_alone)
+{
+    struct fixture fixture;
+    struct instance back;
+    float m[12];
+    fixture_init(&fixture, test_scene_soup());
+    assert_int_equal(fixture.gpu.instance_count, 4); /* neither the flat nor the hidden one */
+    test_transform(m, 1, 1, 1, 0, 0, 7, 8, 9);
+    test_node(&fixture.edits, 2, 0, NODE_MESH, 10, m);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    expect_changes(&fixture, false, true, false, false);
+    assert_int_equal(fixture.changes.uploaded_bytes, sizeof(struct instance));
+    gpu_buffer_read(device, &fixture.gpu.instance_buffer, sizeof(back), &back, sizeof(back));
+    assert_int_equal(back.node, 2);
+    assert_float_equal(back.world_from_object[2][3], 9.0f, 0.0f);
+    assert_float_equal(back.object_from_world[2][3], -9.0f, 0.0f);
+    assert_int_equal(back.flags, 0);
+    fixture_finish(&fixture);
+}
+
+TEST(an_edited_material_moves_no_geometry_and_no_texels)
+{
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_translucent());
+    test_material(&fixture.edits, 5, 0.9f, 0.9f, 0.1f);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    expect_changes(&fixture, false, false, true, false);
+    assert_false(fixture.changes.surfaces);
+    assert_int_equal(fixture.changes.uploaded_bytes, sizeof(struct material));
+    fixture_finish(&fixture);
+}
+
+/* Of a stored surface: its textures are applied, holes are not there; factors are multiplied later. */
+TEST(only_what_is_more_than_a_factor_changes_surfaces)
+{
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_translucent());
+    assert_true(fixture.changes.surfaces);
+    struct scene_material glass = *scene_material(fixture.scene, 3), cutout = *scene_material(fixture.scene, 1);
+    struct scene_material *edited = test_material(&fixture.edits, 3, 0.1f, 0.2f, 0.3f);
+    memcpy(edited->textures, glass.textures, sizeof(glass.textures));
+    edited->transmission = 0.5f;
+    edited->roughness = 0.2f;
+    edited->emission[0] = 3.0f;
+    edited->base_colour[3] = 0.5f;
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_true(fixture.changes.shading && !fixture.changes.surfaces);
+    edited = test_material(&fixture.edits, 3, 0.1f, 0.2f, 0.3f);
+    memcpy(edited->textures, glass.textures, sizeof(glass.textures));
+    edited->textures[MATERIAL_TRANSMISSION].uv_transform[2] = 0.5f;
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_true(fixture.changes.surfaces);
+    edited = test_material(&fixture.edits, 1, 0.1f, 0.2f, 0.3f);
+    memcpy(edited->textures, cutout.textures, sizeof(cutout.textures));
+    edited->alpha_mode = ALPHA_MASK;
+    edited->alpha_cutoff = 0.25f;
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_true(fixture.changes.surfaces);
+    test_texture(&fixture.edits, 2, 5, 5, TEXTURE_RGBA8_LINEAR, WRAP_CLAMP, WRAP_REPEAT, 20);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_true(fixture.changes.surfaces);
+    fixture_finish(&fixture);
+}
+
+TEST(a_material_that_ceases_to_be_a_cutout_is_noticed)
+{
+    struct fixture fixture;
+    struct geometry back[2];
+    fixture_init(&fixture, test_scene_translucent());
+    gpu_buffer_read(device, &fixture.gpu.geometry_buffer, 0, back, sizeof(back));
+    assert_int_equal(back[0].flags & GEOMETRY_HAS_CUTOUT, GEOMETRY_HAS_CUTOUT);
+    assert_int_equal(back[1].flags & GEOMETRY_HAS_CUTOUT, 0);
+    test_material(&fixture.edits, 1, 0.1f, 0.1f, 0.1f);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_false(fixture.gpu.has_cutout);
+    assert_true(fixture.gpu.has_translucent);
+    gpu_buffer_read(device, &fixture.gpu.geometry_buffer, 0, back, sizeof(back));
+    assert_int_equal(back[0].flags & GEOMETRY_HAS_CUTOUT, 0);
+    fixture_finish(&fixture);
+}
+
+/* Materials come and go; the triangles that were not set again keep theirs. */
+TEST(materials_keep_their_indices)
+{
+    struct fixture fixture;
+    uint32_t first[4], last[4];
+    struct material material;
+    fixture_init(&fixture, test_scene_soup());
+    for (uint32_t id = 50; id < 60; id++)
+        test_material(&fixture.edits, id, 0.5f, 0.5f, 0.5f);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    for (uint32_t id = 50; id < 60; id++)
+        *test_add(&fixture.edits, SCENE_MATERIAL) =
+            (struct scene_edit){.kind = EDIT_REMOVE, .object = SCENE_MATERIAL, .id = id};
+    test_material(&fixture.edits, 70, 0.7f, 0.7f, 0.7f);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    expect_changes(&fixture, false, false, true, false);
+    assert_in_range(fixture.gpu.material_count, 4, 13);
+    gpu_buffer_read(device, &fixture.gpu.triangles, 0, first, sizeof(first));
+    gpu_buffer_read(device, &fixture.gpu.triangles, 60 * 16, last, sizeof(last)); /* the second range */
+    gpu_buffer_read(device, &fixture.gpu.materials, first[3] * sizeof(material), &material, sizeof(material));
+    assert_float_equal(material.base_colour[0], 0.1f, 0.0f);
+    gpu_buffer_read(device, &fixture.gpu.materials, last[3] * sizeof(material), &material, sizeof(material));
+    assert_float_equal(material.base_colour[0], 0.4f, 0.0f);
+    fixture_finish(&fixture);
+}
+
+TEST(a_texture_is_halved_in_linear_light_down_to_one_texel)
+{
+    struct fixture fixture;
+    fixture_init(&fixture, test_scene_create());
+    static const uint8_t texels[3][2][4] = {
+        {{0, 0, 0, 0}, {255, 255, 255, 255}}, {{255, 10, 0, 255}, {0, 10, 0, 0}}, {{0, 0, 0, 0}, {0, 0, 0, 0}}};
+    for (uint32_t id = 1; id <= 2; id++) {
+        struct scene_texture *texture = &test_add(&fixture.edits, SCENE_TEXTURE)->set.texture;
+        texture->base.id = id;
+        texture->width = 2;
+        texture->height = 3;
+        texture->format = id == 1 ? TEXTURE_RGBA8_SRGB : TEXTURE_RGBA8_LINEAR;
+        texture->wrap_u = WRAP_MIRROR;
+        texture->texels = test_blob(texels, sizeof(texels));
+    }
+    test_commit(&fixture.edits);
+    update(&fixture);
+    struct texture_info infos[2];
+    uint8_t back[2][7][4];
+    gpu_buffer_read(device, &fixture.gpu.textures, 0, infos, sizeof(infos));
+    gpu_buffer_read(device, &fixture.gpu.texels, 0, back, sizeof(back));
+    assert_int_equal(infos[0].flags, TEXTURE_SRGB | 2u << TEXTURE_WRAP_U_SHIFT | 2u << TEXTURE_LEVELS_SHIFT);
+    assert_int_equal(infos[1].first_texel, 7);
+    assert_memory_equal(back[0], texels, sizeof(texels));
+    /* Two of six texels are white in red: a third of the light, which is 156 in sRGB. */
+    assert_int_equal(back[0][6][0], 156);
+    assert_int_equal(back[1][6][0], 85);
+    assert_int_equal(back[0][6][3], 85); /* alpha is linear always */
+    fixture_finish(&fixture);
+}
+
+TEST(lights_go_along_minus_z_of_their_nodes)
+{
+    struct fixture fixture;
+    struct light back[2];
+    float m[12];
+    fixture_init(&fixture, test_scene_create());
+    struct scene_light *spot = &test_add(&fixture.edits, SCENE_LIGHT)->set.light;
+    *spot = (struct scene_light){
+        .base.id = 1, .kind = LIGHT_SPOT, .colour = {1, 2, 3}, .range = 9, .inner_cone = 0.3f, .outer_cone = 0.6f};
+    struct scene_light *rectangle = &test_add(&fixture.edits, SCENE_LIGHT)->set.light;
+    *rectangle = (struct scene_light){.base.id = 2, .kind = LIGHT_RECTANGLE, .size = {2, 4}};
+    test_transform(m, 2, 2, 2, 1, 1.5707963f, 5, 6, 7); /* z to x */
+    test_node(&fixture.edits, 1, 0, NODE_LIGHT, 1, m);
+    test_node(&fixture.edits, 2, 0, NODE_LIGHT, 2, m);
+    test_commit(&fixture.edits);
+    update(&fixture);
+    expect_changes(&fixture, false, false, false, true);
+    assert_int_equal(fixture.gpu.light_count, 2);
+    gpu_buffer_read(device, &fixture.gpu.lights, 0, back, sizeof(back));
+    assert_float_equal(back[0].position_kind[0], 5, 0);
+    assert_float_equal(back[0].position_kind[3], LIGHT_KIND_SPOT, 0);
+    assert_float_equal(back[0].direction_range[0], -1, 1e-6);
+    assert_float_equal(back[0].direction_range[3], 9, 0);
+    assert_float_equal(back[0].half_u_inner[3], cosf(0.3f), 1e-6);
+    assert_float_equal(back[0].half_v_outer[3], cosf(0.6f), 1e-6);
+    assert_float_equal(fabsf(back[1].half_u_inner[2]), 2, 1e-6);
+    assert_float_equal(back[1].half_v_outer[1], 4, 1e-6);
+    assert_float_equal(fixture.gpu.lower_world[1], 0, 1e-5); /* 6 - (2 + 4): the rectangle in any position */
+    fixture_finish(&fixture);
+}
+
+TEST(an_environment_image_is_there_until_it_is_taken_away)
+{
+    struct fixture fixture;
+    uint16_t half_floats[2 * 1 * 4] = {0x3c00};
+    fixture_init(&fixture, test_scene_create());
+    struct scene_edit *edit = test_add(&fixture.edits, SCENE_NODE);
+    edit->kind = EDIT_SET_ENVIRONMENT;
+    edit->set.environment = (struct scene_environment){
+        .colour = {1, 1, 1}, .width = 2, .height = 1, .texels = test_blob(half_floats, sizeof(half_floats))};
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_true(fixture.gpu.has_environment_image && fixture.changes.lights);
+    assert_int_equal(fixture.gpu.environment.width, 2);
+    edit = test_add(&fixture.edits, SCENE_NODE);
+    edit->kind = EDIT_SET_ENVIRONMENT;
+    edit->set.environment = (struct scene_environment){.colour = {0.5f, 0.5f, 0.5f}, .rotation = 1};
+    test_commit(&fixture.edits);
+    update(&fixture);
+    assert_false(fixture.gpu.has_environment_image);
+    assert_int_equal(fixture.gpu.environment.name, 0);
+    assert_float_equal(fixture.gpu.environment_colour[0], 0.5f, 0);
+    fixture_finish(&fixture);
+}
+
+TEST(a_scene_beyond_the_device_is_refused_and_the_next_update_starts_anew)
+{
+    struct fixture fixture;
+    struct error error = {0};
+    fixture_init(&fixture, test_scene_soup());
+    uint64_t max = device->facts.texture_buffer_texels_max;
+    test_soup_mesh(&fixture.edits, 10, 200, 0.1f, 3);
+    test_commit(&fixture.edits);
+    device->facts.texture_buffer_texels_max = 300;
+    assert_false(gpu_scene_update(&fixture.gpu, fixture.scene, NULL, &fixture.changes, NULL, &error));
+    device->facts.texture_buffer_texels_max = max;
+    assert_int_equal(error.kind, ERROR_LIMIT);
+    assert_string_equal(error.text, "600 vertices; this device's texel buffers hold at most 300");
+    assert_int_equal(fixture.gpu.instance_count, 0);
+    assert_int_equal(gpu_scene_device_bytes(&fixture.gpu), 0);
+    update(&fixture);
+    expect_changes(&fixture, true, true, true, true);
+    assert_int_equal(fixture.gpu.instance_count, 4);
+    fixture_finish(&fixture);
+}
+
+TEST(bounds_hold_all_that_is_visible)
+{
+    struct fixture fixture;
+    float lower[3], upper[3];
+    fixture_init(&fixture, test_scene_soup());
+    assert_true(scene_bounds(fixture.scene, NULL, lower, upper));
+    for (int k = 0; k < 3; k++) {
+        assert_float_equal(fixture.gpu.lower_world[k], lower[k], 1e-4);
+        assert_float_equal(fixture.gpu.upper_world[k], upper[k], 1e-4);
+    }
+    assert_in_range((unsigned)fixture.gpu.diagonal, 4, 12);
+    fixture_finish(&fixture);
+}

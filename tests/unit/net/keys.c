@@ -1,0 +1,264 @@
+/* SPDX-License-Identifier: MIT */
+/* Key files, who has which key, and wrong keys by where they come from. */
+#include <stddef.h>
+#include <stdint.h>
+
+#include "net/attempts.h"
+#include "net/auth.h"
+#include "protocol/sealed/key.h"
+#include "tests/harness/test.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* ---- files --------------------------------------------------------------------------------------------- */
+
+static char folder[64], path[96], other_path[96];
+
+static int make_folder(void **state)
+{
+    (void)state;
+    const char *base = getenv("TMPDIR");
+    snprintf(folder, sizeof folder, "%.40s/farlight-XXXXXX", base ? base : P_tmpdir);
+    assert_non_null(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/key", folder);
+    snprintf(other_path, sizeof other_path, "%s/other", folder);
+    return 0;
+}
+
+static int remove_folder(void **state)
+{
+    (void)state;
+    unlink(path);
+    unlink(other_path);
+    rmdir(folder);
+    return 0;
+}
+
+static void write_file(const char *name, size_t bytes, mode_t mode)
+{
+    char data[100];
+    memset(data, 7, sizeof data);
+    unlink(name);
+    int fd = open(name, O_WRONLY | O_CREAT | O_EXCL, 0600);
+    assert_true(fd >= 0);
+    assert_int_equal(write(fd, data, bytes), bytes);
+    assert_int_equal(fchmod(fd, mode), 0);
+    close(fd);
+}
+
+TEST_WITH(a_key_is_made_for_its_owner_alone_and_never_over_another, make_folder, remove_folder)
+{
+    struct sealed_key key, again;
+    struct decode_error error = {0};
+    struct stat status;
+    mode_t mask = umask(0);
+    assert_true(sealed_key_create(path, &error));
+    umask(mask);
+    assert_int_equal(stat(path, &status), 0);
+    assert_int_equal(status.st_mode & 07777, 0600);
+    assert_int_equal(status.st_size, SEALED_KEY_BYTES);
+    assert_true(sealed_key_read(&key, path, &error));
+    assert_false(sealed_key_create(path, &error));
+    assert_non_null(strstr(error.text, "left alone"));
+    assert_true(sealed_key_read(&again, path, &error));
+    assert_memory_equal(&key, &again, sizeof key);
+    /* Nor through a link that leads nowhere yet. */
+    assert_int_equal(symlink("/nowhere/key", other_path), 0);
+    assert_false(sealed_key_create(other_path, &error));
+    unlink(other_path);
+    assert_true(sealed_key_create(other_path, &error));
+    assert_true(sealed_key_read(&again, other_path, &error));
+    assert_memory_not_equal(&key, &again, sizeof key);
+}
+
+TEST_WITH(what_is_no_key_file_is_refused_by_its_reason, make_folder, remove_folder)
+{
+    static const struct {
+        size_t bytes;
+        mode_t mode;
+        enum protocol_error_code code;
+        const char *what;
+    } cases[] = {
+        {32, 0640, PROTOCOL_ERROR_CODE_DENIED, "mode 0640"},
+        {32, 0604, PROTOCOL_ERROR_CODE_DENIED, "open to others"},
+        {32, 0602, PROTOCOL_ERROR_CODE_DENIED, "chmod 600"},
+        {31, 0600, PROTOCOL_ERROR_CODE_INVALID, "31 bytes"},
+        {33, 0600, PROTOCOL_ERROR_CODE_INVALID, "33 bytes"},
+        {0, 0600, PROTOCOL_ERROR_CODE_INVALID, "0 bytes"},
+    };
+    struct sealed_key key, none = {0};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct decode_error error = {0};
+        write_file(path, cases[i].bytes, cases[i].mode);
+        assert_false(sealed_key_read(&key, path, &error));
+        assert_int_equal(error.code, cases[i].code);
+        assert_string_equal(error.field, path);
+        assert_non_null(strstr(error.text, cases[i].what));
+        assert_memory_equal(&key, &none, sizeof key);
+    }
+    struct decode_error error = {0};
+    write_file(path, 32, 0400);
+    assert_true(sealed_key_read(&key, path, &error));
+    assert_false(sealed_key_read(&key, folder, &error));
+    error = (struct decode_error){0};
+    assert_false(sealed_key_read(&key, other_path, &error));
+    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_INVALID);
+    /* Nobody writes to the pipe: that must not be waited for. */
+    error = (struct decode_error){0};
+    assert_int_equal(mkfifo(other_path, 0600), 0);
+    assert_false(sealed_key_read(&key, other_path, &error));
+    assert_non_null(strstr(error.text, "no file that could hold a key"));
+}
+
+TEST_WITH(a_key_of_somebody_else_is_refused, make_folder, remove_folder)
+{
+    struct sealed_key key;
+    struct decode_error error = {0};
+    write_file(path, 32, 0600);
+    if (chown(path, geteuid() + 1, (gid_t)-1) != 0) {
+        print_message("skipped: only root can give a file away\n");
+        skip();
+    }
+    assert_false(sealed_key_read(&key, path, &error));
+    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_DENIED);
+    assert_non_null(strstr(error.text, "another user"));
+}
+
+TEST_WITH(the_daemon_reads_its_keys_and_wants_two_different_ones, make_folder, remove_folder)
+{
+    struct auth_keys keys;
+    struct error error = {0};
+    struct decode_error why = {0};
+    assert_true(sealed_key_create(path, &why));
+    assert_true(sealed_key_create(other_path, &why));
+    assert_true(auth_read_keys(&keys, "", "", &error));
+    assert_int_equal(keys.count, 0);
+    assert_true(auth_read_keys(&keys, "", other_path, &error));
+    assert_int_equal(keys.count, 1);
+    assert_true(keys.read_only[0]);
+    assert_true(auth_read_keys(&keys, path, other_path, &error));
+    assert_int_equal(keys.count, 2);
+    assert_false(keys.read_only[0]);
+    assert_true(keys.read_only[1]);
+    assert_false(auth_read_keys(&keys, path, path, &error));
+    assert_non_null(strstr(error.text, "same key"));
+    error = (struct error){0};
+    assert_false(auth_read_keys(&keys, "/nowhere/key", "", &error));
+    assert_string_equal(error.field, "/nowhere/key");
+    assert_non_null(strstr(error.remedy, "farlight key"));
+}
+
+/* ---- who comes from where ------------------------------------------------------------------------------ */
+
+static struct address parsed(const char *text)
+{
+    struct address address;
+    struct error error = {0};
+    if (!address_parse(&address, text, &error))
+        fail_msg("%s: %s", text, error.text);
+    return address;
+}
+
+TEST(only_connections_within_loopback_need_no_key)
+{
+    static const struct {
+        const char *own, *peer;
+        bool beyond;
+    } cases[] = {
+        {"unix:/a", "unix:/b", false},
+        {"tcp:127.0.0.1:1", "tcp:127.0.0.1:2", false},
+        {"tcp:[::1]:1", "tcp:[::1]:2", false},
+        {"tcp:0.0.0.0:1", "tcp:127.0.0.1:2", true}, /* whoever else comes there has to have one as well */
+        {"tcp:10.0.0.1:1", "tcp:10.0.0.1:2", true},
+        {"tcp:127.0.0.1:1", "tcp:10.0.0.7:2", true},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct address own = parsed(cases[i].own), peer = parsed(cases[i].peer);
+        assert_int_equal(auth_is_beyond_loopback(&own, &peer), cases[i].beyond);
+    }
+    struct auth_identity identity;
+    struct error error = {0};
+    struct address peer = parsed("tcp:10.0.0.7:2");
+    assert_false(auth_identify(&identity, -1, &peer, false, &error));
+    assert_int_equal(error.kind, ERROR_DENIED);
+    assert_true(auth_identify(&identity, -1, &peer, true, &error));
+    assert_false(identity.known);
+}
+
+TEST(a_key_tells_who_it_is)
+{
+    const struct auth_keys keys = {
+        .keys = {{.bytes = "one"}, {.bytes = "two"}}, .read_only = {false, true}, .count = 2};
+    uint64_t numbers[2];
+    for (size_t i = 0; i < 2; i++) {
+        struct auth_identity identity = {.name = "tcp:10.0.0.7:40312"};
+        auth_identify_by_key(&identity, &keys, i);
+        assert_true(identity.known && identity.has_key && !identity.has_user);
+        assert_int_equal(identity.read_only, i == 1);
+        assert_string_equal(identity.name,
+                            i == 0 ? "key, tcp:10.0.0.7:40312" : "reader's key, tcp:10.0.0.7:40312");
+        numbers[i] = identity.key;
+    }
+    assert_int_not_equal(numbers[0], numbers[1]);
+}
+
+TEST(networks_are_what_one_holder_has)
+{
+    static const struct {
+        const char *a, *b;
+        bool same;
+    } cases[] = {
+        {"tcp:10.0.0.7:1", "tcp:10.0.0.7:2", true},
+        {"tcp:10.0.0.7:1", "tcp:10.0.0.8:1", false},
+        {"tcp:10.0.0.7:1", "tcp:[::ffff:10.0.0.7]:1", true},
+        {"tcp:[2001:db8:1:2::7]:1", "tcp:[2001:db8:1:2:3:4:5:6]:1", true},
+        {"tcp:[2001:db8:1:2::7]:1", "tcp:[2001:db8:1:3::7]:1", false},
+        {"tcp:10.0.0.7:1", "unix:/a", false},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct address a = parsed(cases[i].a), b = parsed(cases[i].b);
+        if ((address_network(&a) == address_network(&b)) != cases[i].same)
+            fail_msg("%s and %s", cases[i].a, cases[i].b);
+    }
+}
+
+/* ---- wrong keys ---------------------------------------------------------------------------------------- */
+
+#define SECOND_NS UINT64_C(1000000000)
+
+TEST(so_many_wrong_keys_a_minute_are_heard_and_no_more)
+{
+    static struct attempts attempts;
+    memset(&attempts, 0, sizeof attempts);
+    for (uint64_t second = 1; second <= 5; second++) {
+        assert_true(attempts_are_allowed(&attempts, 77, 5, second * SECOND_NS));
+        attempts_add_failed(&attempts, 77, second * SECOND_NS);
+    }
+    assert_false(attempts_are_allowed(&attempts, 77, 5, 6 * SECOND_NS));
+    assert_true(attempts_are_allowed(&attempts, 78, 5, 6 * SECOND_NS));
+    assert_false(attempts_are_allowed(&attempts, 77, 5, 61 * SECOND_NS - 1));
+    /* The first is a minute ago, and makes room for one. */
+    assert_true(attempts_are_allowed(&attempts, 77, 5, 61 * SECOND_NS));
+    attempts_add_failed(&attempts, 77, 61 * SECOND_NS);
+    assert_false(attempts_are_allowed(&attempts, 77, 5, 61 * SECOND_NS));
+    assert_true(attempts_are_allowed(&attempts, 77, 5, 1000 * SECOND_NS));
+}
+
+TEST(of_too_many_networks_the_quietest_is_forgotten)
+{
+    static struct attempts attempts;
+    memset(&attempts, 0, sizeof attempts);
+    for (uint64_t network = 1; network <= ATTEMPTS_NETWORKS; network++)
+        attempts_add_failed(&attempts, network, network);
+    attempts_add_failed(&attempts, 1, 1000); /* 2 is now the one that failed the longest ago */
+    attempts_add_failed(&attempts, 9999, 1001);
+    assert_true(attempts_are_allowed(&attempts, 2, 1, 1002));
+    assert_false(attempts_are_allowed(&attempts, 9999, 1, 1002));
+    assert_false(attempts_are_allowed(&attempts, 1, 1, 1002));
+    assert_false(attempts_are_allowed(&attempts, 3, 1, 1002));
+}

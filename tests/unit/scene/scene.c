@@ -1,0 +1,483 @@
+/* SPDX-License-Identifier: MIT */
+/* Transactions: what they refuse, that they then change nothing, and what they note about a change. */
+#include "tests/unit/scene/drafts.h"
+
+#include "base/clock.h"
+#include "tests/harness/test.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- order and references ----------------------------------------------------------------------- */
+
+TEST(an_edit_may_refer_to_what_a_later_one_makes)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_node(&list, 3, 2);
+    add_shown(&list, 2, NODE_MESH, 7);
+    add_range(add_mesh(&list, 7), 0, 2, 5);
+    add_set(&list, SCENE_MATERIAL, 5)->set.material.textures[MATERIAL_BASE_COLOUR].texture = 9;
+    struct scene_texture *texture = &add_set(&list, SCENE_TEXTURE, 9)->set.texture;
+    texture->width = texture->height = 1;
+    texture->texels = make_blob("\1\2\3\4", 4);
+    expect_commit(scene, &list);
+    assert_int_equal(scene_node(scene, 3)->parent, 2);
+    assert_int_equal(scene_node(scene, 2)->child_count, 1);
+    assert_int_equal(scene_mesh(scene, 7)->ranges[0].material, 5);
+    assert_int_equal(scene_mesh(scene, 7)->base.revision, 1);
+    assert_non_null(scene_texture(scene, 9)->texels);
+    assert_true(scene->host_bytes > sizeof square + sizeof square_indices);
+    scene_destroy(scene);
+}
+
+TEST(the_last_edit_of_an_object_counts)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_mesh(&list, 1);
+    add_mesh(&list, 1);
+    add_mesh(&list, 2);
+    add_remove(&list, SCENE_MESH, 2);
+    expect_commit(scene, &list);
+    assert_int_equal(scene->objects[SCENE_MESH].count, 1);
+    uint64_t one_mesh = scene->host_bytes;
+    add_remove(&list, SCENE_MESH, 1);
+    add_mesh(&list, 1);
+    expect_commit(scene, &list);
+    assert_int_equal(scene->objects[SCENE_MESH].count, 1);
+    assert_int_equal(scene_mesh(scene, 1)->base.revision, 2);
+    assert_int_equal(scene->host_bytes, one_mesh);
+    add_remove(&list, SCENE_MESH, 1);
+    expect_commit(scene, &list);
+    assert_int_equal(scene->host_bytes, 0);
+    scene_destroy(scene);
+}
+
+TEST(references_to_nothing_are_refused_and_named)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_shown(&list, 1, NODE_MESH, 4);
+    expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (node 1).object");
+    add_shown(&list, 1, NODE_LIGHT, 0);
+    expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (node 1).object");
+    add_mesh(&list, 4);
+    add_shown(&list, 1, NODE_SPHERES, 4); /* the right number, the wrong kind */
+    expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[1] (node 1).object");
+    add_shown(&list, 1, NODE_GROUP, 4);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).object");
+    struct scene_mesh *mesh = add_mesh(&list, 3);
+    add_range(mesh, 0, 1, 0);
+    add_range(mesh, 1, 1, 8);
+    expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (mesh 3).ranges[1].material");
+    add_set(&list, SCENE_MATERIAL, 6)->set.material.textures[MATERIAL_NORMAL].texture = 2;
+    expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (material 6).textures[1].texture");
+    struct scene_disc *disc = &add_set(&list, SCENE_DISC, 1)->set.disc;
+    disc->material = 5;
+    disc->normal_world[1] = disc->radius = 1;
+    expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (disc 1).material");
+    add_node(&list, 0, 0);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 0)");
+    scene_destroy(scene);
+}
+
+TEST(what_is_in_use_is_not_removed)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_shown(&list, 1, NODE_MESH, 7);
+    add_range(add_mesh(&list, 7), 0, 2, 5);
+    add_set(&list, SCENE_MATERIAL, 5)->set.material.textures[MATERIAL_BUMP].texture = 9;
+    struct scene_texture *texture = &add_set(&list, SCENE_TEXTURE, 9)->set.texture;
+    texture->width = texture->height = 1;
+    texture->texels = make_blob("\1\2\3\4", 4);
+    expect_commit(scene, &list);
+    add_remove(&list, SCENE_MESH, 7);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7)");
+    add_remove(&list, SCENE_MATERIAL, 5);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (material 5)");
+    add_remove(&list, SCENE_TEXTURE, 9);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (texture 9)");
+    add_remove(&list, SCENE_LIGHT, 1);
+    expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (light 1)");
+    /* Everything together goes, in any order. */
+    add_remove(&list, SCENE_TEXTURE, 9);
+    add_remove(&list, SCENE_MESH, 7);
+    add_remove(&list, SCENE_NODE, 1);
+    add_remove(&list, SCENE_MATERIAL, 5);
+    expect_commit(scene, &list);
+    assert_int_equal(scene->host_bytes, 0);
+    scene_destroy(scene);
+}
+
+TEST(a_refused_transaction_leaves_its_blobs_with_the_edits)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    struct blob *positions = blob_ref(add_mesh(&list, 1)->arrays[MESH_POSITIONS]);
+    add_shown(&list, 1, NODE_CAMERA, 1);
+    struct error error = {0};
+    assert_false(scene_commit(scene, list.edits, list.count, &error));
+    assert_int_equal(atomic_load(&positions->references), 2);
+    finish(&list);
+    assert_int_equal(atomic_load(&positions->references), 1);
+    blob_unref(positions);
+    scene_destroy(scene);
+}
+
+/* ---- contents ----------------------------------------------------------------------------------- */
+
+TEST(arrays_must_fit_their_counts)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_mesh(&list, 1)->vertex_count = 5;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[0] (positions)");
+    add_mesh(&list, 1)->triangle_count = 1;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[1] (indices)");
+    add_mesh(&list, 1)->triangle_count = 0x55555556; /* 3 of it wrap to 2 in 32 bits */
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[1] (indices)");
+    struct scene_mesh *mesh = add_mesh(&list, 1);
+    blob_unref(mesh->arrays[MESH_INDICES]);
+    mesh->arrays[MESH_INDICES] = NULL;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[1] (indices)");
+    add_mesh(&list, 1)->arrays[MESH_COLOURS] = make_blob(square, 15);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[6] (colours)");
+    add_mesh(&list, 1)->arrays[MESH_TANGENTS] = make_blob(square, 48);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[3] (tangents)");
+    add_mesh(&list, 1)->vertex_count = 0;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).vertex_count");
+    add_spheres(&list, 2, square, 3)->sphere_count = 2;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (spheres 2).arrays[0] (centres and radii)");
+    struct scene_texture *texture = &add_set(&list, SCENE_TEXTURE, 9)->set.texture;
+    texture->width = texture->height = 65536; /* wraps to 0 in 32 bits */
+    texture->texels = make_blob(square, 4);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (texture 9).arrays[0] (texels)");
+    scene_destroy(scene);
+}
+
+TEST(numbers_that_are_no_place_are_refused)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    const float bad[] = {NAN, INFINITY, -INFINITY, 2e18f, -2e18f};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        for (size_t place = 0; place < 12; place += 11) {
+            float *positions = (float *)(void *)add_mesh(&list, 1)->arrays[MESH_POSITIONS]->data;
+            positions[place] = bad[i];
+            expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[0] (positions)");
+        }
+    }
+    float normals[12] = {0, 0, 1, 0, 0, 1, 0, NAN, 1, 0, 0, 1};
+    add_mesh(&list, 1)->arrays[MESH_NORMALS] = make_blob(normals, sizeof normals);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[2] (normals)");
+    float texcoords[8] = {0, 0, 1, 0, 0, 1, 0, INFINITY};
+    add_mesh(&list, 1)->arrays[MESH_TEXCOORDS_1] = make_blob(texcoords, sizeof texcoords);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[5] (texture coordinates 1)");
+    const float radii[][4] = {{0, 0, 0, 0}, {0, 0, 0, -1}, {0, 0, 0, NAN}, {0, INFINITY, 0, 1}};
+    for (int i = 0; i < 4; i++) {
+        float spheres[8] = {0, 0, 0, 1};
+        memcpy(spheres + 4, radii[i], 16);
+        add_spheres(&list, 2, spheres, 2);
+        expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (spheres 2).arrays[0] (centres and radii)");
+    }
+    struct scene_environment *environment;
+    list.edits[0] = (struct scene_edit){.kind = EDIT_SET_ENVIRONMENT};
+    list.count = 1;
+    environment = &list.edits[0].set.environment;
+    environment->width = 2;
+    environment->height = 1;
+    environment->texels = make_blob((const uint16_t[]){0, 0, 0, 0, 0, 0x7c00, 0, 0}, 16);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (environment).arrays[0] (texels)");
+    scene_destroy(scene);
+}
+
+TEST(indices_beyond_the_vertices_are_refused_wherever_they_stand)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    for (size_t place = 0; place < 6; place++) {
+        uint32_t *indices = (uint32_t *)(void *)add_mesh(&list, 1)->arrays[MESH_INDICES]->data;
+        indices[place] = place % 2 ? 4 : UINT32_MAX;
+        expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).arrays[1] (indices)");
+    }
+    scene_destroy(scene);
+}
+
+TEST(ranges_ascend_without_overlap_and_within_bounds)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    struct scene_mesh *mesh = add_mesh(&list, 1);
+    add_range(mesh, 0, 2, 0);
+    add_range(mesh, 1, 1, 0);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).ranges[1].first");
+    mesh = add_mesh(&list, 1);
+    add_range(mesh, 1, 1, 0);
+    add_range(mesh, 0, 1, 0);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).ranges[1].first");
+    add_range(add_mesh(&list, 1), 1, 2, 0);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).ranges[0].count");
+    add_range(add_mesh(&list, 1), 1, UINT32_MAX, 0); /* the end wraps to 0 */
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).ranges[0].count");
+    mesh = add_mesh(&list, 1);
+    add_range(mesh, 0, 1, 0);
+    add_range(mesh, 1, 1, 0);
+    expect_commit(scene, &list);
+    scene_destroy(scene);
+}
+
+TEST(lights_cameras_and_discs_make_sense)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    struct scene_light *light = &add_set(&list, SCENE_LIGHT, 1)->set.light;
+    light->kind = LIGHT_SPOT;
+    light->inner_cone = 0.5f;
+    light->outer_cone = 0.4f;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (light 1).outer_cone");
+    add_set(&list, SCENE_LIGHT, 1)->set.light.kind = LIGHT_RECTANGLE;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (light 1).size");
+    add_set(&list, SCENE_CAMERA, 2);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (camera 2).height");
+    struct scene_disc *disc = &add_set(&list, SCENE_DISC, 3)->set.disc;
+    disc->normal_world[0] = 0.99f;
+    disc->radius = 1;
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (disc 3).normal_world");
+    scene_destroy(scene);
+}
+
+TEST(bounds_are_those_of_the_vertices_in_use)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    struct scene_mesh *mesh = add_mesh(&list, 1);
+    ((float *)(void *)mesh->arrays[MESH_POSITIONS]->data)[9] = -50; /* vertex 3 */
+    uint32_t *indices = (uint32_t *)(void *)mesh->arrays[MESH_INDICES]->data;
+    indices[5] = 1;
+    const float spheres[8] = {1, 2, 3, 0.5f, -4, 0, 0, 2};
+    add_spheres(&list, 1, spheres, 2);
+    expect_commit(scene, &list);
+    assert_memory_equal(scene_mesh(scene, 1)->lower, ((float[]){0, 0, 0}), 12);
+    assert_memory_equal(scene_mesh(scene, 1)->upper, ((float[]){1, 1, 0}), 12);
+    assert_memory_equal(scene_spheres(scene, 1)->lower, ((float[]){-6, -2, -2}), 12);
+    assert_memory_equal(scene_spheres(scene, 1)->upper, ((float[]){1.5f, 2.5f, 3.5f}), 12);
+    scene_destroy(scene);
+}
+
+/* ---- hierarchy ---------------------------------------------------------------------------------- */
+
+TEST(parents_exist_and_circles_do_not)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_node(&list, 1, 2);
+    expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (node 1).parent");
+    add_node(&list, 1, 1);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).parent");
+    add_node(&list, 1, 3);
+    add_node(&list, 2, 1);
+    add_node(&list, 3, 2);
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).parent");
+    add_node(&list, 1, 0);
+    add_node(&list, 2, 1);
+    add_node(&list, 3, 2);
+    expect_commit(scene, &list);
+    add_node(&list, 1, 3); /* the circle closes through nodes of an earlier transaction */
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).parent");
+    assert_int_equal(scene_node(scene, 1)->parent, 0);
+    scene_destroy(scene);
+}
+
+/* A chain of `length` nodes from the root, ids from `first`. */
+static void commit_chain(struct scene *scene, uint32_t first, uint32_t length)
+{
+    for (uint32_t i = 0; i < length; i++) {
+        struct draft_list list = {0};
+        add_node(&list, first + i, i ? first + i - 1 : 0);
+        expect_commit(scene, &list);
+    }
+}
+
+TEST(the_hierarchy_has_a_greatest_depth)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    commit_chain(scene, 1, SCENE_DEPTH_MAX);
+    add_node(&list, 1000, SCENE_DEPTH_MAX);
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 1000).parent");
+    /* A subtree that is moved down takes its depth along, though its lower nodes are not edited. */
+    add_node(&list, 2000, 0);
+    expect_commit(scene, &list);
+    add_node(&list, 1, 2000);
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 1).parent");
+    float world[12];
+    assert_true(scene_world_from_node(scene, NULL, SCENE_DEPTH_MAX, world));
+    scene_destroy(scene);
+}
+
+TEST(a_removed_node_takes_along_what_hangs_below_it)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_node(&list, 1, 0);
+    add_node(&list, 2, 1);
+    add_node(&list, 3, 2);
+    add_shown(&list, 4, NODE_MESH, 1)->parent = 3;
+    add_node(&list, 5, 1);
+    add_mesh(&list, 1);
+    expect_commit(scene, &list);
+    /* A new child of what goes is refused, a moved one stays. */
+    add_remove(&list, SCENE_NODE, 2);
+    add_node(&list, 6, 3);
+    expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[1] (node 6).parent");
+    add_remove(&list, SCENE_NODE, 2);
+    add_node(&list, 6, 2);
+    expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[1] (node 6).parent");
+    add_remove(&list, SCENE_NODE, 2);
+    add_remove(&list, SCENE_MESH, 1); /* its only user falls with node 2 */
+    expect_commit(scene, &list);
+    assert_int_equal(scene->objects[SCENE_NODE].count, 2);
+    assert_null(scene_node(scene, 4));
+    assert_int_equal(scene_node(scene, 1)->child_count, 1);
+    add_node(&list, 5, 0);
+    add_remove(&list, SCENE_NODE, 1);
+    expect_commit(scene, &list);
+    assert_int_equal(scene->objects[SCENE_NODE].count, 1);
+    assert_non_null(scene_node(scene, 5));
+    scene_destroy(scene);
+}
+
+/* ---- limits and revisions ----------------------------------------------------------------------- */
+
+TEST(limits_are_kept_and_told)
+{
+    struct scene *scene = scene_create("small", &(struct scene_limits){.host_bytes = 1500, .nodes = 2});
+    struct draft_list list = {0};
+    add_node(&list, 1, 0);
+    add_node(&list, 2, 0);
+    expect_commit(scene, &list);
+    add_node(&list, 3, 0);
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits");
+    add_node(&list, 3, 0);
+    add_remove(&list, SCENE_NODE, 1);
+    expect_commit(scene, &list);
+    const float spheres[4 * 60] = {[3] = 1};
+    float numbers[4 * 60];
+    memcpy(numbers, spheres, sizeof numbers);
+    for (int i = 0; i < 60; i++)
+        numbers[4 * i + 3] = 1;
+    add_spheres(&list, 1, numbers, 60);
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits");
+    scene_destroy(scene);
+}
+
+TEST(the_depth_may_be_limited_further)
+{
+    struct scene *scene = scene_create("flat", &(struct scene_limits){.depth = 3});
+    struct draft_list list = {0};
+    commit_chain(scene, 1, 3);
+    add_node(&list, 4, 3);
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 4).parent");
+    add_node(&list, 1, 3); /* a circle is one, and not too deep, however little is allowed */
+    expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1).parent");
+    add_node(&list, 4, 2);
+    expect_commit(scene, &list);
+    scene_destroy(scene);
+    scene =
+        scene_create("deep", &(struct scene_limits){.depth = SCENE_DEPTH_MAX + 1}); /* more than there can be */
+    commit_chain(scene, 1, SCENE_DEPTH_MAX);
+    add_node(&list, 1000, SCENE_DEPTH_MAX);
+    expect_refusal(scene, &list, ERROR_LIMIT, "edits[0] (node 1000).parent");
+    scene_destroy(scene);
+}
+
+struct revisions {
+    uint64_t geometry, instances, shading, lights;
+};
+
+static void expect_touched(const struct scene *scene, struct revisions expected)
+{
+    uint64_t r = scene->revision;
+    struct revisions got = {scene->geometry_revision == r, scene->instances_revision == r,
+                            scene->shading_revision == r, scene->lights_revision == r};
+    if (memcmp(&got, &expected, sizeof got))
+        fail_msg("geometry %d, instances %d, shading %d, lights %d; expected %d %d %d %d", (int)got.geometry,
+                 (int)got.instances, (int)got.shading, (int)got.lights, (int)expected.geometry,
+                 (int)expected.instances, (int)expected.shading, (int)expected.lights);
+}
+
+TEST(revisions_tell_what_a_transaction_touched)
+{
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    add_mesh(&list, 1);
+    add_set(&list, SCENE_LIGHT, 1);
+    add_set(&list, SCENE_CAMERA, 1)->set.camera.fov_y = 1;
+    add_set(&list, SCENE_MATERIAL, 1);
+    add_shown(&list, 1, NODE_MESH, 1);
+    add_shown(&list, 2, NODE_LIGHT, 1);
+    add_shown(&list, 3, NODE_CAMERA, 1);
+    add_node(&list, 4, 0);
+    add_shown(&list, 5, NODE_MESH, 1)->parent = 4;
+    expect_commit(scene, &list);
+    expect_touched(scene, (struct revisions){1, 1, 1, 1});
+    add_mesh(&list, 1);
+    expect_commit(scene, &list);
+    expect_touched(scene, (struct revisions){.geometry = 1});
+    add_shown(&list, 1, NODE_MESH, 1)->hidden = true;
+    expect_commit(scene, &list);
+    expect_touched(scene, (struct revisions){.instances = 1});
+    add_shown(&list, 2, NODE_LIGHT, 1);
+    expect_commit(scene, &list);
+    expect_touched(scene, (struct revisions){.lights = 1});
+    add_shown(&list, 3, NODE_CAMERA, 1);
+    expect_commit(scene, &list);
+    expect_touched(scene, (struct revisions){0});
+    add_node(&list, 4, 0); /* others hang below it */
+    expect_commit(scene, &list);
+    expect_touched(scene, (struct revisions){.instances = 1, .lights = 1});
+    add_set(&list, SCENE_MATERIAL, 1);
+    expect_commit(scene, &list);
+    expect_touched(scene, (struct revisions){.shading = 1});
+    list.edits[0] = (struct scene_edit){.kind = EDIT_SET_ENVIRONMENT};
+    list.count = 1;
+    expect_commit(scene, &list);
+    expect_touched(scene, (struct revisions){.lights = 1});
+    assert_int_equal(scene->environment.revision, scene->revision);
+    add_remove(&list, SCENE_NODE, 1);
+    expect_commit(scene, &list);
+    expect_touched(scene, (struct revisions){.instances = 1});
+    scene_destroy(scene);
+}
+
+/* The size of the largest model that is at hand; its time is printed, as it is spent on the thread that owns GL.
+ */
+TEST(a_mesh_of_871_thousand_triangles_is_checked)
+{
+    const uint32_t triangles = 871414, vertices = 437645;
+    struct scene *scene = new_scene();
+    struct draft_list list = {0};
+    struct scene_mesh *mesh = &add_set(&list, SCENE_MESH, 1)->set.mesh;
+    mesh->vertex_count = vertices;
+    mesh->triangle_count = triangles;
+    mesh->arrays[MESH_POSITIONS] = blob_create(vertices * 12ul);
+    mesh->arrays[MESH_NORMALS] = blob_create(vertices * 12ul);
+    mesh->arrays[MESH_INDICES] = blob_create(triangles * 12ul);
+    float *positions = (float *)(void *)mesh->arrays[MESH_POSITIONS]->data;
+    float *normals = (float *)(void *)mesh->arrays[MESH_NORMALS]->data;
+    uint32_t *indices = (uint32_t *)(void *)mesh->arrays[MESH_INDICES]->data;
+    for (uint32_t i = 0; i < vertices * 3; i++)
+        positions[i] = normals[i] = (float)(i % 1000) - 500.0f;
+    for (uint32_t i = 0; i < triangles * 3; i++)
+        indices[i] = (i / 6 + i % 3 * 7) % vertices;
+    uint64_t start_ns = clock_now_ns();
+    expect_commit(scene, &list);
+    print_message("%u triangles: %.2f ms\n", triangles, (double)(clock_now_ns() - start_ns) / 1e6);
+    assert_true(scene_mesh(scene, 1)->lower[0] == -500.0f);
+    assert_true(scene_mesh(scene, 1)->upper[2] == 499.0f);
+    scene_destroy(scene);
+}

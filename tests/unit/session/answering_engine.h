@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: MIT */
+/* An engine for the tests of sessions, which answers what it is told to, and what such a test does more than once.
+ */
+#ifndef FARLIGHT_TESTS_ANSWERING_ENGINE_H
+#define FARLIGHT_TESTS_ANSWERING_ENGINE_H
+
+#include "tests/unit/session/session_fixture.h"
+
+#include "base/clock.h"
+#include "base/queue.h"
+
+#define FRAME_BYTES ((size_t)700001) /* three pieces, the last of odd size */
+
+/* ---- an engine --------------------------------------------------------------------------------------- */
+
+static struct {
+    struct queue *events;
+    pthread_mutex_t mutex;
+    atomic_bool full;      /* takes no commands */
+    atomic_bool keep_jobs; /* jobs render nothing until they are cancelled */
+    atomic_bool keep_commits;
+    struct engine_command *_Atomic kept_commit; /* has no answer until release_commit() */
+    uint32_t job_request, next_frame, last_frame;
+    struct engine_job job; /* the last one, but for what it owns */
+    struct clip_use job_clips[16];
+    struct tracer_cube cubes[TRACER_CUBES_MAX]; /* of the frames that it renders */
+    uint64_t credit_seen, commits;
+    atomic_uint edits, gone, frames_sent;
+} engine;
+
+static inline void event(enum engine_event_kind kind, const struct engine_command *command, uint32_t request)
+{
+    struct engine_event *made = calloc(1, sizeof *made);
+    made->kind = kind;
+    made->client = command->client;
+    made->request = request;
+    made->revision = engine.commits;
+    if (kind == ENGINE_FAILED)
+        error_set(&made->error, ERROR_CANCELLED, NULL, "cancelled");
+    if (kind == ENGINE_STATS_READY) {
+        made->stats = calloc(1, sizeof *made->stats);
+        strcpy(made->stats->device.name, "none");
+    }
+    queue_push(engine.events, made);
+}
+
+static inline void render(const struct engine_command *command)
+{
+    for (; engine.next_frame <= engine.last_frame && engine.next_frame < engine.credit_seen; engine.next_frame++) {
+        struct engine_event *made = calloc(1, sizeof *made);
+        made->kind = ENGINE_FRAME;
+        made->client = command->client;
+        made->request = engine.job_request;
+        made->frame = calloc(1, sizeof *made->frame);
+        struct engine_frame *frame = made->frame;
+        frame->frame = engine.next_frame;
+        frame->request.width = frame->request.height = frame->request.samples = 1;
+        frame->request.tracer = engine.job.frame.tracer;
+        frame->request.aperture = engine.job.frame.aperture;
+        frame->request.focus = engine.job.frame.focus;
+        frame->shutter_s = engine.job.shutter / 8;
+        frame->result.layers = engine.job.frame.layers ? engine.job.frame.layers : 1;
+        frame->result.samples = 5; /* with those of frames before */
+        memcpy(frame->result.cubes, engine.cubes, sizeof engine.cubes);
+        frame->size_bytes = FRAME_BYTES;
+        frame->bytes = malloc(FRAME_BYTES);
+        for (size_t i = 0; i < FRAME_BYTES; i++)
+            frame->bytes[i] = (uint8_t)(i * 31 + engine.next_frame);
+        frame->encoded_ns = clock_now_ns();
+        stage_times_begin(&frame->result.times);
+        queue_push(engine.events, made);
+    }
+    if (engine.next_frame > engine.last_frame)
+        event(ENGINE_DONE, command, engine.job_request);
+}
+
+static inline bool submit(void *context, struct engine_command *command, struct error *error)
+{
+    (void)context;
+    if (atomic_load(&engine.full))
+        return error_set(error, ERROR_BUSY, NULL, "full");
+    switch (command->kind) {
+    case ENGINE_COMMIT:
+        if (atomic_load(&engine.keep_commits)) {
+            atomic_store(&engine.kept_commit, command);
+            return true;
+        }
+        engine.commits++;
+        atomic_fetch_add(&engine.edits, (unsigned)command->edit_count);
+        event(ENGINE_DONE, command, command->request);
+        break;
+    case ENGINE_SCENE_OPEN:
+    case ENGINE_SCENE_ATTACH:
+    case ENGINE_SCENE_CLOSE:
+    case ENGINE_SCENE_LIST:
+    case ENGINE_SCENE_DESCRIBE:
+    case ENGINE_SCENES_TRIM:
+        event(ENGINE_DONE, command, command->request);
+        break;
+    case ENGINE_JOB_START:
+        engine.job_request = command->request;
+        engine.next_frame = command->job.first_frame;
+        engine.last_frame = command->job.last_frame;
+        engine.credit_seen = command->job.credit;
+        engine.job = command->job;
+        for (uint32_t i = 0; i < command->job.clip_count; i++)
+            engine.job_clips[i] = command->job.clips[i];
+        if (!atomic_load(&engine.keep_jobs))
+            render(command);
+        break;
+    case ENGINE_JOB_CREDIT:
+        engine.credit_seen = command->credit;
+        if (!atomic_load(&engine.keep_jobs))
+            render(command);
+        break;
+    case ENGINE_JOB_CANCEL:
+        event(ENGINE_FAILED, command, command->target_request);
+        event(ENGINE_DONE, command, command->request);
+        break;
+    case ENGINE_VIEW_LOOK:
+    case ENGINE_LIMITS:
+        break;
+    case ENGINE_STATS:
+        event(ENGINE_STATS_READY, command, command->request);
+        break;
+    case ENGINE_CLIENT_GONE:
+        atomic_fetch_add(&engine.gone, 1);
+        event(ENGINE_CLIENT_FORGOTTEN, command, 0);
+        break;
+    }
+    engine_command_destroy(command);
+    return true;
+}
+
+static inline void release_commit(void)
+{
+    struct engine_command *command;
+    while (!(command = atomic_exchange(&engine.kept_commit, NULL)))
+        usleep(1000);
+    event(ENGINE_DONE, command, command->request);
+    engine_command_destroy(command);
+}
+
+static inline int event_fd(void *context)
+{
+    (void)context;
+    return queue_event_fd(engine.events);
+}
+
+static inline struct engine_event *next_event(void *context)
+{
+    (void)context;
+    return queue_try_pop(engine.events);
+}
+
+static inline void report_sent(void *context, uint64_t queue_ns, uint64_t send_ns)
+{
+    (void)context, (void)queue_ns, (void)send_ns;
+    atomic_fetch_add(&engine.frames_sent, 1);
+}
+
+static inline void drop_event(void *item)
+{
+    engine_event_destroy(item);
+}
+
+static inline struct engine_port engine_begin(void)
+{
+    memset(&engine, 0, sizeof engine);
+    engine.events = queue_create(4096, true);
+    return (struct engine_port){
+        .submit = submit, .event_fd = event_fd, .next_event = next_event, .report_sent = report_sent};
+}
+
+static inline void engine_end(void)
+{
+    queue_destroy(engine.events, drop_event);
+}
+
+/* ---- steps ------------------------------------------------------------------------------------------- */
+
+static inline void begin_edit(uint32_t request, uint32_t scene)
+{
+    struct message message = made(MESSAGE_EDIT_BEGIN);
+    message.edit_begin.scene = scene;
+    send_message(request, 0, &message);
+}
+
+static inline void send_node(uint32_t request, uint32_t node)
+{
+    struct message message = made(MESSAGE_SET_NODE);
+    message.set_node.node = node;
+    send_message(request, 0, &message);
+}
+
+static inline void commit(uint32_t request)
+{
+    struct message message = made(MESSAGE_EDIT_COMMIT);
+    send_message(request, 0, &message);
+}
+
+static inline struct message render_message(uint32_t last_frame, uint32_t credit)
+{
+    struct message message = made(MESSAGE_RENDER);
+    message.render.scene = 1;
+    message.render.channel = 2;
+    message.render.credit = credit;
+    message.render.last_frame = last_frame;
+    return message;
+}
+
+#endif

@@ -1,0 +1,443 @@
+/* SPDX-License-Identifier: MIT */
+/* Batch jobs of a session, over a socketpair: their settings on the way to the engine, their frames on the way
+ * back. */
+#include "tests/unit/session/answering_engine.h"
+
+#include "session/frames.h"
+#include "session/session.h"
+#include "tests/harness/test.h"
+
+#include <math.h>
+
+static void expect_frame(uint32_t request, uint32_t number)
+{
+    expect(MESSAGE_FRAME_BEGIN, request);
+    assert_int_equal(client.message.frame_begin.frame, number);
+    assert_int_equal(client.message.frame_begin.size_bytes, FRAME_BYTES);
+    for (size_t offset = 0; offset < FRAME_BYTES; offset += client.message.frame_data.data_bytes) {
+        expect(MESSAGE_FRAME_DATA, request);
+        const struct message_frame_data *data = &client.message.frame_data;
+        assert_int_equal(client.header.channel, 2);
+        assert_int_equal(data->offset_bytes, offset);
+        for (size_t i = 0; i < data->data_bytes; i++) {
+            if (data->data[i] != (uint8_t)((offset + i) * 31 + number))
+                fail_msg("byte %zu of frame %u is %u", offset + i, number, data->data[i]);
+        }
+    }
+    expect(MESSAGE_FRAME_END, request);
+    assert_int_equal(client.message.frame_end.frame, number);
+    bool queue = false, sent = false;
+    for (uint32_t i = 0; i < client.message.frame_end.stages_count; i++) {
+        queue = queue || client.message.frame_end.stages[i].stage == PROTOCOL_STAGE_QUEUE;
+        sent = sent || client.message.frame_end.stages[i].stage == PROTOCOL_STAGE_SEND;
+    }
+    assert_true(queue && sent);
+}
+
+SESSION_TEST(frames_come_whole_in_order_and_as_far_as_credit_goes)
+{
+    open_scene(1, 1);
+    struct message message = render_message(6, 2);
+    send_message(2, 0, &message);
+    expect_frame(2, 0);
+    expect_frame(2, 1);
+    expect_alive(3); /* and no third one */
+    message = made(MESSAGE_CREDIT);
+    message.credit.channel = 2;
+    message.credit.total = 100;
+    send_message(0, 2, &message);
+    for (uint32_t frame = 2; frame <= 6; frame++)
+        expect_frame(2, frame);
+    expect(MESSAGE_OK, 2);
+    assert_int_equal(atomic_load(&engine.frames_sent), 7);
+}
+
+SESSION_TEST(a_cancelled_job_has_one_answer_and_nothing_follows_it)
+{
+    open_scene(1, 1);
+    atomic_store(&engine.keep_jobs, true);
+    struct message message = render_message(5, 10);
+    send_message(2, 0, &message);
+    message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 2;
+    send_message(3, 0, &message);
+    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect(MESSAGE_OK, 3);
+    send_message(4, 0, &message); /* it is gone already */
+    expect(MESSAGE_OK, 4);
+    expect_alive(5);
+}
+
+/* Cancelled in the middle of its frames: pieces may be in the socket, nothing comes after the answer. */
+SESSION_TEST(a_job_whose_credit_is_used_up_is_told_so_once)
+{
+    open_scene(1, 1);
+    struct message message = render_message(2, 2);
+    send_message(2, 0, &message);
+    expect_frame(2, 0);
+    expect_frame(2, 1);
+    for (unsigned i = 0; !client.blocked && i < 200; i++) {
+        expect_alive(9);
+        usleep(10000);
+    }
+    assert_string_equal(client.blocked_text, "the credit is used up");
+    usleep(250000);
+    expect_alive(9);
+    assert_int_equal(client.blocked, 1);
+    message = made(MESSAGE_CREDIT);
+    message.credit.channel = 2;
+    message.credit.total = 3;
+    send_message(0, 0, &message);
+    expect_frame(2, 2);
+    expect(MESSAGE_OK, 2);
+}
+
+SESSION_TEST(a_job_cancelled_while_it_sends_ends_at_its_answer)
+{
+    open_scene(1, 1);
+    struct message message = render_message(50, 51);
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 2;
+    send_message(3, 0, &message);
+    bool answered = false;
+    for (;;) {
+        const struct message *got = receive();
+        if (got->type == MESSAGE_OK)
+            break;
+        assert_int_equal(client.header.request, 2);
+        assert_false(answered);
+        answered = got->type == MESSAGE_ERROR;
+    }
+    assert_true(answered);
+    assert_int_equal(client.header.request, 3);
+    expect_alive(4);
+}
+
+SESSION_TEST(a_job_that_cannot_be_is_refused_by_its_field)
+{
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.scene = 3;
+    send_message(2, 0, &message);
+    expect_error(2, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    message = render_message(0, 1);
+    message.render.width = 1024;
+    send_message(3, 0, &message);
+    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    message = render_message(0, 1);
+    message.render.first_frame = 1;
+    send_message(4, 0, &message);
+    expect_error(4, PROTOCOL_ERROR_CODE_INVALID);
+    assert_string_equal(client.message.error.field, "render.last_frame");
+    message = render_message(0, 1);
+    message.render.encoding = PROTOCOL_ENCODING_JPEG;
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    send_message(5, 0, &message);
+    expect_error(5, PROTOCOL_ERROR_CODE_UNSUPPORTED);
+    message = render_message(0, 1);
+    message.render.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
+    send_message(6, 0, &message);
+    expect_error(6, PROTOCOL_ERROR_CODE_INVALID);
+}
+
+SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
+{
+    open_scene(1, 1);
+    struct record_clip_use clips[] = {{.clip = 4, .start_s = -2, .speed = 0.5f, .loop = 1},
+                                      {.clip = 5, .speed = 3}};
+    struct message message = render_message(0, 1);
+    message.render.clips = clips;
+    message.render.clips_count = 2;
+    message.render.aperture = 0.125f;
+    message.render.focus = 7;
+    message.render.shutter = 0.5f;
+    message.render.pixel_filter = PROTOCOL_PIXEL_FILTER_TENT;
+    message.render.bvh_rays_together = 3;
+    message.render.accumulate = 1;
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    const struct message_frame_begin *begin = &client.message.frame_begin;
+    assert_true(begin->aperture == 0.125f && begin->focus == 7.0f && begin->shutter_s == 0.0625f);
+    assert_int_equal(begin->samples, 5);
+    const struct engine_job *job = &engine.job;
+    assert_int_equal(job->clip_count, 2);
+    assert_true(engine.job_clips[0].clip == 4 && engine.job_clips[0].start_s == -2.0f);
+    assert_true(engine.job_clips[0].speed == 0.5f && engine.job_clips[0].loop);
+    assert_true(engine.job_clips[1].clip == 5 && engine.job_clips[1].speed == 3.0f && !engine.job_clips[1].loop);
+    assert_true(job->shutter == 0.5f && job->frame.filter == FILTER_TENT && job->frame.accumulate);
+    assert_int_equal(job->frame.tracer_options.bvh_rays_together, 3);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+    const uint32_t not_walked[] = {5, 6, 7};
+    for (uint32_t i = 0; i < 3; i++) {
+        message = render_message(0, 1);
+        message.render.bvh_rays_together = not_walked[i];
+        send_message(3 + i, 0, &message);
+        expect_error(3 + i, PROTOCOL_ERROR_CODE_INVALID);
+        assert_string_equal(client.message.error.field, "render.bvh_rays_together");
+    }
+}
+
+SESSION_TEST(settings_of_cubes_go_to_the_engine_with_the_daemons_limits)
+{
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.tracer = PROTOCOL_TRACER_LDC;
+    message.render.ldc_resolution = 16;
+    message.render.ldc_block = 32;
+    message.render.ldc_build = PROTOCOL_LDC_BUILD_LISTS;
+    message.render.ldc_levels = PROTOCOL_LDC_LEVELS_BLOCKS;
+    message.render.ldc_images = PROTOCOL_LDC_IMAGES_ONE;
+    message.render.ldc_tolerance = 0.25f;
+    message.render.ldc_rays_together = 4;
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    assert_int_equal(client.message.frame_begin.tracer, PROTOCOL_TRACER_LDC);
+    const struct tracer_options *options = &engine.job.frame.tracer_options;
+    assert_int_equal(options->ldc_resolution, 16);
+    assert_int_equal(options->ldc_block, 32);
+    assert_int_equal(options->ldc_build, LDC_BUILD_LISTS);
+    assert_int_equal(options->ldc_levels, LDC_LEVELS_BLOCKS);
+    assert_int_equal(options->ldc_images, LDC_IMAGES_ONE);
+    assert_true(options->ldc_tolerance == 0.25f);
+    assert_int_equal(options->ldc_rays_together, 4);
+    assert_int_equal(options->ldc_layers_max, 7);
+    assert_int_equal(options->ldc_mebibytes_max, 3);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+}
+
+SESSION_TEST(layers_go_to_the_engine_and_come_with_the_frame)
+{
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.encoding = PROTOCOL_ENCODING_ZSTD;
+    message.render.layers = 1u << PROTOCOL_LAYER_BEAUTY | 1u << PROTOCOL_LAYER_DEPTH;
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    assert_int_equal(engine.job.frame.layers, 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH);
+    assert_int_equal(client.message.frame_begin.layers, message.render.layers);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+    message = render_message(0, 1); /* the picture alone has any format, named or not */
+    message.render.layers = 1u << PROTOCOL_LAYER_BEAUTY;
+    message.render.encoding = PROTOCOL_ENCODING_JPEG;
+    send_message(3, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 3);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+}
+
+SESSION_TEST(layers_that_pixels_or_messages_do_not_hold_are_refused)
+{
+    static const struct {
+        uint32_t layers, edge_pixels;
+        enum protocol_pixel_format format;
+        enum protocol_encoding encoding;
+        enum protocol_error_code code;
+        const char *remedy;
+    } cases[] = {
+        {3, 16, PROTOCOL_PIXEL_FORMAT_RGBA8, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_CODE_UNSUPPORTED, "rgba32f"},
+        {2, 16, PROTOCOL_PIXEL_FORMAT_RGBA16F, PROTOCOL_ENCODING_ZSTD, PROTOCOL_ERROR_CODE_UNSUPPORTED, "rgba32f"},
+        {64, 16, PROTOCOL_PIXEL_FORMAT_RGBA8, PROTOCOL_ENCODING_JPEG, PROTOCOL_ERROR_CODE_UNSUPPORTED, "zstd"},
+        {2, 16, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_JPEG, PROTOCOL_ERROR_CODE_UNSUPPORTED, "zstd"},
+        /* 8192 x 8192 x 16 bytes are 1 GiB */
+        {15, 8192, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_CODE_LIMIT,
+         "fewer layers"},
+    };
+    open_scene(1, 1);
+    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct message message = render_message(0, 1);
+        message.render.width = message.render.height = cases[i].edge_pixels;
+        message.render.layers = cases[i].layers;
+        message.render.format = cases[i].format;
+        message.render.encoding = cases[i].encoding;
+        send_message(2 + i, 0, &message);
+        expect_error(2 + i, cases[i].code);
+        assert_string_equal(client.message.error.field, "render.layers");
+        assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
+    }
+}
+
+SESSION_TEST(settings_that_no_cube_has_are_refused_by_their_field)
+{
+    static const struct {
+        uint32_t resolution, block, rays;
+        const char *field, *remedy;
+    } cases[] = {
+        {1, 0, 0, "render.ldc_resolution", "16 to 4096"}, {15, 0, 0, "render.ldc_resolution", "16 to 4096"},
+        {0, 1, 0, "render.ldc_block", "16 or 32"},        {0, 24, 0, "render.ldc_block", "16 or 32"},
+        {0, 0, 2, "render.ldc_rays_together", ""},        {0, 0, 3, "render.ldc_rays_together", ""},
+    };
+    open_scene(1, 1);
+    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct message message = render_message(0, 1);
+        message.render.ldc_resolution = cases[i].resolution;
+        message.render.ldc_block = cases[i].block;
+        message.render.ldc_rays_together = cases[i].rays;
+        send_message(2 + i, 0, &message);
+        expect_error(2 + i, PROTOCOL_ERROR_CODE_INVALID);
+        assert_string_equal(client.message.error.field, cases[i].field);
+        assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
+    }
+    struct message message = render_message(0, 1);
+    message.render.ldc_levels = PROTOCOL_LDC_LEVELS_CELLS;
+    message.render.ldc_tolerance = 0.5f;
+    send_message(20, 0, &message);
+    expect_error(20, PROTOCOL_ERROR_CODE_INVALID);
+    assert_string_equal(client.message.error.field, "render.ldc_levels");
+}
+
+SESSION_TEST(settings_of_a_buffers_and_light_go_to_the_engine)
+{
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.tracer = PROTOCOL_TRACER_ABUFFER;
+    message.render.abuffer_resolution = 64;
+    message.render.abuffer_voxels = 64;
+    message.render.abuffer_search = PROTOCOL_ABUFFER_SEARCH_LINEAR1;
+    message.render.integrator = PROTOCOL_INTEGRATOR_PATH;
+    message.render.brdf = PROTOCOL_BRDF_WARD;
+    message.render.ao_distance = 2;
+    message.render.ao_falloff = 0.5f;
+    message.render.ao_rays = 256;
+    message.render.layer_opacity = 0.75f;
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.layers = 1u << PROTOCOL_LAYER_ALBEDO | 1u << PROTOCOL_LAYER_ID;
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    assert_int_equal(client.message.frame_begin.tracer, PROTOCOL_TRACER_ABUFFER);
+    assert_int_equal(client.message.frame_begin.layers, message.render.layers);
+    const struct frame_request *request = &engine.job.frame;
+    assert_int_equal(request->tracer_options.abuffer_resolution, 64);
+    assert_int_equal(request->tracer_options.abuffer_voxels, 64);
+    assert_int_equal(request->tracer_options.abuffer_search, ABUFFER_SEARCH_LINEAR1);
+    assert_int_equal(request->tracer_options.abuffer_mebibytes_max, 1);
+    assert_int_equal(request->integrator, INTEGRATOR_PATH);
+    assert_int_equal(request->brdf, FRAME_BRDF_WARD);
+    assert_true(request->ao_distance == 2 && request->ao_falloff == 0.5f && request->layer_opacity == 0.75f);
+    assert_int_equal(request->ao_rays, 256);
+    assert_int_equal(request->layers, message.render.layers);
+    while (receive()->type != MESSAGE_OK)
+        continue;
+}
+
+SESSION_TEST(settings_that_no_a_buffer_has_are_refused_by_their_field)
+{
+    static const struct {
+        uint32_t resolution, voxels;
+        const char *field, *remedy;
+    } cases[] = {
+        {1, 0, "render.abuffer_resolution", "16 to 4096"}, {15, 0, "render.abuffer_resolution", "16 to 4096"},
+        {0, 8, "render.abuffer_voxels", "16, 32, 64"},     {0, 100, "render.abuffer_voxels", "16, 32, 64"},
+        {32, 64, "render.abuffer_voxels", "higher"},
+    };
+    open_scene(1, 1);
+    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct message message = render_message(0, 1);
+        message.render.abuffer_resolution = cases[i].resolution;
+        message.render.abuffer_voxels = cases[i].voxels;
+        send_message(2 + i, 0, &message);
+        expect_error(2 + i, PROTOCOL_ERROR_CODE_INVALID);
+        assert_string_equal(client.message.error.field, cases[i].field);
+        assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
+    }
+}
+
+SESSION_TEST(layers_count_as_pictures_in_the_memory_for_frames)
+{
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    /* While a job runs, all layers are more than is left of the memory for frames; the picture is not. */
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
+    message.render.width = message.render.height = 128;
+    message.render.layers = 0;
+    atomic_store(&engine.keep_jobs, true);
+    send_message(3, 0, &message);
+    for (uint32_t request = 4; request < 6; request++) {
+        message.render.channel++;
+        message.render.layers = request == 4 ? 127 : 0;
+        send_message(request, 0, &message);
+    }
+    expect_error(4, PROTOCOL_ERROR_CODE_BUSY);
+    expect_alive(6);
+}
+
+SESSION_TEST(cubes_of_a_frame_are_told)
+{
+    open_scene(1, 1);
+    engine.cubes[TRACER_CUBE_DYNAMIC] = (struct tracer_cube){.resolution = 512,
+                                                             .cell_metres = INFINITY, /* the scene is too large */
+                                                             .layers_needed = 300,
+                                                             .layers_kept = 255,
+                                                             .samples = 1 << 20,
+                                                             .samples_lost = 77,
+                                                             .rebuilt = true};
+    struct message message = render_message(0, 1);
+    send_message(2, 0, &message);
+    while (receive()->type != MESSAGE_FRAME_END)
+        continue;
+    assert_int_equal(client.message.frame_end.cubes_count, 1);
+    const struct record_layered_cube *cube = &client.message.frame_end.cubes[0];
+    assert_int_equal(cube->part, PROTOCOL_CUBE_PART_DYNAMIC);
+    assert_int_equal(cube->resolution, 512);
+    assert_true(cube->cell_metres > 1e38f && isfinite(cube->cell_metres));
+    assert_int_equal(cube->layers_needed, 300);
+    assert_int_equal(cube->layers_kept, 255);
+    assert_int_equal(cube->samples, 1 << 20);
+    assert_int_equal(cube->samples_lost, 77);
+    assert_int_equal(cube->rebuilt, 1);
+    expect(MESSAGE_OK, 2);
+}
+
+SESSION_TEST(a_job_whose_frames_have_no_room_waits_for_others_to_end)
+{
+    atomic_store(&engine.keep_jobs, true);
+    open_scene(1, 1);
+    struct message message = render_message(0, 1);
+    message.render.width = message.render.height = 512; /* 7 MiB: 3 frames in the engine, 4 to be sent */
+    send_message(2, 0, &message);
+    message.render.channel = 3;
+    send_message(3, 0, &message);
+    expect_error(3, PROTOCOL_ERROR_CODE_BUSY);
+    assert_int_equal(client.message.error.retryable, 1);
+    assert_non_null(strstr(client.message.error.remedy, "memory.frames"));
+    message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 2;
+    send_message(4, 0, &message);
+    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect(MESSAGE_OK, 4);
+    message = render_message(0, 1);
+    message.render.width = message.render.height = 512;
+    message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F; /* more than there is, but it is the only one */
+    message.render.layers = 127;
+    send_message(5, 0, &message);
+    message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 5;
+    send_message(6, 0, &message);
+    expect_error(5, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect(MESSAGE_OK, 6);
+    assert_int_equal(served.hub.frame_bytes, 0);
+}
+
+TEST(the_head_of_a_frame_piece_is_what_the_codec_writes)
+{
+    static uint8_t data[FRAME_PIECE_BYTES], bytes[FRAMING_MESSAGE_MAX_BYTES];
+    static const size_t sizes[] = {1, 7, 8, 1000, FRAME_PIECE_BYTES};
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        struct message message = made(MESSAGE_FRAME_DATA);
+        message.frame_data.offset_bytes = UINT64_C(0xa1b2c3d4);
+        message.frame_data.data = data;
+        message.frame_data.data_bytes = (uint32_t)sizes[i];
+        struct writer writer;
+        writer_init(&writer, bytes, sizeof bytes);
+        assert_true(message_write(&writer, 77, 5, &message));
+        uint8_t head[FRAME_DATA_HEAD_BYTES];
+        frame_data_head(head, 77, 5, UINT64_C(0xa1b2c3d4), (uint32_t)sizes[i]);
+        assert_memory_equal(head, bytes, sizeof head);
+        assert_int_equal(writer.used_bytes, (sizeof head + sizes[i] + 7) & ~(size_t)7);
+    }
+}

@@ -1,0 +1,404 @@
+/* SPDX-License-Identifier: MIT */
+/* The rule that paces views, on a link that is simulated: bytes stand in one line at a bottleneck, the way there
+ * and back takes a fixed time. */
+#include "session/pacing.h"
+#include "tests/harness/test.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define MS UINT64_C(1000000)
+#define S UINT64_C(1000000000)
+#define FRAME_NS (S / 30)
+#define BEGIN_BYTES 300 /* of the first message */
+
+/* ---- a link --------------------------------------------------------------------------------------- */
+
+struct acknowledgement {
+    uint32_t frame;
+    bool whole;
+    uint64_t at_ns;
+};
+
+struct link {
+    double bytes_per_ns;
+    uint64_t way_ns; /* one way */
+    double free_ns;  /* when the bottleneck has sent all that stands in line */
+    struct acknowledgement coming[2 * PACING_IN_FLIGHT_MAX];
+    size_t coming_count;
+    bool tells_begin;
+};
+
+static struct link link_of(double megabits, uint64_t round_trip_ns)
+{
+    return (struct link){
+        .bytes_per_ns = megabits * 1e6 / 8 / 1e9, .way_ns = round_trip_ns / 2, .tells_begin = true};
+}
+
+static void link_send(struct link *link, uint32_t frame, uint64_t bytes, uint64_t now_ns)
+{
+    double begin_ns = link->free_ns > (double)now_ns ? link->free_ns : (double)now_ns;
+    double begun_ns = begin_ns + BEGIN_BYTES / link->bytes_per_ns;
+    link->free_ns = begin_ns + (double)bytes / link->bytes_per_ns;
+    uint64_t back_ns = 2 * link->way_ns;
+    assert_true(link->coming_count + 2 <= 2 * PACING_IN_FLIGHT_MAX);
+    if (link->tells_begin)
+        link->coming[link->coming_count++] = (struct acknowledgement){frame, false, (uint64_t)begun_ns + back_ns};
+    link->coming[link->coming_count++] = (struct acknowledgement){frame, true, (uint64_t)link->free_ns + back_ns};
+}
+
+/* How long what is sent now would stand in line. */
+static double line_ns(const struct link *link, uint64_t now_ns)
+{
+    return link->free_ns > (double)now_ns ? link->free_ns - (double)now_ns : 0.0;
+}
+
+static void link_deliver(struct link *link, struct pacing *pacing, uint64_t now_ns)
+{
+    size_t count = 0;
+    while (count < link->coming_count && link->coming[count].at_ns <= now_ns) {
+        const struct acknowledgement *next = &link->coming[count++];
+        pacing_acknowledged(pacing, next->frame, next->whole, next->at_ns);
+    }
+    link->coming_count -= count;
+    memmove(link->coming, link->coming + count, link->coming_count * sizeof link->coming[0]);
+}
+
+struct tally {
+    uint32_t frames;
+    uint64_t bytes;
+    double longest_line_ns; /* that a frame stood in, its own bytes included */
+};
+
+/* Frames of about `bytes`, one each FRAME_NS as far as the pacing allows; a tick is a millisecond. */
+static struct tally run(struct pacing *pacing, struct link *link, uint64_t begin_ns, uint64_t end_ns,
+                        uint64_t bytes, uint32_t *frame)
+{
+    struct tally tally = {0};
+    uint64_t next_ns = begin_ns;
+    for (uint64_t now_ns = begin_ns; now_ns < end_ns; now_ns += MS) {
+        link_deliver(link, pacing, now_ns);
+        if (now_ns < next_ns || !pacing_may_send(pacing))
+            continue;
+        uint64_t size = bytes * 4 / 5 + bytes * 2 / 5 * (*frame * 2654435761u >> 16) / 65536; /* 0.8 to 1.2 */
+        pacing_sent(pacing, *frame, size, now_ns);
+        link_send(link, (*frame)++, size, now_ns);
+        double line = line_ns(link, now_ns);
+        tally.longest_line_ns = line > tally.longest_line_ns ? line : tally.longest_line_ns;
+        tally.frames++;
+        tally.bytes += size;
+        next_ns = (now_ns > next_ns + FRAME_NS ? now_ns : next_ns) + FRAME_NS;
+    }
+    return tally;
+}
+
+/* ---- when frames go -------------------------------------------------------------------------------- */
+
+TEST(waits_for_nothing_on_a_link_that_carries_all)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    struct link link = link_of(100, 10 * MS);
+    uint32_t frame = 0;
+    struct tally tally = run(&pacing, &link, 0, 10 * S, 30000, &frame);
+    /* 7 Mbit/s on 100: all but the first, which nothing is known for and which one round trip is waited for. */
+    assert_in_range(tally.frames, 298, 300);
+}
+
+TEST(keeps_the_line_as_short_as_the_rule_says)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    struct link link = link_of(10, 50 * MS);
+    uint32_t frame = 0;
+    /* Twice what the link carries, for five minutes. */
+    run(&pacing, &link, 0, 2 * S, 83000, &frame);
+    struct tally first = run(&pacing, &link, 2 * S, 32 * S, 83000, &frame);
+    run(&pacing, &link, 32 * S, 272 * S, 83000, &frame);
+    struct tally last = run(&pacing, &link, 272 * S, 302 * S, 83000, &frame);
+    /* In flight are at most the bytes of a frame time and a round trip; those in the line are fewer by what is on
+     * the way there and back. A fifth above: sizes of frames are known only when they are sent. */
+    double most_ns = (double)FRAME_NS + 50.0 * MS + 0.2 * 83000 / link.bytes_per_ns;
+    assert_true(first.longest_line_ns < most_ns);
+    assert_true(last.longest_line_ns < most_ns);
+    /* The link is not left idle: a frame of this size takes 66 ms, and the next goes before it is acknowledged. */
+    assert_true((double)last.bytes > 0.5 * 30e9 * link.bytes_per_ns);
+    assert_true(last.frames >= first.frames - 2);
+}
+
+TEST(uses_the_link_where_frames_are_small_beside_it)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    struct link link = link_of(10, 50 * MS);
+    uint32_t frame = 0;
+    /* 6.2 Mbit/s at 30 frames a second. A frame takes 21 ms of the link and 50 of the way: three are in flight. */
+    run(&pacing, &link, 0, 2 * S, 26000, &frame);
+    struct tally tally = run(&pacing, &link, 2 * S, 32 * S, 26000, &frame);
+    assert_in_range(tally.frames, 30 * 30 * 95 / 100, 30 * 30);
+}
+
+static uint64_t rate_learned(bool tells_begin, struct pacing *pacing, uint64_t *true_rate)
+{
+    pacing_init(pacing, FRAME_NS);
+    struct link link = link_of(20, 30 * MS);
+    link.tells_begin = tells_begin;
+    uint32_t frame = 0;
+    run(pacing, &link, 0, 5 * S, 100000, &frame); /* more than it carries, so that frames stand in line */
+    *true_rate = (uint64_t)(link.bytes_per_ns * 1e9);
+    return pacing_bytes_per_second(pacing);
+}
+
+TEST(learns_the_link)
+{
+    struct pacing pacing;
+    uint64_t true_rate, rate = rate_learned(true, &pacing, &true_rate);
+    assert_in_range(rate, true_rate * 95 / 100, true_rate * 105 / 100); /* the first message is not counted */
+    assert_in_range(pacing_round_trip_ns(&pacing), 30 * MS, 31 * MS);   /* its 300 bytes take 0.1 ms */
+    /* Of a client that does not tell of the first bytes a frame of 40 ms has taken 70 with the way. */
+    rate = rate_learned(false, &pacing, &true_rate);
+    assert_in_range(rate, true_rate * 40 / 75, true_rate * 105 / 100);
+}
+
+TEST(follows_a_link_that_becomes_worse)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    struct link link = link_of(40, 20 * MS);
+    uint32_t frame = 0;
+    run(&pacing, &link, 0, 5 * S, 60000, &frame);
+    link.bytes_per_ns /= 8;
+    run(&pacing, &link, 5 * S, 8 * S, 60000, &frame);
+    struct tally after = run(&pacing, &link, 8 * S, 18 * S, 60000, &frame);
+    /* 60 kB take 96 ms now: one is on its way, and one may stand behind it. */
+    assert_true(after.longest_line_ns < 2.5 * 96.0 * MS);
+    assert_in_range(pacing_bytes_per_second(&pacing), 550000, 700000);
+}
+
+TEST(sends_one_at_a_time_to_a_client_that_is_silent)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    assert_true(pacing_may_send(&pacing));
+    pacing_sent(&pacing, 0, 1000, 0);
+    assert_false(pacing_may_send(&pacing));
+    pacing_forget(&pacing);
+    assert_true(pacing_may_send(&pacing));
+    /* Once it has acknowledged, credit does not stand for that any more. */
+    pacing_sent(&pacing, 1, 1000000, MS);
+    pacing_acknowledged(&pacing, 1, true, 101 * MS);
+    pacing_sent(&pacing, 2, 1000000, 102 * MS);
+    pacing_forget(&pacing);
+    assert_false(pacing_may_send(&pacing));
+}
+
+TEST(ignores_acknowledgements_of_what_is_not_in_flight)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    pacing_acknowledged(&pacing, 7, true, MS);
+    pacing_sent(&pacing, 3, 50000, MS);
+    pacing_acknowledged(&pacing, 4, true, 2 * MS);
+    pacing_acknowledged(&pacing, 2, false, 2 * MS);
+    assert_int_equal(pacing.in_flight_bytes, 50000);
+    pacing_acknowledged(&pacing, 3, true, 3 * MS);
+    pacing_acknowledged(&pacing, 3, true, 4 * MS); /* twice */
+    assert_int_equal(pacing.in_flight_bytes, 0);
+    assert_int_equal(pacing.in_flight_count, 0);
+}
+
+TEST(never_has_more_in_flight_than_it_can_note)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    pacing_sent(&pacing, 0, 1, 0);
+    pacing_acknowledged(&pacing, 0, true, 1000); /* 1 byte in 1 us, and .. */
+    uint32_t frame = 1;
+    while (pacing_may_send(&pacing) && frame < 10000)
+        pacing_sent(&pacing, frame++, 1, 1000); /* .. small frames that all fit */
+    assert_int_equal(pacing.in_flight_count, PACING_IN_FLIGHT_MAX);
+}
+
+/* ---- size and quality ------------------------------------------------------------------------------- */
+
+/* Says for how many frames advice is followed, of a picture that costs that much at full size and quality 75. */
+static struct pacing_advice follow(struct pacing *pacing, struct link *link, uint64_t *now_ns, uint64_t render_ns,
+                                   double bytes, unsigned frames)
+{
+    struct pacing_advice advice = {0};
+    static uint32_t frame;
+    for (unsigned i = 0; i < frames; i++) {
+        advice = pacing_advise(pacing, 90);
+        double area = advice.scale_eighths * advice.scale_eighths / 64.0;
+        double quality = (advice.quality - 75.0) / 12.0, size = bytes * area;
+        for (; quality > 1e-3; quality -= 1.0 / 12)
+            size *= 1.0253; /* 1.35 to the twelfth part */
+        for (; quality < -1e-3; quality += 1.0 / 12)
+            size /= 1.0253;
+        uint64_t render_now_ns = (uint64_t)((double)render_ns * area);
+        *now_ns += render_now_ns > FRAME_NS ? render_now_ns : FRAME_NS;
+        for (; link_deliver(link, pacing, *now_ns), !pacing_may_send(pacing);)
+            *now_ns += MS;
+        pacing_sent(pacing, frame, (uint64_t)size, *now_ns);
+        link_send(link, frame++, (uint64_t)size, *now_ns);
+        pacing_learn(pacing, advice.scale_eighths, advice.quality, render_now_ns, (uint64_t)size);
+    }
+    return advice;
+}
+
+TEST(asks_for_everything_where_all_is_fast)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    struct link link = link_of(1000, MS);
+    uint64_t now_ns = 0;
+    struct pacing_advice advice = follow(&pacing, &link, &now_ns, 5 * MS, 100000, 30);
+    assert_int_equal(advice.scale_eighths, PACING_SCALE_FULL);
+    assert_int_equal(advice.quality, 90);
+}
+
+TEST(makes_frames_smaller_that_take_long_to_render)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    struct link link = link_of(1000, MS);
+    uint64_t now_ns = 0;
+    struct pacing_advice advice = follow(&pacing, &link, &now_ns, 100 * MS, 100000, 60);
+    /* 33 ms a frame: half of each side is 25 ms, three quarters would be 56. */
+    assert_int_equal(advice.scale_eighths, 4);
+    /* The scene becomes simple: back to full. */
+    advice = follow(&pacing, &link, &now_ns, 10 * MS, 100000, 60);
+    assert_int_equal(advice.scale_eighths, PACING_SCALE_FULL);
+}
+
+TEST(makes_frames_fit_the_link)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    struct link link = link_of(10, 50 * MS);
+    uint64_t now_ns = 0;
+    /* 150 kB at 75 and 30 frames a second are 36 Mbit/s. */
+    follow(&pacing, &link, &now_ns, 5 * MS, 150000, 60);
+    uint64_t before_ns = now_ns;
+    struct pacing_advice advice = follow(&pacing, &link, &now_ns, 5 * MS, 150000, 300);
+    double frames_per_second = 300e9 / (double)(now_ns - before_ns);
+    assert_true(frames_per_second > 27.0); /* of 30 */
+    assert_true(advice.scale_eighths < PACING_SCALE_FULL);
+    assert_true(advice.quality >= PACING_QUALITY_LEAST);
+    assert_true((double)advice.bytes <= 10e6 / 8 / 30);
+    /* A better link: better frames, and not more than were asked for. */
+    link.bytes_per_ns *= 20;
+    advice = follow(&pacing, &link, &now_ns, 5 * MS, 150000, 600);
+    assert_int_equal(advice.scale_eighths, PACING_SCALE_FULL);
+    assert_int_equal(advice.quality, 90);
+}
+
+/* As follow(), but rendering takes `fixed_ns` whatever the size, and `area_ns` for all of the picture; either is
+ * up to a fifth more or less. */
+static struct pacing_advice follow_renderer(struct pacing *pacing, uint64_t fixed_ns, uint64_t area_ns,
+                                            unsigned frames)
+{
+    struct pacing_advice advice = {0};
+    static uint32_t chance;
+    for (unsigned i = 0; i < frames; i++) {
+        advice = pacing_advise(pacing, 90);
+        double area = advice.scale_eighths * advice.scale_eighths / 64.0;
+        chance = chance * 1664525u + 1013904223u;
+        double more = 0.8 + 0.4 * (chance >> 8) / (1 << 24);
+        pacing_learn(pacing, advice.scale_eighths, advice.quality,
+                     (uint64_t)(more * ((double)fixed_ns + (double)area_ns * area)), 1000);
+    }
+    return advice;
+}
+
+TEST(does_not_shrink_what_takes_long_at_any_size)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    /* 33 ms a frame: 60 ms at the least, 70 in full; hardly worth the picture. */
+    assert_int_equal(follow_renderer(&pacing, 60 * MS, 10 * MS, 100).scale_eighths, PACING_SCALE_FULL);
+    /* Size is what it costs: the same renderer with a slow light transport. */
+    struct pacing_advice advice = follow_renderer(&pacing, 2 * MS, 200 * MS, 100);
+    assert_in_range(advice.scale_eighths, 2, 3); /* 14.5 and 30 ms */
+    /* And back. */
+    assert_int_equal(follow_renderer(&pacing, 2 * MS, 10 * MS, 300).scale_eighths, PACING_SCALE_FULL);
+}
+
+TEST(does_not_flicker)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    struct link link = link_of(1000, MS);
+    uint64_t now_ns = 0;
+    follow(&pacing, &link, &now_ns, 33 * MS, 50000, 60); /* just at the edge between two sizes */
+    unsigned changes = 0, scale = 0;
+    for (int i = 0; i < 300; i++) {
+        struct pacing_advice advice = follow(&pacing, &link, &now_ns, (uint64_t)(i % 2 ? 31 : 36) * MS, 50000, 1);
+        changes += i > 0 && advice.scale_eighths != scale;
+        scale = advice.scale_eighths;
+    }
+    assert_in_range(changes, 0, 2); /* ten seconds */
+}
+
+/* 1 MB a second and a round trip of 20 ms; a frame of 10 KB takes 10 ms. Room for one frame time and the way. */
+TEST(the_wait_for_the_next_frame_is_what_has_to_drain)
+{
+    struct pacing pacing;
+    pacing_init(&pacing, 10 * MS);
+    assert_int_equal(pacing_wait_ns(&pacing, 0), 0);
+    assert_true(pacing_wait_ns(&pacing, 1) == UINT64_MAX); /* nothing is known of the link */
+    pacing_sent(&pacing, 0, 10000, 0);
+    assert_true(pacing_wait_ns(&pacing, 0) == UINT64_MAX);
+    pacing_acknowledged(&pacing, 0, false, 20 * MS);
+    pacing_acknowledged(&pacing, 0, true, 30 * MS);
+    /* 30 KB: three frames. */
+    assert_int_equal(pacing_wait_ns(&pacing, 2), 0);
+    assert_in_range(pacing_wait_ns(&pacing, 3), 10 * MS - 1, 10 * MS + 1);
+    pacing_sent(&pacing, 1, 10000, 30 * MS);
+    assert_int_equal(pacing_wait_ns(&pacing, 1), 0);
+    assert_in_range(pacing_wait_ns(&pacing, 3), 20 * MS - 1, 20 * MS + 1);
+    /* One that is larger than all the room waits until nothing is before it. */
+    pacing_acknowledged(&pacing, 1, false, 50 * MS);
+    pacing_acknowledged(&pacing, 1, true, 60 * MS);
+    pacing_sent(&pacing, 2, 100000, 60 * MS);
+    assert_in_range(pacing_wait_ns(&pacing, 0), 100 * MS - 1, 100 * MS + 1);
+    assert_false(pacing_may_send(&pacing));
+}
+
+/* 10 Mbit/s, 100 ms there and back, and a picture at rest of a megabyte when motion goes on. */
+TEST(motion_does_not_wait_for_what_was_abandoned)
+{
+    struct pacing pacing;
+    struct link link = link_of(10, 100 * MS);
+    uint32_t frame = 0;
+    pacing_init(&pacing, FRAME_NS);
+    assert_true(pacing_is_long(&pacing, 1)); /* nothing is known */
+    run(&pacing, &link, 0, 2 * S, 30000, &frame);
+    link_deliver(&link, &pacing, 3 * S);
+    assert_int_equal(pacing.in_flight_count, 0);
+    assert_true(pacing_is_long(&pacing, 60000));
+    assert_false(pacing_is_long(&pacing, 20000));
+    pacing_sent(&pacing, frame, 1000000, 3 * S);
+    assert_in_range(pacing_wait_ns(&pacing, 0), 500 * MS, 1000 * MS);
+    pacing_abandoned(&pacing, frame);
+    assert_true(pacing_may_send(&pacing));
+    assert_int_equal(pacing_wait_ns(&pacing, 1), 0);  /* nor does one behind it, which is no megabyte either */
+    pacing_acknowledged(&pacing, frame, true, 4 * S); /* in vain */
+    assert_in_range(pacing_bytes_per_second(&pacing), 1100000, 1300000);
+    /* Those before it count on. */
+    pacing_sent(&pacing, frame + 1, 150000, 4 * S);
+    pacing_sent(&pacing, frame + 2, 1000000, 4 * S);
+    pacing_abandoned(&pacing, frame + 2);
+    assert_false(pacing_may_send(&pacing));
+}
+
+TEST(a_wait_beyond_all_measure_is_still_one)
+{
+    const uint64_t month_ns = 30 * 86400 * S;
+    struct pacing pacing;
+    pacing_init(&pacing, FRAME_NS);
+    pacing_sent(&pacing, 0, 1, 0);
+    pacing_acknowledged(&pacing, 0, true, month_ns); /* one byte in a month */
+    pacing_sent(&pacing, 1, UINT32_MAX, month_ns);
+    assert_in_range(pacing_wait_ns(&pacing, 1), month_ns, UINT64_MAX / 4);
+}

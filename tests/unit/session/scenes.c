@@ -1,0 +1,411 @@
+/* SPDX-License-Identifier: MIT */
+/* Several clients on one daemon: scenes that they share, lose and come back to, and clients who may only look. The
+ * daemon is the real one but for its renderer. */
+#include "tests/unit/session/clients_fixture.h"
+#include "tests/harness/test.h"
+
+#define SPHERE_FLOATS 4
+
+static const float sphere[SPHERE_FLOATS] = {1, 2, 3, 0.5f};
+
+static int set_up(void **state)
+{
+    (void)state;
+    struct hub_options options = usual_options();
+    start_daemon(&options);
+    return 0;
+}
+
+static int set_up_for_readers(void **state)
+{
+    (void)state;
+    struct hub_options options = usual_options();
+    options.readers = (struct readers){{(uint32_t)getuid()}, 1};
+    start_daemon(&options);
+    return 0;
+}
+
+static int set_up_with_few_blobs(void **state)
+{
+    (void)state;
+    struct hub_options options = usual_options();
+    options.limits.blob_bytes = 300000;
+    start_daemon(&options);
+    return 0;
+}
+
+/* ---- steps ------------------------------------------------------------------------------------------- */
+
+static void submit_attach(struct client *client, uint32_t scene, const char *name)
+{
+    struct message message = made(MESSAGE_SCENE_ATTACH);
+    message.scene_attach.scene = scene;
+    message.scene_attach.name = name;
+    send_message(client, 100 + scene, 0, &message);
+}
+
+static uint64_t attach(struct client *client, uint32_t scene, const char *name)
+{
+    submit_attach(client, scene, name);
+    return expect_ok(client, 100 + scene);
+}
+
+static void expect_changed(struct client *client, uint32_t scene, uint64_t revision)
+{
+    expect(client, MESSAGE_SCENE_CHANGED, 0);
+    assert_int_equal(client->message.scene_changed.scene, scene);
+    assert_int_equal(client->message.scene_changed.revision, revision);
+}
+
+/* Puts the sphere up, with a node that shows it. */
+static void commit_sphere(struct client *client, uint32_t scene)
+{
+    struct record_blob_ref reference = reference_to(sphere, sizeof sphere);
+    if (offer(client, 1, reference)) {
+        send_blob(client, 2, &reference, sphere);
+        expect_ok(client, 2);
+    }
+    struct message message = made(MESSAGE_EDIT_BEGIN);
+    message.edit_begin.scene = scene;
+    send_message(client, 3, 0, &message);
+    message = made(MESSAGE_SET_SPHERES);
+    message.set_spheres.spheres = 1;
+    message.set_spheres.sphere_count = 1;
+    message.set_spheres.arrays = &reference;
+    message.set_spheres.arrays_count = 1;
+    send_message(client, 3, 0, &message);
+    message = made(MESSAGE_SET_NODE);
+    message.set_node.node = 1;
+    message.set_node.kind = PROTOCOL_NODE_KIND_SPHERES;
+    message.set_node.object = 1;
+    for (int axis = 0; axis < 3; axis++)
+        message.set_node.parent_from_node[5 * axis] = 1;
+    send_message(client, 3, 0, &message);
+    message = made(MESSAGE_EDIT_COMMIT);
+    send_message(client, 3, 0, &message);
+    assert_int_equal(expect_ok(client, 3), 1);
+}
+
+/* ---- sharing ----------------------------------------------------------------------------------------- */
+
+ALL_TESTS(block_signals, NULL)
+EACH_TEST(set_up, tear_down)
+
+TEST(an_edit_by_one_appears_to_the_other)
+{
+    struct client *one = come(false), *other = come(true);
+    open_scene_as(one, 1, "model", PROTOCOL_SHARING_SHARED);
+    commit_sphere(one, 1);
+    assert_int_equal(attach(other, 7, "model"), 1);
+    assert_int_equal(render_frame(other, 20, 7), 1);
+    assert_int_equal(commit_node(one, 21, 1, 5), 2);
+    expect_changed(other, 7, 2);
+    assert_int_equal(render_frame(other, 22, 7), 2);
+    assert_int_equal(commit_node(other, 23, 7, 6), 3);
+    expect_changed(one, 1, 3);
+    assert_int_equal(render_frame(one, 24, 1), 3);
+    cut(one, NULL);
+    cut(other, NULL);
+}
+
+/* Messages of a view until a frame of that revision has come whole; it is acknowledged. */
+static void expect_view_of(struct client *client, uint32_t request, uint64_t revision)
+{
+    uint64_t shown = 0;
+    do {
+        receive(client);
+        if (client->message.type == MESSAGE_SCENE_CHANGED)
+            continue;
+        assert_int_equal(client->header.request, request);
+        if (client->message.type == MESSAGE_FRAME_BEGIN) {
+            assert_true(client->message.frame_begin.revision >= shown);
+            shown = client->message.frame_begin.revision;
+        } else if (client->message.type == MESSAGE_ERROR) {
+            fail_msg("%s: %s", client->message.error.field, client->message.error.text);
+        } else if (client->message.type == MESSAGE_FRAME_END) {
+            struct message ack = made(MESSAGE_FRAME_ACK);
+            ack.frame_ack.channel = request;
+            ack.frame_ack.frame = client->message.frame_end.frame;
+            ack.frame_ack.whole = 1;
+            send_message(client, 0, 0, &ack);
+        }
+    } while (client->message.type != MESSAGE_FRAME_END || shown < revision);
+    assert_int_equal(shown, revision);
+}
+
+TEST(a_view_at_rest_shows_what_another_client_changes)
+{
+    struct client *one = come(false), *other = come(true);
+    open_scene_as(one, 1, "model", PROTOCOL_SHARING_SHARED);
+    commit_sphere(one, 1);
+    attach(other, 7, "model");
+    struct message message = made(MESSAGE_RENDER);
+    message.render.kind = PROTOCOL_JOB_KIND_VIEW;
+    message.render.scene = 7;
+    message.render.channel = 20;
+    message.render.credit = 1000;
+    message.render.frames_per_second = 1000;
+    send_message(other, 20, 0, &message);
+    expect_view_of(other, 20, 1);
+    assert_int_equal(commit_node(one, 21, 1, 5), 2);
+    expect_view_of(other, 20, 2);
+    assert_int_equal(commit_node(one, 22, 1, 6), 3);
+    expect_view_of(other, 20, 3);
+    cut(one, NULL);
+    cut(other, NULL);
+}
+
+TEST(many_changes_are_told_as_one_to_who_does_not_listen)
+{
+    enum { CHANGES = 200 };
+    struct client *one = come(false), *other = come(false);
+    open_scene_as(one, 1, "model", PROTOCOL_SHARING_SHARED);
+    attach(other, 1, "model");
+    for (uint32_t i = 1; i <= CHANGES; i++)
+        assert_int_equal(commit_node(one, i, 1, 1), i);
+    /* However many are told, they ascend, and the last is the last. */
+    uint64_t told = 0;
+    while (told < CHANGES) {
+        expect(other, MESSAGE_SCENE_CHANGED, 0);
+        assert_true(other->message.scene_changed.revision > told);
+        told = other->message.scene_changed.revision;
+    }
+    assert_int_equal(told, CHANGES);
+    cut(one, NULL);
+    cut(other, NULL);
+}
+
+TEST(what_a_scene_holds_is_told)
+{
+    struct client *one = come(false), *other = come(true);
+    open_scene_as(one, 1, "model", PROTOCOL_SHARING_SHARED);
+    open_scene_as(one, 2, "mine", PROTOCOL_SHARING_KEPT);
+    commit_sphere(one, 1);
+    attach(other, 4, "model");
+    struct message message = made(MESSAGE_SCENE_DESCRIBE);
+    message.scene_describe.scene = 4;
+    send_message(other, 5, 0, &message);
+    expect(other, MESSAGE_SCENE_DESCRIPTION, 5);
+    const struct message_scene_description *told = &other->message.scene_description;
+    assert_int_equal(told->revision, 1);
+    assert_int_equal(told->spheres, 1);
+    assert_int_equal(told->empty, 0);
+    for (int axis = 0; axis < 3; axis++)
+        assert_true(told->lower_world[axis] == sphere[axis] - 0.5f &&
+                    told->upper_world[axis] == sphere[axis] + 0.5f);
+    message.scene_describe.scene = 5;
+    send_message(other, 6, 0, &message);
+    expect_error(other, 6, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    assert_string_equal(other->message.error.field, "scene_describe.scene");
+
+    message = made(MESSAGE_SCENE_LIST);
+    send_message(other, 7, 0, &message);
+    expect(other, MESSAGE_SCENE_LIST_REPLY, 7);
+    assert_int_equal(other->message.scene_list_reply.scenes_count, 1);
+    assert_string_equal(other->message.scene_list_reply.scenes[0].name, "model");
+    assert_int_equal(other->message.scene_list_reply.scenes[0].clients, 2);
+    send_message(one, 7, 0, &message);
+    expect(one, MESSAGE_SCENE_LIST_REPLY, 7);
+    assert_int_equal(one->message.scene_list_reply.scenes_count, 2);
+    assert_string_equal(one->message.scene_list_reply.scenes[0].name, "mine");
+    assert_int_equal(one->message.scene_list_reply.scenes[0].sharing, PROTOCOL_SHARING_KEPT);
+    cut(one, NULL);
+    cut(other, NULL);
+}
+
+TEST(scenes_that_cannot_be_come_to_are_refused_by_their_field)
+{
+    struct client *one = come(false), *other = come(true);
+    open_scene_as(one, 1, "kept", PROTOCOL_SHARING_KEPT);
+    submit_attach(other, 1, "kept");
+    expect_error(other, 101, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    assert_string_equal(other->message.error.field, "scene_attach.name");
+    attach(one, 2, "kept");
+    submit_attach(one, 2, "kept");
+    expect_error(one, 102, PROTOCOL_ERROR_CODE_INVALID);
+    assert_string_equal(one->message.error.field, "scene_attach.scene");
+    open_scene_as(one, 3, "", PROTOCOL_SHARING_PRIVATE);
+    submit_attach(one, 4, "kept");
+    expect_error(one, 104, PROTOCOL_ERROR_CODE_LIMIT); /* attached ones count as well */
+    /* The number of one that failed is free. */
+    open_scene_as(other, 1, "", PROTOCOL_SHARING_PRIVATE);
+    cut(one, NULL);
+    cut(other, NULL);
+}
+
+/* ---- lost connections -------------------------------------------------------------------------------- */
+
+TEST(a_cut_connection_finds_its_scene_again_without_sending_it)
+{
+    struct client *witness = come(true), *one = come(false);
+    open_scene_as(one, 1, "kept", PROTOCOL_SHARING_KEPT);
+    commit_sphere(one, 1);
+    cut(one, witness);
+    one = come(false);
+    assert_int_equal(attach(one, 9, "kept"), 1);
+    assert_int_equal(render_frame(one, 20, 9), 1);
+    struct record_blob_ref reference = reference_to(sphere, sizeof sphere);
+    assert_int_equal(offer(one, 21, reference), 0); /* it is held, by the scene */
+    cut(one, NULL);
+    cut(witness, NULL);
+}
+
+TEST(a_stranger_leaves_a_shared_scene_that_stays_whole)
+{
+    struct client *witness = come(false), *stranger = come(true);
+    open_scene_as(stranger, 1, "shared", PROTOCOL_SHARING_SHARED);
+    commit_sphere(stranger, 1);
+    open_scene_as(stranger, 2, "kept", PROTOCOL_SHARING_KEPT);
+    commit_node(stranger, 30, 2, 1);
+    cut(stranger, witness);
+    assert_int_equal(attach(witness, 1, "shared"), 1);
+    assert_int_equal(render_frame(witness, 20, 1), 1);
+    /* What it uses is counted still, though nobody can name it; nobody can come back to the other scene. */
+    struct message message = made(MESSAGE_STATS);
+    send_message(witness, 21, 0, &message);
+    expect(witness, MESSAGE_STATS_REPLY, 21);
+    assert_int_equal(witness->message.stats_reply.blob_bytes, sizeof sphere);
+    assert_int_equal(witness->message.stats_reply.scenes_count, 1);
+    assert_int_equal(offer(witness, 22, reference_to(sphere, sizeof sphere)), 1);
+    cut(witness, NULL);
+}
+
+TEST_WITH(scenes_that_nobody_holds_give_way_to_blobs, set_up_with_few_blobs, tear_down)
+{
+    /* Room for one blob of 200,000 bytes, not for two. */
+    static float spheres[2][50000];
+    for (size_t i = 0; i < sizeof spheres / sizeof spheres[0]; i++) {
+        for (size_t k = 0; k < sizeof spheres[0] / sizeof spheres[0][0]; k++)
+            spheres[i][k] = (float)(k % 5 + i + 1);
+    }
+    struct client *one = come(true), *witness = come(false);
+    open_scene_as(one, 1, "shared", PROTOCOL_SHARING_SHARED);
+    struct record_blob_ref references[2];
+    for (int i = 0; i < 2; i++)
+        references[i] = reference_to(spheres[i], sizeof spheres[i]);
+    assert_int_equal(offer(one, 1, references[0]), 1);
+    send_blob(one, 2, &references[0], spheres[0]);
+    expect_ok(one, 2);
+    struct message message = made(MESSAGE_EDIT_BEGIN);
+    message.edit_begin.scene = 1;
+    send_message(one, 3, 0, &message);
+    message = made(MESSAGE_SET_SPHERES);
+    message.set_spheres.spheres = 1;
+    message.set_spheres.sphere_count = 12500;
+    message.set_spheres.arrays = references;
+    message.set_spheres.arrays_count = 1;
+    send_message(one, 3, 0, &message);
+    message = made(MESSAGE_EDIT_COMMIT);
+    send_message(one, 3, 0, &message);
+    expect_ok(one, 3);
+    cut(one, witness);
+    assert_int_equal(offer(witness, 1, references[1]), 1);
+    send_blob(witness, 2, &references[1], spheres[1]);
+    expect_error(witness, 2, PROTOCOL_ERROR_CODE_LIMIT);
+    assert_int_equal(witness->message.error.retryable, 1);
+    /* The scene ends, and trying again does it; how soon is not said. */
+    for (int tries = 0;; tries++) {
+        uint32_t request = 10 + (uint32_t)tries;
+        send_blob(witness, request, &references[1], spheres[1]);
+        receive(witness);
+        assert_int_equal(witness->header.request, request);
+        if (witness->message.type == MESSAGE_OK)
+            break;
+        if (tries == 5000)
+            fail_msg("%s", witness->message.error.text);
+        usleep(1000);
+    }
+    submit_attach(witness, 1, "shared");
+    expect_error(witness, 101, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    cut(witness, NULL);
+}
+
+/* ---- what stats tell whom ---------------------------------------------------------------------------- */
+
+static const struct message_stats_reply *stats_of(struct client *client)
+{
+    struct message message = made(MESSAGE_STATS);
+    send_message(client, 778, 0, &message);
+    expect(client, MESSAGE_STATS_REPLY, 778);
+    return &client->message.stats_reply;
+}
+
+static void open_one_of_each(struct client *client)
+{
+    open_scene_as(client, 1, "private", PROTOCOL_SHARING_PRIVATE);
+    open_scene_as(client, 2, "kept", PROTOCOL_SHARING_KEPT);
+    open_scene_as(client, 3, "shared", PROTOCOL_SHARING_SHARED);
+}
+
+static void expect_scene_names(struct client *client, uint32_t count, const char *const names[])
+{
+    const struct message_stats_reply *stats = stats_of(client);
+    assert_int_equal(stats->scenes_count, count);
+    for (uint32_t i = 0; i < count; i++)
+        assert_string_equal(stats->scenes[i].name, names[i]);
+}
+
+TEST(what_others_keep_to_themselves_has_no_name_in_stats)
+{
+    struct client *owner = come(true), *other = come(true);
+    open_one_of_each(owner);
+    expect_scene_names(owner, 3, (const char *const[]){"private", "kept", "shared"});
+    expect_scene_names(other, 3, (const char *const[]){"", "", "shared"});
+    const struct message_stats_reply *stats = stats_of(other);
+    assert_int_equal(stats->clients_count, 2);
+    for (uint32_t i = 0; i < 2; i++)
+        assert_int_equal(strncmp(stats->clients[i].name, "test (", 6), 0);
+    cut(other, NULL);
+    cut(owner, NULL);
+}
+
+TEST_WITH(a_reader_hears_of_no_other_client, set_up_for_readers, tear_down)
+{
+    struct client *owner = come(true), *reader = come(false);
+    open_one_of_each(owner);
+    expect_scene_names(reader, 1, (const char *const[]){"shared"});
+    const struct message_stats_reply *stats = stats_of(reader);
+    assert_int_equal(stats->clients_count, 1);
+    assert_int_equal(stats->clients[0].client, 2);
+    assert_int_equal(stats_of(owner)->clients_count, 2);
+    cut(reader, NULL);
+    cut(owner, NULL);
+}
+
+/* ---- readers ----------------------------------------------------------------------------------------- */
+
+TEST_WITH(a_reader_looks_and_changes_nothing, set_up_for_readers, tear_down)
+{
+    struct client *writer = come(true), *reader = come(false);
+    assert_int_equal(writer->capabilities & HANDSHAKE_CAN_READ_ONLY, 0);
+    assert_int_equal(reader->capabilities & HANDSHAKE_CAN_READ_ONLY, HANDSHAKE_CAN_READ_ONLY);
+    open_scene_as(writer, 1, "model", PROTOCOL_SHARING_SHARED);
+    commit_sphere(writer, 1);
+    assert_int_equal(attach(reader, 1, "model"), 1);
+    assert_int_equal(render_frame(reader, 20, 1), 1);
+
+    submit_open(reader, 2, "", PROTOCOL_SHARING_PRIVATE);
+    expect_error(reader, 102, PROTOCOL_ERROR_CODE_DENIED);
+    assert_true(reader->message.error.remedy[0] != '\0');
+    struct record_blob_ref reference = reference_to(sphere, sizeof sphere);
+    struct message message = made(MESSAGE_BLOB_OFFER);
+    message.blob_offer.blobs = &reference;
+    message.blob_offer.blobs_count = 1;
+    send_message(reader, 21, 0, &message);
+    expect_error(reader, 21, PROTOCOL_ERROR_CODE_DENIED);
+    send_blob(reader, 22, &reference, sphere);
+    expect_error(reader, 22, PROTOCOL_ERROR_CODE_DENIED);
+    /* One answer to a whole transaction, whose edits are on their way when it is refused. */
+    message = made(MESSAGE_EDIT_BEGIN);
+    message.edit_begin.scene = 1;
+    send_message(reader, 23, 0, &message);
+    message = made(MESSAGE_SET_NODE);
+    message.set_node.node = 1;
+    send_message(reader, 23, 0, &message);
+    message = made(MESSAGE_EDIT_COMMIT);
+    send_message(reader, 23, 0, &message);
+    expect_error(reader, 23, PROTOCOL_ERROR_CODE_DENIED);
+    assert_int_equal(render_frame(reader, 24, 1), 1); /* as before */
+    cut(reader, NULL);
+    cut(writer, NULL);
+}

@@ -1,0 +1,333 @@
+/* SPDX-License-Identifier: MIT */
+/* A session from hello to goodbye, over a socketpair, with an engine that answers what it is told to: requests and
+ * their answers, whom the daemon waits for how long, keys. */
+#include "tests/unit/session/answering_engine.h"
+
+#include "session/dispatch.h"
+#include "session/session.h"
+#include "tests/harness/test.h"
+
+/* ---- requests ---------------------------------------------------------------------------------------- */
+
+static int real_calls(void **state)
+{
+    (void)state;
+    real = sys;
+    return 0;
+}
+EACH_TEST(real_calls, tear_down)
+
+SESSION_TEST(a_ping_is_answered_and_stats_are_told)
+{
+    expect_alive(7);
+    struct message message = made(MESSAGE_STATS);
+    send_message(8, 0, &message);
+    expect(MESSAGE_STATS_REPLY, 8);
+    assert_int_equal(client.message.stats_reply.clients_count, 1);
+    assert_non_null(
+        strstr(client.message.stats_reply.clients[0].name, client.link ? "test (key, user " : "test (user "));
+    assert_string_equal(client.message.stats_reply.device, "none");
+}
+
+SESSION_TEST(cancels_of_cancels_are_answered_in_their_order)
+{
+    atomic_store(&engine.keep_commits, true);
+    open_scene(1, 1);
+    begin_edit(2, 1);
+    commit(2);
+    for (uint32_t request = 3; request <= 60; request++) {
+        struct message message = made(MESSAGE_CANCEL);
+        message.cancel.target_request = request - 1;
+        send_message(request, 0, &message);
+    }
+    expect_alive(61);
+    release_commit();
+    for (uint32_t request = 2; request <= 60; request++)
+        expect(MESSAGE_OK, request);
+}
+
+SESSION_TEST(a_full_engine_makes_clients_wait_and_loses_nothing)
+{
+    atomic_store(&engine.full, true);
+    struct message message = made(MESSAGE_SCENE_OPEN);
+    for (uint32_t scene = 1; scene <= 2; scene++) {
+        message.scene_open.scene = scene;
+        send_message(scene, 0, &message);
+    }
+    usleep(20000);
+    atomic_store(&engine.full, false);
+    expect(MESSAGE_OK, 1);
+    expect(MESSAGE_OK, 2);
+    expect_alive(3);
+}
+
+/* More than one may have come already when nothing more is to be read. */
+SESSION_TEST(messages_that_come_while_the_engine_is_full_are_answered_later)
+{
+    enum { PINGS = 100 };
+    atomic_store(&engine.full, true);
+    struct message message = made(MESSAGE_SCENE_OPEN);
+    message.scene_open.scene = 1;
+    send_message(1, 0, &message);
+    usleep(20000);
+    message = made(MESSAGE_PING);
+    for (uint32_t request = 2; request < 2 + PINGS; request++)
+        send_message(request, 0, &message);
+    usleep(20000);
+    atomic_store(&engine.full, false);
+    expect(MESSAGE_OK, 1);
+    for (uint32_t request = 2; request < 2 + PINGS; request++)
+        expect(MESSAGE_PONG, request);
+}
+
+SESSION_TEST(rubbish_is_told_so_and_the_connection_closed)
+{
+    uint8_t bytes[64];
+    memset(bytes, 0xff, sizeof bytes);
+    send_bytes(bytes, sizeof bytes);
+    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect(MESSAGE_GOODBYE, 0);
+    expect_end();
+}
+
+SESSION_TEST(a_request_number_in_flight_cannot_be_used_again)
+{
+    open_scene(1, 1);
+    begin_edit(2, 1);
+    begin_edit(2, 1);
+    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect(MESSAGE_GOODBYE, 0);
+    expect_end();
+}
+
+SESSION_TEST(the_65th_request_in_flight_is_refused_and_can_be_retried)
+{
+    open_scene(1, 1);
+    for (uint32_t request = 2; request <= 65; request++)
+        begin_edit(request, 1);
+    begin_edit(66, 1);
+    expect_error(66, PROTOCOL_ERROR_CODE_LIMIT);
+    assert_int_equal(client.message.error.retryable, 1);
+    send_node(66, 1);
+    commit(66);
+    commit(2);
+    expect(MESSAGE_OK, 2);
+}
+
+SESSION_TEST(a_client_that_vanishes_is_forgotten)
+{
+    open_scene(1, 1);
+    struct message message = render_message(50, 51);
+    send_message(2, 0, &message);
+    expect(MESSAGE_FRAME_BEGIN, 2);
+    shutdown(client.fd, SHUT_RDWR);
+    pthread_join(thread, NULL); /* the daemon of a single client ends with it */
+    assert_int_equal(atomic_load(&engine.gone), 1);
+    assert_int_equal(pthread_create(&thread, NULL, run, NULL), 0);
+}
+
+TEST_WITH(every_message_of_a_client_has_a_row, NULL, NULL)
+{
+    for (uint32_t type = 0; type <= UINT16_MAX; type++) {
+        const struct message_info *info = message_lookup(type);
+        bool from_client = info && (info->from & MESSAGE_FROM_CLIENT);
+        if (from_client != (dispatch_find(type) != NULL))
+            fail_msg("%s (%u): from a client: %d, row: %d", message_type_text(type), type, from_client,
+                     !from_client);
+    }
+}
+
+/* ---- patience ---------------------------------------------------------------------------------------- */
+
+static void expect_closed_within_5_s(void)
+{
+    uint64_t before_ns = clock_now_ns();
+    struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+    uint8_t bytes[4096];
+    while (poll(&fd, 1, 20000) == 1 && recv(client.fd, bytes, sizeof bytes, 0) > 0)
+        continue;
+    assert_in_range((clock_now_ns() - before_ns) / 1000000, 0, 5000);
+}
+
+TEST(who_does_not_introduce_himself_is_closed)
+{
+    struct connection_limits limits = patient;
+    limits.handshake_ms = 50;
+    start(&limits);
+    send_bytes("FARL", 4);
+    expect_closed_within_5_s();
+}
+
+TEST(who_does_not_finish_a_message_is_closed)
+{
+    struct connection_limits limits = patient;
+    limits.progress_grace_ms = 50;
+    limits.progress_bytes_per_s = 1000000;
+    start(&limits);
+    greet();
+    uint8_t header[FRAMING_HEADER_BYTES];
+    framing_header_encode(header,
+                          &(struct framing_header){.type = MESSAGE_PING, .payload_bytes = 10, .request = 1});
+    send_bytes(header, sizeof header);
+    expect_error(0, PROTOCOL_ERROR_CODE_TIMEOUT);
+    expect(MESSAGE_GOODBYE, 0);
+    expect_closed_within_5_s();
+}
+
+TEST(who_cannot_finish_a_message_because_nothing_is_read_has_his_time_later)
+{
+    struct connection_limits limits = patient;
+    limits.progress_grace_ms = 100;
+    limits.progress_bytes_per_s = 1000000;
+    limits.queued_soft_bytes = 1000;
+    start(&limits);
+    greet();
+    open_scene(1, 1);
+    uint8_t bytes[1024];
+    struct writer writer;
+    writer_init(&writer, bytes, sizeof bytes);
+    struct message message = render_message(5, 6);
+    assert_true(message_write(&writer, 2, 0, &message));
+    size_t begun_bytes = writer.used_bytes + 20;
+    message = made(MESSAGE_PING);
+    assert_true(message_write(&writer, 3, 0, &message));
+    send_bytes(bytes, begun_bytes); /* the frames fill the way back, the ping is cut off */
+    usleep(400000);
+    send_bytes(bytes + begun_bytes, writer.used_bytes - begun_bytes);
+    bool pong = false, done = false;
+    while (!pong || !done) {
+        const struct message *got = receive();
+        if (got->type == MESSAGE_ERROR || got->type == MESSAGE_GOODBYE)
+            fail_msg("%s", got->type == MESSAGE_ERROR ? got->error.text : got->goodbye.text);
+        pong = pong || got->type == MESSAGE_PONG;
+        done = done || got->type == MESSAGE_OK;
+    }
+}
+
+TEST(who_is_silent_is_closed_but_not_while_he_waits)
+{
+    struct connection_limits limits = patient;
+    limits.idle_ms = 60;
+    start(&limits);
+    greet();
+    atomic_store(&engine.keep_jobs, true);
+    open_scene(1, 1);
+    struct message message = render_message(5, 10);
+    send_message(2, 0, &message);
+    usleep(1300000); /* past the idle time, and past the second in between two looks */
+    expect_alive(3);
+    message = made(MESSAGE_CANCEL);
+    message.cancel.target_request = 2;
+    send_message(4, 0, &message);
+    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect(MESSAGE_OK, 4);
+    expect_error(0, PROTOCOL_ERROR_CODE_TIMEOUT);
+    expect(MESSAGE_GOODBYE, 0);
+    expect_closed_within_5_s();
+}
+
+TEST(who_does_not_read_is_closed)
+{
+    struct connection_limits limits = patient;
+    limits.queued_soft_bytes = 1000;
+    limits.queued_soft_ms = 100;
+    start(&limits);
+    greet();
+    open_scene(1, 1);
+    struct message message = render_message(50, 51);
+    send_message(2, 0, &message);
+    usleep(500000);
+    expect_closed_within_5_s();
+    assert_int_equal(atomic_load(&engine.gone), 1);
+}
+
+/* ---- keys ---------------------------------------------------------------------------------------------- */
+
+TEST(who_is_sealed_but_does_not_introduce_himself_is_closed)
+{
+    struct connection_limits limits = patient;
+    limits.handshake_ms = 200;
+    start(&limits);
+    seal_with(&session_key);
+    expect_closed_within_5_s();
+}
+
+TEST(who_does_not_finish_a_record_is_closed)
+{
+    struct connection_limits limits = patient;
+    limits.progress_grace_ms = 50;
+    limits.progress_bytes_per_s = 1000000;
+    start(&limits);
+    seal_with(&session_key);
+    greet();
+    const uint8_t length_and_a_byte[5] = {200};
+    send_plainly(length_and_a_byte, sizeof length_and_a_byte);
+    expect_closed_within_5_s();
+}
+
+TEST(a_record_that_was_changed_is_told_so_and_the_connection_closed)
+{
+    start(&patient);
+    seal_with(&session_key);
+    greet();
+    uint8_t record[21] = {17};
+    send_plainly(record, sizeof record);
+    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    assert_string_equal(client.message.error.field, "record");
+    expect(MESSAGE_GOODBYE, 0);
+    expect_end();
+}
+
+/* The only session; the daemon's thread sleeps. */
+static const struct session *only_session(void)
+{
+    size_t cursor = 0;
+    void *session = NULL;
+    assert_true(hashmap_next(&served.hub.sessions, &cursor, NULL, &session));
+    return session;
+}
+
+TEST(a_key_says_who_it_is_and_what_he_may_do)
+{
+    static const struct sealed_key *const keys[] = {&session_key, &session_reader_key, NULL};
+    blob_principal principals[3];
+    for (size_t i = 0; i < 3; i++) {
+        start(&patient);
+        if (keys[i])
+            seal_with(keys[i]);
+        greet();
+        expect_alive(1);
+        const struct session *session = only_session();
+        principals[i] = session->principal;
+        assert_true(session->identity.known);
+        assert_int_equal(session->identity.has_key, keys[i] != NULL);
+        assert_int_equal(session->identity.read_only, keys[i] == &session_reader_key);
+        if (i < 2)
+            tear_down(NULL);
+    }
+    assert_int_not_equal(principals[0], principals[1]);
+    assert_int_equal(principals[2], getuid());
+    assert_true(principals[0] > UINT32_MAX && principals[1] > UINT32_MAX);
+}
+
+TEST(a_wrong_key_is_answered_after_a_while)
+{
+    static const struct sealed_key wrong = {.bytes = "nobody knows this one"};
+    struct connection_limits limits = patient;
+    limits.wrong_key_ms = 300;
+    start(&limits);
+    uint64_t before_ns = clock_now_ns();
+    struct decode_error error = {0};
+    enum sealed_result result;
+    client.link = sealed_link_client(&wrong);
+    while ((result = sealed_link_handshake(client.link, &error)) == SEALED_NEED_MORE) {
+        struct pollfd fd = {.fd = client.fd, .events = POLLIN};
+        send_sealed();
+        assert_int_equal(poll(&fd, 1, 20000), 1);
+        assert_true(receive_sealed());
+    }
+    assert_in_range((clock_now_ns() - before_ns) / 1000000, 300, 5000);
+    assert_int_equal(result, SEALED_REFUSED);
+    assert_int_equal(sealed_status(client.link->sealed), SEALED_WRONG_KEY);
+    assert_false(receive_sealed());
+}
