@@ -208,12 +208,13 @@ LINKED = $(if $(filter $(RIVAL_SOURCES),$^),$(filter-out $(B)/shader_sources.o,$
 # Tests register themselves (tests/harness/test.h). Those that need neither libraries nor functions replaced for them alone are
 # one program; run_tests.py runs each of its files in a process of its own.
 MEDIA_TEST_SRC := $(call sources,tests/unit/encode tests/unit/viewer,c)
-FAULT_TEST_SRC := $(call sources,tests/unit/fuzz,c)
-UNIT_TEST_SRC := $(filter-out tests/unit/test_% tests/accuracy/test_% $(MEDIA_TEST_SRC) $(FAULT_TEST_SRC),$(call sources,tests/unit tests/accuracy,c))
+FAULT_TEST_SRC := tests/unit/session/faults.c
+CORPUS_TEST_SRC := $(call sources,tests/unit/fuzz,c)
+UNIT_TEST_SRC := $(filter-out tests/unit/test_% tests/accuracy/test_% $(MEDIA_TEST_SRC) $(FAULT_TEST_SRC) $(CORPUS_TEST_SRC),$(call sources,tests/unit tests/accuracy,c))
 ifneq ($(EMBREE),1)
 UNIT_TEST_SRC := $(filter-out tests/unit/bench/contest.c,$(UNIT_TEST_SRC))
 endif
-TEST_PROGRAMS := $(addprefix $(B)/tests/unit/,unit_tests media_tests fault_tests)
+TEST_PROGRAMS := $(addprefix $(B)/tests/unit/,unit_tests media_tests fault_tests corpus_tests)
 # A test with a main() of its own.
 LONE_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accuracy/test_*.c))
 UNIT_TESTS := $(TEST_PROGRAMS) $(LONE_TESTS)
@@ -223,6 +224,7 @@ $(TEST_PROGRAMS): $(B)/tests/harness/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_
 $(B)/tests/unit/unit_tests: $(call obj,$(UNIT_TEST_SRC))
 $(B)/tests/unit/media_tests: $(call obj,$(MEDIA_TEST_SRC))
 $(B)/tests/unit/fault_tests: $(call obj,$(FAULT_TEST_SRC))
+$(B)/tests/unit/corpus_tests: $(call obj,$(CORPUS_TEST_SRC))
 $(LONE_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -o $@
 # What every tracer promises: one program of a folder, with the rows of all tracers.
@@ -237,7 +239,6 @@ $(BENCHES): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 MODEL_OBJ := $(B)/tests/bench/load_model.o
 RIVAL_OBJ := $(call obj,$(addprefix tests/bench/svo,.c _build.c _tiles.c)) $(RIVAL_SOURCES)
 CONTEST_OBJ := $(MODEL_OBJ) $(call obj,$(addprefix tests/bench/bench_,contest.c embree.c scene.c sheets.c stats.c waves.c))
-$(B)/tests/accuracy/test_abuffer_against_reference: $(MODEL_OBJ)
 # Sessions live in a time of their own.
 SERVING_OBJ := $(call obj,$(addprefix tests/fuzz/,engine_recorder.c serving.c))
 SERVING_WRAP := -Wl,--wrap=clock_now_ns
@@ -249,9 +250,12 @@ $(B)/tests/fuzz/kept_%.o: tests/fuzz/fuzz_%.c
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 # The importer without its main() and its sandbox.
 READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o sandbox.o send.o),$(IMPORT_OBJ))
-# Sessions that begin, break and end, with memory that runs out; and the fuzzers' inputs.
-$(B)/tests/unit/fault_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o $(READERS_OBJ)
-$(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc $(IMPORT_LIBS) -lstdc++
+# Sessions that begin, break and end, with memory that runs out.
+$(B)/tests/unit/fault_tests: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
+$(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
+# What the fuzzers have found.
+$(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ)
+$(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(IMPORT_LIBS) -lstdc++
 # What the daemon encodes is decoded by the library itself.
 $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint pixmap replay settings tour window)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load

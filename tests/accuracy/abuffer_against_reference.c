@@ -8,6 +8,7 @@
 #include "tests/accuracy/against_reference.h"
 
 #include "tests/bench/load_model.h"
+#include "tests/harness/test.h"
 
 #include <unistd.h>
 
@@ -67,34 +68,37 @@ static void expect_scene_like_the_reference(struct fixture *fixture, void (*add)
 /* Of closed shapes: the 36 dB that are asked of dda are asked of steps too. */
 static const double closed_min[SEARCH_COUNT] = {36, 36, 36};
 
-static void mirrors_are_like_the_references(void **state)
+ALL_TESTS(fixture_setup, fixture_teardown)
+EACH_TEST(fixture_clear, NULL)
+
+TEST(mirrors_are_like_the_references)
 {
     expect_scene_like_the_reference(*state, add_mirrors, "mirrors", closed_min);
 }
 
-static void textures_in_a_mirror_are_like_the_references(void **state)
+TEST(textures_in_a_mirror_are_like_the_references)
 {
     expect_scene_like_the_reference(*state, add_textured, "textures in a mirror", closed_min);
 }
 
-static void every_sort_of_texture_is_applied(void **state)
+TEST(every_sort_of_texture_is_applied)
 {
     expect_scene_like_the_reference(*state, add_every_texture, "every texture", closed_min);
 }
 
-static void glass_is_like_the_references(void **state)
+TEST(glass_is_like_the_references)
 {
     expect_scene_like_the_reference(*state, add_glass, "glass", closed_min);
 }
 
-static void spheres_are_like_the_references(void **state)
+TEST(spheres_are_like_the_references)
 {
     expect_scene_like_the_reference(*state, add_spheres, "spheres", closed_min);
 }
 
 /* Whether there is a hole is decided for a cell as a whole, so its rims are a cell's steps, and each of many rims
  * shows. What has holes is no body. */
-static void cutouts_are_like_the_references(void **state)
+TEST(cutouts_are_like_the_references)
 {
     expect_scene_like_the_reference(*state, add_cutout, "cutouts over a mirror", (const double[]){34, 34, 34});
 }
@@ -116,7 +120,7 @@ static void expect_occlusion_like_the_references(struct fixture *fixture, const 
 /* The 34 dB that are asked of dda are asked of steps too. */
 static const double occlusion_min[SEARCH_COUNT] = {34, 34, 34};
 
-static void occlusion_of_closed_shapes_is_like_the_references(void **state)
+TEST(occlusion_of_closed_shapes_is_like_the_references)
 {
     struct fixture *fixture = *state;
     add_mirrors(fixture);
@@ -125,7 +129,7 @@ static void occlusion_of_closed_shapes_is_like_the_references(void **state)
 }
 
 /* A corner of a room, and in it what is not closed either: nothing has an inside. */
-static void occlusion_of_open_shapes_is_like_the_references(void **state)
+TEST(occlusion_of_open_shapes_is_like_the_references)
 {
     struct fixture *fixture = *state;
     static const float walls[3][12] = {{1, 0, 0, 0, 0, 0, 1, -1, 0, -1, 0, 0},
@@ -158,7 +162,7 @@ static void look_at_all(struct fixture *fixture)
     assert_true(frame_camera_look_at(&fixture->request.camera, eye, target, (const float[]){0, 1, 0}, 0.8f));
 }
 
-static void occlusion_of_models_is_like_the_references(void **state)
+TEST(occlusion_of_models_is_like_the_references)
 {
     struct fixture *fixture = *state;
     static const char *const models[] = {"common/teapot.obj", "common/dragon-47k.glb", "common/bunny-69k.obj"};
@@ -215,24 +219,7 @@ static void request_whitted(struct fixture *fixture)
     fixture->request.tracer_options = searches[DDA].options;
 }
 
-static void secondary_rays_agree_with_the_reference(void **state)
+TEST(secondary_rays_agree_with_the_reference)
 {
     with_pairs_of_shapes(state, ABUFFER, request_whitted, expect_rays_agree);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(secondary_rays_agree_with_the_reference, fixture_clear),
-        cmocka_unit_test_setup(mirrors_are_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(textures_in_a_mirror_are_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(every_sort_of_texture_is_applied, fixture_clear),
-        cmocka_unit_test_setup(glass_is_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(spheres_are_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(cutouts_are_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(occlusion_of_closed_shapes_is_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(occlusion_of_open_shapes_is_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(occlusion_of_models_is_like_the_references, fixture_clear),
-    };
-    return cmocka_run_group_tests_name("abuffer against the reference", tests, fixture_setup, fixture_teardown);
 }

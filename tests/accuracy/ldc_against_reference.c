@@ -5,6 +5,7 @@
  *
  * Each test prints what it measured. FARLIGHT_TEST_PICTURES=folder keeps the pictures. */
 #include "tests/accuracy/against_reference.h"
+#include "tests/harness/test.h"
 
 #define LDC 3
 #define RESOLUTION 1024u
@@ -51,39 +52,42 @@ static void expect_scene_like_the_reference(struct fixture *fixture, void (*add)
     expect_like_the_reference(fixture, name, psnr_min);
 }
 
-static void mirrors_are_like_the_references(void **state)
+ALL_TESTS(fixture_setup, fixture_teardown)
+EACH_TEST(fixture_clear, NULL)
+
+TEST(mirrors_are_like_the_references)
 {
     expect_scene_like_the_reference(*state, add_mirrors, "mirrors", PSNR_MIN);
 }
 
-static void textures_in_a_mirror_are_like_the_references(void **state)
+TEST(textures_in_a_mirror_are_like_the_references)
 {
     expect_scene_like_the_reference(*state, add_textured, "textures in a mirror", PSNR_MIN);
 }
 
-static void every_sort_of_texture_is_stored(void **state)
+TEST(every_sort_of_texture_is_stored)
 {
     expect_scene_like_the_reference(*state, add_every_texture, "every texture", PSNR_MIN);
 }
 
-static void glass_is_like_the_references(void **state)
+TEST(glass_is_like_the_references)
 {
     expect_scene_like_the_reference(*state, add_glass, "glass", PSNR_MIN);
 }
 
 /* Whether there is a hole is decided for a cell as a whole, so its rims are a cell's steps, and each of many rims
  * shows. */
-static void cutouts_are_like_the_references(void **state)
+TEST(cutouts_are_like_the_references)
 {
     expect_scene_like_the_reference(*state, add_cutout, "cutouts over a mirror", PSNR_MIN_HOLES);
 }
 
-static void spheres_are_like_the_references(void **state)
+TEST(spheres_are_like_the_references)
 {
     expect_scene_like_the_reference(*state, add_spheres, "spheres", PSNR_MIN);
 }
 
-static void distributed_rays_see_what_the_references_see(void **state)
+TEST(distributed_rays_see_what_the_references_see)
 {
     struct fixture *fixture = *state;
     fixture->request.integrator = INTEGRATOR_DISTRIBUTED;
@@ -92,7 +96,7 @@ static void distributed_rays_see_what_the_references_see(void **state)
 }
 
 /* What moved lies in a cube of its own: rays see both as one, and each other's reflections and shadows. */
-static void what_moves_is_seen_with_what_stands_still(void **state)
+TEST(what_moves_is_seen_with_what_stands_still)
 {
     struct fixture *fixture = *state;
     float m[12];
@@ -118,7 +122,7 @@ static void what_moves_is_seen_with_what_stands_still(void **state)
 
 /* ---- frames ---- */
 
-static void switching_to_another_tracer_and_back_builds_nothing(void **state)
+TEST(switching_to_another_tracer_and_back_builds_nothing)
 {
     struct fixture *fixture = *state;
     static const struct {
@@ -137,7 +141,7 @@ static void switching_to_another_tracer_and_back_builds_nothing(void **state)
 }
 
 /* A picture that goes on does so only with what it was begun with. */
-static void a_picture_of_other_cubes_begins_anew(void **state)
+TEST(a_picture_of_other_cubes_begins_anew)
 {
     struct fixture *fixture = *state;
     add_mirrors(fixture);
@@ -155,7 +159,7 @@ static void a_picture_of_other_cubes_begins_anew(void **state)
     frame_result_finish(&result);
 }
 
-static void what_moves_while_the_shutter_is_open_is_refused_at_once(void **state)
+TEST(what_moves_while_the_shutter_is_open_is_refused_at_once)
 {
     struct fixture *fixture = *state;
     float m[12];
@@ -192,26 +196,7 @@ static void expect_rays_agree(struct fixture *fixture, const char *name, float c
     expect_agreement(name, &found, &asked);
 }
 
-static void secondary_rays_agree_with_the_reference(void **state)
+TEST(secondary_rays_agree_with_the_reference)
 {
     with_pairs_of_shapes(state, LDC, request_cubes, expect_rays_agree);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(secondary_rays_agree_with_the_reference, fixture_clear),
-        cmocka_unit_test_setup(mirrors_are_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(textures_in_a_mirror_are_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(every_sort_of_texture_is_stored, fixture_clear),
-        cmocka_unit_test_setup(glass_is_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(cutouts_are_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(spheres_are_like_the_references, fixture_clear),
-        cmocka_unit_test_setup(distributed_rays_see_what_the_references_see, fixture_clear),
-        cmocka_unit_test_setup(what_moves_is_seen_with_what_stands_still, fixture_clear),
-        cmocka_unit_test_setup(switching_to_another_tracer_and_back_builds_nothing, fixture_clear),
-        cmocka_unit_test_setup(a_picture_of_other_cubes_begins_anew, fixture_clear),
-        cmocka_unit_test_setup(what_moves_while_the_shutter_is_open_is_refused_at_once, fixture_clear),
-    };
-    return cmocka_run_group_tests_name("ldc against the reference", tests, fixture_setup, fixture_teardown);
 }
