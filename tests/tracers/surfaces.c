@@ -147,7 +147,7 @@ static struct scene *scene_of_ball(enum ball ball, bool is_glass)
 {
     struct mesh_builder mesh = {0};
     if (ball != BALL_SPHERE) {
-        add_ball(&mesh, ball_centre, BALL_RADIUS, 160);
+        add_ball(&mesh, ball_centre, BALL_RADIUS, 250);
         return scene_of(&mesh, ball == BALL_CLOSED, is_glass);
     }
     const float sphere[1][4] = {{ball_centre[0], ball_centre[1], ball_centre[2], (float)BALL_RADIUS}};
