@@ -210,14 +210,11 @@ LINKED = $(if $(filter $(RIVAL_SOURCES),$^),$(filter-out $(B)/shader_sources.o,$
 MEDIA_TEST_SRC := $(call sources,tests/unit/encode tests/unit/viewer,c)
 FAULT_TEST_SRC := tests/unit/session/faults.c
 CORPUS_TEST_SRC := $(call sources,tests/unit/fuzz,c)
-UNIT_TEST_SRC := $(filter-out tests/unit/test_% tests/accuracy/test_% $(MEDIA_TEST_SRC) $(FAULT_TEST_SRC) $(CORPUS_TEST_SRC),$(call sources,tests/unit tests/accuracy,c))
+UNIT_TEST_SRC := $(filter-out $(MEDIA_TEST_SRC) $(FAULT_TEST_SRC) $(CORPUS_TEST_SRC),$(call sources,tests/unit tests/accuracy,c))
 ifneq ($(EMBREE),1)
 UNIT_TEST_SRC := $(filter-out tests/unit/bench/contest.c,$(UNIT_TEST_SRC))
 endif
 TEST_PROGRAMS := $(addprefix $(B)/tests/unit/,unit_tests media_tests fault_tests corpus_tests)
-# A test with a main() of its own.
-LONE_TESTS := $(patsubst %.c,$(B)/%,$(wildcard tests/unit/test_*.c tests/accuracy/test_*.c))
-UNIT_TESTS := $(TEST_PROGRAMS) $(LONE_TESTS)
 TEST_LIBS = $(call pkg_libs,$(TEST_PKGS) $(SERVER_PKGS) $(CLIENT_PKGS)) $(EMBREE_LIBS) -lm
 $(TEST_PROGRAMS): $(B)/tests/harness/main.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -o $@
@@ -225,8 +222,6 @@ $(B)/tests/unit/unit_tests: $(call obj,$(UNIT_TEST_SRC))
 $(B)/tests/unit/media_tests: $(call obj,$(MEDIA_TEST_SRC))
 $(B)/tests/unit/fault_tests: $(call obj,$(FAULT_TEST_SRC))
 $(B)/tests/unit/corpus_tests: $(call obj,$(CORPUS_TEST_SRC))
-$(LONE_TESTS): %: %.o $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ)
-	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LINKED) $(TEST_LIBS) -o $@
 # What every tracer promises: one program of a folder, with the rows of all tracers.
 CONTRACT := $(B)/tests/tracers/test_contract
 CONTRACT_OBJ := $(call obj,$(filter-out tests/tracers/test_%,$(wildcard tests/tracers/*.c)))
@@ -318,8 +313,8 @@ TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb gnuplot-no
 LINT_PACKAGES := clang clang-format glslang-tools python3
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 
-.PHONY: tests build-packages test-packages lint-packages fuzz-packages test demo bench soak bench-plot check-headers lint format install uninstall clean help
-tests: $(UNIT_TESTS) $(CONTRACT) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(BENCH_VIEW) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
+.PHONY: tests build-packages test-packages lint-packages fuzz-packages test test-long demo bench soak bench-plot check-headers lint format install uninstall clean help
+tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(BENCH_VIEW) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES)
@@ -335,6 +330,10 @@ JOBS ?= $(shell nproc)
 test: test-packages
 	$(MAKE) -j$(JOBS) all tests
 	python3 tests/tools/run_tests.py $(B) $(TESTS)
+# With what takes minutes: the benchmark itself, tiny, and every hostile file the whole way.
+test-long: test-packages
+	$(MAKE) -j$(JOBS) all tests
+	FARLIGHT_TEST_LONG=1 python3 tests/tools/run_tests.py $(B) $(TESTS)
 demo: build-packages
 	$(MAKE) -j$(JOBS) all $(B)/tests/tools/make_scenes
 	tests/tools/demo.sh $(B) out $(FAST)
@@ -408,6 +407,7 @@ clean:
 help:
 	@echo 'make demo       install what is missing, build, render the bundled scenes into out/   [FAST=1: one picture]'
 	@echo 'make test       install what tests need, build, run all tests   [TESTS=part-of-a-name]'
+	@echo 'make test-long  all tests and what takes minutes: the benchmark itself, every hostile file the whole way'
 	@echo 'make bench      measure, into out/bench.txt and out/bench.json   [BENCH="family reach"; see tests/bench/bench.py]'
 	@echo 'make soak       use one daemon for some minutes, and see that its memory stays flat   [ROUNDS=1000]'
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'

@@ -101,12 +101,15 @@ static int end_file(void **state)
     return running->tear_down && !skip_reason[0] ? running->tear_down(state) : 0;
 }
 
-/* Keeps the tests whose names contain `part`. */
+/* Keeps the test of that name, or else those whose names contain `part`. */
 static void keep_named(struct test_file *file, const char *part)
 {
     size_t kept = 0;
+    bool is_whole = false;
+    for (size_t i = 0; i < file->count; i++)
+        is_whole = is_whole || strcmp(file->tests[i].name, part) == 0;
     for (size_t i = 0; i < file->count; i++) {
-        if (!strstr(file->tests[i].name, part))
+        if (is_whole ? strcmp(file->tests[i].name, part) != 0 : !strstr(file->tests[i].name, part))
             continue;
         file->own_fixtures[kept] = file->own_fixtures[i];
         file->tests[kept++] = file->tests[i];

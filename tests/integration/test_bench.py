@@ -9,7 +9,7 @@ import sys
 import tempfile
 import unittest
 
-from farlight_test import BIN, ROOT, TIMEOUT_S
+from farlight_test import BIN, ROOT, TIMEOUT_S, long_test
 
 BENCH = ROOT / "tests" / "bench"
 sys.path.insert(0, str(BENCH))
@@ -72,6 +72,7 @@ class Verdicts(unittest.TestCase):
         self.assertEqual(self.verdict(0.9, 0.04, at_most=True), "MISSED")
 
 
+@long_test
 @unittest.skipUnless((BIN / "tests/bench/bench_tracers").is_file(), "built without Embree, which the benchmark compares with")
 class Benchmark(unittest.TestCase):
     @classmethod

@@ -33,6 +33,7 @@ EXPECTED_SKIPS = (
     r"sanitizers do not run within the limits of the service",
     r"ptrace: ",  # forbidden in many containers
     r"this kernel does not name children",
+    r"left to make test-long",  # which .ci/run calls
 )
 # They hold what shaders compute against closed forms. Mesa compiles shaders at run time, so that sanitizers do not see
 # them; the C around them is that of the files that stay.
@@ -51,8 +52,8 @@ def run_check(name, command):
     return Result(f"== {name}\n{result.stdout}", int(result.returncode == 0), int(result.returncode != 0), [])
 
 
-def run_cmocka(name, command, tests):
-    """`tests`: their names, where they are known; one that says nothing of how it ended has failed."""
+def run_program(command):
+    """(output, exit status, test -> verdict, (test, reason) of those that were skipped)"""
     try:
         result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
                                 errors="replace", timeout=FILE_TIMEOUT_S)
@@ -70,15 +71,28 @@ def run_cmocka(name, command, tests):
                 skips.append((found[2], reason or "without a reason"))
     if not verdicts and status == 0 and reason:  # a program that skips all of its tests
         skips.append(("all of them", reason))
-    silent = [test for test in tests if test not in verdicts]
+    return output, status, verdicts, skips
+
+
+def run_cmocka(name, command, tests):
+    """`tests`: their names in order, where they are known. What follows a test that failed, or after which the program
+    died, may have failed because of it, and is run again alone."""
+    output, status, verdicts, skips = run_program(command)
+    first = next((i for i, test in enumerate(tests) if verdicts.get(test) in (None, "FAILED")), len(tests))
+    if first < len(tests):
+        verdicts[tests[first]] = "FAILED"
+    for test in tests[first + 1:]:
+        if verdicts.get(test) in (None, "FAILED"):
+            again, _, alone, _ = run_program([command[0], f"{command[1]}:{test}"])
+            verdicts[test] = alone.get(test, "FAILED")
+            output += f"\nalone:\n{again}"
     passed, failed = (sum(verdict == word for verdict in verdicts.values()) for word in ("OK", "FAILED"))
-    failed += len(silent)
     if status != 0 and failed == 0:  # it died after the last test
         failed = 1
     lines = [f"== {name}"]
     if failed or os.environ.get("VERBOSE"):
         lines.append(output)
-    lines += [f"   not run: {test}" for test in silent]
+    lines += [f"   failed: {test}" for test, verdict in verdicts.items() if verdict == "FAILED"]
     lines.append(f"   {passed} passed, {failed} failed, {len(skips)} skipped" + (f" (exit status {status})" if status else ""))
     return Result("\n".join(lines), passed, failed, skips)
 
@@ -134,10 +148,9 @@ def tasks(build, names):
             files[file].append(test)
         for file, tests in files.items():
             found[file] = lambda file=file, program=program, tests=tests: run_cmocka(file, [program, file], tests)
-    for program in (path for folder in ("tracers", "unit", "accuracy")
-                    for path in sorted(build.glob(f"tests/{folder}/test_*"))):
-        if program.suffix == "":
-            found[program.name] = lambda program=program: run_cmocka(program.name, [program], ())
+    contract = build / "tests/tracers/test_contract"
+    if contract.is_file():
+        found[contract.name] = lambda: run_cmocka(contract.name, [contract], ())
     if os.environ.get("FARLIGHT_TEST_SANITIZED"):
         for name in NOT_SANITIZED:
             found.pop(name, None)

@@ -147,7 +147,7 @@ static void run_beside_each_other(uint32_t weight_of_first)
         submit(engine, made);
     }
     for (int i = 0; i < 4; i++)
-        engine_event_destroy(event_within(engine, 10000));
+        engine_event_destroy(event_within(engine, 60000));
     expect_shares(1, weight_of_first, 2, 1);
     stop(engine);
 }
@@ -178,7 +178,7 @@ TEST(who_would_wait_for_the_device_lets_others_go_first)
     }
     atomic_store(&fake.gate_open, true);
     for (int i = 0; i < 4; i++)
-        engine_event_destroy(event_within(engine, 10000));
+        engine_event_destroy(event_within(engine, 60000));
     /* Alone it goes on all the same; together it would have sixteen of seventeen steps. */
     int last = 0, begun = 0;
     for (int i = 0; i < atomic_load(&fake.step_count); i++)
@@ -209,7 +209,7 @@ TEST(edits_wait_for_the_frame_in_hand_and_others_do_not)
     bool applied = false;
     uint32_t frames = 0;
     while (!applied || frames < 2) {
-        struct engine_event *event = event_within(engine, 10000);
+        struct engine_event *event = event_within(engine, 60000);
         assert_non_null(event);
         if (event->kind == ENGINE_FRAME) {
             /* The frame in hand shows what it began with, the next one the edit. */
@@ -243,7 +243,7 @@ TEST(what_waits_for_a_frame_keeps_its_order_and_can_be_cancelled)
     atomic_store(&fake.gate_open, true);
     unsigned answered = 0;
     while (answered != 7) {
-        struct engine_event *event = event_within(engine, 10000);
+        struct engine_event *event = event_within(engine, 60000);
         assert_non_null(event);
         if (event->kind == ENGINE_FRAME)
             assert_int_equal(event->frame->result.revision, event->request == 6);

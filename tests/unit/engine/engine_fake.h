@@ -64,6 +64,8 @@ static struct {
     atomic_int fail_kind;       /* enum error_kind */
     atomic_int fail_from_frame; /* frames from this number on fail; 0: none */
     atomic_bool no_device;
+    atomic_bool holds_steps; /* as long as it is set, a step does not end */
+    atomic_int steps_held;
     atomic_int in_progress; /* frames, of all scenes */
     atomic_int step_count;
     uint64_t step_seeds[STEPS_MAX]; /* whose step it was: the request's seed */
@@ -212,6 +214,10 @@ static inline void fake_work(struct frame_renderer *renderer)
 {
     if (atomic_load(&fake.step_us))
         usleep(atomic_load(&fake.step_us));
+    if (atomic_load(&fake.holds_steps))
+        atomic_fetch_add(&fake.steps_held, 1);
+    while (atomic_load(&fake.holds_steps))
+        usleep(500);
     int step = renderer->last_step = atomic_fetch_add(&fake.step_count, 1);
     uint64_t start_ns = clock_now_ns(), now_ns = start_ns;
     while (now_ns - start_ns < renderer->request.ao_rays * UINT64_C(1000))
@@ -368,7 +374,7 @@ static inline struct engine_event *event_within(struct engine *engine, int ms)
 static inline struct engine_event *expect_event(struct engine *engine, enum engine_event_kind kind,
                                                 uint64_t client, uint32_t request)
 {
-    struct engine_event *event = event_within(engine, 10000);
+    struct engine_event *event = event_within(engine, 60000);
     if (!event)
         fail_msg("no event; expected kind %d for request %u", kind, request);
     if (event->kind != kind || event->client != client || event->request != request)
@@ -449,7 +455,7 @@ static inline void expect_shares(uint64_t seed_a, uint32_t weight_a, uint64_t se
 
 static inline void wait_until(const atomic_int *counter, int value)
 {
-    for (int i = 0; i < 10000 && atomic_load(counter) < value; i++)
+    for (int i = 0; i < 60000 && atomic_load(counter) < value; i++)
         usleep(1000);
     assert_true(atomic_load(counter) >= value);
 }

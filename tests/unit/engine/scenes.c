@@ -233,7 +233,7 @@ TEST(edits_that_came_before_a_close_are_applied)
     bool framed = false;
     uint32_t next = 8;
     while (!framed || next < 10) {
-        struct engine_event *event = event_within(engine, 10000);
+        struct engine_event *event = event_within(engine, 60000);
         assert_non_null(event);
         if (event->client == 1) {
             assert_int_equal(event->kind, ENGINE_DONE);
@@ -282,7 +282,7 @@ TEST(a_cancel_ends_only_what_its_client_waits_for)
     atomic_store(&fake.gate_open, true);
     unsigned ends = 0;
     while (ends != 7) {
-        struct engine_event *event = event_within(engine, 10000);
+        struct engine_event *event = event_within(engine, 60000);
         assert_non_null(event);
         if (event->kind == ENGINE_DONE)
             ends |= 1u << (event->request - 7);

@@ -26,7 +26,7 @@ static void expect_answers(struct engine *engine, const uint32_t *requests, size
 {
     bool seen[16] = {false};
     for (size_t left = count; left > 0;) {
-        struct engine_event *event = event_within(engine, 10000);
+        struct engine_event *event = event_within(engine, 60000);
         assert_non_null(event);
         size_t i = 0;
         while (i < count && requests[i] != event->request)
@@ -87,7 +87,7 @@ TEST(an_edit_waits_for_all_frames_and_lets_none_begin)
     atomic_store(&fake.gate_open, true);
     bool applied = false, rendered = false;
     while (!applied || !rendered) {
-        struct engine_event *event = event_within(engine, 10000);
+        struct engine_event *event = event_within(engine, 60000);
         assert_non_null(event);
         if (event->request == 6)
             applied = true;

@@ -462,7 +462,7 @@ TEST(a_clip_that_goes_ends_the_job_and_says_which)
     atomic_store(&fake.gate_open, true);
     bool removed = false, ended = false;
     for (int events = 0; events < 3; events++) {
-        struct engine_event *event = event_within(engine, 10000);
+        struct engine_event *event = event_within(engine, 60000);
         assert_non_null(event);
         removed = removed || (event->kind == ENGINE_DONE && event->request == 11);
         if (event->kind == ENGINE_FAILED) {

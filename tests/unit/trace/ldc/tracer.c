@@ -2,9 +2,10 @@
 /* What the tracer `ldc` promises beside its answers: what stands still is built once, what moves alone costs its
  * frame, and it says how large its cells are and what was lost. That its answers are right to the size of a cell
  * is shown by tests/accuracy/ldc_against_reference.c. */
-#include "tracer_fixture.h"
+#include "tests/unit/trace/tracer_fixture.h"
 
 #include "render/tracer_set.h"
+#include "tests/harness/test.h"
 
 #define RESOLUTION 64u
 #define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
@@ -98,9 +99,10 @@ static void expect_distance(float distance, double expected)
 
 /* ---- tests ---- */
 
-static void options_out_of_range_are_refused_by_name(void **state)
+ALL_TESTS(open_device, close_device)
+
+TEST(options_out_of_range_are_refused_by_name)
 {
-    (void)state;
     static const struct refused_options rows[] = {
         {"options.ldc_resolution", {.ldc_resolution = 15}},
         {"options.ldc_resolution", {.ldc_resolution = 4097}},
@@ -121,9 +123,8 @@ static void options_out_of_range_are_refused_by_name(void **state)
     expect_options_refused(NUMBER_LDC, rows, sizeof(rows) / sizeof(rows[0]));
 }
 
-static void the_size_of_a_cell_is_that_of_the_longest_side(void **state)
+TEST(the_size_of_a_cell_is_that_of_the_longest_side)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_boxes(3), &small); /* 5 x 1 x 1 */
     expect_built(&fixture, true, false);
@@ -143,9 +144,8 @@ static void the_size_of_a_cell_is_that_of_the_longest_side(void **state)
     fixture_finish(&fixture);
 }
 
-static void what_begins_to_move_leaves_the_static_cube_once(void **state)
+TEST(what_begins_to_move_leaves_the_static_cube_once)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_boxes(3), &small);
     add_box(&fixture.edits, 3, 1, 4, 0, 1);
@@ -170,9 +170,8 @@ static void what_begins_to_move_leaves_the_static_cube_once(void **state)
     fixture_finish(&fixture);
 }
 
-static void what_has_moved_back_stays_dynamic(void **state)
+TEST(what_has_moved_back_stays_dynamic)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_boxes(2), &small);
     add_box(&fixture.edits, 1, 1, 0, 0, 1);
@@ -190,9 +189,8 @@ static void what_has_moved_back_stays_dynamic(void **state)
     fixture_finish(&fixture);
 }
 
-static void what_was_hidden_and_comes_back_is_dynamic(void **state)
+TEST(what_was_hidden_and_comes_back_is_dynamic)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_boxes(3), &small);
     for (int turn = 0; turn < 2; turn++) {
@@ -209,9 +207,8 @@ static void what_was_hidden_and_comes_back_is_dynamic(void **state)
     fixture_finish(&fixture);
 }
 
-static void new_objects_are_static_and_settle_what_stood_still(void **state)
+TEST(new_objects_are_static_and_settle_what_stood_still)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_boxes(3), &small);
     add_box(&fixture.edits, 1, 1, 0, 0, 1);
@@ -239,9 +236,8 @@ static void new_objects_are_static_and_settle_what_stood_still(void **state)
 }
 
 /* A mesh that is sent anew again and again moves, as it were. */
-static void a_mesh_that_is_set_again_is_dynamic(void **state)
+TEST(a_mesh_that_is_set_again_is_dynamic)
 {
-    (void)state;
     struct fixture fixture;
     struct scene *scene = scene_of_boxes(2);
     fixture_init(&fixture, scene, &small);
@@ -258,9 +254,8 @@ static void a_mesh_that_is_set_again_is_dynamic(void **state)
     fixture_finish(&fixture);
 }
 
-static void a_skinned_mesh_is_dynamic_from_the_first(void **state)
+TEST(a_skinned_mesh_is_dynamic_from_the_first)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, test_scene_deformed(), &small);
     expect_built(&fixture, true, true); /* rigid nodes 6 and 7; skins and targets 2, 4, 5 */
@@ -278,9 +273,8 @@ static void a_skinned_mesh_is_dynamic_from_the_first(void **state)
     fixture_finish(&fixture);
 }
 
-static void an_edit_of_a_texture_builds_all_and_a_factor_nothing(void **state)
+TEST(an_edit_of_a_texture_builds_all_and_a_factor_nothing)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, test_scene_translucent(), &small);
     struct scene_material glass = *scene_material(fixture.scene, 3);
@@ -296,9 +290,8 @@ static void an_edit_of_a_texture_builds_all_and_a_factor_nothing(void **state)
 }
 
 /* As flat as can be, one point wide, far away and of any size: boxes stay boxes. */
-static void flat_and_tiny_and_huge_scenes_have_cells(void **state)
+TEST(flat_and_tiny_and_huge_scenes_have_cells)
 {
-    (void)state;
     static const struct {
         float size[3], place[3], longest;
     } rows[] = {
@@ -340,9 +333,8 @@ static struct scene *scene_of_squares(void)
     return edits.scene;
 }
 
-static void more_layers_than_may_be_kept_are_reported_and_the_nearest_stay(void **state)
+TEST(more_layers_than_may_be_kept_are_reported_and_the_nearest_stay)
 {
-    (void)state;
     struct tracer_options options = {.ldc_resolution = RESOLUTION, .ldc_layers_max = 2};
     for (options.ldc_build = LDC_BUILD_AUTO; options.ldc_build <= LDC_BUILD_LISTS; options.ldc_build++) {
         struct fixture fixture;
@@ -358,9 +350,8 @@ static void more_layers_than_may_be_kept_are_reported_and_the_nearest_stay(void 
     }
 }
 
-static void after_a_failure_the_next_update_starts_anew(void **state)
+TEST(after_a_failure_the_next_update_starts_anew)
 {
-    (void)state;
     struct fixture fixture;
     struct error error = {0};
     fixture_init(&fixture, scene_of_boxes(3), &small);
@@ -377,9 +368,8 @@ static void after_a_failure_the_next_update_starts_anew(void **state)
 }
 
 /* As a renderer that is switched between tracers asks for them. */
-static void a_tracer_that_was_away_builds_what_has_changed_meanwhile(void **state)
+TEST(a_tracer_that_was_away_builds_what_has_changed_meanwhile)
 {
-    (void)state;
     static const struct tracer_options options = {.ldc_resolution = RESOLUTION};
     struct tracer_set set = {0};
     struct fixture fixture = {.scene = scene_of_boxes(3), .memory_before_bytes = device->memory_used_bytes};
@@ -417,24 +407,4 @@ static void a_tracer_that_was_away_builds_what_has_changed_meanwhile(void **stat
     fixture.tracer = NULL; /* the set's */
     tracer_set_finish(&set);
     fixture_finish(&fixture);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(options_out_of_range_are_refused_by_name),
-        cmocka_unit_test(the_size_of_a_cell_is_that_of_the_longest_side),
-        cmocka_unit_test(what_begins_to_move_leaves_the_static_cube_once),
-        cmocka_unit_test(what_has_moved_back_stays_dynamic),
-        cmocka_unit_test(what_was_hidden_and_comes_back_is_dynamic),
-        cmocka_unit_test(new_objects_are_static_and_settle_what_stood_still),
-        cmocka_unit_test(a_mesh_that_is_set_again_is_dynamic),
-        cmocka_unit_test(a_skinned_mesh_is_dynamic_from_the_first),
-        cmocka_unit_test(an_edit_of_a_texture_builds_all_and_a_factor_nothing),
-        cmocka_unit_test(flat_and_tiny_and_huge_scenes_have_cells),
-        cmocka_unit_test(more_layers_than_may_be_kept_are_reported_and_the_nearest_stay),
-        cmocka_unit_test(after_a_failure_the_next_update_starts_anew),
-        cmocka_unit_test(a_tracer_that_was_away_builds_what_has_changed_meanwhile),
-    };
-    RUN_ON_A_DEVICE(tests);
 }

@@ -3,12 +3,9 @@
 #include "trace/bvh/build_top.h"
 
 #include "base/progress.h"
+#include "tests/harness/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stddef.h>
-
-#include <cmocka.h>
 
 #include <float.h>
 #include <math.h>
@@ -334,9 +331,8 @@ static void expect_sound(const struct input *input)
         expect_sound_in_form(input, forms[form]);
 }
 
-static void a_tree_over_triangles_is_sound(void **state)
+TEST(a_tree_over_triangles_is_sound)
 {
-    (void)state;
     static const uint32_t counts[] = {1, 2, 3, 9, 100, 3000};
     for (size_t i = 0; i < COUNT(counts); i++) {
         struct input input = triangles(counts[i], 10, 0.3f, (uint32_t)i + 1);
@@ -345,9 +341,8 @@ static void a_tree_over_triangles_is_sound(void **state)
     }
 }
 
-static void a_tree_over_spheres_is_sound(void **state)
+TEST(a_tree_over_spheres_is_sound)
 {
-    (void)state;
     static const uint32_t counts[] = {1, 2, 500};
     for (size_t i = 0; i < COUNT(counts); i++) {
         struct input input = spheres(counts[i], (uint32_t)i + 1);
@@ -356,9 +351,8 @@ static void a_tree_over_spheres_is_sound(void **state)
     }
 }
 
-static void equal_triangles_are_split_without_end(void **state)
+TEST(equal_triangles_are_split_without_end)
 {
-    (void)state;
     struct input input = triangles(2000, 0, 1, 5);
     for (uint32_t i = 0; i < 6000; i++)
         input.indices[i] = i % 3;
@@ -366,9 +360,8 @@ static void equal_triangles_are_split_without_end(void **state)
     input_finish(&input);
 }
 
-static void triangles_without_area_are_kept(void **state)
+TEST(triangles_without_area_are_kept)
 {
-    (void)state;
     struct input input = triangles(500, 3, 0, 6);
     expect_sound(&input);
     input_finish(&input);
@@ -380,9 +373,8 @@ static void scale_and_move(struct input *input, const float scale[3], const floa
         input->positions[i] = input->positions[i] * scale[i % 3] + offset[i % 3];
 }
 
-static void coordinates_at_the_end_of_the_range_do_no_harm(void **state)
+TEST(coordinates_at_the_end_of_the_range_do_no_harm)
 {
-    (void)state;
     struct input input = triangles(300, 1, 0.1f, 7);
     scale_and_move(&input, (float[3]){1e38f, 1e38f, 1e38f}, (float[3]){0, 0, 0});
     /* Boxes alone: surfaces and extents are infinite, and so would the spheres be. */
@@ -391,9 +383,8 @@ static void coordinates_at_the_end_of_the_range_do_no_harm(void **state)
     input_finish(&input);
 }
 
-static void flat_shapes_lie_within_their_grid(void **state)
+TEST(flat_shapes_lie_within_their_grid)
 {
-    (void)state;
     for (int axis = 0; axis < 3; axis++) {
         for (int offset = 0; offset < 3; offset++) {
             struct input input = triangles(300, 1, 0.1f, 20);
@@ -407,9 +398,8 @@ static void flat_shapes_lie_within_their_grid(void **state)
     }
 }
 
-static void single_points_lie_within_their_grid(void **state)
+TEST(single_points_lie_within_their_grid)
 {
-    (void)state;
     static const float points[][3] = {{0, 0, 0}, {1, -1, 1e-30f}, {-7e5f, 0.1f, 1e20f}, {1e-38f, -1e-40f, 0}};
     for (size_t i = 0; i < COUNT(points); i++) {
         struct input input = triangles(20, 0, 0, 21);
@@ -421,9 +411,8 @@ static void single_points_lie_within_their_grid(void **state)
 }
 
 /* Where a float is far coarser than a cell of the grid would be. */
-static void shapes_far_from_the_origin_lie_within_their_grid(void **state)
+TEST(shapes_far_from_the_origin_lie_within_their_grid)
 {
-    (void)state;
     uint32_t seed = 22;
     for (uint32_t i = 0; i < 60; i++) {
         struct input input = triangles(40, 1, 0.1f, 23 + i);
@@ -439,9 +428,8 @@ static void shapes_far_from_the_origin_lie_within_their_grid(void **state)
 }
 
 /* What bvh_grid_over promises, for boxes of all sizes at all places: flat ones as wide as others are narrow. */
-static void a_grid_holds_the_box_it_was_made_for(void **state)
+TEST(a_grid_holds_the_box_it_was_made_for)
 {
-    (void)state;
     uint32_t seed = 24;
     for (uint32_t i = 0; i < 200000; i++) {
         float lower[3], upper[3];
@@ -461,9 +449,8 @@ static void a_grid_holds_the_box_it_was_made_for(void **state)
     }
 }
 
-static void an_evenly_fine_mesh_loses_nothing_to_its_grid(void **state)
+TEST(an_evenly_fine_mesh_loses_nothing_to_its_grid)
 {
-    (void)state;
     struct input input = triangles(5000, 10, 0.2f, 25);
     struct bvh_tree tree = build(&input, &packed);
     /* A triangle is some 800 cells across; two cells more are 0.5 % of a surface. */
@@ -476,9 +463,8 @@ static void an_evenly_fine_mesh_loses_nothing_to_its_grid(void **state)
     input_finish(&input);
 }
 
-static void fine_detail_in_a_great_extent_is_told_by_the_cost_of_its_grid(void **state)
+TEST(fine_detail_in_a_great_extent_is_told_by_the_cost_of_its_grid)
 {
-    (void)state;
     struct input input = triangles(2002, 1, 0.05f, 26);
     for (uint32_t i = 0; i < 9 * 2000; i++)
         input.positions[i] *= 1e-3f; /* 1e-6 of the extent: all of it within one cell */
@@ -493,9 +479,8 @@ static void fine_detail_in_a_great_extent_is_told_by_the_cost_of_its_grid(void *
 }
 
 /* Each triangle on its own scale: every split takes off one, so the tree is as deep as it has primitives. */
-static void a_tree_that_degenerates_to_a_list_is_built(void **state)
+TEST(a_tree_that_degenerates_to_a_list_is_built)
 {
-    (void)state;
     struct input input = triangles(110, 0, 0, 8);
     for (uint32_t t = 0; t < 110; t++)
         for (uint32_t c = 0; c < 9; c++)
@@ -504,9 +489,8 @@ static void a_tree_that_degenerates_to_a_list_is_built(void **state)
     input_finish(&input);
 }
 
-static void the_tree_does_not_depend_on_the_threads(void **state)
+TEST(the_tree_does_not_depend_on_the_threads)
 {
-    (void)state;
     struct input input = triangles(BVH_THREADED_PRIMITIVES + 10000, 10, 0.05f, 9);
     struct bvh_settings settings = packed;
     settings.threads = 1;
@@ -531,9 +515,8 @@ static void the_tree_does_not_depend_on_the_threads(void **state)
 
 /* Whoever watches the thread that waits for it sees that it goes on: the longest part without a sign is that of
  * the first split, through all primitives once. */
-static void a_large_tree_gives_signs_of_its_progress(void **state)
+TEST(a_large_tree_gives_signs_of_its_progress)
 {
-    (void)state;
     struct input input = triangles(BVH_THREADED_PRIMITIVES + 10000, 10, 0.05f, 9);
     struct bvh_settings settings = packed;
     for (settings.threads = 1; settings.threads < 3; settings.threads++) {
@@ -554,9 +537,8 @@ static double first_leaf_corner(const struct view *view, uint32_t octant, int ax
     return decode(view, octant, e).lower[axis];
 }
 
-static void each_octant_meets_the_near_side_first(void **state)
+TEST(each_octant_meets_the_near_side_first)
 {
-    (void)state;
     for (uint32_t axis = 0; axis < 3; axis++) {
         struct input input = triangles(400, 1, 0.1f, 10);
         for (uint32_t i = axis; i < 3600; i += 3)
@@ -574,9 +556,8 @@ static void each_octant_meets_the_near_side_first(void **state)
     }
 }
 
-static void elements_that_do_not_pay_are_thrown_back(void **state)
+TEST(elements_that_do_not_pay_are_thrown_back)
 {
-    (void)state;
     struct input input = triangles(1000, 1, 2, 11); /* large and overlapping: halves are as big as the whole */
     struct bvh_tree tree = build(&input, &packed);
     const struct view view = view_of(&tree, &packed);
@@ -595,18 +576,16 @@ static void elements_that_do_not_pay_are_thrown_back(void **state)
     input_finish(&input);
 }
 
-static void each_form_takes_the_bytes_it_promises(void **state)
+TEST(each_form_takes_the_bytes_it_promises)
 {
-    (void)state;
     assert_int_equal(bvh_element_bytes(&packed), BVH_OCTANTS * sizeof(struct bvh_packed_element));
     assert_int_equal(bvh_element_bytes(&whole), BVH_OCTANTS * sizeof(struct bvh_element));
     assert_int_equal(bvh_element_bytes(&of_spheres), BVH_OCTANTS * sizeof(struct bvh_element));
     assert_int_equal(bvh_element_bytes(&plain), sizeof(struct bvh_element)); /* one order for all directions */
 }
 
-static void a_shape_without_primitives_is_refused(void **state)
+TEST(a_shape_without_primitives_is_refused)
 {
-    (void)state;
     struct bvh_tree tree;
     struct error error = {0};
     assert_false(bvh_tree_build(&tree, &(struct bvh_shape){0}, &(struct bvh_settings){.threads = 1}, &error));
@@ -622,9 +601,8 @@ static bool run_jobs(struct bvh_job *jobs, uint32_t count, struct error *error)
     return bvh_jobs_finish(run, &end_ns, error);
 }
 
-static void several_shapes_are_built_together(void **state)
+TEST(several_shapes_are_built_together)
 {
-    (void)state;
     struct input inputs[] = {triangles(40, 1, 0.1f, 13), triangles(BVH_THREADED_PRIMITIVES, 5, 0.1f, 14),
                              spheres(300, 15), triangles(1, 1, 1, 16)};
     struct bvh_job jobs[COUNT(inputs)];
@@ -748,9 +726,8 @@ static void move_all_a_little(const struct bvh_settings *settings)
     bvh_top_finish(&top);
 }
 
-static void a_moved_instance_refits_its_path_alone(void **state)
+TEST(a_moved_instance_refits_its_path_alone)
 {
-    (void)state;
     for (size_t form = 0; form < COUNT(forms); form++)
         move_all_a_little(forms[form]);
 }
@@ -767,9 +744,8 @@ static bool is_stale_after_move(struct bvh_top *top, uint32_t instance, struct b
 }
 
 /* The outermost to a side moves farther out. */
-static void an_instance_that_leaves_the_grid_needs_a_new_top_tree(void **state)
+TEST(an_instance_that_leaves_the_grid_needs_a_new_top_tree)
 {
-    (void)state;
     for (int side = 0; side < 6; side++) {
         struct bvh_world_box boxes[INSTANCES];
         struct bvh_top top;
@@ -793,9 +769,8 @@ static void an_instance_that_leaves_the_grid_needs_a_new_top_tree(void **state)
 }
 
 /* What overflows gets a box of all numbers (trace/bvh/tracer.c). A new tree would be no better. */
-static void a_top_tree_over_an_endless_instance_is_not_stale_when_new(void **state)
+TEST(a_top_tree_over_an_endless_instance_is_not_stale_when_new)
 {
-    (void)state;
     struct bvh_world_box boxes[INSTANCES];
     struct bvh_top top;
     world_boxes(boxes);
@@ -824,9 +799,8 @@ static void a_top_tree_over_an_endless_instance_is_not_stale_when_new(void **sta
     bvh_top_finish(&top);
 }
 
-static void an_instance_that_comes_or_goes_needs_a_new_top_tree(void **state)
+TEST(an_instance_that_comes_or_goes_needs_a_new_top_tree)
 {
-    (void)state;
     struct bvh_world_box boxes[INSTANCES];
     struct bvh_top top;
     world_boxes(boxes);
@@ -837,9 +811,8 @@ static void an_instance_that_comes_or_goes_needs_a_new_top_tree(void **state)
     bvh_top_finish(&top);
 }
 
-static void a_top_tree_goes_stale_when_everything_has_moved_far(void **state)
+TEST(a_top_tree_goes_stale_when_everything_has_moved_far)
 {
-    (void)state;
     struct bvh_world_box boxes[INSTANCES];
     struct bvh_top top;
     world_boxes(boxes);
@@ -857,9 +830,8 @@ static void a_top_tree_goes_stale_when_everything_has_moved_far(void **state)
     bvh_top_finish(&top);
 }
 
-static void a_top_tree_over_nothing_is_empty(void **state)
+TEST(a_top_tree_over_nothing_is_empty)
 {
-    (void)state;
     struct bvh_top top;
     assert_true(bvh_top_build(&top, NULL, 0, &packed));
     assert_int_equal(top.element_count, 0);
@@ -868,36 +840,4 @@ static void a_top_tree_over_nothing_is_empty(void **state)
     assert_true(bvh_top_build(&top, &nothing, 1, &of_spheres));
     assert_int_equal(top.element_count, 0);
     bvh_top_finish(&top);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_tree_over_triangles_is_sound),
-        cmocka_unit_test(a_tree_over_spheres_is_sound),
-        cmocka_unit_test(equal_triangles_are_split_without_end),
-        cmocka_unit_test(triangles_without_area_are_kept),
-        cmocka_unit_test(coordinates_at_the_end_of_the_range_do_no_harm),
-        cmocka_unit_test(flat_shapes_lie_within_their_grid),
-        cmocka_unit_test(single_points_lie_within_their_grid),
-        cmocka_unit_test(shapes_far_from_the_origin_lie_within_their_grid),
-        cmocka_unit_test(a_grid_holds_the_box_it_was_made_for),
-        cmocka_unit_test(an_evenly_fine_mesh_loses_nothing_to_its_grid),
-        cmocka_unit_test(fine_detail_in_a_great_extent_is_told_by_the_cost_of_its_grid),
-        cmocka_unit_test(a_tree_that_degenerates_to_a_list_is_built),
-        cmocka_unit_test(the_tree_does_not_depend_on_the_threads),
-        cmocka_unit_test(a_large_tree_gives_signs_of_its_progress),
-        cmocka_unit_test(each_octant_meets_the_near_side_first),
-        cmocka_unit_test(elements_that_do_not_pay_are_thrown_back),
-        cmocka_unit_test(each_form_takes_the_bytes_it_promises),
-        cmocka_unit_test(a_shape_without_primitives_is_refused),
-        cmocka_unit_test(several_shapes_are_built_together),
-        cmocka_unit_test(a_moved_instance_refits_its_path_alone),
-        cmocka_unit_test(an_instance_that_leaves_the_grid_needs_a_new_top_tree),
-        cmocka_unit_test(a_top_tree_over_an_endless_instance_is_not_stale_when_new),
-        cmocka_unit_test(an_instance_that_comes_or_goes_needs_a_new_top_tree),
-        cmocka_unit_test(a_top_tree_goes_stale_when_everything_has_moved_far),
-        cmocka_unit_test(a_top_tree_over_nothing_is_empty),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

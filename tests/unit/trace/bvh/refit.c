@@ -3,23 +3,18 @@
  * case. */
 #include "tests/accuracy/motion_scenes.h"
 
-#include "gpu/device.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
 #include "trace/bvh/tracer.h"
 #include "gpu_scene/scene.h"
+#include "tests/fixtures/device.h"
+#include "tests/harness/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stddef.h>
-
-#include <cmocka.h>
 
 #define RAY_COUNT 8192u
 #define TRIANGLES 1500u
 #define NODE 2u
-
-static struct gpu_device *device;
 
 struct fixture {
     struct scene *scene;
@@ -179,9 +174,10 @@ static void expect_like_brute_force(struct fixture *fixture)
     expect_like_brute_force_at(fixture, true);
 }
 
-static void a_mesh_that_deforms_is_refitted(void **state)
+ALL_TESTS(open_device, close_device)
+
+TEST(a_mesh_that_deforms_is_refitted)
 {
-    (void)state;
     static const struct tracer_options forms[] = {{.bvh_rays_together = 1},
                                                   {.bvh_rays_together = 4},
                                                   {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 1}};
@@ -199,9 +195,8 @@ static void a_mesh_that_deforms_is_refitted(void **state)
     }
 }
 
-static void a_pose_that_stays_costs_nothing(void **state)
+TEST(a_pose_that_stays_costs_nothing)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, NULL, 0);
     pose(&fixture, 0.3f, 0.3f);
@@ -211,9 +206,8 @@ static void a_pose_that_stays_costs_nothing(void **state)
     fixture_finish(&fixture);
 }
 
-static void a_mesh_that_deforms_while_the_shutter_is_open_is_met_at_each_rays_time(void **state)
+TEST(a_mesh_that_deforms_while_the_shutter_is_open_is_met_at_each_rays_time)
 {
-    (void)state;
     static const struct tracer_options forms[] = {
         {.bvh_rays_together = 1},
         {.bvh_rays_together = 4},
@@ -231,9 +225,8 @@ static void a_mesh_that_deforms_while_the_shutter_is_open_is_met_at_each_rays_ti
 }
 
 /* At 8 times of each triangle's way neighbours have nothing to do with each other. */
-static void a_tree_that_is_worn_out_is_built_anew(void **state)
+TEST(a_tree_that_is_worn_out_is_built_anew)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, &(struct tracer_options){.bvh_rays_together = 1}, 0);
     const struct tracer_stats *stats = &fixture.tracer->stats;
@@ -249,9 +242,8 @@ static void a_tree_that_is_worn_out_is_built_anew(void **state)
     fixture_finish(&fixture);
 }
 
-static void answers_do_not_depend_on_earlier_poses(void **state)
+TEST(answers_do_not_depend_on_earlier_poses)
 {
-    (void)state;
     for (uint32_t together = 0; together <= 8; together += 4) {
         struct fixture straight, roundabout;
         const struct tracer_options options = {.bvh_rays_together = together};
@@ -272,24 +264,4 @@ static void answers_do_not_depend_on_earlier_poses(void **state)
         fixture_finish(&straight);
         fixture_finish(&roundabout);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_mesh_that_deforms_is_refitted),
-        cmocka_unit_test(a_pose_that_stays_costs_nothing),
-        cmocka_unit_test(a_mesh_that_deforms_while_the_shutter_is_open_is_met_at_each_rays_time),
-        cmocka_unit_test(a_tree_that_is_worn_out_is_built_anew),
-        cmocka_unit_test(answers_do_not_depend_on_earlier_poses),
-    };
-    struct error error = {0};
-    device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);
-    if (!device) {
-        printf("SKIP: no OpenGL device: %s\n", error.text);
-        return 0;
-    }
-    int failures = cmocka_run_group_tests(tests, NULL, NULL);
-    gpu_device_destroy(device);
-    return failures;
 }

@@ -3,23 +3,18 @@
  * depend on which frames were rendered before. And what instances that all move cost. */
 #include "tests/accuracy/test_scenes.h"
 
-#include "gpu/device.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
 #include "trace/bvh/tracer.h"
 #include "gpu_scene/scene.h"
+#include "tests/fixtures/device.h"
+#include "tests/harness/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stddef.h>
-
-#include <cmocka.h>
 
 #define RAY_COUNT 32768u
 #define INSTANCES 60u
 #define MOVING 1000u
-
-static struct gpu_device *device;
 
 struct fixture {
     struct scene *scene;
@@ -207,9 +202,10 @@ static void expect_same_answers(enum look look, const struct tracer_options *opt
     fixture_finish(&moved);
 }
 
-static void answers_do_not_depend_on_how_instances_came_to_where_they_are(void **state)
+ALL_TESTS(open_device, close_device)
+
+TEST(answers_do_not_depend_on_how_instances_came_to_where_they_are)
 {
-    (void)state;
     static const struct tracer_options forms[] = {
         {.bvh_rays_together = 1},
         {.bvh_rays_together = 8},
@@ -235,9 +231,8 @@ static void place_moving(struct test_edits *edits, float time)
     }
 }
 
-static void a_thousand_moving_instances_rebuild_nothing(void **state)
+TEST(a_thousand_moving_instances_rebuild_nothing)
 {
-    (void)state;
     struct fixture fixture;
     struct test_edits edits = {.scene = test_scene_create()};
     test_material(&edits, 1, 0.1f, 0.2f, 0.3f);
@@ -260,21 +255,4 @@ static void a_thousand_moving_instances_rebuild_nothing(void **state)
                              bvh->top.element_count * bvh_element_bytes(&bvh->store.settings));
     }
     fixture_finish(&fixture);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(answers_do_not_depend_on_how_instances_came_to_where_they_are),
-        cmocka_unit_test(a_thousand_moving_instances_rebuild_nothing),
-    };
-    struct error error = {0};
-    device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);
-    if (!device) {
-        printf("SKIP: no OpenGL device: %s\n", error.text);
-        return 0;
-    }
-    int failures = cmocka_run_group_tests(tests, NULL, NULL);
-    gpu_device_destroy(device);
-    return failures;
 }

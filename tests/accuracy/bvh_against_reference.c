@@ -8,19 +8,14 @@
  * steps. Both tracers take a ray to object space, by three products and three sums a coordinate, each of which
  * rounds by half a step, and by matrices that round by half a step; EDGE_STEPS is the sum of that. */
 #include "tests/accuracy/test_scenes.h"
+#include "tests/fixtures/device.h"
 
-#include "gpu/device.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
 #include "gpu_scene/scene.h"
 #include "trace/tracer.h"
 
 #include <float.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #define SIDE 256u
 #define RAY_COUNT (SIDE * SIDE)
@@ -43,8 +38,6 @@
 enum ray_kind { RAYS_PRIMARY, RAYS_BOUNCE, RAYS_SHADOW, RAYS_INSIDE, RAYS_AT_VERTICES };
 static const char *const kind_names[] = {"primary rays", "bounced rays", "shadow rays", "rays from inside",
                                          "rays at vertices"};
-
-static struct gpu_device *device;
 
 struct arena {
     struct scene *scene;
@@ -392,11 +385,20 @@ static void compare(struct arena *arena, enum ray_kind kind)
         assert_in_range(edges, 0, EDGES_MAX);
 }
 
-static void bvh_agrees_with_the_reference(void **state)
+static int open_device_beside_embree(void **state)
 {
-    struct scene *(*const *create)(void) = *state;
+    struct error error = {0};
+    if (tracer_find(REFERENCE, "tracer", &error))
+        return open_device(state);
+    test_skip_file("%s", error.text);
+    return 0;
+}
+ALL_TESTS(open_device_beside_embree, close_device)
+
+static void expect_agreement(struct scene *scene)
+{
     struct arena arena;
-    arena_init(&arena, (*create)());
+    arena_init(&arena, scene);
     compare(&arena, RAYS_PRIMARY);
     make_secondary(&arena, false);
     compare(&arena, RAYS_BOUNCE);
@@ -409,11 +411,30 @@ static void bvh_agrees_with_the_reference(void **state)
     arena_finish(&arena);
 }
 
+TEST(bvh_agrees_with_the_reference_on_a_triangle_soup_in_mirrored_squeezed_and_nested_instances)
+{
+    expect_agreement(test_scene_soup());
+}
+
+TEST(bvh_agrees_with_the_reference_on_spheres_among_triangles)
+{
+    expect_agreement(test_scene_spheres());
+}
+
+TEST(bvh_agrees_with_the_reference_on_cutouts_glass_panes_and_a_disc)
+{
+    expect_agreement(test_scene_translucent());
+}
+
+TEST(bvh_agrees_with_the_reference_on_40K_bumpy_triangles_in_instances)
+{
+    expect_agreement(bumpy_scene());
+}
+
 /* What the comparison forgives must not be what it is there to find: on a surface that is a thousand times wider
  * than a rounding step, nearly no wrong answer lies on an edge. */
-static void a_wrong_answer_within_a_surface_is_no_edge(void **state)
+TEST(a_wrong_answer_within_a_surface_is_no_edge)
 {
-    (void)state;
     struct arena arena;
     arena_init(&arena, bumpy_scene());
     make_primary(&arena);
@@ -433,9 +454,8 @@ static void a_wrong_answer_within_a_surface_is_no_edge(void **state)
 }
 
 /* Debian's Embree ends the process at a ray whose numbers it does not take, in the world or in an instance. */
-static void rays_that_embree_would_end_the_process_at_hit_nothing(void **state)
+TEST(rays_that_embree_would_end_the_process_at_hit_nothing)
 {
-    (void)state;
     static const float odd[] = {NAN, INFINITY, -INFINITY, 1e19f, -3e38f, 4e17f};
     struct arena arena;
     arena_init(&arena, bumpy_scene());
@@ -460,9 +480,8 @@ static void rays_that_embree_would_end_the_process_at_hit_nothing(void **state)
     arena_finish(&arena);
 }
 
-static void a_transform_that_embree_cannot_invert_is_refused_by_name(void **state)
+TEST(a_transform_that_embree_cannot_invert_is_refused_by_name)
 {
-    (void)state;
     const struct scene_changes all = {.geometry = true, .instances = true};
     struct arena arena;
     arena_init(&arena, bumpy_scene());
@@ -484,9 +503,8 @@ static void a_transform_that_embree_cannot_invert_is_refused_by_name(void **stat
     arena_finish(&arena);
 }
 
-static void a_scene_beyond_what_embree_sees_is_refused(void **state)
+TEST(a_scene_beyond_what_embree_sees_is_refused)
 {
-    (void)state;
     const struct scene_changes all = {.geometry = true, .instances = true};
     struct arena arena;
     struct test_edits edits = {.scene = bumpy_scene()};
@@ -508,9 +526,8 @@ static void a_scene_beyond_what_embree_sees_is_refused(void **state)
 }
 
 /* Whatever Embree had allocated by then: from nothing to almost all of it. */
-static void embree_keeps_to_the_memory_limit_and_its_books_are_right_afterwards(void **state)
+TEST(embree_keeps_to_the_memory_limit_and_its_books_are_right_afterwards)
 {
-    (void)state;
     const struct scene_changes all = {.geometry = true, .instances = true, .shading = true, .lights = true};
     const uint64_t limit = device->memory_limit_bytes;
     struct arena arena;
@@ -533,39 +550,4 @@ static void embree_keeps_to_the_memory_limit_and_its_books_are_right_afterwards(
     expect_ok(tracer_update(arena.reference, &arena.gpu, &all, NULL, &error), &error);
     assert_true(device->memory_used_bytes == used - needed + arena.reference->stats.device_bytes);
     arena_finish(&arena);
-}
-
-int main(void)
-{
-    static struct scene *(*create[])(void) = {test_scene_soup, test_scene_spheres, test_scene_translucent,
-                                              bumpy_scene};
-    const struct CMUnitTest tests[] = {
-        {"bvh agrees with the reference on a triangle soup in mirrored, squeezed and nested instances",
-         bvh_agrees_with_the_reference, NULL, NULL, &create[0]},
-        {"bvh agrees with the reference on spheres among triangles", bvh_agrees_with_the_reference, NULL, NULL,
-         &create[1]},
-        {"bvh agrees with the reference on cutouts, glass, panes and a disc", bvh_agrees_with_the_reference, NULL,
-         NULL, &create[2]},
-        {"bvh agrees with the reference on 40K bumpy triangles in instances", bvh_agrees_with_the_reference, NULL,
-         NULL, &create[3]},
-        cmocka_unit_test(a_wrong_answer_within_a_surface_is_no_edge),
-        cmocka_unit_test(rays_that_embree_would_end_the_process_at_hit_nothing),
-        cmocka_unit_test(a_transform_that_embree_cannot_invert_is_refused_by_name),
-        cmocka_unit_test(a_scene_beyond_what_embree_sees_is_refused),
-        cmocka_unit_test(embree_keeps_to_the_memory_limit_and_its_books_are_right_afterwards),
-    };
-    const struct gpu_options options = {.index = -1};
-    struct error error = {0};
-    if (!tracer_find(REFERENCE, "tracer", &error)) {
-        printf("SKIP: %s\n", error.text);
-        return 0;
-    }
-    device = gpu_device_create(&options, &error);
-    if (!device) {
-        printf("SKIP: no OpenGL device: %s\n", error.text);
-        return 0;
-    }
-    int failures = cmocka_run_group_tests_name("bvh against the reference", tests, NULL, NULL);
-    gpu_device_destroy(device);
-    return failures;
 }

@@ -3,8 +3,9 @@
  * under its middle, found without a rasteriser (axes_oracle.h); and both builds give the same samples. */
 #include "tests/accuracy/motion_scenes.h"
 #include "tests/accuracy/test_scenes.h"
-#include "axes_oracle.h"
-#include "ldc_fixture.h"
+#include "tests/unit/trace/axes_oracle.h"
+#include "tests/unit/trace/ldc/fixture.h"
+#include "tests/harness/test.h"
 
 #define RESOLUTION 96u
 /* Of the images' texels: so many at least were compared, or the test shows nothing. */
@@ -106,30 +107,28 @@ static uint32_t expect_scene_like_oracle(struct scene *scene, const struct trace
 
 static const struct tracer_options defaults;
 
+ALL_TESTS(open_device, close_device)
+
 /* Instances as they are, mirrored, scaled unevenly, nested. */
-static void a_soup_is_where_it_is(void **state)
+TEST(a_soup_is_where_it_is)
 {
-    (void)state;
     expect_scene_like_oracle(test_scene_soup(), &defaults, NULL);
 }
 
-static void spheres_are_where_they_are(void **state)
+TEST(spheres_are_where_they_are)
 {
-    (void)state;
     expect_scene_like_oracle(test_scene_spheres(), &defaults, NULL);
 }
 
 /* Skins and morph targets, as the shutter opens; some of it cut out by the alpha of vertices. */
-static void what_deforms_is_where_it_went(void **state)
+TEST(what_deforms_is_where_it_went)
 {
-    (void)state;
     expect_scene_like_oracle(test_scene_deformed(), &defaults, test_motion_of_deformed);
 }
 
 /* The paper's cube: a surface is in the image that its normal leans to most, and in no other. */
-static void a_surface_is_in_one_image_if_that_is_asked_for(void **state)
+TEST(a_surface_is_in_one_image_if_that_is_asked_for)
 {
-    (void)state;
     static const struct tracer_options one = {.ldc_images = LDC_IMAGES_ONE};
     struct scene *(*const scenes[])(void) = {test_scene_soup, test_scene_spheres};
     for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++) {
@@ -159,9 +158,8 @@ static void expect_both_builds_alike(struct fixture *fixture)
     contents_free(&listed);
 }
 
-static void both_builds_give_the_same_samples(void **state)
+TEST(both_builds_give_the_same_samples)
 {
-    (void)state;
     struct scene *(*const scenes[])(void) = {test_scene_soup, test_scene_spheres, test_scene_translucent,
                                              test_scene_deformed};
     for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++) {
@@ -170,16 +168,4 @@ static void both_builds_give_the_same_samples(void **state)
         expect_both_builds_alike(&fixture);
         fixture_finish(&fixture);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_soup_is_where_it_is),
-        cmocka_unit_test(spheres_are_where_they_are),
-        cmocka_unit_test(what_deforms_is_where_it_went),
-        cmocka_unit_test(a_surface_is_in_one_image_if_that_is_asked_for),
-        cmocka_unit_test(both_builds_give_the_same_samples),
-    };
-    RUN_ON_A_DEVICE(tests);
 }

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Layered depth cubes with more layers than may be kept, with many, with none; cubes beside each other; what a
  * build costs that has been done before. */
-#include "ldc_fixture.h"
-#include "stack_scene.h"
+#include "tests/unit/trace/ldc/fixture.h"
+#include "tests/unit/trace/stack_scene.h"
 
 #include "gpu/registry.h"
 #include "trace/ldc/build_state.h"
+#include "tests/harness/test.h"
 
 #define RESOLUTION 32u
 
@@ -29,10 +30,11 @@ static void expect_both_builds_alike(struct fixture *fixture, uint32_t resolutio
     contents_free(&listed);
 }
 
+ALL_TESTS(open_device, close_device)
+
 /* In whatever order they come: few for which there are slots, more, many that are sorted apart. */
-static void many_layers_are_sorted(void **state)
+TEST(many_layers_are_sorted)
 {
-    (void)state;
     static const uint32_t counts[] = {3, 9, 30, 120, 251};
     for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++)
         for (int order = FRONT_TO_BACK; order <= SHUFFLED; order++) {
@@ -50,9 +52,8 @@ static void many_layers_are_sorted(void **state)
 }
 
 /* The farther of two triangles at one place is not another layer of it. */
-static void coincident_triangles_are_one_sample(void **state)
+TEST(coincident_triangles_are_one_sample)
 {
-    (void)state;
     struct fixture single, doubled;
     struct contents one, two;
     fixture_init(&single, stack_scene(20, SHUFFLED, false));
@@ -86,9 +87,8 @@ static void expect_nearest(const struct contents *some, const struct contents *a
     assert_int_equal(some->cube.samples_lost, lost);
 }
 
-static void the_nearest_layers_are_kept(void **state)
+TEST(the_nearest_layers_are_kept)
 {
-    (void)state;
     struct fixture fixture;
     struct contents all, some;
     fixture_init(&fixture, test_scene_soup());
@@ -106,9 +106,8 @@ static void the_nearest_layers_are_kept(void **state)
     fixture_finish(&fixture);
 }
 
-static void memory_limits_the_layers(void **state)
+TEST(memory_limits_the_layers)
 {
-    (void)state;
     struct fixture fixture;
     struct contents all, some;
     struct error error = {0};
@@ -136,9 +135,8 @@ static void memory_limits_the_layers(void **state)
 }
 
 /* A limit of the device's memory, instead of the option's. */
-static void the_device_limits_the_layers(void **state)
+TEST(the_device_limits_the_layers)
 {
-    (void)state;
     struct fixture fixture;
     struct contents all, some;
     uint64_t limit = device->memory_limit_bytes;
@@ -157,9 +155,8 @@ static void the_device_limits_the_layers(void **state)
 }
 
 /* Images of both cubes lie in one buffer, and each device has a size beyond which it reads nothing of one. */
-static void images_that_a_device_cannot_read_are_refused(void **state)
+TEST(images_that_a_device_cannot_read_are_refused)
 {
-    (void)state;
     const uint64_t texels_max = device->facts.texture_buffer_texels_max;
     struct error error = {0};
     struct fixture fixture;
@@ -180,9 +177,8 @@ static void images_that_a_device_cannot_read_are_refused(void **state)
 
 /* More fragments than 32 bits count are told from few, or lists would take them. No device draws as many in the
  * time that a test has: texels say that they have them. */
-static void more_fragments_than_can_be_counted_are_noticed(void **state)
+TEST(more_fragments_than_can_be_counted_are_noticed)
 {
-    (void)state;
     enum { texels = 3 * RESOLUTION * RESOLUTION };
     uint32_t *counts = malloc(texels * sizeof(*counts));
     struct error error = {0};
@@ -214,9 +210,8 @@ static void more_fragments_than_can_be_counted_are_noticed(void **state)
 }
 
 /* The first half of the instances stand still, the others move. */
-static void cubes_leave_each_other_alone(void **state)
+TEST(cubes_leave_each_other_alone)
 {
-    (void)state;
     struct fixture fixture;
     struct contents before, after, moving, alone;
     fixture_init(&fixture, test_scene_soup());
@@ -252,9 +247,8 @@ static void cubes_leave_each_other_alone(void **state)
     fixture_finish(&fixture);
 }
 
-static void a_cube_may_be_empty(void **state)
+TEST(a_cube_may_be_empty)
 {
-    (void)state;
     struct fixture fixture;
     struct contents contents;
     fixture_init(&fixture, test_scene_soup());
@@ -278,9 +272,8 @@ static void a_cube_may_be_empty(void **state)
 }
 
 /* Squares on the very sides of a cube: rounding does not take them out of it. */
-static void what_lies_on_a_side_is_there(void **state)
+TEST(what_lies_on_a_side_is_there)
 {
-    (void)state;
     static const float positions[8][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
                                           {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
     static const uint32_t indices[12] = {0, 1, 2, 2, 1, 3, 4, 5, 6, 6, 5, 7};
@@ -299,21 +292,4 @@ static void what_lies_on_a_side_is_there(void **state)
         assert_int_equal(cube->layers_needed, 2);
     }
     fixture_finish(&fixture);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(many_layers_are_sorted),
-        cmocka_unit_test(coincident_triangles_are_one_sample),
-        cmocka_unit_test(the_nearest_layers_are_kept),
-        cmocka_unit_test(memory_limits_the_layers),
-        cmocka_unit_test(the_device_limits_the_layers),
-        cmocka_unit_test(images_that_a_device_cannot_read_are_refused),
-        cmocka_unit_test(more_fragments_than_can_be_counted_are_noticed),
-        cmocka_unit_test(cubes_leave_each_other_alone),
-        cmocka_unit_test(a_cube_may_be_empty),
-        cmocka_unit_test(what_lies_on_a_side_is_there),
-    };
-    RUN_ON_A_DEVICE(tests);
 }

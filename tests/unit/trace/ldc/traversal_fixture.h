@@ -4,8 +4,8 @@
 #define FARLIGHT_TESTS_LDC_TRAVERSAL_FIXTURE_H
 
 #include "tests/accuracy/test_scenes.h"
-#include "tests/unit/device_fixture.h"
-#include "tests/unit/ldc_samples.h"
+#include "tests/fixtures/waves.h"
+#include "tests/unit/trace/ldc/samples.h"
 
 #include "trace/ldc/levels.h"
 #include "trace/ldc/trace.h"

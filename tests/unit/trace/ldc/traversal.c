@@ -2,7 +2,8 @@
 /* Traversal of layered depth cubes against brute force over all samples of cubes made on the CPU: every form
  * of levels, of rays and of layers together. What is a crossing is the shader's rule (ldc/cube.glsl) in doubles;
  * where it hangs on rounding whether one counts, either answer is taken, see judge(). */
-#include "tests/unit/ldc_traversal_fixture.h"
+#include "tests/unit/trace/ldc/traversal_fixture.h"
+#include "tests/harness/test.h"
 
 /* ldc/plane.glsl, ldc/cube.glsl */
 #define SLACK 0.05
@@ -170,9 +171,10 @@ static void random_rays(struct ray *rays, uint32_t count, const struct ldc_sampl
 
 /* ---- tests ---- */
 
-static void rays_cross_samples_as_by_brute_force(void **state)
+ALL_TESTS(open_device, close_device)
+
+TEST(rays_cross_samples_as_by_brute_force)
 {
-    (void)state;
     static const uint32_t resolutions[] = {97, 64, 33};
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
     for (size_t r = 0; r < sizeof resolutions / sizeof *resolutions; r++) {
@@ -189,9 +191,8 @@ static void rays_cross_samples_as_by_brute_force(void **state)
     free(rays);
 }
 
-static void two_cubes_are_traversed_as_one(void **state)
+TEST(two_cubes_are_traversed_as_one)
 {
-    (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
     struct fixture fixture;
     fixture_init(&fixture, NULL);
@@ -213,9 +214,8 @@ static void two_cubes_are_traversed_as_one(void **state)
 }
 
 /* A few samples that stand still, and behind them more that move than this device has room for in cells. */
-static void where_cells_do_not_fit_a_pyramid_is_traversed(void **state)
+TEST(where_cells_do_not_fit_a_pyramid_is_traversed)
 {
-    (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
     struct fixture fixture;
     fixture_init(&fixture, NULL);
@@ -242,9 +242,8 @@ static void where_cells_do_not_fit_a_pyramid_is_traversed(void **state)
 
 /* Planes that lean as much to one axis as to another, so close to each other that all pass the same cells: nothing
  * is lost of them, and nothing is there twice. */
-static void what_shares_cells_is_in_each_of_them_once(void **state)
+TEST(what_shares_cells_is_in_each_of_them_once)
 {
-    (void)state;
     const int layers = 12;
     const float n = 24;
     struct error error = {0};
@@ -279,9 +278,8 @@ static void what_shares_cells_is_in_each_of_them_once(void **state)
 
 /* Blocks over more samples than software GL lets a loop go round, and what is last of them is the only thing that
  * is far. */
-static void blocks_of_many_layers_hold_all_of_them(void **state)
+TEST(blocks_of_many_layers_hold_all_of_them)
 {
-    (void)state;
     static const float up[3] = {0, 0, 1};
     enum { n = 64, layers = 100, rays_along = 8 };
     struct ray rays[rays_along * rays_along];
@@ -304,9 +302,8 @@ static void blocks_of_many_layers_hold_all_of_them(void **state)
 }
 
 /* Along axes through the middles of texels, along their borders, through corners, and nearly so. */
-static void rays_along_axes_and_borders_cross_samples_as_by_brute_force(void **state)
+TEST(rays_along_axes_and_borders_cross_samples_as_by_brute_force)
 {
-    (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
     struct fixture fixture;
     uint64_t seed = 31;
@@ -333,9 +330,8 @@ static void rays_along_axes_and_borders_cross_samples_as_by_brute_force(void **s
 }
 
 /* Samples in the outermost texels and depths, a floor that lies in the cube's own side. */
-static void what_lies_in_the_sides_of_the_cube_is_hit(void **state)
+TEST(what_lies_in_the_sides_of_the_cube_is_hit)
 {
-    (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
     struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
     struct fixture fixture;
@@ -374,9 +370,8 @@ static void what_lies_in_the_sides_of_the_cube_is_hit(void **state)
 
 /* With a tolerance a hit is where the ray comes as near to a sample's depth, in its texel: rays straight down on a
  * slope meet samples' own depths; a tolerance of nearly nothing is passed by rays that are aslant. */
-static void a_tolerance_takes_depths_for_planes(void **state)
+TEST(a_tolerance_takes_depths_for_planes)
 {
-    (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
     struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
     struct fixture fixture;
@@ -417,19 +412,4 @@ static void a_tolerance_takes_depths_for_planes(void **state)
     fixture_finish(&fixture);
     free(rays);
     free(hits);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rays_cross_samples_as_by_brute_force),
-        cmocka_unit_test(two_cubes_are_traversed_as_one),
-        cmocka_unit_test(where_cells_do_not_fit_a_pyramid_is_traversed),
-        cmocka_unit_test(what_shares_cells_is_in_each_of_them_once),
-        cmocka_unit_test(blocks_of_many_layers_hold_all_of_them),
-        cmocka_unit_test(rays_along_axes_and_borders_cross_samples_as_by_brute_force),
-        cmocka_unit_test(what_lies_in_the_sides_of_the_cube_is_hit),
-        cmocka_unit_test(a_tolerance_takes_depths_for_planes),
-    };
-    RUN_ON_A_DEVICE(tests);
 }

@@ -3,22 +3,17 @@
  * finds. That its answers are right is shown by tests/tracers. */
 #include "tests/accuracy/test_scenes.h"
 
-#include "gpu/device.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
 #include "trace/bvh/tracer.h"
 #include "gpu_scene/scene.h"
 #include "trace/tracer.h"
+#include "tests/fixtures/device.h"
+#include "tests/harness/test.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stddef.h>
 
-#include <cmocka.h>
-
 #define RAY_COUNT 4096u
-
-static struct gpu_device *device;
 
 struct fixture {
     struct scene *scene;
@@ -77,9 +72,10 @@ static struct scene *scene_of_instances(void)
     return edits.scene;
 }
 
-static void a_moved_node_costs_its_path_in_the_top_tree(void **state)
+ALL_TESTS(open_device, close_device)
+
+TEST(a_moved_node_costs_its_path_in_the_top_tree)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_instances(), NULL);
     const struct tracer_stats *stats = &fixture.tracer->stats;
@@ -98,9 +94,8 @@ static void a_moved_node_costs_its_path_in_the_top_tree(void **state)
     fixture_finish(&fixture);
 }
 
-static void a_changed_mesh_rebuilds_its_own_tree(void **state)
+TEST(a_changed_mesh_rebuilds_its_own_tree)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_instances(), NULL);
     const struct tracer_stats *stats = &fixture.tracer->stats;
@@ -209,9 +204,8 @@ static struct scene *scene_of_squares(void)
     return edits.scene;
 }
 
-static void rays_along_axes_through_edges_and_corners_hit_as_by_brute_force(void **state)
+TEST(rays_along_axes_through_edges_and_corners_hit_as_by_brute_force)
 {
-    (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
     uint64_t seed = 21;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
@@ -228,9 +222,8 @@ static void rays_along_axes_through_edges_and_corners_hit_as_by_brute_force(void
     free(rays);
 }
 
-static void grazing_rays_hit_as_by_brute_force(void **state)
+TEST(grazing_rays_hit_as_by_brute_force)
 {
-    (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
     uint64_t seed = 22;
     for (uint32_t i = 0; i < RAY_COUNT; i++) /* a hair above the plane x = 0, or within it */
@@ -240,9 +233,8 @@ static void grazing_rays_hit_as_by_brute_force(void **state)
     free(rays);
 }
 
-static void rays_from_far_away_hit_as_by_brute_force(void **state)
+TEST(rays_from_far_away_hit_as_by_brute_force)
 {
-    (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
     uint64_t seed = 23;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
@@ -257,9 +249,8 @@ static void rays_from_far_away_hit_as_by_brute_force(void **state)
     free(rays);
 }
 
-static void transforms_behind_the_origin_and_around_it_are_entered(void **state)
+TEST(transforms_behind_the_origin_and_around_it_are_entered)
 {
-    (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
     uint64_t seed = 24;
     for (uint32_t i = 0; i < RAY_COUNT; i++) { /* from within the instances; short and long directions */
@@ -293,9 +284,8 @@ static struct scene *scene_of_detail(void)
     return edits.scene;
 }
 
-static void detail_that_a_grid_cannot_tell_apart_is_walked_in_floats(void **state)
+TEST(detail_that_a_grid_cannot_tell_apart_is_walked_in_floats)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_instances(), NULL);
     assert_false(((struct bvh *)fixture.tracer)->store.settings.whole);
@@ -340,9 +330,8 @@ static uint32_t rays_together(struct fixture *fixture, float spread, uint32_t fi
     return together;
 }
 
-static void rays_walk_together_where_neighbours_go_the_same_way(void **state)
+TEST(rays_walk_together_where_neighbours_go_the_same_way)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_instances(), NULL);
     assert_int_equal(rays_together(&fixture, 0.002f, 0, NULL), device->facts.software ? 8 : 1);
@@ -350,9 +339,8 @@ static void rays_walk_together_where_neighbours_go_the_same_way(void **state)
     fixture_finish(&fixture);
 }
 
-static void parts_of_a_wave_walk_as_its_first_part_did_whatever_was_traced_in_between(void **state)
+TEST(parts_of_a_wave_walk_as_its_first_part_did_whatever_was_traced_in_between)
 {
-    (void)state;
     struct fixture fixture;
     uint32_t chosen[2] = {0};
     fixture_init(&fixture, scene_of_instances(), NULL);
@@ -365,9 +353,8 @@ static void parts_of_a_wave_walk_as_its_first_part_did_whatever_was_traced_in_be
 }
 
 /* The first of each eight goes nowhere; the others must neither wait for it nor be lost with it. */
-static void rays_beside_one_that_is_no_number_hit_as_by_brute_force(void **state)
+TEST(rays_beside_one_that_is_no_number_hit_as_by_brute_force)
 {
-    (void)state;
     struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
     uint64_t seed = 34;
     for (uint32_t i = 0; i < RAY_COUNT; i++)
@@ -377,37 +364,10 @@ static void rays_beside_one_that_is_no_number_hit_as_by_brute_force(void **state
     free(rays);
 }
 
-static void a_number_of_rays_that_cannot_walk_together_is_refused(void **state)
+TEST(a_number_of_rays_that_cannot_walk_together_is_refused)
 {
-    (void)state;
     struct error error = {0};
     assert_null(tracer_create(&tracer_bvh_impl, device, &(struct tracer_options){.bvh_rays_together = 5}, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
     assert_string_equal(error.field, "options.bvh_rays_together");
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_moved_node_costs_its_path_in_the_top_tree),
-        cmocka_unit_test(a_changed_mesh_rebuilds_its_own_tree),
-        cmocka_unit_test(rays_along_axes_through_edges_and_corners_hit_as_by_brute_force),
-        cmocka_unit_test(grazing_rays_hit_as_by_brute_force),
-        cmocka_unit_test(rays_from_far_away_hit_as_by_brute_force),
-        cmocka_unit_test(transforms_behind_the_origin_and_around_it_are_entered),
-        cmocka_unit_test(detail_that_a_grid_cannot_tell_apart_is_walked_in_floats),
-        cmocka_unit_test(rays_walk_together_where_neighbours_go_the_same_way),
-        cmocka_unit_test(parts_of_a_wave_walk_as_its_first_part_did_whatever_was_traced_in_between),
-        cmocka_unit_test(rays_beside_one_that_is_no_number_hit_as_by_brute_force),
-        cmocka_unit_test(a_number_of_rays_that_cannot_walk_together_is_refused),
-    };
-    struct error error = {0};
-    device = gpu_device_create(&(struct gpu_options){.index = -1}, &error);
-    if (!device) {
-        printf("SKIP: no OpenGL device: %s\n", error.text);
-        return 0;
-    }
-    int failures = cmocka_run_group_tests(tests, NULL, NULL);
-    gpu_device_destroy(device);
-    return failures;
 }

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* A-buffers with many samples behind each other, with more than there was room for, with none; what is told where
  * they do not fit; what a build costs that has been done before. */
-#include "abuffer_fixture.h"
-#include "abuffer_scenes.h"
-#include "stack_scene.h"
+#include "tests/unit/trace/abuffer/fixture.h"
+#include "tests/unit/trace/abuffer/scenes.h"
+#include "tests/unit/trace/stack_scene.h"
 
 #include "gpu/registry.h"
 #include "abuffer/layout.h"
 #include "trace/abuffer/build_state.h"
+#include "tests/harness/test.h"
 
 #include <epoxy/gl.h>
 
@@ -21,11 +22,12 @@ static void build_and_read(struct fixture *fixture, struct contents *contents, u
     expect_consistent(contents);
 }
 
+ALL_TESTS(open_device, close_device)
+
 /* In whatever order they come: few, that are sorted as they are taken; more; many, for which there is a pass of
  * its own; and more than a device's loops may go over. */
-static void many_layers_are_sorted(void **state)
+TEST(many_layers_are_sorted)
 {
-    (void)state;
     static const uint32_t counts[] = {3, 4, 5, 7, 8, 9, 33, 251, ABUFFER_LIST_MAX, ABUFFER_LIST_MAX + 1, 3001};
     for (size_t i = 0; i < sizeof(counts) / sizeof(counts[0]); i++)
         for (int order = FRONT_TO_BACK; order <= SHUFFLED; order++) {
@@ -46,9 +48,8 @@ static void many_layers_are_sorted(void **state)
 }
 
 /* One body in another, a thousand times: 63 is the greatest number that a sample tells. */
-static void windings_beyond_what_is_told_stay_there(void **state)
+TEST(windings_beyond_what_is_told_stay_there)
 {
-    (void)state;
     struct test_edits edits = {.scene = test_scene_create()};
     struct fixture fixture;
     struct contents contents;
@@ -75,9 +76,8 @@ static void windings_beyond_what_is_told_stay_there(void **state)
 
 /* Of several samples at one place the first is that of the first instance, and of this that of the first
  * primitive. */
-static void coincident_surfaces_keep_their_order(void **state)
+TEST(coincident_surfaces_keep_their_order)
 {
-    (void)state;
     struct fixture fixture;
     struct contents contents;
     uint32_t pairs = 0;
@@ -106,9 +106,8 @@ static void start_with(struct fixture *fixture, uint32_t fragments)
 }
 
 /* Nothing is lost where the lists did not fit at first, and what was drawn for nothing leaves no trace. */
-static void lists_that_do_not_fit_are_made_anew(void **state)
+TEST(lists_that_do_not_fit_are_made_anew)
 {
-    (void)state;
     struct scene *(*const scenes[])(void) = {scene_of_bodies_and_others, test_scene_spheres,
                                              test_scene_translucent};
     for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++) {
@@ -165,9 +164,8 @@ static enum tracer_progress build_in_units(struct fixture *fixture, uint32_t res
 }
 
 /* However small they are, also where lists turn out to be too small in the middle. */
-static void a_build_in_pieces_is_the_same(void **state)
+TEST(a_build_in_pieces_is_the_same)
 {
-    (void)state;
     static const uint32_t units[] = {5, 64, 3001};
     struct scene *(*const scenes[])(void) = {scene_of_bodies_and_others, test_scene_spheres,
                                              test_scene_translucent};
@@ -193,9 +191,8 @@ static void a_build_in_pieces_is_the_same(void **state)
 }
 
 /* A few triangles that take long are cut, too, and no row is left out or drawn twice. */
-static void what_covers_much_is_drawn_in_bands(void **state)
+TEST(what_covers_much_is_drawn_in_bands)
 {
-    (void)state;
     enum { LAYERS = 3, FINE = 1000 };
     struct fixture fixture;
     struct contents whole, pieces;
@@ -214,9 +211,8 @@ static void what_covers_much_is_drawn_in_bands(void **state)
 }
 
 /* The host's part of it, too. */
-static void deep_texels_are_done_in_pieces(void **state)
+TEST(deep_texels_are_done_in_pieces)
 {
-    (void)state;
     struct fixture fixture;
     struct contents whole, pieces;
     uint32_t count = UINT32_MAX, left;
@@ -235,9 +231,8 @@ static void deep_texels_are_done_in_pieces(void **state)
 }
 
 /* After any piece: the store is empty, and the next build is right. */
-static void a_build_that_is_left_leaves_nothing(void **state)
+TEST(a_build_that_is_left_leaves_nothing)
 {
-    (void)state;
     struct fixture fixture;
     struct contents whole, again;
     uint32_t count = UINT32_MAX;
@@ -277,9 +272,8 @@ static void expect_refused(struct fixture *fixture, enum error_kind kind, const 
 }
 
 /* Lists and samples: 28 bytes a sample, 16 a texel. */
-static void more_than_is_allowed_is_refused_with_what_it_needs(void **state)
+TEST(more_than_is_allowed_is_refused_with_what_it_needs)
 {
-    (void)state;
     struct fixture fixture;
     struct contents all, some;
     fixture_init(&fixture, stack_scene(200, SHUFFLED, false));
@@ -314,9 +308,8 @@ static void more_than_is_allowed_is_refused_with_what_it_needs(void **state)
 }
 
 /* Of a high resolution the texels are most of it, and are refused before there is memory for any. */
-static void texels_alone_may_be_more_than_is_allowed(void **state)
+TEST(texels_alone_may_be_more_than_is_allowed)
 {
-    (void)state;
     const uint32_t resolution = 512; /* 12 MiB */
     struct fixture fixture;
     fixture_init(&fixture, stack_scene(1, FRONT_TO_BACK, false));
@@ -332,9 +325,8 @@ static void texels_alone_may_be_more_than_is_allowed(void **state)
 }
 
 /* Each device has a size beyond which it reads nothing of a buffer, and only so much memory. */
-static void what_a_device_cannot_hold_is_refused(void **state)
+TEST(what_a_device_cannot_hold_is_refused)
 {
-    (void)state;
     const uint64_t texels_max = device->facts.texture_buffer_texels_max, limit = device->memory_limit_bytes;
     struct fixture fixture;
     fixture_init(&fixture, stack_scene(100, SHUFFLED, false));
@@ -357,9 +349,8 @@ static void what_a_device_cannot_hold_is_refused(void **state)
 
 /* ---- little ---- */
 
-static void a_scene_may_hold_nothing(void **state)
+TEST(a_scene_may_hold_nothing)
 {
-    (void)state;
     struct fixture fixture;
     struct contents contents;
     fixture_init(&fixture, test_scene_create());
@@ -384,9 +375,8 @@ static void a_scene_may_hold_nothing(void **state)
 }
 
 /* Squares on the very sides of a cube: rounding does not take them out of it. */
-static void what_lies_on_a_side_is_there(void **state)
+TEST(what_lies_on_a_side_is_there)
 {
-    (void)state;
     struct test_edits edits = {.scene = test_scene_create()};
     struct fixture fixture;
     struct contents contents;
@@ -406,24 +396,4 @@ static void what_lies_on_a_side_is_there(void **state)
     assert_int_equal(contents.store.depth_max, 2);
     contents_free(&contents);
     fixture_finish(&fixture);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(many_layers_are_sorted),
-        cmocka_unit_test(windings_beyond_what_is_told_stay_there),
-        cmocka_unit_test(coincident_surfaces_keep_their_order),
-        cmocka_unit_test(lists_that_do_not_fit_are_made_anew),
-        cmocka_unit_test(a_build_in_pieces_is_the_same),
-        cmocka_unit_test(what_covers_much_is_drawn_in_bands),
-        cmocka_unit_test(deep_texels_are_done_in_pieces),
-        cmocka_unit_test(a_build_that_is_left_leaves_nothing),
-        cmocka_unit_test(more_than_is_allowed_is_refused_with_what_it_needs),
-        cmocka_unit_test(texels_alone_may_be_more_than_is_allowed),
-        cmocka_unit_test(what_a_device_cannot_hold_is_refused),
-        cmocka_unit_test(a_scene_may_hold_nothing),
-        cmocka_unit_test(what_lies_on_a_side_is_there),
-    };
-    RUN_ON_A_DEVICE(tests);
 }

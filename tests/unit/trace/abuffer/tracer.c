@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* What the tracer `abuffer` promises beside its answers: it is built when what it holds has changed and at no
  * other time, says how large it is, and is at hand again after a failure. */
-#include "abuffer_scenes.h"
-#include "tracer_fixture.h"
+#include "tests/unit/trace/abuffer/scenes.h"
+#include "tests/unit/trace/tracer_fixture.h"
+#include "tests/harness/test.h"
 
 #define RESOLUTION 64u
 #define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
@@ -59,9 +60,10 @@ static struct scene *scene_of_boxes(uint32_t count)
     return edits.scene;
 }
 
-static void options_out_of_range_are_refused_by_name(void **state)
+ALL_TESTS(open_device, close_device)
+
+TEST(options_out_of_range_are_refused_by_name)
 {
-    (void)state;
     static const struct refused_options rows[] = {
         {"options.abuffer_resolution", {.abuffer_resolution = 15}},
         {"options.abuffer_resolution", {.abuffer_resolution = 4097}},
@@ -74,9 +76,8 @@ static void options_out_of_range_are_refused_by_name(void **state)
     expect_options_refused(NUMBER_ABUFFER, rows, sizeof(rows) / sizeof(rows[0]));
 }
 
-static void it_says_how_large_it_is(void **state)
+TEST(it_says_how_large_it_is)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_boxes(3), &small); /* 8 x 2 x 2 */
     expect_built(&fixture, true);
@@ -98,9 +99,8 @@ static void it_says_how_large_it_is(void **state)
     fixture_finish(&fixture);
 }
 
-static void it_is_built_when_something_changes_and_at_no_other_time(void **state)
+TEST(it_is_built_when_something_changes_and_at_no_other_time)
 {
-    (void)state;
     struct fixture fixture;
     float m[12];
     fixture_init(&fixture, scene_of_boxes(2), &small);
@@ -124,9 +124,8 @@ static void it_is_built_when_something_changes_and_at_no_other_time(void **state
     fixture_finish(&fixture);
 }
 
-static void what_deforms_is_built_where_it_went(void **state)
+TEST(what_deforms_is_built_where_it_went)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_a_crumpled_body(), &small);
     uint64_t samples = cube(&fixture)->samples;
@@ -146,9 +145,8 @@ static void what_deforms_is_built_where_it_went(void **state)
 }
 
 /* A material that begins to be cut out, or no longer is, makes other samples. */
-static void cutouts_are_part_of_it(void **state)
+TEST(cutouts_are_part_of_it)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, scene_of_cut_bodies(), &small);
     uint64_t cut = cube(&fixture)->samples;
@@ -171,9 +169,8 @@ static void cutouts_are_part_of_it(void **state)
     fixture_finish(&fixture);
 }
 
-static void an_empty_scene_is_missed(void **state)
+TEST(an_empty_scene_is_missed)
 {
-    (void)state;
     struct fixture fixture;
     fixture_init(&fixture, test_scene_create(), &small);
     assert_int_equal(cube(&fixture)->resolution, 0);
@@ -189,9 +186,8 @@ static void an_empty_scene_is_missed(void **state)
     fixture_finish(&fixture);
 }
 
-static void after_a_failure_the_next_update_starts_anew(void **state)
+TEST(after_a_failure_the_next_update_starts_anew)
 {
-    (void)state;
     static const struct tracer_options little = {.abuffer_resolution = RESOLUTION, .abuffer_mebibytes_max = 1};
     struct fixture fixture;
     struct error error = {0};
@@ -213,9 +209,8 @@ static void after_a_failure_the_next_update_starts_anew(void **state)
 }
 
 /* Grids are as fine as the images ask for: about sqrt(3 N). */
-static void voxels_follow_the_resolution(void **state)
+TEST(voxels_follow_the_resolution)
 {
-    (void)state;
     static const struct {
         uint32_t resolution;
         uint64_t voxels;
@@ -233,19 +228,4 @@ static void voxels_follow_the_resolution(void **state)
         assert_int_equal(chosen.tracer->stats.device_bytes, bytes);
         fixture_finish(&chosen);
     }
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(options_out_of_range_are_refused_by_name),
-        cmocka_unit_test(it_says_how_large_it_is),
-        cmocka_unit_test(it_is_built_when_something_changes_and_at_no_other_time),
-        cmocka_unit_test(what_deforms_is_built_where_it_went),
-        cmocka_unit_test(cutouts_are_part_of_it),
-        cmocka_unit_test(an_empty_scene_is_missed),
-        cmocka_unit_test(after_a_failure_the_next_update_starts_anew),
-        cmocka_unit_test(voxels_follow_the_resolution),
-    };
-    RUN_ON_A_DEVICE(tests);
 }

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_TESTS_ABUFFER_FIXTURE_H
 #define FARLIGHT_TESTS_ABUFFER_FIXTURE_H
 
-#include "tests/unit/device_fixture.h"
+#include "tests/fixtures/waves.h"
 
 #include "abuffer/layout.h"
 #include "trace/abuffer/build.h"

@@ -5,7 +5,7 @@
 
 #include "tests/accuracy/motion_scenes.h"
 #include "tests/accuracy/test_scenes.h"
-#include "tests/unit/device_fixture.h"
+#include "tests/fixtures/waves.h"
 
 #include "gpu_scene/scene.h"
 #include "trace/tracer.h"

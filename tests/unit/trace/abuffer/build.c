@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* A-buffers hold what is in the scene: each texel of the three images against the triangles and spheres under its
  * middle, found without a rasteriser (axes_oracle.h); and voxels know of what is in them. */
-#include "abuffer_fixture.h"
-#include "abuffer_scenes.h"
-#include "axes_oracle.h"
+#include "tests/unit/trace/abuffer/fixture.h"
+#include "tests/unit/trace/abuffer/scenes.h"
+#include "tests/unit/trace/axes_oracle.h"
 
 #include "gpu/registry.h"
+#include "tests/harness/test.h"
 
 #define RESOLUTION 96u
 #define VOXELS 16u
@@ -284,47 +285,42 @@ static void expect_scene_like_oracle(struct scene *scene,
     fixture_finish(&fixture);
 }
 
+ALL_TESTS(open_device, close_device)
+
 /* Instances as they are, mirrored, scaled unevenly, nested. */
-static void a_soup_is_where_it_is(void **state)
+TEST(a_soup_is_where_it_is)
 {
-    (void)state;
     expect_scene_like_oracle(test_scene_soup(), NULL, true); /* nothing bounds anything */
 }
 
-static void spheres_are_where_they_are_and_balance(void **state)
+TEST(spheres_are_where_they_are_and_balance)
 {
-    (void)state;
     expect_scene_like_oracle(test_scene_spheres(), NULL, true);
 }
 
-static void bodies_balance(void **state)
+TEST(bodies_balance)
 {
-    (void)state;
     expect_scene_like_oracle(scene_of_bodies(), NULL, true);
 }
 
-static void bodies_balance_among_what_is_none(void **state)
+TEST(bodies_balance_among_what_is_none)
 {
-    (void)state;
     expect_scene_like_oracle(scene_of_bodies_and_others(), NULL, true);
 }
 
 /* Skins and morph targets, as the shutter opens; some of it cut out by the alpha of vertices. */
-static void what_deforms_is_where_it_went(void **state)
+TEST(what_deforms_is_where_it_went)
 {
-    (void)state;
     expect_scene_like_oracle(test_scene_deformed(), test_motion_of_deformed, true);
 }
 
-static void a_crumpled_body_balances(void **state)
+TEST(a_crumpled_body_balances)
 {
-    (void)state;
     expect_scene_like_oracle(scene_of_a_crumpled_body(), NULL, true);
 }
 
-static void what_is_cut_out_bounds_no_body(void **state)
+TEST(what_is_cut_out_bounds_no_body)
 {
-    (void)state;
     struct fixture fixture;
     struct contents contents;
     fixture_init(&fixture, scene_of_cut_bodies());
@@ -336,18 +332,4 @@ static void what_is_cut_out_bounds_no_body(void **state)
         assert_false(bounds_body(&contents, i));
     contents_free(&contents);
     fixture_finish(&fixture);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_soup_is_where_it_is),
-        cmocka_unit_test(spheres_are_where_they_are_and_balance),
-        cmocka_unit_test(bodies_balance),
-        cmocka_unit_test(bodies_balance_among_what_is_none),
-        cmocka_unit_test(what_deforms_is_where_it_went),
-        cmocka_unit_test(a_crumpled_body_balances),
-        cmocka_unit_test(what_is_cut_out_bounds_no_body),
-    };
-    RUN_ON_A_DEVICE(tests);
 }

@@ -3,7 +3,7 @@
 #ifndef FARLIGHT_TESTS_LDC_FIXTURE_H
 #define FARLIGHT_TESTS_LDC_FIXTURE_H
 
-#include "tests/unit/device_fixture.h"
+#include "tests/fixtures/waves.h"
 
 #include "ldc/layout.h"
 #include "shared/surface_sample.h"

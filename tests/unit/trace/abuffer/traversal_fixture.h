@@ -5,8 +5,8 @@
 #define FARLIGHT_TESTS_ABUFFER_TRAVERSAL_FIXTURE_H
 
 #include "tests/accuracy/test_scenes.h"
-#include "tests/unit/device_fixture.h"
-#include "tests/unit/abuffer_samples.h"
+#include "tests/fixtures/waves.h"
+#include "tests/unit/trace/abuffer/samples.h"
 
 #include "trace/abuffer/trace.h"
 #include "trace/abuffer/voxels.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Traversal of A-buffers made on the CPU, against the triangles that they were made of. */
-#include "tests/unit/abuffer_traversal_fixture.h"
+#include "tests/unit/trace/abuffer/traversal_fixture.h"
+#include "tests/harness/test.h"
 
 #define CELLS 240u
 #define VOXELS 16u
@@ -131,14 +132,15 @@ static void add_room(struct abuffer_samples *s)
     add_ball(s, (const double[3]){101.3, 60.1, 118.7}, 30.4, 30, true);
 }
 
+ALL_TESTS(open_device, close_device)
+
 /* Where an edge passes a texel a sample's plane goes on beyond it, by up to half a texel: of the searches that
  * look at all texels a few rays in a thousand see that. Steps miss what is passed twice between two of them, which
  * is at edges and rims, by the length of a step: a voxel is 15 cells wide here, and shapes are some 100. And where
  * walls meet that no one image shows, they look in one of the images: some fifteen of a thousand rays pass the
  * walls of the room there. */
-static void rays_meet_shapes_where_they_are(void **state)
+TEST(rays_meet_shapes_where_they_are)
 {
-    (void)state;
     static const struct {
         const char *name;
         void (*add)(struct abuffer_samples *s);
@@ -166,9 +168,8 @@ static void rays_meet_shapes_where_they_are(void **state)
 }
 
 /* Voxels that are no whole number of cells wide, of a cell, and of nearly all of them. */
-static void voxels_of_any_size_lead_to_the_same(void **state)
+TEST(voxels_of_any_size_lead_to_the_same)
 {
-    (void)state;
     static const uint32_t grids[][2] = {{97, 16}, {100, 64}, {64, 64}, {33, 16}, {130, 32}};
     static const struct limits limits[FORM_COUNT] = {{3, 5, 3}, {12, 40, 12}, {16, 50, 16}};
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
@@ -196,9 +197,8 @@ static void voxels_of_any_size_lead_to_the_same(void **state)
 }
 
 /* Hundreds of sheets behind each texel, of which the rays begin between any two. */
-static void deep_columns_are_searched_at_their_depth(void **state)
+TEST(deep_columns_are_searched_at_their_depth)
 {
-    (void)state;
     enum { sheets = 150 };
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
     for (int body = 0; body < 2; body++) {
@@ -230,14 +230,4 @@ static void deep_columns_are_searched_at_their_depth(void **state)
         fixture_finish(&fixture);
     }
     free(rays);
-}
-
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rays_meet_shapes_where_they_are),
-        cmocka_unit_test(voxels_of_any_size_lead_to_the_same),
-        cmocka_unit_test(deep_columns_are_searched_at_their_depth),
-    };
-    RUN_ON_A_DEVICE(tests);
 }
