@@ -110,7 +110,7 @@ static double open_in_a_ball(double reach, double falloff)
     return 1.0 - closed;
 }
 
-TEST(what_is_nearer_closes_more)
+TEST(nearer_surfaces_occlude_more)
 {
     struct fixture *fixture = *state;
     static const float reaches[] = {FAR_AWAY, 3.0f, 2.0f, 1.2f, 0.5f}, falloffs[] = {0.0f, 0.5f, 1.0f, 2.0f, 8.0f};

@@ -262,7 +262,7 @@ TEST(tracers_in_use_stay)
         frame_renderer_destroy(renderers[i]);
 }
 
-TEST(a_renderer_that_goes_in_the_middle_lets_go)
+TEST(a_renderer_destroyed_within_a_frame_releases_what_it_shares)
 {
     struct fixture *fixture = *state;
     uint32_t node = build_scene(fixture);
@@ -353,7 +353,7 @@ TEST(pictures_that_are_copied_behind_are_the_same)
     frame_renderer_destroy(other);
 }
 
-TEST(who_has_no_frame_in_progress_holds_a_picture_only)
+TEST(a_renderer_without_a_frame_in_progress_holds_only_a_picture)
 {
     enum { WATCHERS = 8 };
     struct fixture *fixture = *state;

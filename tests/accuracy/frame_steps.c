@@ -330,7 +330,7 @@ static bool take_way(struct fixture *fixture, const struct way *way)
     return tracer_impl_by_number(way->tracer) != NULL;
 }
 
-TEST(structures_built_in_pieces_are_the_same)
+TEST(structures_built_in_steps_are_the_same)
 {
     struct fixture *fixture = *state;
     a_field_and_a_ball(fixture);
@@ -354,7 +354,7 @@ TEST(structures_built_in_pieces_are_the_same)
 }
 
 /* After any number of pieces: nothing is left of it, and what comes after it is right. */
-TEST(a_structure_that_nobody_waits_for_is_forgotten)
+TEST(a_structure_without_waiting_frames_is_forgotten)
 {
     struct fixture *fixture = *state;
     a_field_and_a_ball(fixture);

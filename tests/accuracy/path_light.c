@@ -105,7 +105,7 @@ static double off_the_form(const struct frame_result *result)
 ALL_TESTS(fixture_setup, fixture_teardown)
 EACH_TEST(fixture_clear, NULL)
 
-TEST(lamps_light_a_floor_as_their_closed_forms_say)
+TEST(lights_illuminate_a_floor_as_their_closed_forms_say)
 {
     struct fixture *fixture = *state;
     static const unsigned tracers[] = {TRACER_REFERENCE, TRACER_BVH};
@@ -190,7 +190,7 @@ TEST(shadow_rays_and_rays_that_go_on_find_the_same_light)
 /* ---- kinds of lights ---- */
 
 /* Where lamps have no size and the floor is diffuse, a path without bounces is what whitted shows. */
-TEST(lamps_without_a_size_bring_what_they_bring_to_whitted)
+TEST(point_lights_contribute_as_in_whitted)
 {
     struct fixture *fixture = *state;
     for (int which = 0; which < 4; which++) { /* each alone, then all */
@@ -218,7 +218,7 @@ TEST(lamps_without_a_size_bring_what_they_bring_to_whitted)
     }
 }
 
-TEST(lamps_are_seen_in_mirrors_and_not_straight_on)
+TEST(lights_are_visible_in_mirrors_and_not_directly)
 {
     struct fixture *fixture = *state;
     static const enum scene_light_kind kinds[] = {LIGHT_RECTANGLE, LIGHT_SPHERE};

@@ -102,7 +102,7 @@ TEST(faint_layers_go_on_until_nothing_is_left)
     assert_pixels(fixture, radiance, 1.0 - left, 1e-5);
 }
 
-TEST(what_is_translucent_is_so_as_much_as_it_is)
+TEST(translucent_surfaces_transmit_their_transmittance)
 {
     struct fixture *fixture = *state;
     begin(fixture, TRACER_REFERENCE);

@@ -113,7 +113,7 @@ class Benchmark(unittest.TestCase):
                     self.assertEqual(len(measure["time"]["runs_ns"]), 1)
                     self.assertFalse(measure.get("agreement", {}).get("failed"), (result["title"], wave["kind"], measure))
 
-    def test_rays_walk_together_in_all_numbers_on_all_kinds_of_rays(self):
+    def test_packets_of_all_sizes_trace_all_kinds_of_rays(self):
         for result in self.document["parts"]["parallel"]["results"]:
             self.assertEqual({(row["order"], row["bounds"], row["together"]) for row in result["rows"]},
                              {(order, bounds, n) for order in ("coherent", "partly", "incoherent")
@@ -221,7 +221,7 @@ class Benchmark(unittest.TestCase):
             self.assertGreater(form["stages_ns"]["shade"][0], 0)
         self.assertLess(forms[bench_frames.WHOLE]["shadow_rays"], 16 * forms[bench_frames.PLAIN]["shadow_rays"])
 
-    def test_embree_is_there_with_1_8_and_16_rays_a_call_beside_the_walk(self):
+    def test_embree_is_measured_with_1_8_and_16_rays_a_call_beside_the_traversal(self):
         result = self.document["parts"]["reach"]["results"][0]
         self.assertEqual([w["kind"] for w in result["waves"]], [*bench_rays.WAVES, "shuffled"])
         for wave in result["waves"]:

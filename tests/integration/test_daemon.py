@@ -184,7 +184,7 @@ class Hostile(Case):
         self.assertIn(ERROR, [kind for kind, _, _ in peer.until_closed()])
         self.assert_alive()
 
-    def test_half_a_message_and_a_vanished_client_cost_nobody_else(self):
+    def test_half_a_message_and_a_vanished_client_affect_no_other_client(self):
         whole = message(SCENE_OPEN, 1, struct.pack("<I", 1), text("half"))
         for count in range(len(whole)):
             peer = Peer(self.daemon)
@@ -338,7 +338,7 @@ class Listening(Case):
         self.assertNotEqual(refused.returncode, 0)
         self.assertIn("--insecure", refused.stderr)
 
-    def test_those_who_hear_why_they_are_refused_count_as_not_introduced(self):
+    def test_clients_that_are_being_refused_count_as_not_introduced(self):
         """Or one host could have all the places for those who come."""
         patient = dict(os.environ, FARLIGHT_NETWORK_HANDSHAKE="600000")  # so that this is not why a connection ends
         with Daemon(listen="tcp:127.0.0.1:0", environment=patient) as daemon:

@@ -123,7 +123,7 @@ class Layers(Case):
         self.assertNotEqual(depths[0], depths[1])
         self.assertNotEqual(depths[1], depths[2])
 
-    def test_the_picture_of_such_a_file_is_compared(self):
+    def test_the_picture_of_an_exr_with_layers_is_compared(self):
         plain, layered = self.render(name="plain.exr")[0], self.render("--layers", ALL, name="layered.exr")[0]
         self.assertIn("R,G,B,A", self.expect(farlight("compare", plain, layered, "--fail-above", "0"), 0).stdout)
 

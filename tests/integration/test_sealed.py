@@ -78,7 +78,7 @@ class Keys(Case):
                 digests.append(farlight_test.frames_of(result)[0]["digest"])
         self.assertEqual(len(set(digests)), 1, digests)
 
-    def test_what_was_sent_is_held_for_whoever_has_the_key_and_for_nobody_else(self):
+    def test_uploaded_scenes_are_held_for_the_holder_of_the_key_only(self):
         def uploaded(*options):
             result = self.expect(farlight("render", bundled_scenes() / "teapot.glb", "--size", "16x16", "--timings=json",
                                           "-o", self.folder / "a.png", *options), 0)
@@ -95,7 +95,7 @@ class Keys(Case):
             # Over the Unix socket too the key says who it is.
             self.assertEqual(uploaded(*here, "--key", self.folder / "key"), 0)
 
-    def test_nobody_comes_in_without_a_key_where_everybody_could_knock(self):
+    def test_a_public_address_needs_a_key(self):
         with SealedDaemon(self.folder) as daemon:
             result = self.expect(farlight("ping", "--server", daemon.reached), 1)
             self.assertIn("--key", result.stderr)
@@ -227,7 +227,7 @@ def try_key(daemon, key):
 
 
 class WrongKeys(Case):
-    def test_those_who_wait_for_their_refusal_count_as_not_introduced(self):
+    def test_clients_that_wait_for_their_refusal_count_as_not_introduced(self):
         for name in ("key", "reader"):
             self.expect(farlight("key", self.folder / name), 0)
         slowly = dict(os.environ, FARLIGHT_NETWORK_WRONG_KEY="5000", FARLIGHT_LIMITS_WRONG_KEYS="16",

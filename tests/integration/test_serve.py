@@ -123,7 +123,7 @@ class Serve(Case):
         self.addCleanup(serving.__exit__)
         return serving.__enter__()
 
-    def test_without_a_folder_of_the_user_s_it_listens_in_one_that_only_he_may_enter(self):
+    def test_without_a_runtime_folder_it_listens_in_a_private_one(self):
         environment = {name: value for name, value in os.environ.items() if name != "XDG_RUNTIME_DIR"}
         with Serving(self.model, environment=environment) as serving:
             address = serving.lines[-1].split()[-1]
@@ -214,7 +214,7 @@ class Serve(Case):
                                stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
         self.assertEqual(words, ["view", "--scene", "it's $HOME", "--server", self.address])
 
-    def test_from_everywhere_who_has_the_key_comes_in(self):
+    def test_the_holder_of_the_key_connects_from_everywhere(self):
         key = self.folder / "key"
         self.expect(farlight("key", key), 0)
         serving = self.serve("--listen", "tcp:0.0.0.0:0", "--key", key, addresses=2)
@@ -272,7 +272,7 @@ class Serve(Case):
             result = self.render(self.folder / "a.png", "--scene", "teapot.glb", status=1, address=daemon.address)
             self.assertIn("farlight scenes", result.stderr)
 
-    def test_who_serves_is_not_idle_however_little_happens(self):
+    def test_a_serving_client_is_not_idle(self):
         config = self.folder / "conf"
         config.write_text("[network]\nidle = 5000\n")
         with Daemon("--config", config) as daemon, Serving(self.model, "--server", daemon.address):
@@ -308,7 +308,7 @@ class Serve(Case):
                                      [("mine", 1)])
                     self.assertEqual(serving.stop(), 0)
 
-    def test_who_has_started_a_daemon_may_be_silent_there(self):
+    def test_the_client_that_started_a_daemon_may_be_silent(self):
         config = self.folder / "conf"
         config.write_text("[network]\nidle = 300\n")
         self.serve("--", "--config", config)  # whose import takes longer than that

@@ -161,7 +161,7 @@ class Reading(Case):
             self.assertEqual(kind, OK)
         return count
 
-    def test_limits_are_read_again_for_those_who_come_and_those_who_are_there(self):
+    def test_limits_are_read_again_for_new_and_present_clients(self):
         self.config.write_text("[limits]\nscenes = 2\n")
         with self.daemon() as daemon:
             before = Peer(daemon)
@@ -234,7 +234,7 @@ class Reading(Case):
             self.assertTrue(comes_in(keys[1]))
 
 
-    def test_who_is_introducing_himself_meanwhile_does_so_with_the_key_that_there_was(self):
+    def test_a_handshake_in_progress_ends_with_the_former_keys(self):
         """A handshake that has begun is ended with the keys with which it began; who comes after it needs the new one."""
         keys = [self.folder / name for name in ("key", "other")]
         for key in keys:
@@ -336,7 +336,7 @@ class LostGpu(Case):
             self.assertEqual(daemon.messages().count("the GPU was lost; opening it again"), 2)
             self.assertEqual(daemon.stop(), 0)
 
-    def test_who_loses_it_again_and_again_is_put_aside_and_others_go_on(self):
+    def test_a_job_that_keeps_losing_the_gpu_is_put_aside_and_others_continue(self):
         with Losing(self.folder) as daemon:
             client, other = self.client(daemon), self.client(daemon)
             daemon.lose(3)

@@ -152,7 +152,7 @@ class Units(unittest.TestCase):
             self.assertIn(said, self.journal())
         self.assertEqual((self.shown("MainPID"), self.shown("ActiveState")), (pid, "active"))
 
-    def test_who_comes_after_it_was_killed_waits_until_it_is_there_again(self):
+    def test_a_client_that_connects_after_a_kill_waits_for_the_restart(self):
         self.assert_served()
         self.kill("KILL")
         self.assert_served()

@@ -84,7 +84,7 @@ TEST(keys_chosen_to_collide_do_not_make_a_map_slow)
         fail_msg("%.2f s for 150000 keys", seconds);
 }
 
-TEST(a_map_is_walked_in_the_order_of_insertion)
+TEST(a_map_is_iterated_in_the_order_of_insertion)
 {
     struct hashmap map = {0};
     int value = 0;

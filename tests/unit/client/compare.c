@@ -82,7 +82,7 @@ static struct message_images_compared some_figures(void)
 
 ALL_TESTS(make_folder, remove_folder)
 
-TEST(a_program_that_ends_or_crashes_is_told_with_its_last_words)
+TEST(a_program_that_ends_or_crashes_is_reported_with_its_last_words)
 {
     assert_false(compare_with("#!/bin/sh\necho 'no more memory' >&2\nexit 3\n", 5000));
     check_error(FL_ERROR_SYSTEM, "farlight-export ended with status 3: no more memory");
@@ -96,7 +96,7 @@ TEST(a_program_that_hangs_is_ended_at_its_deadline)
     check_error(FL_ERROR_TIMEOUT, "took too long");
 }
 
-TEST(rubbish_is_told)
+TEST(garbage_is_reported)
 {
     assert_false(compare_with("#!/bin/sh\necho 'this is no message at all' >&3\nsleep 5\n", 5000));
     check_error(FL_ERROR_PROTOCOL, "the image program sent what the protocol does not allow");

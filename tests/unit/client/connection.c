@@ -51,7 +51,7 @@ static void play_rubbish(struct daemon *daemon)
     more(daemon);
 }
 
-TEST(something_that_is_no_daemon_is_told)
+TEST(a_peer_that_is_no_daemon_is_reported)
 {
     struct daemon *daemon = start(play_rubbish);
     assert_null(connect_to(daemon));
@@ -98,7 +98,7 @@ TEST(a_silent_daemon_is_given_up_and_an_interruption_ends_the_wait)
     stop(daemon);
 }
 
-TEST(wrong_addresses_are_told)
+TEST(wrong_addresses_are_reported)
 {
     static const char *const wrong[] = {
         "",         "unix:",      "tcp:",           "tcp:host",    "tcp:host:",
@@ -179,7 +179,7 @@ static void play_oversize(struct daemon *daemon)
     more(daemon);
 }
 
-TEST(a_daemon_that_breaks_the_protocol_is_told)
+TEST(a_broken_protocol_is_reported)
 {
     struct daemon *daemon = start(play_oversize);
     struct fl_connection *connection = connect_to(daemon);

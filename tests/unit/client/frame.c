@@ -397,7 +397,7 @@ TEST(other_layers_than_were_asked_for_are_refused_before_memory_is_taken)
     assert_null(assembly.frame);
 }
 
-TEST(pieces_out_of_place_are_refused)
+TEST(chunks_out_of_order_are_refused)
 {
     struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
     const struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);

@@ -53,7 +53,7 @@ TEST(the_parts_of_a_range_are_the_range)
             }
 }
 
-TEST(the_greatest_range_does_not_wrap)
+TEST(the_maximum_range_does_not_wrap)
 {
     const struct fl_frame_run range = {.first = 0, .last = 10000000, .step = 10000000};
     struct fl_frame_run run;

@@ -63,14 +63,14 @@ static void check_error(enum fl_error_code code, const char *part)
 
 ALL_TESTS(make_folder, remove_folder)
 
-TEST(an_importer_that_gives_up_is_told_with_its_last_words)
+TEST(an_importer_that_gives_up_is_reported_with_its_last_words)
 {
     assert_null(import_with("#!/bin/sh\necho first >&2\necho 'no more memory' >&2\nexit 3\n", 5000));
     check_error(FL_ERROR_MODEL, "farlight-import ended with status 3: no more memory");
     assert_string_equal(error.field, model);
 }
 
-TEST(an_importer_that_crashes_is_told_with_its_signal)
+TEST(an_importer_that_crashes_is_reported_with_its_signal)
 {
     assert_null(import_with("#!/bin/sh\nkill -SEGV $$\n", 5000));
     check_error(FL_ERROR_MODEL, "farlight-import was ended by signal 11");
@@ -86,7 +86,7 @@ TEST(an_importer_that_hangs_is_killed_at_its_deadline)
     assert_in_range(end.tv_sec - begin.tv_sec, 0, 5);
 }
 
-TEST(an_importer_that_sends_rubbish_is_told)
+TEST(an_importer_that_sends_garbage_is_reported)
 {
     assert_null(import_with("#!/bin/sh\necho 'this is no message at all' >&3\nsleep 5\n", 5000));
     check_error(FL_ERROR_PROTOCOL, "the importer sent what the protocol does not allow");
@@ -336,7 +336,7 @@ TEST(a_file_that_cannot_be_written_is_named_and_nothing_is_left)
     assert_int_equal(count_files(folder), before);
 }
 
-TEST(a_full_disk_is_told_and_nothing_is_left)
+TEST(a_full_disk_is_reported_and_no_file_is_left)
 {
     struct rlimit saved, small;
     char path[128];

@@ -78,7 +78,7 @@ TEST(what_is_missing_has_the_line_of_what_is_around_it)
     fl_json_finish(&json);
 }
 
-TEST(what_is_no_json_is_told_with_its_line)
+TEST(invalid_json_is_reported_with_its_line)
 {
     static const char *const bad[] = {"", "{\"a\": 1,\n\"a\": 2}", "{\"a\":\n tru}", "[1]]", "\"\\ud800\""};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {

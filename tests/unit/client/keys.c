@@ -39,7 +39,7 @@ TEST(keys_are_read_with_defaults)
     free(keys);
 }
 
-TEST(a_wrong_file_is_told_by_line_or_key_and_field)
+TEST(a_wrong_file_is_reported_by_line_or_key_and_field)
 {
     static const struct {
         const char *text, *told;

@@ -134,7 +134,7 @@ static struct fl_scene *attach(struct fl_connection *connection)
     return scene;
 }
 
-TEST(a_scene_that_is_come_to_is_known_as_a_loaded_one)
+TEST(an_attached_scene_is_known_as_a_loaded_one)
 {
     struct daemon *daemon = start(play_scenes);
     struct fl_connection *connection = connect_to(daemon);
@@ -168,7 +168,7 @@ TEST(a_scene_that_is_come_to_is_known_as_a_loaded_one)
     stop(daemon);
 }
 
-TEST(a_scene_that_is_not_there_is_told)
+TEST(a_missing_scene_is_reported)
 {
     struct daemon *daemon = start(play_scenes);
     struct fl_connection *connection = connect_to(daemon);

@@ -124,7 +124,7 @@ static void play_other_key(struct daemon *daemon)
         continue;
 }
 
-TEST(a_wrong_key_is_told_with_what_to_do)
+TEST(a_wrong_key_is_reported_with_a_remedy)
 {
     struct daemon *daemon = start(play_other_key);
     assert_null(connect_sealed(daemon));
@@ -147,7 +147,7 @@ static void play_refusal(struct daemon *daemon)
     more(daemon);
 }
 
-TEST(other_refusals_are_told_too)
+TEST(other_refusals_are_reported_too)
 {
     refusal = SEALED_TOO_MANY;
     struct daemon *daemon = start(play_refusal);
@@ -173,7 +173,7 @@ static void play_key_needed(struct daemon *daemon)
     more(daemon);
 }
 
-TEST(that_a_key_is_needed_is_told_with_what_to_do)
+TEST(a_needed_key_is_reported_with_a_remedy)
 {
     struct daemon *daemon = start(play_key_needed);
     assert_null(connect_to(daemon));

@@ -344,7 +344,7 @@ TEST(an_odd_picture_repeats_its_last_column_and_row)
     unlink(video_path);
 }
 
-TEST(mpeg4_is_there_for_those_who_ask)
+TEST(mpeg4_is_available_on_request)
 {
     uint8_t *decoded;
     need(true);
@@ -521,7 +521,7 @@ static pid_t find_child(void)
     return child;
 }
 
-TEST(a_writer_that_is_killed_is_told_and_leaves_nothing)
+TEST(a_killed_writer_is_reported_and_leaves_no_file)
 {
     static const int numbers[] = {SIGTERM, SIGKILL};
     need(false);
@@ -545,7 +545,7 @@ TEST(a_writer_that_is_killed_is_told_and_leaves_nothing)
     }
 }
 
-TEST(a_full_disk_is_told_and_nothing_is_left)
+TEST(a_full_disk_is_reported_and_no_file_is_left)
 {
     struct rlimit saved, small;
     need(false);

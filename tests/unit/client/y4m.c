@@ -310,7 +310,7 @@ TEST(a_reader_that_has_gone_is_an_error_and_no_signal)
     assert_int_equal(error.code, FL_ERROR_FILE);
 }
 
-TEST(a_full_disk_is_told)
+TEST(a_full_disk_is_reported)
 {
     uint8_t pixels[64] = {0};
     const int fd = open("/dev/full", O_WRONLY);

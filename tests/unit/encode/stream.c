@@ -161,7 +161,7 @@ TEST(a_key_frame_comes_when_it_is_asked_for_and_stands_alone)
     player_end(&late);
 }
 
-TEST(who_has_lost_a_picture_is_well_again_from_the_next_key_frame_on)
+TEST(a_decoder_that_lost_a_picture_recovers_at_the_next_key_frame)
 {
     struct encoder_stream *stream = new_stream();
     struct player player = player_begin();

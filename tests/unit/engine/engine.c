@@ -118,7 +118,7 @@ TEST(large_frames_are_fewer_in_flight_but_always_one)
     }
 }
 
-TEST(frames_that_nobody_takes_stop_the_rendering)
+TEST(frames_without_credit_stop_the_rendering)
 {
     struct engine *engine = start((struct engine_options){.frames_in_flight = 2});
     open_scene(engine, 1, 1);
@@ -162,7 +162,7 @@ TEST(the_weight_of_a_job_is_its_clients_share)
     run_beside_each_other(4);
 }
 
-TEST(who_would_wait_for_the_device_lets_others_go_first)
+TEST(a_job_that_would_wait_for_the_device_lets_others_go_first)
 {
     struct engine *engine = start((struct engine_options){0});
     for (uint64_t client = 1; client <= 2; client++) {

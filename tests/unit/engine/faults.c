@@ -105,7 +105,7 @@ TEST(a_device_that_is_lost_for_good_fails_all_jobs_and_is_told)
     stop(engine);
 }
 
-TEST(whether_the_engine_goes_on_can_be_seen)
+TEST(a_watchdog_sees_whether_the_engine_makes_progress)
 {
     struct engine *engine = start((struct engine_options){0});
     uint64_t turns = 0;
@@ -155,7 +155,7 @@ TEST(edits_that_waited_for_a_lost_frame_are_applied)
     stop(engine);
 }
 
-TEST(idle_scenes_give_way_when_device_memory_runs_out)
+TEST(idle_scenes_are_evicted_when_device_memory_runs_out)
 {
     struct engine *engine = start((struct engine_options){0});
     open_scene(engine, 1, 1);
@@ -234,7 +234,7 @@ TEST(without_a_device_there_is_no_engine)
 
 /* ---- queues and stats --------------------------------------------------------------------------- */
 
-TEST(a_full_queue_is_told_and_nothing_is_lost)
+TEST(a_full_queue_is_reported_and_loses_nothing)
 {
     /* Both queues fill up: nobody takes events while commands come in. */
     struct engine *engine = start((struct engine_options){.queue_capacity = 4});

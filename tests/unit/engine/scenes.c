@@ -90,7 +90,7 @@ static struct engine_command *render_scene(uint64_t client, uint32_t request, ui
 
 /* ---- names ------------------------------------------------------------------------------------------- */
 
-TEST(a_shared_scene_is_rendered_by_all_who_come_to_it)
+TEST(a_shared_scene_is_rendered_by_all_attached_clients)
 {
     struct engine *engine = start((struct engine_options){0});
     open_as(engine, 1, 5, "a", SHARING_SHARED);
@@ -112,7 +112,7 @@ TEST(a_shared_scene_is_rendered_by_all_who_come_to_it)
     stop(engine);
 }
 
-TEST(who_may_come_depends_on_how_it_is_shared)
+TEST(sharing_decides_which_clients_may_attach)
 {
     struct engine *engine = start((struct engine_options){0});
     open_as(engine, 1, 1, "private", SHARING_PRIVATE);
@@ -166,7 +166,7 @@ TEST(a_name_names_one_scene_for_each)
 
 /* ---- changes ----------------------------------------------------------------------------------------- */
 
-TEST(a_commit_is_told_to_all_others)
+TEST(a_commit_notifies_all_other_clients)
 {
     struct engine *engine = start((struct engine_options){0});
     open_as(engine, 1, 5, "a", SHARING_SHARED);
@@ -198,7 +198,7 @@ TEST(a_commit_is_told_to_all_others)
 
 /* ---- ends -------------------------------------------------------------------------------------------- */
 
-TEST(closing_ends_the_jobs_of_who_closes)
+TEST(closing_ends_the_jobs_of_the_client_that_closes)
 {
     struct engine *engine = start((struct engine_options){0});
     open_as(engine, 1, 5, "a", SHARING_SHARED);
@@ -302,7 +302,7 @@ static void leave(struct engine *engine, uint64_t client, const char *name, enum
     client_goes(engine, client);
 }
 
-TEST(a_scene_that_nobody_holds_can_be_come_back_to)
+TEST(a_lingering_scene_can_be_attached_again)
 {
     struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
     leave(engine, 1, "kept", SHARING_KEPT);
@@ -376,7 +376,7 @@ TEST(of_too_many_the_one_that_was_left_first_ends)
     stop(engine);
 }
 
-TEST(who_leaves_many_scenes_loses_his_own)
+TEST(a_client_with_many_lingering_scenes_loses_its_own)
 {
     struct engine *engine =
         start((struct engine_options){.limits.scene_linger_ms = LONG_MS, .limits.lingering_scenes = 3});
@@ -414,7 +414,7 @@ TEST(a_left_scene_gives_its_name_to_a_new_one_of_the_same_user)
     stop(engine);
 }
 
-TEST(left_scenes_give_way_where_memory_is_short)
+TEST(lingering_scenes_are_evicted_where_memory_is_short)
 {
     /* Room for about 100 nodes. */
     uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
@@ -446,7 +446,7 @@ static void leave_nodes(struct engine *engine, uint64_t client, const char *name
     client_goes(engine, client);
 }
 
-TEST(who_needs_room_loses_his_own_left_scenes_before_others_lose_theirs)
+TEST(a_client_that_needs_memory_loses_its_own_lingering_scenes_first)
 {
     uint64_t limit_bytes = 100 * (sizeof(struct scene_node) + 32) + 10;
     struct engine *engine = start((struct engine_options){
@@ -503,7 +503,7 @@ static void leave_spheres(struct engine *engine, uint64_t client, const char *na
     client_goes(engine, client);
 }
 
-TEST(left_scenes_give_way_to_as_many_bytes_of_blobs_as_are_lacking)
+TEST(lingering_scenes_are_evicted_for_the_bytes_of_blobs_that_are_lacking)
 {
     struct engine *engine = start((struct engine_options){.limits.scene_linger_ms = LONG_MS});
     leave_spheres(engine, 1, "theirs");

@@ -74,7 +74,7 @@ static void expect_had(const struct simulation *simulation, size_t job, uint64_t
                  (double)expected_ns / MS, (double)longest_ns / MS);
 }
 
-TEST(nobody_is_picked_when_nobody_is_ready)
+TEST(no_job_is_picked_when_none_is_ready)
 {
     struct simulation simulation = {0};
     assert_true(serve(&simulation) == SCHEDULE_NONE);
@@ -144,7 +144,7 @@ TEST(weights_divide_the_time_between_the_jobs_of_a_client_too)
     expect_had(&simulation, batch, 400 * MS);
 }
 
-TEST(who_comes_back_after_a_pause_has_no_claim_on_what_it_missed)
+TEST(a_job_that_returns_after_a_pause_has_no_claim_on_missed_time)
 {
     struct simulation simulation = {0};
     size_t there = add(&simulation, 0, 1, 5 * MS), paused = add(&simulation, 1, 1, 5 * MS);
@@ -199,7 +199,7 @@ TEST(pauses_of_all_do_not_make_the_first_to_come_the_owner)
     expect_had(&simulation, second, 100 * MS);
 }
 
-TEST(who_pauses_between_slices_is_served_first_and_not_more)
+TEST(a_job_that_pauses_between_slices_is_served_first_and_not_more)
 {
     struct simulation simulation = {0};
     size_t batch = add(&simulation, 0, 1, 8 * MS), view = add(&simulation, 1, 4, 5 * MS);
@@ -276,7 +276,7 @@ TEST(a_long_frame_does_not_keep_the_turn_for_ever)
     assert_true(simulation.longest_wait_ns[light] <= SCHEDULE_TURN_NS + 2 * SCHEDULE_TURN_EACH_NS + 3 * MS);
 }
 
-TEST(who_had_a_very_long_slice_does_not_pay_for_it_for_ever)
+TEST(a_very_long_slice_is_not_paid_for_without_end)
 {
     struct simulation simulation = {0};
     for (size_t i = 0; i < JOBS_MAX; i++)

@@ -135,7 +135,7 @@ TEST(a_frame_that_changes_what_is_shared_is_alone_and_not_overtaken)
     stop(engine);
 }
 
-TEST(a_frame_that_was_put_off_and_is_cancelled_keeps_nobody_waiting)
+TEST(a_postponed_frame_that_is_cancelled_delays_no_client)
 {
     struct engine *engine = start((struct engine_options){0});
     open_scene(engine, 1, 1);

@@ -290,7 +290,7 @@ TEST(noise_is_another_in_every_frame_but_in_none_that_accumulates)
     scene_destroy(scene);
 }
 
-TEST(who_looks_for_himself_sees_the_scene_of_that_time_from_where_he_says)
+TEST(a_given_camera_sees_the_scene_of_that_time)
 {
     struct scene *scene = new_scene();
     struct draft_list list = {0};

@@ -217,7 +217,7 @@ static void start_refining(struct watching *watching)
     wait_until(&fake.frames_begun, 2);
 }
 
-TEST(refining_gives_way_to_a_new_camera)
+TEST(a_new_camera_interrupts_refining)
 {
     struct watching *watching = *state;
     start_refining(watching);
@@ -232,7 +232,7 @@ TEST(refining_gives_way_to_a_new_camera)
     expect_silence(watching->engine); /* there is no credit for a third */
 }
 
-TEST(refining_gives_way_to_an_edit)
+TEST(an_edit_interrupts_refining)
 {
     struct watching *watching = *state;
     start_refining(watching);
@@ -245,7 +245,7 @@ TEST(refining_gives_way_to_an_edit)
     drop(frame);
 }
 
-TEST(who_looks_on_sees_cameras_while_an_edit_waits_for_a_long_frame_of_a_batch)
+TEST(a_view_shows_cameras_while_an_edit_waits_for_a_long_batch_frame)
 {
     struct watching *watching = *state;
     submit(watching->engine, gated(render(1, 9, 0, 0)));
@@ -374,7 +374,7 @@ static void expect_encoded(struct engine_frame *frame, enum encoding encoding, b
     drop(frame);
 }
 
-TEST_WITH(a_stream_goes_on_over_frames_of_rest_and_begins_again_where_it_is_wished, begin_with_encoders, end)
+TEST_WITH(a_stream_continues_over_frames_at_rest_and_restarts_on_request, begin_with_encoders, end)
 {
     struct watching *watching = *state;
     if (!encoder_stream_supports(ENCODING_H264, 4)) {

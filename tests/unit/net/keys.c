@@ -115,7 +115,7 @@ TEST_WITH(what_is_no_key_file_is_refused_by_its_reason, make_folder, remove_fold
     assert_non_null(strstr(error.text, "no file that could hold a key"));
 }
 
-TEST_WITH(a_key_of_somebody_else_is_refused, make_folder, remove_folder)
+TEST_WITH(a_key_file_of_another_user_is_refused, make_folder, remove_folder)
 {
     struct sealed_key key;
     struct decode_error error = {0};
@@ -190,7 +190,7 @@ TEST(only_connections_within_loopback_need_no_key)
     assert_false(identity.known);
 }
 
-TEST(a_key_tells_who_it_is)
+TEST(a_key_names_its_holder)
 {
     const struct auth_keys keys = {
         .keys = {{.bytes = "one"}, {.bytes = "two"}}, .read_only = {false, true}, .count = 2};
@@ -231,7 +231,7 @@ TEST(networks_are_what_one_holder_has)
 
 #define SECOND_NS UINT64_C(1000000000)
 
-TEST(so_many_wrong_keys_a_minute_are_heard_and_no_more)
+TEST(wrong_keys_are_limited_per_minute)
 {
     static struct attempts attempts;
     memset(&attempts, 0, sizeof attempts);

@@ -605,7 +605,7 @@ static bool has(struct blob_store *store, blob_principal principal, uint8_t name
     return blob != NULL;
 }
 
-TEST(a_hash_is_no_key_to_somebody_elses_blob)
+TEST(a_hash_gives_no_access_to_another_clients_blob)
 {
     struct blob_store *store = blob_store_create(10000, 10000);
     put(store, 1000, 1, 100);

@@ -175,7 +175,7 @@ TEST(every_prefix_wants_more_and_what_follows_is_left_alone)
     assert_int_equal(consumed, count);
 }
 
-TEST(names_of_the_greatest_length_fit_the_stated_maximum)
+TEST(names_of_the_maximum_length_fit)
 {
     uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
     struct handshake_hello hello = some_hello();
@@ -230,7 +230,7 @@ TEST(bytes_that_are_no_handshake_are_refused_as_soon_as_they_come)
     expect_fatal_hello(47, 1, 48, "padding");
 }
 
-TEST(a_version_that_nobody_shares_is_named)
+TEST(a_version_without_overlap_is_named)
 {
     struct handshake_hello hello = some_hello();
     struct handshake_reply reply = some_reply();

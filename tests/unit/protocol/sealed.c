@@ -556,7 +556,7 @@ TEST(a_record_cannot_be_repeated_left_out_or_moved)
     }
 }
 
-TEST(no_message_can_be_sent_back_to_who_said_it)
+TEST(a_message_cannot_be_reflected_to_its_sender)
 {
     uint8_t first[72];
     begin(&full_key, &full_key, 1);

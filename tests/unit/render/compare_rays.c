@@ -89,7 +89,7 @@ static void assert_close(double value, double expected, double relative)
 
 EACH_TEST(make_tally, free_tally)
 
-TEST(percentiles_are_true_to_a_bin_and_the_greatest_is_exact)
+TEST(percentiles_are_true_to_a_bin_and_the_maximum_is_exact)
 {
     struct error_histogram *histogram = calloc(1, sizeof *histogram);
     for (int i = 1000; i >= 1; i--)
@@ -102,7 +102,7 @@ TEST(percentiles_are_true_to_a_bin_and_the_greatest_is_exact)
     free(histogram);
 }
 
-TEST(zeros_stay_zero_and_what_is_no_number_is_the_greatest)
+TEST(zeros_stay_zero_and_nan_is_the_maximum)
 {
     struct error_histogram *histogram = calloc(1, sizeof *histogram);
     assert_true(error_histogram_percentile(histogram, 0.5) == 0.0f);

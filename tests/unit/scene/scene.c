@@ -302,7 +302,7 @@ static void commit_chain(struct scene *scene, uint32_t first, uint32_t length)
     }
 }
 
-TEST(the_hierarchy_has_a_greatest_depth)
+TEST(the_hierarchy_has_a_maximum_depth)
 {
     struct scene *scene = new_scene();
     struct draft_list list = {0};
@@ -353,7 +353,7 @@ TEST(a_removed_node_takes_along_what_hangs_below_it)
 
 /* ---- limits and revisions ----------------------------------------------------------------------- */
 
-TEST(limits_are_kept_and_told)
+TEST(limits_are_kept_and_reported)
 {
     struct scene *scene = scene_create("small", &(struct scene_limits){.host_bytes = 1500, .nodes = 2});
     struct draft_list list = {0};

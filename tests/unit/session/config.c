@@ -67,7 +67,7 @@ TEST(a_file_sets_numbers_with_units_texts_and_switches)
     assert_int_equal(config.limits.ldc_layers, 12);
 }
 
-TEST(a_mistake_is_told_with_its_file_line_and_key)
+TEST(a_mistake_is_reported_with_its_file_line_and_key)
 {
     static const struct {
         const char *text, *place, *what;

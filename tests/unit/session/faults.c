@@ -237,7 +237,7 @@ TEST(pieces_interruptions_and_full_buffers_change_nothing)
     }
 }
 
-TEST(who_does_not_read_gets_all_of_it_later)
+TEST(a_slow_reader_gets_everything_later)
 {
     serving_begin();
     assert_true(serving_connect(0));

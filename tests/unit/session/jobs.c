@@ -423,7 +423,7 @@ SESSION_TEST(a_job_whose_frames_have_no_room_waits_for_others_to_end)
     assert_int_equal(served.hub.frame_bytes, 0);
 }
 
-TEST(the_head_of_a_frame_piece_is_what_the_codec_writes)
+TEST(the_header_of_a_frame_chunk_is_what_the_codec_writes)
 {
     static uint8_t data[FRAME_PIECE_BYTES], bytes[FRAMING_MESSAGE_MAX_BYTES];
     static const size_t sizes[] = {1, 7, 8, 1000, FRAME_PIECE_BYTES};

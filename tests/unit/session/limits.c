@@ -125,7 +125,7 @@ static void expect_picture(struct client *client, uint32_t request)
 ALL_TESTS(block_signals, NULL)
 EACH_TEST(NULL, tear_down)
 
-TEST(every_limit_is_told_in_the_handshake)
+TEST(every_limit_is_stated_in_the_handshake)
 {
     struct hub_options options = {
         .limits = {.clients = 101,
@@ -208,7 +208,7 @@ TEST(every_limit_is_told_in_the_handshake)
     go(client);
 }
 
-TEST(times_below_a_second_are_not_told_as_none)
+TEST(times_below_a_second_are_not_stated_as_none)
 {
     struct hub_options options = usual_options();
     options.connection_limits.idle_ms = 900;
@@ -222,7 +222,7 @@ TEST(times_below_a_second_are_not_told_as_none)
 
 /* ---- connections ------------------------------------------------------------------------------------- */
 
-TEST(one_client_too_many_is_told_so_and_may_come_later)
+TEST(one_client_too_many_is_refused_and_may_connect_later)
 {
     struct hub_options options = usual_options();
     options.limits.clients = 2;
@@ -243,7 +243,7 @@ TEST(one_client_too_many_is_told_so_and_may_come_later)
     go(one);
 }
 
-TEST(who_comes_while_too_many_are_silent_waits_until_one_has_spoken)
+TEST(a_client_beside_too_many_silent_ones_waits_until_one_speaks)
 {
     struct hub_options options = usual_options();
     options.limits.unauthenticated = 2;
@@ -304,7 +304,7 @@ TEST(a_message_may_be_slow_but_not_slower_than_the_limit)
     go(within);
 }
 
-TEST(who_lets_too_much_wait_for_him_is_disconnected_at_once)
+TEST(a_client_with_too_much_unread_output_is_disconnected_at_once)
 {
     struct hub_options options = usual_options();
     options.connection_limits.queued_hard_bytes = 64 << 10;
@@ -335,7 +335,7 @@ TEST(who_lets_too_much_wait_for_him_is_disconnected_at_once)
 
 /* ---- scenes ------------------------------------------------------------------------------------------ */
 
-TEST(a_scene_has_so_many_nodes)
+TEST(nodes_of_a_scene_are_limited)
 {
     struct hub_options options = usual_options();
     options.engine_limits.scene.nodes = 3;
@@ -358,7 +358,7 @@ TEST(a_scene_has_so_many_nodes)
     go(other);
 }
 
-TEST(its_hierarchy_is_so_deep)
+TEST(the_depth_of_a_hierarchy_is_limited)
 {
     struct hub_options options = usual_options();
     options.engine_limits.scene.depth = options.limits.depth = 3;
@@ -387,7 +387,7 @@ TEST(its_hierarchy_is_so_deep)
 
 #define SPHERES 1000
 
-TEST(it_takes_so_much_memory)
+TEST(memory_of_a_scene_is_limited)
 {
     struct hub_options options = usual_options();
     options.engine_limits.scene.host_bytes = 20000; /* one set of 16,000 bytes, not two */
@@ -432,7 +432,7 @@ static void send_texture(struct client *client, uint32_t request, uint32_t width
     commit(client, request);
 }
 
-TEST(images_have_edges_of_so_many_texels)
+TEST(edges_of_images_are_limited)
 {
     struct hub_options options = usual_options();
     start_daemon(&options); /* 64 */
@@ -463,7 +463,7 @@ TEST(images_have_edges_of_so_many_texels)
 
 /* ---- blobs ------------------------------------------------------------------------------------------- */
 
-TEST(a_connection_names_so_many_blobs)
+TEST(blobs_of_a_connection_are_limited)
 {
     struct hub_options options = usual_options();
     options.limits.blobs_per_client = 3;
@@ -489,7 +489,7 @@ TEST(a_connection_names_so_many_blobs)
     go(other);
 }
 
-TEST(so_much_is_sent_ahead_and_not_more)
+TEST(upload_credit_limits_what_is_sent_ahead)
 {
     struct hub_options options = usual_options();
     options.limits.upload_window_bytes = 1000; /* less than one message may have */
@@ -514,7 +514,7 @@ TEST(so_much_is_sent_ahead_and_not_more)
 
 /* ---- pictures ---------------------------------------------------------------------------------------- */
 
-TEST(pictures_have_so_many_pixels_and_samples)
+TEST(pixels_and_samples_of_a_picture_are_limited)
 {
     struct hub_options options = usual_options();
     options.limits.width_pixels = 100;
@@ -543,7 +543,7 @@ TEST(pictures_have_so_many_pixels_and_samples)
     go(other);
 }
 
-TEST(so_many_frames_wait_for_who_does_not_read)
+TEST(frames_that_wait_for_a_slow_reader_are_limited)
 {
     struct hub_options options = usual_options();
     options.limits.frame_window_bytes = 2 << 20;

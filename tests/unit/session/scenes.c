@@ -155,7 +155,7 @@ TEST(a_view_at_rest_shows_what_another_client_changes)
     cut(other, NULL);
 }
 
-TEST(many_changes_are_told_as_one_to_who_does_not_listen)
+TEST(many_changes_reach_a_slow_reader_as_one)
 {
     enum { CHANGES = 200 };
     struct client *one = come(false), *other = come(false);
@@ -175,7 +175,7 @@ TEST(many_changes_are_told_as_one_to_who_does_not_listen)
     cut(other, NULL);
 }
 
-TEST(what_a_scene_holds_is_told)
+TEST(contents_of_a_scene_are_reported)
 {
     struct client *one = come(false), *other = come(true);
     open_scene_as(one, 1, "model", PROTOCOL_SHARING_SHARED);
@@ -213,7 +213,7 @@ TEST(what_a_scene_holds_is_told)
     cut(other, NULL);
 }
 
-TEST(scenes_that_cannot_be_come_to_are_refused_by_their_field)
+TEST(scenes_that_cannot_be_attached_are_refused_by_field)
 {
     struct client *one = come(false), *other = come(true);
     open_scene_as(one, 1, "kept", PROTOCOL_SHARING_KEPT);
@@ -270,7 +270,7 @@ TEST(a_stranger_leaves_a_shared_scene_that_stays_whole)
     cut(witness, NULL);
 }
 
-TEST_WITH(scenes_that_nobody_holds_give_way_to_blobs, set_up_with_few_blobs, tear_down)
+TEST_WITH(lingering_scenes_are_evicted_for_blobs, set_up_with_few_blobs, tear_down)
 {
     /* Room for one blob of 200,000 bytes, not for two. */
     static float spheres[2][50000];

@@ -17,7 +17,7 @@ static int real_calls(void **state)
 }
 EACH_TEST(real_calls, tear_down)
 
-SESSION_TEST(a_ping_is_answered_and_stats_are_told)
+SESSION_TEST(a_ping_and_a_request_for_stats_are_answered)
 {
     expect_alive(7);
     struct message message = made(MESSAGE_STATS);
@@ -80,7 +80,7 @@ SESSION_TEST(messages_that_come_while_the_engine_is_full_are_answered_later)
         expect(MESSAGE_PONG, request);
 }
 
-SESSION_TEST(rubbish_is_told_so_and_the_connection_closed)
+SESSION_TEST(garbage_is_answered_by_an_error_and_closes_the_connection)
 {
     uint8_t bytes[64];
     memset(bytes, 0xff, sizeof bytes);
@@ -149,7 +149,7 @@ static void expect_closed_within_5_s(void)
     assert_in_range((clock_now_ns() - before_ns) / 1000000, 0, 5000);
 }
 
-TEST(who_does_not_introduce_himself_is_closed)
+TEST(a_client_without_a_hello_is_disconnected)
 {
     struct connection_limits limits = patient;
     limits.handshake_ms = 50;
@@ -158,7 +158,7 @@ TEST(who_does_not_introduce_himself_is_closed)
     expect_closed_within_5_s();
 }
 
-TEST(who_does_not_finish_a_message_is_closed)
+TEST(a_client_with_an_unfinished_message_is_disconnected)
 {
     struct connection_limits limits = patient;
     limits.progress_grace_ms = 50;
@@ -174,7 +174,7 @@ TEST(who_does_not_finish_a_message_is_closed)
     expect_closed_within_5_s();
 }
 
-TEST(who_cannot_finish_a_message_because_nothing_is_read_has_his_time_later)
+TEST(a_client_that_the_daemon_does_not_read_has_its_time_later)
 {
     struct connection_limits limits = patient;
     limits.progress_grace_ms = 100;
@@ -204,7 +204,7 @@ TEST(who_cannot_finish_a_message_because_nothing_is_read_has_his_time_later)
     }
 }
 
-TEST(who_is_silent_is_closed_but_not_while_he_waits)
+TEST(a_silent_client_is_disconnected_unless_it_waits)
 {
     struct connection_limits limits = patient;
     limits.idle_ms = 60;
@@ -226,7 +226,7 @@ TEST(who_is_silent_is_closed_but_not_while_he_waits)
     expect_closed_within_5_s();
 }
 
-TEST(who_does_not_read_is_closed)
+TEST(a_client_that_does_not_read_is_disconnected)
 {
     struct connection_limits limits = patient;
     limits.queued_soft_bytes = 1000;
@@ -243,7 +243,7 @@ TEST(who_does_not_read_is_closed)
 
 /* ---- keys ---------------------------------------------------------------------------------------------- */
 
-TEST(who_is_sealed_but_does_not_introduce_himself_is_closed)
+TEST(a_sealed_client_without_a_hello_is_disconnected)
 {
     struct connection_limits limits = patient;
     limits.handshake_ms = 200;
@@ -252,7 +252,7 @@ TEST(who_is_sealed_but_does_not_introduce_himself_is_closed)
     expect_closed_within_5_s();
 }
 
-TEST(who_does_not_finish_a_record_is_closed)
+TEST(a_client_with_an_unfinished_record_is_disconnected)
 {
     struct connection_limits limits = patient;
     limits.progress_grace_ms = 50;
@@ -265,7 +265,7 @@ TEST(who_does_not_finish_a_record_is_closed)
     expect_closed_within_5_s();
 }
 
-TEST(a_record_that_was_changed_is_told_so_and_the_connection_closed)
+TEST(a_changed_record_is_reported_and_closes_the_connection)
 {
     start(&patient);
     seal_with(&session_key);
@@ -287,7 +287,7 @@ static const struct session *only_session(void)
     return session;
 }
 
-TEST(a_key_says_who_it_is_and_what_he_may_do)
+TEST(a_key_names_its_holder_and_its_rights)
 {
     static const struct sealed_key *const keys[] = {&session_key, &session_reader_key, NULL};
     blob_principal principals[3];

@@ -365,7 +365,7 @@ SESSION_TEST(frames_are_begun_ahead_of_those_sent_and_not_beyond_credit)
     engine_command_destroy(start);
 }
 
-SESSION_TEST(who_acknowledges_nothing_gets_one_frame_at_a_time)
+SESSION_TEST(a_client_without_acknowledgements_gets_one_frame_at_a_time)
 {
     struct engine_command *start = start_view(2, 100);
     assert_int_equal(start->job.credit, 1);
@@ -378,7 +378,7 @@ SESSION_TEST(who_acknowledges_nothing_gets_one_frame_at_a_time)
     engine_command_destroy(start);
 }
 
-SESSION_TEST(a_flood_of_cameras_is_told_once_until_the_engine_looks)
+SESSION_TEST(a_flood_of_cameras_wakes_the_engine_once)
 {
     struct engine_command *start = start_view(2, 1);
     for (uint64_t number = 1; number <= 1000; number++)
@@ -408,7 +408,7 @@ SESSION_TEST(a_camera_of_no_view_is_ignored_and_one_out_of_order_is_not)
     engine_command_destroy(start);
 }
 
-SESSION_TEST(a_key_frame_is_wished_of_the_engine)
+SESSION_TEST(a_request_for_a_key_frame_reaches_the_engine)
 {
     struct engine_command *start = start_acknowledged_view(2, 1);
     send_ack(0, true, true);
@@ -418,7 +418,7 @@ SESSION_TEST(a_key_frame_is_wished_of_the_engine)
     engine_command_destroy(start);
 }
 
-SESSION_TEST(who_has_no_credit_left_is_told_that_nothing_comes)
+SESSION_TEST(a_client_without_credit_is_told_that_it_is_used_up)
 {
     struct engine_command *start = start_acknowledged_view(2, 1);
     for (unsigned i = 0; !client.blocked && i < 200; i++) {
@@ -523,7 +523,7 @@ SESSION_TEST(a_picture_at_rest_that_motion_overtakes_is_abandoned_and_uses_no_cr
 }
 
 /* Nothing is acknowledged, so that all of them take long as far as is known. */
-SESSION_TEST(what_others_need_or_still_shows_what_is_wished_is_not_abandoned)
+SESSION_TEST(a_frame_that_is_still_needed_is_not_abandoned)
 {
     struct engine_command *start = start_view(2, 100);
     assert_false(is_abandoned(0, 0, ENCODING_ZSTD, 2, false)); /* rest after rest */
@@ -535,7 +535,7 @@ SESSION_TEST(what_others_need_or_still_shows_what_is_wished_is_not_abandoned)
     engine_command_destroy(start);
 }
 
-TEST_WITH(who_does_not_say_that_frames_may_be_abandoned_gets_them_whole, set_up_ungreeted, tear_down)
+TEST_WITH(a_client_that_does_not_allow_abandoned_frames_gets_them_whole, set_up_ungreeted, tear_down)
 {
     assert_int_equal(greet_with(0) & HANDSHAKE_CAN_ABANDON, 0);
     struct engine_command *start = start_view(2, 100);

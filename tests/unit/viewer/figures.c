@@ -214,7 +214,7 @@ static void check_within(const struct hud_state *state)
     }
 }
 
-TEST(the_overlay_tells_what_it_should_within_the_window)
+TEST(the_overlay_shows_its_figures_within_the_window)
 {
     for (uint32_t i = 0; i < 20; i++)
         add(i, i + 1, (1000 + i * 20) * MS);

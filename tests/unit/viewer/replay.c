@@ -60,7 +60,7 @@ TEST(every_kind_of_event_is_read)
     replay_finish(&replay);
 }
 
-TEST(what_is_wrong_is_told_with_its_line_and_event)
+TEST(mistakes_are_reported_with_line_and_event)
 {
     static const struct {
         const char *text, *part;

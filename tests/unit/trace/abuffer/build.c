@@ -303,7 +303,7 @@ TEST(bodies_balance)
     expect_scene_like_oracle(scene_of_bodies(), NULL, true);
 }
 
-TEST(bodies_balance_among_what_is_none)
+TEST(closed_bodies_balance_among_open_surfaces)
 {
     expect_scene_like_oracle(scene_of_bodies_and_others(), NULL, true);
 }

@@ -164,7 +164,7 @@ static enum tracer_progress build_in_units(struct fixture *fixture, uint32_t res
 }
 
 /* However small they are, also where lists turn out to be too small in the middle. */
-TEST(a_build_in_pieces_is_the_same)
+TEST(a_build_in_steps_is_the_same)
 {
     static const uint32_t units[] = {5, 64, 3001};
     struct scene *(*const scenes[])(void) = {scene_of_bodies_and_others, test_scene_spheres,
@@ -211,7 +211,7 @@ TEST(what_covers_much_is_drawn_in_bands)
 }
 
 /* The host's part of it, too. */
-TEST(deep_texels_are_done_in_pieces)
+TEST(deep_texels_are_sorted_in_steps)
 {
     struct fixture fixture;
     struct contents whole, pieces;

@@ -799,7 +799,7 @@ TEST(a_top_tree_over_an_endless_instance_is_not_stale_when_new)
     bvh_top_finish(&top);
 }
 
-TEST(an_instance_that_comes_or_goes_needs_a_new_top_tree)
+TEST(an_added_or_removed_instance_needs_a_new_top_tree)
 {
     struct bvh_world_box boxes[INSTANCES];
     struct bvh_top top;

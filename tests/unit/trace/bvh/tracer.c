@@ -284,7 +284,7 @@ static struct scene *scene_of_detail(void)
     return edits.scene;
 }
 
-TEST(detail_that_a_grid_cannot_tell_apart_is_walked_in_floats)
+TEST(detail_below_the_grid_is_traversed_in_floats)
 {
     struct fixture fixture;
     fixture_init(&fixture, scene_of_instances(), NULL);
@@ -330,7 +330,7 @@ static uint32_t rays_together(struct fixture *fixture, float spread, uint32_t fi
     return together;
 }
 
-TEST(rays_walk_together_where_neighbours_go_the_same_way)
+TEST(coherent_neighbours_are_traced_as_packets)
 {
     struct fixture fixture;
     fixture_init(&fixture, scene_of_instances(), NULL);
@@ -339,7 +339,7 @@ TEST(rays_walk_together_where_neighbours_go_the_same_way)
     fixture_finish(&fixture);
 }
 
-TEST(parts_of_a_wave_walk_as_its_first_part_did_whatever_was_traced_in_between)
+TEST(slices_of_a_wave_keep_the_packet_size_of_the_first)
 {
     struct fixture fixture;
     uint32_t chosen[2] = {0};
@@ -364,7 +364,7 @@ TEST(rays_beside_one_that_is_no_number_hit_as_by_brute_force)
     free(rays);
 }
 
-TEST(a_number_of_rays_that_cannot_walk_together_is_refused)
+TEST(an_impossible_packet_size_is_refused)
 {
     struct error error = {0};
     assert_null(tracer_create(&tracer_bvh_impl, device, &(struct tracer_options){.bvh_rays_together = 5}, &error));
