@@ -437,7 +437,7 @@ $(FUZZ_SEED): %: %.o $(B)/tests/fuzz/recorded_session.o $(COMMON_OBJ) $(PROTOCOL
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium) -o $@
 $(addprefix $(B)/tests/fuzz/fuzz_,$(FUZZERS)): %: %.o $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) -fsanitize=fuzzer $(LDFLAGS_ALL) $^ $(FUZZ_LIBS) -o $@
-$(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ))
+$(B)/tests/fuzz/fuzz_scene: $(filter $(B)/server/scene/% $(B)/server/base/%,$(SERVER_OBJ)) $(COMMON_OBJ)
 $(B)/tests/fuzz/fuzz_sealed: $(SEALED_OBJ)
 $(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_sealed: FUZZ_LIBS = $(call pkg_libs,libsodium) -lm
 $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)

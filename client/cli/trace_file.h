@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The stages of a command as a file of trace events, which ui.perfetto.dev and chrome://tracing open: the array
- * form of the Trace Event Format (Google. Trace Event Format. 2016), complete events ("X"), microseconds of the
- * monotonic clock. Two processes, the client and the daemon; each has tracks, and a track more lanes where its
- * events do not nest. After a crash the file lacks its last line, "]", which the format allows. */
+/* The stages of a command as a file of trace events (protocol/common/trace_event.h) by the monotonic clock. Two
+ * processes, the client and the daemon, and their tracks. After a crash the file lacks its last line, "]", which
+ * the format allows. */
 #ifndef FARLIGHT_CLIENT_CLI_TRACE_FILE_H
 #define FARLIGHT_CLIENT_CLI_TRACE_FILE_H
 

@@ -2,6 +2,7 @@
 #include "base/timeline.h"
 
 #include "base/log.h"
+#include "protocol/common/trace_event.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -13,26 +14,16 @@
 #include <unistd.h>
 
 #define WAITING_MAX_BYTES (8u << 20)
-#define JOBS_MAX 64u  /* whose tracks are remembered; the one unused for longest gets new ones */
-#define LANES_MAX 16u /* as many frames of a job may be in flight */
-#define DEPTH_MAX 8u
+#define JOBS_MAX 64u /* whose tracks are remembered; the one unused for longest gets new ones */
 
-static const char head[] = "[\n", separator[] = ",\n", tail[] = "\n]\n";
+static const char head[] = TRACE_FILE_BEGIN, separator[] = TRACE_FILE_SEPARATOR, tail[] = TRACE_FILE_END;
 
 enum track { TRACK_RENDER, TRACK_OUTPUT, TRACK_GPU, TRACK_COUNT };
-
-/* Events of one thread nest, or follow each other. */
-struct lane {
-    uint64_t thread, last_start_ns;
-    uint64_t ends_ns[DEPTH_MAX]; /* of the events that the last one is within, and its own */
-    unsigned depth;
-};
 
 struct job_tracks {
     uint64_t client, last_used;
     uint32_t job;
-    unsigned lane_counts[TRACK_COUNT];
-    struct lane lanes[TRACK_COUNT][LANES_MAX];
+    struct trace_track tracks[TRACK_COUNT];
 };
 
 struct timeline {
@@ -127,31 +118,8 @@ static void accept(struct timeline *timeline, const char *block, size_t count)
 
 /* ---- events ------------------------------------------------------------------------------------------- */
 
-static void print_text(FILE *out, const char *text)
-{
-    fputc('"', out);
-    for (; *text; text++) {
-        unsigned char c = (unsigned char)*text;
-        if (c == '"' || c == '\\')
-            fprintf(out, "\\%c", c);
-        else if (c < 0x20 || c == 0x7f)
-            fprintf(out, "\\u%04x", c);
-        else
-            fputc(c, out);
-    }
-    fputc('"', out);
-}
-
-static void print_name(FILE *out, const char *kind, uint64_t process, uint64_t thread, const char *name)
-{
-    fprintf(out, "{\"name\":\"%s\",\"ph\":\"M\",\"pid\":%" PRIu64 ",\"tid\":%" PRIu64 ",\"args\":{\"name\":", kind,
-            process, thread);
-    print_text(out, name);
-    fputs("}}", out);
-    fputs(separator, out);
-}
-
-static struct job_tracks *find_tracks(struct timeline *timeline, const struct timeline_frame *frame, FILE *out)
+static struct job_tracks *find_tracks(struct timeline *timeline, const struct timeline_frame *frame,
+                                      struct trace_writer *writer)
 {
     struct job_tracks *oldest = &timeline->jobs[0];
     timeline->uses++;
@@ -167,87 +135,42 @@ static struct job_tracks *find_tracks(struct timeline *timeline, const struct ti
     *oldest = (struct job_tracks){.client = frame->client, .job = frame->job, .last_used = timeline->uses};
     char name[160];
     snprintf(name, sizeof name, "client %" PRIu64 " %s", frame->client, frame->client_name);
-    print_name(out, "process_name", frame->client, 0, name);
+    trace_write_process_name(writer, frame->client, name);
     return oldest;
 }
 
-/* Appends the event if the lane can hold it; false otherwise. */
-static bool lane_takes(struct lane *lane, uint64_t start_ns, uint64_t end_ns)
+static enum track track_of(enum stage_id stage, bool gpu)
 {
-    unsigned depth = lane->depth;
-    if (start_ns < lane->last_start_ns)
-        return false;
-    while (depth > 0 && lane->ends_ns[depth - 1] <= start_ns)
-        depth--;
-    if (depth == DEPTH_MAX || (depth > 0 && end_ns > lane->ends_ns[depth - 1]))
-        return false;
-    lane->ends_ns[depth] = end_ns;
-    lane->depth = depth + 1;
-    lane->last_start_ns = start_ns;
-    return true;
+    if (gpu)
+        return TRACK_GPU;
+    return stage == STAGE_ENCODE || stage == STAGE_QUEUE || stage == STAGE_SEND ? TRACK_OUTPUT : TRACK_RENDER;
 }
 
-static uint64_t thread_of(struct timeline *timeline, struct job_tracks *tracks, enum track track,
-                          uint64_t start_ns, uint64_t end_ns, FILE *out)
+static void print_frame(struct timeline *timeline, const struct timeline_frame *frame, struct trace_writer *writer)
 {
     static const char *const names[TRACK_COUNT] = {"render, CPU", "output, CPU", "render, GPU"};
-    unsigned *count = &tracks->lane_counts[track];
-    for (unsigned i = 0; i < *count; i++)
-        if (lane_takes(&tracks->lanes[track][i], start_ns, end_ns))
-            return tracks->lanes[track][i].thread;
-    if (*count == LANES_MAX) /* more frames than may be: better drawn over others than not at all */
-        return tracks->lanes[track][LANES_MAX - 1].thread;
-    struct lane *lane = &tracks->lanes[track][(*count)++];
-    lane->thread = ++timeline->threads;
-    lane_takes(lane, start_ns, end_ns);
-    char name[64], number[16] = "";
-    if (*count > 1)
-        snprintf(number, sizeof number, " (%u)", *count);
-    snprintf(name, sizeof name, "job %" PRIu32 ": %s%s", tracks->job, names[track], number);
-    print_name(out, "thread_name", tracks->client, lane->thread, name);
-    return lane->thread;
-}
-
-static enum track track_of(const struct stage_span *span)
-{
-    if (span->clock == STAGE_GPU)
-        return TRACK_GPU;
-    return span->stage == STAGE_ENCODE || span->stage == STAGE_QUEUE || span->stage == STAGE_SEND ? TRACK_OUTPUT
-                                                                                                  : TRACK_RENDER;
-}
-
-/* By start; an event before those that it contains. */
-static int compare_spans(const void *a, const void *b)
-{
-    const struct stage_span *first = *(const struct stage_span *const *)a;
-    const struct stage_span *second = *(const struct stage_span *const *)b;
-    if (first->start_ns != second->start_ns)
-        return first->start_ns < second->start_ns ? -1 : 1;
-    if (first->duration_ns != second->duration_ns)
-        return first->duration_ns > second->duration_ns ? -1 : 1;
-    return (first->stage < second->stage) - (first->stage > second->stage); /* frame contains its one stage */
-}
-
-static void print_frame(struct timeline *timeline, const struct timeline_frame *frame, FILE *out)
-{
     const struct stage_times *times = frame->times;
-    const struct stage_span *spans[STAGE_SPANS_MAX];
-    struct job_tracks *tracks = find_tracks(timeline, frame, out);
-    for (uint32_t i = 0; i < times->count; i++)
-        spans[i] = &times->spans[i];
-    qsort(spans, times->count, sizeof spans[0], compare_spans);
+    struct job_tracks *job = find_tracks(timeline, frame, writer);
+    struct trace_event events[STAGE_SPANS_MAX];
     for (uint32_t i = 0; i < times->count; i++) {
-        const struct stage_span *span = spans[i];
-        uint64_t start_ns = times->origin_ns + span->start_ns;
-        uint64_t thread = thread_of(timeline, tracks, track_of(span), start_ns, start_ns + span->duration_ns, out);
-        fprintf(out,
-                "{\"name\":\"%s\",\"cat\":\"%s\",\"ph\":\"X\",\"ts\":%" PRIu64 ".%03u,\"dur\":%" PRIu64
-                ".%03u,\"pid\":%" PRIu64 ",\"tid\":%" PRIu64 ",\"args\":{\"job\":%" PRIu32 ",\"frame\":%" PRIu32
-                ",\"wave\":%" PRIu32 "}}%s",
-                stage_name(span->stage), span->clock == STAGE_GPU ? "gpu" : "cpu", start_ns / 1000,
-                (unsigned)(start_ns % 1000), span->duration_ns / 1000, (unsigned)(span->duration_ns % 1000),
-                frame->client, thread, frame->job, frame->frame, span->wave,
-                i + 1 < times->count ? separator : "");
+        const struct stage_span *span = &times->spans[i];
+        events[i] = (struct trace_event){
+            .name = stage_name(span->stage),
+            .gpu = span->clock == STAGE_GPU,
+            .rank = span->stage, /* frame contains its one stage */
+            .process = frame->client,
+            .start_ns = times->origin_ns + span->start_ns,
+            .duration_ns = span->duration_ns,
+            .arguments = {{"job", frame->job}, {"frame", frame->frame}, {"wave", span->wave}},
+        };
+    }
+    trace_sort_events(events, times->count);
+    for (uint32_t i = 0; i < times->count; i++) {
+        enum track track = track_of((enum stage_id)events[i].rank, events[i].gpu);
+        char name[64];
+        snprintf(name, sizeof(name), "job %" PRIu32 ": %s", frame->job, names[track]);
+        trace_place_event(writer, &job->tracks[track], name, &events[i]);
+        trace_write_event(writer, &events[i]);
     }
 }
 
@@ -260,7 +183,8 @@ void timeline_frame(struct timeline *timeline, const struct timeline_frame *fram
     FILE *out = open_memstream(&block, &count);
     if (!out)
         return;
-    print_frame(timeline, frame, out);
+    struct trace_writer writer = {out, "", &timeline->threads};
+    print_frame(timeline, frame, &writer);
     if (fclose(out) == 0)
         accept(timeline, block, count);
     free(block);
