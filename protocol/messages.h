@@ -75,6 +75,11 @@ void message_init(struct message *message, enum message_type type);
 /* "set_node"; "unknown" for a type that is not in the table. */
 const char *message_type_text(uint32_t type);
 
+static inline uint32_t protocol_pixel_format_bytes(enum protocol_pixel_format format)
+{
+    return format == PROTOCOL_PIXEL_FORMAT_RGBA8 ? 4 : format == PROTOCOL_PIXEL_FORMAT_RGBA16F ? 8 : 16;
+}
+
 /* Per enum: the value's text ("bvh"; "?" outside the enum), and back (false: no such text; *out untouched). */
 #define ENUMERATION(NAME, name, doc)                                                                              \
     const char *protocol_##name##_text(enum protocol_##name value);                                               \

@@ -4,15 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-static size_t bytes_per_pixel(enum protocol_pixel_format format)
-{
-    return format == PROTOCOL_PIXEL_FORMAT_RGBA8 ? 4 : format == PROTOCOL_PIXEL_FORMAT_RGBA16F ? 8 : 16;
-}
-
 bool incoming_begin(struct incoming *incoming, const struct message_frame_begin *begin, bool keep)
 {
     const uint64_t layers = (uint64_t)__builtin_popcount(begin->layers);
-    const uint64_t bytes = layers * begin->width * begin->height * bytes_per_pixel(begin->format);
+    const uint64_t bytes = layers * begin->width * begin->height * protocol_pixel_format_bytes(begin->format);
     if (incoming->begun || begin->encoding != PROTOCOL_ENCODING_RAW || begin->size_bytes != bytes)
         return false;
     incoming->begun = true;

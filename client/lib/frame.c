@@ -17,16 +17,7 @@
 
 uint32_t fl_bytes_per_pixel(enum protocol_pixel_format format)
 {
-    switch (format) {
-    case PROTOCOL_PIXEL_FORMAT_RGBA8:
-        return 4;
-    case PROTOCOL_PIXEL_FORMAT_RGBA16F:
-        return 8;
-    case PROTOCOL_PIXEL_FORMAT_RGBA32F:
-        return 16;
-    default:
-        return 0;
-    }
+    return (unsigned)format < PROTOCOL_PIXEL_FORMAT_COUNT ? protocol_pixel_format_bytes(format) : 0;
 }
 
 /* Of all layers together; 0: more than there can be. */

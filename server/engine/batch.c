@@ -14,14 +14,9 @@
 
 /* ---- start -------------------------------------------------------------------------------------- */
 
-static uint32_t bytes_per_pixel(enum frame_format format)
-{
-    return format == FRAME_RGBA8 ? 4 : format == FRAME_RGBA16F ? 8 : 16;
-}
-
 static bool can_encode(const struct engine_job *spec, enum encoding encoding)
 {
-    uint32_t pixel_bytes = bytes_per_pixel(spec->frame.format);
+    uint32_t pixel_bytes = frame_format_bytes(spec->frame.format);
     return encoder_supports(encoding, pixel_bytes) ||
            (spec->kind == JOB_VIEW && encoder_stream_supports(encoding, pixel_bytes));
 }
@@ -40,13 +35,13 @@ static bool spec_check(const struct engine_job *spec, const struct scene *scene,
         return error_set(error, ERROR_INVALID, "render.samples", "a pixel has at least one sample");
     if (!can_encode(spec, spec->encoding)) {
         error_set(error, ERROR_UNSUPPORTED, "render.encoding", "encoding %u cannot carry pixels of %u bytes",
-                  (unsigned)spec->encoding, bytes_per_pixel(spec->frame.format));
+                  (unsigned)spec->encoding, frame_format_bytes(spec->frame.format));
         return error_remedy(error, "use the pixel format rgba8, or the encoding raw, zstd or predicted");
     }
     if (spec->kind == JOB_VIEW && !can_encode(spec, spec->still_encoding))
         return error_set(error, ERROR_UNSUPPORTED, "render.still_encoding",
                          "encoding %u cannot carry pixels of %u bytes", (unsigned)spec->still_encoding,
-                         bytes_per_pixel(spec->frame.format));
+                         frame_format_bytes(spec->frame.format));
     return tracer_find(spec->frame.tracer, "render.tracer", error) &&
            (!spec->frame.compare || tracer_find(spec->frame.compare_with, "render.compare_with", error)) &&
            shot_check(spec, scene, error);

@@ -230,7 +230,7 @@ bool frame_step_waits(const struct frame_renderer *renderer)
 static size_t attached_bytes(const struct frame_request *request)
 {
     size_t count = (size_t)__builtin_popcount(request->attachments);
-    return count * request->width * request->height * picture_pixel_bytes(FRAME_DEPTH32F);
+    return count * request->width * request->height * frame_format_bytes(FRAME_DEPTH32F);
 }
 
 static bool hand_out(struct frame_renderer *renderer, struct frame_result *result, struct error *error)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What renderers share, a renderer's life, and what they hold on the device. */
+#include "render/frame_request.h"
 #include "render/frame_state.h"
 
 #include <stdlib.h>
@@ -13,7 +14,7 @@ void frame_result_finish(struct frame_result *result)
 
 const uint8_t *frame_result_attachment(const struct frame_result *result, enum frame_attachment which)
 {
-    size_t bytes = (size_t)result->width * result->height * picture_pixel_bytes(FRAME_DEPTH32F);
+    size_t bytes = (size_t)result->width * result->height * frame_format_bytes(FRAME_DEPTH32F);
     /* As planes they come in the order of their layers. */
     bool is_second = which == ATTACHMENT_DEPTH && result->attachments & ATTACHMENT_NORMALS;
     return result->pixels + result->size_bytes + (is_second ? bytes : 0);

@@ -64,6 +64,21 @@ uint32_t frame_request_planes(const struct frame_request *request)
            (request->attachments & ATTACHMENT_NORMALS ? 1u << LAYER_NORMAL : 0);
 }
 
+uint32_t frame_format_bytes(enum frame_format format)
+{
+    switch (format) {
+    case FRAME_RGBA8:
+    case FRAME_DEPTH32F:
+    case FRAME_NORMAL8:
+        return 4;
+    case FRAME_RGBA16F:
+        return 8;
+    case FRAME_RGBA32F:
+        return 16;
+    }
+    return 0;
+}
+
 enum frame_format frame_request_plane_format(const struct frame_request *request, enum frame_layer layer)
 {
     if (request->attachments & ATTACHMENT_DEPTH && layer == LAYER_DEPTH)
@@ -77,7 +92,7 @@ uint64_t frame_request_plane_bytes(const struct frame_request *request, enum fra
 {
     if (layer == LAYER_BEAUTY && request->ycbcr != YCBCR_NONE)
         return (uint64_t)ycbcr_row_bytes(request->width) * ycbcr_row_count(rows);
-    return (uint64_t)request->width * rows * picture_pixel_bytes(frame_request_plane_format(request, layer));
+    return (uint64_t)request->width * rows * frame_format_bytes(frame_request_plane_format(request, layer));
 }
 
 uint64_t frame_request_bytes(const struct frame_request *request)

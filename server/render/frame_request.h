@@ -14,6 +14,7 @@ uint32_t frame_request_layers(const struct frame_request *request);
 uint32_t frame_request_planes(const struct frame_request *request);
 /* Of a plane's pixels on the host, that of the beauty where the request attaches what it is. */
 enum frame_format frame_request_plane_format(const struct frame_request *request, enum frame_layer layer);
+uint32_t frame_format_bytes(enum frame_format format); /* of a pixel */
 /* Of a plane's rows on the host; a multiple of 8, or all that there are. As Y'CbCr an odd last one has two. */
 uint64_t frame_request_plane_bytes(const struct frame_request *request, enum frame_layer layer, uint32_t rows);
 /* Of the frame's pixels, all planes. */

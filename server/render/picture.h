@@ -46,7 +46,6 @@ struct gpu_buffer *picture_band(const struct picture *picture, uint32_t plane, u
 uint64_t picture_device_bytes(const struct picture *picture);
 uint32_t picture_band_first_row(const struct picture *picture, uint32_t band);
 uint32_t picture_band_row_count(const struct picture *picture, uint32_t band);
-size_t picture_pixel_bytes(enum frame_format format);
 void picture_drop_pixels(struct picture *picture);
 void picture_finish(struct picture *picture, struct gpu_device *device);
 

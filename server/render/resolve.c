@@ -8,21 +8,6 @@
 
 #include <math.h>
 
-size_t picture_pixel_bytes(enum frame_format format)
-{
-    switch (format) {
-    case FRAME_RGBA8:
-    case FRAME_DEPTH32F:
-    case FRAME_NORMAL8:
-        return 4;
-    case FRAME_RGBA16F:
-        return 8;
-    case FRAME_RGBA32F:
-        return 16;
-    }
-    return 0;
-}
-
 /* Of the sum of a layer's samples what its pixels show. */
 static float scale_of(const struct picture *picture, const struct frame_request *request, enum frame_layer layer)
 {

@@ -20,26 +20,12 @@
 #define WEIGHT_OF_VIEW 4 /* somebody waits for each of its frames */
 #define WEIGHT_OF_BATCH 1
 
-static uint32_t bytes_per_pixel(enum protocol_pixel_format format)
-{
-    switch (format) {
-    case PROTOCOL_PIXEL_FORMAT_RGBA8:
-        return 4;
-    case PROTOCOL_PIXEL_FORMAT_RGBA16F:
-        return 8;
-    case PROTOCOL_PIXEL_FORMAT_RGBA32F:
-    case PROTOCOL_PIXEL_FORMAT_COUNT:
-        break;
-    }
-    return 16;
-}
-
 /* ---- checks ------------------------------------------------------------------------------------------ */
 
 static uint64_t frame_bytes_of(const struct message_render *render)
 {
     uint32_t layers = render->layers ? render->layers : BEAUTY_ALONE;
-    uint32_t pixel_bytes = bytes_per_pixel(render->format) * (uint32_t)__builtin_popcount(layers) +
+    uint32_t pixel_bytes = protocol_pixel_format_bytes(render->format) * (uint32_t)__builtin_popcount(layers) +
                            ATTACHMENT_PIXEL_BYTES * (uint32_t)__builtin_popcount(render->attachments);
     return (uint64_t)render->width * render->height * pixel_bytes;
 }
@@ -154,7 +140,7 @@ static bool check_encoding(const struct session *session, const struct message_r
                             "a client that decodes it says so in its handshake, and a daemon that encodes it "
                             "in the reply; choose jpeg otherwise");
     }
-    uint32_t pixel_bytes = bytes_per_pixel(render->format);
+    uint32_t pixel_bytes = protocol_pixel_format_bytes(render->format);
     if (is_stream ? pixel_bytes == 4 : encoder_supports((enum encoding)encoding, pixel_bytes))
         return true;
     error_set(error, ERROR_UNSUPPORTED, field, "%s does not carry %s", protocol_encoding_text(encoding),
