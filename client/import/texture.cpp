@@ -2,6 +2,7 @@
 // Images through OpenImageIO: the reader is named by the first bytes and not guessed by the library, it reads from
 // memory, and what the header claims is checked before a pixel is asked for.
 #include "formats.h"
+#include "protocol/common/srgb.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -129,12 +130,6 @@ uint8_t byte_of(float value)
     return uint8_t(std::lround(std::min(std::max(value, 0.0f), 1.0f) * 255.0f)); // NaN becomes 0: max(NaN, 0) is 0
 }
 
-// IEC 61966-2-1.
-float srgb_encode(float linear)
-{
-    return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
-}
-
 // One to four channels to four, in place at the end of the same buffer would save memory; clarity was worth more.
 void expand(const uint8_t *from, unsigned char *to, size_t texels, int channels)
 {
@@ -179,7 +174,7 @@ bool decode_floats(opened_image &image, texture_job &job, size_t texels, std::st
         unsigned char *to = job.texels + i * texel_bytes;
         for (int c = 0; c < 3; c++) {
             const float value = from[channels >= 3 ? c : 0];
-            to[c] = byte_of(job.srgb ? srgb_encode(std::max(0.0f, value)) : value);
+            to[c] = byte_of(job.srgb ? srgb_from_linear_f(std::max(0.0f, value)) : value);
         }
         to[3] = channels == 4 ? byte_of(from[3]) : channels == 2 ? byte_of(from[1]) : 255;
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "heat_map.hpp"
 #include "picture.hpp"
+#include "protocol/common/srgb.h"
 
 #include <OpenImageIO/imagebufalgo.h>
 
@@ -65,7 +66,7 @@ ImageBuf heat_map(const ImageBuf &errors, float top, const std::vector<bool> &ma
     float *to = static_cast<float *>(made.localpixels());
     for (size_t i = 0; i < marked.size(); i++, from += 3, to += 3) {
         for (size_t c = 0; c < 3; c++) // the map's colours are linear
-            to[c] = marked[i] ? (c == 1 ? 0.0f : 1.0f) : srgb_from_linear(from[c]);
+            to[c] = marked[i] ? (c == 1 ? 0.0f : 1.0f) : srgb_from_linear_f(from[c]);
     }
     return made;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "picture.hpp"
+#include "protocol/common/srgb.h"
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imagebufalgo.h>
@@ -130,7 +131,7 @@ void screen_from_linear(float colour[3], float alpha)
         colour[c] = std::clamp(alpha > 0 ? colour[c] / alpha : colour[c], 0.0f, 1e9f);
     tone_map_neutral(colour);
     for (int c = 0; c < 3; c++)
-        colour[c] = srgb_from_linear(std::clamp(colour[c], 0.0f, 1.0f));
+        colour[c] = srgb_from_linear_f(std::clamp(colour[c], 0.0f, 1.0f));
 }
 
 // Which channels are red, green and blue; a grey picture has one for all.
@@ -211,11 +212,6 @@ void picture_drop_alpha(struct picture &picture)
     }
     picture.pixels = OIIO::ImageBufAlgo::channels(picture.pixels, static_cast<int>(kept.size()), kept, {}, names);
     picture.alpha = -1;
-}
-
-float srgb_from_linear(float linear)
-{
-    return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
 }
 
 void picture_to_screen(struct picture &picture)

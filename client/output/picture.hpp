@@ -48,8 +48,6 @@ bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made
 // Leaves the colours alone.
 void picture_drop_alpha(struct picture &picture);
 
-// IEC 61966-2-1.
-float srgb_from_linear(float linear);
 // The colours, alpha aside, become what a PNG of the renderer holds: divided by alpha, through the Khronos PBR
 // Neutral tone mapper (specification 1.0) and the sRGB curve. Does nothing to a picture that is not linear.
 void picture_to_screen(struct picture &picture);

@@ -4,6 +4,7 @@
 
 #include "base/parallel.h"
 #include "shared/material.h"
+#include "protocol/common/srgb.h"
 
 #include <math.h>
 #include <stdatomic.h>
@@ -30,16 +31,13 @@ static struct srgb_tables *create_tables(void)
     if (!tables)
         return NULL;
     for (int i = 0; i < 256; i++) {
-        double c = i / 255.0;
-        double linear = c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4);
-        tables->linear_from_byte[i] = (uint16_t)lrint(linear * 65535.0);
+        tables->linear_from_byte[i] = (uint16_t)lrint(linear_from_srgb(i / 255.0) * 65535.0);
         tables->plain[i] = (uint16_t)(i * 257);
     }
     /* Byte b is the answer from where b's own value is nearer than its predecessor's, as the eye counts. */
     unsigned at = 0;
     for (int b = 0; b < 256; b++) {
-        double c = (b + 0.5) / 255.0;
-        double edge = c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4);
+        double edge = linear_from_srgb((b + 0.5) / 255.0);
         unsigned end = b == 255 ? 65536u : (unsigned)lrint(edge * 65535.0);
         while (at < end && at < 65536u)
             tables->byte_from_linear[at++] = (uint8_t)b;

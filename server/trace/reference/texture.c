@@ -2,19 +2,19 @@
 #include "trace/reference/texture.h"
 
 #include "trace/reference/opacity.h"
+#include "protocol/common/srgb.h"
 
 #include <math.h>
 #include <pthread.h>
 #include <string.h>
 
-/* IEC 61966-2-1, of the 256 values that there are. */
-static float linear_from_srgb[256];
+/* Of the 256 values that there are. */
+static float linear_from_byte[256];
 
 static void make_table(void)
 {
     for (int i = 0; i < 256; i++) {
-        float c = (float)i / 255.0f;
-        linear_from_srgb[i] = c <= 0.04045f ? c / 12.92f : powf((c + 0.055f) / 1.055f, 2.4f);
+        linear_from_byte[i] = linear_from_srgb_f((float)i / 255.0f);
     }
 }
 
@@ -46,7 +46,7 @@ static void add_texel(const struct opacity_texture *texture, int x, int y, float
     const uint8_t *texel = texture->texels->data + 4 * (row * texture->width + column);
     for (int k = 0; k < 4; k++) {
         bool decode = texture->is_srgb && k < 3;
-        sum[k] += share * (decode ? linear_from_srgb[texel[k]] : (float)texel[k] / 255.0f);
+        sum[k] += share * (decode ? linear_from_byte[texel[k]] : (float)texel[k] / 255.0f);
     }
 }
 
