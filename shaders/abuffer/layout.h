@@ -23,11 +23,7 @@
  *   drawn       RGBA32UI, one an instance that was drawn: first id; what is added to a primitive's scene-wide number to
  *               make its id; the instance; DRAWN_* (raster/layout.h). First ids ascend
  *   voxels      RGBA32UI, ABUFFER_BLOCK_TEXELS a block of 4 x 4 x 4 voxels, blocks row after row
- *                 0  x, y  which of the 64 hold something: bit x + 4 y + 16 z
- *                    z     of an empty block: 8 x 4 bits, for the octants of a direction (bit 0, 1, 2: x, y, z run down):
- *                          so many blocks along each side of a cube that begins with this one and reaches that way are
- *                          empty
- *                    w     unused
+ *                 0     which hold something (raster/layout.h)
  *                 1, 2  4 bits a voxel, ABUFFER_VOXEL_*: voxel i in texel 1 + i / 32, component i / 8 % 4, bits 4 (i % 8)
  *   subvoxels   RG32UI, three a voxel, x fastest: in which of 4 x 4 x 4 parts of it the squares of samples' planes are that
  *               texels show, of samples in the images that they lean to; one texel for those that look along x most, one

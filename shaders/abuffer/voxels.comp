@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From what was summed of each voxel's samples to what a ray has to know of it (abuffer/layout.h), and how far it is empty
-// around blocks that hold nothing. One invocation a block.
-//
-// Defines, one a pass, in this order: VOXELS_JUDGE; VOXELS_REACH_X, VOXELS_REACH_Y, VOXELS_REACH_Z.
+// From what was summed of each voxel's samples to what a ray has to know of it (abuffer/layout.h); then raster/reach.comp
+// says how far it is empty around blocks that hold nothing. One invocation a block.
 #include "abuffer/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
@@ -11,8 +9,6 @@ layout(binding = IMAGE_ABUFFER_VOXELS, rgba32ui) uniform uimageBuffer voxels;
 
 uniform int grid; // blocks along a side
 uniform uint first_item, end_item; // of the blocks
-
-#ifdef VOXELS_JUDGE
 
 layout(binding = UNIT_TRACER_0) uniform isamplerBuffer sums; // a voxel's four as one texel
 
@@ -51,53 +47,6 @@ void settle(int at, ivec3 place)
     }
     imageStore(voxels, at, uvec4(occupied, 0u, 0u));
 }
-
-#else
-
-const uint FAR = 15u;
-
-// How many blocks from this one on, one way along an axis, are empty, squares, cubes of them: as many as each of so many
-// rows, squares beside it has. Of up to four octants at once, whose 4 bits are from `shift` on. A block's own words are
-// written by no other invocation. `step_` is in texels.
-uint reach(int at, int left, int step_, uint shift)
-{
-    uvec4 counts = uvec4(FAR);
-    for (uint k = 0u; any(greaterThan(counts, uvec4(k))); k++) {
-        // Beyond the grid all is empty.
-        uvec4 beside = uvec4(FAR);
-        if (int(k) < left) {
-            uvec4 block = imageLoad(voxels, at + int(k) * step_);
-#ifdef VOXELS_REACH_X
-            beside = uvec4((block.x | block.y) == 0u ? FAR : 0u);
-#else
-            beside = uvec4(block.w) >> (shift + uvec4(0u, 4u, 8u, 12u)) & FAR;
-#endif
-        }
-        counts = min(counts, max(beside, uvec4(k)));
-    }
-    return counts.x | counts.y << 4 | counts.z << 8 | counts.w << 12;
-}
-
-void settle(int at, ivec3 place)
-{
-    uvec4 block = imageLoad(voxels, at);
-    bool is_empty = (block.x | block.y) == 0u;
-    int row = ABUFFER_BLOCK_TEXELS * grid;
-#ifdef VOXELS_REACH_X
-    block.w = is_empty ? (reach(at, grid - place.x, ABUFFER_BLOCK_TEXELS, 0u) & 0xfu) |
-                             (reach(at, place.x + 1, -ABUFFER_BLOCK_TEXELS, 0u) & 0xfu) << 4
-                       : 0u;
-#elif defined VOXELS_REACH_Y
-    if (is_empty)
-        block.w |= (reach(at, grid - place.y, row, 0u) & 0xffu) << 8 | (reach(at, place.y + 1, -row, 0u) & 0xffu) << 16;
-#else
-    if (is_empty)
-        block.z = reach(at, grid - place.z, row * grid, 8u) | reach(at, place.z + 1, -row * grid, 8u) << 16;
-#endif
-    imageStore(voxels, at, block);
-}
-
-#endif
 
 void main()
 {

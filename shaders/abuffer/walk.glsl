@@ -2,6 +2,7 @@
 // The walk through the voxels, from one that holds something to the next: a block of 4 x 4 x 4 tells which of its own do,
 // and how far it is empty around it where none does; and a voxel, in which of its 4 x 4 x 4 subvoxels something is.
 #include "abuffer/column.glsl"
+#include "raster/blocks.glsl"
 
 layout(binding = UNIT_TRACER_2) uniform usamplerBuffer abuffer_voxels;
 layout(binding = UNIT_TRACER_5) uniform usamplerBuffer abuffer_subvoxels;
@@ -12,8 +13,7 @@ uniform bool abuffer_has_subvoxels;
 
 struct voxel_walk {
     cell_ray ray;
-    // Axes along which the ray runs down are turned round, so that to the walk it runs up all of them. In
-    // subvoxels.
+    // In subvoxels, axes turned as raster/blocks.glsl says.
     vec3 o, d, inverse;
     ivec3 flip; // -1: turned
     ivec3 subvoxel;
@@ -46,7 +46,7 @@ void begin_walk(trace_ray r, float end, out voxel_walk w)
     w.ray.begin += s_begin;
     bvec3 down = lessThan(w.ray.d, vec3(0.0));
     w.flip = -ivec3(down);
-    w.octant_shift = 4 * (int(down.x) + 2 * int(down.y) + 4 * int(down.z));
+    w.octant_shift = octant_shift_of(down);
     vec3 o = w.ray.o * subvoxels_a_cell;
     w.o = mix(o, along - o, down);
     w.d = abs(w.ray.d) * subvoxels_a_cell;
@@ -84,29 +84,16 @@ uint what_of(int block, uvec3 b)
     return ((i & 8u) == 0u ? two.x : two.y) >> 4u * (i & 7u) & 15u;
 }
 
-// Of 64 cells, a block's voxels or a voxel's subvoxels, those that lie in a cube of so many along each side, 2 or 4, which
-// begins with cell b and reaches the way the ray runs.
-uvec2 cells_ahead(uvec3 b, bvec3 down, uint size)
-{
-    uint many = (1u << size) - 1u, back = size - 1u;
-    uint x = down.x ? many << b.x >> back : many << b.x & 15u;
-    uint y = (size == 4u ? 0xffffu : 0xffu) << 4u * b.y;
-    y = (down.y ? y >> 4u * back : y) & 0xffffu;
-    uint z = down.z ? many << b.z >> back : many << b.z;
-    uint slice = x * 0x1111u & y;
-    return slice * uvec2((z & 1u) | (z & 2u) << 15, (z >> 2 & 1u) | (z & 8u) << 13);
-}
-
 // Past a subvoxel that holds something, which is `found`, or as far as nothing does.
 void step_on(inout voxel_walk w, inout found_voxel found)
 {
     ABUFFER_COUNT(x);
     bvec3 down = notEqual(w.flip, ivec3(0));
-    uvec3 subvoxel = uvec3((w.subvoxel ^ w.flip) + (w.flip & (abuffer_grid << 4))), voxel = subvoxel >> 2u;
+    uvec3 subvoxel = uvec3(turned(w.subvoxel, w.flip, abuffer_grid << 4)), voxel = subvoxel >> 2u;
     int block = block_at(voxel);
     uvec4 words = texelFetch(abuffer_voxels, block);
     uvec3 b = voxel & 3u;
-    uint bit = b.x | b.y << 2 | (b.z & 1u) << 4; // of 32
+    uint bit = part_bit(b);
     bool is_set = ((b.z < 2u ? words.x : words.y) >> bit & 1u) != 0u;
     int inside = subvoxels_at(voxel);
     uvec2 in_x = texelFetch(abuffer_subvoxels, inside).xy, in_y = texelFetch(abuffer_subvoxels, inside + 1).xy;
@@ -115,19 +102,17 @@ void step_on(inout voxel_walk w, inout found_voxel found)
     // The next of 64 voxels, or of a voxel's 64 subvoxels.
     uvec2 bits = is_set ? inner : words.xy;
     uvec3 p = is_set ? subvoxel & 3u : b;
-    bit = p.x | p.y << 2 | (p.z & 1u) << 4;
+    bit = part_bit(p);
     bool is_found = ((p.z < 2u ? bits.x : bits.y) >> bit & 1u) != 0u;
-    uvec2 all_ahead = bits & cells_ahead(p, down, 4u), near_ahead = bits & cells_ahead(p, down, 2u);
-    int many = (all_ahead.x | all_ahead.y) == 0u || is_whole ? 4 : (near_ahead.x | near_ahead.y) == 0u ? 2 : 1;
-    int empty = int(words.z >> w.octant_shift & 15u);
+    int many = is_whole ? 4 : parts_to_pass(bits, p, down);
+    int empty = int(words.z >> w.octant_shift & BLOCK_REACH_MAX);
     bool is_empty = (words.x | words.y) == 0u;
     int shift = is_set ? 0 : is_empty ? 4 : 2;
     ivec3 first = w.subvoxel >> shift;
     ivec3 border = is_empty ? first + (empty > 1 ? empty : 1) : min(first + many, (first | 3) + 1);
     border <<= shift;
     vec3 exits = (vec3(border) - w.o) * w.inverse;
-    float s_out = exits.x < exits.y ? exits.x : exits.y;
-    s_out = exits.z < s_out ? exits.z : s_out;
+    float s_out = nearest_exit(exits);
     s_out = s_out > w.s ? s_out : w.s;
     if (is_found)
         found = found_voxel(what_of(block, b), w.s, s_out);
@@ -136,12 +121,9 @@ void step_on(inout voxel_walk w, inout found_voxel found)
     uint best = shown.x | shown.y << 1 | shown.z << 2;
     if (is_found && bitCount(found.what & ABUFFER_VOXEL_IMAGES) > 1)
         found.what &= best | ABUFFER_VOXEL_BODY;
-    ivec3 next = clamp(ivec3(w.o + s_out * w.d), w.subvoxel, border - 1);
-    // In whole numbers, so that each step goes on.
-    next = mix(next, border, lessThanEqual(exits, vec3(s_out)));
+    ivec3 next = cell_behind(w.o, w.d, s_out, exits, w.subvoxel, border);
     w.subvoxel = next;
     w.s = s_out;
-    // Subvoxels only go up, so whatever is rounded the walk ends.
     w.s = any(greaterThanEqual(next, ivec3(abuffer_grid << 4))) ? 1e30 : w.s;
 }
 

@@ -10,7 +10,7 @@
 //   CELLS_FILL     writes the first entry of each cell; an item is a sample
 //   CELLS_FURTHER  writes those of cells that have one; an item is such an entry
 //   CELLS_SORT     puts the entries of such cells in order; an item is the same
-//   CELLS_REACH_X, CELLS_REACH_Y, CELLS_REACH_Z   how far it is empty; an item is a node
+// Then raster/reach.comp says how far it is empty around empty nodes.
 #include "ldc/layout.h"
 #include "shared/bindings.h"
 #include "common/dispatch.glsl"
@@ -18,7 +18,6 @@
 
 uniform int first_node, grid; // nodes along a side
 
-#if !defined CELLS_REACH_X && !defined CELLS_REACH_Y && !defined CELLS_REACH_Z
 layout(std430, binding = BIND_TRACER_0) buffer count_block {
     uvec4 lower, upper; // nodes that hold something
     uvec4 unused[2];    // what is read by all is not beside what is written by all
@@ -27,7 +26,6 @@ layout(std430, binding = BIND_TRACER_0) buffer count_block {
     uint further_count; // entries of cells that have one
     uint padding;
 } counts;
-#endif
 
 // What is noted of a sample: 12 bits of its texel's u, of v, its axis; then of up to four cells, from the one with the
 // least depth on, in which it is the first to come and has the cell's own entry.
@@ -292,8 +290,6 @@ void main()
 
 #else
 
-#ifdef CELLS_PLACE
-
 void settle(int at, ivec3 place)
 {
     uvec4 node = imageLoad(nodes, at);
@@ -310,49 +306,6 @@ void settle(int at, ivec3 place)
     }
     imageStore(nodes, at, node);
 }
-
-#else
-
-// How many nodes from this one on, one way along an axis, are empty, squares, cubes of them: as many as each of so many
-// rows, squares beside it has. Of up to four octants at once, whose 4 bits are from `shift` on. A node's own words are
-// written by no other invocation.
-uint reach(int at, int left, int step_, uint shift)
-{
-    uvec4 counts = uvec4(LDC_NODE_FAR);
-    for (uint k = 0u; any(greaterThan(counts, uvec4(k))); k++) {
-        // Beyond the grid all is empty.
-        uvec4 beside = uvec4(LDC_NODE_FAR);
-        if (int(k) < left) {
-            uvec4 node = imageLoad(nodes, at + int(k) * step_);
-#ifdef CELLS_REACH_X
-            beside = uvec4((node.x | node.y) == 0u ? LDC_NODE_FAR : 0u);
-#else
-            beside = uvec4(node.w) >> (shift + uvec4(0u, 4u, 8u, 12u)) & LDC_NODE_FAR;
-#endif
-        }
-        counts = min(counts, max(beside, uvec4(k)));
-    }
-    return counts.x | counts.y << 4 | counts.z << 8 | counts.w << 12;
-}
-
-void settle(int at, ivec3 place)
-{
-    uvec4 node = imageLoad(nodes, at);
-    bool is_empty = (node.x | node.y) == 0u;
-#ifdef CELLS_REACH_X
-    node.w = is_empty ? (reach(at, grid - place.x, 1, 0u) & 0xfu) | (reach(at, place.x + 1, -1, 0u) & 0xfu) << 4 : 0u;
-#elif defined CELLS_REACH_Y
-    if (is_empty)
-        node.w |= (reach(at, grid - place.y, grid, 0u) & 0xffu) << 8 |
-                  (reach(at, place.y + 1, -grid, 0u) & 0xffu) << 16;
-#else
-    if (is_empty)
-        node.z = reach(at, grid - place.z, grid * grid, 8u) | reach(at, place.z + 1, -grid * grid, 8u) << 16;
-#endif
-    imageStore(nodes, at, node);
-}
-
-#endif
 
 void main()
 {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The walk through a cube's cells, all three images at once: from the first cell on the ray's way that a sample's plane
 // passes to the next, so that what is found first is, up to a cell, the nearest. How cells are found is in ldc/layout.h
-// (LDC_NODE_*): a node of 16 x 16 x 16 cells knows how far it is empty around it, which of its 64 blocks of 4 x 4 x 4
+// (Cells): a node of 16 x 16 x 16 cells knows how far it is empty around it, which of its 64 blocks of 4 x 4 x 4
 // hold something, and a block knows that of each cell.
 #include "ldc/found.glsl"
+#include "raster/blocks.glsl"
 
 #ifdef LDC_CELLS
 
@@ -14,7 +15,7 @@ layout(binding = UNIT_TRACER_5) uniform usamplerBuffer ldc_entries;
 uniform int ldc_grid[LDC_CUBES]; // nodes along a side
 uniform vec3 ldc_lower[LDC_CUBES], ldc_upper[LDC_CUBES]; // of the cells that hold something
 
-// Axes along which the ray runs down are turned round, so that to the walk it runs up all of them.
+// Axes are turned as raster/blocks.glsl says.
 struct cell_walk {
     vec3 o, d, inverse;
     ivec3 flip;  // -1: turned
@@ -35,7 +36,7 @@ struct found_cell {
 // Not turned.
 ivec3 cube_cell(cell_walk w, ivec3 cell)
 {
-    return (cell ^ w.flip) + (w.flip & (w.grid << LDC_NODE_SHIFT));
+    return turned(cell, w.flip, w.grid << LDC_NODE_SHIFT);
 }
 
 // Where what the ray is in lies, a node or a block of it.
@@ -53,7 +54,7 @@ void begin_cells(trace_ray r, float end, int pass, out cell_walk w)
     w.first_node = ldc_first_node[CUBE(w.cube)];
     bvec3 down = lessThan(c.d, vec3(0.0));
     w.flip = -ivec3(down);
-    w.octant_shift = 4 * (int(down.x) + 2 * int(down.y) + 4 * int(down.z));
+    w.octant_shift = octant_shift_of(down);
     w.o = mix(c.o, float(w.grid << LDC_NODE_SHIFT) - c.o, down);
     w.d = abs(c.d);
     w.inverse = 1.0 / w.d;
@@ -75,19 +76,6 @@ void begin_cells(trace_ray r, float end, int pass, out cell_walk w)
     w.shift = 2;
 }
 
-// Of the 64 parts of a node or a block those that lie in a cube of so many along each side, 2 or 4, which begins with
-// part b and reaches the way the ray runs.
-uvec2 parts_ahead(uvec3 b, bvec3 down, uint size)
-{
-    uint many = (1u << size) - 1u, back = size - 1u;
-    uint x = down.x ? many << b.x >> back : many << b.x & 15u;
-    uint y = (size == 4u ? 0xffffu : 0xffu) << 4u * b.y;
-    y = (down.y ? y >> 4u * back : y) & 0xffffu;
-    uint z = down.z ? many << b.z >> back : many << b.z;
-    uint slice = x * 0x1111u & y;
-    return slice * uvec2((z & 1u) | (z & 2u) << 15, (z >> 2 & 1u) | (z & 8u) << 13);
-}
-
 // Looks at one of 64 parts of what the ray is in, a node or a block, and goes into it or past it; past a cell that a plane
 // passes too, which is `found`.
 void step_on(inout cell_walk w, inout found_cell found, bvec3 down)
@@ -95,7 +83,7 @@ void step_on(inout cell_walk w, inout found_cell found, bvec3 down)
         LDC_COUNT(x);
         uvec4 words = texelFetch(ldc_nodes, w.at);
         uvec3 b = uvec3(cube_cell(w, w.cell)) >> w.shift;
-        uint bit = (b.x & 3u) | (b.y & 3u) << 2 | (b.z & 1u) << 4; // of 32
+        uint bit = part_bit(b);
         bool upper_half = (b.z & 2u) != 0u;
         uint word = upper_half ? words.y : words.x;
         bool is_set = (word >> bit & 1u) != 0u;
@@ -107,24 +95,19 @@ void step_on(inout cell_walk w, inout found_cell found, bvec3 down)
             found.cell = w.cell;
             found.entry = is_set ? words.z + rank : LDC_ENTRY_NONE;
             // As far as the parts ahead are empty.
-            uvec2 all_parts = words.xy & parts_ahead(b & 3u, down, 4u), near_parts = words.xy & parts_ahead(b & 3u, down, 2u);
-            int parts = (all_parts.x | all_parts.y) == 0u ? 4 : (near_parts.x | near_parts.y) == 0u ? 2 : 1;
+            int parts = parts_to_pass(words.xy, b & 3u, down);
             ivec3 border = ((w.cell >> w.shift) + parts) << w.shift, end = ((w.cell >> (w.shift + 2)) + 1) << (w.shift + 2);
             border = min(border, end);
-            int empty = int(words.z >> w.octant_shift & LDC_NODE_FAR);
+            int empty = int(words.z >> w.octant_shift & BLOCK_REACH_MAX);
             ivec3 away = ((w.cell >> LDC_NODE_SHIFT) + (empty > 0 ? empty : 1)) << LDC_NODE_SHIFT;
             border = (words.x | words.y) == 0u ? away : border;
             vec3 exits = (vec3(border) - w.o) * w.inverse;
-            float s_out = exits.x < exits.y ? exits.x : exits.y;
-            s_out = exits.z < s_out ? exits.z : s_out;
-            ivec3 next = clamp(ivec3(w.o + s_out * w.d), w.cell, border - 1);
-            // In whole numbers, so that each step goes on.
-            next = mix(next, border, equal(exits, vec3(s_out)));
+            float s_out = nearest_exit(exits);
+            ivec3 next = cell_behind(w.o, w.d, s_out, exits, w.cell, border);
             ivec3 others = (next ^ w.cell) >> (w.shift + 2);
             bool leaves = (others.x | others.y | others.z) != 0;
             w.cell = next;
             w.s = w.s < s_out ? s_out : w.s;
-            // Cells only go up, so whatever is rounded the walk ends.
             w.s = any(greaterThanEqual(next, ivec3(w.grid << LDC_NODE_SHIFT))) ? 1e30 : w.s;
             w.shift = leaves ? 2 : w.shift;
             w.at = leaves ? node_at(w, next) : w.at;

@@ -44,13 +44,9 @@
 
 /* clang-format off */
 /* Cells: which of them a sample's plane passes, of whatever image. In the buffer of nodes, RGBA32UI, first the nodes,
- * row after row, each of 16 x 16 x 16 cells:
- *   x, y  which of its 64 blocks of 4 x 4 x 4 cells hold something: bit x + 4 y + 16 z
- *   z     of a node with blocks: the texel of its first, the others lie behind it in the order of their bits.
- *         Of one without: 8 x 4 bits, for the octants of a direction (bit 0, 1, 2: x, y, z run down): so many nodes
- *         along each side of a cube that begins with this one and reaches that way hold nothing either
- *   w     while they are made: what is empty along x (2 x 4 bits), then of squares in x and y (4 x 4 bits)
- * then the blocks:
+ * a grid of blocks (raster/layout.h) of 16 x 16 x 16 cells whose parts are 4 x 4 x 4 cells; `z` of one that holds
+ * something is the texel of its first part, the others lie behind it in the order of their bits. Then these parts,
+ * called blocks:
  *   x, y  which of its 64 cells a plane passes
  *   z     entry of the first of these, the others lie behind it
  *   w     unused
@@ -60,8 +56,6 @@
  *   z, w  what the sample has in `geometry` */
 /* clang-format on */
 #define LDC_NODE_SHIFT 4
-#define LDC_NODE_EIGHT 0x00330033u /* 2 x 2 x 2 of 32 bits */
-#define LDC_NODE_FAR 15u
 #define LDC_ENTRY_AXIS_SHIFT 30u
 #define LDC_ENTRY_SAMPLE_MASK 0x3fffffffu
 #define LDC_ENTRY_NONE 0xffffffffu

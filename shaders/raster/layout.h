@@ -27,4 +27,15 @@
 #define FACE_NEEDLE 0x3f000000u      /* it has no normal: steep and leaning every way */
 #define FACE_STEEP_BELOW 0.5f        /* of a unit normal */
 
+/* clang-format off */
+/* A grid of blocks, row after row, by which a ray passes what is empty. Of a block the first texel, RGBA32UI:
+ *   x, y  which of its 4 x 4 x 4 parts hold something: bit x + 4 y + 16 z
+ *   z     of an empty block: 8 x 4 bits, for the octants of a direction (bit 0, 1, 2: x, y, z run down): so many blocks
+ *         along each side of a cube that begins with this one and reaches that way are empty. Of others what the
+ *         tracer needs
+ *   w     while they are made: what is empty along x (2 x 4 bits), then of squares in x and y (4 x 4 bits) */
+/* clang-format on */
+#define BLOCK_REACH_MAX 15u
+#define IMAGE_BLOCKS 0 /* raster/reach.comp */
+
 #endif

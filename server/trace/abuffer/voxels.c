@@ -21,13 +21,10 @@ bool abuffer_voxels_reserve(struct abuffer_store *store, struct error *error)
     return gpu_buffer_reserve(store->device, &store->voxels, texels * TEXEL_BYTES, error);
 }
 
-bool abuffer_voxels_pass(struct abuffer_store *store, unsigned pass, uint32_t first, uint32_t end,
-                         struct error *error)
+/* What is summed of each voxel's samples, to what a ray has to know of it. */
+static bool judge(struct abuffer_store *store, uint32_t first, uint32_t end, struct error *error)
 {
-    static const char *const passes[ABUFFER_VOXEL_PASSES] = {"VOXELS_JUDGE", "VOXELS_REACH_X", "VOXELS_REACH_Y",
-                                                             "VOXELS_REACH_Z"};
-    const struct gpu_define defines[] = {{passes[pass], "1"}, {NULL, NULL}};
-    const struct gpu_program_source source = {.compute = "abuffer/voxels.comp", .defines = defines};
+    const struct gpu_program_source source = {.compute = "abuffer/voxels.comp"};
     const struct gpu_program *program = gpu_program_get(store->device, &source, error);
     if (!program)
         return false;
@@ -38,4 +35,14 @@ bool abuffer_voxels_pass(struct abuffer_store *store, unsigned pass, uint32_t fi
     gpu_uniform_uint(program, "end_item", end);
     gpu_dispatch(store->device, program, end - first);
     return true;
+}
+
+bool abuffer_voxels_pass(struct abuffer_store *store, unsigned pass, uint32_t first, uint32_t end,
+                         struct error *error)
+{
+    const struct raster_blocks blocks = {.buffer = &store->voxels,
+                                         .block_texels = ABUFFER_BLOCK_TEXELS,
+                                         .grid = store->voxels_along / ABUFFER_BLOCK_VOXELS};
+    return pass == 0 ? judge(store, first, end, error)
+                     : raster_reach_pass(store->device, &blocks, pass - 1, first, end, error);
 }

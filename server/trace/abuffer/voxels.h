@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /* From a store's `sums` to its `voxels`: which hold something, by which images a ray is to be searched for in
- * each, and how far nothing is (shaders/abuffer/voxels.comp). */
+ * each, and how far nothing is (shaders/abuffer/voxels.comp, raster/reach.comp). */
 #ifndef FARLIGHT_TRACE_ABUFFER_VOXELS_H
 #define FARLIGHT_TRACE_ABUFFER_VOXELS_H
 
 #include "base/error.h"
 #include "trace/abuffer/store.h"
+#include "trace/raster/reach.h"
 
 #include <stdbool.h>
 #include <stdint.h>
 
 #define ABUFFER_BLOCK_VOXELS 4u /* along a side */
-#define ABUFFER_VOXEL_PASSES 4u
+#define ABUFFER_VOXEL_PASSES (1 + RASTER_REACH_PASSES)
 
 /* Items of each pass. */
 uint32_t abuffer_voxel_blocks(const struct abuffer_store *store);

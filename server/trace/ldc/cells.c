@@ -5,6 +5,7 @@
 #include "shared/bindings.h"
 #include "ldc/layout.h"
 #include "trace/ldc/levels.h"
+#include "trace/raster/reach.h"
 
 #include <epoxy/gl.h>
 
@@ -83,28 +84,19 @@ static bool reserve_entries(struct ldc_cells *cells, struct error *error)
 /* ---- units, from the last to the first ---- */
 
 /* How far it is empty around empty nodes. */
-static bool reach(struct ldc_cells *cells, const char *stage, struct error *error)
+static bool reach(struct ldc_cells *cells, struct error *error)
 {
-    bind_nodes(cells, GL_RGBA32UI);
-    return cells_pass(cells, stage, node_count(cells), error);
-}
-
-static bool reach_z(struct ldc_cells *cells, struct error *error)
-{
-    cells->next = NULL;
-    return reach(cells, "CELLS_REACH_Z", error);
-}
-
-static bool reach_y(struct ldc_cells *cells, struct error *error)
-{
-    cells->next = reach_z;
-    return reach(cells, "CELLS_REACH_Y", error);
-}
-
-static bool reach_x(struct ldc_cells *cells, struct error *error)
-{
-    cells->next = reach_y;
-    return reach(cells, "CELLS_REACH_X", error);
+    struct ldc_store *store = cells->store;
+    const struct raster_blocks nodes = {
+        .buffer = &store->nodes,
+        .first_texel = store->cubes[cells->which].first_node,
+        .block_texels = 1,
+        .grid = cells->grid,
+    };
+    const unsigned pass = cells->reach_passes++;
+    if (cells->reach_passes == RASTER_REACH_PASSES)
+        cells->next = NULL;
+    return raster_reach_pass(store->device, &nodes, pass, 0, (uint32_t)node_count(cells), error);
 }
 
 /* Entries of cells that have one already. */
@@ -119,7 +111,7 @@ static bool pass_further(struct ldc_cells *cells, const char *stage, struct erro
 
 static bool sort_further(struct ldc_cells *cells, struct error *error)
 {
-    cells->next = reach_x;
+    cells->next = reach;
     return pass_further(cells, "CELLS_SORT", error);
 }
 
@@ -132,7 +124,7 @@ static bool fill_further(struct ldc_cells *cells, struct error *error)
 static bool fill_first(struct ldc_cells *cells, struct error *error)
 {
     struct ldc_store *store = cells->store;
-    cells->next = cells->counts.further > 0 ? fill_further : reach_x;
+    cells->next = cells->counts.further > 0 ? fill_further : reach;
     bind_samples(cells);
     gpu_buffer_bind_texels(store->device, &store->nodes, UNIT_TRACER_2, GL_RGBA32UI);
     gpu_buffer_bind_image(store->device, &store->entries, IMAGE_LDC_ENTRIES, GL_RGBA32UI);
@@ -177,7 +169,7 @@ static bool place_blocks(struct ldc_cells *cells, struct error *error)
     if (!ldc_levels_reserve(store, cells->which, nodes + counts->blocks, nodes, CELL_NODE_BYTES, error))
         return false;
     clear_nodes(&store->nodes, cube->first_node + nodes, counts->blocks);
-    cells->next = counts->blocks > 0 ? mark_cells : reach_x;
+    cells->next = counts->blocks > 0 ? mark_cells : reach;
     return true;
 }
 

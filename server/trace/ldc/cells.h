@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Which cells of a cube samples' planes pass: what a ray that looks at all three images at once skips by, and what
- * it finds samples by. LDC_NODE_* of ldc/layout.h, made by shaders/ldc/cells.comp. */
+ * it finds samples by. Cells of ldc/layout.h, made by shaders/ldc/cells.comp and raster/reach.comp. */
 #ifndef FARLIGHT_TRACE_LDC_CELLS_H
 #define FARLIGHT_TRACE_LDC_CELLS_H
 
@@ -25,8 +25,9 @@ struct ldc_cell_counts {
 struct ldc_cells {
     struct ldc_store *store;
     unsigned which;
-    uint32_t grid;        /* nodes along a side */
-    ldc_cells_unit *next; /* NULL: it is done */
+    uint32_t grid;         /* nodes along a side */
+    ldc_cells_unit *next;  /* NULL: it is done */
+    unsigned reach_passes; /* that are done */
     struct gpu_buffer list, counter;
     struct ldc_cell_counts counts;
 };

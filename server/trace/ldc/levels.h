@@ -30,7 +30,7 @@ struct ldc_level_layout {
     uint32_t row;         /* blocks: nodes in a row; of a pyramid each level has 2^(bits (top - l)) */
     uint32_t image_nodes; /* of one of the three */
     bool blocks;          /* one level, not a pyramid up to a single node */
-    bool cells;           /* none of this, but nodes over cells of all three images: LDC_NODE_* of ldc/layout.h */
+    bool cells;           /* none of this, but nodes over cells of all three images: Cells of ldc/layout.h */
     uint32_t grid;        /* cells: nodes along a side */
 };
 struct ldc_level_layout ldc_level_layout_of(const struct ldc_store *store, uint32_t resolution,

@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: MIT */
+/* How far it is empty around the empty blocks of a grid (shaders/raster/layout.h, raster/reach.comp). */
+#ifndef FARLIGHT_TRACE_RASTER_REACH_H
+#define FARLIGHT_TRACE_RASTER_REACH_H
+
+#include "base/error.h"
+#include "gpu/buffer.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define RASTER_REACH_PASSES 3u /* along x, y and z, in this order */
+
+struct raster_blocks {
+    struct gpu_buffer *buffer;
+    uint32_t first_texel, block_texels;
+    uint32_t grid; /* blocks along a side */
+};
+
+/* Blocks first .. end - 1 of a pass, before which all blocks of the passes before it are done. */
+bool raster_reach_pass(struct gpu_device *device, const struct raster_blocks *blocks, unsigned pass,
+                       uint32_t first, uint32_t end, struct error *error);
+
+#endif
