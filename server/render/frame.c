@@ -160,17 +160,17 @@ static bool note_layers(struct frame_renderer *renderer, struct error *error)
 static bool shade_wave(struct frame_renderer *renderer, struct error *error)
 {
     struct render_context *context = &renderer->work->context;
-    switch (renderer->work->integrator->impl->shade(renderer->work->integrator, context, error)) {
-    case INTEGRATOR_AGAIN:
+    switch (wave_passes_shade(&renderer->work->passes, context, error)) {
+    case WAVE_AGAIN:
         return true;
-    case INTEGRATOR_MORE:
+    case WAVE_MORE:
         renderer->phase = PHASE_TRACE;
         return true;
-    case INTEGRATOR_OVERFLOW:
+    case WAVE_OVERFLOW:
         return split_slice(renderer, error);
-    case INTEGRATOR_DONE:
+    case WAVE_DONE:
         return finish_slice(renderer, error);
-    case INTEGRATOR_FAILED:
+    case WAVE_FAILED:
         break;
     }
     return false;

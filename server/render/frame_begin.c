@@ -165,7 +165,7 @@ bool frame_reserve_waves(struct frame_renderer *renderer, struct error *error)
     struct render_context *context = &renderer->work->context;
     return context_reserve(context, renderer->slices.slice_rays, error) &&
            layers_reserve(&renderer->work->layers, context, renderer->slices.slice_rays, error) &&
-           renderer->work->integrator->impl->reserve(renderer->work->integrator, context, error);
+           wave_passes_reserve(&renderer->work->passes, context, error);
 }
 
 static uint32_t slice_rays(const struct frame_renderer *renderer)
@@ -288,7 +288,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
 {
     if (!check_request(renderer, request, error))
         return false;
-    renderer->work = frame_work_take(renderer->shared, integrator_impl_by_number(request->integrator), error);
+    renderer->work = frame_work_take(renderer->shared, integrator_by_number(request->integrator), error);
     if (!renderer->work)
         return false;
     struct render_context *context = &renderer->work->context;

@@ -32,7 +32,7 @@ static bool check_camera(const struct frame_request *request, struct error *erro
 
 static bool check_integrator(const struct frame_request *request, struct error *error)
 {
-    if (!integrator_impl_by_number(request->integrator))
+    if (!integrator_by_number(request->integrator))
         return error_set(error, ERROR_UNSUPPORTED, "integrator", "there is no integrator number %u",
                          (unsigned)request->integrator);
     if (request->brdf > FRAME_BRDF_WARD)

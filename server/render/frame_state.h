@@ -7,12 +7,12 @@
 #include "render/compare/waves.h"
 #include "render/context.h"
 #include "render/frame.h"
-#include "render/integrators/integrator.h"
 #include "render/layers.h"
 #include "render/picture.h"
 #include "render/primary.h"
 #include "render/slices.h"
 #include "render/tracer_set.h"
+#include "render/wave_passes.h"
 
 enum frame_phase {
     PHASE_IDLE,
@@ -43,7 +43,7 @@ struct frame_scene {
 /* What a frame needs while it is in progress, of which nothing is kept. */
 struct frame_work {
     struct frame_work *next; /* idle */
-    struct integrator *integrator;
+    struct wave_passes passes;
     struct render_context context;
     struct primary primary;
     struct layers layers;
@@ -80,7 +80,7 @@ struct frame_renderer {
 };
 
 /* frame_work.c. One that has what that integrator needs, if there is one. */
-struct frame_work *frame_work_take(struct frame_scene *shared, const struct integrator_impl *impl,
+struct frame_work *frame_work_take(struct frame_scene *shared, const struct integrator *integrator,
                                    struct error *error);
 void frame_work_give(struct frame_scene *shared, struct frame_work *work); /* accepts NULL */
 void frame_work_finish(struct frame_scene *shared);                        /* all that are idle */

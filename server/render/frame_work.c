@@ -5,16 +5,9 @@
 
 #include <stdlib.h>
 
-static void drop_integrator(struct frame_work *work)
-{
-    if (work->integrator)
-        work->integrator->impl->destroy(work->integrator);
-    work->integrator = NULL;
-}
-
 static void work_destroy(struct frame_work *work, struct gpu_device *device)
 {
-    drop_integrator(work);
+    wave_passes_finish(&work->passes, device);
     comparison_destroy(work->comparison);
     primary_finish(&work->primary, device);
     layers_finish(&work->layers, device);
@@ -42,13 +35,13 @@ static struct frame_work *work_create(struct frame_scene *shared, struct error *
     return work;
 }
 
-static struct frame_work *take_idle(struct frame_scene *shared, const struct integrator_impl *impl)
+static struct frame_work *take_idle(struct frame_scene *shared, const struct integrator *integrator)
 {
     struct frame_work **place = &shared->idle;
     if (!*place)
         return NULL;
     for (struct frame_work **one = place; *one; one = &(*one)->next)
-        if ((*one)->integrator && (*one)->integrator->impl == impl)
+        if ((*one)->passes.integrator == integrator)
             place = one;
     struct frame_work *work = *place;
     *place = work->next;
@@ -56,20 +49,17 @@ static struct frame_work *take_idle(struct frame_scene *shared, const struct int
     return work;
 }
 
-struct frame_work *frame_work_take(struct frame_scene *shared, const struct integrator_impl *impl,
+struct frame_work *frame_work_take(struct frame_scene *shared, const struct integrator *integrator,
                                    struct error *error)
 {
-    struct frame_work *work = take_idle(shared, impl);
+    struct frame_work *work = take_idle(shared, integrator);
     if (!work)
         work = work_create(shared, error);
-    if (!work || (work->integrator && work->integrator->impl == impl))
-        return work;
-    drop_integrator(work);
-    work->integrator = impl->create(shared->device, error);
-    if (work->integrator)
-        return work;
-    work_destroy(work, shared->device);
-    return NULL;
+    if (work && work->passes.integrator != integrator) {
+        wave_passes_finish(&work->passes, shared->device);
+        work->passes.integrator = integrator;
+    }
+    return work;
 }
 
 /* As many stay as are in use, and one. */
@@ -102,9 +92,8 @@ uint64_t frame_work_device_bytes(const struct frame_work *work)
 {
     uint64_t sum = context_device_bytes(&work->context) + work->primary.visible.size_bytes +
                    work->primary.depth.size_bytes + layers_device_bytes(&work->layers) +
-                   work->copies[0].capacity_bytes + work->copies[1].capacity_bytes;
-    if (work->integrator)
-        sum += work->integrator->impl->device_bytes(work->integrator);
+                   work->copies[0].capacity_bytes + work->copies[1].capacity_bytes +
+                   wave_passes_device_bytes(&work->passes);
     if (work->comparison)
         sum += comparison_device_bytes(work->comparison);
     return sum;

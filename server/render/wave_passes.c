@@ -11,31 +11,20 @@
 #include "shared/wave.h"
 
 #include <epoxy/gl.h>
-#include <stdlib.h>
 
 /* What the scan over the blocks leaves in the wave state's free words. */
 #define WAVE_STATE_SHADOW_RAYS pad0
 #define DEFINES_MAX 12
 
-struct integrator *wave_passes_create(const struct wave_passes_kind *kind, struct gpu_device *device,
-                                      struct error *error)
+bool wave_passes_reserve(struct wave_passes *passes, struct render_context *context, struct error *error)
 {
-    struct wave_passes *passes = calloc(1, sizeof(*passes));
-    if (!passes) {
-        error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the integrator");
-        return NULL;
-    }
-    *passes = (struct wave_passes){.base = {kind->impl, device}, .kind = kind};
-    return &passes->base;
-}
-
-bool wave_passes_reserve(struct integrator *integrator, struct render_context *context, struct error *error)
-{
-    struct wave_passes *passes = (struct wave_passes *)integrator;
+    const struct integrator *integrator = passes->integrator;
     struct gpu_device *device = context->device;
-    size_t waves = context->wave_capacity, children = waves * passes->kind->children_a_hit;
-    size_t shadows = passes->kind->shadow_rays_a_hit(context) > 0 ? waves * passes->kind->shadow_waves : 0;
+    size_t waves = context->wave_capacity, children = waves * integrator->children_a_hit;
+    size_t shadows = integrator->shadow_rays_a_hit(context) > 0 ? waves * integrator->shadow_waves : 0;
     size_t shadow_times = context->scene->has_motion ? shadows : 0;
+    if (integrator->prepare && !integrator->prepare(context, error))
+        return false;
     return gpu_buffer_reserve(device, &passes->radiance, waves * sizeof(vec4), error) &&
            gpu_buffer_reserve(device, &passes->children, children * sizeof(struct child), error) &&
            gpu_buffer_reserve(device, &passes->child_counts, waves * sizeof(uint), error) &&
@@ -45,12 +34,8 @@ bool wave_passes_reserve(struct integrator *integrator, struct render_context *c
            gpu_buffer_reserve(device, &passes->light_samples, shadows * sizeof(vec4), error);
 }
 
-void wave_passes_destroy(struct integrator *integrator)
+void wave_passes_finish(struct wave_passes *passes, struct gpu_device *device)
 {
-    struct wave_passes *passes = (struct wave_passes *)integrator;
-    if (!passes)
-        return;
-    struct gpu_device *device = integrator->device;
     gpu_buffer_finish(device, &passes->radiance);
     gpu_buffer_finish(device, &passes->children);
     gpu_buffer_finish(device, &passes->child_counts);
@@ -58,12 +43,11 @@ void wave_passes_destroy(struct integrator *integrator)
     gpu_buffer_finish(device, &passes->shadow_times);
     gpu_buffer_finish(device, &passes->visibility);
     gpu_buffer_finish(device, &passes->light_samples);
-    free(passes);
+    *passes = (struct wave_passes){0};
 }
 
-uint64_t wave_passes_device_bytes(const struct integrator *integrator)
+uint64_t wave_passes_device_bytes(const struct wave_passes *passes)
 {
-    const struct wave_passes *passes = (const struct wave_passes *)integrator;
     return passes->radiance.capacity_bytes + passes->children.capacity_bytes +
            passes->child_counts.capacity_bytes + passes->shadow_rays.capacity_bytes +
            passes->shadow_times.capacity_bytes + passes->visibility.capacity_bytes +
@@ -84,41 +68,44 @@ static void bind_shading(struct wave_passes *passes, struct render_context *cont
         gpu_buffer_bind_storage(&passes->shadow_times, BIND_RAY_TIMES);
 }
 
-const struct gpu_program *wave_passes_shade_program(struct wave_passes *passes, struct render_context *context,
-                                                    const char *compute, const struct gpu_define *own,
-                                                    struct error *error)
+/* The integrator's program, in use, with the scene and everything that shade.glsl names bound and set. */
+static const struct gpu_program *shade_program(struct wave_passes *passes, struct render_context *context,
+                                               struct error *error)
 {
+    const struct integrator *integrator = passes->integrator;
     struct gpu_define defines[DEFINES_MAX] = {0};
-    size_t n = 0;
-    for (; own && own->name; own++)
-        defines[n++] = *own;
+    size_t n = integrator->defines ? integrator->defines(context, defines) : 0;
     n += context_surface_defines(context, defines + n);
     if (context->features.area_lights)
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     if (context->scene->has_motion)
         defines[n++] = (struct gpu_define){"HAS_TIMES", "1"};
-    const struct gpu_program *program = context_use_with(context, compute, defines, error);
+    const struct gpu_program *program = context_use_with(context, integrator->shader, defines, error);
     if (!program)
         return NULL;
-    bool last = context->wave_number >= context->request.depth + passes->kind->straight_waves;
+    bool last = context->wave_number >= context->request.depth + integrator->straight_waves;
     gpu_uniform_uint(program, "hit_count", context->hit_count);
     gpu_uniform_uint(program, "first_slot", context->slice.first_slot);
     gpu_uniform_uint(program, "wave_number", context->wave_number);
     gpu_uniform_uint(program, "last_wave", last);
-    gpu_uniform_uint(program, "children_a_hit", passes->kind->children_a_hit);
-    gpu_uniform_uint(program, "shadow_rays_a_hit", passes->kind->shadow_rays_a_hit(context));
+    gpu_uniform_uint(program, "children_a_hit", integrator->children_a_hit);
+    gpu_uniform_uint(program, "shadow_rays_a_hit", integrator->shadow_rays_a_hit(context));
     bind_shading(passes, context);
     return program;
 }
 
-bool wave_passes_run(struct wave_passes *passes, struct render_context *context, const char *compute,
-                     const struct gpu_define *defines, uint32_t first, uint32_t count, struct error *error)
+/* Over the hits, of which there are some: shadow rays first .. first + count - 1 of each; where first is 0 also
+ * what the hit sends out, and its children. */
+static bool shade_hits(struct wave_passes *passes, struct render_context *context, uint32_t first, uint32_t count,
+                       struct error *error)
 {
     context_span_begin(context, STAGE_SHADE);
-    const struct gpu_program *program = wave_passes_shade_program(passes, context, compute, defines, error);
+    const struct gpu_program *program = shade_program(passes, context, error);
     if (program) {
         gpu_uniform_uint(program, "first_ray", first);
         gpu_uniform_uint(program, "batch_rays", count);
+        if (passes->integrator->set)
+            passes->integrator->set(context, program);
         gpu_dispatch(context->device, program, context->hit_count);
     }
     context_span_end(context);
@@ -134,9 +121,9 @@ static bool left_scene(struct wave_passes *passes, struct render_context *contex
         return true;
     if (context->environment->kind == ENVIRONMENT_IMAGE)
         defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
-    if (passes->kind->left_scene)
-        defines[n++] = (struct gpu_define){passes->kind->left_scene, "1"};
-    if (passes->kind->left_scene && context->features.area_lights)
+    if (passes->integrator->left_scene)
+        defines[n++] = (struct gpu_define){passes->integrator->left_scene, "1"};
+    if (passes->integrator->left_scene && context->features.area_lights)
         defines[n++] = (struct gpu_define){"HAS_AREA_LIGHTS", "1"};
     context_bind(context);
     gpu_buffer_bind_texels(context->device, environment_lights(context->environment, context->scene),
@@ -173,7 +160,7 @@ static bool trace_shadows(struct wave_passes *passes, struct render_context *con
 static bool gather(struct wave_passes *passes, struct render_context *context, bool last, uint32_t rays_a_hit,
                    struct error *error)
 {
-    const struct gpu_define defines[2] = {{passes->kind->gather, "1"}, {NULL, NULL}};
+    const struct gpu_define defines[2] = {{passes->integrator->gather, "1"}, {NULL, NULL}};
     const struct gpu_program *program = context_use_with(context, "render/gather.comp", defines, error);
     if (!program)
         return false;
@@ -201,7 +188,7 @@ static bool move_children(struct wave_passes *passes, struct render_context *con
     if (!program)
         return false;
     gpu_uniform_uint(program, "hit_count", context->hit_count);
-    gpu_uniform_uint(program, "children_a_hit", passes->kind->children_a_hit);
+    gpu_uniform_uint(program, "children_a_hit", passes->integrator->children_a_hit);
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
     gpu_buffer_bind_storage(&context->block_offsets, BIND_BLOCK_OFFSETS);
     gpu_buffer_bind_texels(context->device, &passes->children, UNIT_MOVE_CHILDREN, GL_RGBA32UI);
@@ -213,37 +200,37 @@ static bool move_children(struct wave_passes *passes, struct render_context *con
     return true;
 }
 
-static enum integrator_progress make_wave(struct wave_passes *passes, struct render_context *context,
-                                          struct error *error)
+static enum wave_progress make_wave(struct wave_passes *passes, struct render_context *context,
+                                    struct error *error)
 {
     struct wave_state state = {0};
     if (context->hit_count == 0)
-        return INTEGRATOR_DONE;
+        return WAVE_DONE;
     const struct gpu_program *count = context_use(context, "render/compact_count.comp", error);
     if (!count)
-        return INTEGRATOR_FAILED;
+        return WAVE_FAILED;
     gpu_buffer_bind_storage(&passes->child_counts, BIND_CHILD_COUNTS);
     gpu_uniform_uint(count, "hit_count", context->hit_count);
     if (!compact_scan(context, count, context->hit_count, &state, error))
-        return INTEGRATOR_FAILED;
+        return WAVE_FAILED;
     context->shadow_rays += state.WAVE_STATE_SHADOW_RAYS;
     if (state.ray_count == 0)
-        return INTEGRATOR_DONE;
+        return WAVE_DONE;
     if (state.ray_count > context->wave_capacity)
-        return INTEGRATOR_OVERFLOW;
+        return WAVE_OVERFLOW;
     if (!move_children(passes, context, error))
-        return INTEGRATOR_FAILED;
+        return WAVE_FAILED;
     context->ray_count = state.ray_count;
     context->secondary_rays += state.ray_count;
-    return INTEGRATOR_MORE;
+    return WAVE_MORE;
 }
 
 /* The children become the context's rays and paths; counts the wave. */
-static enum integrator_progress next_wave(struct wave_passes *passes, struct render_context *context,
-                                          struct error *error)
+static enum wave_progress next_wave(struct wave_passes *passes, struct render_context *context,
+                                    struct error *error)
 {
     context_span_begin(context, STAGE_SHADE);
-    enum integrator_progress progress = make_wave(passes, context, error);
+    enum wave_progress progress = make_wave(passes, context, error);
     context_span_end(context);
     context->asked = 0;
     context->wave_number++;
@@ -255,8 +242,8 @@ static uint32_t batch_of(const struct wave_passes *passes, const struct render_c
 {
     if (context->hit_count == 0)
         return 0;
-    uint32_t left = passes->kind->shadow_rays_a_hit(context) - context->asked;
-    uint32_t together = context->wave_capacity * passes->kind->shadow_waves / context->hit_count;
+    uint32_t left = passes->integrator->shadow_rays_a_hit(context) - context->asked;
+    uint32_t together = context->wave_capacity * passes->integrator->shadow_waves / context->hit_count;
     return left < together ? left : together;
 }
 
@@ -266,32 +253,31 @@ static bool shade_batch(struct wave_passes *passes, struct render_context *conte
     if (context->asked == 0 && !left_scene(passes, context, error))
         return false;
     context->asking = batch_of(passes, context);
-    return context->hit_count == 0 || passes->kind->shade(passes, context, context->asked, context->asking, error);
+    return context->hit_count == 0 || shade_hits(passes, context, context->asked, context->asking, error);
 }
 
-static enum integrator_progress finish_batch(struct wave_passes *passes, struct render_context *context,
-                                             struct error *error)
+static enum wave_progress finish_batch(struct wave_passes *passes, struct render_context *context,
+                                       struct error *error)
 {
     const uint32_t count = context->asking;
     context->asking = 0;
     context->asked += count;
-    bool last = context->hit_count == 0 || context->asked == passes->kind->shadow_rays_a_hit(context);
+    bool last = context->hit_count == 0 || context->asked == passes->integrator->shadow_rays_a_hit(context);
     if (!gather(passes, context, last, count, error))
-        return INTEGRATOR_FAILED;
-    return last ? next_wave(passes, context, error) : INTEGRATOR_AGAIN;
+        return WAVE_FAILED;
+    return last ? next_wave(passes, context, error) : WAVE_AGAIN;
 }
 
-enum integrator_progress wave_passes_shade(struct integrator *integrator, struct render_context *context,
-                                           struct error *error)
+enum wave_progress wave_passes_shade(struct wave_passes *passes, struct render_context *context,
+                                     struct error *error)
 {
-    struct wave_passes *passes = (struct wave_passes *)integrator;
     if (context->asking == 0) {
         if (!shade_batch(passes, context, error))
-            return INTEGRATOR_FAILED;
-        return context->asking > 0 ? INTEGRATOR_AGAIN : finish_batch(passes, context, error);
+            return WAVE_FAILED;
+        return context->asking > 0 ? WAVE_AGAIN : finish_batch(passes, context, error);
     }
     bool done = false;
     if (!trace_shadows(passes, context, &done, error))
-        return INTEGRATOR_FAILED;
-    return done ? finish_batch(passes, context, error) : INTEGRATOR_AGAIN;
+        return WAVE_FAILED;
+    return done ? finish_batch(passes, context, error) : WAVE_AGAIN;
 }

@@ -1,12 +1,160 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/integrators/integrator.h"
 
-const struct integrator_impl *integrator_impl_by_number(unsigned number)
+#include "render/environment_choice.h"
+
+#include "shared/bindings.h"
+#include "shared/path.h"
+
+#include <epoxy/gl.h>
+
+/* Rays that go straight on through blended surfaces do not count as bounces. */
+#define STRAIGHT_WAVES 16
+/* Likewise the layers of ray casting: what is left of the ray limits them, and where that never ends, as behind
+ * perfectly clear panes, this many beyond the depth. */
+#define LAYERS_MAX 256
+#define OPACITY_DEFAULT 0.5f
+
+/* ---- shadow rays of each hit ---- */
+
+static uint32_t no_shadow_rays(const struct render_context *context)
 {
-    static const struct integrator_impl *const impls[] = {
-        [INTEGRATOR_WHITTED] = &integrator_whitted_impl, [INTEGRATOR_DISTRIBUTED] = &integrator_distributed_impl,
-        [INTEGRATOR_RAYCAST] = &integrator_raycast_impl, [INTEGRATOR_AO] = &integrator_ao_impl,
-        [INTEGRATOR_PATH] = &integrator_path_impl,
-    };
-    return number < sizeof(impls) / sizeof(impls[0]) ? impls[number] : NULL;
+    (void)context;
+    return 0;
+}
+
+static uint32_t one_for_each_light(const struct render_context *context)
+{
+    return context->uniforms.light_count;
+}
+
+static uint32_t one_for_all_lights(const struct render_context *context)
+{
+    return context->uniforms.light_count > 0;
+}
+
+static uint32_t one_for_the_environment(const struct render_context *context)
+{
+    return context->environment->kind != ENVIRONMENT_NONE;
+}
+
+static uint32_t one_each_for_lights_and_environment(const struct render_context *context)
+{
+    return one_for_all_lights(context) + one_for_the_environment(context);
+}
+
+/* ---- set-up ---- */
+
+static void set_ao(struct render_context *context, const struct gpu_program *program)
+{
+    gpu_uniform_float(program, "reach", context_ao_distance(context));
+    gpu_uniform_float(program, "falloff", context->request.ao_falloff);
+}
+
+static void set_raycast(struct render_context *context, const struct gpu_program *program)
+{
+    float opacity = context->request.layer_opacity;
+    gpu_uniform_float(program, "layer_opacity", opacity > 0.0f ? opacity : OPACITY_DEFAULT);
+}
+
+static size_t path_defines(const struct render_context *context, struct gpu_define *defines)
+{
+    size_t n = 0;
+    if (context->environment->kind == ENVIRONMENT_IMAGE)
+        defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_IMAGE", "1"};
+    if (context->environment_choice->rows > 0)
+        defines[n++] = (struct gpu_define){"HAS_ENVIRONMENT_TABLE", "1"};
+    if (context->features.anisotropy)
+        defines[n++] = (struct gpu_define){"HAS_ANISOTROPY", "1"};
+    if (context->request.brdf == FRAME_BRDF_WARD)
+        defines[n++] = (struct gpu_define){"WARD", "1"};
+    return n;
+}
+
+static void set_path(struct render_context *context, const struct gpu_program *program)
+{
+    struct environment_choice *choice = context->environment_choice;
+    gpu_uniform_uint(program, "asks_lights", one_for_all_lights(context));
+    gpu_uniform_uint(program, "asks_environment", one_for_the_environment(context));
+    gpu_uniform_uint(program, "environment_rows", choice->rows);
+    gpu_uniform_uint(program, "environment_columns", choice->columns);
+    gpu_buffer_bind_texels(context->device, &choice->table, UNIT_SHADE_ENVIRONMENT, GL_R32F);
+}
+
+static bool prepare_path(struct render_context *context, struct error *error)
+{
+    return environment_choice_update(context->environment_choice, context->device, context->environment,
+                                     &context->scene->scene->environment, error);
+}
+
+/* ---- the table ---- */
+
+static const struct integrator integrators[] = {
+    /* Whitted. An Improved Illumination Model for Shaded Display. 1980: at each hit the light of every light that
+     * a shadow ray reaches, and a ray each for what is mirrored and what is refracted. */
+    [INTEGRATOR_WHITTED] =
+        {
+            .name = "whitted",
+            .shader = "render/whitted.comp",
+            .children_a_hit = CHILDREN_MAX,
+            .shadow_waves = 1,
+            .straight_waves = STRAIGHT_WAVES,
+            .shadow_rays_a_hit = one_for_each_light,
+        },
+    /* Cook, Porter, Carpenter. Distributed Ray Tracing. 1984, one random choice of each kind a sample, as in
+     * section 7 of the stackless sphere tree's paper: at each hit one shadow ray and at most one ray more. */
+    [INTEGRATOR_DISTRIBUTED] =
+        {
+            .name = "distributed",
+            .shader = "render/distributed.comp",
+            .children_a_hit = 1,
+            .shadow_waves = 1,
+            .straight_waves = STRAIGHT_WAVES,
+            .shadow_rays_a_hit = one_for_all_lights,
+        },
+    /* Ray casting through all layers: each is lit without shadows and blended over those behind it. */
+    [INTEGRATOR_RAYCAST] =
+        {
+            .name = "raycast",
+            .shader = "render/raycast.comp",
+            .children_a_hit = 1,
+            .shadow_waves = 1,
+            .straight_waves = LAYERS_MAX,
+            .shadow_rays_a_hit = no_shadow_rays,
+            .set = set_raycast,
+        },
+    /* Ambient occlusion: of each first hit the share of the directions above it in which nothing is within a
+     * distance. Some any-hit rays a sample, and no light. */
+    [INTEGRATOR_AO] =
+        {
+            .name = "ao",
+            .shader = "render/ao.comp",
+            .children_a_hit = 1,
+            .shadow_waves = 1,
+            .straight_waves = STRAIGHT_WAVES,
+            .shadow_rays_a_hit = context_ao_rays,
+            .left_scene = "OPEN",
+            .gather = "GREY",
+            .set = set_ao,
+        },
+    /* Kajiya. The Rendering Equation. 1986: paths from the eye, which ask for light at each hit. The buffers hold
+     * all its shadow rays at once, which its shader counts on. */
+    [INTEGRATOR_PATH] =
+        {
+            .name = "path",
+            .shader = "render/path.comp",
+            .children_a_hit = 1,
+            .shadow_waves = 2,
+            .straight_waves = STRAIGHT_WAVES,
+            .shadow_rays_a_hit = one_each_for_lights_and_environment,
+            .left_scene = "SHARES",
+            .defines = path_defines,
+            .set = set_path,
+            .prepare = prepare_path,
+        },
+};
+
+const struct integrator *integrator_by_number(unsigned number)
+{
+    return number < sizeof(integrators) / sizeof(integrators[0]) ? &integrators[number] : NULL;
 }
