@@ -5,7 +5,7 @@
 
 config ?= release
 B := build/$(config)
-VERSION := 0.1.0
+VERSION := $(shell sed -n 's/^.define FARLIGHT_VERSION "\(.*\)"/\1/p' protocol/version.h)
 PREFIX ?= /usr/local
 DESTDIR ?=
 PKG_CONFIG ?= pkg-config
@@ -16,7 +16,7 @@ endif
 
 WARN := -Wall -Wextra -Werror -Wconversion -Wshadow
 WARN_C := $(WARN) -Wstrict-prototypes -Wmissing-prototypes
-CPPFLAGS_ALL := -D_GNU_SOURCE -DFARLIGHT_VERSION='"$(VERSION)"' -I.
+CPPFLAGS_ALL := -D_GNU_SOURCE -I.
 CFLAGS_ALL := -std=c17 -fno-common -fvisibility=hidden -pthread -MMD -MP
 CXXFLAGS_ALL := -std=c++17 -fvisibility=hidden -pthread -MMD -MP
 LDFLAGS_ALL := -pthread
@@ -108,7 +108,7 @@ VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interr
     job_tracer.c key.c talk.c))
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
-SONAME := libfarlight.so.0
+SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
 LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
@@ -379,10 +379,9 @@ install: all
 	sed 's#@PREFIX@#$(PREFIX)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
 	    >$(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc
 	install -m 644 client/cli/completion.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
-	install -m 644 conf/man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
-	install -m 644 conf/man/*.5 $(DESTDIR)$(PREFIX)/share/man/man5
+	for page in conf/man/*; do sed 's#@VERSION@#$(VERSION)#' $$page \
+	    >$(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$${page##*/}; done
 	install -m 644 client/cli/shot.schema.json $(DESTDIR)$(PREFIX)/share/farlight
-	install -m 644 conf/man/*.8 $(DESTDIR)$(PREFIX)/share/man/man8
 	install -m 644 README.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
 	install -m 644 conf/examples/* $(DESTDIR)$(PREFIX)/share/doc/farlight/examples
 	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight

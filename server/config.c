@@ -3,6 +3,7 @@
 
 #include "base/host.h"
 #include "base/log.h"
+#include "protocol/version.h"
 
 #include <ctype.h>
 #include <errno.h>

@@ -9,6 +9,7 @@
 #include "gpu/device.h"
 #include "engine/engine.h"
 #include "session/daemon.h"
+#include "protocol/version.h"
 
 #include <argp.h>
 #include <stdlib.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/cli.h"
+#include "protocol/version.h"
 
 #include <stdio.h>
 #include <string.h>

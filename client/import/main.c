@@ -8,6 +8,7 @@
 #include "helper/sandbox.h"
 #include "send.h"
 #include "protocol/common/clock.h"
+#include "protocol/version.h"
 
 #include <argp.h>
 #include <errno.h>

@@ -2,6 +2,7 @@
 #include "image.h"
 #include "layers.hpp"
 #include "metadata.hpp"
+#include "protocol/version.h"
 
 #include <OpenImageIO/filesystem.h>
 

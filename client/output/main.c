@@ -6,6 +6,7 @@
 #include "image.h"
 #include "helper/sandbox.h"
 #include "serve.h"
+#include "protocol/version.h"
 
 #include <argp.h>
 #include <signal.h>

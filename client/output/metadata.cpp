@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "metadata.hpp"
 #include "layers.hpp"
+#include "protocol/version.h"
 
 #include <cinttypes>
 #include <cmath>

@@ -3,6 +3,7 @@
 #include "protocol/pixels/ycbcr.h"
 #include "log.h"
 #include "sink.h"
+#include "protocol/version.h"
 
 #include <errno.h>
 #include <libavcodec/avcodec.h>

@@ -6,6 +6,7 @@
 #include "helper/sandbox.h"
 #include "helper/file.h"
 #include "serve.h"
+#include "protocol/version.h"
 
 #include <argp.h>
 #include <signal.h>

@@ -5,6 +5,7 @@
 #include "lib/text.h"
 #include "viewer/input.h"
 #include "viewer/viewer.h"
+#include "protocol/version.h"
 
 #include <errno.h>
 #include <stdlib.h>

@@ -10,6 +10,7 @@
 #include "session/jobs.h"
 #include "session/stats.h"
 #include "session/upload.h"
+#include "protocol/version.h"
 
 #include <inttypes.h>
 #include <stdio.h>

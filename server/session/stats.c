@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "protocol/codec.h"
+#include "protocol/version.h"
 #include "session/session.h"
 
 #include <stdio.h>

@@ -4,6 +4,7 @@
 #include "lib/helper.h"
 #include "protocol/pixels/ycbcr.h"
 #include "tests/harness/test.h"
+#include "protocol/version.h"
 
 #include <dirent.h>
 #include <math.h>
