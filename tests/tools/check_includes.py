@@ -1,151 +1,230 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Who may include whom: the architecture's rules as a table, held against the sources.
+"""Which room may include which: the architecture's rules as a table, checked against the sources.
 
-Exit status 1 and a line for each include that no rule allows. Run from the root of the project.
+Usage: check_includes.py [--write]. Run from the root of the project. One line for each fault, and exit status 1:
+an include that no rule allows, a permission that no file uses, a table in server/README.md that is out of date
+(--write brings it up to date).
 """
 import pathlib
 import re
 import sys
 
-# Folder -> folders of the project that it may include from (itself is always allowed).
-BASE, GPU = "server/base", "server/gpu"
-STRUCTURES = {BASE, GPU, "server/scene", "server/gpu_scene", "server/trace", "shaders/shared"}  # what each may use
+# Room (a folder with all below it) -> rooms that it may include from, besides itself. From the lowest to the highest
+# floor: a row may name only rows above it. `*` stands for one folder that has no row of its own, the same in the whole
+# row; so a new tracer needs no row.
+BASE, GPU, SCENE, GPU_SCENE, TRACE = "server/base", "server/gpu", "server/scene", "server/gpu_scene", "server/trace"
+SHARED, COMMON = "shaders/shared", "shaders/common"
 MAY_INCLUDE = {
-    "protocol": set(),
-    "protocol/sealed": {"protocol"},
-    "protocol/common": set(),
-    "protocol/pixels": {"protocol/common"},
-    "protocol/docs": {"protocol", "protocol/sealed", "protocol/common"},
-    BASE: {"protocol/common"},
-    "server/scene": {BASE},
-    GPU: {BASE},
-    "server/gpu_scene": {BASE, GPU, "server/scene", "shaders/shared", "protocol/common"},
-    "server/trace": STRUCTURES,
-    "server/trace/raster": STRUCTURES | {"shaders/raster"},
-    "server/trace/abuffer": STRUCTURES | {"server/trace/raster", "shaders/abuffer"},
-    "server/trace/bvh": STRUCTURES | {"shaders/bvh"},
-    "server/trace/ldc": STRUCTURES | {"server/trace/raster", "shaders/ldc"},
-    "server/trace/naive": STRUCTURES,
-    "server/trace/reference": STRUCTURES | {"protocol/common"},
-    "server/render": STRUCTURES,
-    "server/encode": {BASE, "protocol/pixels"},
-    "server/engine": {BASE, GPU, "server/scene", "server/gpu_scene", "server/trace", "server/render", "server/encode"},
-    "server/net": {BASE, "protocol", "protocol/sealed"},
-    "server/session": {BASE, "server/net", "server/scene", "server/engine", "server/encode", "server/render",
-                       "protocol", "protocol/sealed", "server"},
-    "server": {BASE, GPU, "server/net", "server/session", "server/engine", "server/encode", "protocol",
-               "protocol/sealed"},
-    "client/lib": {"protocol", "protocol/common", "protocol/sealed", "protocol/pixels"},
-    "client/cli": {"client/lib", "protocol", "protocol/common", "protocol/sealed"},
-    "client/helper": {"protocol"},
-    "client/import": {"client/helper", "protocol", "protocol/common"},
-    "client/output": {"client/helper", "protocol", "protocol/common"},
-    "client/video": {"client/helper", "client/lib", "protocol", "protocol/pixels"},  # of lib: rate
-    "client/viewer": {"protocol", "protocol/common", "client/lib", "client/cli"},  # the command line is parsed as that of render
-    "shaders/shared": set(),
-    "shaders/raster": {"shaders/shared"},
-    "shaders/abuffer": {"shaders/shared", "shaders/raster"},
-    "shaders/bvh": {"shaders/shared"},
-    "shaders/ldc": {"shaders/shared", "shaders/raster"},
+    "protocol": (),
+    "protocol/sealed": ("protocol",),
+    "protocol/common": (),
+    "protocol/pixels": ("protocol/common",),
+    "protocol/docs": ("protocol", "protocol/sealed", "protocol/common"),
+    SHARED: (),
+    COMMON: (SHARED,),
+    "shaders/gpu_scene": (SHARED, COMMON),
+    "shaders/raster": (SHARED, COMMON),
+    "shaders/trace": (SHARED, COMMON),
+    "shaders/render": (SHARED, COMMON),
+    "shaders/*": (SHARED, COMMON, "shaders/raster"),
+    BASE: ("protocol/common",),
+    GPU: (BASE,),
+    SCENE: (BASE,),
+    GPU_SCENE: (BASE, GPU, SCENE, SHARED),
+    TRACE: (BASE, GPU, GPU_SCENE, SHARED),
+    "server/trace/raster": (BASE, GPU, GPU_SCENE, "shaders/raster"),
+    "server/trace/*": (BASE, GPU, SCENE, GPU_SCENE, TRACE, "server/trace/raster", SHARED, "shaders/*"),
+    "server/render": (BASE, GPU, SCENE, GPU_SCENE, TRACE, SHARED),
+    "server/encode": (BASE, "protocol/pixels"),
+    "server/net": (BASE, "protocol", "protocol/sealed"),
+    "server/engine": (BASE, GPU, SCENE, "server/render", "server/encode"),
+    "server/session": (BASE, SCENE, "server/render", "server/encode", "server/net", "server/engine", "protocol"),
+    "server": (BASE, GPU, "server/engine", "server/session"),
+    "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels"),
+    "client/helper": ("protocol",),
+    "client/import": ("protocol", "protocol/common", "client/helper"),
+    "client/output": ("protocol", "client/helper"),
+    "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
+    "client/cli": ("protocol/common", "protocol/sealed", "client/lib"),
+    "client/viewer": ("protocol/common", "client/lib", "client/cli"),  # the command line is parsed as that of render
 }
-# System headers that only some folders, and those below them, may use.
-RESTRICTED = [
-    (re.compile(r"^(epoxy|GL|EGL)/"), {"server/gpu", "server/gpu_scene", "server/trace", "server/render"}),
-    (re.compile(r"^embree"), {"server/trace/reference"}),
-    (re.compile(r"^(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h"),
-     {"server/base", "server/net", "client/lib", "client/helper", "client/import", "client/cli"}),
-    (re.compile(r"^lib(av|sw)"), {"client/video", "client/viewer", "server/encode"}),
-    (re.compile(r"^SDL2?/"), {"client/viewer"}),
-    (re.compile(r"^OpenImageIO/"), {"client/import", "client/output"}),
-    (re.compile(r"^(tiny_gltf|tiny_obj_loader)"), {"client/import"}),
-    (re.compile(r"^(turbojpeg|zstd)\.h"), {"server/encode", "client/lib", "protocol/pixels"}),
-    (re.compile(r"^sodium\.h"), {"server/session", "client/lib", "protocol/common", "protocol/sealed", "protocol/docs"}),
-]
+# Files that every room may include.
+FOR_EVERYBODY = re.compile(r"^protocol/(version\.h|(words|tracers)\.(h|def))$")
+# A test in tests/unit/ROOM is one of that room: it may include the room (of the server, the protocol or the client) and all
+# that is below it. The rest of tests/ may include every room; no room includes tests/.
+TESTS, UNIT = "tests", "tests/unit/"
+UNIT_ROOTS = ("", "server/", "server/trace/", "client/", "protocol/")
+# System headers that only some rooms, and the folders below them, may use.
+RESTRICTED = {
+    r"(epoxy|GL|EGL)/": (GPU, GPU_SCENE, TRACE, "server/render"),
+    r"embree": ("server/trace/reference",),
+    r"(sys/socket|sys/un|netinet/.*|netdb|arpa/inet)\.h": (BASE, "server/net", "client/lib", "client/helper", "client/import"),
+    r"lib(av|sw)": ("client/video", "client/viewer", "server/encode"),
+    r"SDL2?/": ("client/viewer",),
+    r"OpenImageIO/": ("client/import", "client/output"),
+    r"tiny_(gltf|obj_loader)": ("client/import",),
+    r"(turbojpeg|zstd)\.h": ("server/encode", "client/lib", "protocol/pixels"),
+    r"sodium\.h": ("server/session", "protocol/common", "protocol/sealed"),
+}
+# Where the matrix of the server's rooms stands.
+README = pathlib.Path("server/README.md")
+MARKERS = ("<!-- include rules: begin -->", "<!-- include rules: end -->")
+
+FILE = "tests/tools/check_includes.py"
 ROOTS = ("", "server", "shaders", "client")  # as the compiler's -I
+SOURCES = {".c", ".h", ".cpp", ".hpp"}
+STAGES = {".comp", ".vert", ".geom", ".frag"}
 INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"([^"]+)"|<([^>]+)>)')
+MAIN = re.compile(r"^\s*void\s+main\s*\(", re.M)
 
 
-def owner(path):
-    """The folder whose rules hold for a file, the longest that is in the table."""
-    folder = path.parent.as_posix()
-    while folder and folder not in MAY_INCLUDE:
-        folder = folder.rpartition("/")[0]
-    return folder
+def room_of(path):
+    """(room, its row in the table) of a file; of a test, which has no row, (its folder, None)."""
+    for folder in (path.parent, *path.parent.parents):
+        for row in (folder.as_posix(), (folder.parent / "*").as_posix()):
+            if row in MAY_INCLUDE:
+                return folder.as_posix(), row
+    return path.parent.as_posix(), None
+
+
+def below(room, row):
+    """The room and all that it may include, by way of others too."""
+    found, open_rows = set(), [(room, row)]
+    while open_rows:
+        room, row = open_rows.pop()
+        if room not in found:
+            found.add(room)
+            name = room.rpartition("/")[2]
+            open_rows += [(other.replace("*", name), other) for other in MAY_INCLUDE.get(row, ())]
+    return found
 
 
 def resolve(including, name):
-    for base in (including.parent, *map(pathlib.Path, ROOTS)):
+    of_shader = including.parts[0] == "shaders" and including.suffix != ".h"  # these count from shaders/ alone
+    for base in [pathlib.Path("shaders")] if of_shader else (including.parent, *map(pathlib.Path, ROOTS)):
         if (base / name).is_file():
             return pathlib.Path((base / name).resolve().relative_to(pathlib.Path.cwd()))
     return None
 
 
-def check(path, report):
-    here = owner(path)
-    own_header_expected = path.suffix == ".c" and path.with_suffix(".h").is_file()
-    first = True
-    for number, line in enumerate(path.read_text().splitlines(), 1):
-        match = INCLUDE.match(line)
-        if not match:
-            continue
-        quoted, system = match.groups()
-        if first and own_header_expected and resolve(path, quoted or "") != path.with_suffix(".h"):
-            report(path, number, "the first include is not the file's own header")
-        first = False
-        if quoted:
-            target = resolve(path, quoted)
-            if target is None:
-                report(path, number, f"no such header in the project: {quoted}")
-            elif owner(target) != here and owner(target) not in MAY_INCLUDE[here]:
-                report(path, number, f"{here} may not include {owner(target)} ({quoted})")
-        for pattern, allowed in RESTRICTED:
-            if system and pattern.match(system) and not any(here == one or here.startswith(one + "/") for one in allowed):
-                report(path, number, f"<{system}> belongs to {', '.join(sorted(allowed))}")
+class Checker:
+    """The faults found so far, and which permissions were used."""
+
+    def __init__(self):
+        self.faults = []
+        self.files = 0
+        self.used = set()  # (row, room of the row) and (pattern, room)
+
+    def report(self, path, line, text):
+        self.faults.append(f"{path}:{line}: {text}")
+
+    def may_include(self, path, target):
+        room, row = room_of(path)
+        other, _ = room_of(target)
+        if other == room or FOR_EVERYBODY.match(target.as_posix()):
+            return True
+        if row:
+            name = room.rpartition("/")[2]
+            allowed = [permission for permission in MAY_INCLUDE[row] if permission.replace("*", name) == other]
+            self.used.update((row, permission) for permission in allowed)
+            return bool(allowed)
+        if not room.startswith(UNIT) or other.startswith(TESTS):
+            return True
+        subject = room[len(UNIT):]
+        rooms = [found for root in UNIT_ROOTS if (found := room_of(pathlib.Path(root + subject, "file")))[0] == root + subject]
+        return any(other in below(*found) for found in rooms)
+
+    def check_system(self, path, line, header):
+        room, row = room_of(path)
+        for pattern, rooms in RESTRICTED.items():
+            if row and re.match(pattern, header):
+                allowed = [one for one in rooms if room == one or room.startswith(one + "/")]
+                self.used.update((pattern, one) for one in allowed)
+                if not allowed:
+                    self.report(path, line, f"<{header}> is for {', '.join(rooms)}")
+
+    def check(self, path):
+        self.files += 1
+        text = path.read_text()
+        own_header = next((path.with_suffix(end) for end in (".h", ".hpp") if path.with_suffix(end).is_file()), None)
+        first = path.suffix in {".c", ".cpp"} and own_header is not None and not path.parts[0] == TESTS
+        for number, line in enumerate(text.splitlines(), 1):
+            match = INCLUDE.match(line)
+            if not match:
+                continue
+            quoted, system = match.groups()
+            target = resolve(path, quoted) if quoted else None
+            if first and target != own_header:
+                self.report(path, number, "the first include is not the file's own header")
+            first = False
+            if system:
+                self.check_system(path, number, system)
+            elif target is None:
+                self.report(path, number, f"no such header in the project: {quoted}")
+            elif not self.may_include(path, target):
+                self.report(path, number, f"{room_of(path)[0]} may not include {room_of(target)[0]} ({quoted})")
+        if path.parts[0] == "shaders" and bool(MAIN.search(text)) != (path.suffix in STAGES):
+            self.report(path, 1, "main() stands in files with a stage's suffix, and only there")
+
+    def check_table(self):
+        """Rows name only rows above them, and everything that is allowed is used."""
+        rows = list(MAY_INCLUDE)
+        for row, permissions in MAY_INCLUDE.items():
+            for permission in permissions:
+                if rows.index(permission) >= rows.index(row):
+                    self.faults.append(f"{FILE}: {row} names {permission}, which is not below it")
+                elif (row, permission) not in self.used:
+                    self.faults.append(f"{FILE}: no file of {row} includes {permission}: take the permission away")
+        for pattern, rooms in RESTRICTED.items():
+            for room in rooms:
+                if (pattern, room) not in self.used:
+                    self.faults.append(f"{FILE}: no file of {room} includes <{pattern}>: take the permission away")
 
 
-SHADER_INCLUDE_OK = re.compile(r"^(shared|common|raster)/")
+def sources():
+    for root, suffixes in (("protocol", SOURCES), ("server", SOURCES), ("client", SOURCES), ("tests", SOURCES),
+                           ("shaders", {".h", ".glsl"} | STAGES)):
+        yield from sorted(path for path in pathlib.Path(root).rglob("*") if path.suffix in suffixes)
 
 
-def check_shader(path, report):
-    text = path.read_text()
-    tracer = path.parent.name
-    for number, line in enumerate(text.splitlines(), 1):
-        match = INCLUDE.match(line)
-        if match and match.group(1):
-            name = match.group(1)
-            if not (pathlib.Path("shaders") / name).is_file():
-                report(path, number, f"no such shader file: {name}")
-            elif not SHADER_INCLUDE_OK.match(name) and not name.startswith(tracer + "/"):
-                report(path, number, f"{tracer} may include shared/, common/, raster/ and itself, not {name}")
-    has_main = re.search(r"^\s*void\s+main\s*\(", text, re.M) is not None
-    if has_main != (path.suffix in {".comp", ".vert", ".geom", ".frag"}):
-        report(path, 1, "main() stands in files with a stage suffix, and only there")
+def matrix():
+    """The server's part of the table, as Markdown."""
+    def named(room):
+        return "main" if room == "server" else room.removeprefix("server/").replace("*", "TRACER")
+    rows = [row for row in MAY_INCLUDE if row == "server" or row.startswith("server/")]
+    columns = [row for row in rows if any(row in MAY_INCLUDE[other] for other in rows)]
+    lines = ["| room | " + " | ".join(map(named, columns)) + " | others |", "|" + " --- |" * (len(columns) + 2)]
+    for row in rows:
+        others = [permission.replace("*", "TRACER") for permission in MAY_INCLUDE[row] if permission not in columns]
+        marks = ["x" if column in MAY_INCLUDE[row] else "" for column in columns]
+        lines.append("| " + " | ".join([f"`{named(row)}`", *marks, ", ".join(others)]) + " |")
+    return "\n".join([MARKERS[0], *(re.sub(" +", " ", line) for line in lines), MARKERS[1]])
+
+
+def check_matrix(checker, write):
+    text = README.read_text()
+    begin, end = (text.find(marker) for marker in MARKERS)
+    if begin < 0 or end < begin:
+        checker.faults.append(f"{README}: no lines {MARKERS[0]} and {MARKERS[1]}, between which the matrix stands")
+        return
+    current = text[:begin] + matrix() + text[end + len(MARKERS[1]):]
+    if write:
+        README.write_text(current)
+    elif current != text:
+        checker.faults.append(f"{README}: the matrix is out of date: run {sys.argv[0]} --write")
 
 
 def main():
-    faults = []
-
-    def report(path, number, text):
-        faults.append(f"{path}:{number}: {text}")
-
-    files = 0
-    for root in ("protocol", "server", "client"):
-        for path in sorted(pathlib.Path(root).rglob("*")):
-            if path.suffix in {".c", ".h", ".cpp"}:
-                check(path, report)
-                files += 1
-    for path in sorted(pathlib.Path("shaders").rglob("*")):
-        if path.suffix in {".glsl", ".comp", ".vert", ".geom", ".frag"}:
-            check_shader(path, report)
-            files += 1
-        elif path.suffix == ".h":
-            check(path, report)
-            files += 1
-    for fault in faults:
+    checker = Checker()
+    for path in sources():
+        checker.check(path)
+    checker.check_table()
+    check_matrix(checker, "--write" in sys.argv[1:])
+    for fault in checker.faults:
         print(fault)
-    print(f"include rules: {files} files, {len(faults)} faults")
-    return 1 if faults else 0
+    print(f"include rules: {checker.files} files, {len(checker.faults)} faults")
+    return 1 if checker.faults else 0
 
 
 if __name__ == "__main__":
