@@ -1,6 +1,6 @@
 # farlight. `make help` lists the targets.
 #
-# config=debug|release|sanitize|fuzz chooses the flags and the folder below build/.
+# config=debug|release|sanitize|coverage|fuzz chooses the flags and the folder below build/.
 # Sources are found by folder: a new .c file needs no line here.
 
 config ?= release
@@ -28,13 +28,16 @@ OPT := -O2 -g -fno-math-errno -fno-trapping-math
 else ifeq ($(config),sanitize)
 OPT := -O1 -g -DFARLIGHT_DEBUG -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
 LDFLAGS_ALL += -fsanitize=address,undefined
+else ifeq ($(config),coverage)
+OPT := -O0 -g --coverage -fprofile-update=atomic
+LDFLAGS_ALL += --coverage
 else ifeq ($(config),fuzz)
 CC := clang
 CXX := clang++
 OPT := -O1 -g -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined -fno-omit-frame-pointer
 LDFLAGS_ALL += -fsanitize=address,undefined
 else
-$(error config=$(config) is not one of debug, release, sanitize, fuzz)
+$(error config=$(config) is not one of debug, release, sanitize, coverage, fuzz)
 endif
 
 # The tracer `reference` is Embree: built in where its header is found. EMBREE=0 leaves it out.
@@ -311,9 +314,11 @@ BUILD_PACKAGES := gcc g++ make pkg-config libepoxy-dev libegl-dev libgl-dev libc
     libtinyobjloader-dev libembree-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libsdl2-dev libsdl2-ttf-dev fonts-dejavu-core libegl1 libgl1-mesa-dri
 TEST_PACKAGES := libcmocka-dev python3 python3-jsonschema ffmpeg xvfb gnuplot-nox
 LINT_PACKAGES := clang clang-format glslang-tools python3
+ANALYZE_PACKAGES := clang clang-tidy python3
+COVERAGE_PACKAGES := gcovr
 FUZZ_PACKAGES := clang libclang-rt-14-dev
 
-.PHONY: tests build-packages test-packages lint-packages fuzz-packages test test-long demo bench soak bench-plot check-headers lint format install uninstall clean help
+.PHONY: tests build-packages test-packages lint-packages analyze-packages coverage-packages fuzz-packages test test-long demo bench soak bench-plot check-headers check-rules lint check analyze coverage format install uninstall clean distclean help
 tests: $(TEST_PROGRAMS) $(CONTRACT) $(BENCH_PROGRAMS) $(BENCH_DISTRIBUTED) $(BENCH_STEPS) $(BENCH_CANCEL) $(BENCH_LINK) $(BENCH_VIEW) $(B)/tests/tools/make_scenes $(B)/tests/tools/pose_dump $(LOSING_DAEMON)
 
 build-packages:
@@ -322,6 +327,10 @@ test-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES)
 lint-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(LINT_PACKAGES)
+analyze-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(ANALYZE_PACKAGES)
+coverage-packages:
+	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(TEST_PACKAGES) $(COVERAGE_PACKAGES)
 fuzz-packages:
 	@tests/tools/install_packages.sh $(BUILD_PACKAGES) $(FUZZ_PACKAGES)
 
@@ -352,17 +361,50 @@ bench-plot: test-packages
 	$(MAKE) -j$(JOBS) $(BENCHED)
 	python3 tests/bench/bench_plot.py $(B)
 
+# ---- what is checked without running it
 check-headers:
 	@tests/tools/check_headers.sh $(CC) -I. -Iserver -Ishaders -Iclient $(SERVER_CFLAGS) $(CLIENT_CFLAGS)
 FORMATTED = $(call sources,server protocol client tests shaders,c h hpp cpp)
 format:
 	clang-format -i $(FORMATTED)
+# Include rules, headers alone, layout: without installing, and without clang's compiler.
+check-rules: check-headers
+	@python3 tests/tools/check_includes.py
+	@printf '%s\n' $(FORMATTED) | xargs -P $(JOBS) -n 40 clang-format --dry-run -Werror
 lint: lint-packages
-	python3 tests/tools/check_includes.py
+	@$(MAKE) -s check-rules compile_commands.json
 	python3 tests/tools/check_shaders.py
-	$(MAKE) -s check-headers
-	@clang-format --dry-run -Werror $(FORMATTED)
-	$(MAKE) CC=clang CXX=clang++ config=debug B=build/clang all tests
+	python3 tests/tools/compile_commands.py --syntax
+# About a minute after a build; installs nothing, and names what is missing.
+check:
+	@tests/tools/install_packages.sh --check $(BUILD_PACKAGES) $(TEST_PACKAGES) clang-format
+	@$(MAKE) -s check-rules
+	@$(MAKE) -j$(JOBS) $(foreach name,$(PURE_TESTS),$(filter $(B)/tests/unit/$(name)%,$(UNIT_TESTS)))
+	@python3 tests/tools/run_tests.py $(B) $(PURE_TESTS)
+# Parts of names of tests that need no GPU, no daemon and no file outside the checkout.
+PURE_TESTS := test_affine test_base test_camera_path test_client_catalogue test_client_json test_client_keys test_client_text \
+    test_client_y4m test_config test_curve test_job_scheduler test_keys test_net test_pacing test_pose test_protocol test_queue test_scene \
+    test_sequence test_session_edits test_session_limits test_timeline
+# How each source is compiled, for editors and clang's tools; from our own rules.
+.PHONY: compile_commands.json
+compile_commands.json:
+	@$(MAKE) -nB V=1 --no-print-directory all tests | python3 tests/tools/compile_commands.py >$@.new && mv $@.new $@
+# gcc's analyzer knows C only. What it finds is an error of the build, whose objects stay: a second run costs what changed.
+analyze: analyze-packages
+	@$(MAKE) -s compile_commands.json
+	python3 tests/tools/compile_commands.py --tidy server/ protocol/ client/
+	$(MAKE) -j$(JOBS) CC=gcc CXX=g++ B=build/analyze CFLAGS='$(ANALYZE_FLAGS)' $(patsubst $(B)/%,build/analyze/%,$(ANALYZED))
+ANALYZE_FLAGS := -fanalyzer
+ANALYZED = $(filter-out $(B)/shader_sources.o %.opp %.a,$(sort $(SERVER_OBJ) $(PROTOCOL_OBJ) $(LIB_OBJ) $(CLI_OBJ) $(VIEWER_OBJ) \
+    $(HELPER_OBJ) $(IMPORT_OBJ) $(EXPORT_OBJ) $(VIDEO_OBJ)))
+# Lines that tests reach, as HTML; TESTS chooses among them.
+coverage: coverage-packages
+	$(MAKE) -j$(JOBS) config=coverage all tests
+	find build/coverage -name '*.gcda' -delete
+	python3 tests/tools/run_tests.py build/coverage $(TESTS)
+	@mkdir -p out/coverage
+	gcovr -j $(JOBS) --root . --filter 'server/' --filter 'client/' --filter 'protocol/' --gcov-ignore-parse-errors \
+	    --html-details out/coverage/index.html --print-summary build/coverage
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/farlight \
@@ -400,8 +442,11 @@ uninstall:
 	    $(DESTDIR)$(PREFIX)/lib/sysusers.d/farlight.conf
 	rm -rf $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)$(PREFIX)/share/farlight $(DESTDIR)$(PREFIX)/include/farlight
 
+# What was rendered and measured stays.
 clean:
-	rm -rf build out
+	rm -rf build compile_commands.json
+distclean: clean
+	rm -rf out
 
 help:
 	@echo 'make demo       install what is missing, build, render the bundled scenes into out/   [FAST=1: one picture]'
@@ -412,9 +457,14 @@ help:
 	@echo 'make bench-plot draw the scaling curves into out/, as SVG and PNG'
 	@echo 'make all        build the programs into build/$$config/   [config=debug|release|sanitize|fuzz EMBREE=0]'
 	@echo 'make fuzz       run every fuzzer for a while   [SECONDS=20]'
-	@echo 'make lint       include rules, shaders, headers alone, format, clang with warnings as errors'
+	@echo 'make check      the rules of the sources and the unit tests that need no GPU and no daemon; installs nothing'
+	@echo 'make lint       include rules, headers alone, format, shaders, clang with warnings as errors'
+	@echo 'make analyze    clang-tidy and gcc -fanalyzer'
+	@echo 'make coverage   which lines tests reach, into out/coverage   [TESTS=part-of-a-name]'
+	@echo 'make compile_commands.json   how each source is compiled, for editors'
 	@echo 'make format     clang-format over our sources'
 	@echo 'make install    [PREFIX=/usr/local DESTDIR=]'
+	@echo 'make clean      remove build/; distclean removes out/ as well'
 
 -include $(shell find build -name '*.d' 2>/dev/null)
 .SECONDARY:

@@ -74,8 +74,8 @@ static void print_hello(void)
 {
     uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
     struct handshake_hello hello = {.version_min = 1, .version_max = 1, .name = "example"};
-    for (uint8_t i = 0; i < sizeof(hello.nonce); i++) {
-        hello.nonce[i] = i;
+    for (size_t i = 0; i < sizeof(hello.nonce); i++) {
+        hello.nonce[i] = (uint8_t)i;
     }
     print_bytes("Client, hello", bytes, handshake_hello_encode(bytes, &hello));
     printf("The daemon's reply has random numbers, its limits and its name in it. Behind it comes the first "

@@ -1,21 +1,36 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Installs the named Debian packages that are missing, or says how to. Usage: install_packages.sh PACKAGE..
+# Installs the named Debian packages that are missing and says which, or says how to. With --check it installs nothing.
+# Usage: install_packages.sh [--check] PACKAGE..
 set -u
+check=
+if [ "${1:-}" = --check ]; then
+    check=1
+    shift
+fi
+if ! command -v dpkg-query >/dev/null 2>&1; then
+    echo "not a Debian system: going on with what is there; it should have what these packages have: $*" >&2
+    exit 0
+fi
 missing=
 for package in "$@"; do
     dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing="$missing $package"
 done
 [ -z "$missing" ] && exit 0
-echo "packages to install:$missing" >&2
+how="apt-get install --no-install-recommends$missing"
+if [ -n "$check" ]; then
+    echo "packages that are missing:$missing; to install them: $how" >&2
+    exit 1
+fi
 if [ "$(id -u)" -eq 0 ]; then
     run=
 elif command -v sudo >/dev/null 2>&1 && sudo -n true 2>/dev/null; then
     run="sudo -n"
 else
-    echo "this needs root; run: apt-get install --no-install-recommends$missing" >&2
+    echo "packages that are missing:$missing; installing them needs root: $how" >&2
     exit 1
 fi
+echo "installing packages that are missing:$missing" >&2
 export DEBIAN_FRONTEND=noninteractive
 # shellcheck disable=SC2086
 $run apt-get update -q >&2 &&
