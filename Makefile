@@ -424,7 +424,7 @@ install: all
 	for page in conf/man/*; do sed 's#@VERSION@#$(VERSION)#' $$page \
 	    >$(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$${page##*/}; done
 	install -m 644 client/cli/shot.schema.json $(DESTDIR)$(PREFIX)/share/farlight
-	install -m 644 README.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
+	install -m 644 README.md CHANGELOG.md SECURITY.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
 	install -m 644 conf/examples/* $(DESTDIR)$(PREFIX)/share/doc/farlight/examples
 	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight
 	sed 's#/usr/local/bin#$(PREFIX)/bin#' conf/farlightd.service >$(DESTDIR)$(PREFIX)/lib/systemd/system/farlightd.service

@@ -7,7 +7,8 @@ steps, link, view, ldc, abuffer, reach; all of them where none is named. Each fi
 warm-up, with the median absolute deviation beside it; what is compared takes turns, run by run. Scenes of FARLIGHT_SCENES
 (default: ../shared/scenes beside the checkout) are left out, and named, where missing.
 
-Writes FOLDER/bench.txt and FOLDER/bench.json (FOLDER: out). Parts that an earlier run on the same device and commit left
+Writes FOLDER/bench.txt and FOLDER/bench.json (FOLDER: out); a run that writes into out, other than with --tiny, also brings
+the sections of its parts in tests/bench/README.md up to date. Parts that an earlier run on the same device and commit left
 there stay. The JSON: {"format": 1, "environment": {date, commit, processor, processors, device, vendor, version, software,
 embree, and on a GPU copy_bytes_per_s}, "parts": {NAME: {..}}}. Figures are objects of median, deviation, least, greatest
 and runs; keys end with their unit. tracers, reach, family, pixels and rays have `results`, one for each call of
@@ -37,6 +38,7 @@ import bench_ldc_show
 import bench_link
 import bench_rays
 import bench_reach
+import bench_readme
 import bench_steps
 import bench_view
 from bench_common import Bench, Failure, command, environment, say
@@ -66,6 +68,7 @@ PARTS = {
     "reach": ("bvh beside Embree", bench_rays.measure_reach, bench_rays.show_reach),
 }
 WANTED_TITLE = "What is wanted"
+OUT = pathlib.Path("out")
 SAME = ("commit", "device", "version", "processor", "processors")
 
 
@@ -81,12 +84,15 @@ def section(title, text):
     return f"## {title}\n\n{text}\n"
 
 
-def part_section(name, data):
-    title, _, show = PARTS[name]
-    text = show(data)
+def part_text(name, data):
+    text = PARTS[name][2](data)
     if data.get("left_out"):
         text += "\n\nleft out, as they are not below FARLIGHT_SCENES: " + ", ".join(data["left_out"])
-    return section(title, text)
+    return text
+
+
+def part_section(name, data):
+    return section(PARTS[name][0], part_text(name, data))
 
 
 def show_environment(facts):
@@ -110,6 +116,14 @@ def write(document, out):
     out.mkdir(parents=True, exist_ok=True)
     (out / "bench.json").write_text(json.dumps(document, indent=1) + "\n")
     (out / "bench.txt").write_text(render(document))
+
+
+def write_readme(document):
+    """What bench.json has, in the README beside this file."""
+    parts = [(name, PARTS[name][0], part_text(name, document["parts"][name])) for name in PARTS if name in document["parts"]]
+    if "wanted" in document["parts"]:
+        parts.append(("wanted", WANTED_TITLE, bench_reach.show(document["parts"]["wanted"])))
+    bench_readme.write(document["environment"], parts)
 
 
 def measure(bench, names, document, out):
@@ -155,7 +169,7 @@ def main():
     parser = argparse.ArgumentParser(description="Measures farlight; see the head of this file.")
     parser.add_argument("build", help="folder with the programs, build/release")
     parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out"), help="where the tables go (out)")
+    parser.add_argument("--out", type=pathlib.Path, default=OUT, help="where the tables go (out)")
     parser.add_argument("--runs", type=int, help="how many runs a figure has (3 to 9)")
     parser.add_argument("--link-seconds", type=int, default=60, help="how long the part view looks over a slow link (60)")
     parser.add_argument("--tiny", action="store_true", help="the smallest scenes only: shows that it works, measures nothing")
@@ -169,6 +183,9 @@ def main():
         parser.error("between 2 and 3600 seconds")
     faults = run(arguments.build, arguments.parts or list(PARTS), arguments.out, arguments.runs, arguments.tiny,
                  arguments.link_seconds)
+    document = load(arguments.out / "bench.json")
+    if document and not arguments.tiny and arguments.out == OUT:
+        write_readme(document)
     for fault in faults:
         print(f"bench: {fault}", file=sys.stderr)
     print(f"{arguments.out / 'bench.txt'}\n{arguments.out / 'bench.json'}")

@@ -137,9 +137,13 @@ def processor_name():
 
 
 def commit_name():
-    result = subprocess.run(["git", "-C", ROOT, "describe", "--always", "--dirty"], stdout=subprocess.PIPE,
-                            stderr=subprocess.DEVNULL, text=True, check=False)
-    return result.stdout.strip() or "unknown"
+    """As `git describe --dirty` has it, but for the figures that a run itself writes."""
+    def git(*arguments):
+        return subprocess.run(["git", "-C", ROOT, *arguments], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+                              check=False).stdout.strip()
+    name = git("describe", "--always")
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!tests/bench/README.md")
+    return name + ("-dirty" if changed else "") if name else "unknown"
 
 
 def environment(bench):
