@@ -377,7 +377,7 @@ lint: lint-packages
 	python3 tests/tools/compile_commands.py --syntax
 # About a minute after a build; installs nothing, and names what is missing.
 check:
-	@tests/tools/install_packages.sh --check $(BUILD_PACKAGES) $(TEST_PACKAGES) clang-format
+	@tests/tools/install_packages.sh --check $(BUILD_PACKAGES) libcmocka-dev python3 clang-format
 	@$(MAKE) -s check-rules
 	@$(MAKE) -j$(JOBS) $(foreach name,$(PURE_TESTS),$(filter $(B)/tests/unit/$(name)%,$(UNIT_TESTS)))
 	@python3 tests/tools/run_tests.py $(B) $(PURE_TESTS)
