@@ -383,7 +383,7 @@ check:
 	@python3 tests/tools/run_tests.py $(B) $(PURE_TESTS)
 # Parts of names of tests that need no GPU, no daemon and no file outside the checkout.
 PURE_TESTS := test_affine test_base test_camera_path test_client_catalogue test_client_json test_client_keys test_client_text \
-    test_client_y4m test_config test_curve test_job_scheduler test_keys test_net test_pacing test_pose test_protocol test_queue test_scene \
+    test_client_y4m test_config test_curve test_job_scheduler test_keys test_net test_pacing test_protocol test_queue test_scene \
     test_sequence test_session_edits test_session_limits test_timeline
 # How each source is compiled, for editors and clang's tools; from our own rules.
 .PHONY: compile_commands.json
