@@ -51,10 +51,17 @@ MAY_INCLUDE = {
 }
 # Files that every room may include.
 FOR_EVERYBODY = re.compile(r"^protocol/(version\.h|(words|tracers)\.(h|def))$")
-# A test in tests/unit/ROOM is one of that room: it may include the room (of the server, the protocol or the client) and all
-# that is below it. The rest of tests/ may include every room; no room includes tests/.
+# A test in tests/unit/ROOM is one of the rooms of that name, with those in it (`client`: all of the client): it may include
+# them, all that is below them, and what UNIT_ALSO says. The rest of tests/ may include every room; no room includes tests/.
 TESTS, UNIT = "tests", "tests/unit/"
-UNIT_ROOTS = ("", "server/", "server/trace/", "client/", "protocol/")
+UNIT_ROOTS = ("", "server/", "server/trace/", "client/")
+UNIT_ALSO = {
+    "client": ("server/encode",),  # what the daemon encodes is decoded
+    "encode": ("server/engine",),  # the pool of encoders
+    "gpu_scene": ("server/trace",),  # where rays meet what moved
+    "net": ("server/session",),  # the blobs of a connection
+    "session": ("server",),  # the limits of the configuration
+}
 # System headers that only some rooms, and the folders below them, may use.
 RESTRICTED = {
     r"(epoxy|GL|EGL)/": (GPU, GPU_SCENE, TRACE, "server/render"),
@@ -114,7 +121,7 @@ class Checker:
     def __init__(self):
         self.faults = []
         self.files = 0
-        self.used = set()  # (row, room of the row) and (pattern, room)
+        self.used = set()  # (row, room of the row), (pattern, room) and (test's room, room)
 
     def report(self, path, line, text):
         self.faults.append(f"{path}:{line}: {text}")
@@ -132,8 +139,12 @@ class Checker:
         if not room.startswith(UNIT) or other.startswith(TESTS):
             return True
         subject = room[len(UNIT):]
-        rooms = [found for root in UNIT_ROOTS if (found := room_of(pathlib.Path(root + subject, "file")))[0] == root + subject]
-        return any(other in below(*found) for found in rooms)
+        rooms = [room for row in MAY_INCLUDE for root in UNIT_ROOTS
+                 if ((room := row.replace("*", subject)) + "/").startswith(root + subject + "/") and pathlib.Path(room).is_dir()]
+        if not rooms or any(other in below(*room_of(pathlib.Path(room, "file"))) for room in rooms):
+            return True
+        self.used.add((subject, other))
+        return other in UNIT_ALSO.get(subject, ())
 
     def check_system(self, path, line, header):
         room, row = room_of(path)
@@ -180,6 +191,10 @@ class Checker:
             for room in rooms:
                 if (pattern, room) not in self.used:
                     self.faults.append(f"{FILE}: no file of {room} includes <{pattern}>: take the permission away")
+        for subject, rooms in UNIT_ALSO.items():
+            for room in rooms:
+                if (subject, room) not in self.used:
+                    self.faults.append(f"{FILE}: no test of {subject} includes {room}: take the permission away")
 
 
 def sources():

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Runs every test and prints one closing line: N passed, N failed, N skipped.
 
-Usage: run_tests.py BUILD_FOLDER [PART_OF_A_NAME ..]
+Usage: run_tests.py BUILD_FOLDER [PART_OF_A_NAME ..]      /scene/ is the folder of that name alone
 C tests are cmocka programs below BUILD_FOLDER/tests that hold many files of tests; each file runs in a process of its
 own. Integration tests are unittest modules in tests/integration, which find the programs through FARLIGHT_BIN. The
 rules of the sources are checked first. Files and modules run side by side, as most of them leave processors idle:
@@ -154,7 +154,7 @@ def tasks(build, names):
     if os.environ.get("FARLIGHT_TEST_SANITIZED"):
         for name in NOT_SANITIZED:
             found.pop(name, None)
-    return {name: task for name, task in found.items() if not names or any(part in name for part in names)}
+    return {name: task for name, task in found.items() if not names or any(part in f"/{name}" for part in names)}
 
 
 def known_times(path):
