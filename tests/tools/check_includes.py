@@ -31,10 +31,10 @@ MAY_INCLUDE = {
     BASE: ("protocol/common",),
     GPU: (BASE,),
     SCENE: (BASE,),
-    GPU_SCENE: (BASE, GPU, SCENE, SHARED),
+    GPU_SCENE: ("protocol/common", BASE, GPU, SCENE, SHARED),
     TRACE: (BASE, GPU, GPU_SCENE, SHARED),
     "server/trace/raster": (BASE, GPU, GPU_SCENE, "shaders/raster"),
-    "server/trace/*": (BASE, GPU, SCENE, GPU_SCENE, TRACE, "server/trace/raster", SHARED, "shaders/*"),
+    "server/trace/*": ("protocol/common", BASE, GPU, SCENE, GPU_SCENE, TRACE, "server/trace/raster", SHARED, "shaders/*"),
     "server/render": (BASE, GPU, SCENE, GPU_SCENE, TRACE, SHARED),
     "server/encode": (BASE, "protocol/pixels"),
     "server/net": (BASE, "protocol", "protocol/sealed"),
@@ -44,7 +44,7 @@ MAY_INCLUDE = {
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels"),
     "client/helper": ("protocol",),
     "client/import": ("protocol", "protocol/common", "client/helper"),
-    "client/output": ("protocol", "client/helper"),
+    "client/output": ("protocol", "protocol/common", "client/helper"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
     "client/cli": ("protocol/common", "protocol/sealed", "client/lib"),
     "client/viewer": ("protocol/common", "client/lib", "client/cli"),  # the command line is parsed as that of render
