@@ -37,23 +37,23 @@ struct animation {
 static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Animation:", -2},
     {"script", KEY_SCRIPT, "SHOT.json", 0,
-     "What to render, from a file (farlight-shot(5)); options of the command line go before it", 0},
+     "Read what to render from a file (farlight-shot(5)); options of the command line override it", 0},
     {"scene", KEY_SCENE, "NAME", 0,
-     "A scene that is up at --server, in place of MODEL ('farlight scenes' lists them)", 0},
-    {"dry-run", KEY_DRY_RUN, NULL, 0, "Check options and script, and render nothing", 0},
-    {"frames", KEY_FRAMES, "A-B[:STEP]", 0, "Which frames (default: once through the clips)", 0},
-    {"fps", KEY_FPS, "N", 0, "Frames per second (default 24); frame A is at time 0", 0},
+     "Use a shared scene at --server in place of MODEL ('farlight scenes' lists them)", 0},
+    {"dry-run", KEY_DRY_RUN, NULL, 0, "Check options and script without rendering", 0},
+    {"frames", KEY_FRAMES, "A-B[:STEP]", 0, "Render these frames (default: once through the clips)", 0},
+    {"fps", KEY_FPS, "N", 0, "Set frames per second (default 24); frame A is at time 0", 0},
     {"orbit", KEY_ORBIT, "DEGREES", OPTION_ARG_OPTIONAL,
-     "Turn about the scene, or about --look-at; over the range in all (default 360; --orbit=180 with the sign =)",
+     "Turn around the scene, or around --look-at, by this angle over the range (default 360; write --orbit=180)",
      0},
     {"keys", KEY_KEYS, "FILE.json", 0,
-     "Camera keys: array of {\"time\", \"eye\", \"look_at\", \"up\", \"fov\"}; seconds, degrees", 0},
-    {"lossless", KEY_LOSSLESS, NULL, 0, "Every pixel as it is, for .mkv", 0},
-    {NULL, 0, NULL, 0, "Parts, and what goes wrong:", -1},
-    {"shard", KEY_SHARD, "K/N", 0, "Only every N-th frame of the range, beginning with the K-th", 0},
-    {"resume", KEY_RESUME, NULL, 0, "Leave out frames whose files are there, complete and of the wanted size", 0},
+     "Read camera keys: array of {\"time\", \"eye\", \"look_at\", \"up\", \"fov\"}; seconds, degrees", 0},
+    {"lossless", KEY_LOSSLESS, NULL, 0, "Write a lossless video, for .mkv", 0},
+    {NULL, 0, NULL, 0, "Parts and failures:", -1},
+    {"shard", KEY_SHARD, "K/N", 0, "Render only every N-th frame of the range, beginning with the K-th", 0},
+    {"resume", KEY_RESUME, NULL, 0, "Skip frames whose files exist, are complete and have the requested size", 0},
     {"retries", KEY_RETRIES, "N", 0,
-     "How often in a row a lost daemon is sought again, 0 to 1000 (default 5); nothing is lost by it", 0},
+     "Reconnect to a lost daemon up to N times in a row, 0 to 1000 (default 5); no frame is lost", 0},
     {0}};
 
 /* An error of lib/text.h gets the option's name. */
@@ -150,16 +150,17 @@ static bool complete(struct animation *animation)
     const bool has_keys = animation->keys_path != NULL;
     if (!job->series.has_range && job->clip_count == 0 && !job->script) {
         cli_usage(job, "--frames", "no range of frames is given");
-        return fl_error_remedy(&job->error, "such as --frames 1-120; a clip or a script need none");
+        return fl_error_remedy(&job->error, "for example --frames 1-120; a clip or a script needs none");
     }
     if (job->options.frames_per_second <= 0)
         job->options.frames_per_second = 24;
     if (!cli_job_complete(job, true))
         return false;
     if (has_keys && (job->is_orbit || job->camera || job->has_eye))
-        return cli_usage(job, "--keys", "cannot go with --orbit, --camera or --eye") == 0;
+        return cli_usage(job, "--keys", "cannot be combined with --orbit, --camera or --eye") == 0;
     if (job->is_orbit && job->camera)
-        return cli_usage(job, "--orbit", "cannot go with --camera; it can begin at --eye and --look-at") == 0;
+        return cli_usage(job, "--orbit",
+                         "cannot be combined with --camera; it can begin at --eye and --look-at") == 0;
     if (has_keys)
         return complete_keys(animation);
     /* Frames of a camera that stands still would all be alike, where nothing else moves. */
@@ -211,10 +212,11 @@ static bool read_all(struct animation *animation, int argc, char **argv)
         .parser = parse,
         .args_doc = "MODEL --frames A-B -o 'DIR/%04d.exr'\nMODEL --clip NAME -o MOVIE.mp4\n"
                     "--scene NAME --server ADDRESS --frames A-B -o 'DIR/%04d.exr'\n--script SHOT.json",
-        .doc = "Render a series of pictures, or a video, of a model that moves or that a camera moves about.\v"
-               "In the name of the images %d or %04d stands for the frame's number, %% for a percent sign. Videos "
-               "end "
-               "in .mp4, .mkv or .y4m; '-' is standard output, as y4m.",
+        .doc =
+            "Render a series of pictures or a video of a model, with clips or a moving camera.\v"
+            "In the name of the images write %d or %04d for the frame's number and %% for a percent sign. Videos "
+            "end "
+            "in .mp4, .mkv or .y4m; '-' is standard output, as y4m.",
         .children = children};
     struct animation typed = {0};
     bool good = begin(&typed) && argp_parse(&argp, argc, argv, 0, NULL, &typed) == 0;

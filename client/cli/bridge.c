@@ -15,7 +15,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     if (key != ARGP_KEY_ARG)
         return ARGP_ERR_UNKNOWN;
     if (wanted->address)
-        return cli_usage(&wanted->job, value, "only one address at a time");
+        return cli_usage(&wanted->job, value, "only one address can be given");
     wanted->address = value;
     return 0;
 }
@@ -31,7 +31,7 @@ int cli_bridge(int argc, char **argv)
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
     if (!wanted.address) {
-        cli_usage(&wanted.job, "ADDRESS", "no socket is named");
+        cli_usage(&wanted.job, "ADDRESS", "the address of a socket is needed");
         return cli_report(&wanted.job.error);
     }
     struct fl_error error = {0};

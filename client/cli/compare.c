@@ -23,17 +23,17 @@ struct comparing {
 static const struct argp_option options[] = {
     {"output", 'o', "IMAGE", 0, "Write a picture of the errors, PNG or JPEG by its ending", 0},
     {"layout", KEY_LAYOUT, "NAME", 0,
-     "What the picture shows: heat, the errors alone (default), or side, with both images", 0},
+     "Choose the content of the picture: heat, only the errors (default), or side, with both images", 0},
     {"heat-top", KEY_HEAT_TOP, "ERROR", 0,
-     "The error with the brightest colour (default: the greatest error, at most 1)", 0},
-    {"threshold", KEY_THRESHOLD, "ERROR", 0, "A pixel is beyond where a channel differs by more (default 0.01)",
+     "Set the error that gets the brightest colour (default: the maximum error, at most 1)", 0},
+    {"threshold", KEY_THRESHOLD, "ERROR", 0, "Count a pixel as beyond if a channel differs by more (default 0.01)",
      0},
     {"fail-above", KEY_FAIL_ABOVE, "[FIGURE=]VALUE", 0,
      "Exit with 1 if a figure is worse: psnr (dB) and ssim below the value; mean, rms, max, butteraugli, and the "
      "shares beyond, visible and nonfinite (0.001 or 0.1%) above it. Without a name: max. May be repeated",
      0},
     {"ignore-alpha", KEY_IGNORE_ALPHA, NULL, 0, "Compare colours only", 0},
-    {"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0},
+    {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
     {0}};
 
 /* An error of what a function of the library read gets the option's name. */
@@ -55,7 +55,7 @@ static error_t parse_error(struct comparing *comparing, const char *field, const
 static error_t add_operand(struct comparing *comparing, char *value)
 {
     if (comparing->operand_count == OPERANDS_MAX)
-        return cli_usage(&comparing->job, value, "two images are compared, not more");
+        return cli_usage(&comparing->job, value, "only two images can be compared");
     comparing->operands[comparing->operand_count++] = value;
     return 0;
 }
@@ -165,17 +165,17 @@ int cli_compare(int argc, char **argv)
         .options = options,
         .parser = parse,
         .args_doc = "IMAGE IMAGE\nMODEL --tracers A,B",
-        .doc =
-            "Say how far two images of one size are apart, or two tracers on a model, ray by ray.\v"
-            "Options of the second form: 'farlight compare --tracers bvh,reference --help'. "
-            "Images are EXR, HDR, PNG or JPEG. EXR and HDR files are compared in linear light, others as what a "
-            "screen shows, 0 to 1. Exit status: 0 within all limits, 1 not, 2 not compared."};
+        .doc = "Measure the difference of two images of one size, or of two tracers on a model, ray by ray.\v"
+               "Options of the second form: 'farlight compare --tracers bvh,reference --help'. "
+               "Images are EXR, HDR, PNG or JPEG. EXR and HDR files are compared in linear light, others as a "
+               "screen shows them, 0 to 1. Exit status: 0 within all limits, 1 beyond a limit, 2 not compared."};
     struct comparing comparing = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &comparing) != 0)
         return cli_trouble(&comparing.job.error);
     if (comparing.operand_count < 2) {
         cli_usage(&comparing.job, "IMAGE", "two image files are needed");
-        fl_error_remedy(&comparing.job.error, "or, of a model, the tracers: --tracers bvh,reference");
+        fl_error_remedy(&comparing.job.error,
+                        "name them, or compare tracers on a model with --tracers bvh,reference");
         return cli_trouble(&comparing.job.error);
     }
     return compare_images(&comparing);

@@ -41,21 +41,22 @@ struct tracer_comparison {
 };
 
 static const struct argp_option options[] = {
-    {"tracers", KEY_TRACERS, "A,B", 0, "The tracer under examination, and the reference", 0},
+    {"tracers", KEY_TRACERS, "A,B", 0, "Compare tracer A with the reference B", 0},
     {"far", KEY_FAR, "SHARE", 0,
-     "Two hits of a ray disagree beyond this share of the scene's diagonal (default 0.0001)", 0},
-    {"time", KEY_TIME, "SECONDS", 0, "The moment of the clips that is compared (default 0)", 0},
-    {"output", KEY_PICTURE, "PICTURE", 0, "PNG or JPEG: the reference, the tracer and the errors, side by side",
+     "Count hits as different if they are farther apart than this share of the scene's diagonal (default 0.0001)",
      0},
+    {"time", KEY_TIME, "SECONDS", 0, "Compare at this time of the clips (default 0)", 0},
+    {"output", KEY_PICTURE, "PICTURE", 0,
+     "Write the reference, the tracer and the errors side by side, PNG or JPEG", 0},
     {"heat-top", KEY_HEAT_TOP, "ERROR", 0,
-     "The error with the brightest colour in it (default: the greatest error, at most 1)", 0},
-    {"threshold", KEY_THRESHOLD, "ERROR", 0, "A pixel is beyond where a channel differs by more (default 0.01)",
+     "Set the error that gets the brightest colour (default: the maximum error, at most 1)", 0},
+    {"threshold", KEY_THRESHOLD, "ERROR", 0, "Count a pixel as beyond if a channel differs by more (default 0.01)",
      0},
     {"fail-above", KEY_FAIL_ABOVE, "[FIGURE=]VALUE", 0,
      "Exit with 1 if a figure is worse: agree, the share of the rays that both answer alike, below the value "
      "(99.99%); else as for images, see 'farlight compare --help'. May be repeated",
      0},
-    {"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0},
+    {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
     {0}};
 
 /* ---- command line ---- */
@@ -67,7 +68,7 @@ static error_t parse_tracers(struct tracer_comparison *comparison, const char *v
     const char *comma = strchr(value, ',');
     const size_t length = comma ? (size_t)(comma - value) : 0;
     if (length == 0 || length >= sizeof(name) || strchr(comma + 1, ','))
-        return cli_usage(job, "--tracers", "'%s' is not two tracers, such as bvh,reference", value);
+        return cli_usage(job, "--tracers", "'%s' is not a pair of tracers like bvh,reference", value);
     memcpy(name, value, length);
     name[length] = '\0';
     const bool known_first = protocol_tracer_parse(name, &comparison->tracer);
@@ -164,7 +165,7 @@ static bool complete(struct tracer_comparison *comparison)
 {
     struct cli_job *job = &comparison->job;
     if (!comparison->has_tracers)
-        return cli_usage(job, "--tracers", "no tracers are named, such as bvh,reference") == 0;
+        return cli_usage(job, "--tracers", "a pair of tracers is needed, for example bvh,reference") == 0;
     if (job->time_s != 0 && job->clip_count == 0) {
         cli_usage(job, "--time", "no clip is played");
         return fl_error_remedy(&job->error, "add --clip NAME");
@@ -347,9 +348,9 @@ int cli_compare_tracers(int argc, char **argv)
         .options = options,
         .parser = parse,
         .args_doc = "MODEL --tracers A,B",
-        .doc = "Render one picture of a model with tracer A, have tracer B answer every ray of it too, and say "
+        .doc = "Render one picture of a model with tracer A, trace all of its rays with tracer B too, and show "
                "where the answers differ, wave by wave; then render it with B and compare the pictures.\v"
-               "All first hits are traced. Exit status: 0 within all limits, 1 not, 2 not compared.",
+               "All first hits are traced. Exit status: 0 within all limits, 1 beyond a limit, 2 not compared.",
         .children = children};
     struct tracer_comparison comparison = {.far_share = FAR_DEFAULT};
     struct fl_error error = {0};

@@ -35,7 +35,7 @@ static bool find_figure(const char *name, size_t length, enum cli_figure *found,
         const size_t used = strlen(known);
         snprintf(known + used, sizeof(known) - used, "%s%s", used > 0 ? ", " : "", figures[i].name);
     }
-    fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%.*s' is no figure", (int)(length < 80 ? length : 80), name);
+    fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%.*s' is not a figure", (int)(length < 80 ? length : 80), name);
     return fl_error_remedy(error, "known: %s", known);
 }
 
@@ -64,7 +64,8 @@ bool cli_limits_add(struct cli_limits *limits, const char *text, struct fl_error
     const struct figure *figure = &figures[limit.figure];
     const char *value = equals ? equals + 1 : text;
     if (!figure->is_share && strchr(value, '%'))
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is no share of the pixels", figure->name);
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "",
+                            "'%s' is not a share of the pixels, so it cannot be a percentage", figure->name);
     if (figure->is_share ? !cli_share_parse(value, &limit.value, error)
                          : !fl_text_real(value, figure->least, figure->greatest, &limit.value, error))
         return false;
@@ -138,7 +139,7 @@ static void print_errors(FILE *out, const struct fl_comparison *comparison)
         fprintf(out, "  %-16sinfinite: no error\n", "PSNR");
     fprintf(out, "  %-16s%.6g\n", "mean error", comparison->mean_error);
     fprintf(out, "  %-16s%.6g\n", "rms error", comparison->rms_error);
-    fprintf(out, "  %-16s%.6g", "greatest error", comparison->greatest_error);
+    fprintf(out, "  %-16s%.6g", "maximum error", comparison->greatest_error);
     if (comparison->greatest_error > 0)
         fprintf(out, " at %u,%u, channel %u of %s", comparison->greatest_x, comparison->greatest_y,
                 comparison->greatest_channel + 1, comparison->channel_names);
@@ -177,7 +178,7 @@ void cli_comparison_print(FILE *out, const struct fl_comparison *comparison, con
     if (comparison->has_ssim)
         fprintf(out, "  %-16s%.6f\n", "SSIM", comparison->ssim);
     if (comparison->has_butteraugli)
-        fprintf(out, "  %-16s%.4g (3-norm), greatest %.4g; %.4g %% of the pixels above 1\n", "Butteraugli",
+        fprintf(out, "  %-16s%.4g (3-norm), maximum %.4g; %.4g %% of the pixels above 1\n", "Butteraugli",
                 comparison->butteraugli, comparison->butteraugli_greatest,
                 100 * share(comparison->visible, comparison));
     if (comparison->nonfinite > 0)
@@ -186,8 +187,8 @@ void cli_comparison_print(FILE *out, const struct fl_comparison *comparison, con
                 " in the second): beyond, and in no other figure\n",
                 "not finite", comparison->nonfinite, comparison->nonfinite_a, comparison->nonfinite_b);
     if (comparison->picture_width > 0 && comparison->greatest_error > 0)
-        fprintf(out, "  %-16s%ux%u, errors from black, 0, to light yellow, %.4g, by the square root\n", "picture",
-                comparison->picture_width, comparison->picture_height, comparison->heat_top);
+        fprintf(out, "  %-16s%ux%u, errors from black, 0, to light yellow, %.4g, on a square-root scale\n",
+                "picture", comparison->picture_width, comparison->picture_height, comparison->heat_top);
     else if (comparison->picture_width > 0)
         fprintf(out, "  %-16s%ux%u, black: no error\n", "picture", comparison->picture_width,
                 comparison->picture_height);

@@ -30,8 +30,8 @@ struct fl_connection *cli_daemon_connect(const struct cli_daemon *daemon, const 
     if (server && server[0] == '\0')
         server = NULL; /* an empty FARLIGHT_SERVER names none */
     if (!server && must_be_named) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, "--server", "no daemon is named");
-        fl_error_remedy(error, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]");
+        fl_error_set(error, FL_ERROR_ARGUMENT, "--server", "no address of a daemon is given");
+        fl_error_remedy(error, "give unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]");
         return NULL;
     }
     if (!cli_interrupt_begin(error))

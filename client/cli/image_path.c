@@ -73,12 +73,12 @@ bool cli_check_output(const char *path, char *folder, size_t folder_bytes, struc
     struct stat status;
     if (stat(folder, &status) < 0) {
         fl_error_set(error, FL_ERROR_FILE, path, "its folder cannot be used: %s", strerror(errno));
-        return errno == ENOENT ? fl_error_remedy(error, "make it with 'mkdir -p %.200s'", folder) : false;
+        return errno == ENOENT ? fl_error_remedy(error, "create it with 'mkdir -p %.200s'", folder) : false;
     }
     if (!S_ISDIR(status.st_mode))
-        return fl_error_set(error, FL_ERROR_FILE, path, "'%s' is no folder", folder);
+        return fl_error_set(error, FL_ERROR_FILE, path, "'%s' is not a folder", folder);
     if (stat(path, &status) == 0 && !S_ISREG(status.st_mode))
-        return fl_error_set(error, FL_ERROR_FILE, path, "exists and is no ordinary file");
+        return fl_error_set(error, FL_ERROR_FILE, path, "exists and is not a regular file");
     return try_folder(path, folder, error);
 }
 
@@ -105,7 +105,7 @@ bool cli_check_error_picture(const char *picture, const char *const *inputs, siz
         return true;
     const enum cli_image image = cli_image_by_path(picture);
     if (image != CLI_IMAGE_PNG && image != CLI_IMAGE_JPEG) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, picture, "a picture of errors is PNG or JPEG");
+        fl_error_set(error, FL_ERROR_ARGUMENT, picture, "a picture of errors must be PNG or JPEG");
         return fl_error_remedy(error, "known endings: .png .jpg .jpeg");
     }
     return cli_check_not_input(picture, "--output", inputs, count, error) &&
@@ -129,7 +129,7 @@ bool cli_temporary_folder(char *folder, size_t folder_bytes, struct fl_error *er
         parent = P_tmpdir;
     const int length = snprintf(folder, folder_bytes, "%s/farlight-XXXXXX", parent);
     if (length < 0 || (size_t)length >= folder_bytes || !mkdtemp(folder))
-        return fl_error_set(error, FL_ERROR_FILE, parent, "no temporary folder can be made: %s", strerror(errno));
+        return fl_error_set(error, FL_ERROR_FILE, parent, "cannot create a temporary folder: %s", strerror(errno));
     return true;
 }
 

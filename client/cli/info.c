@@ -14,8 +14,8 @@ struct info_options {
 };
 
 static const struct argp_option options[] = {
-    {"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0},
-    {"environment", 'e', "FILE", 0, "Look at this environment image as well", 0},
+    {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
+    {"environment", 'e', "FILE", 0, "Check this environment image as well", 0},
     {0}};
 
 static error_t parse(int key, char *value, struct argp_state *state)
@@ -30,7 +30,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         return 0;
     case ARGP_KEY_ARG:
         if (wanted->model)
-            return cli_usage(&wanted->job, value, "only one model at a time");
+            return cli_usage(&wanted->job, value, "only one model can be given");
         wanted->model = value;
         return 0;
     default:
@@ -116,7 +116,7 @@ static void print_table(const struct info_options *wanted, const struct fl_model
     printf("\n");
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++)
         printf("  %-10s %12" PRIu64 "\n", rows[i].name, rows[i].value);
-    printf("  %-10s %12.3f MB in files, %.3f MB to upload at most\n", "bytes",
+    printf("  %-10s %12.3f MB in files, at most %.3f MB to upload\n", "bytes",
            (double)info->import.read_bytes * 1e-6, (double)info->import.offered_bytes * 1e-6);
     for (size_t i = 0; i < info->camera_count; i++) {
         printf("  camera %zu: ", i);
@@ -141,15 +141,16 @@ static void print_table(const struct info_options *wanted, const struct fl_model
 
 int cli_info(int argc, char **argv)
 {
-    static const struct argp argp = {.options = options,
-                                     .parser = parse,
-                                     .args_doc = "MODEL",
-                                     .doc = "Say what a model file holds, and what of it cannot be used."};
+    static const struct argp argp = {
+        .options = options,
+        .parser = parse,
+        .args_doc = "MODEL",
+        .doc = "Show what a model file contains, and which parts of it are not supported."};
     struct info_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
     if (!wanted.model && !wanted.environment) {
-        cli_usage(&wanted.job, "MODEL", "no model file is named");
+        cli_usage(&wanted.job, "MODEL", "a model file is needed");
         return cli_report(&wanted.job.error);
     }
     struct fl_error error = {0};

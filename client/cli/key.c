@@ -26,7 +26,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     if (key != ARGP_KEY_ARG)
         return ARGP_ERR_UNKNOWN;
     if (wanted->path)
-        return cli_usage(&wanted->job, value, "only one file at a time");
+        return cli_usage(&wanted->job, value, "only one file can be given");
     wanted->path = value;
     return 0;
 }
@@ -36,14 +36,14 @@ int cli_key(int argc, char **argv)
     static const struct argp argp = {
         .parser = parse,
         .args_doc = "FILE",
-        .doc = "Make a new key: 32 random bytes in a new file of mode 0600. A daemon that has it (farlightd "
+        .doc = "Create a key: 32 random bytes in a new file of mode 0600. A daemon with this key (farlightd "
                "--key-file) "
-               "lets those in who have a copy (--key), from everywhere; what they say is sealed with it."};
+               "accepts clients with a copy of it (--key) from any host, on sealed connections."};
     struct key_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);
     if (!wanted.path) {
-        cli_usage(&wanted.job, "FILE", "no file is named");
+        cli_usage(&wanted.job, "FILE", "a file name is needed");
         return cli_report(&wanted.job.error);
     }
     struct decode_error why = {0};

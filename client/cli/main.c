@@ -11,17 +11,17 @@ static const struct subcommand {
     int (*run)(int argc, char **argv);
     const char *doc;
 } subcommands[] = {
-    {"render", "farlight render", cli_render, "one picture of a model"},
-    {"animate", "farlight animate", cli_animate, "a series of pictures along a camera's path"},
-    {"view", "farlight view", cli_view, "a window on a scene that is rendered elsewhere"},
-    {"info", "farlight info", cli_info, "what a model file holds"},
-    {"compare", "farlight compare", cli_compare, "how far two images are apart, or two tracers"},
-    {"serve", "farlight serve", cli_serve, "puts a model up for others"},
-    {"scenes", "farlight scenes", cli_scenes, "which scenes a daemon has that others may come to"},
-    {"stats", "farlight stats", cli_stats, "what a daemon has and does"},
-    {"ping", "farlight ping", cli_ping, "the way to a daemon and back"},
-    {"key", "farlight key", cli_key, "a new key for sealed connections"},
-    {"bridge", "farlight bridge", cli_bridge, "what ssh runs on the daemon's host"},
+    {"render", "farlight render", cli_render, "render one picture of a model"},
+    {"animate", "farlight animate", cli_animate, "render a series of pictures or a video"},
+    {"view", "farlight view", cli_view, "open a window on a model or a shared scene"},
+    {"info", "farlight info", cli_info, "show what a model file contains"},
+    {"compare", "farlight compare", cli_compare, "measure the difference of two images or two tracers"},
+    {"serve", "farlight serve", cli_serve, "share a model for other clients"},
+    {"scenes", "farlight scenes", cli_scenes, "list the scenes of a daemon to which clients may attach"},
+    {"stats", "farlight stats", cli_stats, "show a daemon's clients, scenes, memory and times"},
+    {"ping", "farlight ping", cli_ping, "measure the round-trip time to a daemon"},
+    {"key", "farlight key", cli_key, "create a key for sealed connections"},
+    {"bridge", "farlight bridge", cli_bridge, "copy standard input and output to a daemon's socket"},
 };
 #define SUBCOMMAND_COUNT (sizeof(subcommands) / sizeof(subcommands[0]))
 
@@ -30,9 +30,9 @@ static void print_help(FILE *out)
     fputs("Usage: farlight SUBCOMMAND [OPTION...]\nRay-trace models with a farlight daemon.\n\n", out);
     for (size_t i = 0; i < SUBCOMMAND_COUNT; i++)
         fprintf(out, "  %-9s %s\n", subcommands[i].name, subcommands[i].doc);
-    fputs("  help      this text; 'farlight help SUBCOMMAND' lists its options\n\n"
+    fputs("  help      show this text; 'farlight help SUBCOMMAND' lists options\n\n"
           "'farlight --version' prints the version.\n"
-          "Exit status: 0 done, 1 failed, 2 wrong usage, 75 try again later, 130 and 143 interrupted.\n",
+          "Exit status: 0 success, 1 failure, 2 wrong usage, 75 try again later, 130 and 143 interrupted.\n",
           out);
 }
 
@@ -67,8 +67,8 @@ static int help(int argc, char **argv)
 static int unknown(const char *name)
 {
     struct fl_error error;
-    fl_error_set(&error, FL_ERROR_ARGUMENT, name, "is no subcommand");
-    fl_error_remedy(&error, "'farlight help' lists them");
+    fl_error_set(&error, FL_ERROR_ARGUMENT, name, "is not a subcommand");
+    fl_error_remedy(&error, "'farlight help' lists all subcommands");
     return cli_report(&error);
 }
 

@@ -12,7 +12,7 @@ struct ping_options {
     struct cli_job job; /* holds the error of what was typed */
 };
 
-static const struct argp_option options[] = {{"count", 'c', "N", 0, "How many times (default 5)", 0}, {0}};
+static const struct argp_option options[] = {{"count", 'c', "N", 0, "Measure N times (default 5)", 0}, {0}};
 
 static const struct argp_child children[] = {{&cli_daemon_argp, 0, NULL, 0}, {0}};
 
@@ -29,7 +29,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         snprintf(wanted->job.error.field, sizeof(wanted->job.error.field), "--count");
         return EINVAL;
     case ARGP_KEY_ARG:
-        return cli_usage(&wanted->job, value, "is not expected");
+        return cli_usage(&wanted->job, value, "is an argument too many");
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -46,7 +46,7 @@ static bool ping(struct fl_connection *connection, const struct ping_options *wa
         greatest_ns = ns > greatest_ns ? ns : greatest_ns;
         sum_ns += ns;
     }
-    printf("%s: %" PRIu64 " round trips, least %.3f ms, mean %.3f ms, greatest %.3f ms\n",
+    printf("%s: %" PRIu64 " round trips, minimum %.3f ms, mean %.3f ms, maximum %.3f ms\n",
            fl_connection_address(connection), wanted->count, (double)least_ns * 1e-6,
            (double)sum_ns * 1e-6 / (double)wanted->count, (double)greatest_ns * 1e-6);
     return true;
@@ -54,8 +54,10 @@ static bool ping(struct fl_connection *connection, const struct ping_options *wa
 
 int cli_ping(int argc, char **argv)
 {
-    static const struct argp argp = {
-        .options = options, .parser = parse, .children = children, .doc = "Measure the way to a daemon and back."};
+    static const struct argp argp = {.options = options,
+                                     .parser = parse,
+                                     .children = children,
+                                     .doc = "Measure the round-trip time to a daemon."};
     struct ping_options wanted = {.count = 5};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);

@@ -10,8 +10,8 @@ enum key { KEY_TIME = 0x400, KEY_PROGRESSIVE, KEY_SCENE };
 
 static const struct argp_option options[] = {
     {"scene", KEY_SCENE, "NAME", 0,
-     "A scene that is up at --server, in place of MODEL ('farlight scenes' lists them)", -1},
-    {"time", KEY_TIME, "SECONDS", 0, "The moment of the clips that is shown (default 0)", -1},
+     "Use a shared scene at --server in place of MODEL ('farlight scenes' lists them)", -1},
+    {"time", KEY_TIME, "SECONDS", 0, "Show this time of the clips (default 0)", -1},
     {"progressive", KEY_PROGRESSIVE, "N", OPTION_ARG_OPTIONAL,
      "Write the picture again after every N samples (default: after 1, 2, 4, 8 ..) until --samples are reached, "
      "or "

@@ -14,7 +14,8 @@ struct scenes_options {
     struct cli_job job; /* holds the error of what was typed */
 };
 
-static const struct argp_option options[] = {{"json", KEY_JSON, NULL, 0, "One JSON object a line", 0}, {0}};
+static const struct argp_option options[] = {{"json", KEY_JSON, NULL, 0, "Print one JSON object per line", 0},
+                                             {0}};
 
 static const struct argp_child children[] = {{&cli_daemon_argp, 0, NULL, 0}, {0}};
 
@@ -29,7 +30,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         wanted->json = true;
         return 0;
     case ARGP_KEY_ARG:
-        return cli_usage(&wanted->job, value, "is not expected");
+        return cli_usage(&wanted->job, value, "is an argument too many");
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -63,8 +64,9 @@ int cli_scenes(int argc, char **argv)
     static const struct argp argp = {.options = options,
                                      .parser = parse,
                                      .children = children,
-                                     .doc = "List the scenes of a daemon that others may come to: those that are "
-                                            "shared, and those that are kept for whoever asks."};
+                                     .doc =
+                                         "List the scenes of a daemon to which clients may attach: those that are "
+                                         "shared with all clients, and those kept for the same user or key."};
     struct scenes_options wanted = {0};
     if (argp_parse(&argp, argc, argv, 0, NULL, &wanted) != 0)
         return cli_report(&wanted.job.error);

@@ -31,16 +31,16 @@ struct serving {
 
 static const struct argp_option options[] = {
     {"listen", KEY_LISTEN, "ADDRESS", 0,
-     "Where the daemon listens: unix:/PATH or tcp:HOST:PORT; may be repeated (default: a socket in "
-     "$XDG_RUNTIME_DIR, or without that in a folder of its own in /tmp)",
+     "Let the daemon listen at unix:/PATH or tcp:HOST:PORT; may be repeated (default: a socket in "
+     "$XDG_RUNTIME_DIR, or without that in a new folder in /tmp)",
      0},
     {"server", 's', "ADDRESS", 0,
-     "Put the scene up on a daemon that runs there: unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]", 0},
+     "Share the scene on this running daemon: unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]", 0},
     {"key", KEY_KEY, "FILE", 0,
-     "Key for TCP beyond this host ('farlight key' makes one): of the daemon that is started, or of --server", 0},
-    {"name", KEY_NAME, "NAME", 0, "What others call the scene (default: the model's file name)", 0},
-    {"environment", KEY_ENVIRONMENT, "FILE", 0, "Equirectangular image (HDR or EXR) that lights the scene", 0},
-    {"quiet", 'q', NULL, 0, "No progress, no notes about the model", 0},
+     "Use this key for TCP beyond this host ('farlight key' creates one), for the new daemon or for --server", 0},
+    {"name", KEY_NAME, "NAME", 0, "Set the scene's name for other clients (default: the model's file name)", 0},
+    {"environment", KEY_ENVIRONMENT, "FILE", 0, "Light the scene with this equirectangular image (HDR or EXR)", 0},
+    {"quiet", 'q', NULL, 0, "Print no progress and no notes about the model", 0},
     {0}};
 
 static error_t add_word(struct serving *serving, const char *word)
@@ -57,7 +57,8 @@ static error_t take_argument(struct serving *serving, char *value, const struct 
     if (state->quoted > 0 && state->next > state->quoted)
         return add_word(serving, value);
     if (serving->job.model)
-        return cli_usage(&serving->job, value, "one model at a time; options of the daemon come behind --");
+        return cli_usage(&serving->job, value,
+                         "only one model can be given; options of the daemon follow after --");
     serving->job.model = value;
     return 0;
 }
@@ -69,7 +70,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     switch (key) {
     case KEY_LISTEN:
         if (serving->listen_count == LISTENS_MAX)
-            return cli_usage(job, "--listen", "at most %d addresses", LISTENS_MAX);
+            return cli_usage(job, "--listen", "at most %d addresses can be given", LISTENS_MAX);
         serving->listens[serving->listen_count++] = value;
         return 0;
     case 's':
@@ -106,7 +107,7 @@ static const char *usual_address(struct serving *serving)
         folder = mkdtemp(serving->folder);
     }
     if (!folder) {
-        cli_usage(&serving->job, "--listen", "no folder for a socket can be made in %s: %s; set XDG_RUNTIME_DIR",
+        cli_usage(&serving->job, "--listen", "cannot create a folder for a socket in %s: %s; set XDG_RUNTIME_DIR",
                   P_tmpdir, strerror(errno));
         serving->folder[0] = '\0';
         return NULL;
@@ -151,15 +152,17 @@ static bool complete(struct serving *serving)
 {
     struct cli_job *job = &serving->job;
     if (!job->model)
-        return cli_usage(job, "MODEL", "no model file is named") == 0;
+        return cli_usage(job, "MODEL", "a model file is needed") == 0;
     if (serving->name && serving->name[0] == '\0')
-        return cli_usage(job, "--name", "others need a name to come by") == 0;
+        return cli_usage(job, "--name", "the name is empty, but other clients need it to attach") == 0;
     if (!job->server)
         return complete_daemon(serving);
     if (serving->listen_count > 0)
-        return cli_usage(job, "--listen", "the daemon at --server listens already") == 0;
+        return cli_usage(job, "--listen",
+                         "the daemon at --server already has its addresses; leave --listen out") == 0;
     if (serving->word_count > 0)
-        return cli_usage(job, serving->words[0], "the daemon at --server has its options already") == 0;
+        return cli_usage(job, serving->words[0],
+                         "the daemon at --server already has its options; leave this out") == 0;
     return true;
 }
 
@@ -220,7 +223,7 @@ static bool announce(const struct serving *serving, const struct cli_loading *lo
         return false;
     fputs("serving \"", stdout);
     cli_print_name(name);
-    printf("\", %llu triangles and %llu spheres; look at it by\n", (unsigned long long)bounds.triangles,
+    printf("\", %llu triangles and %llu spheres; view it with\n", (unsigned long long)bounds.triangles,
            (unsigned long long)bounds.spheres);
     if (serving->job.server)
         print_line(serving, name, serving->job.server);
@@ -296,7 +299,7 @@ static bool recover(const struct serving *serving, struct cli_loading *loading, 
             continue;
         cli_progress_clear(loading->progress);
         if (!serving->job.quiet)
-            fputs("farlight: the scene is up again\n", stderr);
+            fputs("farlight: the scene is shared again\n", stderr);
         return true;
     }
     return false;
@@ -342,9 +345,9 @@ int cli_serve(int argc, char **argv)
         .options = options,
         .parser = parse,
         .args_doc = "MODEL [-- OPTION OF FARLIGHTD...]",
-        .doc = "Put a model up for others to look at and to render, until Ctrl-C.\v"
-               "Without --server a daemon is started for it, which ends with this command. What is behind -- are "
-               "options of that daemon, such as --device software."};
+        .doc = "Share a model for other clients to view, render and edit, until Ctrl-C.\v"
+               "Without --server the command starts a daemon, which ends with the command. Arguments after -- are "
+               "options of that daemon, for example --device software."};
     struct serving serving = {0};
     if (argp_parse(&argp, argc, argv, ARGP_IN_ORDER, NULL, &serving) != 0)
         return cli_report(&serving.job.error);

@@ -99,8 +99,7 @@ static bool choose_frames(struct session *session, struct fl_error *error)
     if (session->is_series && series->shard_parts > 0 &&
         !fl_frame_run_shard(&series->range, series->shard_part, series->shard_parts, &wanted)) {
         if (!job->quiet)
-            fprintf(stderr, "farlight: there are fewer frames than parts: none falls to part %u\n",
-                    series->shard_part);
+            fprintf(stderr, "farlight: there are fewer frames than parts: part %u has none\n", series->shard_part);
         return true;
     }
     if (session->is_series && series->shard_parts == 0)
@@ -109,7 +108,7 @@ static bool choose_frames(struct session *session, struct fl_error *error)
         return false;
     const uint32_t there = fl_frame_run_count(&wanted) - session->set.frame_count;
     if (series->resume && !job->quiet && there > 0)
-        fprintf(stderr, "farlight: %u of %u frames are there already\n", there, fl_frame_run_count(&wanted));
+        fprintf(stderr, "farlight: %u of %u frames exist already\n", there, fl_frame_run_count(&wanted));
     return true;
 }
 
@@ -367,7 +366,7 @@ int cli_dry_run(struct cli_job *job)
     if (done && session.has_set)
         printf("%u frame%s would be rendered\n", session.set.frame_count, session.set.frame_count == 1 ? "" : "s");
     else if (done)
-        puts("how many frames would be rendered only the model can tell");
+        puts("the number of frames depends on the model");
     cli_sinks_close(&session.sinks);
     fl_frame_set_finish(&session.set);
     return done ? CLI_DONE : cli_report(&error);

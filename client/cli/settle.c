@@ -18,8 +18,7 @@ static bool in_script(const struct cli_job *job, unsigned line, const char *path
     const size_t length = strlen(job->script);
     fl_error_set(error, why.code, job->script + (length > 150 ? length - 150 : 0), "line %u: %s: %s", line, path,
                  why.text);
-    return fl_error_remedy(error, "%s",
-                           why.remedy[0] != '\0' ? why.remedy : "'farlight info' lists what there is");
+    return fl_error_remedy(error, "%s", why.remedy[0] != '\0' ? why.remedy : "'farlight info' lists the names");
 }
 
 static bool in_script_at(const struct cli_job *job, const struct fl_json_place *place, struct fl_error *error)
@@ -59,8 +58,8 @@ static bool settle_target(const struct cli_channel *given, struct fl_scene *scen
         return false;
     if (given->channel.path != PROTOCOL_CHANNEL_PATH_LIGHT_SIZE || fl_scene_light_has_size(scene, *object))
         return true;
-    fl_error_set(error, FL_ERROR_ARGUMENT, "light", "the light '%s' has no size: it is no rectangle and no sphere",
-                 given->target);
+    fl_error_set(error, FL_ERROR_ARGUMENT, "light",
+                 "the light '%s' has no size: it is neither a rectangle nor a sphere", given->target);
     return fl_error_remedy(
         error, "give a point light of a glTF file \"extras\": {\"radius\": 0.1}, which makes it a sphere");
 }
@@ -118,9 +117,9 @@ static bool choose_range(struct cli_job *job, double clips_s, struct fl_error *e
         return fl_error_remedy(error, "--frames 1-120");
     }
     if (!(frames < FRAME_MAX)) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, "--frames", "to go through once takes more than %u frames",
+        fl_error_set(error, FL_ERROR_ARGUMENT, "--frames", "once through the clips takes more than %u frames",
                      FRAME_MAX);
-        return fl_error_remedy(error, "give a range of frames, such as --frames 1-120");
+        return fl_error_remedy(error, "give a range of frames, for example --frames 1-120");
     }
     series->has_range = true;
     series->range = (struct fl_frame_run){.first = 1, .last = frames > 1 ? (uint32_t)frames : 1, .step = 1};

@@ -58,7 +58,7 @@ static bool apply_object(const struct shot_reader *reader, const struct shot_val
         return false;
     if (json_object_get(at->value, "rotation") && json_object_get(at->value, "rotation_degrees"))
         return shot_wrong(reader, at, "leave one of them out",
-                          "\"rotation\" and \"rotation_degrees\" say the same");
+                          "\"rotation\" and \"rotation_degrees\" set the same value");
     for (const struct shot_property *property = group->properties; property->name; property++) {
         const struct shot_value value = shot_member(at, property->name);
         struct fl_channel channel;
@@ -156,7 +156,7 @@ static bool apply_output(const struct shot_reader *reader, const struct shot_val
     const bool to_stdout = strcmp(written, "-") == 0;
     if (output->image == CLI_IMAGE_UNKNOWN && !to_stdout)
         return shot_wrong(reader, at, "known: .png .jpg .jpeg .exr .hdr .mp4 .mkv .y4m, or say \"format\"",
-                          "its ending names no format");
+                          "the ending is not that of a known format");
     if (!to_stdout && !cli_image_is_video(output->image)) {
         if (!fl_pattern_parse(written, &pattern, &why))
             return shot_wrong(reader, at, why.remedy[0] != '\0' ? why.remedy : "write it like 'frames/%04d.exr'",
@@ -166,7 +166,7 @@ static bool apply_output(const struct shot_reader *reader, const struct shot_val
     }
     for (size_t i = 0; i < job->output_count; i++)
         if (strcmp(job->outputs[i].path, output->path) == 0)
-            return shot_wrong(reader, at, "leave one of them out", "is there twice");
+            return shot_wrong(reader, at, "leave one of them out", "occurs twice");
     job->output_count++;
     return true;
 }
@@ -176,7 +176,7 @@ static bool apply_outputs(const struct shot_reader *reader, const struct shot_va
     if (!shot_is_array(reader, at, CLI_OUTPUTS_MAX))
         return false;
     if (json_array_size(at->value) == 0)
-        return shot_wrong(reader, at, "\"outputs\": [\"frames/%04d.exr\"]", "names no file");
+        return shot_wrong(reader, at, "\"outputs\": [\"frames/%04d.exr\"]", "contains no file");
     for (size_t i = 0; i < json_array_size(at->value); i++) {
         const struct shot_value output = shot_element(at, i);
         if (!apply_output(reader, &output))
@@ -209,7 +209,8 @@ static bool apply_members(const struct shot_reader *reader, const struct shot_va
             return false;
     }
     if (output.value && outputs.value)
-        return shot_wrong(reader, &output, "leave one of them out", "\"outputs\" is there, too");
+        return shot_wrong(reader, &output, "leave one of them out",
+                          "\"output\" and \"outputs\" cannot be combined");
     if ((output.value && !apply_output(reader, &output)) || (outputs.value && !apply_outputs(reader, &outputs)))
         return false;
     /* All of the file has been read, so that every mistake in it is told. */

@@ -69,7 +69,7 @@ static bool dolly_end(const struct shot_reader *reader, const struct shot_value 
     if (place.value) {
         struct fl_channel channel;
         if (shot_is_keyed(&place))
-            return shot_wrong(reader, &place, "key \"eye\" instead", "must be one place");
+            return shot_wrong(reader, &place, "key \"eye\" instead", "must be a single position");
         if (!shot_channel(reader, &place, &properties[EYE], &channel))
             return false;
         memcpy(to, channel.values, 3 * sizeof(*to));
@@ -82,7 +82,7 @@ static bool dolly_end(const struct shot_reader *reader, const struct shot_value 
         length2 += part * part;
     }
     if (!(length2 > 0))
-        return shot_wrong(reader, at, "move one of them", "\"look_at\" is where \"eye\" is");
+        return shot_wrong(reader, at, "move one of them", "\"look_at\" and \"eye\" are the same point");
     for (unsigned i = 0; i < 3; i++) {
         const double part = (double)key->look_at_world[i] - (double)key->eye_world[i];
         to[i] = (float)((double)key->eye_world[i] + metres * part / __builtin_sqrt(length2));
@@ -135,18 +135,20 @@ static bool check_place(const struct shot_reader *reader, const struct shot_valu
     const bool orbits = orbit.value && !json_is_false(orbit.value);
     if (name.value && (has_place || view[UP].value || view[FOV].value || orbits || dolly.value))
         return shot_wrong(reader, &name, "leave \"name\" out, or eye, look_at, up, fov, orbit and dolly",
-                          "a camera of the model has its own place and view");
+                          "a camera of the model has its own position and view");
     if (!view[EYE].value != !view[LOOK_AT].value)
-        return shot_wrong(reader, at, "\"eye\" and \"look_at\" go together", "\"%s\" is missing",
+        return shot_wrong(reader, at, "give both \"eye\" and \"look_at\"", "\"%s\" is missing",
                           !view[EYE].value ? "eye" : "look_at");
     if (!has_place && (view[UP].value || view[FOV].value || dolly.value))
-        return shot_wrong(reader, at, "say where the camera is", "\"eye\" and \"look_at\" are missing");
+        return shot_wrong(reader, at, "give the position of the camera", "\"eye\" and \"look_at\" are missing");
     for (enum view which = EYE; which <= FOV; which++)
         if (orbits && shot_is_keyed(&view[which]))
-            return shot_wrong(reader, &view[which], "key all of the way, or none of it",
+            return shot_wrong(reader, &view[which],
+                              "leave \"orbit\" out and key the whole path, or give a single value",
                               "cannot change on an orbit");
     if (dolly.value && (orbits || shot_is_keyed(&view[EYE])))
-        return shot_wrong(reader, &dolly, "leave one of them out", "cannot go with an orbit or a keyed eye");
+        return shot_wrong(reader, &dolly, "leave one of them out",
+                          "cannot be combined with an orbit or a keyed eye");
     return true;
 }
 

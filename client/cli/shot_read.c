@@ -171,7 +171,7 @@ bool shot_path(const struct shot_reader *reader, const struct shot_value *at, co
 {
     const char *read = json_string_value(at->value);
     if (!read || read[0] == '\0')
-        return shot_wrong(reader, at, "name a file, from the folder of this one", "must be the path of a file");
+        return shot_wrong(reader, at, "give a path relative to this file's folder", "must be the path of a file");
     if (read[0] == '/' || strcmp(read, "-") == 0) {
         *path = read;
         return true;

@@ -47,7 +47,7 @@ static bool wrong_shape(const struct shot_reader *reader, const struct shot_valu
                  : property->kind == SHOT_SIZE                         ? "1 or "
                                                                        : "",
                  property->width);
-    snprintf(remedy, sizeof(remedy), "such as \"%s\": %s", property->name, property->example);
+    snprintf(remedy, sizeof(remedy), "for example \"%s\": %s", property->name, property->example);
     return shot_wrong(reader, at, remedy, "%s", what);
 }
 
@@ -119,7 +119,7 @@ static bool read_value(const struct shot_reader *reader, const struct shot_value
         const double length = sqrt((double)read[0] * (double)read[0] + (double)read[1] * (double)read[1] +
                                    (double)read[2] * (double)read[2] + (double)read[3] * (double)read[3]);
         if (!(length > 1e-6))
-            return shot_wrong(reader, at, "no turn is [0, 0, 0, 1]", "is no direction of a turn");
+            return shot_wrong(reader, at, "[0, 0, 0, 1] is no rotation", "has length 0, so it is not a rotation");
         for (unsigned i = 0; i < 4; i++)
             value[i] = (float)((double)read[i] / length);
     }
@@ -159,14 +159,14 @@ static bool read_interpolation(const struct shot_reader *reader, const struct sh
     if (!text || !protocol_interpolation_parse(text, &keys->interpolation)) {
         char known[160], remedy[200];
         snprintf(remedy, sizeof(remedy), "known: %s", protocol_enum_list("interpolation", known, sizeof(known)));
-        return shot_wrong(reader, &given, remedy, "is no interpolation");
+        return shot_wrong(reader, &given, remedy, "is not an interpolation");
     }
     if (is_flag && keys->interpolation != PROTOCOL_INTERPOLATION_STEP)
-        return shot_wrong(reader, &given, "leave it out, or say step", "true and false have nothing between them");
+        return shot_wrong(reader, &given, "leave it out, or use step", "true and false cannot be interpolated");
     if (is_angles && keys->interpolation != PROTOCOL_INTERPOLATION_STEP &&
         keys->interpolation != PROTOCOL_INTERPOLATION_LINEAR)
-        return shot_wrong(reader, &given, "say linear or step, or use \"rotation\"",
-                          "angles can only be linear or steps");
+        return shot_wrong(reader, &given, "use linear or step, or \"rotation\"",
+                          "angles can only be interpolated by linear or step");
     return true;
 }
 
@@ -179,7 +179,8 @@ static bool read_times(const struct shot_reader *reader, const struct shot_value
             return false;
         out[i] = (float)time_s;
         if (i > 0 && !(out[i] > out[i - 1]))
-            return shot_wrong(reader, &at, "times ascend, in seconds", "does not come after the time before");
+            return shot_wrong(reader, &at, "give times in seconds, ascending",
+                              "is not later than the time before it");
     }
     return true;
 }
@@ -201,7 +202,7 @@ static bool read_spline_key(const struct shot_reader *reader, const struct shot_
     }
     const struct shot_value pair = shot_element(handles, i);
     if (json_array_size(pair.value) != 2)
-        return shot_wrong(reader, &pair, "two values a key, what is before it and what is after it",
+        return shot_wrong(reader, &pair, "give two values per key: before it and after it",
                           "must be an array of two values");
     /* A curve's control values may lie beyond what the curve reaches, and tangents are per second. */
     struct shot_property property = *keys->property;
@@ -255,8 +256,7 @@ static bool read_angles(const struct shot_reader *reader, const struct shot_valu
             keys->interpolation == PROTOCOL_INTERPOLATION_STEP ? 1 : (float)(floor(most / STEP_DEGREES) + 1);
         total += i > 0 ? (size_t)degrees[i][3] : 0;
         if (total > KEYS_MAX)
-            return shot_wrong(reader, &at, "turn less often, or in several shots",
-                              "turns too often to be followed");
+            return shot_wrong(reader, &at, "use fewer turns, or several shots", "turns too often");
     }
     if (!allocate(reader, keys, total))
         return false;
@@ -291,17 +291,17 @@ static bool read_keys(const struct shot_reader *reader, const struct shot_value 
         return false;
     const size_t count = json_array_size(times.value);
     if (count == 0)
-        return shot_wrong(reader, &times, remedy, "has no time");
+        return shot_wrong(reader, &times, remedy, "is empty");
     if (json_array_size(values.value) != count)
-        return shot_wrong(reader, &values, "one value for each time", "has %zu values for %zu times",
+        return shot_wrong(reader, &values, "give one value for each time", "has %zu values for %zu times",
                           json_array_size(values.value), count);
     if (handles.value && !has_handles(keys->interpolation))
-        return shot_wrong(reader, &handles, "say \"interpolation\": \"bezier\" or \"cubic-spline\"",
-                          "belongs to the interpolations bezier and cubic-spline");
+        return shot_wrong(reader, &handles, "use \"interpolation\": \"bezier\" or \"cubic-spline\"",
+                          "needs the interpolation bezier or cubic-spline");
     if (handles.value && !shot_is_array(reader, &handles, KEYS_MAX))
         return false;
     if (handles.value && json_array_size(handles.value) != count)
-        return shot_wrong(reader, &handles, "one pair for each time", "has %zu pairs for %zu times",
+        return shot_wrong(reader, &handles, "give one pair for each time", "has %zu pairs for %zu times",
                           json_array_size(handles.value), count);
     if (!allocate(reader, keys, count) || !read_times(reader, &times, keys->times))
         return false;
@@ -360,7 +360,8 @@ bool shot_add_channel(const struct shot_reader *reader, const struct shot_value 
     if (!job->channels)
         return false;
     if (job->channel_count == CHANNELS_MAX)
-        return shot_wrong(reader, at, "leave some out", "is one value too many: there can be %u", CHANNELS_MAX);
+        return shot_wrong(reader, at, "leave some out", "exceeds the maximum of %u values that change",
+                          CHANNELS_MAX);
     struct cli_channel *added = &job->channels[job->channel_count++];
     *added = (struct cli_channel){
         .channel = *channel, .kind = kind, .target = target, .place = keep_place(reader, &at->place)};

@@ -19,7 +19,7 @@ static bool prepare_stdout(struct cli_sink *sink, struct fl_error *error)
         const bool is_video = cli_image_is_video(sink->output.image);
         fl_error_set(error, FL_ERROR_ARGUMENT, "--output", "%s would be written to the terminal",
                      is_video ? "a video" : "an image");
-        return fl_error_remedy(error, is_video ? "pipe it into a program, such as 'ffmpeg -i - movie.webm'"
+        return fl_error_remedy(error, is_video ? "pipe it into a program, for example 'ffmpeg -i - movie.webm'"
                                                : "redirect it, or name a file");
     }
     if (cli_image_is_video(sink->output.image))

@@ -15,8 +15,8 @@ struct stats_options {
 };
 
 static const struct argp_option options[] = {
-    {"json", KEY_JSON, NULL, 0, "One JSON object on one line", 0},
-    {"limits", KEY_LIMITS, NULL, 0, "What the daemon allows, too (in JSON always)", 0},
+    {"json", KEY_JSON, NULL, 0, "Print one JSON object on one line", 0},
+    {"limits", KEY_LIMITS, NULL, 0, "Show the daemon's limits too (JSON always contains them)", 0},
     {0},
 };
 
@@ -36,7 +36,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
         wanted->limits = true;
         return 0;
     case ARGP_KEY_ARG:
-        return cli_usage(&wanted->job, value, "is not expected");
+        return cli_usage(&wanted->job, value, "is an argument too many");
     default:
         return ARGP_ERR_UNKNOWN;
     }
@@ -155,7 +155,7 @@ static const char *plain(const char *text, char out[130])
 static void print_stages(const struct message_stats_reply *reply)
 {
     if (reply->stages_count > 0)
-        printf("stage        clock %12s %14s %12s %12s\n", "spans", "total ms", "mean ms", "greatest ms");
+        printf("stage        clock %12s %14s %12s %12s\n", "spans", "total ms", "mean ms", "maximum ms");
     for (uint32_t i = 0; i < reply->stages_count; i++) {
         const struct record_stage_total *total = &reply->stages[i];
         const double mean = total->count > 0 ? (double)total->total_ns * 1e-6 / (double)total->count : 0;

@@ -258,7 +258,7 @@ static void print_rays(const struct cli_timings *timings)
     if (ns > 0)
         fprintf(timings->out, "; %.2f Mray/s in primary and trace", (double)rays * 1e3 / (double)ns);
     if (timings->splits > 0)
-        fprintf(timings->out, "; %" PRIu64 " slices done again as halves", timings->splits);
+        fprintf(timings->out, "; %" PRIu64 " slices repeated as halves", timings->splits);
     fprintf(timings->out, "\n  %-16s%12.3f MB of %.3f MB pixels; to the device %.3f MB; structure %.3f MB\n",
             "bytes sent", (double)timings->wire_bytes * 1e-6 / frames,
             (double)timings->pixels_bytes * 1e-6 / frames, (double)timings->uploaded_bytes * 1e-6 / frames,
@@ -289,12 +289,12 @@ static void print_import(const struct cli_timings *timings, const struct fl_impo
     char upload[120];
     snprintf(upload, sizeof(upload), "%.3f MB of %.3f MB offered", (double)import->uploaded_bytes * 1e-6,
              (double)import->offered_bytes * 1e-6);
-    print_part(timings, "load", import->load_ns, "waited for the scene; of that or beside it:");
+    print_part(timings, "load", import->load_ns, "waited for the scene; including or in parallel:");
     print_part(timings, "  read", import->read_ns, "importer: files");
     print_part(timings, "  parse", import->parse_ns, "importer: parsing and decoding");
     print_part(timings, "  hash", import->hash_ns, "importer: hashing");
     print_part(timings, "  upload", import->upload_ns, upload);
-    print_part(timings, "  commit", import->commit_ns, "daemon: edits taken");
+    print_part(timings, "  commit", import->commit_ns, "daemon: edits applied");
 }
 
 static void print_table(struct cli_timings *timings, const struct cli_client_times *times)
@@ -310,7 +310,7 @@ static void print_table(struct cli_timings *timings, const struct cli_client_tim
     print_part(timings, "start", times->start_ns, "daemon started or reached");
     if (times->import->load_ns > 0) /* else the scene was there */
         print_import(timings, times->import);
-    print_part(timings, "wait", timings->wait_ns, "for frames; of that:");
+    print_part(timings, "wait", timings->wait_ns, "for frames; including:");
     print_part(timings, "  receive", timings->receive_ns, "first byte to last");
     print_part(timings, "  decode", timings->decode_ns, "and digest");
     print_part(timings, "export", times->export_ns, "waited for image files");

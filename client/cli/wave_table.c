@@ -98,11 +98,11 @@ void cli_print_waves(const struct fl_frame *frame, enum protocol_tracer referenc
         "  agree    the same answer: both hit at the same distance, both miss, or equally dark shadows; edges "
         "aside\n"
         "  far      both hit, at distances that differ by more than %g of the scene's diagonal, or in shadow and\n"
-        "           differently dark by more than 2/255\n"
+        "           with transmittances that differ by more than 2/255\n"
         "  edges    of those that disagree, rays within rounding of an edge: %s itself gives %s's answer\n"
-        "           to a ray that is moved by a few rounding steps\n"
-        "  surface  the same distance, but a normal over 5 degrees apart, another material or the other side\n"
-        "  errors are of rays that both hit, edges aside; Mray/s from the call to the whole answer\n",
+        "           if the ray is moved by a few rounding steps\n"
+        "  surface  the same distance, but normals over 5 degrees apart, or another material or side\n"
+        "  errors are of rays that hit with both, without edges; Mray/s from the call to the complete answer\n",
         far_share, reference_name, name);
 }
 

@@ -120,7 +120,7 @@ static bool hand_over(struct channel *channel)
                             &channel->scratch, &why))
             return refuse(channel, why.field, why.text);
         if (!channel->handle(channel->user, frame.header.request, &message))
-            return refuse(channel, frame.info->name, "does not belong here");
+            return refuse(channel, frame.info->name, "is not allowed here");
     }
 }
 

@@ -29,7 +29,7 @@ static bool skin_valid(struct import_scene *scene, const char *name, uint32_t jo
                            IMPORT_JOINTS_MAX);
     for (uint32_t i = 0; i < joint_count; i++)
         if (joints[i] == 0 || joints[i] > scene->last_id[PROTOCOL_OBJECT_KIND_NODE])
-            return import_fail(scene, name, "joint %u of a skin is no node", i);
+            return import_fail(scene, name, "joint %u of a skin is not a node", i);
     if (joint_from_mesh && !all_within(joint_from_mesh, (size_t)joint_count * 12, 3e38f))
         return import_fail(scene, name, "a skin has a matrix that is not finite");
     return true;

@@ -172,7 +172,7 @@ sparse_elements sparse_of(reader &r, int index, const elements &e, const std::st
     if (count < 1 || size_t(count) > e.count)
         fail(r, here, "a count of %d is not within 1 .. %zu", count, e.count);
     if (!is_unsigned(type))
-        fail(r, here, "indices of component type %d", type);
+        fail(r, here, "component type %d is not allowed for indices", type);
     if (accessor.sparse.indices.byteOffset < 0 || accessor.sparse.values.byteOffset < 0)
         fail(r, here, "a negative offset");
     const size_t part = component_bytes(type);
@@ -211,7 +211,7 @@ size_t accessor_count(reader &r, int accessor, int type, const std::string &wher
 {
     const elements e = elements_of(r, accessor, where);
     if (type != 0 && r.model.accessors[size_t(accessor)].type != type)
-        fail(r, where, "accessors[%d] has another type than its use demands", accessor);
+        fail(r, where, "accessors[%d] has the wrong type for its use", accessor);
     return e.count;
 }
 

@@ -161,7 +161,7 @@ uint32_t append(builder &b, const std::vector<float> &values)
 {
     check_room(b.r, b.where, b.floats.size() + values.size(), sizeof(float));
     if (values.size() > UINT32_MAX - b.floats.size())
-        fail(b.r, b.where, "more numbers than a clip can hold");
+        fail(b.r, b.where, "the clip has too many numbers");
     const uint32_t first = uint32_t(b.floats.size());
     b.floats.insert(b.floats.end(), values.begin(), values.end());
     return first;

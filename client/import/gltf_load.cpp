@@ -58,7 +58,7 @@ chunks cut_binary(reader &r, const unsigned char *bytes, size_t size_bytes)
         fail(r, "", "the file is cut off within its header: %zu bytes", size_bytes);
     const uint32_t version = u32_at(bytes + 4), length = u32_at(bytes + 8);
     if (version != 2)
-        fail(r, "", "binary glTF of version %u; only version 2 is known", version);
+        fail(r, "", "binary glTF of version %u is not supported; use version 2", version);
     if (length > size_bytes || length < 20)
         fail(r, "", "the header states %u bytes, the file has %zu", length, size_bytes);
     for (size_t at = 12; length - at >= 8;) {
@@ -147,7 +147,7 @@ bool read_data_uri(std::vector<unsigned char> *out, std::string *error, const st
     for (size_t i = comma + 1; i < uri.size() && uri[i] != '='; i++) {
         const int value = base64_value(uri[i]);
         if (value < 0) {
-            *error += "a data URI with characters that are no base64";
+            *error += "a data URI with characters that are not base64";
             return false;
         }
         bits = bits << 6 | uint32_t(value);
@@ -214,9 +214,9 @@ void check_version(reader &r)
     const std::string &version = r.model.asset.version, &least = r.model.asset.minVersion;
 
     if (version.compare(0, 2, "2.") != 0)
-        fail(r, "asset", "glTF version '%.32s'; only 2.0 is known", version.c_str());
+        fail(r, "asset", "glTF version '%.32s' is not supported; use 2.0", version.c_str());
     if (!least.empty() && least != "2.0")
-        fail(r, "asset", "the file demands glTF version '%.32s'; 2.0 is known", least.c_str());
+        fail(r, "asset", "the file needs glTF version '%.32s'; only 2.0 is supported", least.c_str());
 }
 } // namespace
 

@@ -241,8 +241,8 @@ void alpha(const building &b)
     else if (mode == "BLEND")
         b.set.alpha_mode = PROTOCOL_ALPHA_MODE_BLEND;
     else if (mode != "OPAQUE")
-        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(), "alpha mode '%.32s' is taken as OPAQUE",
-                    mode.c_str());
+        import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
+                    "unknown alpha mode '%.32s' is treated as OPAQUE", mode.c_str());
     // A cutoff above 1 is allowed and leaves nothing of the surface; 1 leaves what is fully opaque.
     b.set.alpha_cutoff = limited(b.r, b.where, "the alpha cutoff", b.source.alphaCutoff, 0, 1);
     b.set.double_sided = b.source.doubleSided;

@@ -344,7 +344,7 @@ void check_room(reader &r, const std::string &where, uint64_t count, uint64_t el
 {
     const uint64_t room = IMPORT_BYTES_MAX - r.scene->blob_bytes;
     if (count > room / element_bytes)
-        fail(r, where, "the scene would take more than %llu GiB",
+        fail(r, where, "the scene would need more than %llu GiB",
              static_cast<unsigned long long>(IMPORT_BYTES_MAX >> 30));
 }
 

@@ -197,7 +197,7 @@ std::vector<int> roots_of(reader &r)
         if (root < 0 || size_t(root) >= model.nodes.size())
             fail(r, place("scenes", size_t(scene)), "node %d does not exist", root);
         if (r.parents[size_t(root)] >= 0)
-            fail(r, place("scenes", size_t(scene)), "node %d is no root: it is a child of node %d", root,
+            fail(r, place("scenes", size_t(scene)), "node %d is not a root: it is a child of node %d", root,
                  r.parents[size_t(root)]);
         if (!seen.insert(root).second)
             fail(r, place("scenes", size_t(scene)), "node %d is listed twice", root);

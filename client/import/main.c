@@ -35,9 +35,10 @@ struct options {
 enum { OPTION_FD = 256, OPTION_SCENE, OPTION_ENVIRONMENT, OPTION_NO_MODEL };
 
 static const struct argp_option option_rows[] = {
-    {"fd", OPTION_FD, "N", 0, "connected stream socket to speak over (required)", 0},
-    {"scene", OPTION_SCENE, "ID", 0, "scene that the edits are for (default 1)", 0},
-    {"environment", OPTION_ENVIRONMENT, "FILE", 0, "light from all around: equirectangular image, HDR or EXR", 0},
+    {"fd", OPTION_FD, "N", 0, "use this connected stream socket (required)", 0},
+    {"scene", OPTION_SCENE, "ID", 0, "edit this scene (default 1)", 0},
+    {"environment", OPTION_ENVIRONMENT, "FILE", 0, "light the scene with this equirectangular image, HDR or EXR",
+     0},
     {"no-model", OPTION_NO_MODEL, NULL, 0, "send the environment only; MODEL is not needed", 0},
     {0}};
 
@@ -72,7 +73,7 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         return 0;
     case ARGP_KEY_ARG:
         if (options->model)
-            argp_error(state, "one MODEL only, not '%s' as well", argument);
+            argp_error(state, "only one MODEL can be given; '%s' is a second one", argument);
         options->model = argument;
         return 0;
     case ARGP_KEY_END:
@@ -83,7 +84,7 @@ static error_t parse_option(int key, char *argument, struct argp_state *state)
         else if (!options->model)
             argp_error(state, "MODEL is missing");
         if (!options->model && !options->environment)
-            argp_error(state, "neither MODEL nor --environment");
+            argp_error(state, "give MODEL or --environment");
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -177,7 +178,7 @@ static bool import_all(struct import_scene *scene, struct files *files, struct s
                    parse_model(scene, files, options->model, bytes, size_bytes);
         free(bytes);
         if (imported && scene->edit_count == 0)
-            import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "there is nothing in it that can be shown");
+            import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
     }
     if (imported && options->environment) {
         bytes = files_read_descriptor(files, files->environment, &size_bytes, reason);
@@ -228,7 +229,7 @@ int main(int argc, char **argv)
 {
     static const struct argp argp = {
         option_rows, parse_option,
-        "MODEL",     "Turns MODEL (glTF 2.0, GLB, OBJ, NFF) into messages of farlight's protocol.",
+        "MODEL",     "Turn MODEL (glTF 2.0, GLB, OBJ, NFF) into messages of farlight's protocol.",
         NULL,        NULL,
         NULL};
     static struct import_scene scene; /* the table of notes is too large for the stack of a careful program */

@@ -190,7 +190,7 @@ uint32_t import_add_blob(struct import_scene *scene, void *bytes, uint64_t size_
     if (scene->failed || scene->blob_count >= UINT32_MAX - 1)
         goto release;
     if (size_bytes > IMPORT_BYTES_MAX - scene->blob_bytes) {
-        import_fail(scene, NULL, "the scene would take more than %llu GiB",
+        import_fail(scene, NULL, "the scene would need more than %llu GiB",
                     (unsigned long long)(IMPORT_BYTES_MAX >> 30));
         goto release;
     }

@@ -124,7 +124,7 @@ static bool read_numbers(struct nff *nff, float *out, uint32_t count, const char
                                i + 1, count, of);
         word = next_word(nff);
         if (!to_number(word, &out[i]))
-            return import_fail(nff->scene, where(nff), "'%.*s' is no number that '%s' could have (%u of %u)",
+            return import_fail(nff->scene, where(nff), "'%.*s' is not an allowed number of '%s' (%u of %u)",
                                shown(word), word.text, of, i + 1, count);
     }
     return true;
@@ -145,8 +145,7 @@ static uint32_t read_some(struct nff *nff, float *out, uint32_t most)
             count++;
     }
     if (more)
-        import_note(nff->scene, PROTOCOL_SEVERITY_INFO, where(nff),
-                    "words at the end of a line that NFF does not have");
+        import_note(nff->scene, PROTOCOL_SEVERITY_INFO, where(nff), "unknown words at the end of a line");
     return count;
 }
 
@@ -294,7 +293,7 @@ static bool view_usable(struct nff *nff)
         across += product * product;
     }
     if (!(length > 0))
-        return import_fail(nff->scene, where(nff), "the viewpoint looks from where it looks at");
+        return import_fail(nff->scene, where(nff), "'from' and 'at' of the viewpoint are the same point");
     if (!(across > 1e-18 * length * up_length))
         return import_fail(nff->scene, where(nff), "'up' is zero or along the view");
     if (!(nff->angle_degrees > 0 && nff->angle_degrees < 177))
@@ -422,7 +421,7 @@ static bool read_statement(struct nff *nff, struct word word)
         return read_solid(nff, 12);
     if (word_is(word, "tess")) /* how finely round things are cut: spheres are exact here */
         return read_some(nff, nothing, 1) <= 1;
-    return import_fail(nff->scene, where(nff), "'%.*s' is no statement of NFF", shown(word), word.text);
+    return import_fail(nff->scene, where(nff), "'%.*s' is not a statement of NFF", shown(word), word.text);
 }
 
 /* ---- what is added at the end ---- */
@@ -505,7 +504,7 @@ static bool finish(struct nff *nff)
     struct message_set_environment environment = {0};
 
     if (nff->shapes.sphere_count == 0 && nff->shapes.triangle_count == 0)
-        return import_fail(nff->scene, NULL, "there is nothing in it that can be shown");
+        return import_fail(nff->scene, NULL, "it contains nothing that can be shown");
     if (!add_lights(nff) || !nff_finish_shapes(&nff->shapes) || (nff->has_view && !add_camera(nff)))
         return false;
     if (nff->has_background) {

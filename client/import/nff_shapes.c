@@ -161,7 +161,7 @@ bool nff_add_polygon(struct nff_shapes *shapes, const float *corners, const floa
         add_vertex(shapes, corners + (size_t)i * 3, normal);
     }
     if (!polygon_triangulate(corners, count, triangles, &shapes->polygon_budget))
-        import_note(shapes->scene, PROTOCOL_SEVERITY_WARNING, where, "a twisted polygon may be shown wrongly");
+        import_note(shapes->scene, PROTOCOL_SEVERITY_WARNING, where, "a twisted polygon may look wrong");
     for (uint32_t i = 0; i + 2 < count; i++)
         add_triangle(shapes, first + triangles[i * 3], first + triangles[i * 3 + 1], first + triangles[i * 3 + 2]);
     free(triangles);

@@ -150,7 +150,7 @@ void add_face(state &s, const tinyobj::index_t *indices, int count)
     s.triangles.resize(size_t(count - 2) * 3);
     if (!polygon_triangulate(s.corner_positions.data(), uint32_t(count), s.triangles.data(), &s.budget))
         import_note(s.r.scene, PROTOCOL_SEVERITY_WARNING, s.stream.place().c_str(),
-                    "a twisted polygon may be shown wrongly");
+                    "a twisted polygon may look wrong");
     for (uint32_t corner : s.triangles)
         s.indices.push_back(s.corners[corner]);
     s.names.insert(s.names.end(), size_t(count - 2), s.name);
@@ -266,7 +266,7 @@ void import(reader &r, const unsigned char *bytes, size_t size_bytes)
     if (r.scene->failed)
         return;
     if (s.indices.empty()) {
-        import_fail(r.scene, nullptr, "there are no faces in it%s",
+        import_fail(r.scene, nullptr, "it contains no faces%s",
                     text.has_points_or_lines ? "; points and lines cannot be shown" : "");
         return;
     }

@@ -397,7 +397,7 @@ std::vector<uint32_t> add_materials(reader &r, const std::vector<tinyobj::materi
         if (found != defined.end())
             wanted[name] = found->second;
         else
-            import_note(r.scene, PROTOCOL_SEVERITY_WARNING, nullptr, "the material '%.100s' is defined nowhere",
+            import_note(r.scene, PROTOCOL_SEVERITY_WARNING, nullptr, "the material '%.100s' is not defined",
                         name.c_str());
     }
     read_images(b, image_names(materials, wanted));

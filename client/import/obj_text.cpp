@@ -97,7 +97,7 @@ bool scan_vertex(scan &s, const char *at, const char *end)
                     return import_fail(s.r.scene, place.c_str(), "'%.20s' is not a finite number", token.c_str());
                 if (count < 3)
                     import_note(s.r.scene, PROTOCOL_SEVERITY_WARNING, place.c_str(),
-                                "a coordinate that is no number was read as far as it went");
+                                "a coordinate that is not a number was read up to the first wrong character");
             }
         }
         count++;

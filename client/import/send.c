@@ -62,7 +62,7 @@ static bool handle_need(struct sender *sender, uint32_t request, const struct me
         return true;
     for (uint32_t i = 0; i < need->needed_count; i++) {
         if (need->needed[i].index >= sender->offered)
-            return import_fail(sender->scene, NULL, "the server asks for blob %u of %u", need->needed[i].index,
+            return import_fail(sender->scene, NULL, "the server requested blob %u of %u", need->needed[i].index,
                                sender->offered);
         sender->needed[need->needed[i].index] = true;
     }

@@ -95,7 +95,7 @@ bool spec_reasonable(const OIIO::ImageSpec &spec, std::string &reason)
     }
     const uint64_t texels = uint64_t(spec.width) * uint64_t(spec.height);
     if (texels * uint64_t(std::max(spec.nchannels, 4)) * 4 > image_bytes_max) {
-        reason = "would take more than 1 GiB";
+        reason = "would need more than 1 GiB";
         return false;
     }
     return true;
@@ -119,7 +119,7 @@ bool opened_image::open(const char *reader, std::string &reason)
     if (!input->open(std::string("image.") + reader, spec, hints)) {
         reason = input->geterror();
         if (reason.empty())
-            reason = std::string("is no valid ") + reader + " image";
+            reason = std::string("is not a valid ") + reader + " image";
         return false;
     }
     return spec_reasonable(spec, reason);
@@ -185,7 +185,7 @@ bool decode(texture_job &job, std::string &reason)
 {
     const char *reader = reader_of(job.bytes, job.size_bytes);
     if (!reader) {
-        reason = "is no image of a known format";
+        reason = "is not an image of a known format";
         return false;
     }
     opened_image image(job.bytes, job.size_bytes);
@@ -193,7 +193,7 @@ bool decode(texture_job &job, std::string &reason)
         return false;
     const size_t texels = size_t(image.spec.width) * size_t(image.spec.height);
     if (all_images_bytes.fetch_add(texels * texel_bytes) > all_images_bytes_max - texels * texel_bytes) {
-        reason = "would, with the images before it, take more than 4 GiB";
+        reason = "would need, with the images before it, more than 4 GiB";
         return false;
     }
     job.texels = static_cast<unsigned char *>(calloc(texels, texel_bytes));
@@ -260,7 +260,7 @@ bool environment_decode(import_scene *scene, const char *file, const unsigned ch
     std::string reason;
 
     if (!reader)
-        return import_fail(scene, file, "the environment is no image of a known format");
+        return import_fail(scene, file, "the environment is not an image of a known format");
     opened_image image(bytes, size_bytes);
     if (!image.open(reader, reason))
         return import_fail(scene, file, "the environment cannot be read: %s", reason.c_str());

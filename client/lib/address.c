@@ -33,7 +33,7 @@ static int connect_by(int fd, const struct sockaddr *address, socklen_t address_
 static int refuse(const char *address, int failure, struct fl_error *error)
 {
     if (failure > 0) {
-        fl_error_set(error, FL_ERROR_CONNECTION, address, "no daemon can be reached there: %s", strerror(failure));
+        fl_error_set(error, FL_ERROR_CONNECTION, address, "cannot reach a daemon: %s", strerror(failure));
         fl_error_remedy(error, "start one with 'farlightd --listen ADDRESS', or leave --server out");
         if (error)
             error->retryable = failure == EAGAIN || failure == ETIMEDOUT;
@@ -125,7 +125,7 @@ int fl_address_connect(const char *address, uint64_t deadline_ns, int interrupt_
         return connect_unix(address, address + 5, deadline_ns, interrupt_fd, error);
     if (strncmp(address, "tcp:", 4) == 0)
         return connect_tcp(address, address + 4, deadline_ns, interrupt_fd, error);
-    fl_error_set(error, FL_ERROR_ARGUMENT, address, "is no address of a daemon");
-    fl_error_remedy(error, "unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]");
+    fl_error_set(error, FL_ERROR_ARGUMENT, address, "is not an address of a daemon");
+    fl_error_remedy(error, "give unix:PATH, tcp:HOST:PORT or ssh:HOST[:SOCKET]");
     return -1;
 }

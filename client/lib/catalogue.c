@@ -224,7 +224,7 @@ bool fl_catalogue_find(const struct fl_catalogue *catalogue, enum protocol_objec
                                         : kind == PROTOCOL_OBJECT_KIND_LIGHT    ? FL_CATALOGUE_LIGHTS
                                                                                 : FL_CATALOGUE_LIST_COUNT;
     if (list == FL_CATALOGUE_LIST_COUNT)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "objects of this kind are not known by name");
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "objects of this kind have no names");
     uint64_t index = 0;
     if (find_name(catalogue, list, which, id) ||
         (list == FL_CATALOGUE_LIGHTS && find_name(catalogue, FL_CATALOGUE_LIGHT_NODES, which, id)))
@@ -269,7 +269,7 @@ bool fl_catalogue_find_clip(const struct fl_catalogue *catalogue, const char *wh
         return fl_error_remedy(error, "%s", listing.text);
     }
     if (found->clip == 0)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "--clip", "clip '%s' moves nothing that is shown", which);
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "--clip", "clip '%s' moves nothing in the scene", which);
     *clip = found->clip;
     if (info)
         *info = found;

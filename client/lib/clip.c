@@ -36,7 +36,7 @@ static bool gather(struct clip *clip, const struct fl_channel *channels, size_t 
         const struct fl_channel *channel = &channels[i];
         if (channel->key_count == 0 || channel->key_count > NUMBERS_MAX || channel->width == 0 ||
             channel->width > 1024)
-            return fl_error_set(error, FL_ERROR_ARGUMENT, "clip", "channel %zu has no keys, or too many", i);
+            return fl_error_set(error, FL_ERROR_ARGUMENT, "clip", "channel %zu has no keys or too many", i);
         total += (uint64_t)channel->key_count * (1 + numbers_per_key(channel));
         if (total > NUMBERS_MAX)
             return fl_error_set(error, FL_ERROR_ARGUMENT, "clip", "it has more than %u numbers", NUMBERS_MAX);

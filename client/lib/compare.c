@@ -148,7 +148,7 @@ static bool explain(struct judge *judge, struct fl_error *error)
 {
     char words[520];
     fl_process_last_words(&judge->process, 1000, words, sizeof(words));
-    return fl_error_set(error, FL_ERROR_SYSTEM, "farlight-export", "the image program gave up%s%s",
+    return fl_error_set(error, FL_ERROR_SYSTEM, "farlight-export", "the image program failed%s%s",
                         words[0] != '\0' ? ": " : "", words);
 }
 
@@ -168,7 +168,7 @@ static bool receive(struct judge *judge, struct fl_comparison *comparison, struc
             }
             if (message.type != MESSAGE_IMAGES_COMPARED || !is_sound(&message.images_compared))
                 return fl_error_set(error, FL_ERROR_PROTOCOL, "farlight-export",
-                                    "a comparison is not answered by such a message (%s)",
+                                    "the answer to a comparison has the wrong type (%s)",
                                     message_type_text(message.type));
             take(comparison, &message.images_compared);
             return true;

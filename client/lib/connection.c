@@ -124,7 +124,7 @@ bool fl_connection_send(struct fl_connection *connection, uint32_t request, uint
     if (!fl_connection_push_late(connection, error))
         return false;
     if (!fl_stream_has_room(&connection->stream))
-        return fl_error_set(error, FL_ERROR_TIMEOUT, "", "the daemon takes nothing more");
+        return fl_error_set(error, FL_ERROR_TIMEOUT, "", "the daemon reads no more messages");
     if (!fl_stream_push(&connection->stream, request, channel, message, error))
         return false;
     /* While the daemon takes nothing we go on reading, so that both cannot wait for each other. What is read
@@ -253,9 +253,9 @@ bool fl_connection_answer(struct fl_connection *connection, uint32_t request, en
 
 static bool tell_key_needed(const struct fl_connection *connection, struct fl_error *error)
 {
-    fl_error_set(error, FL_ERROR_REFUSED, connection->address, "the daemon lets only those in who have its key");
+    fl_error_set(error, FL_ERROR_REFUSED, connection->address, "the daemon accepts only clients with its key");
     error->server_code = PROTOCOL_ERROR_CODE_DENIED;
-    return fl_error_remedy(error, "--key or FARLIGHT_KEY names the file with a copy of it");
+    return fl_error_remedy(error, "name the file with a copy of the key by --key or FARLIGHT_KEY");
 }
 
 static bool read_key(struct sealed_key *key, const char *key_file, struct fl_error *error)
@@ -265,8 +265,8 @@ static bool read_key(struct sealed_key *key, const char *key_file, struct fl_err
         return true;
     fl_error_set(error, FL_ERROR_FILE, key_file, "%s", why.text);
     return fl_error_remedy(error, why.code == PROTOCOL_ERROR_CODE_DENIED
-                                      ? "a key is for its owner alone"
-                                      : "a key file has 32 bytes; 'farlight key FILE' makes one");
+                                      ? "only its owner may read or write a key: run 'chmod 600'"
+                                      : "a key file has 32 bytes; 'farlight key FILE' creates one");
 }
 
 static bool shake_hands(struct fl_connection *connection, const char *name, uint64_t deadline_ns,
@@ -298,7 +298,7 @@ static bool shake_hands(struct fl_connection *connection, const char *name, uint
             &reply, stream->in + stream->in_start, stream->in_end - stream->in_start, &consumed, &why);
         if (result == HANDSHAKE_FATAL)
             return fl_error_set(error, FL_ERROR_PROTOCOL, connection->address,
-                                "no farlight daemon answers there: %s", why.text);
+                                "the server there is not a farlight daemon: %s", why.text);
         if (result == HANDSHAKE_CONSUMED) {
             stream->in_start += consumed;
             if (reply.version == 0 && (reply.capabilities & HANDSHAKE_NEEDS_KEY) != 0)
@@ -327,8 +327,9 @@ static bool start_ssh(struct fl_connection *connection, const char *where, int *
     const char *harmless = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/._-+@%,=";
     if (path[strspn(path, harmless)] != '\0' ||
         snprintf(socket_address, sizeof(socket_address), "unix:%s", path) >= (int)sizeof(socket_address))
-        return fl_error_set(error, FL_ERROR_ARGUMENT, connection->address,
-                            "the socket's path has characters that a shell would read");
+        return fl_error_set(
+            error, FL_ERROR_ARGUMENT, connection->address,
+            "the socket's path has characters with a meaning for the shell; use letters, digits and /._-+@%%,=");
     snprintf(host, sizeof(host), "%.*s", (int)host_bytes, where);
     const char *const arguments[] = {"-T", "--", host, "farlight", "bridge", socket_address, NULL};
     return fl_process_start(&connection->process, "ssh", FL_WIRING_STANDARD, arguments, fd, error);

@@ -46,8 +46,8 @@ bool fl_exporter_wait(struct fl_exporter *exporter, struct fl_error *error)
     if (message.type == MESSAGE_OK)
         return true;
     if (message.type != MESSAGE_ERROR)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "farlight-export", "a file is not answered by %s",
-                            message_type_text(message.type));
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "farlight-export",
+                            "the answer to an image file has the wrong type: %s", message_type_text(message.type));
     fl_error_from_message(error, &message.error);
     error->code = FL_ERROR_FILE;
     memcpy(error->field, exporter->path, sizeof(error->field));

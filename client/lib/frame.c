@@ -77,7 +77,7 @@ static bool check_attachments(const struct fl_assembly *assembly, const struct m
     const bool has_normals = (begin->attachments & FL_ATTACH_NORMALS) != 0;
     if (begin->attachments != assembly->expected.attachments)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.attachments",
-                            "the attachments %#x came in place of %#x", begin->attachments,
+                            "attachments %#x arrived, but %#x were expected", begin->attachments,
                             assembly->expected.attachments);
     if (has_depth != (begin->depth_bytes > 0) || begin->depth_bytes > most)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.depth_bytes", "%llu bytes cannot be depths",
@@ -99,21 +99,22 @@ static bool check_begin(const struct fl_assembly *assembly, const struct message
 {
     const struct fl_frame_expected *expected = &assembly->expected;
     if (assembly->frame)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "a frame began inside another");
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin",
+                            "a frame began before the previous one ended");
     if (expected->is_view ? begin->frame < number : begin->frame != number)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.frame", "frame %u came in place of frame %u",
-                            begin->frame, number);
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.frame",
+                            "frame %u arrived, but frame %u was expected", begin->frame, number);
     if (!is_expected_size(expected, begin) || begin->format != expected->format ||
         (begin->encoding != expected->encoding &&
          (!expected->is_view || begin->encoding != expected->still_encoding)))
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "%ux%u %s %s came in place of %ux%u %s %s",
-                            begin->width, begin->height, protocol_pixel_format_text(begin->format),
-                            protocol_encoding_text(begin->encoding), expected->width, expected->height,
-                            protocol_pixel_format_text(expected->format),
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin",
+                            "%ux%u %s %s arrived, but %ux%u %s %s was expected", begin->width, begin->height,
+                            protocol_pixel_format_text(begin->format), protocol_encoding_text(begin->encoding),
+                            expected->width, expected->height, protocol_pixel_format_text(expected->format),
                             protocol_encoding_text(expected->encoding));
     if (begin->layers != expected->layers)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.layers", "the layers %#x came in place of %#x",
-                            begin->layers, expected->layers);
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin.layers",
+                            "layers %#x arrived, but %#x were expected", begin->layers, expected->layers);
     const size_t pixels_bytes = pixels_bytes_of(begin);
     const uint64_t most = encoded_bytes_max(begin, pixels_bytes);
     const bool exact = begin->encoding == PROTOCOL_ENCODING_RAW;
@@ -190,11 +191,11 @@ bool fl_assembly_begin(struct fl_assembly *assembly, const struct message_frame_
 bool fl_assembly_data(struct fl_assembly *assembly, const struct message_frame_data *data, struct fl_error *error)
 {
     if (!assembly->frame)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data", "a piece came without a frame");
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data", "data arrived outside a frame");
     if (data->offset_bytes != assembly->received_bytes ||
         data->data_bytes > assembly->encoded_bytes - assembly->received_bytes)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data.offset_bytes",
-                            "a piece of %u bytes came for %llu where %llu of %llu are there", data->data_bytes,
+                            "%u bytes arrived for offset %llu, but %llu of %llu bytes are there", data->data_bytes,
                             (unsigned long long)data->offset_bytes, (unsigned long long)assembly->received_bytes,
                             (unsigned long long)assembly->encoded_bytes);
     if (data->data_bytes > 0)
@@ -215,10 +216,10 @@ static bool decode_zstd(const struct fl_assembly *assembly, struct fl_error *err
     const size_t made =
         ZSTD_decompress(frame->pixels, frame->pixels_bytes, assembly->encoded, picture_bytes(assembly));
     if (ZSTD_isError(made))
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "not to be decompressed: %s",
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "cannot be decompressed: %s",
                             ZSTD_getErrorName(made));
     if (made != frame->pixels_bytes)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "%zu bytes came out in place of %zu", made,
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "it decompresses to %zu bytes, not %zu", made,
                             frame->pixels_bytes);
     return true;
 }
@@ -230,7 +231,7 @@ static bool decode_predicted(const struct predicted_form *form, const uint8_t *e
     if (result.status == PREDICTED_NO_MEMORY)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     return result.status == PREDICTED_DONE ||
-           fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "not to be decompressed: %s", result.reason);
+           fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "cannot be decompressed: %s", result.reason);
 }
 
 static bool decode_predicted_pixels(const struct fl_assembly *assembly, struct fl_error *error)
@@ -279,8 +280,8 @@ static bool decode_jpeg(const struct fl_assembly *assembly, struct fl_error *err
     bool good =
         tjDecompressHeader3(decoder, assembly->encoded, bytes, &width, &height, &subsampling, &colours) == 0;
     if (good && (width != (int)frame->width || height != (int)frame->height)) {
-        fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "a JPEG of %dx%d came in place of %ux%u", width, height,
-                     frame->width, frame->height);
+        fl_error_set(error, FL_ERROR_PROTOCOL, "frame", "a JPEG of %dx%d arrived, but %ux%u was expected", width,
+                     height, frame->width, frame->height);
     } else {
         good = good && tjDecompress2(decoder, assembly->encoded, bytes, frame->pixels, width, 0, height, TJPF_RGBA,
                                      TJFLAG_STOPONWARNING) == 0;
@@ -307,7 +308,7 @@ static bool decode_pixels(const struct fl_assembly *assembly, struct fl_error *e
         return false;
     if (XXH3_64bits(frame->pixels, frame->pixels_bytes) != frame->digest)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame.digest",
-                            "the pixels of frame %u are not those rendered", frame->frame);
+                            "the pixels of frame %u differ from those that were rendered", frame->frame);
     frame->digest_checked = true;
     return true;
 }
@@ -347,7 +348,7 @@ struct fl_frame *fl_assembly_end(struct fl_assembly *assembly, const struct mess
     struct fl_frame *frame = assembly->frame;
     if (!frame || end->frame != frame->frame || end->abandoned != 0 ||
         assembly->received_bytes != assembly->encoded_bytes) {
-        fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "a frame ended that is not complete");
+        fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "an incomplete frame ended");
         return NULL;
     }
     const uint64_t decode_begin_ns = monotonic_now_ns();
@@ -380,7 +381,7 @@ bool fl_frame_queue_push(struct fl_frame_queue *queue, struct fl_frame *frame, s
 {
     if (queue->count == queue->capacity) {
         fl_frame_destroy(frame);
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "more frames came than were asked for");
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end", "more frames arrived than were requested");
     }
     queue->frames[(queue->first + queue->count++) % queue->capacity] = frame;
     return true;

@@ -17,15 +17,15 @@ bool fl_text_shard(const char *text, uint32_t *part, uint32_t *parts, struct fl_
     snprintf(first, sizeof(first), "%.*s", (int)(length < sizeof(first) ? length : 0), text);
     if (length == 0 || length >= sizeof(first) || !fl_text_integer(first, 1, PARTS_MAX, &of, NULL) ||
         !fl_text_integer(slash + 1, 1, PARTS_MAX, &all, NULL)) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a part K/N, K and N from 1 to %u", text,
+        fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a part K/N with K and N from 1 to %u", text,
                      PARTS_MAX);
-        return fl_error_remedy(error, "the third of eight parts is 3/8");
+        return fl_error_remedy(error, "write the third of eight parts as 3/8");
     }
     if (of > all) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s': there is no part %llu of %llu", text,
                      (unsigned long long)of, (unsigned long long)all);
-        return fl_error_remedy(error, "parts are 1/%llu to %llu/%llu", (unsigned long long)all,
-                               (unsigned long long)all, (unsigned long long)all);
+        return fl_error_remedy(error, "use 1/%llu to %llu/%llu", (unsigned long long)all, (unsigned long long)all,
+                               (unsigned long long)all);
     }
     *part = (uint32_t)of;
     *parts = (uint32_t)all;

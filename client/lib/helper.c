@@ -28,7 +28,7 @@ static bool explain(struct fl_helper *helper, struct fl_error *error)
     char words[520];
     helper->lost = true;
     fl_process_last_words(&helper->process, 1000, words, sizeof(words));
-    return fl_error_set(error, FL_ERROR_SYSTEM, helper->program, "%s gave up%s%s", helper->what,
+    return fl_error_set(error, FL_ERROR_SYSTEM, helper->program, "%s failed%s%s", helper->what,
                         words[0] != '\0' ? ": " : "", words);
 }
 

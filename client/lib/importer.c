@@ -32,7 +32,7 @@ bool fl_importer_start(struct fl_importer *importer, const struct fl_load_option
     importer->process.talk_fd = -1;
     importer->deadline_ns = importer->begin_ns + timeout_ms * 1000000ull;
     if (!options->model && !options->environment)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "model", "no file is named");
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "model", "a file name is needed");
     if ((options->model && !check_file(options->model, error)) ||
         (options->environment && !check_file(options->environment, error)))
         return false;
@@ -140,7 +140,7 @@ bool fl_importer_explain(struct fl_importer *importer, struct fl_error *error)
     }
     char words[520];
     fl_process_last_words(&importer->process, 1000, words, sizeof(words));
-    return fl_error_set(error, FL_ERROR_MODEL, model, "the importer gave up without saying why%s%s",
+    return fl_error_set(error, FL_ERROR_MODEL, model, "the importer failed without a message%s%s",
                         words[0] != '\0' ? ": " : "", words);
 }
 

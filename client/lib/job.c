@@ -92,7 +92,8 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_optio
     }
     if ((options->layers & ~FL_LAYERS_PICTURE) != 0 &&
         (options->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || options->encoding == PROTOCOL_ENCODING_JPEG)) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, "layers", "need the pixel format rgba32f, raw or by zstd");
+        fl_error_set(error, FL_ERROR_ARGUMENT, "layers",
+                     "need the pixel format rgba32f and the encoding raw or zstd");
         return NULL;
     }
     struct fl_job *job = calloc(1, sizeof(*job));
@@ -156,7 +157,7 @@ static bool take(struct fl_job *job, const struct message *message, struct fl_er
     switch (message->type) {
     case MESSAGE_FRAME_BEGIN:
         if (job->next_frame > job->last_frame)
-            return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "a frame came after the last");
+            return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_begin", "a frame arrived after the last one");
         return fl_assembly_begin(&job->assembly, &message->frame_begin, (uint32_t)job->next_frame,
                                  monotonic_now_ns(), error);
     case MESSAGE_FRAME_DATA:
@@ -169,7 +170,7 @@ static bool take(struct fl_job *job, const struct message *message, struct fl_er
     case MESSAGE_ERROR:
         return conclude(job, message, error);
     default:
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "a job is not answered by %s",
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "the answer to a job has the wrong type: %s",
                             message_type_text(message->type));
     }
 }

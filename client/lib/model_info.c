@@ -105,7 +105,7 @@ static bool drain(struct listing *listing, struct fl_error *error)
             return false;
         if (message.type == MESSAGE_BLOB_DATA)
             return fl_error_set(error, FL_ERROR_PROTOCOL, "farlight-import",
-                                "the importer sent what nobody needs");
+                                "the importer sent an unexpected message");
         if (!fl_importer_observe(&listing->importer, &message, error) || !list(listing, &message, error) ||
             !answer(listing, &frame, &message, error))
             return false;
@@ -126,7 +126,7 @@ static bool run(struct listing *listing, int interrupt_fd, struct fl_error *erro
         struct pollfd polled = {.fd = importer->stream.fd, .events = fl_stream_events(&importer->stream)};
         if (!fl_wait(&polled, 1, interrupt_fd, importer->deadline_ns, error)) {
             if (error->code == FL_ERROR_TIMEOUT)
-                fl_error_set(error, FL_ERROR_TIMEOUT, importer->options.model, "the import took too long");
+                fl_error_set(error, FL_ERROR_TIMEOUT, importer->options.model, "the import timed out");
             return false;
         }
         if (!fl_stream_transfer(&importer->stream, error))

@@ -47,8 +47,9 @@ bool fl_find_program(const char *name, char *path, size_t path_bytes, struct fl_
             return true;
         at += folder_bytes + (at[folder_bytes] == ':');
     }
-    fl_error_set(error, FL_ERROR_FILE, name, "this program of farlight's is not installed");
-    return fl_error_remedy(error, "put it beside this program, in PATH, or name its folder in FARLIGHT_LIBEXEC");
+    fl_error_set(error, FL_ERROR_FILE, name, "this program, a part of farlight, is not installed");
+    return fl_error_remedy(
+        error, "put it into this program's folder or into PATH, or name its folder in FARLIGHT_LIBEXEC");
 }
 
 /* What the child's descriptors shall be. */

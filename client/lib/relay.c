@@ -47,18 +47,18 @@ enum fl_relay_verdict fl_relay_from_importer(struct fl_relay *relay, const struc
 {
     const enum fl_relay_verdict kind = kind_of(message->type);
     if (kind == FL_RELAY_REFUSE)
-        return refuse(error, "the importer sent a message that it may not send", message);
+        return refuse(error, "the importer sent a message that is not allowed", message);
     if (kind == FL_RELAY_LOCAL)
         return kind;
     const bool in_range = header->request > 0 && (header->request <= relay->greatest_request ||
                                                   header->request - relay->greatest_request <= REQUEST_AHEAD_MAX);
     if (!in_range || header->request > UINT32_MAX - relay->request_base)
-        return refuse(error, "the importer does not count its requests", message);
+        return refuse(error, "the importer's request numbers are not consecutive", message);
     if (header->channel > (message->type == MESSAGE_BLOB_DATA ? 1u : 0u))
         return refuse(error, "the importer used a channel that is not its own", message);
     if (message->type == MESSAGE_EDIT_BEGIN) {
         if (message->edit_begin.scene != IMPORTER_SCENE)
-            return refuse(error, "the importer wants to edit another scene", message);
+            return refuse(error, "the importer tried to edit another scene", message);
         message->edit_begin.scene = relay->scene;
     }
     if (header->request > relay->greatest_request)

@@ -164,7 +164,7 @@ static bool exchange(struct load *load, struct fl_error *error)
             return true;
         }
         if (error->code == FL_ERROR_TIMEOUT)
-            fl_error_set(error, FL_ERROR_TIMEOUT, load->importer->options.model, "the import took too long");
+            fl_error_set(error, FL_ERROR_TIMEOUT, load->importer->options.model, "the import timed out");
         return false;
     }
     if (!fl_stream_transfer(daemon, error))
@@ -392,7 +392,7 @@ bool fl_scene_find_camera(const struct fl_scene *scene, const char *which, uint3
     }
     fl_error_set(error, FL_ERROR_ARGUMENT, "--camera", "the model has no camera '%s'", which);
     if (scene->camera_count == 0)
-        return fl_error_remedy(error, "it has none at all; use --eye and --look-at");
+        return fl_error_remedy(error, "it has no cameras; use --eye and --look-at");
     return fl_error_remedy(error, "it has %zu; 'farlight info' lists them", scene->camera_count);
 }
 

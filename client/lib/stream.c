@@ -35,7 +35,7 @@ bool fl_stream_init(struct fl_stream *stream, int fd, uint32_t accept, const cha
 bool fl_stream_seal(struct fl_stream *stream, const struct sealed_key *key, struct fl_error *error)
 {
     stream->link = sealed_link_client(key);
-    return stream->link || fl_error_set(error, FL_ERROR_MEMORY, "", "no memory, or no random numbers");
+    return stream->link || fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory, or no random numbers");
 }
 
 bool fl_stream_is_whole(const struct fl_stream *stream)
@@ -186,9 +186,9 @@ static bool tell_refusal(enum sealed_status status, struct fl_error *error)
 {
     fl_error_set(error, FL_ERROR_REFUSED, "", "%s", sealed_status_text(status));
     if (status == SEALED_WRONG_KEY)
-        fl_error_remedy(error, "--key or FARLIGHT_KEY names the file with a copy of the daemon's key");
+        fl_error_remedy(error, "name the file with a copy of the daemon's key by --key or FARLIGHT_KEY");
     else if (status == SEALED_NO_KEY)
-        fl_error_remedy(error, "leave --key and FARLIGHT_KEY out, or start it with --key-file");
+        fl_error_remedy(error, "leave --key and FARLIGHT_KEY out, or start the daemon with --key-file");
     else if (status == SEALED_TOO_MANY)
         fl_error_remedy(error, "try again in a minute");
     if (error) {
@@ -204,7 +204,7 @@ static bool tell_broken_seal(const struct fl_stream *stream, const struct decode
 {
     if (why->code == PROTOCOL_ERROR_CODE_OUT_OF_MEMORY)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
-    return fl_error_set(error, FL_ERROR_PROTOCOL, "", "what came is not what %s has sealed: %s: %s", stream->peer,
+    return fl_error_set(error, FL_ERROR_PROTOCOL, "", "the data is not what %s has sealed: %s: %s", stream->peer,
                         why->field, why->text);
 }
 
@@ -268,7 +268,7 @@ bool fl_stream_has_remains(const struct fl_stream *stream)
 static enum fl_stream_result broken(const struct fl_stream *stream, const struct decode_error *why,
                                     struct fl_error *error)
 {
-    fl_error_set(error, FL_ERROR_PROTOCOL, why->field, "%s sent what the protocol does not allow: %s",
+    fl_error_set(error, FL_ERROR_PROTOCOL, why->field, "%s sent a message that the protocol does not allow: %s",
                  stream->peer, why->text);
     return FL_STREAM_ERROR;
 }
@@ -334,6 +334,6 @@ bool fl_wait(struct pollfd *polled, size_t count, int interrupt_fd, uint64_t dea
         if (ready > 0)
             return true;
         if (deadline_ns != UINT64_MAX && monotonic_now_ns() >= deadline_ns)
-            return fl_error_set(error, FL_ERROR_TIMEOUT, "", "it took too long");
+            return fl_error_set(error, FL_ERROR_TIMEOUT, "", "it timed out");
     }
 }

@@ -126,7 +126,7 @@ bool fl_text_range(const char *text, uint32_t *first, uint32_t *last, uint32_t *
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s' is not a range of frames A-B or A-B:STEP, 0 to %d",
                             text, FRAME_MAX);
     if (to < from)
-        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s': the last frame lies before the first", text);
+        return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s': the last frame is before the first", text);
     *first = (uint32_t)from;
     *last = (uint32_t)to;
     *step = (uint32_t)by;
@@ -194,11 +194,11 @@ bool fl_pattern_parse(const char *text, struct fl_pattern *pattern, struct fl_er
             length = read_conversion(at, &digits);
             if (length == 0)
                 return fl_error_set(error, FL_ERROR_ARGUMENT, "",
-                                    "'%s': after %% only 'd', '0Nd' (N digits) or another %% may stand", text);
+                                    "'%s': %% must be followed by 'd', '0Nd' (N digits) or another %%", text);
             at += length == 1 ? 2 : length;
             if (length > 1) {
                 if (made.digits != 0)
-                    return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s': the frame's number stands twice",
+                    return fl_error_set(error, FL_ERROR_ARGUMENT, "", "'%s': the frame's number occurs twice",
                                         text);
                 made.digits = digits;
                 out = made.after;
@@ -210,7 +210,7 @@ bool fl_pattern_parse(const char *text, struct fl_pattern *pattern, struct fl_er
         }
         if (made.digits != 0 && c == '/')
             return fl_error_set(error, FL_ERROR_ARGUMENT, "",
-                                "'%s': the frame's number may only stand in the file's name, not in a folder's",
+                                "'%s': the frame's number may only be in the file's name, not in a folder's",
                                 text);
         if (room <= 1)
             return fl_error_set(error, FL_ERROR_ARGUMENT, "", "the file's name is too long");

@@ -27,8 +27,8 @@ static bool take_failure(struct fl_video *video, const struct message *message, 
     video->answered = true;
     video->temporary[0] = '\0';
     if (message->type != MESSAGE_ERROR)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, video->helper.program, "a video is not answered by %s",
-                            message_type_text(message->type));
+        return fl_error_set(error, FL_ERROR_PROTOCOL, video->helper.program,
+                            "the answer to a video has the wrong type: %s", message_type_text(message->type));
     fl_error_from_message(&why, &message->error);
     /* The caller named a file, an option or a frame; it is the file that does not come about. */
     fl_error_set(error, FL_ERROR_FILE, video->path, "%s", why.text);

@@ -103,7 +103,7 @@ struct fl_view *fl_view_start(struct fl_scene *scene, const struct fl_view_optio
     struct fl_connection *connection = scene->connection;
     const unsigned in_flight = options->job.frames_in_flight;
     if (connection->view) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, "", "another view is there on this connection");
+        fl_error_set(error, FL_ERROR_ARGUMENT, "", "another view runs on this connection");
         return NULL;
     }
     struct fl_view *view = calloc(1, sizeof(*view));
@@ -224,7 +224,7 @@ static bool abandon(struct fl_view *view, uint32_t number, struct fl_error *erro
     const struct fl_frame *frame = view->assembly.frame;
     if (!frame || frame->frame != number || frame->moving || frame->encoding == PROTOCOL_ENCODING_H264)
         return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_end.abandoned",
-                            "frame %u ended unfinished, which only a picture at rest may do", number);
+                            "frame %u ended incomplete, which is allowed only for a picture at rest", number);
     fl_assembly_finish(&view->assembly);
     return true;
 }
@@ -265,7 +265,7 @@ static bool conclude(struct fl_view *view, size_t index, const struct message *m
     if (message->type == MESSAGE_ERROR && is_newest)
         fl_error_from_message(&view->failure, &message->error);
     else if (is_newest)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "a view ended that nothing took the place of");
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "a view ended without a successor");
     return true;
 }
 
@@ -284,7 +284,7 @@ static bool take(struct fl_view *view, size_t index, const struct message *messa
     case MESSAGE_FRAME_DATA:
     case MESSAGE_FRAME_END:
         if (request != view->assembled_request)
-            return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data", "pieces of two frames came mixed");
+            return fl_error_set(error, FL_ERROR_PROTOCOL, "frame_data", "data of two frames arrived mixed");
         if (message->type == MESSAGE_FRAME_DATA)
             return fl_assembly_data(&view->assembly, &message->frame_data, error);
         return take_end(view, view->asked[index].change, message, error);
@@ -292,7 +292,7 @@ static bool take(struct fl_view *view, size_t index, const struct message *messa
     case MESSAGE_ERROR:
         return conclude(view, index, message, error);
     default:
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "a view is not answered by %s",
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "render", "the answer to a view has the wrong type: %s",
                             message_type_text(message->type));
     }
 }

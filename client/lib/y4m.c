@@ -123,7 +123,7 @@ static bool check_frame(const struct fl_y4m *y4m, const struct fl_frame *frame, 
     if (y4m->broken)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "this video stream has ended within a frame");
     if (frame->format != PROTOCOL_PIXEL_FORMAT_RGBA8) {
-        fl_error_set(error, FL_ERROR_ARGUMENT, "format", "a video has no %s pixels",
+        fl_error_set(error, FL_ERROR_ARGUMENT, "format", "a video cannot store %s pixels",
                      protocol_pixel_format_text(frame->format));
         return fl_error_remedy(error, "render with the pixel format rgba8");
     }

@@ -214,7 +214,7 @@ bool compare_images(const struct message_compare_images *wanted, const struct co
         OIIO::attribute("threads", 0); // all processors: nothing else runs meanwhile
         return read_picture(*a, each.a, *result) && read_picture(*b, each.b, *result) && compare(each);
     } catch (const std::bad_alloc &) {
-        return fail(*result, wanted->a, "and the other picture need more memory than there is");
+        return fail(*result, wanted->a, "and the other picture need more memory than is available");
     } catch (const std::exception &exception) {
         return fail(*result, wanted->a, exception.what());
     }

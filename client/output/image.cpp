@@ -145,7 +145,7 @@ bool encode(const struct image &image, std::vector<unsigned char> &file, char *r
     const struct image *layers = has_layers(*image.begin) ? &image : nullptr;
     std::string why;
     if (layers && (image.format != IMAGE_EXR || image.begin->format != PROTOCOL_PIXEL_FORMAT_RGBA32F))
-        return fail(reason, reason_bytes, "only an EXR file, of 32-bit floats, takes layers");
+        return fail(reason, reason_bytes, "only an EXR file of 32-bit floats can store layers");
     if (!write_pixels(image.format, make_spec(image), {type, image.pixels, 4 * type.size(), layers}, file, why))
         return fail(reason, reason_bytes, why);
     if (image.format == IMAGE_HDR)
@@ -157,7 +157,7 @@ bool encode(const struct plain_image &image, std::vector<unsigned char> &file, c
 {
     OIIO::ImageSpec spec(static_cast<int>(image.width), static_cast<int>(image.height), 3, OIIO::TypeDesc::UINT8);
     if (image.format != IMAGE_PNG && image.format != IMAGE_JPEG)
-        return fail(reason, reason_bytes, "a picture of errors is PNG or JPEG");
+        return fail(reason, reason_bytes, "a picture of errors must be PNG or JPEG");
     spec.attribute("oiio:ColorSpace", "sRGB");
     spec.attribute("Compression", "jpeg:95");
     spec.attribute("png:compressionLevel", 4);

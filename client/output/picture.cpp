@@ -75,7 +75,7 @@ bool check_spec(const OIIO::ImageSpec &spec, std::string &reason)
         return fail(reason, "is not a flat image");
     if (spec.width > edge_max || spec.height > edge_max)
         return fail(reason, "is " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
-                                " pixels, more than " + std::to_string(edge_max) + " one way");
+                                " pixels, more than " + std::to_string(edge_max) + " in one direction");
     return true;
 }
 
@@ -102,7 +102,7 @@ bool choose_channels(const OIIO::ImageSpec &spec, struct channel_range &chosen, 
                                 std::to_string(channels_max) + " are compared");
     for (int i = 0; i < chosen.count; i++)
         if (spec.channelformat(chosen.first + i) == OIIO::TypeDesc::UINT32)
-            return fail(reason, "has numbers of objects in place of a picture");
+            return fail(reason, "contains numbers of objects instead of a picture");
     return true;
 }
 
@@ -173,7 +173,7 @@ bool picture_decode(const uint8_t *file, size_t file_bytes, struct picture &made
 {
     const signature *kind = signature_of(file, file_bytes);
     if (!kind)
-        return fail(reason, "is no EXR, HDR, PNG or JPEG image");
+        return fail(reason, "is not an EXR, HDR, PNG or JPEG image");
     if (is_cut_off(*kind, file, file_bytes))
         return fail(reason, "is cut off: the end of the JPEG image is missing");
     const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(kind->reader);

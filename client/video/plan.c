@@ -50,7 +50,7 @@ static const struct choice *choose(const struct message_video_begin *wanted, str
         }
     }
     if (!known)
-        video_fail(failure, "codec", "h264, mpeg4 and ffv1 are known", "'%s' is no codec that can be written",
+        video_fail(failure, "codec", "use h264, mpeg4 or ffv1", "'%s' is not a codec that can be written",
                    wanted->codec);
     else
         video_fail(failure, "codec", "install a libavcodec with libx264", "this libavcodec has no encoder for %s",
@@ -62,13 +62,13 @@ bool video_plan(struct video_plan *plan, const struct message_video_begin *wante
 {
     *plan = (struct video_plan){.container = container_of(wanted->path, wanted->format)};
     if (!plan->container)
-        return video_fail(failure, "path", "let it end in .mp4 or .mkv",
-                          "the ending names no format of videos that can be written");
+        return video_fail(failure, "path", "use the ending .mp4 or .mkv",
+                          "the ending is not that of a video format that can be written");
     const struct choice *chosen = choose(wanted, failure);
     if (!chosen)
         return false;
     if (chosen->lossless && strcmp(plan->container, "mp4") == 0)
-        return video_fail(failure, "lossless", "let the file end in .mkv", "an MP4 file does not hold FFV1");
+        return video_fail(failure, "lossless", "use the ending .mkv", "an MP4 file does not hold FFV1");
     plan->encoder = chosen->encoder;
     plan->rgb = chosen->lossless;
     plan->quality = wanted->quality > 0 ? wanted->quality : DEFAULT_QUALITY;
@@ -82,5 +82,5 @@ bool video_plan_allows(const struct video_plan *plan, uint32_t width, uint32_t h
     const uint32_t macroblocks = ((width + 15) / 16) * ((height + 15) / 16);
     return strcmp(plan->encoder, "libx264") != 0 || macroblocks <= H264_MACROBLOCKS_MAX ||
            video_fail(failure, "size", "render smaller frames, or a lossless .mkv",
-                      "H.264 has no pictures of %ux%u: 35,651,584 pixels are the most", width, height);
+                      "H.264 cannot encode pictures of %ux%u: the maximum is 35,651,584 pixels", width, height);
 }

@@ -79,10 +79,10 @@ static bool check_frame(const struct session *session, const struct message_fram
                         struct video_failure *failure)
 {
     if (begin->format != PROTOCOL_PIXEL_FORMAT_RGBA8)
-        return video_fail(failure, "format", "render with the pixel format rgba8", "a video has no %s pixels",
-                          protocol_pixel_format_text(begin->format));
+        return video_fail(failure, "format", "render with the pixel format rgba8",
+                          "a video cannot store %s pixels", protocol_pixel_format_text(begin->format));
     if (begin->layers != 1u << PROTOCOL_LAYER_BEAUTY)
-        return video_fail(failure, "layers", "render without layers", "a video has the picture alone");
+        return video_fail(failure, "layers", "render without layers", "a video can store only the picture");
     if (session->frames > 0 && (begin->width != session->width || begin->height != session->height))
         return video_fail(failure, "size", "all frames of a video have the size of its first",
                           "frame %u has %ux%u pixels, but the video has %ux%u", begin->frame, begin->width,
@@ -167,11 +167,11 @@ static bool end_video(struct session *session, const struct message_video_end *e
     struct video_failure failure = {.field = "", .remedy = NULL};
     bool good = true;
     if (session->state == STATE_OPEN && session->frames != end->frames) {
-        video_fail(&failure, "frames", "send every frame whole, and their number at the end",
+        video_fail(&failure, "frames", "send every frame complete, and the number of frames at the end",
                    "%u frames were announced, but %u came", end->frames, session->frames);
         good = fail(session, &failure);
     } else if (session->state == STATE_OPEN && session->frames == 0) {
-        video_fail(&failure, "frames", "render at least one", "a video without frames cannot be");
+        video_fail(&failure, "frames", "render at least one frame", "a video needs at least one frame");
         good = fail(session, &failure);
     } else if (session->state == STATE_OPEN) {
         good = finish_video(session, &failure);

@@ -51,7 +51,7 @@ static bool to_pixels(struct decoder *decoder, struct pixmap *picture, struct fl
                              picture->width, picture->height, AV_PIX_FMT_RGBA, SWS_BILINEAR, NULL, NULL, NULL);
     if (!decoder->colours ||
         sws_setColorspaceDetails(decoder->colours, matrix, is_full, matrix, 1, 0, 1 << 16, 1 << 16) < 0)
-        return fl_error_set(error, FL_ERROR_SYSTEM, "", "a frame in H.264 has colours that are not known");
+        return fl_error_set(error, FL_ERROR_SYSTEM, "", "a frame in H.264 has an unknown colour space");
     uint8_t *const planes[] = {picture->pixels};
     const int strides[] = {picture->width * 4};
     sws_scale(decoder->colours, (const uint8_t *const *)frame->data, frame->linesize, 0, picture->height, planes,
@@ -69,7 +69,7 @@ bool decoder_decode(struct decoder *decoder, const struct fl_frame *frame, struc
                     struct fl_error *error)
 {
     if (decoder->lost && !frame->key_frame)
-        return fl_error_set(error, FL_ERROR_PROTOCOL, "", "a frame before it is missing");
+        return fl_error_set(error, FL_ERROR_PROTOCOL, "", "the frame before it is missing");
     if (decoder->lost)
         avcodec_flush_buffers(decoder->context);
     decoder->lost = true;

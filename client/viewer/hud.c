@@ -344,9 +344,9 @@ static double draw_legend(struct layout *layout, double bottom)
     if (state->heat == HUD_HEAT_NONE)
         return bottom;
     if (state->heat == HUD_HEAT_WAITING)
-        snprintf(figures, sizeof(figures), "the reference is traced ..");
+        snprintf(figures, sizeof(figures), "tracing the reference ..");
     else
-        snprintf(figures, sizeof(figures), "mean %.2g, greatest %.2g; %.2g %% of the pixels beyond %g",
+        snprintf(figures, sizeof(figures), "mean %.2g, maximum %.2g; %.2g %% of the pixels beyond %g",
                  state->heat_figures.mean, state->heat_figures.greatest, state->heat_figures.beyond * 100,
                  HEAT_BEYOND);
     const double width = fmax(bar, text_width(layout, HUD_PLAIN, figures)) + 2 * inner;

@@ -35,27 +35,29 @@ enum key {
 static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Window:", -2},
     {"scene", KEY_SCENE, "NAME", 0,
-     "A scene that is up at --server, in place of MODEL ('farlight scenes' lists them)", -2},
-    {"samples", KEY_SAMPLES, "N", 0, "Samples per pixel that a picture at rest gets (default 64)", -2},
-    {"pass-samples", KEY_PASS, "N", 0, "Of them, how many each frame adds (default 1)", -2},
+     "Use a shared scene at --server in place of MODEL ('farlight scenes' lists them)", -2},
+    {"samples", KEY_SAMPLES, "N", 0, "Render N samples per pixel while nothing moves (default 64)", -2},
+    {"pass-samples", KEY_PASS, "N", 0, "Add N of these samples with each frame (default 1)", -2},
     {"integrator", KEY_INTEGRATOR, "NAME", 0,
-     "whitted (default), distributed (with a lens or a shutter), raycast, ao, path", -2},
-    {"fps", KEY_RATE, "N", 0, "Frames per second, at most (default 60)", -2},
-    {"scale", KEY_SCALE, "N", 0, "Render one pixel for so many of the window, each way: 1 (default), 2, 4, 8", -2},
+     "Use whitted (default), distributed (default with a lens or a shutter), raycast, ao or path", -2},
+    {"fps", KEY_RATE, "N", 0, "Render at most N frames per second (default 60)", -2},
+    {"scale", KEY_SCALE, "N", 0, "Show a rendered pixel as NxN pixels of the window: 1 (default), 2, 4, 8", -2},
     {"encoding", KEY_ENCODING, "NAME", 0,
      "How pixels travel while something moves: raw, h264, jpeg, predicted, zstd (default: raw on this machine, "
      "else "
      "h264)",
      -2},
     {"still-encoding", KEY_STILL_ENCODING, "NAME", 0,
-     "The same while nothing moves: raw, predicted, zstd, jpeg (default: raw on this machine, else predicted)",
+     "Encode pixels like this while nothing moves: raw, predicted, zstd, jpeg (default: raw on this machine, else "
+     "predicted)",
      -2},
-    {"adapt", KEY_ADAPT, NULL, 0, "Quality and size follow the link while it moves (default over a network)", -2},
-    {"no-adapt", KEY_NO_ADAPT, NULL, 0, "They stay; only fewer frames come", -2},
-    {"weight", KEY_WEIGHT, "N", 0, "Share of the device beside other clients, 1 to 16 (default: the daemon's)",
-     -2},
-    {"replay", KEY_REPLAY, "INPUT.json", 0, "Timed events in place of a person; ends after the last", -2},
-    {"headless", KEY_HEADLESS, NULL, 0, "No window; needs --replay", -2},
+    {"adapt", KEY_ADAPT, NULL, 0,
+     "Adapt quality and size to the link while something moves (default over a network)", -2},
+    {"no-adapt", KEY_NO_ADAPT, NULL, 0, "Keep quality and size; a slow link gets fewer frames", -2},
+    {"weight", KEY_WEIGHT, "N", 0,
+     "Set this client's share of the device relative to others, 1 to 16 (default: the daemon's)", -2},
+    {"replay", KEY_REPLAY, "INPUT.json", 0, "Read timed input events from this file; exit after the last", -2},
+    {"headless", KEY_HEADLESS, NULL, 0, "Open no window; needs --replay", -2},
     {0}};
 
 struct command_line {
@@ -129,7 +131,7 @@ static error_t set_rate(struct command_line *line, const char *value)
 static error_t set_model(struct command_line *line, const char *value)
 {
     if (line->job.model)
-        return cli_usage(&line->job, value, "only one model can be looked at");
+        return cli_usage(&line->job, value, "only one model can be shown");
     line->job.model = value;
     return 0;
 }
@@ -200,9 +202,9 @@ static bool complete(struct command_line *line)
     struct cli_job *job = &line->job;
     struct viewer_options *viewer = &line->viewer;
     if (viewer->headless && !viewer->replay)
-        return cli_usage(job, "--headless", "without a window there is nobody but --replay") == 0;
+        return cli_usage(job, "--headless", "without a window --replay is needed") == 0;
     if (job->clip_count > 1)
-        return cli_usage(job, "--clip", "one clip is played at a time") == 0;
+        return cli_usage(job, "--clip", "only one clip can be played") == 0;
     if ((job->model && !cli_check_input(job->model, &job->error)) ||
         (job->environment && !cli_check_input(job->environment, &job->error)))
         return false;
@@ -245,7 +247,7 @@ int main(int argc, char **argv)
         .options = options,
         .parser = parse,
         .args_doc = "MODEL",
-        .doc = "Open a window on a model, or on a scene that a daemon has.\v"
+        .doc = "Open a window on a model, or on a shared scene of a daemon.\v"
                "MODEL is glTF, GLB, OBJ or NFF. FARLIGHT_SERVER, FARLIGHT_SIZE and so on give defaults.",
         .children = children,
         .help_filter = help_filter};

@@ -223,7 +223,7 @@ bool paint_in_memory(int width, int height, const struct pixmap *picture, const 
     SDL_Renderer *renderer = surface ? SDL_CreateSoftwareRenderer(surface) : NULL;
     struct painter *painter = NULL;
     if (!renderer)
-        fl_error_set(error, FL_ERROR_SYSTEM, "", "nothing can be drawn: %s", SDL_GetError());
+        fl_error_set(error, FL_ERROR_SYSTEM, "", "drawing failed: %s", SDL_GetError());
     else
         painter = painter_create(renderer, error);
     if (painter) {

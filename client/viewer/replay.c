@@ -35,7 +35,7 @@ static bool read_number(struct reader *reader, const json_t *event, const char *
         return true;
     const double number = json_number_value(found);
     if (!json_is_number(found) || !(number >= least && number <= greatest))
-        return refuse(reader, key, "is no number in its range");
+        return refuse(reader, key, "is not a number in its range");
     *value = number;
     return true;
 }
@@ -44,7 +44,7 @@ static bool read_text(struct reader *reader, const json_t *event, const char *ke
 {
     const char *found = json_string_value(json_object_get(event, key));
     if (!found || found[0] == '\0' || strlen(found) >= text_bytes)
-        return refuse(reader, key, "is no text, or too long");
+        return refuse(reader, key, "is not a text, or too long");
     strcpy(text, found);
     return true;
 }
@@ -146,7 +146,7 @@ static bool read_event(struct reader *reader, const json_t *json, struct replay 
         event->input.kind = INPUT_KEY_UP;
         good = true;
     } else {
-        return refuse(reader, NULL, "is none of mouse, wheel, key, resize, wait, screenshot, state, after");
+        return refuse(reader, NULL, "is not one of mouse, wheel, key, resize, wait, screenshot, state, after");
     }
     replay->count++;
     return good;
@@ -161,7 +161,7 @@ bool replay_load(struct replay *replay, const char *path, struct fl_error *error
     const size_t count = json_array_size(reader.json.root);
     bool good = json_is_array(reader.json.root);
     if (!good)
-        fl_error_set(error, FL_ERROR_FILE, path, "is no list of events");
+        fl_error_set(error, FL_ERROR_FILE, path, "is not a list of events");
     replay->events = calloc(2 * count + 1, sizeof(*replay->events));
     if (good && !replay->events)
         good = fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");

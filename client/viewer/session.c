@@ -95,7 +95,7 @@ static void *open_all(void *argument)
                                                .can_h264 = true,
                                                .interrupt_fd = options->interrupt_fd,
                                                .timeout_ms = session->times_live > 0 ? AGAIN_TIMEOUT_MS : 0};
-    set_progress(session, options->server ? options->server : "a daemon is started", 0);
+    set_progress(session, options->server ? options->server : "starting a daemon", 0);
     session->connection = fl_connect(&connect, &session->open_error);
     if (session->connection)
         session->scene = come_to_scene(session, &session->open_error);
@@ -109,7 +109,7 @@ static bool begin_opening(struct session *session)
     session->state = SESSION_OPENING;
     atomic_store(&session->opened, false);
     session->has_thread = pthread_create(&session->thread, NULL, open_all, session) == 0;
-    return session->has_thread || fl_error_set(&session->error, FL_ERROR_SYSTEM, "", "no thread can be started");
+    return session->has_thread || fl_error_set(&session->error, FL_ERROR_SYSTEM, "", "cannot start a thread");
 }
 
 /* ---- from state to state ---- */
@@ -174,7 +174,7 @@ struct session *session_create(const struct session_options *options, struct fl_
     struct session *session = calloc(1, sizeof(*session));
     uint64_t number = 0;
     if (!session || getrandom(&number, sizeof(number), 0) != (ssize_t)sizeof(number)) {
-        fl_error_set(error, FL_ERROR_SYSTEM, "", "no memory, or no random numbers");
+        fl_error_set(error, FL_ERROR_SYSTEM, "", "out of memory, or no random numbers");
         free(session);
         return NULL;
     }

@@ -69,7 +69,7 @@ static void screenshot(struct viewer *viewer)
     struct fl_error error = {0};
     snprintf(path, sizeof(path), "farlight-%u.png", ++viewer->screenshots);
     if (viewer_screenshot(viewer, path, &error))
-        viewer_say(viewer, "%s is written", path);
+        viewer_say(viewer, "%s written", path);
     else
         viewer_say(viewer, "%s: %s", path, error.text);
 }
@@ -203,7 +203,7 @@ void viewer_replay(struct viewer *viewer, uint64_t now_ns)
         if (!has_come(viewer, event)) {
             if (now_ns >= due_ns + (uint64_t)(event->timeout_s * 1e9))
                 fl_error_set(&viewer->failure, FL_ERROR_TIMEOUT, viewer->options->replay,
-                             "event %zu: what is waited for has not come within %g s", event->number,
+                             "event %zu: the awaited state did not occur within %g s", event->number,
                              event->timeout_s);
             return;
         }

@@ -43,7 +43,7 @@ static void fill_status(struct viewer *viewer, struct hud_state *state)
     state->status_text = text;
     if (session_scene(viewer->session)) {
         state->status = viewer->frames > 0 ? HUD_LIVE : HUD_LOADING;
-        snprintf(text, sizeof(text), "the first picture is made");
+        snprintf(text, sizeof(text), "rendering the first picture");
         return;
     }
     state->status = was_live ? HUD_LOST : HUD_LOADING;

@@ -195,7 +195,7 @@ static void take_focus(struct viewer *viewer, const struct fl_frame *frame)
     double place[3];
     struct viewer_camera camera = viewer->camera;
     if (!met(frame, place)) {
-        viewer_say(viewer, "there is nothing to focus on");
+        viewer_say(viewer, "there is no surface to focus on");
         return;
     }
     camera_focus(&camera, place);

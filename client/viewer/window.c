@@ -32,7 +32,7 @@ struct window *window_create(const char *title, int width, int height, struct fl
     SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1"); /* the program has its own */
     SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");
     if (SDL_Init(SDL_INIT_VIDEO) != 0 || !is_seen(SDL_GetCurrentVideoDriver())) {
-        fl_error_set(error, FL_ERROR_SYSTEM, "", "there is no display for a window");
+        fl_error_set(error, FL_ERROR_SYSTEM, "", "no display for a window");
         fl_error_remedy(error, "set DISPLAY or WAYLAND_DISPLAY, or use --headless --replay");
         window_destroy(made);
         return NULL;

@@ -420,7 +420,7 @@ class BadFiles(Compare):
     def test_other_files_are_no_images(self):
         path = self.folder / "text.png"
         path.write_text("no image at all\n" * 50)
-        self.refused(path, self.good, says=(path, "is no EXR, HDR, PNG or JPEG"))
+        self.refused(path, self.good, says=(path, "is not an EXR, HDR, PNG or JPEG"))
 
     def test_what_was_typed_wrong_is_said(self):
         self.refused(self.good, says=("two image files",))

@@ -148,7 +148,7 @@ class Written(unittest.TestCase):
                 (File().add_skin(joints=[1]), "names joint 1 of 1"), (File().add_skin(joints=[1, 77]), "node 77"),
                 (File().add_skin(joints=[1, -3]), "node -3"), (File().add_skin(joints=[]), "0 joints"),
                 (File().add_skin(joints=[1, 2], inverseBindMatrices=99), "accessor 99"),
-                (File().add_skin(joints=[1, 2], inverseBindMatrices=0), "another type")):
+                (File().add_skin(joints=[1, 2], inverseBindMatrices=0), "wrong type")):
             with self.subTest(expected):
                 self.assertIn(expected, self.run_file(made, 1).text())
 

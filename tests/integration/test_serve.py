@@ -233,7 +233,7 @@ class Serve(Case):
         self.render(self.folder / "a.png", "--scene", "teapot.glb")
         result = self.render(self.folder / "b.png", self.model, status=1)
         self.assertIn("may only look", result.stderr)
-        self.assertIn("ask whoever runs the daemon", result.stderr)
+        self.assertIn("ask the daemon", result.stderr)
         self.assertNotIn("b.png", self.leftovers())
         viewer = Viewer(self.socket, "teapot.glb")
         self.addCleanup(viewer.close)
@@ -318,7 +318,7 @@ class Serve(Case):
     def test_two_scenes_of_one_name_are_refused(self):
         with Daemon() as daemon, Serving(self.model, "--server", daemon.address):
             result = self.expect(farlight("serve", self.model, "--server", daemon.address), 1)
-            self.assertIn('there is a scene "teapot.glb" already', result.stderr)
+            self.assertIn('a scene "teapot.glb" exists already', result.stderr)
             with Serving(self.model, "--server", daemon.address, "--name", "another"):
                 self.assertEqual([scene["name"] for scene in self.scenes(daemon.address)], ["another", "teapot.glb"])
 
@@ -352,15 +352,15 @@ class Serve(Case):
 
     def test_mistakes_are_told_before_anything_starts(self):
         for arguments, part in (
-                (("serve",), "no model"),
-                (("serve", self.model, "--name", ""), "need a name"),
-                (("serve", self.model, "--server", "unix:/x", "--listen", "unix:/y"), "listens already"),
-                (("serve", self.model, "--server", "unix:/x", "--", "--device", "0"), "its options already"),
-                (("serve", self.model, self.model), "one model at a time"),
-                (("render", "--scene", "x", "-o", "x.png"), "no daemon is named"),
+                (("serve",), "a model file is needed"),
+                (("serve", self.model, "--name", ""), "need it to attach"),
+                (("serve", self.model, "--server", "unix:/x", "--listen", "unix:/y"), "already has its addresses"),
+                (("serve", self.model, "--server", "unix:/x", "--", "--device", "0"), "already has its options"),
+                (("serve", self.model, self.model), "only one model"),
+                (("render", "--scene", "x", "-o", "x.png"), "no address of a daemon is given"),
                 (("render", self.model, "--scene", "x", "--server", "unix:/x", "-o", "x.png"), "one or the other"),
                 (("render", "--scene", "x", "--server", "unix:/x", "--environment", "a.hdr", "-o", "x.png"), "light"),
-                (("scenes",), "no daemon is named")):
+                (("scenes",), "no address of a daemon is given")):
             result = farlight(*arguments, cwd=self.folder)
             self.assertEqual(result.returncode, 2, arguments)
             self.assertIn(part, result.stderr)
@@ -369,7 +369,7 @@ class Serve(Case):
     def test_an_address_that_cannot_be_listened_at_is_told_in_the_daemons_words(self):
         (self.folder / "file").write_text("mine")
         result = self.expect(farlight("serve", self.model, "--listen", f"unix:{self.folder}/file"), 1)
-        self.assertIn("no socket; it is left alone", result.stderr)
+        self.assertIn("not a socket; it was left alone", result.stderr)
         self.assertEqual((self.folder / "file").read_text(), "mine")
 
     def test_a_name_that_nothing_has_is_told(self):

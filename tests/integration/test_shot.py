@@ -66,20 +66,20 @@ EXAMPLES = {
 # What only the program can see: the example, the way to the value, what to put there (None: take it out), and words
 # that must be told, the line's beginning among them.
 BEYOND_THE_SCHEMA = [
-    ("moving", ("camera", "eye", "times", 1), 0, "camera.eye.times[1]: does not come after"),
+    ("moving", ("camera", "eye", "times", 1), 0, "camera.eye.times[1]: is not later"),
     ("moving", ("camera", "eye", "values"), [[0, 0, 0]], "camera.eye.values: has 1 values for 3 times"),
     ("moving", ("camera", "eye", "handles", 2), None, "camera.eye.handles: has 2 pairs for 3 times"),
-    ("moving", ("nodes", 0, "rotation"), [0, 0, 0, 0], "nodes[0].rotation: is no direction of a turn"),
+    ("moving", ("nodes", 0, "rotation"), [0, 0, 0, 0], "nodes[0].rotation: has length 0"),
     ("moving", ("nodes", 1, "rotation_degrees", "values"), [[0, -3.6e6, 0], [0, 3.6e6, 0]], "turns too often"),
     ("moving", ("camera", "orbit"), True, "camera.eye: cannot change on an orbit"),
-    ("orbit", ("camera", "dolly"), {"by": 1}, "camera.dolly: cannot go with an orbit"),
-    ("dolly", ("camera", "look_at"), [0, 1, 5], '"look_at" is where "eye" is'),
-    ("stills", ("frames",), "240-1", "frames: '240-1': the last frame lies before the first"),
+    ("orbit", ("camera", "dolly"), {"by": 1}, "camera.dolly: cannot be combined with an orbit"),
+    ("dolly", ("camera", "look_at"), [0, 1, 5], '"look_at" and "eye" are the same point'),
+    ("stills", ("frames",), "240-1", "frames: '240-1': the last frame is before the first"),
     ("stills", ("shard",), "9/8", "shard: '9/8': there is no part 9 of 8"),
     ("stills", ("output",), "frames.exr", "output: 'frames.exr' has no place for the frame's number"),
-    ("stills", ("output",), "%d/0001.exr", "output: '%d/0001.exr': the frame's number may only stand in the file's"),
+    ("stills", ("output",), "%d/0001.exr", "output: '%d/0001.exr': the frame's number may only be in the file's"),
     ("dolly", ("depth",), 2, "contradicts"),
-    ("movie", ("outputs", 0), "movie.webm", "outputs[0]: its ending names no format"),
+    ("movie", ("outputs", 0), "movie.webm", "outputs[0]: the ending is not that of a known format"),
 ]
 
 
@@ -149,7 +149,7 @@ class Mistakes(Shots):
                 ('"roughness": 0.3', '"roughness": 1.3', "materials[0].roughness: is out of range"),
                 ('"ior": 1.33', '"ior": "glass"', "materials[0].ior: must be a number"),
                 ('"metallic"', '"metalic"', "materials[0].metalic: is not known"),
-                ('"step"', '"stepp"', "camera.exposure.interpolation: is no interpolation"),
+                ('"step"', '"stepp"', "camera.exposure.interpolation: is not an interpolation"),
                 ('"target": "glaze",\n', '\n', 'materials[1]: "target" is missing'),
                 ('"hidden": false', '"hidden": 0', "nodes[0].hidden: must be true or false")):
             with self.subTest(told=told):

@@ -55,7 +55,7 @@ TEST(a_peer_that_is_no_daemon_is_reported)
 {
     struct daemon *daemon = start(play_rubbish);
     assert_null(connect_to(daemon));
-    check_error(FL_ERROR_PROTOCOL, "no farlight daemon answers there");
+    check_error(FL_ERROR_PROTOCOL, "not a farlight daemon");
     stop(daemon);
 }
 

@@ -111,7 +111,7 @@ TEST(a_model_that_is_missing_or_no_file_starts_nothing)
     assert_null(fl_model_info(&(struct fl_load_options){.model = folder}, 0, &error));
     check_error(FL_ERROR_FILE, "is not a file");
     assert_null(fl_model_info(&(struct fl_load_options){0}, 0, &error));
-    check_error(FL_ERROR_ARGUMENT, "no file is named");
+    check_error(FL_ERROR_ARGUMENT, "a file name is needed");
 }
 
 TEST(a_helper_that_is_not_installed_is_named)

@@ -177,7 +177,7 @@ TEST(a_needed_key_is_reported_with_a_remedy)
 {
     struct daemon *daemon = start(play_key_needed);
     assert_null(connect_to(daemon));
-    check_error(FL_ERROR_REFUSED, "have its key");
+    check_error(FL_ERROR_REFUSED, "clients with its key");
     assert_non_null(strstr(error.remedy, "--key"));
     stop(daemon);
 }

@@ -407,7 +407,7 @@ TEST(what_cannot_be_written_is_said_before_the_first_frame)
         {"a.mp4", {.lossless = true}, "an MP4 file does not hold FFV1", ".mkv", NULL},
         {"a.mkv", {.lossless = true, .codec = "h264"}, "h264 is not lossless, which is asked", "leave", NULL},
         {"a.mkv", {.codec = "ffv1"}, "ffv1 is lossless, which is not asked for", "ask for lossless", NULL},
-        {"a.mp4", {.codec = "h264_v4l2m2m"}, "is no codec that can be written", "h264, mpeg4", NULL},
+        {"a.mp4", {.codec = "h264_v4l2m2m"}, "is not a codec that can be written", "h264, mpeg4", NULL},
         {"a.mp4", {.frames_per_second = 2000}, "not within 0.001 .. 1000", "", "frames_per_second"},
         {"a.mp4", {.quality = 52}, "not within 0 .. 51", "", "quality"},
         {"\xff.mp4", {0}, "no UTF-8", "", "path"}};
@@ -481,7 +481,7 @@ TEST(a_video_without_frames_is_refused)
     struct fl_video *video = fl_video_start(&(struct fl_video_options){.path = path_of("a.mkv")}, &error);
     assert_non_null(video);
     assert_false(fl_video_finish(video, &error));
-    assert_non_null(strstr(error.text, "a video without frames cannot be"));
+    assert_non_null(strstr(error.text, "a video needs at least one frame"));
     assert_non_null(strstr(error.remedy, "at least one"));
     fl_video_destroy(video);
     assert_int_equal(count_files(), 0);
@@ -774,7 +774,7 @@ TEST(a_client_that_breaks_the_protocol_is_left_with_a_line_and_no_file)
         error = (struct fl_error){0};
         assert_false(fl_helper_receive(&writer, &message, &error));
         if (strstr(error.text, "farlight-video ended with status 1") == NULL ||
-            strstr(error.text, "does not belong here") == NULL)
+            strstr(error.text, "is not allowed here") == NULL)
             fail_msg("%d: %s", kind, error.text);
         fl_helper_finish(&writer);
         assert_int_equal(count_files(), 0);

@@ -455,7 +455,7 @@ TEST(frames_that_nothing_allows_break_the_connection)
     expect_broken(&frame, 1, "jpeg");
     frame = some_frame(5, 0);
     frame.digest++;
-    expect_broken(&frame, 1, "not those rendered");
+    expect_broken(&frame, 1, "differ from those that were rendered");
     frame = some_frame(5, 0);
     frame.layers = 3;
     expect_broken(&frame, 1, "layers");
@@ -484,7 +484,7 @@ TEST(more_frames_than_credit_break_the_connection)
     struct fl_view *view = begin_view(&viewing, play_flood);
     uint64_t ns = 0;
     assert_false(fl_ping(viewing.scene.connection, &ns, &error));
-    check_error(FL_ERROR_PROTOCOL, "more frames came than were asked for");
+    check_error(FL_ERROR_PROTOCOL, "more frames arrived than were requested");
     end_view(&viewing, view);
 }
 
@@ -566,7 +566,7 @@ TEST(a_frame_of_motion_that_is_abandoned_breaks_the_connection)
     struct viewing viewing;
     struct fl_view *view = begin_view(&viewing, play_abandoned);
     assert_null(fl_view_next(view, 10000, &error));
-    check_error(FL_ERROR_PROTOCOL, "which only a picture at rest may do");
+    check_error(FL_ERROR_PROTOCOL, "which is allowed only for a picture at rest");
     end_view(&viewing, view);
 }
 
