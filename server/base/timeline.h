@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Stage times of all frames as a file of trace events, which ui.perfetto.dev and chrome://tracing open: the array
- * form of the Trace Event Format (Google. Trace Event Format. 2016), complete events ("X"), microseconds of
- * clock_now_ns(), processes are clients, threads are tracks of a job: render, output (encoding, waiting, sending)
- * and GPU, each with more lanes where frames overlap, so that the events of one thread nest.
+/* Stage times of all frames as a file of trace events (protocol/common/trace_event.h) by clock_now_ns(). Processes
+ * are clients, tracks those of a job: render, output (encoding, waiting, sending) and GPU.
  * A thread of its own writes; callers never wait for the disk. While the daemon runs, and after a crash,
  * the file lacks its last line, "]", which the format allows. */
 #ifndef FARLIGHT_BASE_TIMELINE_H
