@@ -61,6 +61,7 @@ UNIT_ALSO = {
     "gpu_scene": ("server/trace",),  # where rays meet what moved
     "net": ("server/session",),  # the blobs of a connection
     "session": ("server",),  # the limits of the configuration
+    "trace/ldc": ("server/render",),  # cubes of tracers that are switched
 }
 # System headers that only some rooms, and the folders below them, may use.
 RESTRICTED = {
@@ -139,8 +140,9 @@ class Checker:
         if not room.startswith(UNIT) or other.startswith(TESTS):
             return True
         subject = room[len(UNIT):]
-        rooms = [room for row in MAY_INCLUDE for root in UNIT_ROOTS
-                 if ((room := row.replace("*", subject)) + "/").startswith(root + subject + "/") and pathlib.Path(room).is_dir()]
+        name = pathlib.Path(subject).name
+        rooms = [room for room in (row.replace("*", name) for row in MAY_INCLUDE) for root in UNIT_ROOTS
+                 if f"{room}/".startswith(f"{root}{subject}/") and pathlib.Path(room).is_dir()]
         if not rooms or any(other in below(*room_of(pathlib.Path(room, "file"))) for room in rooms):
             return True
         self.used.add((subject, other))
