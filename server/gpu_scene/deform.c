@@ -191,7 +191,7 @@ static bool update_use(struct work *work, uint32_t use_index, const struct scene
     use->value_count = count;
     if (changed) {
         use->revision = ++work->gpu->deformed_revision;
-        changes->deformed = true;
+        changes->bits |= CHANGED_DEFORMED;
         find_box(use, work->scene, &deform->meshes[use->mesh]);
     }
     bool ok = (use->is_placed && same_open) || add_pass(work, use_index, false);

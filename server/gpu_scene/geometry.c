@@ -394,7 +394,7 @@ bool gpu_scene_upload_geometry(struct gpu_scene *gpu, const struct scene *scene,
     for (size_t i = 0; i < sizeof(optional) / sizeof(optional[0]); i++)
         if (!gpu_buffer_reserve(gpu->device, optional[i], 0, error)) /* keeps the memory */
             return false;
-    changes->geometry = true;
+    changes->bits |= CHANGED_GEOMETRY;
     if (!check_totals(gpu, &totals, error) || !upload_meshes(gpu, &totals, changes, error) ||
         !upload_spheres(gpu, &totals, changes, error) || !gpu_scene_deform_upload_rest(gpu, scene, changes, error))
         return false;

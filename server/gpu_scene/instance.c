@@ -172,7 +172,7 @@ static void write_changed(struct gpu_scene *gpu, const struct instance *fresh, u
                 end = k + 1;
         size_t bytes = (end - i) * sizeof(*fresh);
         gpu_buffer_write(gpu->device, &gpu->instance_buffer, i * sizeof(*fresh), &fresh[i], bytes);
-        changes->instances = true;
+        changes->bits |= CHANGED_INSTANCES;
         changes->uploaded_bytes += bytes;
         i = end;
     }
@@ -215,7 +215,7 @@ static bool upload(struct gpu_scene *gpu, const struct fresh *fresh, struct scen
         size_t bytes = fresh->count * sizeof(*fresh->instances);
         if (!gpu_buffer_upload(gpu->device, &gpu->instance_buffer, fresh->instances, bytes, error))
             return false;
-        changes->instances = true;
+        changes->bits |= CHANGED_INSTANCES;
         changes->uploaded_bytes += bytes;
     }
     size_t bytes = fresh->motion_count * sizeof(*fresh->motions);
@@ -223,7 +223,7 @@ static bool upload(struct gpu_scene *gpu, const struct fresh *fresh, struct scen
         return true;
     if (!gpu_buffer_upload(gpu->device, &gpu->motion_buffer, fresh->motions, bytes, error))
         return false;
-    changes->instances = true;
+    changes->bits |= CHANGED_INSTANCES;
     changes->uploaded_bytes += bytes;
     return true;
 }
@@ -293,6 +293,7 @@ bool gpu_scene_upload_discs(struct gpu_scene *gpu, const struct scene *scene, st
     gpu->discs = discs;
     gpu->disc_count = (uint32_t)count;
     gpu->state->discs_signature = signature;
+    changes->bits |= CHANGED_DISCS;
     changes->uploaded_bytes += count * sizeof(*discs);
     return true;
 }

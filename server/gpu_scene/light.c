@@ -92,7 +92,7 @@ static bool upload_environment(struct gpu_scene *gpu, const struct scene *scene,
     memcpy(gpu->environment_colour, environment->colour, sizeof(gpu->environment_colour));
     gpu->environment_rotation = environment->rotation;
     gpu->has_environment_image = environment->texels != NULL;
-    changes->lights = true;
+    changes->bits |= CHANGED_LIGHTS;
     if (gpu->has_environment_image) {
         if (!gpu_texture_reserve(gpu->device, &gpu->environment, GL_RGBA16F, environment->width,
                                  environment->height, error))
@@ -152,12 +152,12 @@ bool gpu_scene_upload_lights(struct gpu_scene *gpu, const struct scene *scene, c
     bool same = gpu->state->any_update && gpu->light_count == count_before &&
                 memcmp(packed, gpu->state->lights, bytes) == 0;
     if (!gpu->state->any_update || gpu->lights_revision != scene->lights_revision)
-        changes->lights = true;
+        changes->bits |= CHANGED_LIGHTS;
     free(gpu->state->lights);
     gpu->state->lights = packed;
     if (same)
         return true;
-    changes->lights = true;
+    changes->bits |= CHANGED_LIGHTS;
     changes->uploaded_bytes += bytes;
     return gpu_buffer_upload(gpu->device, &gpu->lights, packed, bytes, error);
 }

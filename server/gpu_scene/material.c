@@ -138,7 +138,7 @@ static bool upload_changed(struct gpu_scene *gpu, struct gpu_buffer *buffer, con
 {
     const char *now = fresh, *before = mirror;
     if (!mirror || buffer->size_bytes != count * item_bytes) {
-        changes->shading = true;
+        changes->bits |= CHANGED_SHADING;
         changes->uploaded_bytes += count * item_bytes;
         return gpu_buffer_upload(gpu->device, buffer, fresh, count * item_bytes, error);
     }
@@ -149,7 +149,7 @@ static bool upload_changed(struct gpu_scene *gpu, struct gpu_buffer *buffer, con
         end--;
     if (first == end)
         return true;
-    changes->shading = true;
+    changes->bits |= CHANGED_SHADING;
     changes->uploaded_bytes += (end - first) * item_bytes;
     gpu_buffer_write(gpu->device, buffer, first * item_bytes, now + first * item_bytes,
                      (end - first) * item_bytes);
@@ -209,7 +209,8 @@ bool gpu_scene_upload_materials(struct gpu_scene *gpu, const struct scene *scene
     while (ok && hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value))
         pack_material(gpu, scene_pose_material(pose, value), &packed[gpu_scene_material_index(gpu, (uint32_t)id)],
                       slots, &slot_count);
-    changes->surfaces |= ok && !same_surfaces(gpu, packed, count, slots, slot_count);
+    if (ok && !same_surfaces(gpu, packed, count, slots, slot_count))
+        changes->bits |= CHANGED_SURFACES;
     ok = ok &&
          upload_changed(gpu, &gpu->materials, packed, state->materials, sizeof(*packed), count, changes, error) &&
          upload_changed(gpu, &gpu->texture_slots, slots, state->texture_slots, sizeof(*slots), slot_count, changes,

@@ -101,7 +101,7 @@ static unsigned posed_parts(const struct scene_motion *motion)
 static bool update_shading(struct gpu_scene *gpu, const struct scene *scene, const struct scene_motion *motion,
                            bool edited, struct scene_changes *changes, struct error *error)
 {
-    changes->shading = edited;
+    changes->bits |= edited ? CHANGED_SHADING : 0;
     return (!edited || (gpu_scene_index_materials(gpu, scene, error) &&
                         gpu_scene_upload_textures(gpu, scene, changes, error))) &&
            gpu_scene_upload_materials(gpu, scene, motion, changes, error);
@@ -124,7 +124,7 @@ static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const
         return false;
     if (geometry && !gpu_scene_upload_discs(gpu, scene, changes, error))
         return false;
-    if (geometry || shading || changes->geometry)
+    if (geometry || shading || (changes->bits & CHANGED_GEOMETRY))
         gpu_scene_classify_geometry(gpu, scene, motion);
     if ((geometry || nodes || (posed & POSED_MORPHS)) && !gpu_scene_deform(gpu, scene, motion, changes, error))
         return false;
@@ -133,7 +133,7 @@ static bool update_parts(struct gpu_scene *gpu, const struct scene *scene, const
     if ((geometry || nodes) && !gpu_scene_upload_instances(gpu, scene, motion, changes, error))
         return false;
     /* The bounds are of geometry, instances and lights together; lights see to them last. */
-    if ((geometry || nodes || lights || changes->deformed) &&
+    if ((geometry || nodes || lights || (changes->bits & CHANGED_DEFORMED)) &&
         !gpu_scene_upload_lights(gpu, scene, motion, changes, error))
         return false;
     return gpu_check(gpu->device, "scene upload", error);

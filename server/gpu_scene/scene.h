@@ -15,14 +15,28 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* What one update changed; a tracer does no more than that needs. */
+/* What can change between two frames, as bits. A tracer says with the same bits what its structure is built from
+ * (tracer_impl.depends_on). */
+enum scene_change {
+    CHANGED_GEOMETRY = 1 << 0, /* meshes or sphere sets were added, removed or set again */
+    CHANGED_DEFORMED =
+        1 << 1, /* vertices of deforming geometries moved; which: gpu_scene_geometry.deformed_revision */
+    CHANGED_INSTANCES = 1 << 2, /* transforms, or which instances there are */
+    CHANGED_DISCS = 1 << 3,     /* discs, which no structure of the scene holds but the reference's */
+    CHANGED_SHADING = 1 << 4,   /* materials, textures; alpha too */
+    CHANGED_SURFACES =
+        1 << 5,              /* of these: textures, how materials use them, and where they cut out; not factors */
+    CHANGED_LIGHTS = 1 << 6, /* lights and the environment */
+    CHANGED_VIEW = 1 << 7,   /* the camera, or the size of the picture: struct trace_view. Never of a scene */
+};
+#define CHANGED_SCENE (CHANGED_VIEW - 1u) /* all that a scene can change */
+#define CHANGED_ALL                                                                                               \
+    (CHANGED_SCENE | (unsigned)CHANGED_VIEW) /* of a structure that is built for the first time                   \
+                                              */
+
+/* What one update of the copy changed. */
 struct scene_changes {
-    bool geometry;  /* primitives were added, removed or changed */
-    bool deformed;  /* vertices of deforming geometries are others; of which, their deformed_revision tells */
-    bool instances; /* transforms, or which instances there are */
-    bool shading;   /* materials, textures; alpha too */
-    bool surfaces;  /* of these: textures, how materials use them, and where they cut out; not their factors */
-    bool lights;
+    unsigned bits; /* enum scene_change */
     uint64_t uploaded_bytes;
 };
 

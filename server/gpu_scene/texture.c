@@ -255,7 +255,7 @@ bool gpu_scene_upload_textures(struct gpu_scene *gpu, const struct scene *scene,
     if (!ok)
         return false;
     gpu->state->textures_signature = signature;
-    changes->shading = changes->surfaces = true;
+    changes->bits |= CHANGED_SHADING | CHANGED_SURFACES;
     changes->uploaded_bytes += texel_count * 4 + count * sizeof(*infos);
     return true;
 }

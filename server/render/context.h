@@ -21,15 +21,14 @@ struct slice {
     uint32_t first_slot, slot_count;
 };
 
-#define PART_WAVES 8 /* the last stands for all that follow */
-
 struct render_context {
     struct gpu_device *device;
     struct gpu_scene *scene; /* shared with other frames, as are the next three */
     struct environment *environment;
     struct environment_choice *environment_choice; /* which the integrator path keeps up */
     struct tracer *tracer;
-    struct comparison *comparison; /* of the frame in hand; NULL: nothing is compared */
+    struct trace_state *trace_state; /* of the wave in hand, by that tracer */
+    struct comparison *comparison;   /* of the frame in hand; NULL: nothing is compared */
     struct gpu_timer *timer;
     struct frame_request request;
     struct stage_times times;
@@ -51,13 +50,10 @@ struct render_context {
     uint32_t hit_count;
     uint32_t asked;  /* shadow rays of each hit of the wave in hand that are traced already */
     uint32_t asking; /* and that are made and not traced to the end; 0: none */
-    uint32_t traced; /* rays that are, of the wave that is being traced; 0: none is */
-    uint32_t chosen; /* for it by its tracer */
-    uint32_t part_rays[RAY_KIND_COUNT][PART_WAVES]; /* how many are traced in one step, wave_trace.h */
-    struct gpu_buffer block_offsets, wave_state;    /* of the compaction */
-    struct gpu_buffer slice_sums;                   /* vec4 a sample of the slice: radiance so far, coverage */
-    uint64_t shadow_rays, secondary_rays;           /* of the slice in hand */
-    uint32_t span_count;                            /* since the timer was collected */
+    struct gpu_buffer block_offsets, wave_state; /* of the compaction */
+    struct gpu_buffer slice_sums;                /* vec4 a sample of the slice: radiance so far, coverage */
+    uint64_t shadow_rays, secondary_rays;        /* of the slice in hand */
+    uint32_t span_count;                         /* since the timer was collected */
 };
 
 /* Spans of this frame; the ring is emptied before it is full. */

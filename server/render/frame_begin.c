@@ -7,7 +7,6 @@
 #include "render/camera.h"
 #include "render/frame_request.h"
 #include "render/pixel_filter.h"
-#include "render/wave_trace.h"
 
 #include <math.h>
 #include <string.h>
@@ -52,13 +51,17 @@ bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *
                      const struct scene_motion *motion, const struct frame_request *request)
 {
     struct error refused = {0}; /* by frame_begin, before it changes anything */
-    const struct tracer_impl *const impls[] = {
+    const struct tracer_impl *const wanted[] = {
         find_tracer(renderer, request->tracer, "tracer", &refused),
         request->compare ? find_tracer(renderer, request->compare_with, "compare_with", &refused) : NULL,
     };
-    size_t count = request->compare ? 2 : 1;
     if (is_alone(renderer) || refused.kind != ERROR_NONE)
         return true;
+    const struct tracer_impl *impls[2]; /* that are shared with the other frames */
+    size_t count = 0;
+    for (size_t i = 0; i < 2; i++)
+        if (wanted[i] && !(wanted[i]->depends_on & CHANGED_VIEW))
+            impls[count++] = wanted[i];
     return gpu_scene_is_current(&renderer->shared->copy, scene, motion) &&
            tracer_set_are_free(&renderer->shared->tracers, impls, count, &request->tracer_options);
 }
@@ -66,8 +69,7 @@ bool frame_may_begin(const struct frame_renderer *renderer, const struct scene *
 /* An update that failed leaves no revision. */
 static void note_showing(struct frame_scene *shared, uint64_t revision_before, const struct scene_changes *changes)
 {
-    if (shared->copy.revision != revision_before || changes->geometry || changes->deformed || changes->instances ||
-        changes->shading || changes->lights)
+    if (shared->copy.revision != revision_before || changes->bits)
         shared->showing++;
 }
 
@@ -79,7 +81,7 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     struct scene_changes changes = {0};
     uint64_t revision_before = shared->copy.revision;
     bool updated = gpu_scene_update(&shared->copy, scene, motion, &changes, &context->times, error);
-    tracer_set_note(&shared->tracers, updated ? &changes : NULL);
+    change_history_note(&shared->changes, updated ? changes.bits : CHANGED_SCENE);
     note_showing(shared, revision_before, &changes);
     if (!updated)
         return false;
@@ -97,11 +99,10 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
 static struct tracer *take_tracer(struct frame_renderer *renderer, unsigned number, const char *field,
                                   struct error *error)
 {
-    struct frame_scene *shared = renderer->shared;
     const struct tracer_impl *impl = find_tracer(renderer, number, field, error);
-    if (!tracer_check_motion(impl, &shared->copy, error))
+    if (!tracer_check_motion(impl, &renderer->shared->copy, error))
         return NULL;
-    return tracer_set_take(&shared->tracers, renderer->device, impl,
+    return tracer_set_take(frame_tracers(renderer, impl), renderer->device, impl,
                            &renderer->work->context.request.tracer_options, error);
 }
 
@@ -110,19 +111,27 @@ static bool take_tracers(struct frame_renderer *renderer, struct error *error)
     struct render_context *context = &renderer->work->context;
     const struct frame_request *request = &context->request;
     renderer->tracer = context->tracer = take_tracer(renderer, request->tracer, "tracer", error);
-    if (!renderer->tracer || !request->compare)
-        return renderer->tracer;
+    if (!renderer->tracer || !frame_work_trace_by(renderer->work, renderer->tracer, error))
+        return false;
+    if (!request->compare)
+        return true;
+    struct tracer_set *tracers = frame_tracers(renderer, renderer->tracer->impl);
     renderer->second = request->compare_with == request->tracer
-                           ? tracer_set_take_again(&renderer->shared->tracers, renderer->tracer)
+                           ? tracer_set_take_again(tracers, renderer->tracer)
                            : take_tracer(renderer, request->compare_with, "compare_with", error);
     return renderer->second;
 }
 
+static void give_tracer(struct frame_renderer *renderer, const struct tracer *tracer)
+{
+    if (tracer)
+        tracer_set_give(frame_tracers(renderer, tracer->impl), tracer);
+}
+
 void frame_end(struct frame_renderer *renderer)
 {
-    struct tracer_set *tracers = &renderer->shared->tracers;
-    tracer_set_give(tracers, renderer->tracer);
-    tracer_set_give(tracers, renderer->second);
+    give_tracer(renderer, renderer->tracer);
+    give_tracer(renderer, renderer->second);
     renderer->tracer = renderer->second = NULL;
     if (renderer->phase != PHASE_IDLE)
         renderer->shared->frames--;
@@ -235,7 +244,6 @@ static bool get_ready(struct frame_renderer *renderer, struct error *error)
         1.0f / sqrtf(request->accumulate ? SAMPLES_GOING_ON : (float)request->samples);
     context->spread = request->samples > 1 || request->accumulate;
     fill_filter(context);
-    wave_trace_forget(context);
     context->uniforms.seed = (uint32_t)(request->seed ^ request->seed >> 32);
     if (!reserve_frame(renderer, error) || !gpu_check(renderer->device, "beginning a frame", error))
         return false;
@@ -256,8 +264,9 @@ static enum tracer_progress bring(struct frame_renderer *renderer, const struct 
     const uint64_t start_ns = clock_now_ns();
     spans->origin_ns = context->times.origin_ns;
     spans->count = 0;
-    enum tracer_progress progress =
-        tracer_set_bring(&shared->tracers, tracer, &shared->copy, shared->step_ns, spans, error);
+    const struct tracer_update update = {.view = &renderer->view, .times = spans};
+    enum tracer_progress progress = tracer_set_bring(frame_tracers(renderer, tracer->impl), tracer, &shared->copy,
+                                                     &update, shared->step_ns, error);
     if (tracer == renderer->tracer)
         context_add_times(context, spans);
     else /* a structure that is no part of what the frame's own tracer cost */
@@ -283,6 +292,19 @@ bool frame_build(struct frame_renderer *renderer, struct error *error)
     return progress == TRACER_DONE ? get_ready(renderer, error) : progress == TRACER_MORE;
 }
 
+static struct trace_view view_of(const struct frame_request *request)
+{
+    struct trace_view view = {
+        .fov_y = request->camera.fov_y,
+        .ortho_height = request->camera.ortho_height,
+        .near = request->camera.near,
+        .width = request->width,
+        .height = request->height,
+    };
+    memcpy(view.world_from_view, request->camera.world_from_view, sizeof(view.world_from_view));
+    return view;
+}
+
 static bool begin(struct frame_renderer *renderer, const struct scene *scene, const struct scene_motion *motion,
                   const struct frame_request *request, struct error *error)
 {
@@ -294,6 +316,7 @@ static bool begin(struct frame_renderer *renderer, const struct scene *scene, co
     struct render_context *context = &renderer->work->context;
     context->request = *request;
     renderer->result = (struct frame_result){0};
+    renderer->view = view_of(request);
     renderer->samples_before = may_go_on(renderer, request) ? renderer->kept_samples : 0;
     renderer->kept_samples = 0; /* until this one is finished */
     stage_times_begin(&context->times);

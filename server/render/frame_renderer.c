@@ -29,6 +29,7 @@ struct frame_scene *frame_scene_create(struct gpu_device *device, struct error *
     }
     shared->device = device;
     shared->step_ns = STEP_NS;
+    shared->tracers.history = &shared->changes;
     gpu_scene_init(&shared->copy, device);
     return shared;
 }
@@ -59,6 +60,11 @@ uint64_t frame_scene_device_bytes(const struct frame_scene *shared)
     return sum;
 }
 
+struct tracer_set *frame_tracers(struct frame_renderer *renderer, const struct tracer_impl *impl)
+{
+    return impl->depends_on & CHANGED_VIEW ? &renderer->tracers : &renderer->shared->tracers;
+}
+
 struct frame_renderer *frame_renderer_create(struct frame_scene *shared, struct error *error)
 {
     struct frame_renderer *renderer = calloc(1, sizeof(*renderer));
@@ -68,6 +74,7 @@ struct frame_renderer *frame_renderer_create(struct frame_scene *shared, struct 
     }
     renderer->device = shared->device;
     renderer->shared = shared;
+    renderer->tracers.history = &shared->changes;
     /* Software GL copies at once, and would do so twice. */
     renderer->reads_behind = !shared->device->facts.software;
     return renderer;
@@ -78,6 +85,7 @@ void frame_renderer_destroy(struct frame_renderer *renderer)
     if (!renderer)
         return;
     frame_abandon(renderer);
+    tracer_set_finish(&renderer->tracers);
     picture_finish(&renderer->picture, renderer->device);
     free(renderer);
 }
@@ -101,6 +109,6 @@ void frame_renderer_stand_in(struct frame_renderer *renderer, unsigned number, c
 
 uint64_t frame_renderer_device_bytes(const struct frame_renderer *renderer)
 {
-    return picture_device_bytes(&renderer->picture) +
+    return picture_device_bytes(&renderer->picture) + tracer_set_device_bytes(&renderer->tracers) +
            (renderer->work ? frame_work_device_bytes(renderer->work) : 0);
 }

@@ -30,8 +30,9 @@ enum frame_phase {
 struct frame_scene {
     struct gpu_device *device;
     struct gpu_scene copy;
-    struct tracer_set tracers;
-    uint64_t step_ns; /* of bringing them to the scene */
+    struct change_history changes; /* of the copy */
+    struct tracer_set tracers;     /* that depend on the scene alone */
+    uint64_t step_ns;              /* of bringing them to the scene */
     struct environment environment;
     struct environment_choice environment_choice;
     uint64_t showing;        /* counts up when the copy is of something else: a revision, poses */
@@ -44,6 +45,7 @@ struct frame_scene {
 struct frame_work {
     struct frame_work *next; /* idle */
     struct wave_passes passes;
+    struct trace_state *trace_state; /* of its waves; NULL: no frame has traced any yet */
     struct render_context context;
     struct primary primary;
     struct layers layers;
@@ -56,13 +58,15 @@ struct frame_renderer {
     struct gpu_device *device;
     struct frame_scene *shared;
     struct picture picture;
+    struct tracer_set tracers; /* that depend on the view: no other renderer's frames may use them */
     const struct tracer_impl *stand_in;
     unsigned stand_in_number;
     uint32_t wanted_slice_pixels, wanted_wave_rays; /* 0: chosen */
     bool reads_behind;                              /* bands are copied while the device has other work */
     /* the frame in hand */
     enum frame_phase phase;
-    struct frame_work *work;        /* owned until it ends */
+    struct frame_work *work; /* owned until it ends */
+    struct trace_view view;
     struct tracer *tracer, *second; /* held; NULL: none */
     bool built;                     /* `tracer` is what the scene is */
     bool rasterise;
@@ -84,7 +88,11 @@ struct frame_work *frame_work_take(struct frame_scene *shared, const struct inte
                                    struct error *error);
 void frame_work_give(struct frame_scene *shared, struct frame_work *work); /* accepts NULL */
 void frame_work_finish(struct frame_scene *shared);                        /* all that are idle */
+/* Makes the work's trace state one for these, where it is not. */
+bool frame_work_trace_by(struct frame_work *work, const struct tracer *tracer, struct error *error);
 uint64_t frame_work_device_bytes(const struct frame_work *work);
+/* frame_renderer.c. Which set a tracer belongs to follows from what it depends on. */
+struct tracer_set *frame_tracers(struct frame_renderer *renderer, const struct tracer_impl *impl);
 /* frame_begin.c. A step of bringing the tracers to the scene; the last one leaves the frame ready for its first
  * sample. */
 bool frame_build(struct frame_renderer *renderer, struct error *error);

@@ -260,7 +260,7 @@ static bool trace_hits(struct render_context *context, bool *done, struct error 
 bool primary_begin_slice(const struct primary *primary, struct render_context *context, struct error *error)
 {
     context->ray_count = context->slice.slot_count << context->uniforms.sample_shift;
-    context->wave_number = context->asked = context->asking = context->traced = 0;
+    context->wave_number = context->asked = context->asking = 0;
     context->sampled_hits = !primary && context->tracer->impl->sampled;
     context->shadow_rays = context->secondary_rays = 0;
     context_span_begin(context, STAGE_PRIMARY);

@@ -1,22 +1,23 @@
 /* SPDX-License-Identifier: MIT */
 #include "render/tracer_set.h"
 
-void tracer_set_note(struct tracer_set *set, const struct scene_changes *changes)
+#include <string.h>
+
+void change_history_note(struct change_history *history, unsigned changed)
 {
-    for (int i = 0; i < TRACERS_KEPT; i++) {
-        struct scene_changes *pending = &set->slots[i].pending;
-        if (!changes) {
-            if (set->slots[i].tracer)
-                tracer_outdate(set->slots[i].tracer);
-            continue;
-        }
-        pending->geometry |= changes->geometry;
-        pending->deformed |= changes->deformed;
-        pending->instances |= changes->instances;
-        pending->shading |= changes->shading;
-        pending->surfaces |= changes->surfaces;
-        pending->lights |= changes->lights;
-    }
+    if (!changed)
+        return;
+    history->update_count++;
+    for (unsigned left = changed; left; left &= left - 1)
+        history->last[__builtin_ctz(left)] = history->update_count;
+}
+
+unsigned change_history_since(const struct change_history *history, uint64_t update_count)
+{
+    unsigned changed = 0;
+    for (unsigned bit = 0; bit < sizeof(changed) * 8; bit++)
+        changed |= history->last[bit] > update_count ? 1u << bit : 0;
+    return changed;
 }
 
 static void empty_slot(struct tracer_slot *slot)
@@ -31,11 +32,10 @@ static bool holds(const struct tracer_slot *slot, const struct tracer_impl *impl
     return slot->tracer && slot->impl == impl && tracer_options_same(&slot->options, options);
 }
 
-static bool is_up_to_date(const struct tracer_slot *slot)
+static bool is_up_to_date(const struct tracer_set *set, const struct tracer_slot *slot)
 {
-    const struct scene_changes *pending = &slot->pending;
-    return slot->tracer->updated && !slot->tracer->updating && !pending->geometry && !pending->deformed &&
-           !pending->instances && !pending->shading && !pending->surfaces && !pending->lights;
+    return slot->tracer->updated && !slot->tracer->updating &&
+           !(change_history_since(set->history, slot->told) & slot->impl->depends_on);
 }
 
 bool tracer_set_are_free(const struct tracer_set *set, const struct tracer_impl *const impls[], size_t count,
@@ -47,7 +47,7 @@ bool tracer_set_are_free(const struct tracer_set *set, const struct tracer_impl 
         bool wanted = false;
         for (size_t k = 0; k < count; k++)
             wanted = wanted || holds(slot, impls[k], options);
-        if (wanted && slot->users && !is_up_to_date(slot) && !slot->tracer->updating)
+        if (wanted && slot->users && !is_up_to_date(set, slot) && !slot->tracer->updating)
             return false;
         missing -= wanted;
         room += !wanted && !slot->users;
@@ -113,14 +113,28 @@ struct tracer *tracer_set_take_again(struct tracer_set *set, struct tracer *trac
     return tracer;
 }
 
+static unsigned pending(const struct tracer_set *set, const struct tracer_slot *slot,
+                        const struct trace_view *view)
+{
+    unsigned changed = change_history_since(set->history, slot->told);
+    if (view && memcmp(view, &slot->view, sizeof(*view)) != 0)
+        changed |= CHANGED_VIEW;
+    return changed;
+}
+
 enum tracer_progress tracer_set_bring(struct tracer_set *set, const struct tracer *tracer, struct gpu_scene *scene,
-                                      uint64_t step_ns, struct stage_times *times, struct error *error)
+                                      const struct tracer_update *update, uint64_t step_ns, struct error *error)
 {
     struct tracer_slot *slot = slot_of(set, tracer);
-    enum tracer_progress progress = tracer_update_step(slot->tracer, scene, &slot->pending, step_ns, times, error);
-    if (progress == TRACER_DONE)
-        slot->pending = (struct scene_changes){0};
-    return progress;
+    struct tracer_update own = *update;
+    own.changed = pending(set, slot, update->view);
+    enum tracer_progress progress = tracer_update_step(slot->tracer, scene, &own, step_ns, error);
+    if (progress != TRACER_DONE)
+        return progress;
+    slot->told = set->history->update_count;
+    if (update->view)
+        slot->view = *update->view;
+    return TRACER_DONE;
 }
 
 void tracer_set_give(struct tracer_set *set, const struct tracer *tracer)
@@ -135,7 +149,7 @@ uint64_t tracer_set_device_bytes(const struct tracer_set *set)
     uint64_t sum = 0;
     for (int i = 0; i < TRACERS_KEPT; i++)
         if (set->slots[i].tracer)
-            sum += set->slots[i].tracer->stats.device_bytes;
+            sum += tracer_device_bytes(set->slots[i].tracer);
     return sum;
 }
 

@@ -55,31 +55,10 @@ const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const
     return gpu_program_get(scene->device, &whole, error);
 }
 
-bool trace_surfaces(const struct gpu_scene *scene, const struct wave *wave, struct error *error)
+void trace_program_run(const struct gpu_program *program, const struct gpu_scene *scene,
+                       const struct ray_range *rays, const struct trace_program_source *source)
 {
-    if (wave->kind == WAVE_ANY || wave->crossings_only)
-        return true;
-    struct gpu_define defines[3] = {0};
-    size_t n = 0;
-    if (scene->has_spheres)
-        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
-    if (has_motion(scene, wave))
-        defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
-    const struct gpu_program_source source = {.compute = "trace/surface.comp", .defines = defines};
-    const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
-    if (!program)
-        return false;
-    gpu_uniform_uint(program, "first_ray", wave->first_ray);
-    gpu_uniform_uint(program, "ray_count", wave->end_ray);
-    bind_rays(scene, wave);
-    gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
-    gpu_dispatch(scene->device, program, wave->end_ray - wave->first_ray);
-    return true;
-}
-
-bool trace_program_run(const struct gpu_program *program, const struct gpu_scene *scene, const struct wave *wave,
-                       const struct trace_program_source *source, struct error *error)
-{
+    const struct wave *wave = rays->wave;
     uint32_t together = source->rays_together ? source->rays_together : 1;
     bind_rays(scene, wave);
     if (wave->kind == WAVE_ANY)
@@ -88,15 +67,47 @@ bool trace_program_run(const struct gpu_program *program, const struct gpu_scene
         gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
     gpu_uniform_uint(program, "disc_count", scene->disc_count);
     gpu_uniform_uint(program, "instance_count", scene->instance_count);
-    for (uint32_t first = wave->first_ray, part; first < wave->end_ray; first += part) {
-        part = wave->end_ray - first;
+    for (uint32_t first = rays->first, part; first < rays->end; first += part) {
+        part = rays->end - first;
         if (source->rays_a_dispatch && source->rays_a_dispatch < part)
             part = source->rays_a_dispatch;
         gpu_uniform_uint(program, "first_ray", first);
         gpu_uniform_uint(program, "ray_count", first + part);
         gpu_dispatch(scene->device, program, ((uint64_t)part + together - 1) / together);
-        if (first + part < wave->end_ray) /* a part of its own to the driver too, which may gather commands */
+        if (first + part < rays->end) /* a part of its own to the driver too, which may gather commands */
             glFlush();
     }
-    return trace_surfaces(scene, wave, error);
+}
+
+/* ---- surfaces ---- */
+
+const struct gpu_program *trace_surface_program_get(const struct gpu_scene *scene, const char *compute,
+                                                    const struct gpu_define *defines, struct error *error)
+{
+    return gpu_program_get(scene->device, &(struct gpu_program_source){.compute = compute, .defines = defines},
+                           error);
+}
+
+void trace_surface_program_run(const struct gpu_program *program, const struct gpu_scene *scene,
+                               const struct ray_range *rays)
+{
+    gpu_uniform_uint(program, "first_ray", rays->first);
+    gpu_uniform_uint(program, "ray_count", rays->end);
+    bind_rays(scene, rays->wave);
+    gpu_buffer_bind_image(scene->device, rays->wave->hits, IMAGE_HITS, GL_RGBA32UI);
+    gpu_dispatch(scene->device, program, rays->end - rays->first);
+}
+
+bool trace_surfaces(const struct gpu_scene *scene, const struct ray_range *rays, struct error *error)
+{
+    struct gpu_define defines[3] = {0};
+    size_t n = 0;
+    if (scene->has_spheres)
+        defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
+    if (has_motion(scene, rays->wave))
+        defines[n++] = (struct gpu_define){"HAS_MOTION", "1"};
+    const struct gpu_program *program = trace_surface_program_get(scene, "trace/surface.comp", defines, error);
+    if (program)
+        trace_surface_program_run(program, scene, rays);
+    return program != NULL;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The program of shaders/trace/wave.comp for one traverse.glsl, and a wave through it. What a tracer's trace()
- * does. */
+/* The programs that most tracers run: shaders/trace/wave.comp with the tracer's traverse.glsl, from rays to
+ * intersections, and a surface.comp, from intersections to hits. */
 #ifndef FARLIGHT_TRACE_PROGRAM_H
 #define FARLIGHT_TRACE_PROGRAM_H
 
@@ -25,11 +25,20 @@ struct trace_program_source {
  * trace_program_run. */
 const struct gpu_program *trace_program_get(const struct gpu_scene *scene, const struct wave *wave,
                                             const struct trace_program_source *source, struct error *error);
-/* Binds the wave's buffers, sets `ray_count`, `disc_count` and `instance_count`, dispatches, and makes hits of the
- * crossings. The scene's buffers and the tracer's own are bound already. */
-bool trace_program_run(const struct gpu_program *program, const struct gpu_scene *scene, const struct wave *wave,
-                       const struct trace_program_source *source, struct error *error);
-/* From crossings to hits, in place: what trace_program_run ends with. Nothing to do for any-hit waves. */
-bool trace_surfaces(const struct gpu_scene *scene, const struct wave *wave, struct error *error);
+/* Binds the wave's buffers, sets `first_ray`, `ray_count`, `disc_count` and `instance_count`, and dispatches: the
+ * rays of the range get their intersections or visibilities. The scene's buffers and the tracer's own are bound
+ * already. */
+void trace_program_run(const struct gpu_program *program, const struct gpu_scene *scene,
+                       const struct ray_range *rays, const struct trace_program_source *source);
+
+/* A surface program in two steps: the tracer may bind its buffers and set its uniforms between them. `compute` is
+ * "<tracer>/surface.comp"; `defines` ends with {0}, NULL: none. */
+const struct gpu_program *trace_surface_program_get(const struct gpu_scene *scene, const char *compute,
+                                                    const struct gpu_define *defines, struct error *error);
+/* Binds rays and hits, sets `first_ray` and `ray_count`, and dispatches: intersections become hits, in place. */
+void trace_surface_program_run(const struct gpu_program *program, const struct gpu_scene *scene,
+                               const struct ray_range *rays);
+/* Both, for intersections that name a primitive of the scene. */
+bool trace_surfaces(const struct gpu_scene *scene, const struct ray_range *rays, struct error *error);
 
 #endif

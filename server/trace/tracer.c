@@ -1,9 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/tracer.h"
 
-#include "shared/hit.h"
-#include "shared/ray.h"
-
 #include <stdio.h>
 #include <string.h>
 
@@ -77,24 +74,46 @@ struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *
 
 void tracer_destroy(struct tracer *tracer)
 {
-    if (tracer)
-        tracer->impl->destroy(tracer);
+    if (!tracer)
+        return;
+    trace_state_destroy(tracer->state);
+    tracer->impl->destroy(tracer);
+}
+
+uint64_t tracer_device_bytes(const struct tracer *tracer)
+{
+    return tracer->stats.device_bytes + (tracer->state ? trace_state_device_bytes(tracer->state) : 0);
+}
+
+/* What the stats say of the last update. */
+static void begin_stats(struct tracer_stats *stats)
+{
+    stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
+    for (int i = 0; i < TRACER_CUBES_MAX; i++)
+        stats->cubes[i].rebuilt = false;
 }
 
 enum tracer_progress tracer_update_step(struct tracer *tracer, struct gpu_scene *scene,
-                                        const struct scene_changes *changes, uint64_t step_ns,
-                                        struct stage_times *times, struct error *error)
+                                        const struct tracer_update *update, uint64_t step_ns, struct error *error)
 {
-    static const struct scene_changes everything = {
-        .geometry = true, .deformed = true, .instances = true, .shading = true, .surfaces = true, .lights = true};
-    gpu_push_group(tracer->device, tracer->impl->name);
+    const struct tracer_impl *impl = tracer->impl;
+    struct tracer_update own = *update;
+    own.changed = impl->depends_on & (tracer->updated ? update->changed : CHANGED_ALL);
+    if (!tracer->updating)
+        begin_stats(&tracer->stats);
+    if (tracer->updated && !tracer->updating && own.changed == 0)
+        return TRACER_DONE;
+    if ((impl->depends_on & CHANGED_VIEW) && !update->view) {
+        error_set(error, ERROR_INTERNAL, NULL, "%s: an update without the view that it depends on", impl->name);
+        return TRACER_FAILED;
+    }
+    gpu_push_group(tracer->device, impl->name);
     tracer->step_end_ns = step_ns == STEP_WITHOUT_END ? STEP_WITHOUT_END : clock_now_ns() + step_ns;
-    enum tracer_progress progress =
-        tracer->impl->update(tracer, scene, tracer->updated ? changes : &everything, times, error);
-    bool good = progress != TRACER_FAILED && gpu_check(tracer->device, tracer->impl->name, error);
+    enum tracer_progress progress = impl->update(tracer, scene, &own, error);
+    bool good = progress != TRACER_FAILED && gpu_check(tracer->device, impl->name, error);
     gpu_pop_group(tracer->device);
     if (!good && progress == TRACER_MORE)
-        tracer->impl->abandon(tracer);
+        impl->abandon(tracer);
     tracer->updating = good && progress == TRACER_MORE;
     /* After a failure nothing is known of the structure: the next update makes it anew. In the middle of an update
      * that has begun with the structure of some revision, this is what the steps go by. */
@@ -117,12 +136,12 @@ void tracer_update_abandon(struct tracer *tracer)
     tracer->updating = tracer->updated = false;
 }
 
-bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct scene_changes *changes,
-                   struct stage_times *times, struct error *error)
+bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct tracer_update *update,
+                   struct error *error)
 {
     enum tracer_progress progress = TRACER_MORE;
     while (progress == TRACER_MORE)
-        progress = tracer_update_step(tracer, scene, changes, STEP_WITHOUT_END, times, error);
+        progress = tracer_update_step(tracer, scene, update, STEP_WITHOUT_END, error);
     return progress == TRACER_DONE;
 }
 
@@ -130,36 +149,4 @@ void tracer_outdate(struct tracer *tracer)
 {
     tracer_update_abandon(tracer);
     tracer->updated = false;
-}
-
-static bool buffer_holds(const struct gpu_buffer *buffer, uint32_t count, size_t item_bytes)
-{
-    return buffer && buffer->size_bytes / item_bytes >= count;
-}
-
-bool tracer_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error)
-{
-    struct wave part = *wave;
-    part.end_ray = wave->end_ray > 0 ? wave->end_ray : wave->ray_count;
-    bool fits = part.first_ray < part.end_ray && part.end_ray <= wave->ray_count &&
-                part.first_ray % WAVE_PART_RAYS == 0 && (part.first_ray == 0 || part.chosen) &&
-                buffer_holds(wave->rays, wave->ray_count, sizeof(struct ray));
-    if (wave->kind == WAVE_ANY)
-        fits = fits && buffer_holds(wave->visibility, wave->ray_count, sizeof(uint32_t));
-    else
-        fits = fits && buffer_holds(wave->hits, wave->ray_count, sizeof(struct hit));
-    fits = fits && (!wave->times || buffer_holds(wave->times, wave->ray_count, sizeof(float)));
-    if (!fits)
-        return error_set(error, ERROR_INTERNAL, NULL, "%s: a wave of %u rays does not fit its buffers",
-                         tracer->impl->name, wave->ray_count);
-    if (!tracer->updated || tracer->updating)
-        return error_set(error, ERROR_INTERNAL, NULL, "%s: traced before it was brought to the scene",
-                         tracer->impl->name);
-    if (wave->times && !tracer_check_motion(tracer->impl, scene, error))
-        return false;
-    gpu_push_group(tracer->device, tracer->impl->name);
-    bool ok =
-        tracer->impl->trace(tracer, scene, &part, error) && gpu_check(tracer->device, tracer->impl->name, error);
-    gpu_pop_group(tracer->device);
-    return ok;
 }

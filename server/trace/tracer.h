@@ -1,24 +1,28 @@
 /* SPDX-License-Identifier: MIT */
-/* One interface for every acceleration structure. The wrappers below check, time and call. */
+/* One interface for every acceleration structure. A tracer answers waves of rays about the scene that its
+ * structure was brought to. The wrappers below check, limit the time, and call the tracer's implementation.
+ *
+ * Owners. What a structure is built from (tracer_impl.depends_on) decides who owns it:
+ *   the scene alone      struct tracer, owned by what all viewers of a scene share (render/frame_renderer.c)
+ *   CHANGED_VIEW too     struct tracer, owned by the renderer of that view: it never serves another one
+ *   the rays of a wave   struct trace_state, owned by the work of one frame; several frames may be in progress
+ *
+ * Threads: all of it belongs to the thread that owns the device. Times are in nanoseconds. What fails fills *error
+ * and leaves the object such that it can be destroyed, or brought to the scene again from the beginning. */
 #ifndef FARLIGHT_TRACE_TRACER_H
 #define FARLIGHT_TRACE_TRACER_H
 
 #include "base/error.h"
 #include "base/stage_times.h"
 #include "gpu/device.h"
-#include "trace/step.h"
 #include "gpu_scene/scene.h"
+#include "trace/step.h"
+#include "trace/view.h"
 #include "trace/wave.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-enum tracer_dependency { /* bits: what a structure is built from */
-                         TRACER_NEEDS_SCENE = 1,
-                         TRACER_NEEDS_VIEW = 2,
-                         TRACER_NEEDS_RAYS = 4,
-};
 
 /* Options of all tracers; zero is the default of each. Compared byte by byte (render/tracer_set.c), so there is no
  * member that leaves a gap. */
@@ -90,37 +94,95 @@ struct tracer {
     struct tracer_options options;
     struct tracer_stats stats;
     /* by the wrappers: */
-    bool updated;         /* the structure is that of some revision */
-    bool updating;        /* an update has begun and has not come to its end */
-    uint64_t step_end_ns; /* when its step in hand is to end: for step_is_over() */
+    bool updated;              /* the structure is that of some revision */
+    bool updating;             /* an update has begun and has not come to its end */
+    uint64_t step_end_ns;      /* when the step of the update in progress is to end: for step_is_over() */
+    struct trace_state *state; /* of waves that are traced at once; NULL: there was none yet */
+};
+
+/* What an update is told. */
+struct tracer_update {
+    unsigned changed; /* enum scene_change: since the last update of this tracer that came to its end */
+    /* What to build a structure of a view from; NULL where nothing that the tracer depends on is of a view. Copied
+     * by a tracer that needs it after the step. */
+    const struct trace_view *view;
+    struct stage_times *times; /* the step's spans are added to it; NULL: nobody asks */
+};
+
+/* The structure that a tracer builds from the rays of one wave, and how far it has come with it. It serves one
+ * wave after another, and keeps its buffers from wave to wave and from frame to frame. It refers to no tracer, but
+ * works with every one of the same implementation and options. An implementation that needs more begins its own
+ * struct with this one. */
+struct trace_state {
+    const struct tracer_impl *impl;
+    struct gpu_device *device;
+    struct tracer_options options;
+    /* by the wrappers: */
+    struct wave wave;     /* in progress */
+    bool in_progress;     /* the wave has begun and is not traced to its end */
+    uint32_t traced_rays; /* rays before this one have their final answers */
+    /* Of a tracer that traces ranges of rays: how many rays the next step may have, by family; 0: not known. */
+    uint32_t step_rays[WAVE_FAMILIES];
 };
 
 struct tracer_impl {
     const char *name;
-    unsigned depends_on; /* tracer_dependency bits */
-    bool sampled;        /* hits of meshes and spheres are stored samples (HIT_SAMPLED) */
+    /* enum scene_change: what the structure is built from. `update` is called when one of these changed, and for
+     * the first structure; with CHANGED_VIEW among them each view has a tracer of its own. */
+    unsigned depends_on;
+    bool sampled; /* hits of meshes and spheres are stored samples (HIT_SAMPLED) */
     /* The structure knows the scene as the shutter opens: rays of a scene in which something moves meanwhile must
      * have no times. */
     bool still;
+    /* The smallest range of rays that trace_range() is good for: ranges begin at multiples of it, so that rays
+     * that are traversed together stay together, and have no fewer rays unless the wave ends. 0: 1. */
+    uint32_t minimum_rays;
+
+    /* ---- the structure ---- */
+
+    /* NULL and *error: the options make no sense (ERROR_INVALID names the field), or there is no memory. */
     struct tracer *(*create)(struct gpu_device *device, const struct tracer_options *options, struct error *error);
     void (*destroy)(struct tracer *tracer);
-    /* Does a step of bringing the structure to the scene, until about tracer->step_end_ns; `changes` is what
-     * changed since the last update of this tracer. Everything is marked changed on the first. After TRACER_MORE
-     * it is called again with the same scene, which stays as it is, but for scene->motion, which only the first
-     * step may look at. What it has found so far the tracer keeps in its own struct: buffers of others may be
-     * bound between two steps. Reports what the step took as STAGE_BUILD and STAGE_UPLOAD, and keeps the stats'
-     * device_bytes true. */
+    /* Does a step of bringing the structure to the scene, until about tracer->step_end_ns; update->changed has
+     * none but bits that the tracer depends on, all of them at first. After TRACER_MORE it is called again with
+     * the same scene, view and bits; scene->motion may be read in the first step only. What it has found so far
+     * the tracer keeps in its own struct: other buffers may be bound between two steps. Reports the times of the
+     * step as STAGE_BUILD and STAGE_UPLOAD, and keeps the stats' device_bytes true. Stats of the last update are 0
+     * when the first step begins. After TRACER_FAILED the structure is empty. */
     enum tracer_progress (*update)(struct tracer *tracer, struct gpu_scene *scene,
-                                   const struct scene_changes *changes, struct stage_times *times,
-                                   struct error *error);
-    /* Lets go of an update that is not done, and of all that was built; the next one is a first one. NULL: there
-     * is never more than one step. */
+                                   const struct tracer_update *update, struct error *error);
+    /* Drops an update that is not done, and all that was built; the next one is a first one. NULL: an update is
+     * always one step. */
     void (*abandon)(struct tracer *tracer);
-    /* Whether the next step would only wait, for threads of the tracer's own. NULL: never. */
+    /* Whether the next step of the update would only wait, for threads of the tracer's own. NULL: never. */
     bool (*waits)(struct tracer *tracer);
-    /* Buffers of the scene are bound. Queues the work; does not wait, unless it is done on the CPU. Rays
-     * wave->first_ray .. wave->end_ray - 1, of which there are some. */
-    bool (*trace)(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error);
+
+    /* ---- waves: the scene's buffers are bound; work is queued and not waited for, unless the CPU does it ---- */
+
+    /* Makes and frees the state of waves. `create` leaves the members of struct trace_state zero; the wrapper sets
+     * them. All three NULL: the struct trace_state is enough. */
+    struct trace_state *(*state_create)(struct gpu_device *device, const struct tracer_options *options,
+                                        struct error *error);
+    void (*state_destroy)(struct trace_state *state);
+    uint64_t (*state_device_bytes)(const struct trace_state *state);
+    /* Begins state->wave: decides what holds for all of it. NULL: there is nothing to do. */
+    bool (*trace_begin)(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                        struct error *error);
+    /* One of these two finds the intersections (shared/hit.h) or visibilities of state->wave.
+     * trace_range: for tracers that trace one ray, or one packet, independently of others. Does the rays of the
+     * range; the wrapper chooses ranges that fit a step and calls it for one after another. */
+    bool (*trace_range)(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                        const struct ray_range *rays, struct error *error);
+    /* trace_step: for tracers that advance in another way, by batches of triangles for example. Does a step until
+     * about `step_end_ns` (STEP_WITHOUT_END: all of it). No answer counts before TRACER_DONE; other waves of other
+     * states may be traced between two steps. A wave may also be dropped: then the next call is trace_begin. */
+    enum tracer_progress (*trace_step)(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                                       uint64_t step_end_ns, struct error *error);
+    /* Turns the intersections of these rays of a WAVE_CLOSEST into hits, in place: what the shading reads of a
+     * surface. NULL: an intersection names a primitive of the scene, and trace_surfaces() (trace/program.h) does
+     * it. Sampled tracers run a program of their own, shaders/<tracer>/surface.comp. */
+    bool (*surfaces)(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
+                     struct error *error);
 };
 
 extern const struct tracer_impl tracer_bvh_impl, tracer_naive_impl, tracer_reference_impl, tracer_ldc_impl,
@@ -137,23 +199,58 @@ bool tracer_check_motion(const struct tracer_impl *impl, const struct gpu_scene 
 struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *device,
                              const struct tracer_options *options, struct error *error);
 void tracer_destroy(struct tracer *tracer); /* accepts NULL */
-/* An update is made of steps of about `step_ns` each (STEP_NS), of which this does one. The scene and what its
- * arrays hold must not change until it is done or abandoned. The first update, and the first one after a failure
- * or one that was abandoned, takes everything to be changed. */
+/* Of the structure, and of the state of waves that are traced at once. */
+uint64_t tracer_device_bytes(const struct tracer *tracer);
+
+/* ---- bringing the structure to the scene ---- */
+
+/* Does one step of about `step_ns` (STEP_NS; 0: the smallest one; STEP_WITHOUT_END: all of it). The scene, its
+ * arrays and the view must not change until the update is done or abandoned. Bits that the tracer does not depend
+ * on are ignored: where no other changed, nothing is called. The first update, and the first one after a failure
+ * or one that was abandoned, takes everything as changed. A tracer that depends on the view is refused without
+ * one, ERROR_INTERNAL. */
 enum tracer_progress tracer_update_step(struct tracer *tracer, struct gpu_scene *scene,
-                                        const struct scene_changes *changes, uint64_t step_ns,
-                                        struct stage_times *times, struct error *error);
+                                        const struct tracer_update *update, uint64_t step_ns, struct error *error);
 /* Whether the next step would do nothing but wait. */
 bool tracer_update_waits(struct tracer *tracer);
 /* Nothing happens where no update has begun. */
 void tracer_update_abandon(struct tracer *tracer);
-/* All of it at once. */
-bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct scene_changes *changes,
-                   struct stage_times *times, struct error *error);
-/* So does the next one: it is not known what changed. */
+/* All steps at once. */
+bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct tracer_update *update,
+                   struct error *error);
+/* The next update takes everything as changed. */
 void tracer_outdate(struct tracer *tracer);
-/* Traces rays 0 .. wave->ray_count - 1 (at least 1 and at most what the buffers hold, which is checked), or the
- * part of them that the wave names. */
+
+/* ---- tracing, resumable ---- */
+
+/* The caller owns the state. NULL and *error where there is no memory for it. */
+struct trace_state *trace_state_create(const struct tracer_impl *impl, struct gpu_device *device,
+                                       const struct tracer_options *options, struct error *error);
+void trace_state_destroy(struct trace_state *state); /* accepts NULL */
+/* Whether the state was made for these. */
+bool trace_state_fits(const struct trace_state *state, const struct tracer_impl *impl,
+                      const struct tracer_options *options);
+uint64_t trace_state_device_bytes(const struct trace_state *state);
+/* Drops the wave in progress, if any, and what was learnt of the cost of rays: for the beginning of a frame. */
+void trace_state_reset(struct trace_state *state);
+/* Begins a wave, which must fit its buffers (checked; ERROR_INTERNAL). A wave in progress is dropped. */
+bool tracer_trace_begin(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
+                        struct trace_state *state, struct error *error);
+/* Does a step of about `step_ns` (as above) of the wave in progress, from rays to hits or visibilities. The
+ * scene's buffers are bound; between two steps others may be. The cut into steps depends on the clock, the answers
+ * do not: after TRACER_DONE they are to the bit those of the whole wave traced at once. After TRACER_FAILED no
+ * wave is in progress. */
+enum tracer_progress tracer_trace_step(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                                       uint64_t step_ns, struct error *error);
+
+/* ---- tracing at once, with a state of the tracer's own: tests, benchmarks, comparisons ---- */
+
+/* From rays to hits or visibilities: tracer_intersect() and tracer_surfaces(). */
 bool tracer_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error);
+/* The traversal alone: hits are left as intersections, of which only distance, primitive and instance are set. */
+bool tracer_intersect(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
+                      struct error *error);
+/* Turns all intersections of the wave into hits; there is nothing to do for visibilities. */
+bool tracer_surfaces(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error);
 
 #endif

@@ -5,10 +5,8 @@
 
 #include "gpu/buffer.h"
 
+#include <stdbool.h>
 #include <stdint.h>
-
-/* Parts begin at multiples of it: rays that walk together, 8 or 3, say, stay together. */
-#define WAVE_PART_RAYS 192u
 
 enum wave_kind {
     WAVE_CLOSEST, /* fills `hits` */
@@ -16,24 +14,35 @@ enum wave_kind {
                      translucent ones (transmission, blend) tint it */
 };
 
+/* Waves of one family have rays of one kind and bounce, which cost about the same: what a tracer learnt from one
+ * of them (how many rays fit a step, how large a buffer has to be) is a good guess for the next. */
+#define WAVE_FAMILIES 32u
+
+/* Describes a wave; owns nothing. The buffers are the caller's and stay as they are until the wave is traced. */
 struct wave {
     enum wave_kind kind;
-    uint32_t ray_count; /* on the host: how many of `rays` are to be traced */
-    /* The part of them that is traced now, so that a long wave is some short steps: from a multiple of
-     * WAVE_PART_RAYS up to end_ray; 0: to the last. Parts come in their order, others' waves may come in between,
-     * and with all of them traced the answers are the whole wave's to the bit. */
-    uint32_t first_ray, end_ray;
-    /* What a tracer chooses for a wave by its first part; the caller's, for the parts after it. May be NULL where
-     * the first part is the whole. */
-    uint32_t *chosen;
+    unsigned family; /* below WAVE_FAMILIES; 0 where the caller does not tell them apart */
+    /* How many of `rays` are to be traced, at least 1: exactly so many, or where `counts` is set an upper bound.
+     */
+    uint32_t ray_count;
+    /* NULL, or a buffer that begins with a struct wave_counts (shared/wave.h), written on the device before the
+     * wave is traced: how many rays there are, at most ray_count, and the work groups of a dispatch over them. The
+     * buffers hold ray_count rays all the same; what is in them behind the last ray is arbitrary but finite. A
+     * tracer may trace these too, in which case their answers mean nothing; it never waits for the counts to be on
+     * the host. */
+    struct gpu_buffer *counts;
     struct gpu_buffer *rays;       /* struct ray */
     struct gpu_buffer *hits;       /* struct hit; closest */
     struct gpu_buffer *visibility; /* uint; any */
     struct gpu_buffer *times;      /* float a ray: when, 0: the shutter opens, 1: it closes; NULL: all at 0 */
     bool shared_origin;            /* all rays begin at one point */
-    float origin_spread;           /* or all on a disc of this diameter, a lens: metres; 0: who knows where */
-    /* Closest hits of an exact tracer stay crossings (shared/hit.h): for benchmarks, of the walk alone. */
-    bool crossings_only;
+    float origin_spread;           /* or all on a disc of this diameter, a lens: metres; 0: nothing is known */
+};
+
+/* Consecutive rays of a wave, at least one. */
+struct ray_range {
+    const struct wave *wave;
+    uint32_t first, end; /* rays first .. end - 1 */
 };
 
 #endif

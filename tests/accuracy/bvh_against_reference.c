@@ -233,9 +233,9 @@ static void *trace(struct arena *arena, struct tracer *tracer, const struct ray 
 static struct tracer *make_tracer(struct arena *arena, unsigned number)
 {
     struct error error = {0};
-    const struct scene_changes all = {.geometry = true, .instances = true, .shading = true, .lights = true};
+    const struct tracer_update all = {.changed = CHANGED_SCENE};
     struct tracer *tracer = tracer_create(tracer_impl_by_number(number), device, NULL, &error);
-    expect_ok(tracer && tracer_update(tracer, &arena->gpu, &all, NULL, &error), &error);
+    expect_ok(tracer && tracer_update(tracer, &arena->gpu, &all, &error), &error);
     return tracer;
 }
 
@@ -482,7 +482,7 @@ TEST(rays_that_embree_would_end_the_process_at_hit_nothing)
 
 TEST(a_transform_that_embree_cannot_invert_is_refused_by_name)
 {
-    const struct scene_changes all = {.geometry = true, .instances = true};
+    const struct tracer_update all = {.changed = CHANGED_SCENE};
     struct arena arena;
     arena_init(&arena, bumpy_scene());
     for (int round = 0; round < 2; round++) {
@@ -494,7 +494,7 @@ TEST(a_transform_that_embree_cannot_invert_is_refused_by_name)
         test_node(&edits, 4, 0, NODE_MESH, 1, m);
         test_commit(&edits);
         expect_ok(gpu_scene_update(&arena.gpu, arena.scene, NULL, &changes, NULL, &error), &error);
-        bool ok = tracer_update(arena.reference, &arena.gpu, &all, NULL, &error);
+        bool ok = tracer_update(arena.reference, &arena.gpu, &all, &error);
         assert_int_equal(ok, round == 1);
         assert_int_equal(error.kind, round == 0 ? ERROR_UNSUPPORTED : ERROR_NONE);
         if (round == 0)
@@ -505,7 +505,7 @@ TEST(a_transform_that_embree_cannot_invert_is_refused_by_name)
 
 TEST(a_scene_beyond_what_embree_sees_is_refused)
 {
-    const struct scene_changes all = {.geometry = true, .instances = true};
+    const struct tracer_update all = {.changed = CHANGED_SCENE};
     struct arena arena;
     struct test_edits edits = {.scene = bumpy_scene()};
     struct scene_changes changes;
@@ -519,7 +519,7 @@ TEST(a_scene_beyond_what_embree_sees_is_refused)
     test_node(&edits, 3, 0, NODE_MESH, 1, m);
     test_commit(&edits);
     expect_ok(gpu_scene_update(&arena.gpu, arena.scene, NULL, &changes, NULL, &error), &error);
-    assert_false(tracer_update(arena.reference, &arena.gpu, &all, NULL, &error));
+    assert_false(tracer_update(arena.reference, &arena.gpu, &all, &error));
     assert_int_equal(error.kind, ERROR_UNSUPPORTED);
     assert_string_equal(error.field, "tracer");
     arena_finish(&arena);
@@ -528,7 +528,7 @@ TEST(a_scene_beyond_what_embree_sees_is_refused)
 /* Whatever Embree had allocated by then: from nothing to almost all of it. */
 TEST(embree_keeps_to_the_memory_limit_and_its_books_are_right_afterwards)
 {
-    const struct scene_changes all = {.geometry = true, .instances = true, .shading = true, .lights = true};
+    const struct tracer_update all = {.changed = CHANGED_SCENE};
     const uint64_t limit = device->memory_limit_bytes;
     struct arena arena;
     struct error error = {0};
@@ -541,13 +541,13 @@ TEST(embree_keeps_to_the_memory_limit_and_its_books_are_right_afterwards)
     for (uint64_t part = 0; part < 8; part++) {
         error = (struct error){0};
         device->memory_limit_bytes = used - needed + part * needed / 8;
-        assert_false(tracer_update(arena.reference, &arena.gpu, &all, NULL, &error));
+        assert_false(tracer_update(arena.reference, &arena.gpu, &all, &error));
         assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
         assert_int_equal(arena.reference->stats.device_bytes, 0);
         assert_true(device->memory_used_bytes == used - needed);
     }
     device->memory_limit_bytes = limit;
-    expect_ok(tracer_update(arena.reference, &arena.gpu, &all, NULL, &error), &error);
+    expect_ok(tracer_update(arena.reference, &arena.gpu, &all, &error), &error);
     assert_true(device->memory_used_bytes == used - needed + arena.reference->stats.device_bytes);
     arena_finish(&arena);
 }

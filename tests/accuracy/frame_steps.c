@@ -25,14 +25,14 @@ static bool slow;
 static uint64_t rays_of_step;
 static unsigned waves_of_step;
 
-static bool count_rays(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                       struct error *error)
+static bool count_rays(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                       const struct ray_range *rays, struct error *error)
 {
-    const uint64_t rays = wave->end_ray - wave->first_ray, ns = slow ? rays * RAY_NS : 0;
-    rays_of_step += rays;
+    const uint64_t count = rays->end - rays->first, ns = slow ? count * RAY_NS : 0;
+    rays_of_step += count;
     waves_of_step++;
     nanosleep(&(struct timespec){(time_t)(ns / 1000000000u), (long)(ns % 1000000000u)}, NULL);
-    return behind->trace(tracer, scene, wave, error);
+    return behind->trace_range(tracer, scene, state, rays, error);
 }
 
 /* More lamps than go into one batch, mirrors, glass and panes. */
@@ -74,7 +74,7 @@ static struct frame_result render_counted(struct fixture *fixture, unsigned trac
     slow = is_slow;
     static struct tracer_impl counted[TRACER_COUNT]; /* the renderer keeps tracers of them */
     counted[tracer] = *behind;
-    counted[tracer].trace = count_rays;
+    counted[tracer].trace_range = count_rays;
     frame_renderer_stand_in(fixture->renderer, tracer, &counted[tracer]);
     fixture->request.tracer = tracer;
     *counts = (struct counts){0};

@@ -5,6 +5,7 @@
 
 #include "shared/hit.h"
 #include "shared/ray.h"
+#include "trace/program.h"
 #include "trace/tracer.h"
 #include "tests/harness/test.h"
 
@@ -71,16 +72,33 @@ static void spoil(struct gpu_scene *scene, const struct wave *wave)
     free(answers);
 }
 
-static bool wrong_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                        struct error *error)
+static bool is_wrong_about(const struct wave *wave)
+{
+    return wrong.way != WRONG_NOT && wrong.way != WRONG_SLOW && kind_of(wave) == wrong.kind;
+}
+
+/* Waves that are compared are traced at once: the range is all of it. */
+static bool wrong_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                        const struct ray_range *rays, struct error *error)
 {
     wrong.waves++;
     if (wrong.way == WRONG_SLOW)
         nanosleep(&(struct timespec){.tv_nsec = SLOW_NS}, NULL);
-    if (!tracer_naive_impl.trace(tracer, scene, wave, error))
+    if (!tracer_naive_impl.trace_range(tracer, scene, state, rays, error))
         return false;
-    if (wrong.way != WRONG_NOT && wrong.way != WRONG_SLOW && kind_of(wave) == wrong.kind)
-        spoil(scene, wave);
+    if (state->wave.kind == WAVE_ANY && is_wrong_about(&state->wave))
+        spoil(scene, &state->wave);
+    return true;
+}
+
+static bool wrong_surfaces(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
+                           struct error *error)
+{
+    (void)tracer;
+    if (!trace_surfaces(scene, rays, error))
+        return false;
+    if (is_wrong_about(rays->wave))
+        spoil(scene, rays->wave);
     return true;
 }
 
@@ -132,7 +150,8 @@ static void examine_wrong(struct fixture *fixture, enum wrong_way way, enum ray_
     static struct tracer_impl impl;
     impl = tracer_naive_impl;
     impl.name = "wrong";
-    impl.trace = wrong_trace;
+    impl.trace_range = wrong_range;
+    impl.surfaces = wrong_surfaces;
     wrong.way = way;
     wrong.kind = kind;
     wrong.waves = 0;

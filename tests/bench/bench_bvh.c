@@ -137,9 +137,8 @@ static void run(struct bench *bench, struct tracer *tracer, int kind, bool surfa
                               .rays = &bench->ray_buffer,
                               .hits = &bench->answers,
                               .visibility = &bench->answers,
-                              .shared_origin = kind == WAVE_PRIMARY,
-                              .crossings_only = !surfaces};
-    require(tracer_trace(tracer, &bench->gpu, &wave, &error), &error);
+                              .shared_origin = kind == WAVE_PRIMARY};
+    require((surfaces ? tracer_trace : tracer_intersect)(tracer, &bench->gpu, &wave, &error), &error);
     glFinish();
 }
 
@@ -211,7 +210,8 @@ static void measure_form(struct bench *bench, const struct form *form)
     struct stage_times times;
     stage_times_begin(&times);
     struct tracer *tracer = tracer_create(&tracer_bvh_impl, bench->device, &form->options, &error);
-    require(tracer && tracer_update(tracer, &bench->gpu, &(struct scene_changes){0}, &times, &error), &error);
+    require(tracer && tracer_update(tracer, &bench->gpu, &(struct tracer_update){.times = &times}, &error),
+            &error);
     double rates[WAVE_KINDS], compile_ms[WAVE_KINDS];
     for (int kind = 0; kind < WAVE_KINDS; kind++)
         rates[kind] = measure(bench, tracer, kind, &compile_ms[kind]);

@@ -170,7 +170,8 @@ static uint64_t update(struct bent *bent, struct tracer *tracer)
 {
     struct error error = {0};
     uint64_t start_ns = clock_now_ns();
-    require(tracer_update(tracer, &bent->gpu, &(struct scene_changes){.deformed = true}, NULL, &error), &error);
+    require(tracer_update(tracer, &bent->gpu, &(struct tracer_update){.changed = CHANGED_DEFORMED}, &error),
+            &error);
     glFinish();
     return clock_now_ns() - start_ns;
 }
@@ -188,10 +189,10 @@ static struct hit *trace(struct bent *bent, struct tracer *tracer, struct gpu_bu
     struct hit *hits = malloc(RAY_COUNT * sizeof *hits);
     require(gpu_buffer_reserve(bent->device, &answers, RAY_COUNT * sizeof *hits, &error), &error);
     gpu_scene_bind(&bent->gpu);
-    const struct wave wave = {.ray_count = RAY_COUNT, .rays = rays, .hits = &answers, .crossings_only = true};
+    const struct wave wave = {.ray_count = RAY_COUNT, .rays = rays, .hits = &answers};
     for (int run = 0; run < 4; run++) {
         uint64_t start_ns = clock_now_ns();
-        require(tracer_trace(tracer, &bent->gpu, &wave, &error), &error);
+        require(tracer_intersect(tracer, &bent->gpu, &wave, &error), &error);
         glFinish();
         uint64_t took_ns = clock_now_ns() - start_ns;
         *time_ns = run == 0 || took_ns < *time_ns ? took_ns : *time_ns;
@@ -245,8 +246,8 @@ static void bent_init(struct bent *bent, struct gpu_device *device, uint32_t tri
     bent->refitted = tracer_create(&tracer_bvh_impl, device, NULL, &error);
     bent->rebuilt = tracer_create(&tracer_bvh_impl, device, NULL, &error);
     require(bent->refitted && bent->rebuilt && bent->vertices, &error);
-    require(tracer_update(bent->refitted, &bent->gpu, &changes, NULL, &error) &&
-                tracer_update(bent->rebuilt, &bent->gpu, &changes, NULL, &error),
+    require(tracer_update(bent->refitted, &bent->gpu, &(struct tracer_update){0}, &error) &&
+                tracer_update(bent->rebuilt, &bent->gpu, &(struct tracer_update){0}, &error),
             &error);
 }
 

@@ -52,7 +52,7 @@ static bool upload(struct bench_contest *contest, const struct bench_wave *wave,
                               wave->ray_count * (is_any ? sizeof(uint32_t) : sizeof(struct hit)), error);
 }
 
-static bool run_tracer(struct bench_contest *contest, struct tracer *tracer, bool crossings_only,
+static bool run_tracer(struct bench_contest *contest, struct tracer *tracer, bool intersections_only,
                        const struct bench_wave *wave, struct error *error)
 {
     const struct bench_wave_fact *fact = &bench_wave_facts[wave->kind];
@@ -61,9 +61,10 @@ static bool run_tracer(struct bench_contest *contest, struct tracer *tracer, boo
                                    .rays = &contest->ray_buffer,
                                    .hits = &contest->answer_buffer,
                                    .visibility = &contest->answer_buffer,
-                                   .shared_origin = fact->shared_origin,
-                                   .crossings_only = crossings_only};
-    bool ok = tracer_trace(tracer, &contest->scene->gpu, &on_device, error);
+                                   .shared_origin = fact->shared_origin};
+    struct gpu_scene *gpu = &contest->scene->gpu;
+    bool ok = intersections_only ? tracer_intersect(tracer, gpu, &on_device, error)
+                                 : tracer_trace(tracer, gpu, &on_device, error);
     glFinish();
     return ok;
 }
@@ -278,11 +279,11 @@ bool bench_contest_wave(struct bench_contest *contest, const struct bench_wave *
     return ok;
 }
 
-static bool trace_once(struct bench_contest *contest, struct tracer *tracer, bool crossings_only,
+static bool trace_once(struct bench_contest *contest, struct tracer *tracer, bool intersections_only,
                        const struct bench_wave *wave, struct hit *hits, struct error *error)
 {
     gpu_scene_bind(&contest->scene->gpu);
-    if (!upload(contest, wave, error) || !run_tracer(contest, tracer, crossings_only, wave, error))
+    if (!upload(contest, wave, error) || !run_tracer(contest, tracer, intersections_only, wave, error))
         return false;
     gpu_buffer_read(contest->device, &contest->answer_buffer, 0, hits, wave->ray_count * sizeof *hits);
     return true;

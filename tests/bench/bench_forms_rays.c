@@ -45,7 +45,7 @@ static bool build(struct bench_forms *bench, struct bench_form *form, uint64_t *
     tracer_outdate(form->made);
     glFinish();
     const uint64_t start_ns = clock_now_ns();
-    const bool done = tracer_update(form->made, &bench->scene.gpu, &(struct scene_changes){0}, NULL, error);
+    const bool done = tracer_update(form->made, &bench->scene.gpu, &(struct tracer_update){0}, error);
     glFinish();
     *time_ns = clock_now_ns() - start_ns;
     if (done && form->tracer == BENCH_TRACER_LDC && !form->made->stats.cubes[TRACER_CUBE_STATIC].rebuilt)

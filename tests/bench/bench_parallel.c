@@ -78,9 +78,8 @@ static void shuffle(struct ray *rays, uint32_t count)
 static void trace(struct bench *bench, struct tracer *tracer, uint32_t ray_count, bool surfaces)
 {
     struct error error = {0};
-    const struct wave wave = {
-        .ray_count = ray_count, .rays = &bench->rays, .hits = &bench->hits, .crossings_only = !surfaces};
-    require(tracer_trace(tracer, &bench->scene.gpu, &wave, &error), &error);
+    const struct wave wave = {.ray_count = ray_count, .rays = &bench->rays, .hits = &bench->hits};
+    require((surfaces ? tracer_trace : tracer_intersect)(tracer, &bench->scene.gpu, &wave, &error), &error);
     glFinish();
 }
 
@@ -179,7 +178,7 @@ static void make_tracers(struct bench *bench)
                                                        bounds == BOXES ? BVH_BOUNDS_BOX : BVH_BOUNDS_SPHERE,
                                                    .bvh_rays_together = numbers[n]};
             struct tracer *tracer = tracer_create(&tracer_bvh_impl, bench->device, &options, &error);
-            require(tracer && tracer_update(tracer, &bench->scene.gpu, &(struct scene_changes){0}, NULL, &error),
+            require(tracer && tracer_update(tracer, &bench->scene.gpu, &(struct tracer_update){0}, &error),
                     &error);
             bench->tracers[bounds][n] = tracer;
         }

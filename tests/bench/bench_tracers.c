@@ -49,7 +49,7 @@ static bool build_tracer(struct bench *bench, struct structure *structure, const
         if (!structure->made)
             return false;
         const uint64_t start_ns = clock_now_ns();
-        bool ok = tracer_update(structure->made, &bench->scene.gpu, &(struct scene_changes){0}, NULL, error);
+        bool ok = tracer_update(structure->made, &bench->scene.gpu, &(struct tracer_update){0}, error);
         glFinish();
         bench_add(&structure->builds, clock_now_ns() - start_ns);
         if (!ok)

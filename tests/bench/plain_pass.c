@@ -75,10 +75,9 @@ static bool draw(struct plain_pass *pass, struct gpu_scene *scene, const uint32_
 }
 
 static enum tracer_progress plain_update(struct tracer *tracer, struct gpu_scene *scene,
-                                         const struct scene_changes *changes, struct stage_times *times,
-                                         struct error *error)
+                                         const struct tracer_update *update, struct error *error)
 {
-    (void)changes, (void)times;
+    (void)update;
     uint32_t *instances = NULL, count = 0;
     const bool done = axes_list_instances(scene, &instances, &count, error) &&
                       (count == 0 || draw((struct plain_pass *)tracer, scene, instances, count, error));
@@ -87,18 +86,18 @@ static enum tracer_progress plain_update(struct tracer *tracer, struct gpu_scene
     return tracer_progress_of(done);
 }
 
-static bool plain_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                        struct error *error)
+static bool plain_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                              const struct ray_range *rays, struct error *error)
 {
-    (void)tracer, (void)scene, (void)wave;
+    (void)tracer, (void)scene, (void)state, (void)rays;
     return error_set(error, ERROR_UNSUPPORTED, "--form", "a plain pass can be built only");
 }
 
 const struct tracer_impl plain_pass_impl = {
     .name = "plain",
-    .depends_on = TRACER_NEEDS_SCENE,
+    .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES,
     .create = plain_create,
     .destroy = plain_destroy,
     .update = plain_update,
-    .trace = plain_trace,
+    .trace_range = plain_trace_range,
 };

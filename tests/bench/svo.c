@@ -71,23 +71,21 @@ static struct tracer *create_tiles(struct gpu_device *device, const struct trace
 }
 
 static enum tracer_progress svo_update(struct tracer *tracer, struct gpu_scene *scene,
-                                       const struct scene_changes *changes, struct stage_times *times,
-                                       struct error *error)
+                                       const struct tracer_update *update, struct error *error)
 {
     struct svo *svo = (struct svo *)tracer;
-    if (!changes->geometry && !changes->deformed && !changes->instances && !changes->surfaces)
-        return TRACER_DONE;
     gpu_timer_begin(svo->timer, STAGE_BUILD, 0);
     const bool done = svo_tree_build(&svo->tree, scene, error);
     gpu_timer_end(svo->timer);
-    gpu_timer_collect(svo->timer, times);
+    gpu_timer_collect(svo->timer, update->times);
     tracer->stats = (struct tracer_stats){.device_bytes = svo_tree_bytes(&svo->tree),
                                           .nodes = svo->tree.facts.records,
                                           .nodes_rebuilt = svo->tree.facts.records};
     return tracer_progress_of(done);
 }
 
-static bool svo_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error)
+static bool svo_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                            const struct ray_range *rays, struct error *error)
 {
     struct svo_tree *tree = &((struct svo *)tracer)->tree;
     const bool tiles = tree->kind == SVO_KIND_TILES;
@@ -101,7 +99,7 @@ static bool svo_trace(struct tracer *tracer, struct gpu_scene *scene, const stru
         defines[2] = (struct gpu_define){"SVO_PLANES", "1"};
     const struct trace_program_source source = {.traverse = tiles ? "svo/tile_traverse.glsl" : "svo/traverse.glsl",
                                                 .defines = defines};
-    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
+    const struct gpu_program *program = trace_program_get(scene, &state->wave, &source, error);
     static const float nothing[3] = {0};
     if (!program)
         return false;
@@ -115,7 +113,8 @@ static bool svo_trace(struct tracer *tracer, struct gpu_scene *scene, const stru
     gpu_uniform_vec(program, "upper_cells", 3, tree->facts.fragments ? tree->upper_cells : nothing);
     gpu_uniform_uint(program, "first_leaf", tree->first_leaf);
     gpu_uniform_uint(program, "drawn_count", tree->draw.drawn_count);
-    return trace_program_run(program, scene, wave, &source, error);
+    trace_program_run(program, scene, rays, &source);
+    return true;
 }
 
 struct svo_build_facts svo_facts(const struct tracer *tracer)
@@ -125,8 +124,9 @@ struct svo_build_facts svo_facts(const struct tracer *tracer)
 
 #define SVO_IMPL(own_name, own_create)                                                                            \
     {                                                                                                             \
-        .name = own_name, .depends_on = TRACER_NEEDS_SCENE, .still = true, .create = own_create,                  \
-        .destroy = svo_destroy, .update = svo_update, .trace = svo_trace                                          \
+        .name = own_name,                                                                                         \
+        .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_SURFACES, .still = true,  \
+        .create = own_create, .destroy = svo_destroy, .update = svo_update, .trace_range = svo_trace_range        \
     }
 
 const struct tracer_impl svo_cells_impl = SVO_IMPL("svo, cells", create_cells);

@@ -143,8 +143,8 @@ enum tracer_progress fixture_update_in_steps(struct fixture *fixture, uint32_t s
 /* Answers to the fixture's rays, of which the wave has `count`; the caller frees RAY_COUNT of them: struct hit, or
  * of WAVE_ANY uint32_t. */
 void *fixture_trace(struct fixture *fixture, enum wave_kind kind, uint32_t count);
-/* The same by parts of so many rays. */
-void *fixture_trace_in_parts(struct fixture *fixture, enum wave_kind kind, uint32_t count, uint32_t part_rays);
+/* The same in steps of so many rays, where the tracer goes by rays; 0: in the smallest steps. */
+void *fixture_trace_in_steps(struct fixture *fixture, enum wave_kind kind, uint32_t count, uint32_t step_rays);
 /* Answers to rays of a test's own, at most RAY_COUNT. */
 void fixture_trace_rays(struct fixture *fixture, enum wave_kind kind, const struct ray *rays, uint32_t count,
                         void *answers);

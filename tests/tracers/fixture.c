@@ -29,7 +29,8 @@ bool fixture_try_update(struct fixture *fixture, struct error *error)
     struct scene_changes changes;
     fixture_commit(fixture, &changes);
     stage_times_begin(&fixture->times);
-    return tracer_update(fixture->tracer, &fixture->gpu, &changes, &fixture->times, error);
+    return tracer_update(fixture->tracer, &fixture->gpu,
+                         &(struct tracer_update){.changed = changes.bits, .times = &fixture->times}, error);
 }
 
 void fixture_update(struct fixture *fixture)
@@ -41,12 +42,13 @@ void fixture_update(struct fixture *fixture)
 enum tracer_progress fixture_update_in_steps(struct fixture *fixture, uint32_t steps_max, uint32_t *steps,
                                              struct error *error)
 {
-    static const struct scene_changes nothing; /* the tracer is outdated, and takes everything to be changed */
+    /* The tracer is outdated, and takes everything as changed. */
+    const struct tracer_update update = {.times = &fixture->times};
     enum tracer_progress progress = TRACER_MORE;
     uint32_t made = 0;
     stage_times_begin(&fixture->times);
     for (; made < steps_max && progress == TRACER_MORE; made++) {
-        progress = tracer_update_step(fixture->tracer, &fixture->gpu, &nothing, 0, &fixture->times, error);
+        progress = tracer_update_step(fixture->tracer, &fixture->gpu, &update, 0, error);
         /* What of the device's memory is not others' is the structure's, in the middle of an update too. */
         assert_int_equal(device->memory_used_bytes - fixture->others_bytes, fixture->tracer->stats.device_bytes);
     }
@@ -193,15 +195,21 @@ void *fixture_trace(struct fixture *fixture, enum wave_kind kind, uint32_t count
     return read_answers(fixture, kind);
 }
 
-void *fixture_trace_in_parts(struct fixture *fixture, enum wave_kind kind, uint32_t count, uint32_t part_rays)
+void *fixture_trace_in_steps(struct fixture *fixture, enum wave_kind kind, uint32_t count, uint32_t step_rays)
 {
-    struct wave wave = begin_wave(fixture, kind, count);
-    uint32_t chosen = 0;
-    wave.chosen = &chosen;
-    for (; wave.first_ray < count; wave.first_ray = wave.end_ray) {
-        wave.end_ray = count - wave.first_ray < part_rays ? count : wave.first_ray + part_rays;
-        run_wave(fixture, &wave);
+    struct tracer *tracer = fixture->tracer;
+    struct error error = {0};
+    const struct wave wave = begin_wave(fixture, kind, count);
+    struct trace_state *state = trace_state_create(tracer->impl, device, &tracer->options, &error);
+    expect_ok(state && tracer_trace_begin(tracer, &fixture->gpu, &wave, state, &error), &error);
+    gpu_scene_bind(&fixture->gpu);
+    enum tracer_progress progress = TRACER_MORE;
+    while (progress == TRACER_MORE) {
+        state->step_rays[wave.family] = step_rays;
+        progress = tracer_trace_step(tracer, &fixture->gpu, state, step_rays > 0 ? STEP_NS : 0, &error);
     }
+    expect_ok(progress == TRACER_DONE, &error);
+    trace_state_destroy(state);
     return read_answers(fixture, kind);
 }
 

@@ -55,9 +55,10 @@ CHECK(a_structure_built_in_steps_answers_as_one_built_at_once, CHECK_FORMS)
     add_box(&fixture.edits, 2, 0, 0, 0);
     struct scene_changes changes;
     fixture_commit(&fixture, &changes);
+    const struct tracer_update update = {.changed = changes.bits, .times = &fixture.times};
     enum tracer_progress progress = TRACER_MORE;
     while (progress == TRACER_MORE)
-        progress = tracer_update_step(fixture.tracer, &fixture.gpu, &changes, 0, &fixture.times, &error);
+        progress = tracer_update_step(fixture.tracer, &fixture.gpu, &update, 0, &error);
     expect_ok(progress == TRACER_DONE, &error);
     struct answers in_steps = trace_both(&fixture);
     tracer_outdate(fixture.tracer);

@@ -2,6 +2,8 @@
 /* Waves: of any number of rays, in parts, with rays that are none, and such as do not fit. */
 #include "tests/tracers/contract.h"
 
+#include "shared/wave.h"
+
 #include <float.h>
 
 #define FAR 1e30f
@@ -41,7 +43,7 @@ CHECK(a_wave_of_any_size_has_the_answers_of_its_rays_and_no_others, CHECK_FORMS)
     fixture_finish(&fixture);
 }
 
-CHECK(a_wave_in_parts_has_the_answers_of_the_whole, CHECK_FORMS)
+CHECK(a_wave_in_steps_has_the_answers_of_the_whole, CHECK_FORMS)
 {
     const struct contract_case *of = *state;
     const uint32_t count = 1777; /* no multiple of anything */
@@ -51,8 +53,8 @@ CHECK(a_wave_in_parts_has_the_answers_of_the_whole, CHECK_FORMS)
         const enum wave_kind kind = any ? WAVE_ANY : WAVE_CLOSEST;
         const size_t item_bytes = any ? sizeof(uint32_t) : sizeof(struct hit);
         void *whole = fixture_trace(&fixture, kind, count);
-        for (uint32_t parts = 1; parts <= 4; parts += 3) {
-            void *answers = fixture_trace_in_parts(&fixture, kind, count, parts * WAVE_PART_RAYS);
+        for (uint32_t step_rays = 0; step_rays <= 768; step_rays += 768) {
+            void *answers = fixture_trace_in_steps(&fixture, kind, count, step_rays);
             expect_same_until(answers, whole, item_bytes, count, any ? "any" : "closest");
             free(answers);
         }
@@ -121,6 +123,38 @@ CHECK(a_wave_that_does_not_fit_its_buffers_is_refused, 0)
     assert_int_equal(error.kind, ERROR_INTERNAL);
     wave.ray_count = 0;
     assert_false(tracer_trace(fixture.tracer, &fixture.gpu, &wave, NULL));
+    wave.ray_count = RAY_COUNT;
+    wave.family = WAVE_FAMILIES;
+    assert_false(tracer_trace(fixture.tracer, &fixture.gpu, &wave, NULL));
+    fixture_finish(&fixture);
+}
+
+/* The host knows no more than how many there are at most. */
+CHECK(rays_that_the_device_counts_get_the_same_answers, 0)
+{
+    const struct contract_case *of = *state;
+    const struct wave_counts counts = {.ray_count = 1000, .groups_x = 16, .groups_y = 1, .groups_z = 1};
+    struct gpu_buffer small = {0}, buffer = {0};
+    struct fixture fixture;
+    struct error error = {0};
+    fixture_init(&fixture, of->tracer, test_scene_soup());
+    struct hit *expected = fixture_trace(&fixture, WAVE_CLOSEST, RAY_COUNT);
+    struct hit *hits = malloc(RAY_COUNT * sizeof(*hits));
+    expect_ok(gpu_buffer_upload(device, &small, &counts, sizeof(counts) - 4, &error) &&
+                  gpu_buffer_upload(device, &buffer, &counts, sizeof(counts), &error),
+              &error);
+    struct wave wave = {.ray_count = RAY_COUNT, .counts = &small, .rays = &fixture.rays, .hits = &fixture.answers};
+    gpu_scene_bind(&fixture.gpu);
+    assert_false(tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error));
+    assert_int_equal(error.kind, ERROR_INTERNAL);
+    wave.counts = &buffer;
+    expect_ok(tracer_trace(fixture.tracer, &fixture.gpu, &wave, &error), &error);
+    gpu_buffer_read(device, &fixture.answers, 0, hits, counts.ray_count * sizeof(*hits));
+    assert_memory_equal(hits, expected, counts.ray_count * sizeof(*hits));
+    gpu_buffer_finish(device, &small);
+    gpu_buffer_finish(device, &buffer);
+    free(hits);
+    free(expected);
     fixture_finish(&fixture);
 }
 

@@ -11,33 +11,26 @@
 /* Fills any GPU; more at once only nears the time after which a driver ends a dispatch. */
 #define DISPATCH_RAYS_MAX (1u << 18)
 
-/* Crossings of samples to hits, in place. */
-static bool make_surfaces(struct abuffer_store *store, const struct gpu_scene *scene, const struct wave *wave,
-                          struct error *error)
+bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene, const struct ray_range *rays,
+                      struct error *error)
 {
     struct gpu_define defines[3] = {0};
     size_t n = 0;
-    if (wave->kind == WAVE_ANY || wave->crossings_only)
-        return true;
     if (scene->has_spheres)
         defines[n++] = (struct gpu_define){"HAS_SPHERES", "1"};
     if (scene->disc_count > 0)
         defines[n++] = (struct gpu_define){"HAS_DISCS", "1"};
-    const struct gpu_program_source source = {.compute = "abuffer/surface.comp", .defines = defines};
-    const struct gpu_program *program = gpu_program_get(scene->device, &source, error);
+    const struct gpu_program *program = trace_surface_program_get(scene, "abuffer/surface.comp", defines, error);
     if (!program)
         return false;
-    gpu_uniform_uint(program, "first_ray", wave->first_ray);
-    gpu_uniform_uint(program, "ray_count", wave->end_ray);
     gpu_uniform_int(program, "abuffer_drawn_count", (int32_t)store->drawn_count);
-    gpu_buffer_bind_texels(scene->device, wave->rays, UNIT_RAYS, GL_RGBA32F);
-    gpu_buffer_bind_image(scene->device, wave->hits, IMAGE_HITS, GL_RGBA32UI);
-    gpu_dispatch(scene->device, program, wave->end_ray - wave->first_ray);
+    gpu_buffer_bind_texels(store->device, &store->drawn, UNIT_TRACER_4, GL_RGBA32UI);
+    trace_surface_program_run(program, scene, rays);
     return true;
 }
 
-bool abuffer_trace(struct abuffer_store *store, struct gpu_scene *scene, const struct wave *wave,
-                   const struct tracer_options *options, struct error *error)
+bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, const struct ray_range *rays,
+                       const struct tracer_options *options, struct error *error)
 {
     struct gpu_define defines[5] = {{"TRACER_ABUFFER", "1"}};
     size_t n = 1;
@@ -46,7 +39,7 @@ bool abuffer_trace(struct abuffer_store *store, struct gpu_scene *scene, const s
     if (options->abuffer_search == ABUFFER_SEARCH_LINEAR3 || options->abuffer_search == ABUFFER_SEARCH_LINEAR1)
         defines[n++] =
             (struct gpu_define){"ABUFFER_STEPS", options->abuffer_search == ABUFFER_SEARCH_LINEAR3 ? "3" : "1"};
-    if (options->abuffer_count_steps && wave->kind == WAVE_CLOSEST)
+    if (options->abuffer_count_steps && rays->wave->kind == WAVE_CLOSEST)
         defines[n++] = (struct gpu_define){"ABUFFER_COUNT_STEPS", "1"};
     const struct trace_program_source source = {
         .traverse = "abuffer/traverse.glsl",
@@ -54,7 +47,7 @@ bool abuffer_trace(struct abuffer_store *store, struct gpu_scene *scene, const s
         .rays_together = 1,
         .rays_a_dispatch = store->device->facts.software ? 0 : DISPATCH_RAYS_MAX,
     };
-    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
+    const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);
     if (!program)
         return false;
     const float place[4] = {store->lower_world[0], store->lower_world[1], store->lower_world[2],
@@ -70,8 +63,6 @@ bool abuffer_trace(struct abuffer_store *store, struct gpu_scene *scene, const s
     gpu_buffer_bind_texels(store->device, &store->ids, UNIT_TRACER_3, GL_R32UI);
     gpu_buffer_bind_texels(store->device, &store->drawn, UNIT_TRACER_4, GL_RGBA32UI);
     gpu_buffer_bind_texels(store->device, &store->subvoxels, UNIT_TRACER_5, GL_RG32UI);
-    /* Crossings of samples are no matter of trace_surfaces(). */
-    struct wave walk = *wave;
-    walk.crossings_only = true;
-    return trace_program_run(program, scene, &walk, &source, error) && make_surfaces(store, scene, wave, error);
+    trace_program_run(program, scene, rays, &source);
+    return true;
 }

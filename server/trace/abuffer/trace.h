@@ -11,9 +11,11 @@
 
 #include <stdbool.h>
 
-/* What tracer_impl.trace does. Buffers of the scene are bound. A hit's distance is that of the ray's crossing, its
- * surface that of the sample's own primitive at the place nearest to the crossing. */
-bool abuffer_trace(struct abuffer_store *store, struct gpu_scene *scene, const struct wave *wave,
-                   const struct tracer_options *options, struct error *error);
+/* What tracer_impl.trace_range and .surfaces do. Buffers of the scene are bound. A hit's distance is where the ray
+ * meets the sample's plane, its surface that of the sample's own primitive at the place nearest to there. */
+bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, const struct ray_range *rays,
+                       const struct tracer_options *options, struct error *error);
+bool abuffer_surfaces(struct abuffer_store *store, const struct gpu_scene *scene, const struct ray_range *rays,
+                      struct error *error);
 
 #endif

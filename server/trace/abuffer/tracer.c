@@ -160,20 +160,15 @@ static enum tracer_progress do_step(struct abuffer *abuffer, struct gpu_scene *s
 }
 
 static enum tracer_progress abuffer_update(struct tracer *tracer, struct gpu_scene *scene,
-                                           const struct scene_changes *changes, struct stage_times *times,
-                                           struct error *error)
+                                           const struct tracer_update *update, struct error *error)
 {
     struct abuffer *abuffer = (struct abuffer *)tracer;
     struct tracer_stats *stats = &tracer->stats;
-    if (!abuffer_build_is_on(abuffer->builder)) {
-        stats->uploaded_bytes = stats->nodes_rebuilt = 0;
-        stats->cubes[TRACER_CUBE_STATIC].rebuilt = false;
-        /* Of surfaces it matters only where they are cut out. */
-        bool cuts = changes->surfaces && (scene->has_cutout || abuffer->had_cutout);
-        if (!changes->geometry && !changes->deformed && !changes->instances && !cuts)
-            return TRACER_DONE;
-    }
-    enum tracer_progress progress = do_step(abuffer, scene, times, error);
+    /* Of surfaces it matters only where they are cut out. */
+    if (!abuffer_build_is_on(abuffer->builder) && update->changed == CHANGED_SURFACES && !scene->has_cutout &&
+        !abuffer->had_cutout)
+        return TRACER_DONE;
+    enum tracer_progress progress = do_step(abuffer, scene, update->times, error);
     if (progress == TRACER_FAILED) {
         abuffer_store_finish(&abuffer->store);
         abuffer_builder_clear(abuffer->builder);
@@ -192,19 +187,28 @@ static void abuffer_abandon(struct tracer *tracer)
     fill_stats(abuffer);
 }
 
-static bool abuffer_trace_wave(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                               struct error *error)
+static bool abuffer_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                                const struct ray_range *rays, struct error *error)
 {
-    return abuffer_trace(&((struct abuffer *)tracer)->store, scene, wave, &tracer->options, error);
+    (void)state;
+    return abuffer_intersect(&((struct abuffer *)tracer)->store, scene, rays, &tracer->options, error);
+}
+
+static bool abuffer_make_surfaces(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
+                                  struct error *error)
+{
+    return abuffer_surfaces(&((struct abuffer *)tracer)->store, scene, rays, error);
 }
 
 const struct tracer_impl tracer_abuffer_impl = {
     .name = "abuffer",
-    .depends_on = TRACER_NEEDS_SCENE,
+    .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_SURFACES,
     .still = true,
+    .minimum_rays = 192,
     .create = abuffer_create,
     .destroy = abuffer_destroy,
     .update = abuffer_update,
     .abandon = abuffer_abandon,
-    .trace = abuffer_trace_wave,
+    .trace_range = abuffer_trace_range,
+    .surfaces = abuffer_make_surfaces,
 };

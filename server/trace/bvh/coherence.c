@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /* How many rays of a wave walk together. The choice follows the rays and the scene alone, never the clock, so that
- * a picture is the same every time: it is made for the whole wave, with its first part. */
+ * a picture is the same every time: it is made once for the whole wave, before its first step. */
 #include "trace/bvh/tracer.h"
 
 #include "gpu/program.h"
@@ -77,13 +77,7 @@ uint32_t bvh_rays_together(struct bvh *bvh, const struct gpu_scene *scene, const
         return options->bvh_rays_together;
     if (!scene->device->facts.software || wave->ray_count < COHERENCE_RAYS_MIN)
         return 1;
-    if (wave->first_ray > 0)
-        return *wave->chosen;
     if (!measure_coherence(bvh, scene, wave, counts, error))
         return 0;
-    uint32_t together =
-        counts[0] >= (uint64_t)RAYS_A_WALK_MIN * counts[1] && counts[1] > 0 ? TOGETHER_SOFTWARE : 1;
-    if (wave->chosen)
-        *wave->chosen = together;
-    return together;
+    return counts[0] >= (uint64_t)RAYS_A_WALK_MIN * counts[1] && counts[1] > 0 ? TOGETHER_SOFTWARE : 1;
 }

@@ -297,12 +297,11 @@ static enum tracer_progress go_on(struct bvh *bvh, struct gpu_scene *scene, stru
     return tracer_progress_of(update_instances(bvh, scene, times, error));
 }
 
-static bool begin_update(struct bvh *bvh, const struct gpu_scene *scene, const struct scene_changes *changes,
-                         struct error *error)
+static bool begin_update(struct bvh *bvh, const struct gpu_scene *scene, unsigned changed, struct error *error)
 {
-    bool trees = changes->geometry || changes->deformed;
+    bool trees = changed & (CHANGED_GEOMETRY | CHANGED_DEFORMED);
     bvh->phase = trees ? BVH_TREES : BVH_TOP;
-    return !trees || bvh_store_begin(&bvh->store, scene, changes->geometry, error);
+    return !trees || bvh_store_begin(&bvh->store, scene, changed & CHANGED_GEOMETRY, error);
 }
 
 static void fill_stats(struct bvh *bvh)
@@ -313,21 +312,14 @@ static void fill_stats(struct bvh *bvh)
 }
 
 static enum tracer_progress bvh_update(struct tracer *tracer, struct gpu_scene *scene,
-                                       const struct scene_changes *changes, struct stage_times *times,
-                                       struct error *error)
+                                       const struct tracer_update *update, struct error *error)
 {
     struct bvh *bvh = (struct bvh *)tracer;
-    struct tracer_stats *stats = &tracer->stats;
     enum tracer_progress progress = TRACER_MORE;
-    if (bvh->phase == BVH_IDLE) {
-        stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
-        if (!changes->geometry && !changes->deformed && !changes->instances)
-            return TRACER_DONE;
-        if (!begin_update(bvh, scene, changes, error))
-            progress = TRACER_FAILED;
-    }
+    if (bvh->phase == BVH_IDLE && !begin_update(bvh, scene, update->changed, error))
+        progress = TRACER_FAILED;
     if (progress == TRACER_MORE)
-        progress = go_on(bvh, scene, times, error);
+        progress = go_on(bvh, scene, update->times, error);
     if (progress == TRACER_FAILED)
         bvh_reset(bvh);
     if (progress != TRACER_MORE)
@@ -350,6 +342,30 @@ static bool bvh_waits(struct tracer *tracer)
 }
 
 /* ---- waves ---- */
+
+static struct trace_state *bvh_state_create(struct gpu_device *device, const struct tracer_options *options,
+                                            struct error *error)
+{
+    (void)device, (void)options;
+    struct bvh_state *state = calloc(1, sizeof(*state));
+    if (state)
+        return &state->base;
+    error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the state of a wave");
+    return NULL;
+}
+
+static void bvh_state_destroy(struct trace_state *state)
+{
+    free(state);
+}
+
+static bool bvh_trace_begin(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                            struct error *error)
+{
+    struct bvh_state *own = (struct bvh_state *)state;
+    own->rays_together = bvh_rays_together((struct bvh *)tracer, scene, &state->wave, error);
+    return own->rays_together > 0;
+}
 
 static void bind(struct bvh *bvh)
 {
@@ -384,13 +400,13 @@ static void set_uniforms(const struct bvh *bvh, const struct gpu_program *progra
     }
 }
 
-static bool bvh_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error)
+static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                            const struct ray_range *rays, struct error *error)
 {
     struct bvh *bvh = (struct bvh *)tracer;
     const struct bvh_settings *settings = &bvh->store.settings;
-    uint32_t together = bvh_rays_together(bvh, scene, wave, error);
-    if (together == 0)
-        return false;
+    const struct wave *wave = &state->wave;
+    const uint32_t together = ((struct bvh_state *)state)->rays_together;
     struct gpu_define defines[9] = {{"TRACER_BVH", "1"}};
     size_t n = 1;
     if (settings->bounds == BVH_BOUNDS_OF_SPHERES)
@@ -419,16 +435,21 @@ static bool bvh_trace(struct tracer *tracer, struct gpu_scene *scene, const stru
         return false;
     bind(bvh);
     set_uniforms(bvh, program, scene, wave);
-    return trace_program_run(program, scene, wave, &source, error);
+    trace_program_run(program, scene, rays, &source);
+    return true;
 }
 
 const struct tracer_impl tracer_bvh_impl = {
     .name = "bvh",
-    .depends_on = TRACER_NEEDS_SCENE,
+    .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES,
+    .minimum_rays = 192, /* a multiple of all packets' sizes */
     .create = bvh_create,
     .destroy = bvh_destroy,
     .update = bvh_update,
     .abandon = bvh_abandon,
     .waits = bvh_waits,
-    .trace = bvh_trace,
+    .state_create = bvh_state_create,
+    .state_destroy = bvh_state_destroy,
+    .trace_begin = bvh_trace_begin,
+    .trace_range = bvh_trace_range,
 };

@@ -23,6 +23,12 @@ struct bvh {
     struct gpu_buffer coherence; /* what bvh/coherence.comp counts */
 };
 
+/* Of one wave. */
+struct bvh_state {
+    struct trace_state base;
+    uint32_t rays_together;
+};
+
 /* How far apart rays that are walked together may begin, in world space. Those of a lens, all over it: they meet
  * again where the lens is in focus. */
 float bvh_reach_together(const struct gpu_scene *scene, const struct wave *wave);

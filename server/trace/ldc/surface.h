@@ -10,10 +10,9 @@
 
 #include <stdbool.h>
 
-/* From crossings as ldc_trace.h has them to hits, in place: what trace_surfaces() is to exact tracers. The scene's
- * buffers are bound already. Nothing to do for any-hit waves and those that want crossings only. Queues the work.
- */
-bool ldc_surfaces(struct ldc_store *store, const struct gpu_scene *scene, const struct wave *wave,
+/* From intersections as trace.h has them to hits, in place: what trace_surfaces() is to exact tracers. The scene's
+ * buffers are bound already. Queues the work. */
+bool ldc_surfaces(struct ldc_store *store, const struct gpu_scene *scene, const struct ray_range *rays,
                   struct error *error);
 
 #endif

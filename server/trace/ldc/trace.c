@@ -4,7 +4,6 @@
 #include "gpu/program.h"
 #include "shared/bindings.h"
 #include "trace/ldc/levels.h"
-#include "trace/ldc/surface.h"
 #include "trace/program.h"
 
 #include <epoxy/gl.h>
@@ -55,8 +54,8 @@ static void bind(struct ldc_store *store, bool cells)
     gpu_buffer_bind_texels(store->device, &store->entries, UNIT_TRACER_5, GL_RGBA32UI);
 }
 
-bool ldc_trace(struct ldc_store *store, struct gpu_scene *scene, const struct wave *wave,
-               const struct tracer_options *options, struct error *error)
+bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struct ray_range *rays,
+                   const struct tracer_options *options, struct error *error)
 {
     static const struct ldc_cube nothing = {.cell_world = 1};
     const struct ldc_cube *cubes[TRACER_CUBES_MAX] = {&nothing};
@@ -76,7 +75,7 @@ bool ldc_trace(struct ldc_store *store, struct gpu_scene *scene, const struct wa
         {"LDC_LAYERS_TOGETHER", options->ldc_layers_together == 1 ? "1" : "4"},
     };
     size_t n = 4;
-    if (options->ldc_count_steps && wave->kind == WAVE_CLOSEST)
+    if (options->ldc_count_steps && rays->wave->kind == WAVE_CLOSEST)
         defines[n++] = (struct gpu_define){"LDC_COUNT_STEPS", "1"};
     if (layout.cells)
         defines[n++] = (struct gpu_define){"LDC_CELLS", "1"};
@@ -90,7 +89,7 @@ bool ldc_trace(struct ldc_store *store, struct gpu_scene *scene, const struct wa
         .rays_together = options->ldc_rays_together ? options->ldc_rays_together : 1,
         .rays_a_dispatch = store->device->facts.software ? 0 : DISPATCH_RAYS_MAX,
     };
-    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
+    const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);
     if (!program)
         return false;
     bind(store, layout.cells);
@@ -98,8 +97,6 @@ bool ldc_trace(struct ldc_store *store, struct gpu_scene *scene, const struct wa
         const struct ldc_level_layout own = ldc_level_layout_of(store, cubes[i]->resolution, options);
         set_cube(program, i, cubes[i], &own, options);
     }
-    /* Crossings of samples are no matter of trace_surfaces(). */
-    struct wave walk = *wave;
-    walk.crossings_only = true;
-    return trace_program_run(program, scene, &walk, &source, error) && ldc_surfaces(store, scene, wave, error);
+    trace_program_run(program, scene, rays, &source);
+    return true;
 }

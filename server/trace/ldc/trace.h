@@ -11,10 +11,10 @@
 
 #include <stdbool.h>
 
-/* Closest hits: crossings, of which `instance` is HIT_NO_PRIMITIVE - 1 for a sample, whose number `primitive` is,
- * and HIT_NO_PRIMITIVE for a disc; then, unless the wave wants crossings only, hits of them (ldc/surface.comp).
- * Any hits: transmittances. Cubes with resolution 0 are passed over. */
-bool ldc_trace(struct ldc_store *store, struct gpu_scene *scene, const struct wave *wave,
-               const struct tracer_options *options, struct error *error);
+/* Closest hits: intersections, of which `instance` is HIT_NO_PRIMITIVE - 1 for a sample, whose number `primitive`
+ * is, and HIT_NO_PRIMITIVE for a disc; ldc_surfaces() makes hits of them. Any hits: transmittances. Cubes with
+ * resolution 0 are passed over. */
+bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struct ray_range *rays,
+                   const struct tracer_options *options, struct error *error);
 
 #endif

@@ -9,6 +9,7 @@
 #include "trace/ldc/levels.h"
 #include "trace/ldc/parts.h"
 #include "trace/ldc/store.h"
+#include "trace/ldc/surface.h"
 #include "trace/ldc/trace.h"
 #include "trace/tracer.h"
 
@@ -234,11 +235,11 @@ static void fill_stats(struct ldc *ldc)
 }
 
 /* Which cubes are to be built. Of materials it is known which have changed, but not where they are. */
-static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene *scene,
-                                         const struct scene_changes *changes, struct error *error)
+static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene *scene, unsigned changed,
+                                         struct error *error)
 {
-    bool any = changes->surfaces;
-    if (!ldc_parts_update(&ldc->parts, scene, ldc->resolution, changes->geometry, ldc->stale, error))
+    bool any = changed & CHANGED_SURFACES;
+    if (!ldc_parts_update(&ldc->parts, scene, ldc->resolution, changed & CHANGED_GEOMETRY, ldc->stale, error))
         return TRACER_FAILED;
     for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
         any = any || ldc->stale[i]; /* what lies behind a cube goes with it */
@@ -249,22 +250,14 @@ static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene
 }
 
 static enum tracer_progress ldc_update(struct tracer *tracer, struct gpu_scene *scene,
-                                       const struct scene_changes *changes, struct stage_times *times,
-                                       struct error *error)
+                                       const struct tracer_update *update, struct error *error)
 {
     struct ldc *ldc = (struct ldc *)tracer;
-    struct tracer_stats *stats = &tracer->stats;
     enum tracer_progress progress = TRACER_MORE;
-    if (ldc->phase == LDC_IDLE) {
-        stats->uploaded_bytes = stats->nodes_rebuilt = 0;
-        for (int i = 0; i < TRACER_CUBES_MAX; i++)
-            stats->cubes[i].rebuilt = false;
-        if (!changes->geometry && !changes->deformed && !changes->instances && !changes->surfaces)
-            return TRACER_DONE;
-        progress = begin_update(ldc, scene, changes, error);
-    }
+    if (ldc->phase == LDC_IDLE)
+        progress = begin_update(ldc, scene, update->changed, error);
     if (progress == TRACER_MORE)
-        progress = go_on(ldc, scene, times, error);
+        progress = go_on(ldc, scene, update->times, error);
     if (progress == TRACER_FAILED)
         reset(ldc);
     if (progress == TRACER_DONE)
@@ -280,20 +273,29 @@ static void ldc_abandon(struct tracer *tracer)
     fill_stats(ldc);
 }
 
-static bool ldc_trace_wave(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                           struct error *error)
+static bool ldc_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                            const struct ray_range *rays, struct error *error)
 {
-    return ldc_trace(&((struct ldc *)tracer)->store, scene, wave, &tracer->options, error);
+    (void)state;
+    return ldc_intersect(&((struct ldc *)tracer)->store, scene, rays, &tracer->options, error);
+}
+
+static bool ldc_make_surfaces(struct tracer *tracer, struct gpu_scene *scene, const struct ray_range *rays,
+                              struct error *error)
+{
+    return ldc_surfaces(&((struct ldc *)tracer)->store, scene, rays, error);
 }
 
 const struct tracer_impl tracer_ldc_impl = {
     .name = "ldc",
-    .depends_on = TRACER_NEEDS_SCENE,
+    .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_SURFACES,
     .sampled = true,
     .still = true,
+    .minimum_rays = 192,
     .create = ldc_create,
     .destroy = ldc_destroy,
     .update = ldc_update,
     .abandon = ldc_abandon,
-    .trace = ldc_trace_wave,
+    .trace_range = ldc_trace_range,
+    .surfaces = ldc_make_surfaces,
 };

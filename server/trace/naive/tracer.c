@@ -38,10 +38,9 @@ static void naive_destroy(struct tracer *tracer)
 }
 
 static enum tracer_progress naive_update(struct tracer *tracer, struct gpu_scene *scene,
-                                         const struct scene_changes *changes, struct stage_times *times,
-                                         struct error *error)
+                                         const struct tracer_update *update, struct error *error)
 {
-    (void)changes, (void)times;
+    (void)update;
     uint64_t primitives = 1;
     for (uint32_t i = 0; i < scene->instance_count; i++)
         primitives += scene->geometries[scene->instances[i].geometry].device.primitive_count;
@@ -57,29 +56,29 @@ static enum tracer_progress naive_update(struct tracer *tracer, struct gpu_scene
     ((struct naive *)tracer)->rays_a_dispatch = rays > UINT32_MAX          ? UINT32_MAX
                                                 : rays < DISPATCH_RAYS_MIN ? DISPATCH_RAYS_MIN
                                                                            : (uint32_t)rays;
-    tracer->stats = (struct tracer_stats){0}; /* there is nothing but the scene itself */
     return TRACER_DONE;
 }
 
-static bool naive_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                        struct error *error)
+static bool naive_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                              const struct ray_range *rays, struct error *error)
 {
     const struct trace_program_source source = {
         .traverse = "naive/traverse.glsl",
         .defines = naive_defines,
         .rays_a_dispatch = ((struct naive *)tracer)->rays_a_dispatch,
     };
-    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
-    if (!program)
-        return false;
-    return trace_program_run(program, scene, wave, &source, error);
+    const struct gpu_program *program = trace_program_get(scene, &state->wave, &source, error);
+    if (program)
+        trace_program_run(program, scene, rays, &source);
+    return program != NULL;
 }
 
 const struct tracer_impl tracer_naive_impl = {
     .name = "naive",
-    .depends_on = 0,
+    .depends_on = CHANGED_GEOMETRY | CHANGED_INSTANCES | CHANGED_SHADING, /* what limits it */
+    .minimum_rays = 192,
     .create = naive_create,
     .destroy = naive_destroy,
     .update = naive_update,
-    .trace = naive_trace,
+    .trace_range = naive_trace_range,
 };

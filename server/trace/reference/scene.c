@@ -369,28 +369,29 @@ static bool update_materials(struct reference *reference, const struct gpu_scene
     return true;
 }
 
-static bool update_parts(struct reference *reference, const struct gpu_scene *scene,
-                         const struct scene_changes *changes, struct error *error)
+static bool update_parts(struct reference *reference, const struct gpu_scene *scene, unsigned changed,
+                         struct error *error)
 {
-    bool changed = !reference->top, shading = changes->shading || changes->geometry;
+    bool top_changed = !reference->top, shading = changed & (CHANGED_SHADING | CHANGED_GEOMETRY);
     if (!reference->top)
         reference->top = new_scene(reference->device);
-    if (!reference->top || (changes->geometry && !list_entries(reference, scene)) ||
+    if (!reference->top || ((changed & CHANGED_GEOMETRY) && !list_entries(reference, scene)) ||
         (shading && !update_materials(reference, scene)))
         return false;
-    if ((changes->geometry || changes->deformed) && !deform_entries(reference, scene, error))
+    if ((changed & (CHANGED_GEOMETRY | CHANGED_DEFORMED)) && !deform_entries(reference, scene, error))
         return false;
     commit_entries(reference);
-    return update_discs(reference, scene, shading, &changed) &&
-           reference_update_instances(reference, scene, shading || changes->instances || changes->deformed,
-                                      &changed, error);
+    return update_discs(reference, scene, shading, &top_changed) &&
+           reference_update_instances(reference, scene,
+                                      shading || (changed & (CHANGED_INSTANCES | CHANGED_DEFORMED)), &top_changed,
+                                      error);
 }
 
-bool reference_scene_update(struct reference *reference, const struct gpu_scene *scene,
-                            const struct scene_changes *changes, struct error *error)
+bool reference_scene_update(struct reference *reference, const struct gpu_scene *scene, unsigned changed,
+                            struct error *error)
 {
     struct tracer_stats *stats = &reference->base.stats;
-    bool ok = update_parts(reference, scene, changes, error);
+    bool ok = update_parts(reference, scene, changed, error);
     /* What Embree says comes first: where it fails it says why. */
     if (!reference_check(reference, "building", error) || !ok)
         return no_memory(error, scene);

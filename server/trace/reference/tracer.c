@@ -4,7 +4,6 @@
 #include "base/clock.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
-#include "trace/program.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -151,19 +150,17 @@ static struct tracer *reference_create(struct gpu_device *device, const struct t
 }
 
 static enum tracer_progress reference_update(struct tracer *tracer, struct gpu_scene *scene,
-                                             const struct scene_changes *changes, struct stage_times *times,
-                                             struct error *error)
+                                             const struct tracer_update *update, struct error *error)
 {
     struct reference *reference = (struct reference *)tracer;
     uint64_t start_ns = clock_now_ns();
-    tracer->stats.uploaded_bytes = tracer->stats.nodes_rebuilt = 0;
-    bool ok = reference_scene_update(reference, scene, changes, error) && book_memory(reference, error);
+    bool ok = reference_scene_update(reference, scene, update->changed, error) && book_memory(reference, error);
     if (!ok) {
         struct error second = {0}; /* says nothing that *error does not */
         reference_scene_finish(reference);
         book_memory(reference, &second);
     }
-    stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    stage_times_add(update->times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return tracer_progress_of(ok);
 }
 
@@ -185,20 +182,22 @@ static bool reserve_host(struct reference *reference, uint32_t ray_count, struct
 }
 
 /* Unlike the others it waits, for the rays and for itself. */
-static bool reference_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave,
-                            struct error *error)
+static bool reference_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                                  const struct ray_range *rays, struct error *error)
 {
+    (void)scene;
     struct reference *reference = (struct reference *)tracer;
+    const struct wave *wave = &state->wave;
     if (!reserve_host(reference, wave->ray_count, error))
         return false;
-    const size_t first = wave->first_ray, count = wave->end_ray - wave->first_ray;
+    const size_t first = rays->first, count = rays->end - rays->first;
     gpu_buffer_read(tracer->device, wave->rays, first * sizeof(struct ray), reference->rays + first,
                     count * sizeof(struct ray));
     if (wave->times)
         gpu_buffer_read(tracer->device, wave->times, first * sizeof(float), reference->times + first,
                         count * sizeof(float));
     uint64_t start_ns = clock_now_ns();
-    reference_walk(reference, wave);
+    reference_walk(reference, rays);
     tracer->stats.walk_ns = clock_now_ns() - start_ns;
     if (!reference_check(reference, "tracing", error))
         return false;
@@ -208,14 +207,15 @@ static bool reference_trace(struct tracer *tracer, struct gpu_scene *scene, cons
     else
         gpu_buffer_write(tracer->device, wave->hits, first * sizeof(struct hit),
                          (const struct hit *)reference->answers + first, count * sizeof(struct hit));
-    return trace_surfaces(scene, wave, error);
+    return true;
 }
 
 const struct tracer_impl tracer_reference_impl = {
     .name = "reference",
-    .depends_on = TRACER_NEEDS_SCENE,
+    .depends_on = CHANGED_GEOMETRY | CHANGED_DEFORMED | CHANGED_INSTANCES | CHANGED_DISCS | CHANGED_SHADING,
+    .minimum_rays = 192,
     .create = reference_create,
     .destroy = reference_destroy,
     .update = reference_update,
-    .trace = reference_trace,
+    .trace_range = reference_trace_range,
 };

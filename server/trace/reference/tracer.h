@@ -79,8 +79,8 @@ struct reference {
 bool reference_check(struct reference *reference, const char *what, struct error *error);
 
 /* reference_scene.c: brings all of the above to the scene. After a failure reference_scene_finish is due. */
-bool reference_scene_update(struct reference *reference, const struct gpu_scene *scene,
-                            const struct scene_changes *changes, struct error *error);
+bool reference_scene_update(struct reference *reference, const struct gpu_scene *scene, unsigned changed,
+                            struct error *error);
 void reference_scene_finish(struct reference *reference); /* leaves it empty */
 /* reference_instance.c. `look`: some may have moved, or show what was built anew; *changed is set where they do.
  */
@@ -89,7 +89,7 @@ bool reference_update_instances(struct reference *reference, const struct gpu_sc
 void reference_drop_instances(struct reference *reference);
 
 /* reference_walk.c: a wave that lies in `rays` and `times`; crossings or visibilities into `answers`. */
-void reference_walk(struct reference *reference, const struct wave *wave);
+void reference_walk(struct reference *reference, const struct ray_range *rays);
 /* Embree asks these about each candidate on a geometry that has cutouts (closest), or lets light pass (any). */
 void reference_filter_closest(const struct RTCFilterFunctionNArguments *arguments);
 void reference_filter_any(const struct RTCFilterFunctionNArguments *arguments);

@@ -64,7 +64,7 @@ struct packet {
 
 struct walk {
     struct reference *reference;
-    const struct wave *wave;
+    const struct ray_range *rays;
     unsigned width;
 };
 
@@ -282,14 +282,14 @@ static inline __attribute__((always_inline)) void
 walk_packets(const struct walk *walk, struct walk_context *context, uint32_t first, uint32_t end, unsigned n)
 {
     const struct reference *reference = walk->reference;
-    bool any = walk->wave->kind == WAVE_ANY;
+    bool any = walk->rays->wave->kind == WAVE_ANY;
     struct packet packet;
     for (uint32_t at = first; at < end; at += n) {
         unsigned count = end - at < n ? end - at : n;
         for (unsigned lane = 0; lane < n; lane++) {
             static const struct ray dead = {.direction_t_max = {0.0f, 0.0f, 0.0f, -1.0f}};
             bool there = lane < count;
-            float time = there && walk->wave->times ? reference->times[at + lane] : 0.0f;
+            float time = there && walk->rays->wave->times ? reference->times[at + lane] : 0.0f;
             set_lane(&packet, n, lane, there ? &reference->rays[at + lane] : &dead, time, at + lane - first,
                      reference->coordinate_max);
         }
@@ -311,12 +311,12 @@ walk_packets(const struct walk *walk, struct walk_context *context, uint32_t fir
 static void walk_chunk(void *argument, uint32_t chunk)
 {
     const struct walk *walk = argument;
-    uint32_t first = walk->wave->first_ray + chunk * CHUNK_RAYS, left = walk->wave->end_ray - first;
+    uint32_t first = walk->rays->first + chunk * CHUNK_RAYS, left = walk->rays->end - first;
     uint32_t end = first + (left < CHUNK_RAYS ? left : CHUNK_RAYS);
     struct walk_context context;
     unsigned mode = enter_fast_mode();
     rtcInitIntersectContext(&context.embree);
-    if (walk->wave->kind == WAVE_ANY)
+    if (walk->rays->wave->kind == WAVE_ANY)
         for (uint32_t i = 0; i < end - first; i++)
             for (int k = 0; k < 3; k++)
                 context.transmittance[i][k] = 1.0f;
@@ -336,9 +336,9 @@ static void walk_chunk(void *argument, uint32_t chunk)
     leave_fast_mode(mode);
 }
 
-void reference_walk(struct reference *reference, const struct wave *wave)
+void reference_walk(struct reference *reference, const struct ray_range *rays)
 {
-    struct walk walk = {.reference = reference, .wave = wave, .width = reference->width};
-    uint32_t chunks = (wave->end_ray - wave->first_ray - 1) / CHUNK_RAYS + 1;
+    struct walk walk = {.reference = reference, .rays = rays, .width = reference->width};
+    uint32_t chunks = (rays->end - rays->first - 1) / CHUNK_RAYS + 1;
     parallel_run(parallel_processors(), chunks, walk_chunk, &walk);
 }

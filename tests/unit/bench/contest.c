@@ -37,18 +37,20 @@ static void liar_destroy(struct tracer *tracer)
 }
 
 static enum tracer_progress liar_update(struct tracer *tracer, struct gpu_scene *gpu,
-                                        const struct scene_changes *changes, struct stage_times *times,
-                                        struct error *error)
+                                        const struct tracer_update *update, struct error *error)
 {
     (void)tracer;
-    return tracer_progress_of(tracer_update(honest, gpu, changes, times, error));
+    return tracer_progress_of(tracer_update(honest, gpu, update, error));
 }
 
 /* Every hundredth hit is told wrong. */
-static bool liar_trace(struct tracer *tracer, struct gpu_scene *gpu, const struct wave *wave, struct error *error)
+static bool liar_trace(struct tracer *tracer, struct gpu_scene *gpu, struct trace_state *state,
+                       const struct ray_range *rays, struct error *error)
 {
     static struct hit hits[RAYS];
-    if (!tracer_trace(honest, gpu, wave, error) || lie == LIE_NONE)
+    const struct wave *wave = &state->wave;
+    (void)rays; /* all of them */
+    if (!tracer_intersect(honest, gpu, wave, error) || lie == LIE_NONE)
         return true;
     gpu_buffer_read(tracer->device, wave->hits, 0, hits, wave->ray_count * sizeof *hits);
     for (uint32_t i = 0, met = 0; i < wave->ray_count; i++) {
@@ -59,8 +61,11 @@ static bool liar_trace(struct tracer *tracer, struct gpu_scene *gpu, const struc
     return true;
 }
 
-static const struct tracer_impl liar_impl = {
-    .name = "liar", .create = liar_create, .destroy = liar_destroy, .update = liar_update, .trace = liar_trace};
+static const struct tracer_impl liar_impl = {.name = "liar",
+                                             .create = liar_create,
+                                             .destroy = liar_destroy,
+                                             .update = liar_update,
+                                             .trace_range = liar_trace};
 
 /* ---- a contest of it and Embree ---- */
 
@@ -82,7 +87,7 @@ static struct outcome contest_with(enum lie told)
     assert_non_null(embree);
     assert_true(build_ns > 0);
     assert_true(bench_embree_bytes(embree) > 0);
-    assert_true(tracer_update(liar, &scene.gpu, &(struct scene_changes){0}, NULL, &error));
+    assert_true(tracer_update(liar, &scene.gpu, &(struct tracer_update){0}, &error));
     struct bench_contest contest = {.device = device, .scene = &scene, .runs = 2};
     struct bench_contender *raw = bench_contest_add(&contest, "embree", "1 a call, robust", BENCH_RAW);
     raw->embree = embree;

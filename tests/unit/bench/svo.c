@@ -107,7 +107,7 @@ static struct tracer *build(struct stage *stage, const struct tracer_impl *impl,
     struct error error = {0};
     const struct tracer_options options = {.abuffer_resolution = resolution};
     struct tracer *tracer = tracer_create(impl, device, &options, &error);
-    must(tracer && tracer_update(tracer, &stage->gpu, &(struct scene_changes){0}, NULL, &error), &error);
+    must(tracer && tracer_update(tracer, &stage->gpu, &(struct tracer_update){0}, &error), &error);
     return tracer;
 }
 

@@ -30,8 +30,7 @@ static struct {
 } watched;
 
 static enum tracer_progress watched_update(struct tracer *tracer, struct gpu_scene *scene,
-                                           const struct scene_changes *changes, struct stage_times *times,
-                                           struct error *error)
+                                           const struct tracer_update *update, struct error *error)
 {
     bool goes_on = watched.building == tracer;
     if (goes_on && atomic_load(&watched.pieces) == 1 && !atomic_load(&watched.gate)) {
@@ -40,7 +39,7 @@ static enum tracer_progress watched_update(struct tracer *tracer, struct gpu_sce
             poll(NULL, 0, 1);
     }
     tracer->step_end_ns = 0; /* the least that it can be cut to */
-    enum tracer_progress progress = tracer_bvh_impl.update(tracer, scene, changes, times, error);
+    enum tracer_progress progress = tracer_bvh_impl.update(tracer, scene, update, error);
     if (goes_on || progress == TRACER_MORE) {
         watched.building = progress == TRACER_MORE ? tracer : NULL;
         atomic_fetch_add(&watched.pieces, 1);

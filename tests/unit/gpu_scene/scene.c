@@ -41,10 +41,10 @@ static void fixture_finish(struct fixture *fixture)
 
 static void expect_changes(const struct fixture *fixture, bool geometry, bool instances, bool shading, bool lights)
 {
-    assert_int_equal(fixture->changes.geometry, geometry);
-    assert_int_equal(fixture->changes.instances, instances);
-    assert_int_equal(fixture->changes.shading, shading);
-    assert_int_equal(fixture->changes.lights, lights);
+    assert_int_equal((fixture->changes.bits & CHANGED_GEOMETRY) != 0, geometry);
+    assert_int_equal((fixture->changes.bits & CHANGED_INSTANCES) != 0, instances);
+    assert_int_equal((fixture->changes.bits & CHANGED_SHADING) != 0, shading);
+    assert_int_equal((fixture->changes.bits & CHANGED_LIGHTS) != 0, lights);
 }
 
 ALL_TESTS(open_device, close_device)
@@ -93,7 +93,7 @@ TEST(an_edited_material_moves_no_geometry_and_no_texels)
     test_commit(&fixture.edits);
     update(&fixture);
     expect_changes(&fixture, false, false, true, false);
-    assert_false(fixture.changes.surfaces);
+    assert_false((fixture.changes.bits & CHANGED_SURFACES));
     assert_int_equal(fixture.changes.uploaded_bytes, sizeof(struct material));
     fixture_finish(&fixture);
 }
@@ -103,7 +103,7 @@ TEST(only_what_is_more_than_a_factor_changes_surfaces)
 {
     struct fixture fixture;
     fixture_init(&fixture, test_scene_translucent());
-    assert_true(fixture.changes.surfaces);
+    assert_true((fixture.changes.bits & CHANGED_SURFACES));
     struct scene_material glass = *scene_material(fixture.scene, 3), cutout = *scene_material(fixture.scene, 1);
     struct scene_material *edited = test_material(&fixture.edits, 3, 0.1f, 0.2f, 0.3f);
     memcpy(edited->textures, glass.textures, sizeof(glass.textures));
@@ -113,24 +113,24 @@ TEST(only_what_is_more_than_a_factor_changes_surfaces)
     edited->base_colour[3] = 0.5f;
     test_commit(&fixture.edits);
     update(&fixture);
-    assert_true(fixture.changes.shading && !fixture.changes.surfaces);
+    assert_true((fixture.changes.bits & CHANGED_SHADING) && !(fixture.changes.bits & CHANGED_SURFACES));
     edited = test_material(&fixture.edits, 3, 0.1f, 0.2f, 0.3f);
     memcpy(edited->textures, glass.textures, sizeof(glass.textures));
     edited->textures[MATERIAL_TRANSMISSION].uv_transform[2] = 0.5f;
     test_commit(&fixture.edits);
     update(&fixture);
-    assert_true(fixture.changes.surfaces);
+    assert_true((fixture.changes.bits & CHANGED_SURFACES));
     edited = test_material(&fixture.edits, 1, 0.1f, 0.2f, 0.3f);
     memcpy(edited->textures, cutout.textures, sizeof(cutout.textures));
     edited->alpha_mode = ALPHA_MASK;
     edited->alpha_cutoff = 0.25f;
     test_commit(&fixture.edits);
     update(&fixture);
-    assert_true(fixture.changes.surfaces);
+    assert_true((fixture.changes.bits & CHANGED_SURFACES));
     test_texture(&fixture.edits, 2, 5, 5, TEXTURE_RGBA8_LINEAR, WRAP_CLAMP, WRAP_REPEAT, 20);
     test_commit(&fixture.edits);
     update(&fixture);
-    assert_true(fixture.changes.surfaces);
+    assert_true((fixture.changes.bits & CHANGED_SURFACES));
     fixture_finish(&fixture);
 }
 
@@ -253,7 +253,7 @@ TEST(an_environment_image_is_there_until_it_is_taken_away)
         .colour = {1, 1, 1}, .width = 2, .height = 1, .texels = test_blob(half_floats, sizeof(half_floats))};
     test_commit(&fixture.edits);
     update(&fixture);
-    assert_true(fixture.gpu.has_environment_image && fixture.changes.lights);
+    assert_true(fixture.gpu.has_environment_image && (fixture.changes.bits & CHANGED_LIGHTS));
     assert_int_equal(fixture.gpu.environment.width, 2);
     edit = test_add(&fixture.edits, SCENE_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;

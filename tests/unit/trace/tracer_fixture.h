@@ -29,7 +29,8 @@ static inline bool try_update(struct fixture *fixture, struct error *error)
     const struct scene_motion *motion = fixture->motion.pose_count ? &fixture->motion : NULL;
     expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, motion, &changes, NULL, error), error);
     stage_times_begin(&fixture->times);
-    return tracer_update(fixture->tracer, &fixture->gpu, &changes, &fixture->times, error);
+    return tracer_update(fixture->tracer, &fixture->gpu,
+                         &(struct tracer_update){.changed = changes.bits, .times = &fixture->times}, error);
 }
 
 static inline void update(struct fixture *fixture)
@@ -71,7 +72,7 @@ static inline bool trace_by_tracer(void *user, const struct wave *wave, struct e
 static inline struct hit trace_one(struct fixture *fixture, struct ray ray)
 {
     struct hit hit;
-    trace_rays(trace_by_tracer, fixture, WAVE_CLOSEST, false, &ray, 1, &hit, NULL);
+    trace_rays(trace_by_tracer, fixture, WAVE_CLOSEST, &ray, 1, &hit, NULL);
     return hit;
 }
 

@@ -72,13 +72,15 @@ static inline bool traverse_wave(void *user, const struct wave *wave, struct err
 {
     const struct traversal *traversal = user;
     gpu_scene_bind(&traversal->fixture->gpu);
-    return abuffer_trace(&traversal->fixture->store, &traversal->fixture->gpu, wave, traversal->options, error);
+    const struct ray_range all = {.wave = wave, .end = wave->ray_count};
+    return abuffer_intersect(&traversal->fixture->store, &traversal->fixture->gpu, &all, traversal->options,
+                             error);
 }
 
 static inline void trace(struct fixture *fixture, const struct tracer_options *options, enum wave_kind kind,
                          const struct ray *rays, uint32_t count, struct hit *hits, uint32_t *visibility)
 {
-    trace_rays(traverse_wave, &(struct traversal){fixture, options}, kind, true, rays, count, hits, visibility);
+    trace_rays(traverse_wave, &(struct traversal){fixture, options}, kind, rays, count, hits, visibility);
 }
 
 /* ---- shapes ---- */

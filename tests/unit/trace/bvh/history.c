@@ -36,7 +36,9 @@ static void update(struct fixture *fixture)
     if (fixture->edits.count > 0)
         test_commit(&fixture->edits);
     expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, NULL, &fixture->changes, NULL, &error), &error);
-    expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &fixture->changes, NULL, &error), &error);
+    expect_ok(tracer_update(fixture->tracer, &fixture->gpu,
+                            &(struct tracer_update){.changed = fixture->changes.bits}, &error),
+              &error);
 }
 
 static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)

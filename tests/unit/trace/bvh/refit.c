@@ -84,7 +84,9 @@ static void pose(struct fixture *fixture, float open, float close)
     for (uint32_t p = 0; p < motion.pose_count; p++)
         test_pose_weights(&motion.poses[p], NODE, (const float[]){p == 0 ? open : close}, 1);
     expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, &motion, &changes, NULL, &error), &error);
-    expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &changes, NULL, &error), &error);
+    expect_ok(
+        tracer_update(fixture->tracer, &fixture->gpu, &(struct tracer_update){.changed = changes.bits}, &error),
+        &error);
     scene_motion_finish(&motion);
 }
 
@@ -153,7 +155,7 @@ static void expect_like_brute_force_at(struct fixture *fixture, bool timed)
 {
     struct error error = {0};
     struct tracer *naive = tracer_create(&tracer_naive_impl, device, NULL, &error);
-    expect_ok(naive && tracer_update(naive, &fixture->gpu, &(struct scene_changes){0}, NULL, &error), &error);
+    expect_ok(naive && tracer_update(naive, &fixture->gpu, &(struct tracer_update){0}, &error), &error);
     struct hit *expected = trace(fixture, naive, timed), *hits = trace(fixture, fixture->tracer, timed);
     uint32_t hit_count = 0;
     for (uint32_t i = 0; i < RAY_COUNT; i++) {

@@ -35,7 +35,9 @@ static void update(struct fixture *fixture)
     if (fixture->edits.count > 0)
         test_commit(&fixture->edits);
     expect_ok(gpu_scene_update(&fixture->gpu, fixture->scene, NULL, &changes, NULL, &error), &error);
-    expect_ok(tracer_update(fixture->tracer, &fixture->gpu, &changes, NULL, &error), &error);
+    expect_ok(
+        tracer_update(fixture->tracer, &fixture->gpu, &(struct tracer_update){.changed = changes.bits}, &error),
+        &error);
 }
 
 static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)
@@ -115,9 +117,8 @@ static struct hit *trace(struct gpu_scene *gpu, const struct tracer_impl *impl,
 {
     struct error error = {0};
     struct gpu_buffer ray_buffer = {0}, hit_buffer = {0};
-    struct scene_changes everything = {.geometry = true, .instances = true};
     struct tracer *tracer = tracer_create(impl, device, options, &error);
-    expect_ok(tracer && tracer_update(tracer, gpu, &everything, NULL, &error), &error);
+    expect_ok(tracer && tracer_update(tracer, gpu, &(struct tracer_update){0}, &error), &error);
     expect_ok(gpu_buffer_upload(device, &ray_buffer, rays, RAY_COUNT * sizeof(struct ray), &error), &error);
     expect_ok(gpu_buffer_reserve(device, &hit_buffer, RAY_COUNT * sizeof(struct hit), &error), &error);
     gpu_scene_bind(gpu);
@@ -309,46 +310,65 @@ TEST(detail_below_the_grid_is_traversed_in_floats)
     free(rays);
 }
 
-/* Eight neighbours at a time are `spread` radians from one direction, and begin at one point. */
-static uint32_t rays_together(struct fixture *fixture, float spread, uint32_t first_ray, uint32_t *chosen)
+/* A wave of rays, eight neighbours at a time `spread` radians from one direction, that all begin at one point. */
+static void upload_rays(struct gpu_buffer *buffer, float spread)
 {
     struct error error = {0};
-    struct gpu_buffer buffer = {0};
     struct ray *rays = malloc(RAY_COUNT * sizeof(struct ray));
     uint64_t seed = 33;
     for (uint32_t i = 0; i < RAY_COUNT; i += 8)
         for (uint32_t k = i; k < i + 8; k++)
             rays[k] = make_ray(0, 0, 20, 0.5f + test_uniform(&seed, -spread, spread),
                                0.5f + test_uniform(&seed, -spread, spread), -1);
-    expect_ok(gpu_buffer_upload(device, &buffer, rays, RAY_COUNT * sizeof(struct ray), &error), &error);
-    const struct wave wave = {
-        .ray_count = RAY_COUNT, .first_ray = first_ray, .end_ray = RAY_COUNT, .chosen = chosen, .rays = &buffer};
-    uint32_t together = bvh_rays_together((struct bvh *)fixture->tracer, &fixture->gpu, &wave, &error);
-    expect_ok(together > 0, &error);
-    gpu_buffer_finish(device, &buffer);
+    expect_ok(gpu_buffer_upload(device, buffer, rays, RAY_COUNT * sizeof(struct ray), &error), &error);
     free(rays);
-    return together;
 }
 
-TEST(coherent_neighbours_are_traced_as_packets)
+static struct trace_state *begin_wave(struct fixture *fixture, struct gpu_buffer *rays, struct gpu_buffer *hits)
 {
-    struct fixture fixture;
-    fixture_init(&fixture, scene_of_instances(), NULL);
-    assert_int_equal(rays_together(&fixture, 0.002f, 0, NULL), device->facts.software ? 8 : 1);
-    assert_int_equal(rays_together(&fixture, 0.4f, 0, NULL), 1);
-    fixture_finish(&fixture);
+    struct error error = {0};
+    struct tracer *tracer = fixture->tracer;
+    struct trace_state *state = trace_state_create(tracer->impl, device, &tracer->options, &error);
+    expect_ok(state && gpu_buffer_reserve(device, hits, RAY_COUNT * sizeof(struct hit), &error), &error);
+    const struct wave wave = {.ray_count = RAY_COUNT, .rays = rays, .hits = hits};
+    expect_ok(tracer_trace_begin(tracer, &fixture->gpu, &wave, state, &error), &error);
+    return state;
 }
 
-TEST(slices_of_a_wave_keep_the_packet_size_of_the_first)
+static uint32_t packet_of(const struct trace_state *state)
 {
+    return ((const struct bvh_state *)state)->rays_together;
+}
+
+/* Also in the middle of a wave, whatever was traced in between and whatever its other rays are. */
+TEST(coherent_neighbours_are_traced_as_packets_and_a_wave_keeps_its_packet_size)
+{
+    enum { CLOSE, APART, WAVES };
+    static const float spreads[WAVES] = {0.002f, 0.4f};
+    const uint32_t packets[WAVES] = {device->facts.software ? 8 : 1, 1};
     struct fixture fixture;
-    uint32_t chosen[2] = {0};
+    struct error error = {0};
+    struct gpu_buffer rays[WAVES] = {0}, hits[WAVES] = {0};
+    struct trace_state *waves[WAVES];
     fixture_init(&fixture, scene_of_instances(), NULL);
-    uint32_t close = rays_together(&fixture, 0.002f, 0, &chosen[0]),
-             apart = rays_together(&fixture, 0.4f, 0, &chosen[1]);
-    /* What is left of either is as the other one was: it is not looked at. */
-    assert_int_equal(rays_together(&fixture, 0.4f, WAVE_PART_RAYS, &chosen[0]), close);
-    assert_int_equal(rays_together(&fixture, 0.002f, WAVE_PART_RAYS, &chosen[1]), apart);
+    for (int i = 0; i < WAVES; i++) {
+        upload_rays(&rays[i], spreads[i]);
+        waves[i] = begin_wave(&fixture, &rays[i], &hits[i]);
+        assert_int_equal(packet_of(waves[i]), packets[i]);
+    }
+    gpu_scene_bind(&fixture.gpu);
+    for (int round = 0; round < 3; round++) {
+        for (int i = 0; i < WAVES; i++) {
+            assert_int_equal(tracer_trace_step(fixture.tracer, &fixture.gpu, waves[i], 0, &error), TRACER_MORE);
+            assert_int_equal(packet_of(waves[i]), packets[i]);
+            upload_rays(&rays[i], spreads[1 - i]); /* what is left is as the other wave was */
+        }
+    }
+    for (int i = 0; i < WAVES; i++) {
+        trace_state_destroy(waves[i]);
+        gpu_buffer_finish(device, &rays[i]);
+        gpu_buffer_finish(device, &hits[i]);
+    }
     fixture_finish(&fixture);
 }
 

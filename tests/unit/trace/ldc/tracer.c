@@ -371,7 +371,8 @@ TEST(after_a_failure_the_next_update_starts_anew)
 TEST(a_tracer_that_was_away_builds_what_has_changed_meanwhile)
 {
     static const struct tracer_options options = {.ldc_resolution = RESOLUTION};
-    struct tracer_set set = {0};
+    struct change_history history = {0};
+    struct tracer_set set = {.history = &history};
     struct fixture fixture = {.scene = scene_of_boxes(3), .memory_before_bytes = device->memory_used_bytes};
     struct error error = {0};
     struct scene_changes changes;
@@ -391,13 +392,14 @@ TEST(a_tracer_that_was_away_builds_what_has_changed_meanwhile)
             test_commit(&fixture.edits);
         }
         expect_ok(gpu_scene_update(&fixture.gpu, fixture.scene, NULL, &changes, NULL, &error), &error);
-        tracer_set_note(&set, &changes);
+        change_history_note(&history, changes.bits);
         stage_times_begin(&fixture.times);
         fixture.tracer = tracer_set_take(&set, device, tracer_impl_by_number(frames[i].tracer), &options, &error);
         expect_ok(fixture.tracer != NULL, &error);
         enum tracer_progress progress = TRACER_MORE;
         while (progress == TRACER_MORE)
-            progress = tracer_set_bring(&set, fixture.tracer, &fixture.gpu, 0, &fixture.times, &error);
+            progress = tracer_set_bring(&set, fixture.tracer, &fixture.gpu,
+                                        &(struct tracer_update){.times = &fixture.times}, 0, &error);
         expect_ok(progress == TRACER_DONE, &error);
         if (frames[i].tracer == NUMBER_LDC)
             expect_built(&fixture, frames[i].static_cube, frames[i].dynamic_cube);
