@@ -132,7 +132,7 @@ TEST(a_clip_tells_its_identifier_and_length)
     assert_true(fl_catalogue_find_clip(&catalogue, "1", &clip, NULL, &error));
     assert_int_equal(clip, 5);
     assert_false(fl_catalogue_find_clip(&catalogue, "nothing", &clip, NULL, &error));
-    assert_string_equal(error.text, "clip 'nothing' moves nothing that is shown");
+    assert_string_equal(error.text, "clip 'nothing' moves nothing in the scene");
 }
 
 TEST(a_new_identifier_is_one_that_the_import_has_not_used)

@@ -93,13 +93,13 @@ TEST(a_program_that_ends_or_crashes_is_reported_with_its_last_words)
 TEST(a_program_that_hangs_is_ended_at_its_deadline)
 {
     assert_false(compare_with("#!/bin/sh\ntrap '' TERM\nexec sleep 60\n", 200));
-    check_error(FL_ERROR_TIMEOUT, "took too long");
+    check_error(FL_ERROR_TIMEOUT, "timed out");
 }
 
 TEST(garbage_is_reported)
 {
     assert_false(compare_with("#!/bin/sh\necho 'this is no message at all' >&3\nsleep 5\n", 5000));
-    check_error(FL_ERROR_PROTOCOL, "the image program sent what the protocol does not allow");
+    check_error(FL_ERROR_PROTOCOL, "the image program sent a message that the protocol does not allow");
 }
 
 TEST(figures_arrive_and_no_error_is_an_infinite_ratio)

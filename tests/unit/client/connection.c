@@ -364,7 +364,7 @@ static void play_wrong_frame(struct daemon *daemon)
 
 TEST(a_frame_that_comes_twice_is_a_broken_protocol)
 {
-    expect_broken_after_a_frame(play_wrong_frame, "frame 0 came in place of frame 1");
+    expect_broken_after_a_frame(play_wrong_frame, "frame 0 arrived, but frame 1 was expected");
 }
 
 static void play_early_end(struct daemon *daemon)

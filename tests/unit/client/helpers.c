@@ -82,14 +82,14 @@ TEST(an_importer_that_hangs_is_killed_at_its_deadline)
     clock_gettime(CLOCK_MONOTONIC, &begin);
     assert_null(import_with("#!/bin/sh\ntrap '' TERM\nexec sleep 60\n", 200));
     clock_gettime(CLOCK_MONOTONIC, &end);
-    check_error(FL_ERROR_TIMEOUT, "took too long");
+    check_error(FL_ERROR_TIMEOUT, "timed out");
     assert_in_range(end.tv_sec - begin.tv_sec, 0, 5);
 }
 
 TEST(an_importer_that_sends_garbage_is_reported)
 {
     assert_null(import_with("#!/bin/sh\necho 'this is no message at all' >&3\nsleep 5\n", 5000));
-    check_error(FL_ERROR_PROTOCOL, "the importer sent what the protocol does not allow");
+    check_error(FL_ERROR_PROTOCOL, "the importer sent a message that the protocol does not allow");
 }
 
 TEST(an_importer_may_not_speak_for_the_client)
@@ -99,7 +99,7 @@ TEST(an_importer_may_not_speak_for_the_client)
     assert_null(import_with("#!/bin/sh\nprintf '\\002\\000\\000\\000\\011\\000\\000\\000\\001\\000\\000\\000\\000"
                             "\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000\\000' >&3\nsleep 5\n",
                             5000));
-    check_error(FL_ERROR_PROTOCOL, "may not send (stats)");
+    check_error(FL_ERROR_PROTOCOL, "not allowed (stats)");
 }
 
 TEST(a_model_that_is_missing_or_no_file_starts_nothing)

@@ -403,7 +403,7 @@ TEST(what_cannot_be_written_is_said_before_the_first_frame)
     } rows[] = {
         {"missing/a.mp4", {0}, "No such file", "", NULL},
         {"", {.format = "mp4"}, "Is a directory", "", NULL},
-        {"a.avi", {0}, "the ending names no format", ".mp4 or .mkv", NULL},
+        {"a.avi", {0}, "the ending is not that of a video format", ".mp4 or .mkv", NULL},
         {"a.mp4", {.lossless = true}, "an MP4 file does not hold FFV1", ".mkv", NULL},
         {"a.mkv", {.lossless = true, .codec = "h264"}, "h264 is not lossless, which is asked", "leave", NULL},
         {"a.mkv", {.codec = "ffv1"}, "ffv1 is lossless, which is not asked for", "ask for lossless", NULL},
@@ -447,8 +447,8 @@ TEST(a_frame_that_does_not_fit_ends_the_video_and_nothing_is_left)
         const char *text, *remedy;
     } rows[] = {
         {{64, 64}, {64, 32}, PROTOCOL_PIXEL_FORMAT_RGBA8, "64x32 pixels, but the video has 64x64", "size"},
-        {{64, 64}, {64, 64}, PROTOCOL_PIXEL_FORMAT_RGBA16F, "no rgba16f pixels", "rgba8"},
-        {{0, 0}, {8192, 4368}, PROTOCOL_PIXEL_FORMAT_RGBA8, "H.264 has no pictures of 8192x4368", "smaller"}};
+        {{64, 64}, {64, 64}, PROTOCOL_PIXEL_FORMAT_RGBA16F, "rgba16f pixels", "rgba8"},
+        {{0, 0}, {8192, 4368}, PROTOCOL_PIXEL_FORMAT_RGBA8, "H.264 cannot encode pictures of 8192x4368", "smaller"}};
     need(false);
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct fl_video *video = fl_video_start(&(struct fl_video_options){.path = path_of("a.mp4")}, &error);
@@ -540,7 +540,7 @@ TEST(a_killed_writer_is_reported_and_leaves_no_file)
         error = (struct fl_error){0};
         assert_false(fl_video_finish(video, &error));
         assert_int_equal(error.code, FL_ERROR_SYSTEM);
-        assert_non_null(strstr(error.text, "the video writer gave up: farlight-video"));
+        assert_non_null(strstr(error.text, "the video writer failed: farlight-video"));
         fl_video_destroy(video);
         assert_int_equal(count_files(), 0);
     }

@@ -445,7 +445,7 @@ static void expect_broken(const struct message_frame_begin *frame, unsigned coun
 TEST(frames_that_nothing_allows_break_the_connection)
 {
     struct message_frame_begin frame = some_frame(4, 0);
-    expect_broken(&frame, 1, "frame 4 came in place of frame 5");
+    expect_broken(&frame, 1, "frame 4 arrived, but frame 5 was expected");
     frame = some_frame(9, 0); /* numbers may be left out */
     frame.width = EDGE + 1;
     frame.size_bytes = (uint64_t)(EDGE + 1) * EDGE * 4;
@@ -631,7 +631,7 @@ TEST(what_had_no_room_beside_much_else_is_acknowledged_later)
     /* Sending ends where there is no room for a message of any size. */
     while (fl_view_look(view, &some_camera, NULL, &error))
         continue;
-    check_error(FL_ERROR_TIMEOUT, "nothing more");
+    check_error(FL_ERROR_TIMEOUT, "no more messages");
     fl_frame_destroy(next_frame(view));
     sem_post(&may_read);
     fl_frame_destroy(next_frame(view));
@@ -669,16 +669,16 @@ TEST(what_ends_beside_much_else_is_given_back_later)
     struct fl_view *view = start_view(scene);
     while (fl_view_look(view, &some_camera, NULL, &error))
         continue;
-    check_error(FL_ERROR_TIMEOUT, "nothing more");
+    check_error(FL_ERROR_TIMEOUT, "no more messages");
     fl_view_destroy(view);
     fl_scene_destroy(scene);
     uint64_t ping_ns;
     assert_false(fl_ping(connection, &ping_ns, &error)); /* still nothing has room */
-    check_error(FL_ERROR_TIMEOUT, "nothing more");
+    check_error(FL_ERROR_TIMEOUT, "no more messages");
     sem_post(&may_read);
     /* What asks next goes behind. */
     while (!fl_ping(connection, &ping_ns, &error))
-        check_error(FL_ERROR_TIMEOUT, "nothing more");
+        check_error(FL_ERROR_TIMEOUT, "no more messages");
     fl_connection_destroy(connection);
     stop(daemon);
     sem_destroy(&may_read);

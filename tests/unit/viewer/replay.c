@@ -67,20 +67,20 @@ TEST(mistakes_are_reported_with_line_and_event)
     } wrong[] = {
         {"{}", "is not a list of events"},
         {"[{]", "line 1"},
-        {"[{\"after\": 1},\n {\"nothing\": 1}]", "line 2: [1]: is none of"},
-        {"[{\"after\": -1}]", "after: is no number"},
-        {"[{\"after\": 1e9}]", "after: is no number"},
+        {"[{\"after\": 1},\n {\"nothing\": 1}]", "line 2: [1]: is not one of"},
+        {"[{\"after\": -1}]", "after: is not a number"},
+        {"[{\"after\": 1e9}]", "after: is not a number"},
         {"[{\"mouse\": \"jump\"}]", "mouse: is not one of"},
-        {"[{\"mouse\": \"down\", \"x\": \"5\"}]", "x: is no number"},
+        {"[{\"mouse\": \"down\", \"x\": \"5\"}]", "x: is not a number"},
         {"[{\"key\": \"\"}]", "key: is not a text"},
         {"[{\"key\": 5}]", "key: is not a text"},
         {"[{\"key\": \"a name that is far too long for a key\"}]", "key: is not a text"},
         {"[{\"wait\": \"for me\"}]", "wait: is not one of"},
-        {"[{\"wait\": \"rest\", \"samples\": 0}]", "samples: is no number"},
+        {"[{\"wait\": \"rest\", \"samples\": 0}]", "samples: is not a number"},
         {"[{\"resize\": [640]}]", "resize: is not"},
         {"[{\"resize\": [640, 100000]}]", "resize: is not"},
         {"[{\"screenshot\": true}]", "screenshot: is not a text"},
-        {"[5]", "[0]: is none of"},
+        {"[5]", "[0]: is not one of"},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         if (load(wrong[i].text))
