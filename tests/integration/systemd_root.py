@@ -11,7 +11,7 @@ import tempfile
 import time
 
 SYSTEMD = pathlib.Path("/lib/systemd/systemd")
-BOOT_TIMEOUT_S = 30
+BOOT_TIMEOUT_S = 120
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 
 # Joins the control group and goes into namespaces of its own; ends with whoever started it, and all that is inside with it.

@@ -331,7 +331,7 @@ class OnTheWay(Case):
                     data[at - offset] ^= 0x10
                 return bytes(data)
             result = farlight("ping", "--count", "100", "--server", self.proxy(change), "--key", self.keys / "key",
-                              timeout=20)
+                              timeout=120)
             self.assertEqual(result.returncode, 1, f"byte {at}: {result.stdout}")
 
     def test_a_connection_that_is_cut_is_noticed(self):
@@ -339,7 +339,7 @@ class OnTheWay(Case):
             def change(data, offset, at=at):
                 return data[:max(0, at - offset)]
             result = farlight("ping", "--count", "100", "--server", self.proxy(change), "--key", self.keys / "key",
-                              timeout=20)
+                              timeout=120)
             self.assertEqual(result.returncode, 1, f"byte {at}: {result.stdout}")
             self.assertIn("closed the connection", result.stderr)
 

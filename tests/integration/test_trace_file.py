@@ -151,7 +151,7 @@ class OfTheDaemon(Traced):
         path = self.folder / "trace.json"
         with Daemon("--trace-file", path) as daemon:
             self.expect(self.render("--server", daemon.address), 0)
-            deadline = time.monotonic() + 10
+            deadline = time.monotonic() + TIMEOUT_S
             while time.monotonic() < deadline and '"send"' not in path.read_text():
                 time.sleep(0.02)
             self.check_form(json.loads(path.read_text() + "]"))

@@ -76,7 +76,7 @@ SESSION_TEST(a_job_whose_credit_is_used_up_is_told_so_once)
     send_message(2, 0, &message);
     expect_frame(2, 0);
     expect_frame(2, 1);
-    for (unsigned i = 0; !client.blocked && i < 200; i++) {
+    for (unsigned i = 0; !client.blocked && i < 6000; i++) {
         expect_alive(9);
         usleep(10000);
     }

@@ -421,7 +421,7 @@ SESSION_TEST(a_request_for_a_key_frame_reaches_the_engine)
 SESSION_TEST(a_client_without_credit_is_told_that_it_is_used_up)
 {
     struct engine_command *start = start_acknowledged_view(2, 1);
-    for (unsigned i = 0; !client.blocked && i < 200; i++) {
+    for (unsigned i = 0; !client.blocked && i < 6000; i++) {
         expect_alive(9);
         usleep(10000);
     }
