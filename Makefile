@@ -107,8 +107,8 @@ EXPORT_OBJ := $(call obj,$(EXPORT_C) $(EXPORT_CXX)) $(B)/helper.a
 VIDEO_OBJ := $(call obj,$(VIDEO_C) client/lib/rate.c protocol/pixels/ycbcr.c) $(B)/helper.a
 
 # The viewer takes the command line as render does.
-VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interrupt.c job_complete.c job_light.c job_options.c \
-    job_tracer.c key.c talk.c))
+VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interrupt.c job_complete.c job_fields.c job_options.c \
+    key.c talk.c))
 
 # The library for others' programs: position-independent, only what farlight.h declares is visible.
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
@@ -117,20 +117,17 @@ LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) 
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
 
 .PHONY: all
-all: $(PROGRAMS) $(B)/$(SONAME) $(B)/protocol.md
+all: $(PROGRAMS) $(B)/$(SONAME) $(B)/protocol.md $(B)/shot.schema.json $(B)/man/farlight.1
 ifneq ($(EMBREE),1)
 	@echo 'built without Embree: the tracer reference is left out (its header is in the package libembree-dev)'
 endif
 
 $(B)/server/%.o: INCLUDES = -Iserver -Ishaders $(SERVER_CFLAGS)
-# The one object that knows whether Embree is in; it is made again when that changes, and all that links it.
+# The table of the tracers takes what is linked; it is made again when that changes, and with it all that links it.
 EMBREE_STAMP := $(B)/embree-$(EMBREE)
 $(EMBREE_STAMP):
 	@mkdir -p $(B) && rm -f $(B)/embree-[01] && touch $@
 $(B)/server/trace/tracer.o: $(EMBREE_STAMP)
-ifeq ($(EMBREE),1)
-$(B)/server/trace/tracer.o: CPPFLAGS_ALL += -DFARLIGHT_HAVE_EMBREE
-endif
 $(B)/shader_sources.o: INCLUDES = -Iserver
 $(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
 $(B)/client/import/%.opp $(B)/client/import/%.o: INCLUDES = -Iclient $(IMPORT_CFLAGS)
@@ -203,6 +200,13 @@ $(B)/protocol-docgen: $(call obj,$(DOCS_SRC)) $(PROTOCOL_OBJ) $(SEALED_OBJ) $(CO
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $^ $(call pkg_libs,libsodium libxxhash) -o $@
 $(B)/protocol.md: $(B)/protocol-docgen protocol/docs/guide.md
 	$^ >$@.new && mv $@.new $@
+
+# What the tables say of tracers and options, in the place of the line that asks for it.
+$(B)/shot.schema.json: client/cli/shot.schema.json $(B)/farlight
+	$(B)/farlight tracers --schema >$@.part && sed -e '/@SETTINGS@/{r $@.part' -e 'd;}' $< >$@.new && mv $@.new $@
+$(B)/man/farlight.1: conf/man/farlight.1 $(B)/farlight
+	@mkdir -p $(@D)
+	$(B)/farlight tracers --manual >$@.part && sed -e '/@TRACERS@/{r $@.part' -e 'd;}' $< >$@.new && mv $@.new $@
 
 # ---- tests -----------------------------------------------------------------------------------------
 # What has shaders of its own has them in place of the daemon's alone.
@@ -416,13 +420,13 @@ install: all
 	install -m 755 $(B)/$(SONAME) $(DESTDIR)$(PREFIX)/lib
 	ln -sf $(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so
 	install -m 644 client/lib/farlight.h $(DESTDIR)$(PREFIX)/include/farlight/lib
-	install -m 644 protocol/messages.h protocol/messages.def $(DESTDIR)$(PREFIX)/include/farlight/protocol
+	install -m 644 $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.def) $(DESTDIR)$(PREFIX)/include/farlight/protocol
 	sed 's#@PREFIX@#$(PREFIX)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
 	    >$(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc
 	install -m 644 client/cli/completion.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
-	for page in conf/man/*; do sed 's#@VERSION@#$(VERSION)#' $$page \
+	for page in $(filter-out conf/man/farlight.1,$(wildcard conf/man/*)) $(B)/man/farlight.1; do sed 's#@VERSION@#$(VERSION)#' $$page \
 	    >$(DESTDIR)$(PREFIX)/share/man/man$${page##*.}/$${page##*/}; done
-	install -m 644 client/cli/shot.schema.json $(DESTDIR)$(PREFIX)/share/farlight
+	install -m 644 $(B)/shot.schema.json $(DESTDIR)$(PREFIX)/share/farlight
 	install -m 644 README.md CHANGELOG.md SECURITY.md LICENSE $(B)/protocol.md $(DESTDIR)$(PREFIX)/share/doc/farlight
 	install -m 644 conf/examples/* $(DESTDIR)$(PREFIX)/share/doc/farlight/examples
 	install -m 644 conf/farlightd.conf $(DESTDIR)/etc/farlight

@@ -38,11 +38,17 @@ static bool check_int(const struct field_desc *field, const void *place, const s
                       struct decode_error *error)
 {
     uint64_t value = field_load_int(field, place);
-    if (value < field->min || value > field->max) {
+    char allowed[96], instead[32];
+    if (field_has_number(field, value)) {
+        return true;
+    }
+    if (!field->zero_is_default) {
         return check_fail(error, PROTOCOL_ERROR_CODE_INVALID, path,
                           "%" PRIu64 " is not within %" PRIu64 " .. %" PRIu64, value, field->min, field->max);
     }
-    return true;
+    return check_fail(error, PROTOCOL_ERROR_CODE_INVALID, path, "%" PRIu64 " is not one of %s (0: %s)", value,
+                      field_allowed_text(field, allowed, sizeof(allowed)),
+                      field_default_text(field, instead, sizeof(instead)));
 }
 
 static bool check_enum(const struct field_desc *field, const void *place, const struct path *path,

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "protocol/describe.h"
 
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define LENGTH(array) (sizeof(array) / sizeof(array)[0])
@@ -10,17 +13,17 @@
 #define ENUMERATION(NAME, name, doc) static const struct value_desc values_##name[] = {
 #define VALUE(NAME, VALUE_NAME, number, text, doc) {#VALUE_NAME, number, text, doc},
 #define ENUMERATION_END(NAME, name) };
-#include "protocol/messages.def"
+#include "protocol/words.def"
 
 const struct enum_desc protocol_enums[] = {
 #define ENUMERATION(NAME, name, doc) {#name, doc, values_##name, LENGTH(values_##name)},
-#include "protocol/messages.def"
+#include "protocol/words.def"
 };
 const size_t protocol_enum_count = LENGTH(protocol_enums);
 
 enum enum_index {
 #define ENUMERATION(NAME, name, doc) enum_index_##name,
-#include "protocol/messages.def"
+#include "protocol/words.def"
 };
 
 /* ---- sizes on the wire ---- */
@@ -33,6 +36,10 @@ enum enum_index {
 #define REAL(field, min, max, doc) + 4
 #define REALS(field, count, min, max, doc) + 4 * (count)
 #define BYTES(field, count, doc) + (count)
+#define SETTING_WHOLE(tracer, field, min, max, default_value, unit, mark, doc) + 4
+#define SETTING_ONE_OF(tracer, field, numbers, max, default_value, unit, mark, doc) + 4
+#define SETTING_REAL(tracer, field, min, max, default_value, unit, mark, doc) + 4
+#define SETTING_CHOICE(tracer, field, choices, mark, doc) + 4
 #include "protocol/messages.def"
 
 #define RECORD(name, doc) enum { wire_counted_record_##name = 0
@@ -79,17 +86,24 @@ enum enum_index {
 #define RECORD_END(name) FIELDS_END
 #define MESSAGE_END(NAME, name) FIELDS_END
 #define INT(type, field, min_value, max_value, field_doc)                                                         \
+    OPTION_INT(type, field, min_value, max_value, min_value, "", field_doc)
+#define OPTION_INT(type, field, min_value, max_value, default_value, field_unit, field_doc)                       \
     {.name = #field, .doc = field_doc, .kind = FIELD_INT, .width_bytes = sizeof(PROTOCOL_INT_##type), .count = 1, \
-     .offset = offsetof(owner, field), .min = min_value##ULL, .max = max_value##ULL},
+     .offset = offsetof(owner, field), .min = min_value##ULL, .max = max_value##ULL,                              \
+     .default_int = default_value##ULL, .unit = field_unit},
 #define ENUM(enum_name, field, field_doc)                                                                         \
     {.name = #field, .doc = field_doc, .kind = FIELD_ENUM, .width_bytes = 4, .count = 1,                          \
      .offset = offsetof(owner, field), .enumeration = &protocol_enums[enum_index_##enum_name]},
 #define REAL(field, min_value, max_value, field_doc)                                                              \
+    OPTION_REAL(field, min_value, max_value, (min_value) > 0 ? (min_value) : 0, "", field_doc)
+#define OPTION_REAL(field, min_value, max_value, default_value, field_unit, field_doc)                            \
     {.name = #field, .doc = field_doc, .kind = FIELD_REAL, .width_bytes = 4, .count = 1,                          \
-     .offset = offsetof(owner, field), .real_min = (float)(min_value), .real_max = (float)(max_value)},
+     .offset = offsetof(owner, field), .real_min = (float)(min_value), .real_max = (float)(max_value),            \
+     .default_real = (float)(default_value), .unit = field_unit},
 #define REALS(field, number, min_value, max_value, field_doc)                                                     \
     {.name = #field, .doc = field_doc, .kind = FIELD_REAL, .width_bytes = 4, .count = number,                     \
-     .offset = offsetof(owner, field), .real_min = (float)(min_value), .real_max = (float)(max_value)},
+     .offset = offsetof(owner, field), .real_min = (float)(min_value), .real_max = (float)(max_value),            \
+     .default_real = (float)((min_value) > 0 ? (min_value) : 0)},
 #define BYTES(field, number, field_doc)                                                                           \
     {.name = #field, .doc = field_doc, .kind = FIELD_BYTES, .width_bytes = 1, .count = number,                    \
      .offset = offsetof(owner, field)},
@@ -101,6 +115,23 @@ enum enum_index {
 #define BULK(field, max_bytes, field_doc)                                                                         \
     {.name = #field, .doc = field_doc, .kind = FIELD_BULK, .offset = offsetof(owner, field),                      \
      .count_offset = offsetof(owner, field##_bytes), .max = max_bytes},
+/* Of the fields of a message they stand in the member `settings`. */
+#define MARK_COMMON false
+#define MARK_EXPERIMENT true
+#define SETTING(owned, field, mark, field_doc)                                                                    \
+    .name = #owned "_" #field, .doc = field_doc, .tracer = #owned, .is_experiment = MARK_##mark,                  \
+    .width_bytes = 4, .count = 1, .offset = offsetof(owner, settings.owned.field)
+#define SETTING_WHOLE(owned, field, min_value, max_value, default_value, field_unit, mark, field_doc)             \
+    {SETTING(owned, field, mark, field_doc), .kind = FIELD_INT, .min = min_value, .max = max_value,               \
+     .zero_is_default = true, .default_int = default_value, .unit = field_unit},
+#define SETTING_ONE_OF(owned, field, listed, max_value, default_value, field_unit, mark, field_doc)               \
+    {SETTING(owned, field, mark, field_doc), .kind = FIELD_INT, .numbers = listed, .max = max_value,              \
+     .zero_is_default = true, .default_int = default_value, .unit = field_unit},
+#define SETTING_REAL(owned, field, min_value, max_value, default_value, field_unit, mark, field_doc)              \
+    {SETTING(owned, field, mark, field_doc), .kind = FIELD_REAL, .real_min = (float)(min_value),                  \
+     .real_max = (float)(max_value), .default_real = (float)(default_value), .unit = field_unit},
+#define SETTING_CHOICE(owned, field, choices, mark, field_doc)                                                    \
+    {SETTING(owned, field, mark, field_doc), .kind = FIELD_ENUM, .enumeration = &protocol_enums[enum_index_##choices]},
 #include "protocol/messages.def"
 
 /* ---- tables of all ---- */
@@ -153,6 +184,66 @@ bool field_is_counted(const struct field_desc *field)
     return field->kind == FIELD_STRING || field->kind == FIELD_ARRAY || field->kind == FIELD_BULK;
 }
 
+const struct field_desc *struct_field(const struct struct_desc *desc, const char *name)
+{
+    const struct field_desc *field = desc->fields;
+    while (field->name && strcmp(field->name, name) != 0) {
+        field++;
+    }
+    return field->name ? field : NULL;
+}
+
+bool field_has_number(const struct field_desc *field, uint64_t value)
+{
+    if (value == 0 && field->zero_is_default) {
+        return true;
+    }
+    for (const char *at = field->numbers; at && *at != '\0'; at += strspn(at, ", ")) {
+        char *end = NULL;
+        if (strtoull(at, &end, 10) == value) {
+            return true;
+        }
+        at = end;
+    }
+    return !field->numbers && value >= field->min && value <= field->max;
+}
+
+const char *field_allowed_text(const struct field_desc *field, char *out, size_t out_bytes)
+{
+    const char *before = field->zero_is_default && field->default_int == 0 ? "auto, " : "";
+    switch (field->kind) {
+    case FIELD_INT:
+        if (field->numbers) {
+            snprintf(out, out_bytes, "%s%s", before, field->numbers);
+        } else {
+            snprintf(out, out_bytes, "%s%" PRIu64 " to %" PRIu64, before, field->min, field->max);
+        }
+        return out;
+    case FIELD_REAL:
+        snprintf(out, out_bytes, "%g to %g", (double)field->real_min, (double)field->real_max);
+        return out;
+    case FIELD_ENUM:
+        return protocol_enum_list(field->enumeration->name, out, out_bytes);
+    default:
+        out[0] = '\0';
+        return out;
+    }
+}
+
+const char *field_default_text(const struct field_desc *field, char *out, size_t out_bytes)
+{
+    if (field->kind == FIELD_REAL) {
+        snprintf(out, out_bytes, "%g", (double)field->default_real);
+    } else if (field->kind == FIELD_ENUM) {
+        snprintf(out, out_bytes, "%s", enum_desc_text(field->enumeration, 0));
+    } else if (field->zero_is_default && field->default_int == 0) {
+        snprintf(out, out_bytes, "auto");
+    } else {
+        snprintf(out, out_bytes, "%" PRIu64, field->default_int);
+    }
+    return out;
+}
+
 const char *enum_desc_text(const struct enum_desc *desc, uint32_t number)
 {
     for (size_t i = 0; i < desc->value_count; i++) {
@@ -165,16 +256,14 @@ const char *enum_desc_text(const struct enum_desc *desc, uint32_t number)
 
 void field_default(const struct field_desc *field, void *place)
 {
-    uint64_t value = field->min; /* unsigned: the minimum is 0 or above it */
-    float real = field->real_min > 0.0f ? field->real_min : 0.0f;
     const char *empty = "";
     switch (field->kind) {
     case FIELD_INT:
-        field_store_int(field, place, value);
+        field_store_int(field, place, field->default_int);
         break;
     case FIELD_REAL:
         for (uint32_t i = 0; i < field->count; i++) {
-            memcpy((char *)place + 4 * i, &real, 4);
+            memcpy((char *)place + 4 * i, &field->default_real, 4);
         }
         break;
     case FIELD_STRING:

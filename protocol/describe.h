@@ -43,7 +43,14 @@ struct field_desc {
     size_t offset;        /* of the field in its struct */
     size_t count_offset;  /* of <field>_count or <field>_bytes */
     uint64_t min, max;
-    float real_min, real_max;
+    const char *numbers; /* the only ones allowed within them: "2, 4, 8"; NULL: all */
+    bool
+        zero_is_default; /* 0 is allowed besides, and stands for the default; where that is 0 itself, for 'auto' */
+    uint64_t default_int;
+    float real_min, real_max, default_real;
+    const char *unit;   /* of the value, "metres"; "" or NULL: none */
+    const char *tracer; /* whose setting it is; NULL: nobody's */
+    bool is_experiment; /* of such a setting: see tracers.def */
     const struct enum_desc *enumeration;
     const struct struct_desc *(*record)(void);
 };
@@ -74,6 +81,12 @@ extern const size_t protocol_message_count;
 
 const struct message_desc *message_describe(uint32_t type); /* NULL: unknown */
 bool field_is_counted(const struct field_desc *field);
+/* By its name; NULL: there is none. */
+const struct field_desc *struct_field(const struct struct_desc *desc, const char *name);
+/* What a value may be, for people: "16 to 4096", "auto, 1, 4", "overlap, one". Cut off where it does not fit. */
+const char *field_allowed_text(const struct field_desc *field, char *out, size_t out_bytes);
+const char *field_default_text(const struct field_desc *field, char *out, size_t out_bytes); /* "1024", "auto" */
+bool field_has_number(const struct field_desc *field, uint64_t value); /* whether an INT may have the value */
 /* The text of an enum's value; NULL: not in it. */
 const char *enum_desc_text(const struct enum_desc *desc, uint32_t number);
 
@@ -85,7 +98,7 @@ uint64_t field_load_int(const struct field_desc *field, const void *place);
 void field_store_int(const struct field_desc *field, void *place, uint64_t value);
 /* `place` must be zeroed. */
 void field_default(const struct field_desc *field, void *place);
-/* Every fixed field 0, or its minimum where that is above 0; the counted ones empty, strings "". */
+/* Every fixed field has the default of the table; the counted ones are empty, strings "". */
 void struct_defaults(const struct struct_desc *desc, void *body);
 
 /* UTF-8 without NUL, over-long forms, surrogates and numbers above U+10FFFF. */

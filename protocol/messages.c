@@ -45,9 +45,9 @@ static const struct value_desc *find_value(const char *enum_name, const char *te
         if (value) {                                                                                              \
             *out = (enum protocol_##name)value->number;                                                           \
         }                                                                                                         \
-        return value != NULL;                                                                                     \
+        return value;                                                                                             \
     }
-#include "protocol/messages.def"
+#include "protocol/words.def"
 
 const char *protocol_enum_list(const char *enum_name, char *out, size_t out_bytes)
 {

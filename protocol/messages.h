@@ -7,9 +7,11 @@
  * Memory: a message owns nothing. Decoded strings and arrays live in the caller's scratch (codec.h), bulk
  * data is a view into the payload; both must outlive the message. Strings are never NULL after decoding;
  * a NULL string is encoded as the empty one. All-zero is a struct with every field 0, empty or first value;
- * message_init() also raises fields whose minimum is above 0. */
+ * message_init() also sets the defaults that are above 0. */
 #ifndef FARLIGHT_PROTOCOL_MESSAGES_H
 #define FARLIGHT_PROTOCOL_MESSAGES_H
+
+#include "protocol/tracers.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -20,7 +22,7 @@
 #define ENUMERATION(NAME, name, doc) enum protocol_##name {
 #define VALUE(NAME, VALUE_NAME, number, text, doc) PROTOCOL_##NAME##_##VALUE_NAME = (number),
 #define ENUMERATION_END(NAME, name) PROTOCOL_##NAME##_COUNT };
-#include "protocol/messages.def"
+#include "protocol/words.def"
 
 /* ---- fields ---- */
 #define PROTOCOL_INT_u8 uint8_t
@@ -33,6 +35,7 @@
 #define INT(type, field, min, max, doc) PROTOCOL_INT_##type field;
 #define ENUM(enum_name, field, doc) enum protocol_##enum_name field;
 #define REAL(field, min, max, doc) float field;
+#define TRACER_SETTINGS(field) struct tracer_settings field;
 #define REALS(field, count, min, max, doc) float field[count];
 #define BYTES(field, count, doc) uint8_t field[count];
 #define STRING(field, max, doc) const char *field;
@@ -69,7 +72,8 @@ struct message {
 extern "C" {
 #endif
 
-/* All fields 0, empty ("") or first value; those whose minimum is above 0 get it. Unknown type: all zero. */
+/* Every field gets the default of the table: 0, empty ("") or the first value where it has none of its own.
+ * Unknown type: all zero. */
 void message_init(struct message *message, enum message_type type);
 
 /* "set_node"; "unknown" for a type that is not in the table. */
@@ -84,7 +88,7 @@ static inline uint32_t protocol_pixel_format_bytes(enum protocol_pixel_format fo
 #define ENUMERATION(NAME, name, doc)                                                                              \
     const char *protocol_##name##_text(enum protocol_##name value);                                               \
     bool protocol_##name##_parse(const char *text, enum protocol_##name *out);
-#include "protocol/messages.def"
+#include "protocol/words.def"
 
 /* For help texts and error messages: "bvh, naive" for the enum called "tracer". Writes at most out_bytes with
  * the NUL, cut off if too long; empty for an unknown enum. Returns out. */

@@ -21,7 +21,7 @@
 #define COMMENT_COLUMNS 100
 #define COMMENT_MAX_BYTES 1024
 
-enum option_type { OPTION_TEXT, OPTION_BOOL, OPTION_LEVEL, OPTION_U32, OPTION_BYTES };
+enum option_type { OPTION_TEXT, OPTION_BOOL, OPTION_LEVEL, OPTION_U32, OPTION_BYTES, OPTION_MEBIBYTES };
 
 /* When a value is taken: at the start, or again when the daemon is told to read its configuration. */
 enum option_time { START, ANYTIME };
@@ -77,12 +77,10 @@ static const struct option options[] = {
      "Host memory that the frames of all jobs may take; a job that may need more has to wait for others to end"},
     {"memory", "device", START, OPTION_BYTES, AT(device_bytes), "0", 0, 16 * TIB, "bytes",
      "Device memory; 0: 70 % of what the device tells it has, of the host's for software GL"},
-    {"memory", "ldc", ANYTIME, OPTION_BYTES, AT(limits.ldc_bytes), "0", 0, 16 * TIB, "bytes",
-     "The part of it that the samples of one layered depth cube may take, in whole MiB; of more the nearest layers "
-     "are kept, and the frame says so. 0: no limit of its own"},
-    {"memory", "abuffer", ANYTIME, OPTION_BYTES, AT(limits.abuffer_bytes), "0", 0, 16 * TIB, "bytes",
-     "The part of it that the lists of the tracer abuffer may take, in whole MiB; a scene that needs more is refused. "
-     "0: no limit of its own"},
+#define MEMORY_LIMIT(tracer, doc)                                                                                 \
+    {"memory", #tracer, ANYTIME, OPTION_MEBIBYTES, AT(limits.tracers.tracer##_mebibytes), "0", 0, 16 * TIB, "bytes", \
+     "The part of the device memory for " doc ". 0: no limit of its own"},
+#include "protocol/tracers.def"
 
     {"limits", "clients", ANYTIME, OPTION_U32, AT(limits.clients), "256", 1, 65536, "", "Connected clients"},
     {"limits", "unauthenticated", ANYTIME, OPTION_U32, AT(limits.unauthenticated), "64", 1, 65536, "",
@@ -112,8 +110,9 @@ static const struct option options[] = {
     {"limits", "width", ANYTIME, OPTION_U32, AT(limits.width_pixels), "8192", 1, 8192, "pixels", "Width of a frame"},
     {"limits", "height", ANYTIME, OPTION_U32, AT(limits.height_pixels), "8192", 1, 8192, "pixels", "Height of a frame"},
     {"limits", "samples", ANYTIME, OPTION_U32, AT(limits.samples), "65536", 1, 65536, "", "Samples per pixel"},
-    {"limits", "ldc_layers", ANYTIME, OPTION_U32, AT(limits.ldc_layers), "255", 1, 255, "",
-     "Layers of a layered depth cube; of more the nearest are kept, and the frame says so"},
+#define TRACER_LIMIT(tracer, field, min, max, doc)                                                                \
+    {"limits", #tracer "_" #field, ANYTIME, OPTION_U32, AT(limits.tracers.tracer##_##field), #max, min, max, "", doc},
+#include "protocol/tracers.def"
     {"limits", "upload_window", ANYTIME, OPTION_BYTES, AT(limits.upload_window_bytes), "16M", MIB, GIB, "bytes",
      "Blob data that a client may send ahead"},
     {"limits", "frame_window", ANYTIME, OPTION_BYTES, AT(limits.frame_window_bytes), "64M", MIB, 16 * GIB, "bytes",
@@ -197,15 +196,17 @@ static bool set_number(struct config *config, const struct option *option, const
                        struct error *error)
 {
     uint64_t number;
-    bool bytes = option->type == OPTION_BYTES;
+    bool bytes = option->type != OPTION_U32;
     if (!parse_number(value, bytes, &number))
         return error_set(error, ERROR_INVALID, field, "\"%s\" is no number%s", value,
                          bytes ? ", nor one with K, M, G, T or %" : "");
     if (number < option->min || number > option->max)
         return error_set(error, ERROR_INVALID, field, "%" PRIu64 " is not within %" PRIu64 " .. %" PRIu64 " %s",
                          number, option->min, option->max, option->unit);
-    if (bytes)
+    if (option->type == OPTION_BYTES)
         *(uint64_t *)slot(config, option) = number;
+    else if (option->type == OPTION_MEBIBYTES) /* less than one is a limit still */
+        *(uint32_t *)slot(config, option) = number > 0 && number < MIB ? 1 : (uint32_t)(number / MIB);
     else
         *(uint32_t *)slot(config, option) = (uint32_t)number;
     return true;
@@ -228,6 +229,7 @@ static bool set_option(struct config *config, const struct option *option, const
                error_set(error, ERROR_INVALID, field, "\"%s\" is not one of error, warning, info, debug", value);
     case OPTION_U32:
     case OPTION_BYTES:
+    case OPTION_MEBIBYTES:
         break;
     }
     return set_number(config, option, value, field, error);
@@ -415,6 +417,9 @@ static void print_value(const struct config *config, const struct option *option
     case OPTION_BYTES:
         fprintf(stream, "%" PRIu64, *(const uint64_t *)value);
         return;
+    case OPTION_MEBIBYTES:
+        fprintf(stream, "%" PRIu64, *(const uint32_t *)value * MIB);
+        return;
     }
 }
 
@@ -442,7 +447,7 @@ static void print_comment(const char *text, FILE *stream)
 static void print_doc(const struct option *option, FILE *stream)
 {
     char text[COMMENT_MAX_BYTES], range[64] = "";
-    if (option->type == OPTION_U32 || option->type == OPTION_BYTES)
+    if (option->type == OPTION_U32 || option->type == OPTION_BYTES || option->type == OPTION_MEBIBYTES)
         snprintf(range, sizeof range, " %" PRIu64 " .. %" PRIu64 "%s%s.", option->min, option->max,
                  option->unit[0] ? " " : "", option->unit);
     snprintf(text, sizeof text, "%s.%s%s", option->doc, option->time == START ? " Taken at the start only." : "",

@@ -140,7 +140,7 @@ static bool complete_keys(struct animation *animation)
         return false;
     job->options.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
     job->options.keys = animation->keys;
-    job->options.key_count = count;
+    job->options.keys_count = (uint32_t)count;
     return true;
 }
 
@@ -152,8 +152,6 @@ static bool complete(struct animation *animation)
         cli_usage(job, "--frames", "no range of frames is given");
         return fl_error_remedy(&job->error, "for example --frames 1-120; a clip or a script needs none");
     }
-    if (job->options.frames_per_second <= 0)
-        job->options.frames_per_second = 24;
     if (!cli_job_complete(job, true))
         return false;
     if (has_keys && (job->is_orbit || job->camera || job->has_eye))
@@ -172,7 +170,7 @@ static bool complete(struct animation *animation)
 
 static bool begin(struct animation *animation)
 {
-    const bool begun = cli_job_begin(&animation->job);
+    const bool begun = cli_job_begin(&animation->job, fl_render_defaults());
     animation->job.series.orbit_degrees = TURN_DEGREES;
     animation->job.series.retries = DEFAULT_RETRIES;
     return begun;
@@ -206,8 +204,8 @@ static bool apply_script(struct animation *animation, const struct animation *ty
 
 static bool read_all(struct animation *animation, int argc, char **argv)
 {
-    static const struct argp_child children[] = {{&cli_job_argp, 0, NULL, 0}, {0}};
-    static const struct argp argp = {
+    const struct argp_child children[] = {{cli_job_argp(), 0, NULL, 0}, {0}};
+    const struct argp argp = {
         .options = options,
         .parser = parse,
         .args_doc = "MODEL --frames A-B -o 'DIR/%04d.exr'\nMODEL --clip NAME -o MOVIE.mp4\n"

@@ -32,6 +32,8 @@ int cli_ping(int argc, char **argv);
 int cli_bridge(int argc, char **argv);
 int cli_view(int argc, char **argv);
 int cli_key(int argc, char **argv);
+int cli_tracers(int argc, char **argv);
+int cli_complete(int argc, char **argv); /* for the shell: values of an option */
 
 /* ---- key.c ---- */
 
@@ -112,7 +114,7 @@ void cli_progress_clear(struct cli_progress *progress);
 /* The last bar of what is done stays; any other is removed. */
 void cli_progress_end(struct cli_progress *progress, bool done);
 
-/* ---- job_options.c, job_tracer.c, job_light.c: what render and animate have in common ---- */
+/* ---- job_options.c, job_fields.c: what render and animate have in common ---- */
 
 enum cli_timings_form { CLI_TIMINGS_NONE, CLI_TIMINGS_TABLE, CLI_TIMINGS_JSON };
 
@@ -182,22 +184,23 @@ struct cli_job {
     bool has_aperture, has_focus;
     bool has_eye, has_look_at, has_up, has_fov; /* in `key` */
     bool float_pixels, half_pixels, has_encoding, has_primary, has_quality, has_integrator, quiet, is_orbit;
+    bool has_samples;
     char depth_field[24];  /* what said how deep, for people; empty: nothing */
     unsigned file_quality; /* of JPEG files; 0: default */
     enum cli_timings_form timings;
     struct record_camera_key key;
-    struct fl_job_options options;
+    struct message_render options;
     struct fl_error error; /* of what was typed */
 };
 
 /* A child parser; its input is a struct cli_job. */
-extern const struct argp cli_job_argp;
+const struct argp *cli_job_argp(void);
 /* Likewise, without what says where the picture goes, which tracer makes it and how its first hits are found. */
 const struct argp *cli_picture_argp(void);
 /* Likewise for a window, without what is of files; samples, integrator and encoding have other defaults there. */
 const struct argp *cli_view_argp(void);
-/* Defaults, then FARLIGHT_*; before the command line is read. */
-bool cli_job_begin(struct cli_job *job);
+/* The defaults, then FARLIGHT_*; before the command line is read. */
+bool cli_job_begin(struct cli_job *job, struct message_render defaults);
 /* As if "--OPTION VALUE" had been typed; NULL for an option without a value. ARGP_ERR_UNKNOWN: there is none. */
 error_t cli_job_set(struct cli_job *job, const char *option, const char *value);
 /* Sets the job's error and returns EINVAL. */

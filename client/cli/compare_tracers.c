@@ -223,7 +223,7 @@ static struct fl_frame *render(struct tracer_comparison *comparison, const char 
 
 static bool render_both(struct tracer_comparison *comparison, struct fl_error *error)
 {
-    struct fl_job_options *wanted = &comparison->job.options;
+    struct message_render *wanted = &comparison->job.options;
     bool warned[PROTOCOL_CUBE_PART_COUNT] = {false};
     char what[100];
     snprintf(what, sizeof(what), "rays of %s and %s", protocol_tracer_text(comparison->tracer),
@@ -354,8 +354,8 @@ int cli_compare_tracers(int argc, char **argv)
         .children = children};
     struct tracer_comparison comparison = {.far_share = FAR_DEFAULT};
     struct fl_error error = {0};
-    if (!cli_job_begin(&comparison.job) || argp_parse(&argp, argc, argv, 0, NULL, &comparison) != 0 ||
-        !complete(&comparison))
+    if (!cli_job_begin(&comparison.job, fl_render_defaults()) ||
+        argp_parse(&argp, argc, argv, 0, NULL, &comparison) != 0 || !complete(&comparison))
         return cli_trouble(&comparison.job.error);
     if (!cli_interrupt_begin(&error))
         return cli_trouble(&error);

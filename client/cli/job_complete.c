@@ -63,7 +63,7 @@ static bool is_linear(enum cli_image image)
 /* Of all formats only EXR has channels by name; what they hold is more than half floats can. */
 static bool complete_layers(struct cli_job *job)
 {
-    struct fl_job_options *wanted = &job->options;
+    struct message_render *wanted = &job->options;
     const uint64_t bytes = (uint64_t)wanted->width * wanted->height * 16;
     if (wanted->layers == 0)
         return true;
@@ -113,7 +113,7 @@ static bool complete_pixels(struct cli_job *job)
 
 static bool complete_outputs(struct cli_job *job, bool is_series)
 {
-    if (job->output != NULL) {
+    if (job->output) {
         job->outputs[0] = (struct cli_output){.path = job->output, .image = job->image};
         job->output_count = 1;
     }
@@ -129,7 +129,7 @@ static bool complete_outputs(struct cli_job *job, bool is_series)
 
 static bool complete_encoding(struct cli_job *job)
 {
-    if (!job->has_encoding && job->server != NULL && strncmp(job->server, "unix:", 5) != 0)
+    if (!job->has_encoding && job->server && strncmp(job->server, "unix:", 5) != 0)
         job->options.encoding = PROTOCOL_ENCODING_ZSTD;
     if (job->options.encoding == PROTOCOL_ENCODING_JPEG && job->options.format != PROTOCOL_PIXEL_FORMAT_RGBA8)
         return cli_usage(job, "--encoding", "jpeg carries 8-bit pictures only, %s files need more",
@@ -181,19 +181,19 @@ static bool complete_camera(struct cli_job *job)
     if (job->has_eye != job->has_look_at)
         return cli_usage(job, job->has_eye ? "--eye" : "--look-at", "needs %s as well",
                          job->has_eye ? "--look-at" : "--eye") == 0;
-    if (has_key && job->camera != NULL)
+    if (has_key && job->camera)
         return cli_usage(job, "--camera", "cannot go with --eye and --look-at") == 0;
     if (!has_key && (job->has_up || job->has_fov))
         return cli_usage(job, job->has_up ? "--up" : "--fov", "needs --eye and --look-at") == 0;
     if (!has_key)
         return true;
-    if (memcmp(job->key.eye_world, job->key.look_at_world, sizeof job->key.eye_world) == 0)
+    if (memcmp(job->key.eye_world, job->key.look_at_world, sizeof(job->key.eye_world)) == 0)
         return cli_usage(job, "--look-at", "is where --eye is") == 0;
     if (is_zero(job->key.up_world) || is_degenerate(&job->key))
         return cli_usage(job, "--up", "must not be parallel to the view direction") == 0;
     job->options.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
     job->options.keys = &job->key;
-    job->options.key_count = 1;
+    job->options.keys_count = 1;
     return true;
 }
 
@@ -201,7 +201,7 @@ static bool complete_camera(struct cli_job *job)
  * choose, and whitted makes no noise. */
 static void complete_integrator(struct cli_job *job)
 {
-    const struct fl_job_options *wanted = &job->options;
+    const struct message_render *wanted = &job->options;
     const bool spreads =
         wanted->samples > 1 || wanted->aperture > 0 || wanted->shutter > 0 || job->lens_changes || job->endless;
     if (!job->has_integrator)
@@ -212,26 +212,21 @@ static void complete_integrator(struct cli_job *job)
  * number. */
 static void complete_samples(struct cli_job *job)
 {
-    struct fl_job_options *wanted = &job->options;
-    job->endless = job->progressive && wanted->samples == 0;
-    if (wanted->samples == 0 && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
+    struct message_render *wanted = &job->options;
+    job->endless = job->progressive && !job->has_samples;
+    if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_PATH)
         wanted->samples = PATH_SAMPLES;
-    else if (wanted->samples == 0 && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
+    else if (!job->has_samples && wanted->integrator == PROTOCOL_INTEGRATOR_AO)
         wanted->samples = AO_SAMPLES;
 }
 
 static bool complete_tracer(struct cli_job *job)
 {
-    struct fl_job_options *wanted = &job->options;
-    const uint32_t resolution = wanted->abuffer_resolution > 0 ? wanted->abuffer_resolution : 1280;
-    if (wanted->ldc_levels == PROTOCOL_LDC_LEVELS_CELLS && wanted->ldc_tolerance > 0) {
-        cli_usage(job, "--ldc-levels", "cells know nothing of --ldc-tolerance");
-        return fl_error_remedy(&job->error, "leave out one of them");
-    }
-    if (wanted->abuffer_voxels > resolution) {
-        cli_usage(job, "--voxels", "%u are more than the %u texels of --abuffer-resolution",
-                  wanted->abuffer_voxels, resolution);
-        return fl_error_remedy(&job->error, "choose fewer, auto, or a higher --abuffer-resolution");
+    struct message_render *wanted = &job->options;
+    struct setting_fault fault;
+    if (!tracer_settings_check(&wanted->settings, "--", &fault)) {
+        cli_usage(job, fault.field, "%s", fault.text);
+        return fl_error_remedy(&job->error, "%s", fault.remedy);
     }
     /* Else most of the "truth" would be the rasteriser's. */
     if (!job->has_primary && wanted->tracer == PROTOCOL_TRACER_REFERENCE)
@@ -263,13 +258,13 @@ static bool complete_clips(struct cli_job *job)
 /* What is up already cannot be given another light, and only a daemon that others can reach has it. */
 static bool complete_scene(struct cli_job *job)
 {
-    if (job->scene == NULL)
-        return job->model != NULL || cli_usage(job, "MODEL", "no model file is named") == 0;
-    if (job->model != NULL)
+    if (!job->scene)
+        return job->model || cli_usage(job, "MODEL", "no model file is named") == 0;
+    if (job->model)
         return cli_usage(job, "--scene", "cannot go with the model %s: it is one or the other", job->model) == 0;
-    if (job->environment != NULL)
+    if (job->environment)
         return cli_usage(job, "--environment", "cannot go with --scene: that has its light already") == 0;
-    if (job->server != NULL)
+    if (job->server)
         return true;
     cli_usage(job, "--scene", "no daemon is named that has it");
     return fl_error_remedy(&job->error, "add --server ADDRESS");
@@ -279,10 +274,6 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
 {
     if (!complete_scene(job))
         return false;
-    if (job->options.width == 0) {
-        job->options.width = 1280;
-        job->options.height = 720;
-    }
     complete_samples(job);
     complete_integrator(job);
     return complete_tracer(job) && complete_clips(job) && complete_outputs(job, is_series) &&
@@ -291,13 +282,9 @@ bool cli_job_complete(struct cli_job *job, bool is_series)
 
 bool cli_job_complete_view(struct cli_job *job)
 {
-    struct fl_job_options *wanted = &job->options;
+    struct message_render *wanted = &job->options;
     if (!complete_scene(job))
         return false;
-    if (wanted->width == 0) {
-        wanted->width = 1280;
-        wanted->height = 720;
-    }
     /* What makes no noise is the better one while it moves. */
     if (!job->has_integrator && (wanted->aperture > 0 || wanted->shutter > 0))
         wanted->integrator = PROTOCOL_INTEGRATOR_DISTRIBUTED;

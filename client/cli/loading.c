@@ -88,8 +88,8 @@ void cli_loading_close(struct cli_loading *loading)
 /* By name or number; without either the model's first camera, unless keys or an orbit say where to look. */
 bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct fl_error *error)
 {
-    struct fl_job_options *options = &job->options;
-    if (options->key_count > 0 || job->is_orbit)
+    struct message_render *options = &job->options;
+    if (options->keys_count > 0 || job->is_orbit)
         return true;
     if (job->camera) {
         options->camera_path = PROTOCOL_CAMERA_PATH_NODE;

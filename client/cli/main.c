@@ -16,6 +16,7 @@ static const struct subcommand {
     {"view", "farlight view", cli_view, "open a window on a model or a shared scene"},
     {"info", "farlight info", cli_info, "show what a model file contains"},
     {"compare", "farlight compare", cli_compare, "measure the difference of two images or two tracers"},
+    {"tracers", "farlight tracers", cli_tracers, "list the tracers and their settings"},
     {"serve", "farlight serve", cli_serve, "share a model for other clients"},
     {"scenes", "farlight scenes", cli_scenes, "list the scenes of a daemon to which clients may attach"},
     {"stats", "farlight stats", cli_stats, "show a daemon's clients, scenes, memory and times"},
@@ -87,7 +88,9 @@ int main(int argc, char **argv)
     }
     const struct subcommand *subcommand = find(argv[1]);
     int status = CLI_USAGE;
-    if (subcommand)
+    if (strcmp(argv[1], "complete") == 0)
+        status = cli_complete(argc - 1, argv + 1);
+    else if (subcommand)
         status = run(subcommand, argc - 1, argv + 1);
     else
         status = unknown(argv[1]);

@@ -70,16 +70,17 @@ static bool complete(struct cli_job *job)
 
 int cli_render(int argc, char **argv)
 {
-    static const struct argp_child children[] = {{&cli_job_argp, 0, NULL, 0}, {0}};
-    static const struct argp argp = {.options = options,
-                                     .parser = parse,
-                                     .args_doc = "MODEL -o IMAGE\n--scene NAME --server ADDRESS -o IMAGE",
-                                     .doc = "Render one picture of a model.\v"
-                                            "MODEL is glTF, GLB, OBJ or NFF. FARLIGHT_SERVER, FARLIGHT_SIZE, "
-                                            "FARLIGHT_SAMPLES and so on give defaults.",
-                                     .children = children};
+    const struct argp_child children[] = {{cli_job_argp(), 0, NULL, 0}, {0}};
+    const struct argp argp = {.options = options,
+                              .parser = parse,
+                              .args_doc = "MODEL -o IMAGE\n--scene NAME --server ADDRESS -o IMAGE",
+                              .doc = "Render one picture of a model.\v"
+                                     "MODEL is glTF, GLB, OBJ or NFF. FARLIGHT_SERVER, FARLIGHT_SIZE, "
+                                     "FARLIGHT_SAMPLES and so on give defaults.",
+                              .children = children};
     struct cli_job job;
-    if (!cli_job_begin(&job) || argp_parse(&argp, argc, argv, 0, NULL, &job) != 0 || !complete(&job))
+    if (!cli_job_begin(&job, fl_render_defaults()) || argp_parse(&argp, argc, argv, 0, NULL, &job) != 0 ||
+        !complete(&job))
         return cli_report(&job.error);
     return cli_run_job(&job, false);
 }

@@ -204,8 +204,8 @@ static bool end_passes(struct session *session, uint32_t held, struct fl_error *
 static bool render_passes(struct session *session, struct fl_error *error)
 {
     const struct cli_job *job = session->job;
-    struct fl_job_options options = job->options;
-    const uint32_t total = job->endless ? UINT32_MAX : options.samples > 0 ? options.samples : 1;
+    struct message_render options = job->options;
+    const uint32_t total = job->endless ? UINT32_MAX : options.samples;
     const struct fl_frame_run still = {.step = 1};
     uint64_t pass_ns = 0;
     options.accumulate = true;
@@ -226,7 +226,7 @@ static bool render_passes(struct session *session, struct fl_error *error)
 /* What is left of one run, as one job. */
 static bool render_run(struct session *session, const struct fl_frame_run *run, struct fl_error *error)
 {
-    struct fl_job_options options = session->job->options;
+    struct message_render options = session->job->options;
     if (session->job->progressive)
         return render_passes(session, error);
     options.first_frame = session->begun ? (uint32_t)session->next : run->first;

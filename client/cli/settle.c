@@ -130,7 +130,7 @@ static bool choose_range(struct cli_job *job, double clips_s, struct fl_error *e
  * doubled frame; a dolly arrives with the last. */
 static void settle_camera(struct cli_job *job)
 {
-    struct fl_job_options *wanted = &job->options;
+    struct message_render *wanted = &job->options;
     const struct cli_series *series = &job->series;
     const double step_s = (double)series->range.step / (double)wanted->frames_per_second;
     const uint32_t frames = fl_frame_run_count(&series->range);
@@ -158,6 +158,6 @@ bool cli_settle(struct cli_job *job, struct fl_scene *scene, bool is_series, str
     if (job->channel_count > 0 && !settle_channels(job, scene, error))
         return false;
     job->options.clips = job->clip_uses;
-    job->options.clip_count = job->clip_count + (job->channel_count > 0 ? 1 : 0);
+    job->options.clips_count = (uint32_t)job->clip_count + (job->channel_count > 0 ? 1 : 0);
     return true;
 }

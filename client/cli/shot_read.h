@@ -68,7 +68,7 @@ bool shot_add_channel(const struct shot_reader *reader, const struct shot_value 
 
 /* ---- shot_settings.c ---- */
 
-#define SHOT_SETTINGS_MAX 64
+#define SHOT_SETTINGS_MAX 96
 /* Into `names`, which has room for SHOT_SETTINGS_MAX. Returns how many there are. */
 size_t shot_setting_names(const char **names);
 /* Those that the file's object has. */

@@ -2,6 +2,8 @@
 /* Members of a request file that the command line has, too: each is set as if it had been typed. */
 #include "cli/shot_read.h"
 
+#include "cli/job_fields.h"
+
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
@@ -10,6 +12,7 @@
 
 enum type { WORD, WHOLE, REAL, SIZE, FLAG, WHOLE_OR_WORD, WORDS };
 
+/* Those that are no field of `render`. */
 static const struct setting {
     const char *name, *option;
     enum type type;
@@ -19,44 +22,13 @@ static const struct setting {
     {"fps", "fps", REAL, "24"},
     {"shard", "shard", WORD, "\"3/8\""},
     {"size", "size", SIZE, "[1920, 1080]"},
-    {"samples", "samples", WHOLE, "16"},
-    {"depth", "depth", WHOLE, "8"},
-    {"seed", "seed", WHOLE, "1"},
-    {"exposure", "exposure", REAL, "0.5"},
-    {"tone_map", "tone-map", WORD, "\"neutral\""},
-    {"shutter", "shutter", REAL, "0.5"},
-    {"filter", "filter", WORD, "\"gaussian\""},
-    {"tracer", "tracer", WORD, "\"bvh\""},
-    {"bvh_bounds", "bvh-bounds", WORD, "\"box\""},
-    {"bvh_rays", "bvh-rays", WHOLE, "2"},
-    {"ldc_resolution", "ldc-resolution", WHOLE, "1024"},
-    {"ldc_block", "ldc-block", WHOLE, "8"},
-    {"ldc_build", "ldc-build", WORD, "\"lists\""},
-    {"ldc_levels", "ldc-levels", WORD, "\"pyramid\""},
-    {"ldc_images", "ldc-images", WORD, "\"one\""},
-    {"ldc_tolerance", "ldc-tolerance", REAL, "0.001"},
-    {"ldc_rays", "ldc-rays", WHOLE, "4"},
-    {"abuffer_resolution", "abuffer-resolution", WHOLE, "1280"},
-    {"voxels", "voxels", WHOLE_OR_WORD, "128"},
-    {"search", "search", WORD, "\"linear3\""},
-    {"integrator", "integrator", WORD, "\"distributed\""},
-    {"bounces", "bounces", WHOLE, "8"},
-    {"brdf", "brdf", WORD, "\"ward\""},
-    {"ao_distance", "ao-distance", REAL, "0.5"},
-    {"ao_falloff", "ao-falloff", REAL, "1"},
-    {"ao_rays", "ao-rays", WHOLE, "8"},
-    {"layer_opacity", "layer-opacity", REAL, "0.5"},
     {"layers", "layers", WORDS, "[\"beauty\", \"depth\"]"},
-    {"primary", "primary", WORD, "\"raster\""},
-    {"encoding", "encoding", WORD, "\"zstd\""},
-    {"quality", "quality", WHOLE, "90"},
     {"format", "format", WORD, "\"exr\""},
     {"half", "half", FLAG, "true"},
     {"float", "float", FLAG, "true"},
     {"lossless", "lossless", FLAG, "true"},
 };
-#define SETTING_COUNT (sizeof settings / sizeof settings[0])
-_Static_assert(SETTING_COUNT <= SHOT_SETTINGS_MAX, "room for all names");
+#define SETTING_COUNT (sizeof(settings) / sizeof(settings[0]))
 
 static bool wrong_type(const struct shot_reader *reader, const struct shot_value *at,
                        const struct setting *setting)
@@ -69,7 +41,7 @@ static bool wrong_type(const struct shot_reader *reader, const struct shot_value
                                          [WHOLE_OR_WORD] = "a whole number or a word",
                                          [WORDS] = "an array of strings"};
     char remedy[80];
-    snprintf(remedy, sizeof remedy, "such as \"%s\": %s", setting->name, setting->example);
+    snprintf(remedy, sizeof(remedy), "such as \"%s\": %s", setting->name, setting->example);
     return shot_wrong(reader, at, remedy, "must be %s", wanted[setting->type]);
 }
 
@@ -86,7 +58,7 @@ static const char *joined(const json_t *array, char *text, size_t text_bytes)
     size_t used = 0;
     for (size_t i = 0; i < json_array_size(array); i++) {
         const char *word = json_string_value(json_array_get(array, i));
-        if (word == NULL || strchr(word, ',') != NULL || strlen(word) + 2 > text_bytes - used)
+        if (!word || strchr(word, ',') || strlen(word) + 2 > text_bytes - used)
             return NULL;
         used += (size_t)snprintf(text + used, text_bytes - used, "%s%s", i > 0 ? "," : "", word);
     }
@@ -124,9 +96,9 @@ static const char *typed(const struct setting *setting, const json_t *value, cha
 static bool apply_setting(const struct shot_reader *reader, const struct shot_value *at,
                           const struct setting *setting)
 {
-    char text[256], remedy[sizeof reader->job->error.remedy];
-    const char *value = typed(setting, at->value, text, sizeof text);
-    if (value == NULL)
+    char text[256], remedy[sizeof(reader->job->error.remedy)];
+    const char *value = typed(setting, at->value, text, sizeof(text));
+    if (!value)
         return wrong_type(reader, at, setting);
     if (json_is_false(at->value))
         return true;
@@ -137,22 +109,51 @@ static bool apply_setting(const struct shot_reader *reader, const struct shot_va
     if (status == 0)
         return true;
     const struct fl_error why = reader->job->error;
-    snprintf(remedy, sizeof remedy, "such as \"%s\": %s", setting->name, setting->example);
+    snprintf(remedy, sizeof(remedy), "such as \"%s\": %s", setting->name, setting->example);
     return shot_wrong(reader, at, why.remedy[0] != '\0' ? why.remedy : remedy, "%s", why.text);
+}
+
+/* A member that is a field of `render`, with an example from its description. */
+static bool apply_field(const struct shot_reader *reader, const struct shot_value *at,
+                        const struct cli_field *field)
+{
+    char usual[32], quoted[40];
+    const struct field_desc *desc = field->field;
+    const bool is_auto = desc->zero_is_default && desc->default_int == 0;
+    const bool is_word = desc->kind == FIELD_ENUM;
+    field_default_text(desc, usual, sizeof(usual));
+    snprintf(quoted, sizeof(quoted), is_word || is_auto ? "\"%s\"" : "%s", usual);
+    const struct setting setting = {field->member, field->option,
+                                    is_word                    ? WORD
+                                    : desc->kind == FIELD_REAL ? REAL
+                                    : is_auto                  ? WHOLE_OR_WORD
+                                                               : WHOLE,
+                                    quoted};
+    return apply_setting(reader, at, &setting);
 }
 
 size_t shot_setting_names(const char **names)
 {
+    size_t count = 0;
     for (size_t i = 0; i < SETTING_COUNT; i++)
-        names[i] = settings[i].name;
-    return SETTING_COUNT;
+        names[count++] = settings[i].name;
+    for (size_t i = 0; i < cli_field_count() && count < SHOT_SETTINGS_MAX; i++)
+        if (cli_field_at(i)->is_of_shot)
+            names[count++] = cli_field_at(i)->member;
+    return count;
 }
 
 bool shot_settings(const struct shot_reader *reader, const struct shot_value *root)
 {
     for (size_t i = 0; i < SETTING_COUNT; i++) {
         const struct shot_value at = shot_member(root, settings[i].name);
-        if (at.value != NULL && !apply_setting(reader, &at, &settings[i]))
+        if (at.value && !apply_setting(reader, &at, &settings[i]))
+            return false;
+    }
+    for (size_t i = 0; i < cli_field_count(); i++) {
+        const struct cli_field *field = cli_field_at(i);
+        const struct shot_value at = shot_member(root, field->member);
+        if (at.value && field->is_of_shot && !apply_field(reader, &at, field))
             return false;
     }
     return true;

@@ -125,7 +125,7 @@ bool cli_sinks_start(struct cli_sinks *sinks, struct fl_error *error)
 
 static bool have(struct cli_sink *sink, uint32_t frame)
 {
-    const struct fl_job_options *wanted = &sink->job->options;
+    const struct message_render *wanted = &sink->job->options;
     uint32_t width = 0, height = 0;
     return sink->is_series && fl_pattern_path(&sink->pattern, frame, sink->path, sizeof(sink->path)) &&
            fl_image_size(sink->path, &width, &height) && width == wanted->width && height == wanted->height;

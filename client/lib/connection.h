@@ -99,9 +99,6 @@ int fl_view_take(struct fl_view *view, const struct framing_header *header, cons
                  struct fl_error *error);
 /* Of another client's doing. */
 void fl_scenes_changed(struct fl_connection *connection, const struct message_scene_changed *changed);
-/* "zero is the default", spelled out. */
-void fl_job_fill_render(struct message_render *render, const struct fl_job_options *options);
-
 /* Connects a socket to "unix:PATH" or "tcp:HOST:PORT"; -1 on failure. `local`: see fl_connection_is_local. */
 int fl_address_connect(const char *address, uint64_t deadline_ns, int interrupt_fd, bool *local,
                        struct fl_error *error);

@@ -4,7 +4,9 @@
  *   struct fl_error error = {0};
  *   struct fl_connection *connection = fl_connect(&(struct fl_connect_options){0}, &error);   a private daemon
  *   struct fl_scene *scene = fl_scene_load(connection, &(struct fl_load_options){.model = "a.glb"}, &error);
- *   struct fl_job *job = fl_render_start(scene, &(struct fl_job_options){.samples = 4}, &error);
+ *   struct message_render render = fl_render_defaults();
+ *   render.samples = 4;
+ *   struct fl_job *job = fl_render_start(scene, &render, &error);
  *   struct fl_frame *frame;
  *   while ((frame = fl_render_next(job, &error))) { ... fl_frame_destroy(frame); }
  *   fl_render_destroy(job); fl_scene_destroy(scene); fl_connection_destroy(connection);
@@ -275,67 +277,11 @@ FL_API void fl_model_info_destroy(struct fl_model_info *info);
 
 struct fl_job;
 
-#define FL_DEPTH_NONE (-1)
-
-struct fl_job_options {
-    uint32_t width, height; /* 0: 1280x720 */
-    uint32_t samples;       /* 0: 1 */
-    int depth;              /* bounces after the first hit; 0: 8; FL_DEPTH_NONE: none */
-    uint64_t seed;
-    uint32_t first_frame, last_frame, frame_step; /* step 0: 1 */
-    float frames_per_second;                      /* 0: 24 */
-    uint32_t time_origin_frame;                   /* the frame at time 0 */
-    enum protocol_tracer tracer;
-    enum protocol_bvh_bounds bvh_bounds;
-    enum protocol_integrator integrator;
-    enum protocol_primary primary;
-    enum protocol_tone_map tone_map;
-    float exposure_stops;
-    enum protocol_pixel_format format;
-    enum protocol_encoding encoding;
-    unsigned quality; /* 0: JPEG 90, H.264 80, else level 1 */
-    enum protocol_camera_path camera_path;
-    uint32_t camera_node;
-    float orbit_turn, orbit_seconds; /* radians, seconds */
-    const struct record_camera_key *keys;
-    size_t key_count;
-    unsigned frames_in_flight; /* that the daemon may send ahead; 0: 2 */
-    /* Every wave of rays, the primary one too (which is traced then, not rasterised), is traced by `compare_with`
-     * as well, and the answers are compared ray by ray: frames come with wave_comparisons. The picture is
-     * `tracer`'s. */
-    bool compare;
-    enum protocol_tracer compare_with;
-    float compare_far; /* two hits are far from each other beyond this share of the scene's diagonal; 0: 1/10000 */
-    float aperture;    /* diameter of the lens, metres; 0: everything is sharp */
-    float focus;       /* distance of the plane that is sharp, metres; 0: that of what is looked at */
-    float shutter;     /* how long it is open, in frames; 0: nothing moves within a frame */
-    enum protocol_pixel_filter pixel_filter;
-    unsigned bvh_rays_together; /* that walk as one: 1, 2, 3, 4, 8; 0: chosen for each wave */
-    bool accumulate;            /* frames add to those before as long as nothing changes: see fl_frame.samples */
-    const struct record_clip_use *clips; /* that are played, at most 16 */
-    size_t clip_count;
-    /* Of the tracer ldc. */
-    uint32_t ldc_resolution; /* cells along the longest side of a cube, 16 to 4096; 0: 1024 */
-    unsigned ldc_block;      /* texels along a side of a block: 2, 4, 8, 16, 32; 0: 8 */
-    enum protocol_ldc_build ldc_build;
-    enum protocol_ldc_levels ldc_levels;
-    enum protocol_ldc_images ldc_images;
-    /* A ray hits where it comes this near to a sample, metres; 0: where it crosses its plane. Not with cells. */
-    float ldc_tolerance;
-    unsigned ldc_rays_together; /* that walk as one: 1, 4; 0: chosen */
-    /* Of the tracer abuffer. */
-    uint32_t abuffer_resolution; /* texels along a side of the A-buffers, 16 to 4096; 0: 1280 */
-    unsigned abuffer_voxels;     /* along a side of the grid: 16, 32, 64, 128, 256; 0: chosen */
-    enum protocol_abuffer_search abuffer_search;
-    enum protocol_brdf brdf; /* of rough surfaces, for the integrator path */
-    float ao_distance;       /* metres; 0: a tenth of the scene's diagonal */
-    float ao_falloff;        /* as a power of 1 - distance / ao_distance; 0: all counts the same */
-    unsigned ao_rays;        /* for each sample; 0: 8 */
-    float layer_opacity;     /* of opaque surfaces, for the integrator raycast; 0: 0.5 */
-    /* Set of layers, 1 << enum protocol_layer each; 0: the picture alone. Others need format rgba32f, encoding raw
-     * or zstd. */
-    unsigned layers;
-};
+/* What is rendered is the protocol's own message: protocol/messages.def and tracers.def say what each field means
+ * and allows, or `farlight tracers` and farlight(1). These return it with the defaults of the table. The library
+ * sets `kind`, `scene` and `channel`; of a job `credit` is the number of frames that the daemon may send ahead.
+ * Keys and clips are only read. */
+FL_API struct message_render fl_render_defaults(void);
 
 /* One picture and what it cost. */
 struct fl_frame {
@@ -379,7 +325,7 @@ struct fl_frame {
 };
 
 /* One job at a time per connection. */
-FL_API struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_options *options,
+FL_API struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_render *wanted,
                                       struct fl_error *error);
 /* The next frame, in order; NULL with error->code FL_ERROR_NONE after the last. The caller destroys it. */
 FL_API struct fl_frame *fl_render_next(struct fl_job *job, struct fl_error *error);
@@ -400,17 +346,10 @@ struct fl_view;
 
 enum fl_attachment { FL_ATTACH_DEPTH = 1, FL_ATTACH_NORMALS = 2 }; /* bits */
 
-struct fl_view_options {
-    /* What it shows. Of the fields that only a range of frames has, none is used; `frames_per_second` is the most
-     * that is wanted, 0: 60; `samples` what a picture gets at most while nothing moves, 0: 64; format rgba8;
-     * `encoding` is that of motion. `frames_in_flight` 0: 4. */
-    struct fl_job_options job;
-    enum protocol_encoding still_encoding;
-    unsigned pass_samples; /* that a frame adds while nothing moves; 0: 1 */
-    unsigned weight;       /* beside other clients, 1 to 16; 0: the daemon's default */
-    bool adapt;            /* quality and size follow the link while it moves */
-    unsigned attachments;  /* enum fl_attachment bits */
-};
+/* Likewise of a view. Of the fields that only a range of frames has, none is used; `frames_per_second` is the most
+ * that is wanted, 60 here; `samples` what a picture gets at most while nothing moves, 64 here; the format is
+ * rgba8; `encoding` is that of motion; `credit` 4; `attachments` enum fl_attachment bits. */
+FL_API struct message_render fl_view_defaults(void);
 
 struct fl_view_camera {
     float eye_world[3], look_at_world[3], up_world[3];
@@ -422,10 +361,10 @@ struct fl_view_camera {
     uint32_t node;
 };
 
-FL_API struct fl_view *fl_view_start(struct fl_scene *scene, const struct fl_view_options *options,
+FL_API struct fl_view *fl_view_start(struct fl_scene *scene, const struct message_render *options,
                                      struct fl_error *error);
 /* From now on it shows something else (size, tracer, integrator, exposure ..); camera and frame numbers go on. */
-FL_API bool fl_view_change(struct fl_view *view, const struct fl_view_options *options, struct fl_error *error);
+FL_API bool fl_view_change(struct fl_view *view, const struct message_render *options, struct fl_error *error);
 /* Sends it and returns; *command (may be NULL) is the number by which frames name it. */
 FL_API bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uint64_t *command,
                          struct fl_error *error);

@@ -8,7 +8,6 @@
 #include <stdlib.h>
 
 #define CANCEL_NS 10000000000ull
-#define DEFAULT_FRAMES_IN_FLIGHT 2u
 
 struct fl_job {
     struct fl_connection *connection;
@@ -22,76 +21,22 @@ struct fl_job {
     struct fl_frame_queue done; /* that nobody has asked for yet */
 };
 
-void fl_job_fill_render(struct message_render *render, const struct fl_job_options *options)
+struct message_render fl_render_defaults(void)
 {
-    const unsigned default_quality = options->encoding == PROTOCOL_ENCODING_JPEG   ? 90
-                                     : options->encoding == PROTOCOL_ENCODING_H264 ? 80
-                                                                                   : 1;
-    render->width = options->width > 0 ? options->width : 1280;
-    render->height = options->height > 0 ? options->height : 720;
-    render->samples = options->samples > 0 ? options->samples : 1;
-    render->depth = options->depth == 0 ? 8 : options->depth < 0 ? 0 : (uint32_t)options->depth;
-    render->seed = options->seed;
-    render->first_frame = options->first_frame;
-    render->last_frame = options->last_frame;
-    render->frame_step = options->frame_step > 0 ? options->frame_step : 1;
-    render->frames_per_second = options->frames_per_second > 0 ? options->frames_per_second : 24;
-    render->time_origin_frame = options->time_origin_frame;
-    render->tracer = options->tracer;
-    render->bvh_bounds = options->bvh_bounds;
-    render->integrator = options->integrator;
-    render->primary = options->primary;
-    render->tone_map = options->tone_map;
-    render->exposure_stops = options->exposure_stops;
-    render->format = options->format;
-    render->encoding = options->encoding;
-    render->quality = options->quality > 0 ? options->quality : default_quality;
-    render->camera_path = options->camera_path;
-    render->camera_node = options->camera_node;
-    render->orbit_turn = options->orbit_turn;
-    render->orbit_seconds = options->orbit_seconds;
-    render->compare = options->compare ? 1 : 0;
-    render->compare_with = options->compare_with;
-    render->compare_far = options->compare_far;
-    render->aperture = options->aperture;
-    render->focus = options->focus;
-    render->shutter = options->shutter;
-    render->pixel_filter = options->pixel_filter;
-    render->bvh_rays_together = options->bvh_rays_together;
-    render->accumulate = options->accumulate ? 1 : 0;
-    render->ldc_resolution = options->ldc_resolution;
-    render->ldc_block = options->ldc_block;
-    render->ldc_build = options->ldc_build;
-    render->ldc_levels = options->ldc_levels;
-    render->ldc_images = options->ldc_images;
-    render->ldc_tolerance = options->ldc_tolerance;
-    render->ldc_rays_together = options->ldc_rays_together;
-    render->abuffer_resolution = options->abuffer_resolution;
-    render->abuffer_voxels = options->abuffer_voxels;
-    render->abuffer_search = options->abuffer_search;
-    render->brdf = options->brdf;
-    render->ao_distance = options->ao_distance;
-    render->ao_falloff = options->ao_falloff;
-    render->ao_rays = options->ao_rays;
-    render->layer_opacity = options->layer_opacity;
-    render->layers = options->layers;
-    render->clips = (struct record_clip_use *)(uintptr_t)options->clips; /* only read */
-    render->clips_count = (uint32_t)options->clip_count;
-    render->keys = (struct record_camera_key *)(uintptr_t)options->keys; /* only read */
-    render->keys_count = (uint32_t)options->key_count;
-    render->credit = options->frames_in_flight > 0 ? options->frames_in_flight : DEFAULT_FRAMES_IN_FLIGHT;
+    struct message message;
+    message_init(&message, MESSAGE_RENDER);
+    return message.render;
 }
 
-struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_options *options,
-                               struct fl_error *error)
+struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_render *wanted, struct fl_error *error)
 {
     struct fl_connection *connection = scene->connection;
     if (connection->job) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "", "another job runs on this connection");
         return NULL;
     }
-    if ((options->layers & ~FL_LAYERS_PICTURE) != 0 &&
-        (options->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || options->encoding == PROTOCOL_ENCODING_JPEG)) {
+    if ((wanted->layers & ~FL_LAYERS_PICTURE) != 0 &&
+        (wanted->format != PROTOCOL_PIXEL_FORMAT_RGBA32F || wanted->encoding == PROTOCOL_ENCODING_JPEG)) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "layers",
                      "need the pixel format rgba32f and the encoding raw or zstd");
         return NULL;
@@ -101,9 +46,8 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_optio
         fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
         return NULL;
     }
-    struct message message = {.type = MESSAGE_RENDER};
+    struct message message = {.type = MESSAGE_RENDER, .render = *wanted};
     struct message_render *render = &message.render;
-    fl_job_fill_render(render, options);
     job->connection = connection;
     job->request = fl_connection_next_request(connection);
     job->channel = ++connection->last_channel;
@@ -118,6 +62,7 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct fl_job_optio
         .encoding = render->encoding,
         .layers = render->layers != 0 ? render->layers : FL_LAYERS_PICTURE,
     };
+    render->kind = PROTOCOL_JOB_KIND_BATCH;
     render->scene = scene->scene;
     render->channel = job->channel;
     if (!fl_frame_queue_init(&job->done, render->credit, error) ||

@@ -45,24 +45,24 @@ struct fl_view {
 
 /* ---- going out ---- */
 
-static void fill_render(struct message_render *render, const struct fl_view *view,
-                        const struct fl_view_options *options)
+struct message_render fl_view_defaults(void)
 {
-    struct fl_job_options job = options->job;
-    job.format = PROTOCOL_PIXEL_FORMAT_RGBA8;
-    job.first_frame = job.last_frame = 0;
-    job.samples = job.samples > 0 ? job.samples : DEFAULT_SAMPLES;
-    job.frames_per_second = job.frames_per_second > 0 ? job.frames_per_second : DEFAULT_FRAMES_PER_SECOND;
-    fl_job_fill_render(render, &job);
+    struct message_render render = fl_render_defaults();
+    render.kind = PROTOCOL_JOB_KIND_VIEW;
+    render.samples = DEFAULT_SAMPLES;
+    render.frames_per_second = DEFAULT_FRAMES_PER_SECOND;
+    render.credit = DEFAULT_FRAMES_IN_FLIGHT;
+    return render;
+}
+
+static void fill_render(struct message_render *render, const struct fl_view *view)
+{
     render->kind = PROTOCOL_JOB_KIND_VIEW;
     render->scene = view->scene;
     render->channel = view->channel;
     render->credit = (uint32_t)view->done.capacity;
-    render->still_encoding = options->still_encoding;
-    render->pass_samples = options->pass_samples;
-    render->weight = options->weight;
-    render->adapt = options->adapt ? 1 : 0;
-    render->attachments = options->attachments;
+    render->format = PROTOCOL_PIXEL_FORMAT_RGBA8;
+    render->first_frame = render->last_frame = 0;
 }
 
 /* Of all renders of the view together. */
@@ -75,11 +75,11 @@ static bool tell_credit(struct fl_view *view, struct fl_error *error)
 }
 
 /* One more render on the view's channel. */
-static bool ask(struct fl_view *view, const struct fl_view_options *options, struct fl_error *error)
+static bool ask(struct fl_view *view, const struct message_render *wanted, struct fl_error *error)
 {
-    struct message message = {.type = MESSAGE_RENDER};
+    struct message message = {.type = MESSAGE_RENDER, .render = *wanted};
     struct message_render *render = &message.render;
-    fill_render(render, view, options);
+    fill_render(render, view);
     struct asked *asked = &view->asked[view->asked_count];
     asked->request = fl_connection_next_request(view->connection);
     asked->change = view->changes;
@@ -97,11 +97,9 @@ static bool ask(struct fl_view *view, const struct fl_view_options *options, str
     return true;
 }
 
-struct fl_view *fl_view_start(struct fl_scene *scene, const struct fl_view_options *options,
-                              struct fl_error *error)
+struct fl_view *fl_view_start(struct fl_scene *scene, const struct message_render *wanted, struct fl_error *error)
 {
     struct fl_connection *connection = scene->connection;
-    const unsigned in_flight = options->job.frames_in_flight;
     if (connection->view) {
         fl_error_set(error, FL_ERROR_ARGUMENT, "", "another view runs on this connection");
         return NULL;
@@ -114,8 +112,7 @@ struct fl_view *fl_view_start(struct fl_scene *scene, const struct fl_view_optio
     view->connection = connection;
     view->scene = scene->scene;
     view->channel = ++connection->last_channel;
-    if (!fl_frame_queue_init(&view->done, in_flight > 0 ? in_flight : DEFAULT_FRAMES_IN_FLIGHT, error) ||
-        !ask(view, options, error)) {
+    if (!fl_frame_queue_init(&view->done, wanted->credit, error) || !ask(view, wanted, error)) {
         fl_frame_queue_finish(&view->done);
         free(view);
         return NULL;
@@ -136,7 +133,7 @@ static bool check(const struct fl_view *view, struct fl_error *error)
     return false;
 }
 
-bool fl_view_change(struct fl_view *view, const struct fl_view_options *options, struct fl_error *error)
+bool fl_view_change(struct fl_view *view, const struct message_render *wanted, struct fl_error *error)
 {
     const uint64_t deadline_ns = monotonic_now_ns() + ANSWER_NS;
     if (!check(view, error))
@@ -147,7 +144,7 @@ bool fl_view_change(struct fl_view *view, const struct fl_view_options *options,
             return false;
     }
     view->changes++;
-    return ask(view, options, error) && tell_credit(view, error);
+    return ask(view, wanted, error) && tell_credit(view, error);
 }
 
 bool fl_view_look(struct fl_view *view, const struct fl_view_camera *camera, uint64_t *command,

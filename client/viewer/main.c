@@ -11,8 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define DEFAULT_SAMPLES 64u
-
 /* The C library looks for it by name, past our hidden visibility. */
 __attribute__((visibility("default"))) const char *argp_program_version = "farlight-view " FARLIGHT_VERSION;
 
@@ -105,8 +103,8 @@ static error_t set_still_encoding(struct command_line *line, const char *value)
 {
     struct viewer_options *viewer = &line->viewer;
     viewer->has_still_encoding = true;
-    if (protocol_encoding_parse(value, &viewer->view.still_encoding) &&
-        viewer->view.still_encoding != PROTOCOL_ENCODING_H264)
+    if (protocol_encoding_parse(value, &line->job.options.still_encoding) &&
+        line->job.options.still_encoding != PROTOCOL_ENCODING_H264)
         return 0;
     return cli_usage(&line->job, "--still-encoding", "'%s' is not raw, predicted, zstd or jpeg", value);
 }
@@ -166,9 +164,9 @@ static error_t parse(int key, char *value, struct argp_state *state)
     case KEY_SAMPLES:
         return set_integer(&line->job, "--samples", value, 1, 65536, &line->job.options.samples);
     case KEY_PASS:
-        return set_integer(&line->job, "--pass-samples", value, 1, 256, &viewer->view.pass_samples);
+        return set_integer(&line->job, "--pass-samples", value, 1, 256, &line->job.options.pass_samples);
     case KEY_WEIGHT:
-        return set_integer(&line->job, "--weight", value, 1, 16, &viewer->view.weight);
+        return set_integer(&line->job, "--weight", value, 1, 16, &line->job.options.weight);
     case KEY_INTEGRATOR:
         return set_integrator(line, value);
     case KEY_SCALE:
@@ -226,8 +224,7 @@ static void fill(struct command_line *line)
     viewer->model = job->model;
     viewer->environment = job->environment;
     viewer->scene_name = job->scene;
-    viewer->view.job = job->options;
-    viewer->view.job.samples = job->options.samples > 0 ? job->options.samples : DEFAULT_SAMPLES;
+    viewer->view = job->options;
     viewer->has_encoding = job->has_encoding;
     viewer->has_primary = job->has_primary;
     viewer->has_integrator = job->has_integrator;
@@ -253,7 +250,8 @@ int main(int argc, char **argv)
         .help_filter = help_filter};
     static struct command_line line;
     argp_err_exit_status = CLI_USAGE;
-    if (!cli_job_begin(&line.job) || argp_parse(&argp, argc, argv, 0, NULL, &line) != 0 || !complete(&line))
+    if (!cli_job_begin(&line.job, fl_view_defaults()) || argp_parse(&argp, argc, argv, 0, NULL, &line) != 0 ||
+        !complete(&line))
         return cli_report(&line.job.error);
     struct fl_error error = {0};
     if (!cli_interrupt_begin(&error))

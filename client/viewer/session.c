@@ -263,7 +263,7 @@ static bool fail(struct session *session, const struct fl_error *error, struct f
     return false;
 }
 
-bool session_show(struct session *session, const struct fl_view_options *options, uint64_t *change)
+bool session_show(struct session *session, const struct message_render *options, uint64_t *change)
 {
     struct fl_error error = {0}, ignored;
     if (session->view && fl_view_change(session->view, options, &error)) {
@@ -307,7 +307,7 @@ struct fl_frame *session_next(struct session *session, unsigned timeout_ms, stru
 
 /* ---- beside the view ---- */
 
-bool session_ask(struct session *session, const struct fl_job_options *options, struct fl_error *refusal)
+bool session_ask(struct session *session, const struct message_render *options, struct fl_error *refusal)
 {
     struct fl_error error = {0};
     session_give_up(session);

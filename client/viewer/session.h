@@ -41,7 +41,7 @@ struct fl_scene *session_scene(struct session *session);
 bool session_is_local(const struct session *session);
 bool session_can_h264(const struct session *session);
 /* Shows it from now on. *change is the number that its frames have in fl_frame.change. */
-bool session_show(struct session *session, const struct fl_view_options *options, uint64_t *change);
+bool session_show(struct session *session, const struct message_render *options, uint64_t *change);
 bool session_look(struct session *session, const struct fl_view_camera *camera, uint64_t *command);
 void session_want_key_frame(struct session *session);
 /* The next frame; NULL: none within the time, or *refusal (code not NONE) says that the view or its last change
@@ -49,7 +49,7 @@ void session_want_key_frame(struct session *session);
 struct fl_frame *session_next(struct session *session, unsigned timeout_ms, struct fl_error *refusal);
 
 /* One frame beside the view; what was asked for before is given up. False: refused, or lost. */
-bool session_ask(struct session *session, const struct fl_job_options *options, struct fl_error *refusal);
+bool session_ask(struct session *session, const struct message_render *options, struct fl_error *refusal);
 /* Its frame once it is there. NULL with *refusal code NONE: not yet. */
 struct fl_frame *session_answer(struct session *session, struct fl_error *refusal);
 void session_give_up(struct session *session); /* what was asked for */

@@ -10,6 +10,13 @@ static int around(int value, int step, int count)
     return (value + step + count) % count;
 }
 
+/* Numbers may have gaps. */
+static bool is_for_everybody(enum protocol_tracer tracer)
+{
+    const struct tracer_desc *desc = tracer_describe((uint32_t)tracer);
+    return desc && !desc->is_for_tests;
+}
+
 /* What the daemon has to be told of. */
 static bool change_view(struct settings *settings, enum action action)
 {
@@ -17,10 +24,10 @@ static bool change_view(struct settings *settings, enum action action)
     switch (action) {
     case ACTION_NEXT_TRACER:
     case ACTION_PREVIOUS_TRACER:
-        do /* the naive one is for tests: nobody waits for it */
+        do /* nobody waits for one that is for tests */
             settings->tracer = (enum protocol_tracer)around(
                 (int)settings->tracer, action == ACTION_NEXT_TRACER ? 1 : -1, PROTOCOL_TRACER_COUNT);
-        while (settings->tracer == PROTOCOL_TRACER_NAIVE);
+        while (!is_for_everybody(settings->tracer));
         return true;
     case ACTION_NEXT_INTEGRATOR:
     case ACTION_PREVIOUS_INTEGRATOR:

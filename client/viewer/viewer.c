@@ -35,7 +35,7 @@ void viewer_say(struct viewer *viewer, const char *format, ...)
 static bool settle(struct viewer *viewer, struct fl_error *error)
 {
     const struct viewer_options *options = viewer->options;
-    struct fl_job_options *job = &viewer->view.job;
+    struct message_render *job = &viewer->view;
     struct fl_scene *scene = session_scene(viewer->session);
     const struct fl_camera_info *first = fl_scene_camera(scene, 0);
     uint32_t clip = 0;
@@ -45,7 +45,7 @@ static bool settle(struct viewer *viewer, struct fl_error *error)
         job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
         if (!fl_scene_find_camera(scene, options->camera, &job->camera_node, error))
             return false;
-    } else if (job->key_count == 0 && first) {
+    } else if (job->keys_count == 0 && first) {
         job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
         job->camera_node = first->node;
     }
@@ -208,12 +208,12 @@ bool viewer_run(const struct viewer_options *options, struct fl_error *error)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     viewer->options = options;
     viewer->view = options->view;
-    viewer->width = (int)options->view.job.width;
-    viewer->height = (int)options->view.job.height;
+    viewer->width = (int)options->view.width;
+    viewer->height = (int)options->view.height;
     viewer->scale = 1;
-    viewer->settings = (struct settings){.tracer = options->view.job.tracer,
-                                         .integrator = options->view.job.integrator,
-                                         .tone_map = options->view.job.tone_map,
+    viewer->settings = (struct settings){.tracer = options->view.tracer,
+                                         .integrator = options->view.integrator,
+                                         .tone_map = options->view.tone_map,
                                          .coarser = (int)options->coarser};
     const bool opened = open_viewer(viewer, error);
     const bool done = opened && run(viewer);

@@ -9,7 +9,7 @@
 struct viewer_options {
     const char *server, *key_file, *model, *environment, *scene_name; /* as of session_options */
     /* As of the command line; width and height are the window's, as of the desktop. */
-    struct fl_view_options view;
+    struct message_render view;
     bool has_encoding, has_still_encoding, has_primary, has_integrator;
     bool always_adapt, never_adapt;
     const char *camera, *clip; /* names or numbers; NULL: none is named */

@@ -65,15 +65,15 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
                                 .scale = viewer->scale,
                                 .notice = "",
                                 .settings = &viewer->settings,
-                                .exposure_stops = (double)viewer->view.job.exposure_stops +
-                                                  viewer->settings.exposure_thirds / 3.0,
+                                .exposure_stops =
+                                    (double)viewer->view.exposure_stops + viewer->settings.exposure_thirds / 3.0,
                                 .tour = &viewer->tour,
                                 .metrics = &viewer->metrics,
                                 .now_ns = monotonic_now_ns(),
                                 .picture_width = viewer->frame.width,
                                 .picture_height = viewer->frame.height,
                                 .samples = viewer->frame.samples,
-                                .samples_wanted = viewer->view.job.samples,
+                                .samples_wanted = viewer->view.samples,
                                 .moving = viewer->frame.moving,
                                 .revision = viewer->frame.revision,
                                 .wire_bytes = viewer->frame.wire_bytes,

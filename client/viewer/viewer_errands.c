@@ -16,7 +16,7 @@ bool viewer_follows(const struct viewer *viewer)
 
 uint32_t viewer_home_node(const struct viewer *viewer)
 {
-    return viewer->view.job.camera_path == PROTOCOL_CAMERA_PATH_NODE ? viewer->view.job.camera_node : 0;
+    return viewer->view.camera_path == PROTOCOL_CAMERA_PATH_NODE ? viewer->view.camera_node : 0;
 }
 
 void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32_t node)
@@ -38,12 +38,12 @@ void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32
 /* ---- asking ---- */
 
 /* One ray through the middle of one pixel, which tells where it ends. */
-static void fill_probe(const struct viewer *viewer, struct fl_job_options *job)
+static void fill_probe(const struct viewer *viewer, struct message_render *job)
 {
-    *job = viewer->view.job;
+    *job = viewer->view;
     job->width = job->height = 1;
     job->samples = 1;
-    job->depth = FL_DEPTH_NONE;
+    job->depth = 0;
     job->tracer = viewer->settings.tracer;
     job->integrator = PROTOCOL_INTEGRATOR_WHITTED;
     job->aperture = job->shutter = 0;
@@ -62,21 +62,21 @@ static void fill_key(const struct viewer_camera *camera, struct record_camera_ke
     key->fov_y = out.fov_y;
 }
 
-static void use_node(struct fl_job_options *job, uint32_t node)
+static void use_node(struct message_render *job, uint32_t node)
 {
     job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
     job->camera_node = node;
 }
 
-static void use_key(struct fl_job_options *job, struct record_camera_key *key)
+static void use_key(struct message_render *job, struct record_camera_key *key)
 {
     job->camera_path = PROTOCOL_CAMERA_PATH_KEYS;
     job->keys = key;
-    job->key_count = 1;
+    job->keys_count = 1;
 }
 
 /* The frame at the job's time 0 is that at the tour's time. */
-static void use_clip(const struct viewer *viewer, struct fl_job_options *job, struct record_clip_use *use)
+static void use_clip(const struct viewer *viewer, struct message_render *job, struct record_clip_use *use)
 {
     const struct tour *tour = &viewer->tour;
     const struct fl_clip_info *clip =
@@ -85,7 +85,7 @@ static void use_clip(const struct viewer *viewer, struct fl_job_options *job, st
         return;
     *use = (struct record_clip_use){.clip = clip->clip, .start_s = -(float)tour->time_s, .speed = 1, .loop = 1};
     job->clips = use;
-    job->clip_count = 1;
+    job->clips_count = 1;
 }
 
 static void aim(const struct viewer *viewer, struct record_camera_key *key)
@@ -101,9 +101,9 @@ static void aim(const struct viewer *viewer, struct record_camera_key *key)
 }
 
 /* All but the tracer as in the view. */
-static void fill_reference(const struct viewer *viewer, struct fl_job_options *job, struct record_camera_key *key)
+static void fill_reference(const struct viewer *viewer, struct message_render *job, struct record_camera_key *key)
 {
-    *job = viewer->view.job;
+    *job = viewer->view;
     job->width = (uint32_t)viewer->compared.width;
     job->height = (uint32_t)viewer->compared.height;
     job->samples = viewer->frame.samples;
@@ -123,7 +123,7 @@ static void fill_reference(const struct viewer *viewer, struct fl_job_options *j
 
 static bool ask(struct viewer *viewer, enum errand errand, struct fl_error *refusal)
 {
-    struct fl_job_options job;
+    struct message_render job;
     struct record_camera_key key = {0};
     struct record_clip_use use;
     fill_probe(viewer, &job);

@@ -21,14 +21,14 @@ void viewer_render_size(const struct viewer *viewer, uint32_t *width, uint32_t *
 }
 
 /* On this machine pixels travel as they are; over a network as video while they move, and without loss at rest. */
-static void choose_encodings(const struct viewer *viewer, struct fl_view_options *view)
+static void choose_encodings(const struct viewer *viewer, struct message_render *view)
 {
     const struct viewer_options *options = viewer->options;
     const bool is_local = session_is_local(viewer->session);
     if (!options->has_encoding)
-        view->job.encoding = is_local                            ? PROTOCOL_ENCODING_RAW
-                             : session_can_h264(viewer->session) ? PROTOCOL_ENCODING_H264
-                                                                 : PROTOCOL_ENCODING_JPEG;
+        view->encoding = is_local                            ? PROTOCOL_ENCODING_RAW
+                         : session_can_h264(viewer->session) ? PROTOCOL_ENCODING_H264
+                                                             : PROTOCOL_ENCODING_JPEG;
     if (!options->has_still_encoding)
         view->still_encoding = is_local ? PROTOCOL_ENCODING_RAW : PROTOCOL_ENCODING_PREDICTED;
     view->adapt = options->always_adapt || (!is_local && !options->never_adapt);
@@ -36,25 +36,25 @@ static void choose_encodings(const struct viewer *viewer, struct fl_view_options
 
 static void show(struct viewer *viewer)
 {
-    struct fl_view_options view = viewer->view;
+    struct message_render view = viewer->view;
     const struct settings *settings = &viewer->settings;
     struct record_clip_use use = {.speed = 1, .loop = 1};
     const struct fl_clip_info *clip =
         viewer->tour.clip != TOUR_NONE ? fl_scene_clip(session_scene(viewer->session), (size_t)viewer->tour.clip)
                                        : NULL;
-    viewer_render_size(viewer, &view.job.width, &view.job.height);
+    viewer_render_size(viewer, &view.width, &view.height);
     choose_encodings(viewer, &view);
-    view.job.tracer = settings->tracer;
-    view.job.integrator = settings->integrator;
-    view.job.tone_map = settings->tone_map;
-    view.job.exposure_stops += (float)settings->exposure_thirds / 3;
+    view.tracer = settings->tracer;
+    view.integrator = settings->integrator;
+    view.tone_map = settings->tone_map;
+    view.exposure_stops += (float)settings->exposure_thirds / 3;
     /* Else most of the "truth" would be the rasteriser's. */
     if (!viewer->options->has_primary && settings->tracer == PROTOCOL_TRACER_REFERENCE)
-        view.job.primary = PROTOCOL_PRIMARY_TRACE;
+        view.primary = PROTOCOL_PRIMARY_TRACE;
     if (clip && clip->clip != 0) {
         use.clip = clip->clip;
-        view.job.clips = &use;
-        view.job.clip_count = 1;
+        view.clips = &use;
+        view.clips_count = 1;
     }
     viewer->must_show = !session_show(viewer->session, &view, &viewer->change);
     viewer->must_look = true; /* frames name a camera from which on they are the new ones */
@@ -150,7 +150,7 @@ void viewer_receive(struct viewer *viewer, unsigned timeout_ms)
 
 bool viewer_is_at_rest(const struct viewer *viewer, unsigned samples)
 {
-    const unsigned most = viewer->view.job.samples, enough = samples > 0 && samples < most ? samples : most;
+    const unsigned most = viewer->view.samples, enough = samples > 0 && samples < most ? samples : most;
     return viewer->has_camera && viewer->has_looked && !viewer->must_show && !viewer->must_look &&
            !viewer->told_moving && viewer->glide_begin_ns == 0 && viewer->frames > 0 &&
            viewer->frame.command == viewer->command && viewer->frame.change == viewer->change &&

@@ -21,7 +21,7 @@ enum errand {
 
 struct viewer {
     const struct viewer_options *options;
-    struct fl_view_options view; /* of the options, with what only the scene could tell */
+    struct message_render view; /* of the options, with what only the scene could tell */
     struct session *session;
     unsigned times_live;   /* of the session, as of when its view was started */
     struct window *window; /* NULL: headless */

@@ -174,6 +174,7 @@ static void print_render(void)
     message.render.credit = 1;
     message.render.width = message.render.height = 2;
     message.render.samples = 1;
+    message.render.depth = 0;
     message.render.frame_step = 1;
     message.render.frames_per_second = 24;
     message.render.tone_map = PROTOCOL_TONE_MAP_NONE;

@@ -12,7 +12,8 @@
 static void print_rules(void)
 {
     printf("# The wire format of farlight, version %u\n\n"
-           "Written from `protocol/messages.def` and `protocol/docs/guide.md`; do not edit.\n\n"
+           "Written from `protocol/messages.def`, `words.def` and `tracers.def` and of `protocol/docs/guide.md`; "
+           "do not edit.\n\n"
            "All numbers are little-endian. A connection begins with the handshake; after it both sides send\n"
            "messages. Lengths are metres, angles radians unless a field says degrees, colours linear Rec. 709,\n"
            "times nanoseconds. Matrices are 3x4 row-major (rows x, y, z; the fourth column is the translation).\n"
@@ -185,6 +186,12 @@ static void print_enum(const struct enum_desc *desc)
 
 static void print_int_range(const struct field_desc *field)
 {
+    char text[96];
+    if (field->zero_is_default) {
+        printf("%s; 0: %s", field_allowed_text(field, text, sizeof(text)),
+               field->default_int == 0 ? "the tracer chooses" : "the default");
+        return;
+    }
     uint64_t type_max = field->width_bytes == 8 ? UINT64_MAX : (UINT64_C(1) << (8 * field->width_bytes)) - 1;
     if (field->min == 0 && field->max == type_max) {
         printf("any");
@@ -224,6 +231,12 @@ static void print_field_row(const struct field_desc *field, size_t offset)
     case FIELD_BULK:
         printf("bulk | at most %" PRIu64 " bytes", field->max);
         break;
+    }
+    char text[32];
+    const bool has_default = field->kind == FIELD_INT ? field->default_int != field->min
+                                                      : field->kind == FIELD_REAL && field->default_real > 0.0f;
+    if (has_default) {
+        printf("; default %s", field_default_text(field, text, sizeof(text)));
     }
     printf(" | %s |\n", field->doc);
 }

@@ -4,7 +4,6 @@
 #include "session/frames.h"
 #include "session/jobs.h"
 #include "session/session.h"
-#include "session/tracer_settings.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -19,6 +18,9 @@
 #define ATTACHMENT_PIXEL_BYTES 4
 #define WEIGHT_OF_VIEW 4 /* somebody waits for each of its frames */
 #define WEIGHT_OF_BATCH 1
+#define QUALITY_OF_JPEG 90
+#define QUALITY_OF_H264 80
+#define LEVEL_OF_ZSTD 1
 
 /* ---- checks ------------------------------------------------------------------------------------------ */
 
@@ -148,6 +150,15 @@ static bool check_encoding(const struct session *session, const struct message_r
     return error_remedy(error, "raw, zstd and predicted carry every format");
 }
 
+static bool check_tracers(const struct message_render *render, struct error *error)
+{
+    struct setting_fault fault;
+    if (tracer_settings_check(&render->settings, "render.", &fault))
+        return true;
+    error_set(error, ERROR_INVALID, fault.field, "%s", fault.text);
+    return error_remedy(error, "%s", fault.remedy);
+}
+
 /* What is different with views. */
 static bool check_kind(const struct session *session, const struct message_render *render, struct error *error)
 {
@@ -185,8 +196,18 @@ bool job_check(const struct session *session, const struct message_render *rende
     if (has_level && render->quality > ZSTD_LEVEL_MAX)
         return error_set(error, ERROR_INVALID, "render.quality", "%s has levels up to %u, not %u",
                          protocol_encoding_text(render->encoding), ZSTD_LEVEL_MAX, render->quality);
-    return tracer_settings_check(render, error) && check_limits(session, render, error) &&
-           check_camera(render, error) && check_room(session, render, error);
+    return check_tracers(render, error) && check_limits(session, render, error) && check_camera(render, error) &&
+           check_room(session, render, error);
+}
+
+/* Where the client leaves it to us. */
+static uint32_t job_quality(const struct message_render *render)
+{
+    if (render->quality)
+        return render->quality;
+    return render->encoding == PROTOCOL_ENCODING_JPEG   ? QUALITY_OF_JPEG
+           : render->encoding == PROTOCOL_ENCODING_H264 ? QUALITY_OF_H264
+                                                        : LEVEL_OF_ZSTD;
 }
 
 /* ---- for the engine ---------------------------------------------------------------------------------- */
@@ -250,7 +271,7 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                 .depth = render->depth,
                 .seed = render->seed,
                 .tracer = render->tracer,
-                .tracer_options = tracer_settings(&session->hub->options.limits, render),
+                .tracer_options = tracer_options_of(&render->settings, &session->hub->options.limits.tracers),
                 .integrator = (enum frame_integrator)render->integrator,
                 .primary = (enum frame_primary)render->primary,
                 .tone_map = (enum frame_tone_map)render->tone_map,
@@ -273,12 +294,12 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
             },
         .shutter = render->shutter,
         .encoding = (enum encoding)render->encoding,
-        .quality = render->quality,
+        .quality = job_quality(render),
         .path = (enum camera_path)render->camera_path,
         .camera_node = render->camera_node,
         .orbit_turn = render->orbit_turn,
         .orbit_seconds = render->orbit_seconds,
-        .pass_samples = render->pass_samples ? render->pass_samples : 1,
+        .pass_samples = render->pass_samples,
         .still_encoding = (enum encoding)render->still_encoding,
         .weight = render->weight ? render->weight
                   : is_view      ? WEIGHT_OF_VIEW

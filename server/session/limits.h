@@ -3,6 +3,8 @@
 #ifndef FARLIGHT_SESSION_LIMITS_H
 #define FARLIGHT_SESSION_LIMITS_H
 
+#include "protocol/tracers.h"
+
 #include <stdint.h>
 
 struct session_limits {
@@ -20,9 +22,7 @@ struct session_limits {
     uint32_t texture_edge_texels;
     uint32_t width_pixels, height_pixels;
     uint32_t samples;
-    uint32_t ldc_layers;        /* of a layered depth cube; of more the farther ones are left out */
-    uint64_t ldc_bytes;         /* device memory of a cube's samples, likewise; 0: no limit but the device's */
-    uint64_t abuffer_bytes;     /* device memory of A-buffers; 0: no limit but the device's */
+    struct tracer_limits tracers;
     uint64_t blob_bytes;        /* all blobs of all clients, arriving ones included */
     uint64_t blob_cache_bytes;  /* of them: blobs that nobody uses now */
     uint64_t transaction_bytes; /* of them: memory */

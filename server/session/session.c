@@ -224,8 +224,6 @@ static void fill_limits(struct handshake_limits *told, const struct session *ses
         .blob_memory_bytes = limits->blob_bytes,
         .transaction_memory_bytes = limits->transaction_bytes,
         .frame_memory_bytes = limits->frame_bytes,
-        .ldc_memory_bytes = limits->ldc_bytes,
-        .abuffer_memory_bytes = limits->abuffer_bytes,
         .upload_window_bytes = limits->upload_window_bytes,
         .frame_window_bytes = limits->frame_window_bytes,
         .queued_soft_ms = connection_limits->queued_soft_ms,
@@ -241,7 +239,9 @@ static void fill_limits(struct handshake_limits *told, const struct session *ses
         .transaction_edits = limits->transaction_edits,
         .scene_linger_seconds = seconds_of(options->engine_limits.scene_linger_ms),
         .scenes_lingering = (uint32_t)options->engine_limits.lingering_scenes,
-        .ldc_layers_max = limits->ldc_layers,
+#define MEMORY_LIMIT(tracer, doc) .tracer##_memory_bytes = (uint64_t)limits->tracers.tracer##_mebibytes << 20,
+#define TRACER_LIMIT(tracer, field, min, max, doc) .tracer##_##field##_max = limits->tracers.tracer##_##field,
+#include "protocol/tracers.def"
     };
 }
 

@@ -4,19 +4,24 @@
 #include <stdio.h>
 #include <string.h>
 
-#define NUMBER_REFERENCE 2
-
 /* By the protocol's numbers; a tracer that a build leaves out is NULL. */
 static const struct tracer_impl *const tracers[] = {
-    [0] = &tracer_bvh_impl,
-    [1] = &tracer_naive_impl,
-#ifdef FARLIGHT_HAVE_EMBREE
-    [NUMBER_REFERENCE] = &tracer_reference_impl,
-#endif
-    [3] = &tracer_ldc_impl,
-    [4] = &tracer_abuffer_impl,
+#define TRACER(NAME, name, number, use, needs, doc) [number] = &tracer_##name##_impl,
+#include "protocol/tracers.def"
 };
 #define TRACER_COUNT (sizeof(tracers) / sizeof(tracers[0]))
+
+/* The options begin with what struct tracer_settings has. */
+_Static_assert(offsetof(struct tracer_options, limits) == sizeof(struct tracer_settings), "words alone");
+
+struct tracer_options tracer_options_of(const struct tracer_settings *settings, const struct tracer_limits *limits)
+{
+    struct tracer_options options = {.limits = *limits};
+    struct tracer_settings resolved = *settings;
+    tracer_settings_resolve(&resolved);
+    memcpy(&options, &resolved, sizeof(resolved));
+    return options;
+}
 
 bool tracer_options_same(const struct tracer_options *a, const struct tracer_options *b)
 {
@@ -38,10 +43,11 @@ const struct tracer_impl *tracer_find(unsigned number, const char *field, struct
     for (size_t i = 0; i < TRACER_COUNT && used < sizeof(list); i++)
         if (tracers[i])
             used += (size_t)snprintf(list + used, sizeof(list) - used, "%s%s", used ? ", " : "", tracers[i]->name);
-    if (number == NUMBER_REFERENCE) {
+    const struct tracer_desc *desc = tracer_describe(number);
+    if (desc && desc->needs[0]) {
         error_set(error, ERROR_UNSUPPORTED, field,
-                  "this farlightd was built without Embree, which the tracer reference is");
-        error_remedy(error, "install libembree-dev and build it again, or choose another tracer: %s", list);
+                  "this farlightd was built without %s, which the tracer %s needs", desc->needs, desc->name);
+        error_remedy(error, "install it and build farlightd again, or choose another tracer: %s", list);
     } else {
         error_set(error, ERROR_UNSUPPORTED, field, "this build has no tracer number %u", number);
         error_remedy(error, "available: %s", list);
@@ -62,13 +68,26 @@ bool tracer_check_motion(const struct tracer_impl *impl, const struct gpu_scene 
 struct tracer *tracer_create(const struct tracer_impl *impl, struct gpu_device *device,
                              const struct tracer_options *options, struct error *error)
 {
-    static const struct tracer_options defaults;
-    struct tracer *tracer = impl->create(device, options ? options : &defaults, error);
+    struct tracer_options resolved = {0};
+    struct setting_fault fault;
+    if (options)
+        resolved = *options;
+    struct tracer_settings settings;
+    memcpy(&settings, &resolved, sizeof(settings));
+    if (!tracer_settings_check(&settings, "options.", &fault)) {
+        error_set(error, ERROR_INVALID, fault.field, "%s", fault.text);
+        error_remedy(error, "%s", fault.remedy);
+        return NULL;
+    }
+    resolved = tracer_options_of(&settings, &resolved.limits);
+    if (options)
+        resolved.bench = options->bench;
+    struct tracer *tracer = impl->create(device, &resolved, error);
     if (!tracer)
         return NULL;
     tracer->impl = impl;
     tracer->device = device;
-    tracer->options = options ? *options : defaults;
+    tracer->options = resolved;
     return tracer;
 }
 

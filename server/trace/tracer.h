@@ -16,6 +16,7 @@
 #include "base/stage_times.h"
 #include "gpu/device.h"
 #include "gpu_scene/scene.h"
+#include "protocol/tracers.h"
 #include "trace/step.h"
 #include "trace/view.h"
 #include "trace/wave.h"
@@ -24,42 +25,39 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Options of all tracers; zero is the default of each. Compared byte by byte (render/tracer_set.c), so there is no
- * member that leaves a gap. */
-struct tracer_options {
-    enum { BVH_BOUNDS_AUTO, BVH_BOUNDS_BOX, BVH_BOUNDS_SPHERE } bvh_bounds; /* protocol's numbers */
-    /* plain: sphere links in a storage buffer, for the benchmark */
-    enum { BVH_LAYOUT_FAST, BVH_LAYOUT_PLAIN } bvh_layout;
-    uint32_t bvh_rays_together;     /* 0: chosen; 1, 2, 3, 4, 8 */
-    uint32_t reference_rays_a_call; /* 0: chosen; 1, 4, 8, 16 */
-    uint32_t ldc_resolution;        /* cells along the longest side of a cube; 0: 1024; 16 to 4096 */
-    uint32_t ldc_block;             /* texels along a side of a min/max block: 2, 4, 8, 16, 32; 0: 8 */
-    enum { LDC_BUILD_AUTO, LDC_BUILD_PEEL, LDC_BUILD_LISTS } ldc_build; /* protocol's numbers */
-    /* protocol's numbers; auto: cells, or with a tolerance, which these know nothing of, or where they do not fit,
-     * a pyramid */
-    enum { LDC_LEVELS_AUTO, LDC_LEVELS_BLOCKS, LDC_LEVELS_PYRAMID, LDC_LEVELS_CELLS } ldc_levels;
-    /* Which images a triangle is in: those that its normal leans to almost as much as to one, or that one alone.
-     */
-    enum { LDC_IMAGES_OVERLAP, LDC_IMAGES_ONE } ldc_images; /* protocol's numbers */
-    /* 0: a hit is where the ray crosses a sample's plane; else where it comes as near to the sample: metres */
-    float ldc_tolerance;
-    uint32_t ldc_rays_together;   /* 0: chosen; 1, 4 */
-    uint32_t ldc_layers_together; /* of a texel, tested at once; 0: chosen; 1, 4; for the benchmark */
-    uint32_t ldc_count_steps;   /* 1: crossings say what the walk did (shaders/ldc/cube.glsl); for the benchmark */
-    uint32_t ldc_layers_max;    /* 0: 255, more cannot be kept; of more the nearest are kept */
-    uint32_t ldc_mebibytes_max; /* device memory of one cube's samples; 0: no limit but the device's */
-    uint32_t abuffer_resolution; /* texels along a side of an A-buffer; 0: 1280; 16 to 4096 */
-    uint32_t abuffer_voxels; /* along a side of the grid: 16, 32, 64, 128, 256; 0: chosen from the resolution */
-    enum {
-        ABUFFER_SEARCH_AUTO,
-        ABUFFER_SEARCH_DDA,
-        ABUFFER_SEARCH_LINEAR3,
-        ABUFFER_SEARCH_LINEAR1
-    } abuffer_search;
-    uint32_t abuffer_count_steps;   /* 1: crossings say what the walk did; for the benchmark */
-    uint32_t abuffer_mebibytes_max; /* device memory of the lists and samples; 0: no limit but the device's */
-    /* Words only, without bytes between them: tracer_options_same() compares all. */
+/* The choices of the settings: LDC_BUILD_PEEL and its like. */
+#define CHOICES(PREFIX, name, doc) enum {
+#define CHOICE(PREFIX, VALUE_NAME, number, text, doc) PREFIX##_##VALUE_NAME = (number),
+#define CHOICES_END(PREFIX, name)                                                                                 \
+    PREFIX##_COUNT                                                                                                \
+    }                                                                                                             \
+    ;
+#include "protocol/tracers.def"
+
+/* What only benchmarks and tests choose; zero is the default of each. */
+struct tracer_bench {
+    enum { BVH_LAYOUT_FAST, BVH_LAYOUT_PLAIN } bvh_layout; /* plain: sphere links in a storage buffer */
+    uint32_t reference_rays;                               /* in a call of Embree; 0: chosen; 1, 4, 8, 16 */
+    uint32_t ldc_layers_together;                          /* of a texel, tested at once; 0: chosen; 1, 4 */
+    uint32_t ldc_count_steps;     /* 1: hits say what the traversal did (shaders/ldc/cube.glsl) */
+    uint32_t abuffer_count_steps; /* likewise */
+    uint32_t baseline_side; /* texels or cells along a side, of a structure of the benchmark's own; 0: its most */
 };
+
+/* Options of all tracers; zero is the default of each. A tracer gets them with the defaults of tracers.def in
+ * place, and looks at those of its own name: options->ldc.resolution. Words only, without bytes between them:
+ * tracer_options_same() compares all. */
+/* clang-format off */
+struct tracer_options {
+#define SETTINGS(tracer) struct tracer##_settings tracer;
+#include "protocol/tracers.def"
+    struct tracer_limits limits;
+    struct tracer_bench bench;
+};
+/* clang-format on */
+
+struct tracer_options tracer_options_of(const struct tracer_settings *settings,
+                                        const struct tracer_limits *limits);
 
 /* Whether one tracer serves both, and a picture by either goes on from one by the other. */
 bool tracer_options_same(const struct tracer_options *a, const struct tracer_options *b);
@@ -185,8 +183,10 @@ struct tracer_impl {
                      struct error *error);
 };
 
-extern const struct tracer_impl tracer_bvh_impl, tracer_naive_impl, tracer_reference_impl, tracer_ldc_impl,
-    tracer_abuffer_impl;
+/* tracer_bvh_impl and its like, one for each row of tracers.def; weak, as a build may leave a tracer out. */
+#define TRACER(NAME, name, number, use, needs, doc)                                                               \
+    extern const struct tracer_impl tracer_##name##_impl __attribute__((weak));
+#include "protocol/tracers.def"
 
 /* The table of what this build has; index is the protocol's tracer number, NULL where it is left out. */
 const struct tracer_impl *tracer_impl_by_number(unsigned number);

@@ -20,9 +20,9 @@ static const struct search {
     const char *name;
     struct tracer_options options;
 } searches[SEARCH_COUNT] = {
-    [DDA] = {"dda", {.abuffer_search = ABUFFER_SEARCH_DDA}},
-    [LINEAR3] = {"linear3", {.abuffer_search = ABUFFER_SEARCH_LINEAR3}},
-    [LINEAR1] = {"linear1", {.abuffer_search = ABUFFER_SEARCH_LINEAR1}},
+    [DDA] = {"dda", {.abuffer = {.search = ABUFFER_SEARCH_DDA}}},
+    [LINEAR3] = {"linear3", {.abuffer = {.search = ABUFFER_SEARCH_LINEAR3}}},
+    [LINEAR1] = {"linear1", {.abuffer = {.search = ABUFFER_SEARCH_LINEAR1}}},
 };
 
 /* ---- pictures ---- */
@@ -34,7 +34,7 @@ static struct frame_result render(struct fixture *fixture, unsigned tracer, cons
     fixture->request.tracer = tracer;
     fixture->request.tracer_options = *options;
     struct frame_result result = fixture_render(fixture);
-    snprintf(kept, sizeof(kept), "abuffer_%s_%u_%u", name, tracer, (unsigned)options->abuffer_search);
+    snprintf(kept, sizeof(kept), "abuffer_%s_%u_%u", name, tracer, (unsigned)options->abuffer.search);
     fixture_keep(&result, kept);
     return result;
 }

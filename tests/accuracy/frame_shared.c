@@ -91,7 +91,7 @@ static struct frame_request view_request(struct fixture *fixture, uint32_t view)
     request.compare = views[view].compare;
     request.compare_with = TRACER_NAIVE;
     request.seed = view;
-    request.tracer_options.ldc_resolution = 64;
+    request.tracer_options.ldc.resolution = 64;
     const float eye[3] = {(float)view - 2.5f, 0.5f, 5.0f}, target[3] = {0}, up[3] = {0, 1, 0};
     assert_true(frame_camera_look_at(&request.camera, eye, target, up, 0.6f));
     return request;
@@ -236,7 +236,7 @@ TEST(tracers_in_use_stay)
         requests[i] = fixture->request;
         requests[i].tracer = TRACER_LDC;
         requests[i].primary = PRIMARY_TRACE;
-        requests[i].tracer_options.ldc_resolution = 32 + 16 * (i % 5);
+        requests[i].tracer_options.ldc.resolution = 32 + 16 * (i % 5);
     }
     for (uint32_t i = 0; i < 4; i++)
         begin(fixture, renderers[i], &requests[i]);

@@ -257,7 +257,7 @@ static void a_field_and_a_ball(struct fixture *fixture)
     fixture_commit(fixture);
     fixture->request.width = fixture->request.height = 64;
     fixture->request.primary = PRIMARY_TRACE;
-    fixture->request.tracer_options.ldc_resolution = fixture->request.tracer_options.abuffer_resolution = 128;
+    fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 128;
 }
 
 /* The scene is new to the device, and its structures are made in pieces of that length. */
@@ -326,7 +326,7 @@ enum { WAYS = sizeof(ways) / sizeof(ways[0]) };
 static bool take_way(struct fixture *fixture, const struct way *way)
 {
     fixture->request.tracer = way->tracer;
-    fixture->request.tracer_options.ldc_build = way->ldc_build;
+    fixture->request.tracer_options.ldc.build = way->ldc_build;
     return tracer_impl_by_number(way->tracer) != NULL;
 }
 

@@ -137,7 +137,7 @@ TEST(sampled_structures_have_layers_too)
     uint32_t material = red->base.id;
     fixture_square(fixture, 5, material, at);
     fixture->request.primary = PRIMARY_TRACE;
-    fixture->request.tracer_options.ldc_resolution = fixture->request.tracer_options.abuffer_resolution = 256;
+    fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 256;
     for (unsigned tracer = LDC; tracer <= ABUFFER; tracer++) {
         fixture->request.tracer = tracer;
         expect_plane(fixture, normal, middle, 10.0 / 256); /* a cell */
@@ -337,7 +337,7 @@ TEST(attachments_are_those_layers_beside_a_picture_that_stays_as_it_is)
     add_glass(fixture);
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     fixture->request.tracer = BVH;
-    fixture->request.tracer_options.bvh_rays_together = 1;
+    fixture->request.tracer_options.bvh.rays = 1;
     fixture->request.samples = 3;
     struct frame_result layers = render(fixture, BIT(LAYER_NORMAL) | BIT(LAYER_DEPTH));
     fixture->request.layers = 0;
@@ -380,7 +380,7 @@ TEST(neither_the_picture_nor_the_layers_depend_on_each_other)
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     fixture->request.samples = 3;
     fixture->request.tracer = BVH;
-    fixture->request.tracer_options.bvh_rays_together = 1; /* else it follows the slices, and rounding at edges */
+    fixture->request.tracer_options.bvh.rays = 1; /* else it follows the slices, and rounding at edges */
     for (int integrator = INTEGRATOR_WHITTED; integrator <= INTEGRATOR_PATH; integrator++) {
         fixture->request.integrator = (enum frame_integrator)integrator;
         frame_renderer_set_capacity(fixture->renderer, 0, 0);

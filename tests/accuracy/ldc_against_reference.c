@@ -18,7 +18,7 @@
 static void request_cubes(struct fixture *fixture)
 {
     request_picture(fixture, 5);
-    fixture->request.tracer_options.ldc_resolution = RESOLUTION;
+    fixture->request.tracer_options.ldc.resolution = RESOLUTION;
 }
 
 static struct frame_result render(struct fixture *fixture, unsigned tracer, const char *name)
@@ -131,7 +131,7 @@ TEST(switching_to_another_tracer_and_back_builds_nothing)
     } frames[] = {{LDC, true}, {BVH, false}, {LDC, false}, {BVH, false}, {LDC, false}};
     add_mirrors(fixture);
     request_cubes(fixture);
-    fixture->request.tracer_options.ldc_resolution = 128;
+    fixture->request.tracer_options.ldc.resolution = 128;
     for (size_t i = 0; i < sizeof(frames) / sizeof(frames[0]); i++) {
         struct frame_result result = render(fixture, frames[i].tracer, "switched");
         assert_int_equal(result.cubes[TRACER_CUBE_STATIC].rebuilt, frames[i].builds);
@@ -147,13 +147,13 @@ TEST(a_picture_of_other_cubes_begins_anew)
     add_mirrors(fixture);
     fixture->request.tracer = LDC;
     fixture->request.accumulate = true;
-    fixture->request.tracer_options.ldc_resolution = 64;
+    fixture->request.tracer_options.ldc.resolution = 64;
     for (uint32_t i = 1; i <= 2; i++) {
         struct frame_result result = fixture_render(fixture);
         assert_int_equal(result.samples, i);
         frame_result_finish(&result);
     }
-    fixture->request.tracer_options.ldc_resolution = 128;
+    fixture->request.tracer_options.ldc.resolution = 128;
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.samples, 1);
     frame_result_finish(&result);
@@ -173,7 +173,7 @@ TEST(what_moves_while_the_shutter_is_open_is_refused_at_once)
         memcpy(places[i].parent_from_node, m, sizeof(m));
     }
     const struct scene_motion open = {.poses = poses, .pose_count = 2}, closed = {.poses = poses, .pose_count = 1};
-    fixture->request.tracer_options.ldc_resolution = 64;
+    fixture->request.tracer_options.ldc.resolution = 64;
     for (int compare = 0; compare < 2; compare++) {
         struct error error = {0};
         fixture->request.tracer = compare ? BVH : LDC;

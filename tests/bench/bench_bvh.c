@@ -34,14 +34,14 @@ struct form {
     struct tracer_options options;
 };
 static const struct form forms[] = {
-    {"plain (spheres, storage buffer)", {.bvh_layout = BVH_LAYOUT_PLAIN}},
-    {"spheres, 1 ray", {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 1}},
-    {"spheres, 2 together", {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 2}},
-    {"boxes, 1 ray", {.bvh_bounds = BVH_BOUNDS_BOX, .bvh_rays_together = 1}},
-    {"boxes, 2 together", {.bvh_bounds = BVH_BOUNDS_BOX, .bvh_rays_together = 2}},
-    {"boxes, 4 together", {.bvh_bounds = BVH_BOUNDS_BOX, .bvh_rays_together = 4}},
-    {"boxes, 8 together", {.bvh_bounds = BVH_BOUNDS_BOX, .bvh_rays_together = 8}},
-    {"auto", {0}},
+    {"plain (spheres, storage buffer)", {.bench = {.bvh_layout = BVH_LAYOUT_PLAIN}}},
+    {"spheres, 1 ray", {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 1}}},
+    {"spheres, 2 together", {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 2}}},
+    {"boxes, 1 ray", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 1}}},
+    {"boxes, 2 together", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 2}}},
+    {"boxes, 4 together", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 4}}},
+    {"boxes, 8 together", {.bvh = {.bounds = BVH_BOUNDS_BOX, .rays = 8}}},
+    {"auto", {.bvh = {0}}},
 };
 #define FORM_COUNT (sizeof(forms) / sizeof(forms[0]))
 enum { WAVE_PRIMARY, WAVE_BOUNCE, WAVE_SHADOW, WAVE_KINDS };

@@ -19,8 +19,10 @@
 static bool cancel_after(struct fl_scene *scene, enum protocol_tracer tracer, uint64_t wait_ns,
                          uint64_t *cancel_ns, struct fl_error *error)
 {
-    const struct fl_job_options options = {
-        .width = 1280, .height = 720, .samples = 64, .integrator = PROTOCOL_INTEGRATOR_PATH, .tracer = tracer};
+    struct message_render options = fl_render_defaults();
+    options.samples = 64;
+    options.integrator = PROTOCOL_INTEGRATOR_PATH;
+    options.tracer = tracer;
     struct fl_job *job = fl_render_start(scene, &options, error);
     if (!job)
         return false;
@@ -34,8 +36,11 @@ static bool cancel_after(struct fl_scene *scene, enum protocol_tracer tracer, ui
 
 static bool warm_up(struct fl_scene *scene, enum protocol_tracer tracer, struct fl_error *error)
 {
-    const struct fl_job_options options = {
-        .width = 160, .height = 90, .samples = 1, .integrator = PROTOCOL_INTEGRATOR_PATH, .tracer = tracer};
+    struct message_render options = fl_render_defaults();
+    options.width = 160;
+    options.height = 90;
+    options.integrator = PROTOCOL_INTEGRATOR_PATH;
+    options.tracer = tracer;
     struct fl_job *job = fl_render_start(scene, &options, error);
     struct fl_frame *frame = job ? fl_render_next(job, error) : NULL;
     bool rendered = frame != NULL;

@@ -57,7 +57,7 @@ static bool render(struct bench *bench, const struct form *form, struct frame_re
     request.integrator = form->integrator;
     request.samples = form->samples;
     request.aperture = form->aperture;
-    request.tracer_options.bvh_rays_together = form->rays_together;
+    request.tracer_options.bvh.rays = form->rays_together;
     frame_renderer_set_capacity(bench->renderer, form->slice_rays, 0);
     if (!frame_begin(bench->renderer, bench->scene, form->moves ? &bench->motion : NULL, &request, error))
         return false;

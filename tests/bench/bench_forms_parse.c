@@ -16,23 +16,23 @@ static bool set_ldc_key(struct tracer_options *options, const char *key, const c
     bool known;
     if (strcmp(key, "build") == 0) {
         known = bench_parse_word(value, builds, 3, &word);
-        options->ldc_build = word;
+        options->ldc.build = word;
         return known;
     }
     if (strcmp(key, "levels") == 0) {
         known = bench_parse_word(value, levels, 4, &word);
-        options->ldc_levels = word;
+        options->ldc.levels = word;
         return known;
     }
     if (strcmp(key, "images") == 0) {
         known = bench_parse_word(value, images, 2, &word);
-        options->ldc_images = word;
+        options->ldc.images = word;
         return known;
     }
     if (strcmp(key, "tolerance") == 0) {
         char *end;
-        options->ldc_tolerance = strtof(value, &end);
-        return end != value && *end == '\0' && options->ldc_tolerance >= 0;
+        options->ldc.tolerance = strtof(value, &end);
+        return end != value && *end == '\0' && options->ldc.tolerance >= 0;
     }
     return false;
 }
@@ -46,12 +46,13 @@ static bool set_key(struct bench_form *form, const char *key, const char *value)
         const char *key;
         uint32_t *number;
         bool fits;
-    } numbers[] = {{"resolution", &options->ldc_resolution, is_ldc},
-                   {"block", &options->ldc_block, is_ldc},
-                   {"rays", &options->ldc_rays_together, is_ldc},
-                   {"layers", &options->ldc_layers_together, is_ldc},
-                   {"resolution", &options->abuffer_resolution, is_abuffer || form->rival},
-                   {"voxels", &options->abuffer_voxels, is_abuffer},
+    } numbers[] = {{"resolution", &options->ldc.resolution, is_ldc},
+                   {"block", &options->ldc.block, is_ldc},
+                   {"rays", &options->ldc.rays, is_ldc},
+                   {"layers", &options->bench.ldc_layers_together, is_ldc},
+                   {"resolution", &options->abuffer.resolution, is_abuffer},
+                   {"resolution", &options->bench.baseline_side, form->rival},
+                   {"voxels", &options->abuffer.voxels, is_abuffer},
                    {"ao", &form->ao_rays, true}};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         if (numbers[i].fits && strcmp(key, numbers[i].key) == 0)
@@ -59,7 +60,7 @@ static bool set_key(struct bench_form *form, const char *key, const char *value)
     if (is_abuffer && strcmp(key, "search") == 0) {
         uint32_t word = 0;
         const bool known = bench_parse_word(value, searches, 4, &word);
-        options->abuffer_search = word;
+        options->abuffer.search = word;
         return known;
     }
     return is_ldc && set_ldc_key(options, key, value);

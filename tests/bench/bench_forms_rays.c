@@ -137,9 +137,9 @@ static bool count_steps(struct bench_contest *contest, struct bench_form *form, 
     static const char *const names[3] = {"nodes", "texels", "samples"};
     double sums[3] = {0};
     struct tracer_options *options = &form->made->options;
-    options->ldc_count_steps = options->abuffer_count_steps = 1;
+    options->bench.ldc_count_steps = options->bench.abuffer_count_steps = 1;
     const bool done = bench_contest_crossings(contest, form->made, wave, counts, error);
-    options->ldc_count_steps = options->abuffer_count_steps = 0;
+    options->bench.ldc_count_steps = options->bench.abuffer_count_steps = 0;
     for (uint32_t i = 0; done && i < wave->ray_count; i++) {
         sums[0] += (double)counts[i].distance;
         sums[1] += (double)counts[i].instance;

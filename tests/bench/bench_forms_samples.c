@@ -39,7 +39,7 @@ static bool build(struct bench_forms *bench, const struct bench_form *form, stru
                   const uint32_t *instances, bool counts, struct error *error)
 {
     struct gpu_scene *gpu = &bench->scene.gpu;
-    place(&sampled->store.cubes[TRACER_CUBE_STATIC], gpu, form->options.ldc_resolution);
+    place(&sampled->store.cubes[TRACER_CUBE_STATIC], gpu, form->options.ldc.resolution);
     glFinish();
     const uint64_t start_ns = clock_now_ns();
     gpu_scene_bind(gpu);
@@ -61,7 +61,7 @@ static bool build_all(struct bench_forms *bench, struct sampled *sampled, const 
     for (unsigned run = 0; run < WARM_UPS_LISTS + bench->runs; run++) {
         for (unsigned i = 0; i < bench->form_count; i++) {
             const struct bench_form *form = &bench->forms[i];
-            const bool peels = form->options.ldc_build == LDC_BUILD_PEEL;
+            const bool peels = form->options.ldc.build == LDC_BUILD_PEEL;
             if (peels && run >= WARM_UPS_PEEL && run < WARM_UPS_LISTS)
                 continue;
             if (!build(bench, form, &sampled[i], instances, run >= WARM_UPS_LISTS, error))

@@ -174,9 +174,8 @@ static void make_tracers(struct bench *bench)
     struct error error = {0};
     for (int bounds = 0; bounds < BOUNDS; bounds++) {
         for (size_t n = 0; n < NUMBER_COUNT; n++) {
-            const struct tracer_options options = {.bvh_bounds =
-                                                       bounds == BOXES ? BVH_BOUNDS_BOX : BVH_BOUNDS_SPHERE,
-                                                   .bvh_rays_together = numbers[n]};
+            const struct tracer_options options = {
+                .bvh = {.bounds = bounds == BOXES ? BVH_BOUNDS_BOX : BVH_BOUNDS_SPHERE, .rays = numbers[n]}};
             struct tracer *tracer = tracer_create(&tracer_bvh_impl, bench->device, &options, &error);
             require(tracer && tracer_update(tracer, &bench->scene.gpu, &(struct tracer_update){0}, &error),
                     &error);

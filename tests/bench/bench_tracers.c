@@ -129,7 +129,7 @@ static bool build_all(struct bench *bench, struct error *error)
             return false;
         /* What choosing the number of rays walked together is measured by. */
         if (impl == &tracer_bvh_impl && !bench->options.quick &&
-            !add_tracer(bench, impl, "1 ray", &(struct tracer_options){.bvh_rays_together = 1}, error))
+            !add_tracer(bench, impl, "1 ray", &(struct tracer_options){.bvh = {.rays = 1}}, error))
             return false;
     }
     fprintf(stderr, "    building embree\n");

@@ -301,16 +301,16 @@ static bool come(struct viewer *viewer, struct fl_error *error)
 /* Until its first picture, from which it takes where it stands. */
 static bool begin_view(struct viewer *viewer, struct fl_error *error)
 {
-    const struct fl_view_options terms = {
-        .job = {.width = options.width,
-                .height = options.height,
-                .samples = 1,
-                .depth = 4,
-                .encoding = (enum protocol_encoding)options.encoding,
-                .frames_per_second = (float)options.rate},
-        .still_encoding = options.rest > 0 ? PROTOCOL_ENCODING_RAW : (enum protocol_encoding)options.encoding,
-        .weight = options.weight,
-        .adapt = options.adapt};
+    struct message_render terms = fl_view_defaults();
+    terms.width = options.width;
+    terms.height = options.height;
+    terms.samples = 1;
+    terms.depth = 4;
+    terms.encoding = (enum protocol_encoding)options.encoding;
+    terms.frames_per_second = (float)options.rate;
+    terms.still_encoding = options.rest > 0 ? PROTOCOL_ENCODING_RAW : terms.encoding;
+    terms.weight = options.weight;
+    terms.adapt = options.adapt;
     struct fl_scene_bounds bounds;
     viewer->view = fl_view_start(viewer->scene, &terms, error);
     struct fl_frame *frame = viewer->view ? fl_view_next(viewer->view, FIRST_MS, error) : NULL;
@@ -330,12 +330,12 @@ static bool begin_view(struct viewer *viewer, struct fl_error *error)
 /* Frame after frame, for as long as anybody measures. */
 static struct fl_job *begin_batch(struct viewer *beside, struct fl_error *error)
 {
-    const struct fl_job_options job = {.width = 640,
-                                       .height = 480,
-                                       .samples = 4,
-                                       .depth = 4,
-                                       .last_frame = 1000000,
-                                       .encoding = PROTOCOL_ENCODING_JPEG};
+    struct message_render job = fl_render_defaults();
+    job.width = 640;
+    job.height = 480;
+    job.samples = job.depth = 4;
+    job.last_frame = 1000000;
+    job.encoding = PROTOCOL_ENCODING_JPEG;
     beside->connection =
         fl_connect(&(struct fl_connect_options){.server = options.address, .key_file = options.key}, error);
     if (beside->connection)

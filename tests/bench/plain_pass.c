@@ -37,7 +37,7 @@ static struct tracer *plain_create(struct gpu_device *device, const struct trace
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a pass");
         return NULL;
     }
-    pass->resolution = options->abuffer_resolution ? options->abuffer_resolution : RESOLUTION_DEFAULT;
+    pass->resolution = options->bench.baseline_side ? options->bench.baseline_side : RESOLUTION_DEFAULT;
     axes_draw_init(&pass->draw, device);
     if (gpu_texture_reserve_array(device, &pass->depth, GL_DEPTH_COMPONENT32F, pass->resolution, pass->resolution,
                                   3, error) &&

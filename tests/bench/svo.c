@@ -32,9 +32,9 @@ static void svo_destroy(struct tracer *tracer)
 static struct tracer *create(struct gpu_device *device, const struct tracer_options *options, enum svo_kind kind,
                              struct error *error)
 {
-    const uint32_t resolution = options->abuffer_resolution ? options->abuffer_resolution : SVO_SIDE_MAX;
+    const uint32_t resolution = options->bench.baseline_side ? options->bench.baseline_side : SVO_SIDE_MAX;
     if (resolution < RESOLUTION_MIN || resolution > SVO_SIDE_MAX) {
-        error_set(error, ERROR_INVALID, "options.abuffer_resolution", "an octree has %d to %d cells along a side",
+        error_set(error, ERROR_INVALID, "options.baseline_side", "an octree has %d to %d cells along a side",
                   RESOLUTION_MIN, SVO_SIDE_MAX);
         return NULL;
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A sparse voxel octree as a tracer, for the benchmark: what voxels and A-buffers are held against, after the
- * papers that svo/svo.h names. Its cells are as many along a side as tracer_options.abuffer_resolution says, at
+ * papers that svo/svo.h names. Its cells are as many along a side as tracer_options.bench.baseline_side says, at
  * most SVO_SIDE_MAX; 0: as many.
  *
  * A hit is the primitive of lowest id in a leaf, at the place of it that is nearest to the ray. Its distance is

@@ -203,7 +203,7 @@ void serving_begin(void)
                    .requests_in_flight = 16,
                    .scenes_per_client = 4,
                    .jobs_per_client = 3,
-                   .ldc_layers = 7,
+                   .tracers.ldc_layers = 7,
                    .blobs_per_client = 16,
                    .transaction_edits = 24,
                    .transaction_bytes = 64 << 10,

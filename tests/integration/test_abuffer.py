@@ -9,19 +9,19 @@ from farlight_test import Case, Daemon, bundled_scenes, farlight, frames_of, gri
 
 SIZE = ["--size", "160x120"]
 ABUFFER = ["--tracer", "abuffer"]
-SMALL = [*ABUFFER, "--abuffer-resolution", "256", "--voxels", "16"]  # so that searches have much to find in a voxel
+SMALL = [*ABUFFER, "--abuffer-resolution", "256", "--abuffer-voxels", "16"]  # so that searches have much to find in a voxel
 
 
 class Options(Case):
     def test_each_wrong_value_is_told_with_its_option_and_what_is_known(self):
         for option, value, says in (
                 ("--abuffer-resolution", "15", "16 to 4096"), ("--abuffer-resolution", "4097", "4096"),
-                ("--abuffer-resolution", "fine", "fine"), ("--voxels", "100", "auto, 16, 32, 64, 128, 256"),
-                ("--voxels", "512", "auto, 16"), ("--voxels", "8", "auto, 16"), ("--voxels", "many", "auto, 16"),
-                ("--search", "linear2", "auto, dda, linear3, linear1"),
+                ("--abuffer-resolution", "fine", "fine"), ("--abuffer-voxels", "100", "auto, 16, 32, 64, 128, 256"),
+                ("--abuffer-voxels", "512", "auto, 16"), ("--abuffer-voxels", "8", "auto, 16"), ("--abuffer-voxels", "many", "auto, 16"),
+                ("--abuffer-search", "linear2", "auto, dda, linear3, linear1"),
                 ("--integrator", "photons", "whitted, distributed, raycast, ao, path"), ("--brdf", "phong", "ggx, ward"),
                 ("--ao-distance", "-1", "-1"), ("--ao-falloff", "65", "64"), ("--ao-rays", "0", "256"),
-                ("--ao-rays", "257", "256"), ("--layer-opacity", "0", "above 0"), ("--layer-opacity", "1.5", "1.5"),
+                ("--ao-rays", "257", "256"), ("--layer-opacity", "0", "from 1e-06 to 1"), ("--layer-opacity", "1.5", "1.5"),
                 ("--bounces", "33", "32")):
             for command in (["render"], ["animate", "--frames", "1-2"], ["compare", "--tracers", "abuffer,bvh"]):
                 with self.subTest(option=option, value=value, command=command[0]):
@@ -33,8 +33,8 @@ class Options(Case):
 
     def test_the_grid_is_not_finer_than_the_images(self):
         result = self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", *ABUFFER,
-                                      "--abuffer-resolution", "64", "--voxels", "128"), 2)
-        for words in ("--voxels: 128", "64 texels", "--abuffer-resolution"):
+                                      "--abuffer-resolution", "64", "--abuffer-voxels", "128"), 2)
+        for words in ("--abuffer-voxels: 128", "64 texels", "--abuffer-resolution"):
             self.assertIn(words, result.stderr)
 
     def dry_run(self, *arguments, **variables):
@@ -80,21 +80,21 @@ class Pictures(Case):
 
     def test_options_arrive(self):
         digests = {}
-        for options in ((), ("--search", "auto"), ("--search", "dda"), ("--search", "linear3"), ("--search", "linear1"),
-                        ("--voxels", "32"), ("--abuffer-resolution", "200")):
+        for options in ((), ("--abuffer-search", "auto"), ("--abuffer-search", "dda"), ("--abuffer-search", "linear3"), ("--abuffer-search", "linear1"),
+                        ("--abuffer-voxels", "32"), ("--abuffer-resolution", "200")):
             digests[options] = self.picture("x", *SMALL, *options)[1]["digest"]
-        same = {digests[()], digests["--search", "auto"], digests["--search", "dda"]}
+        same = {digests[()], digests["--abuffer-search", "auto"], digests["--abuffer-search", "dda"]}
         self.assertEqual(len(same), 1, "auto is dda, and one picture comes of one request")
-        self.assertNotIn(digests["--search", "linear3"], same)
-        self.assertNotEqual(digests["--search", "linear1"], digests["--search", "linear3"])
+        self.assertNotIn(digests["--abuffer-search", "linear3"], same)
+        self.assertNotEqual(digests["--abuffer-search", "linear1"], digests["--abuffer-search", "linear3"])
         self.assertNotIn(digests["--abuffer-resolution", "200"], same)
 
     def test_voxels_are_chosen_by_the_resolution(self):
         """The power of two nearest to the root of three times the resolution: 27.7 of 256 texels, 32; 62 of 1280, 64."""
         for resolution, voxels in ((256, 32), (1280, 64)):
             options = [*ABUFFER, "--abuffer-resolution", resolution]
-            digests = {self.picture("x", *options, *more)[1]["digest"] for more in ((), ("--voxels", "auto"),
-                                                                                     ("--voxels", voxels))}
+            digests = {self.picture("x", *options, *more)[1]["digest"] for more in ((), ("--abuffer-voxels", "auto"),
+                                                                                     ("--abuffer-voxels", voxels))}
             self.assertEqual(len(digests), 1, resolution)
 
     def test_two_tracers_of_one_daemon_do_not_mind_each_other(self):
@@ -179,7 +179,7 @@ class Comparison(Case):
                             (("both_hit", "both_missed"), ("rays",)))
             self.assertGreater(rays, 1000)
             self.assertGreaterEqual(agreed / rays, 0.99, kind)
-        text = self.expect(farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "abuffer,bvh", "--search",
+        text = self.expect(farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "abuffer,bvh", "--abuffer-search",
                                     "linear1", *SIZE), 0).stdout
         self.assertIn("abuffer against bvh", text)
         self.assertIn("lists: 1280 texels of ", text)

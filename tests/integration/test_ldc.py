@@ -21,7 +21,7 @@ class Options(Case):
         for option, value, says in (
                 ("--ldc-resolution", "15", "16 to 4096"), ("--ldc-resolution", "4097", "4096"),
                 ("--ldc-resolution", "fine", "fine"), ("--ldc-block", "12", "2, 4, 8, 16, 32"),
-                ("--ldc-block", "64", "32"), ("--ldc-rays", "2", "0, 1, 4"), ("--ldc-rays", "8", "4"),
+                ("--ldc-block", "64", "32"), ("--ldc-rays", "2", "auto, 1, 4"), ("--ldc-rays", "8", "4"),
                 ("--ldc-build", "magic", "auto, peel, lists"), ("--ldc-levels", "tree", "auto, blocks, pyramid, cells"),
                 ("--ldc-images", "two", "overlap, one"),
                 ("--ldc-tolerance", "-1", "-1"), ("--ldc-tolerance", "nan", "nan")):
@@ -36,7 +36,7 @@ class Options(Case):
     def test_cells_and_a_tolerance_do_not_go_together(self):
         result = self.expect(farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", *LDC,
                                       "--ldc-levels", "cells", "--ldc-tolerance", "0.1"), 2)
-        self.assertIn("--ldc-levels: cells know nothing of --ldc-tolerance (leave out one of them)", result.stderr)
+        self.assertIn("--ldc-levels: cells cannot be combined with --ldc-tolerance (leave out one of them)", result.stderr)
 
     def test_the_environment_gives_defaults(self):
         result = farlight("render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png",

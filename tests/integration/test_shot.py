@@ -8,7 +8,7 @@ import re
 import farlight_test
 from farlight_test import Case, bundled_scenes, farlight
 
-SCHEMA = farlight_test.ROOT / "client/cli/shot.schema.json"
+SCHEMA = farlight_test.BIN / "shot.schema.json"
 
 # Between them the examples have every member that there is, each in every shape.
 EXAMPLES = {
@@ -20,7 +20,7 @@ EXAMPLES = {
         "exposure": -1.5, "tone_map": "aces", "shutter": 0.5, "filter": "gaussian", "tracer": "bvh",
         "bvh_bounds": "sphere", "bvh_rays": 2, "ldc_resolution": 512, "ldc_block": 4, "ldc_build": "lists",
         "ldc_levels": "pyramid", "ldc_images": "one", "ldc_tolerance": 0.001, "ldc_rays": 4,
-        "abuffer_resolution": 512, "voxels": 16, "search": "linear3", "brdf": "ward", "ao_distance": 0.5, "ao_falloff": 1,
+        "abuffer_resolution": 512, "abuffer_voxels": 16, "abuffer_search": "linear3", "brdf": "ward", "ao_distance": 0.5, "ao_falloff": 1,
         "ao_rays": 4, "layer_opacity": 0.25, "layers": ["beauty", "depth", "id"], "integrator": "path", "primary": "trace", "encoding": "zstd",
         "quality": 3, "format": "exr", "half": True, "float": False, "output": "%04d.exr"},
     "movie": {
@@ -54,7 +54,7 @@ EXAMPLES = {
         "outputs": ["%04d.png", "movie.mp4"]},
     "orbit": {"model": "teapot.glb", "camera": {"eye": [0, 1, 5], "look_at": [0, 0, 0], "fov": 40,
                                                 "orbit": {"degrees": -90, "seconds": 2}}, "output": "%d.jpg"},
-    "dolly": {"model": "teapot.glb", "bounces": 3, "voxels": "auto", "camera": {"eye": [0, 1, 5], "look_at": [0, 0, 0],
+    "dolly": {"model": "teapot.glb", "bounces": 3, "abuffer_voxels": "auto", "camera": {"eye": [0, 1, 5], "look_at": [0, 0, 0],
                                                 "dolly": {"by": 2, "seconds": 2, "ease": True}}, "output": "%d.png"},
     "dolly to": {"model": "teapot.glb", "camera": {"eye": [0, 1, 5], "look_at": [0, 0, 0],
                                                    "dolly": {"to": [1, 1, 1]}}, "output": "-"},
@@ -272,8 +272,8 @@ class Schema(Shots):
                 ("stills", ("ldc_rays",), range(6)),
                 ("stills", ("ldc_tolerance",), (0, 1e6, 1.1e6, -0.1)),
                 ("stills", ("abuffer_resolution",), (0, 1, 15, 16, 4096, 4097, 512.5)),
-                ("stills", ("voxels",), (0, 8, 16, 17, 32, 64, 100, 128, 256, 512, -1, "auto", "all", "64", 16.5)),
-                ("stills", ("search",), ("auto", "dda", "linear1", "linear2")),
+                ("stills", ("abuffer_voxels",), (0, 8, 16, 17, 32, 64, 100, 128, 256, 512, -1, "auto", "all", "64", 16.5)),
+                ("stills", ("abuffer_search",), ("auto", "dda", "linear1", "linear2")),
                 ("stills", ("ao_distance",), (0, 1e12, 1.1e12, -0.1)),
                 ("stills", ("ao_falloff",), (0, 64, 64.5, -0.1)),
                 ("stills", ("ao_rays",), (0, 1, 256, 257)),
@@ -303,7 +303,7 @@ class Schema(Shots):
     def test_the_schema_lists_the_names_that_the_program_knows(self):
         properties = json.loads(SCHEMA.read_text())["properties"]
         for name in ("tone_map", "filter", "tracer", "bvh_bounds", "ldc_build", "ldc_levels", "ldc_images", "integrator",
-                     "search", "brdf", "primary", "encoding"):
+                     "abuffer_search", "brdf", "primary", "encoding"):
             with self.subTest(name=name):
                 result = self.expect(self.try_shot({"model": "teapot.glb", name: "nonsense"}), 2)
                 known = re.search(r"known: ([^)]*)\)", result.stderr).group(1).split(", ")

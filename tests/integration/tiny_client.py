@@ -246,9 +246,9 @@ class Client:
         their defaults: as an older client would send it."""
         if kind == VIEW:
             self.acknowledged.add(channel)
-        fixed = struct.pack("<8I", scene, kind, channel, 0, 0, 0, 0, 0)
+        fixed = struct.pack("<8I", scene, kind, channel, 0, 1, 0, 0, 0)
         fixed += struct.pack("<5IQ3IfI", credit, *size, samples, depth, 0, 0, 0, 1, 24, 0)
-        fixed += struct.pack("<5If4I", 0, 0, 0, 0, 0, 0, 0, 0, 1, CAMERA_PATH_KEYS)
+        fixed += struct.pack("<4If4I", 0, 0, 0, 0, 0, 0, 0, 1, CAMERA_PATH_KEYS)
         return self.ask(RENDER, payload(fixed, array([struct.pack("<f", 0) + camera_bytes(camera)]), array([])))
 
     def look(self, channel, command, camera, moving=False):

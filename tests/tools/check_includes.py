@@ -46,7 +46,7 @@ MAY_INCLUDE = {
     "client/import": ("protocol", "protocol/common", "client/helper"),
     "client/output": ("protocol", "protocol/common", "client/helper"),
     "client/video": ("protocol", "protocol/pixels", "client/helper", "client/lib"),  # of lib: rate
-    "client/cli": ("protocol/common", "protocol/sealed", "client/lib"),
+    "client/cli": ("protocol", "protocol/common", "protocol/sealed", "client/lib"),
     "client/viewer": ("protocol/common", "client/lib", "client/cli"),  # the command line is parsed as that of render
 }
 # Files that every room may include.

@@ -15,42 +15,41 @@ static const struct tracer_row rows[] = {
         .name = "bvh" form, .number = 0, __VA_ARGS__                                                              \
     }
     BVH("", .is_form = false),
-    BVH(", one ray alone", .is_form = true, .options.bvh_rays_together = 1),
-    BVH(", two rays together", .is_form = true, .options.bvh_rays_together = 2),
-    BVH(", eight rays together", .is_form = true, .options.bvh_rays_together = 8),
-    BVH(" in the plain form", .is_form = true, .options.bvh_layout = BVH_LAYOUT_PLAIN),
+    BVH(", one ray alone", .is_form = true, .options.bvh.rays = 1),
+    BVH(", two rays together", .is_form = true, .options.bvh.rays = 2),
+    BVH(", eight rays together", .is_form = true, .options.bvh.rays = 8),
+    BVH(" in the plain form", .is_form = true, .options.bench.bvh_layout = BVH_LAYOUT_PLAIN),
     BVH(" with spheres, four rays together", .is_form = true,
-        .options = {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 4}),
+        .options = {.bvh.bounds = BVH_BOUNDS_SPHERE, .bvh.rays = 4}),
 #define REFERENCE(form, ...)                                                                                      \
     {                                                                                                             \
         .name = "reference" form, .number = 2, __VA_ARGS__                                                        \
     }
     /* As many rays a call as the processor takes at once. */
     REFERENCE("", .refuses_sizes = "Embree's numbers end at 1e18, and it cannot invert what is scaled by less"),
-    REFERENCE(", one ray a call", .is_form = true, .options.reference_rays_a_call = 1),
-    REFERENCE(", four rays a call", .is_form = true, .options.reference_rays_a_call = 4),
-    REFERENCE(", eight rays a call", .is_form = true, .options.reference_rays_a_call = 8),
+    REFERENCE(", one ray a call", .is_form = true, .options.bench.reference_rays = 1),
+    REFERENCE(", four rays a call", .is_form = true, .options.bench.reference_rays = 4),
+    REFERENCE(", eight rays a call", .is_form = true, .options.bench.reference_rays = 8),
 #define LDC(form, ...)                                                                                            \
     {                                                                                                             \
         .name = "ldc" form, .number = 3, .is_form = sizeof(form) > 1,                                             \
-        .options = {.ldc_resolution = 256, __VA_ARGS__}, .sampled = {256, 0.25, 0.004, BORDERS},                  \
+        .options = {.ldc.resolution = 256, __VA_ARGS__}, .sampled = {256, 0.25, 0.004, BORDERS},                  \
         .refuses_motion = STILL                                                                                   \
     }
-    LDC("", .ldc_build = LDC_BUILD_AUTO),
-    LDC(", peeled, four rays together", .ldc_build = LDC_BUILD_PEEL, .ldc_rays_together = 4),
-    LDC(", in lists, by a pyramid", .ldc_build = LDC_BUILD_LISTS, .ldc_levels = LDC_LEVELS_PYRAMID),
-    LDC(" by a pyramid, four rays together, layers one by one", .ldc_levels = LDC_LEVELS_PYRAMID,
-        .ldc_rays_together = 4, .ldc_layers_together = 1),
-    LDC(" by blocks of 8", .ldc_levels = LDC_LEVELS_BLOCKS),
-    LDC(" by blocks of 2, four rays together", .ldc_levels = LDC_LEVELS_BLOCKS, .ldc_block = 2,
-        .ldc_rays_together = 4),
-    LDC(" by blocks of 32, layers one by one", .ldc_levels = LDC_LEVELS_BLOCKS, .ldc_block = 32,
-        .ldc_layers_together = 1),
-#define ABUFFER(form, search)                                                                                     \
+    LDC("", .ldc.build = LDC_BUILD_AUTO),
+    LDC(", peeled, four rays together", .ldc.build = LDC_BUILD_PEEL, .ldc.rays = 4),
+    LDC(", in lists, by a pyramid", .ldc.build = LDC_BUILD_LISTS, .ldc.levels = LDC_LEVELS_PYRAMID),
+    LDC(" by a pyramid, four rays together, layers one by one", .ldc.levels = LDC_LEVELS_PYRAMID, .ldc.rays = 4,
+        .bench.ldc_layers_together = 1),
+    LDC(" by blocks of 8", .ldc.levels = LDC_LEVELS_BLOCKS),
+    LDC(" by blocks of 2, four rays together", .ldc.levels = LDC_LEVELS_BLOCKS, .ldc.block = 2, .ldc.rays = 4),
+    LDC(" by blocks of 32, layers one by one", .ldc.levels = LDC_LEVELS_BLOCKS, .ldc.block = 32,
+        .bench.ldc_layers_together = 1),
+#define ABUFFER(form, searched)                                                                                   \
     {                                                                                                             \
         .name = "abuffer" form, .number = 4, .is_form = sizeof(form) > 1,                                         \
-        .options = {.abuffer_resolution = 256, .abuffer_search = search}, .sampled = {256, 0.25, 0.01, BORDERS},  \
-        .refuses_motion = STILL                                                                                   \
+        .options = {.abuffer.resolution = 256, .abuffer.search = searched},                                       \
+        .sampled = {256, 0.25, 0.01, BORDERS}, .refuses_motion = STILL                                            \
     }
     ABUFFER("", ABUFFER_SEARCH_DDA),
     ABUFFER(", three columns a step", ABUFFER_SEARCH_LINEAR3),

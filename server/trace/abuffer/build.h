@@ -28,7 +28,7 @@ bool abuffer_build_begin(struct abuffer_builder *builder, struct abuffer_store *
                          const uint32_t *instances, uint32_t instance_count, const struct tracer_options *options,
                          struct error *error);
 /* Goes on with what was begun, until about step_end_ns. Waits for the device. Where the lists' buffer is too
- * small it is made larger, and the pass is repeated; where options->abuffer_mebibytes_max or the device forbid
+ * small it is made larger, and the pass is repeated; where options->limits.abuffer_mebibytes or the device forbid
  * that, it fails with ERROR_LIMIT or ERROR_OUT_OF_MEMORY. */
 enum tracer_progress abuffer_build_step(struct abuffer_builder *builder, uint64_t step_end_ns,
                                         struct error *error);

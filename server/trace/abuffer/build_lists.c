@@ -31,7 +31,7 @@ static uint64_t bytes_of(const struct abuffer_task *task, uint64_t nodes)
 /* That the options and the device allow. */
 static uint64_t nodes_allowed(const struct abuffer_task *task)
 {
-    uint64_t allowed = (uint64_t)task->options->abuffer_mebibytes_max << 20, fixed = bytes_of(task, 0);
+    uint64_t allowed = (uint64_t)task->options->limits.abuffer_mebibytes << 20, fixed = bytes_of(task, 0);
     uint64_t most = task->builder->device->facts.texture_buffer_texels_max;
     if (allowed == 0)
         return most;
@@ -48,13 +48,13 @@ static bool refuse(const struct abuffer_task *task, uint64_t nodes, struct error
                   (unsigned long long)task->builder->device->facts.texture_buffer_texels_max);
     else
         error_set(error, ERROR_LIMIT, "abuffer", "%llu samples need %llu MiB; %u MiB are allowed",
-                  (unsigned long long)nodes, (unsigned long long)needed, task->options->abuffer_mebibytes_max);
+                  (unsigned long long)nodes, (unsigned long long)needed, task->options->limits.abuffer_mebibytes);
     return error_remedy(error, "take a lower resolution, or raise memory.abuffer");
 }
 
 bool abuffer_texels_allowed(const struct abuffer_task *task, struct error *error)
 {
-    uint32_t allowed = task->options->abuffer_mebibytes_max;
+    uint32_t allowed = task->options->limits.abuffer_mebibytes;
     uint64_t needed = (bytes_of(task, 0) + ((uint64_t)1 << 20) - 1) >> 20;
     if (allowed == 0 || needed <= allowed)
         return true;

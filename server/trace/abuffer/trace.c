@@ -36,10 +36,10 @@ bool abuffer_intersect(struct abuffer_store *store, struct gpu_scene *scene, con
     size_t n = 1;
     if (store->resolution == 0)
         defines[n++] = (struct gpu_define){"ABUFFER_EMPTY", "1"};
-    if (options->abuffer_search == ABUFFER_SEARCH_LINEAR3 || options->abuffer_search == ABUFFER_SEARCH_LINEAR1)
+    if (options->abuffer.search == ABUFFER_SEARCH_LINEAR3 || options->abuffer.search == ABUFFER_SEARCH_LINEAR1)
         defines[n++] =
-            (struct gpu_define){"ABUFFER_STEPS", options->abuffer_search == ABUFFER_SEARCH_LINEAR3 ? "3" : "1"};
-    if (options->abuffer_count_steps && rays->wave->kind == WAVE_CLOSEST)
+            (struct gpu_define){"ABUFFER_STEPS", options->abuffer.search == ABUFFER_SEARCH_LINEAR3 ? "3" : "1"};
+    if (options->bench.abuffer_count_steps && rays->wave->kind == WAVE_CLOSEST)
         defines[n++] = (struct gpu_define){"ABUFFER_COUNT_STEPS", "1"};
     const struct trace_program_source source = {
         .traverse = "abuffer/traverse.glsl",

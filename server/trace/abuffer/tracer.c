@@ -14,9 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define RESOLUTION_MIN 16
-#define RESOLUTION_MAX 4096
-#define RESOLUTION_DEFAULT 1280 /* the paper's */
 #define VOXELS_MIN 16
 #define VOXELS_MAX 256
 
@@ -41,25 +38,6 @@ static uint32_t voxels_for(uint32_t resolution)
     return voxels;
 }
 
-static bool check_options(const struct tracer_options *options, struct error *error)
-{
-    uint32_t resolution = options->abuffer_resolution ? options->abuffer_resolution : RESOLUTION_DEFAULT;
-    uint32_t voxels = options->abuffer_voxels;
-    if (resolution < RESOLUTION_MIN || resolution > RESOLUTION_MAX)
-        return error_set(error, ERROR_INVALID, "options.abuffer_resolution", "%u texels; %d to %d are possible",
-                         resolution, RESOLUTION_MIN, RESOLUTION_MAX);
-    if (voxels != 0 && (voxels < VOXELS_MIN || voxels > VOXELS_MAX || (voxels & (voxels - 1)) != 0))
-        return error_set(error, ERROR_INVALID, "options.abuffer_voxels",
-                         "a grid has 16, 32, 64, 128 or 256 voxels along a side, not %u", voxels);
-    if (voxels > resolution)
-        return error_set(error, ERROR_INVALID, "options.abuffer_voxels",
-                         "%u voxels along a side are more than the %u texels", voxels, resolution);
-    if (options->abuffer_search > ABUFFER_SEARCH_LINEAR1)
-        return error_set(error, ERROR_INVALID, "options.abuffer_search", "there is no search number %u",
-                         (unsigned)options->abuffer_search);
-    return true;
-}
-
 /* ---- life ---- */
 
 static void abuffer_destroy(struct tracer *tracer)
@@ -76,16 +54,14 @@ static void abuffer_destroy(struct tracer *tracer)
 static struct tracer *abuffer_create(struct gpu_device *device, const struct tracer_options *options,
                                      struct error *error)
 {
-    if (!check_options(options, error))
-        return NULL;
     struct abuffer *abuffer = calloc(1, sizeof(*abuffer));
     if (!abuffer) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
         return NULL;
     }
     abuffer_store_init(&abuffer->store, device);
-    abuffer->resolution = options->abuffer_resolution ? options->abuffer_resolution : RESOLUTION_DEFAULT;
-    abuffer->voxels_along = options->abuffer_voxels ? options->abuffer_voxels : voxels_for(abuffer->resolution);
+    abuffer->resolution = options->abuffer.resolution;
+    abuffer->voxels_along = options->abuffer.voxels ? options->abuffer.voxels : voxels_for(abuffer->resolution);
     abuffer->timer = gpu_timer_create(device);
     if (!abuffer->timer)
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer's timer");

@@ -87,7 +87,7 @@ struct bvh_refit_plan {
 
 enum bvh_bounds { BVH_BOUNDS_OF_BOXES, BVH_BOUNDS_OF_SPHERES };
 
-struct bvh_settings {
+struct bvh_form {
     enum bvh_bounds bounds;
     bool plain;              /* one order for every direction */
     bool whole;              /* boxes in floats, not on a grid */
@@ -125,14 +125,14 @@ struct bvh_tree {
 };
 
 /* What the settings mean for elements. */
-uint32_t bvh_octants(const struct bvh_settings *settings); /* copies: BVH_OCTANTS or 1 */
-bool bvh_is_packed(const struct bvh_settings *settings);
-uint32_t bvh_element_words(const struct bvh_settings *settings); /* uint32_t of one element of one copy */
-size_t bvh_element_bytes(const struct bvh_settings *settings);   /* of one element in all copies */
+uint32_t bvh_octants(const struct bvh_form *settings); /* copies: BVH_OCTANTS or 1 */
+bool bvh_is_packed(const struct bvh_form *settings);
+uint32_t bvh_element_words(const struct bvh_form *settings); /* uint32_t of one element of one copy */
+size_t bvh_element_bytes(const struct bvh_form *settings);   /* of one element in all copies */
 
 /* Bounds are padded outward by BVH_PAD_RELATIVE of their magnitude, so that the rounding of the traversal's
  * arithmetic cannot lose a hit (shaders/bvh/bounds.glsl has the sum). ERROR_OUT_OF_MEMORY, ERROR_LIMIT. */
-bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_settings *settings,
+bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
                     struct error *error);
 void bvh_tree_finish(struct bvh_tree *tree);
 #define BVH_PAD_RELATIVE 0x1p-21f
@@ -148,7 +148,7 @@ struct bvh_job {
  * they point to until the run is finished or stopped, and are only stopped between two of a build's loops over the
  * primitives of a range. The caller finishes the trees, in any case. NULL: out of memory. */
 struct bvh_run;
-struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_settings *settings);
+struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_form *settings);
 /* Waits until then, by clock_now_ns(), at most. False: it is not done. */
 bool bvh_jobs_wait(struct bvh_run *run, uint64_t until_ns);
 /* Waits for the end; *end_ns is when it came. False: one failed; its error is in *error. */
@@ -186,7 +186,7 @@ struct bvh_bound {
 struct bvh_bound bvh_bound_of_box(const float lower[3], const float upper[3]); /* padded */
 struct bvh_bound bvh_bound_of_sphere(const float centre[3], float radius);     /* padded */
 /* Writes element e into every copy. leaf: 0 for an inner element. Packed, the box must lie in the grid. */
-void bvh_write_element(uint32_t *elements, const struct bvh_settings *settings, const struct bvh_baked *baked,
+void bvh_write_element(uint32_t *elements, const struct bvh_form *settings, const struct bvh_baked *baked,
                        const struct bvh_grid *grid, uint32_t e, const struct bvh_bound *bound, uint32_t leaf);
 uint32_t bvh_leaf(uint32_t kind, uint32_t first, uint32_t count);
 float bvh_box_area(const float lower[3], const float upper[3]);

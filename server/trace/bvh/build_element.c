@@ -15,22 +15,22 @@
 /* An axis along which a tree has (almost) no extent gets cells of this share of its greatest one. */
 #define GRID_FLATNESS 0x1p-20
 
-uint32_t bvh_octants(const struct bvh_settings *settings)
+uint32_t bvh_octants(const struct bvh_form *settings)
 {
     return settings->plain ? 1 : BVH_OCTANTS;
 }
 
-bool bvh_is_packed(const struct bvh_settings *settings)
+bool bvh_is_packed(const struct bvh_form *settings)
 {
     return settings->bounds == BVH_BOUNDS_OF_BOXES && !settings->plain && !settings->whole;
 }
 
-uint32_t bvh_element_words(const struct bvh_settings *settings)
+uint32_t bvh_element_words(const struct bvh_form *settings)
 {
     return bvh_is_packed(settings) ? sizeof(struct bvh_packed_element) / 4 : sizeof(struct bvh_element) / 4;
 }
 
-size_t bvh_element_bytes(const struct bvh_settings *settings)
+size_t bvh_element_bytes(const struct bvh_form *settings)
 {
     return (size_t)bvh_octants(settings) * bvh_element_words(settings) * sizeof(uint32_t);
 }
@@ -143,7 +143,7 @@ static void write_packed(uint32_t *elements, const struct bvh_baked *baked, cons
     }
 }
 
-void bvh_write_element(uint32_t *elements, const struct bvh_settings *settings, const struct bvh_baked *baked,
+void bvh_write_element(uint32_t *elements, const struct bvh_form *settings, const struct bvh_baked *baked,
                        const struct bvh_grid *grid, uint32_t e, const struct bvh_bound *bound, uint32_t leaf)
 {
     if (bvh_is_packed(settings)) {

@@ -12,7 +12,7 @@
 struct bvh_run {
     struct bvh_job *jobs;
     uint32_t count;
-    struct bvh_settings settings;
+    struct bvh_form settings;
     atomic_bool stop;
     pthread_t thread;
     bool has_thread;
@@ -74,7 +74,7 @@ static void init_ended(struct bvh_run *run)
     pthread_mutex_init(&run->mutex, NULL);
 }
 
-struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_settings *settings)
+struct bvh_run *bvh_jobs_start(struct bvh_job *jobs, uint32_t count, const struct bvh_form *settings)
 {
     uint64_t primitives = 0;
     struct bvh_run *run = calloc(1, sizeof *run);

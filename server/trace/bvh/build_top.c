@@ -108,7 +108,7 @@ static uint32_t collect(const struct bvh_world_box *boxes, uint32_t count, struc
 }
 
 bool bvh_top_build(struct bvh_top *top, const struct bvh_world_box *boxes, uint32_t count,
-                   const struct bvh_settings *settings)
+                   const struct bvh_form *settings)
 {
     *top = (struct bvh_top){.instance_count = count, .settings = *settings};
     if (count == 0)

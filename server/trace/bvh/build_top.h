@@ -21,14 +21,14 @@ struct bvh_top {
     uint32_t *element_of;        /* instance to element; BVH_NONE: not in the tree */
     bool *moved;                 /* elements whose box is to be made again */
     uint32_t instance_count;
-    struct bvh_settings settings;
+    struct bvh_form settings;
     float built_cost; /* when the tree was built; see bvh_top_is_stale */
     bool left_grid;   /* something has moved out of the grid */
 };
 
 /* Transform elements of instances 0 .. count - 1. False: out of memory. */
 bool bvh_top_build(struct bvh_top *top, const struct bvh_world_box *boxes, uint32_t count,
-                   const struct bvh_settings *settings);
+                   const struct bvh_form *settings);
 void bvh_top_finish(struct bvh_top *top);
 /* Where an instance is now. One that comes or goes (becomes empty or was) needs a new tree: false. */
 bool bvh_top_move(struct bvh_top *top, uint32_t instance, const struct bvh_world_box *box);

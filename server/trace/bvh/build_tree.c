@@ -21,7 +21,7 @@ static const struct bvh_costs costs = {.element = 1, .primitive = 0.5f, .leaf_ma
 struct work {
     struct bvh_tree *tree;
     const struct bvh_shape *shape;
-    const struct bvh_settings *settings;
+    const struct bvh_form *settings;
     unsigned threads;
     struct bvh_box *boxes; /* gone when the primitives are there */
     struct bvh_binary binary;
@@ -344,7 +344,7 @@ static bool build(struct work *work)
     return true;
 }
 
-bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_settings *settings,
+bool bvh_tree_build(struct bvh_tree *tree, const struct bvh_shape *shape, const struct bvh_form *settings,
                     struct error *error)
 {
     uint64_t start_ns = clock_now_ns();

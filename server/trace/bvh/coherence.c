@@ -71,10 +71,10 @@ uint32_t bvh_rays_together(struct bvh *bvh, const struct gpu_scene *scene, const
 {
     const struct tracer_options *options = &bvh->base.options;
     uint32_t counts[2];
-    if (options->bvh_layout == BVH_LAYOUT_PLAIN)
+    if (options->bench.bvh_layout == BVH_LAYOUT_PLAIN)
         return 1;
-    if (options->bvh_rays_together != 0)
-        return options->bvh_rays_together;
+    if (options->bvh.rays != 0)
+        return options->bvh.rays;
     if (!scene->device->facts.software || wave->ray_count < COHERENCE_RAYS_MIN)
         return 1;
     if (!measure_coherence(bvh, scene, wave, counts, error))

@@ -88,7 +88,7 @@ bool bvh_refit_bounds(struct bvh_refit *refit, struct gpu_device *device, const 
 }
 
 bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const struct bvh_refit_place *place,
-                     const struct bvh_settings *settings, const struct bvh_grid *grid, struct error *error)
+                     const struct bvh_form *settings, const struct bvh_grid *grid, struct error *error)
 {
     struct gpu_define defines[2] = {{NULL, NULL}};
     if (settings->bounds == BVH_BOUNDS_OF_SPHERES)

@@ -58,6 +58,6 @@ bool bvh_refit_bounds(struct bvh_refit *refit, struct gpu_device *device, const 
                       struct error *error);
 /* Elements from the boxes; `grid` is over the root's box. */
 bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const struct bvh_refit_place *place,
-                     const struct bvh_settings *settings, const struct bvh_grid *grid, struct error *error);
+                     const struct bvh_form *settings, const struct bvh_grid *grid, struct error *error);
 
 #endif

@@ -16,7 +16,7 @@
 #define WRITE_RUNS_MAX 64u
 #define UPLOAD_BYTES ((uint64_t)1 << 22) /* at a time */
 
-void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_settings *settings)
+void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_form *settings)
 {
     *store = (struct bvh_store){.device = device, .settings = *settings, .top_lost = true};
 }
@@ -43,7 +43,7 @@ void bvh_store_finish(struct bvh_store *store)
         bvh_refit_finish(&store->entries[i].refit, store->device);
     free(store->entries);
     free(store->entry_of);
-    const struct bvh_settings settings = store->settings;
+    const struct bvh_form settings = store->settings;
     bvh_store_init(store, store->device, &settings);
 }
 

@@ -47,7 +47,7 @@ struct bvh_store_build {
 
 struct bvh_store {
     struct gpu_device *device;
-    struct bvh_settings settings;
+    struct bvh_form settings;
     struct bvh_entry *entries; /* as they lie on the device */
     uint32_t entry_count;
     uint32_t *entry_of; /* geometry of the scene to entry; BVH_NONE: without primitives */
@@ -65,7 +65,7 @@ struct bvh_store_report {
     uint64_t built_elements, refitted_elements, uploaded_bytes;
 };
 
-void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_settings *settings);
+void bvh_store_init(struct bvh_store *store, struct gpu_device *device, const struct bvh_form *settings);
 void bvh_store_finish(struct bvh_store *store);
 /* Trees for all geometries of the scene, building those that are new or changed: begun, then in steps that end at
  * about that time. What the scene's arrays hold must not change meanwhile. What is kept is not uploaded

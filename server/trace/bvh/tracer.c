@@ -25,12 +25,12 @@ static unsigned build_threads(void)
     return processors > BUILD_THREADS_MAX ? BUILD_THREADS_MAX : processors;
 }
 
-static struct bvh_settings settings_of(const struct tracer_options *options)
+static struct bvh_form settings_of(const struct tracer_options *options)
 {
-    bool plain = options->bvh_layout == BVH_LAYOUT_PLAIN;
+    bool plain = options->bench.bvh_layout == BVH_LAYOUT_PLAIN;
     /* Boxes are twice as fast as spheres (bench_bvh), so `auto` is boxes. */
-    bool spheres = plain || options->bvh_bounds == BVH_BOUNDS_SPHERE;
-    return (struct bvh_settings){
+    bool spheres = plain || options->bvh.bounds == BVH_BOUNDS_SPHERE;
+    return (struct bvh_form){
         .bounds = spheres ? BVH_BOUNDS_OF_SPHERES : BVH_BOUNDS_OF_BOXES,
         .plain = plain,
         .threads = build_threads(),
@@ -40,18 +40,12 @@ static struct bvh_settings settings_of(const struct tracer_options *options)
 static struct tracer *bvh_create(struct gpu_device *device, const struct tracer_options *options,
                                  struct error *error)
 {
-    uint32_t together = options->bvh_rays_together;
-    if (together > 8 || (together > 4 && together < 8)) {
-        error_set(error, ERROR_INVALID, "options.bvh_rays_together", "1, 2, 3, 4 or 8 rays walk together, not %u",
-                  together);
-        return NULL;
-    }
     struct bvh *bvh = calloc(1, sizeof *bvh);
     if (!bvh) {
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer");
         return NULL;
     }
-    struct bvh_settings settings = settings_of(options);
+    struct bvh_form settings = settings_of(options);
     bvh_store_init(&bvh->store, device, &settings);
     return &bvh->base;
 }
@@ -404,7 +398,7 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
                             const struct ray_range *rays, struct error *error)
 {
     struct bvh *bvh = (struct bvh *)tracer;
-    const struct bvh_settings *settings = &bvh->store.settings;
+    const struct bvh_form *settings = &bvh->store.settings;
     const struct wave *wave = &state->wave;
     const uint32_t together = ((struct bvh_state *)state)->rays_together;
     struct gpu_define defines[9] = {{"TRACER_BVH", "1"}};

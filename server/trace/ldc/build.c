@@ -144,7 +144,7 @@ static bool begin(struct ldc_task *task, struct error *error)
     struct gpu_device *device = builder->device;
     size_t texel_numbers = (size_t)task->texel_count * sizeof(uint32_t);
     uint64_t texels = (uint64_t)task->cube->first_texel + task->texel_count;
-    task->next = task->options->ldc_build == LDC_BUILD_PEEL ? ldc_peel : ldc_lists;
+    task->next = task->options->ldc.build == LDC_BUILD_PEEL ? ldc_peel : ldc_lists;
     if (texels > device->facts.texture_buffer_texels_max)
         return error_set(error, ERROR_LIMIT, "options.ldc_resolution",
                          "%llu texels are more than the device takes", (unsigned long long)texels);
@@ -181,8 +181,8 @@ enum tracer_progress ldc_build_begin(struct ldc_builder *builder, struct ldc_sto
         .options = options,
         .next = begin,
         .texel_count = 3 * resolution * resolution,
-        .layers_max = options->ldc_layers_max > 0 && options->ldc_layers_max < LDC_LAYERS_MAX
-                          ? options->ldc_layers_max
+        .layers_max = options->limits.ldc_layers > 0 && options->limits.ldc_layers < LDC_LAYERS_MAX
+                          ? options->limits.ldc_layers
                           : LDC_LAYERS_MAX,
     };
     return progress_of(&builder->task, axes_draw_prepare(&builder->draw, scene, instances, instance_count, error));

@@ -24,9 +24,9 @@ void ldc_builder_clear(struct ldc_builder *builder);
 /* Begins to fill cube `which` of the store, whose lower_world, cell_world and resolution are set, with the
  * triangles and spheres of instances[0 .. count - 1] as they are when the shutter opens (gpu_scene's); texels,
  * quads, geometry and surface are written, nodes are not. Of the other cube nothing changes but, if this is the
- * static one, everything behind it is lost. Discs are no part of it. More layers than options->ldc_layers_max or
- * than fit options->ldc_mebibytes_max: the nearest (least depth) of each texel are kept, and the cube says how
- * many were needed. Never TRACER_DONE; store, scene and options must stay until the build is done. */
+ * static one, everything behind it is lost. Discs are no part of it. More layers than options->limits.ldc_layers
+ * or than fit options->limits.ldc_mebibytes: the nearest (least depth) of each texel are kept, and the cube says
+ * how many were needed. Never TRACER_DONE; store, scene and options must stay until the build is done. */
 enum tracer_progress ldc_build_begin(struct ldc_builder *builder, struct ldc_store *store, unsigned which,
                                      struct gpu_scene *scene, const uint32_t *instances, uint32_t instance_count,
                                      const struct tracer_options *options, struct error *error);

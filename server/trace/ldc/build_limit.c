@@ -35,7 +35,7 @@ static bool fits_device(const struct ldc_task *task, uint64_t samples, uint64_t 
 
 static bool fits(const struct ldc_task *task, uint64_t samples, uint64_t quads)
 {
-    uint64_t allowed = (uint64_t)task->options->ldc_mebibytes_max << 20;
+    uint64_t allowed = (uint64_t)task->options->limits.ldc_mebibytes << 20;
     return (allowed == 0 || sample_bytes(samples, quads) <= allowed) && fits_device(task, samples, quads);
 }
 

@@ -13,14 +13,13 @@
 #define RANGE_BYTES (2 * sizeof(float))
 /* 4 x 4 children: half the levels of 2 x 2. */
 #define PYRAMID_BITS 2
-#define BLOCK_DEFAULT 8
 
 struct ldc_level_layout ldc_level_layout_of(const struct ldc_store *store, uint32_t resolution,
                                             const struct tracer_options *options)
 {
-    struct ldc_level_layout layout = {.blocks = options->ldc_levels == LDC_LEVELS_BLOCKS};
+    struct ldc_level_layout layout = {.blocks = options->ldc.levels == LDC_LEVELS_BLOCKS};
     if (layout.blocks) {
-        uint32_t block = options->ldc_block ? options->ldc_block : BLOCK_DEFAULT;
+        uint32_t block = options->ldc.block;
         while (2u << layout.bits <= block)
             layout.bits++;
         layout.top = 1;
@@ -28,8 +27,8 @@ struct ldc_level_layout ldc_level_layout_of(const struct ldc_store *store, uint3
         layout.image_nodes = layout.row * layout.row;
         return layout;
     }
-    const bool may_have_cells = options->ldc_levels == LDC_LEVELS_AUTO && !(options->ldc_tolerance > 0);
-    if (options->ldc_levels == LDC_LEVELS_CELLS || (may_have_cells && !store->no_cells)) {
+    const bool may_have_cells = options->ldc.levels == LDC_LEVELS_AUTO && !(options->ldc.tolerance > 0);
+    if (options->ldc.levels == LDC_LEVELS_CELLS || (may_have_cells && !store->no_cells)) {
         layout.cells = true;
         layout.grid = (resolution + (1u << LDC_NODE_SHIFT) - 1) >> LDC_NODE_SHIFT;
         return layout;
@@ -156,7 +155,7 @@ static enum tracer_progress build_levels(struct ldc_levels *levels, struct error
 /* What failed was cells that nobody asked for by name, as there are too many. */
 static bool may_have_ranges(const struct ldc_levels *levels, const struct error *of_cells)
 {
-    return levels->options->ldc_levels == LDC_LEVELS_AUTO && !levels->store->no_cells &&
+    return levels->options->ldc.levels == LDC_LEVELS_AUTO && !levels->store->no_cells &&
            (of_cells->kind == ERROR_LIMIT || of_cells->kind == ERROR_OUT_OF_MEMORY);
 }
 

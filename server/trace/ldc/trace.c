@@ -41,7 +41,7 @@ static void set_cube(const struct gpu_program *program, unsigned slot, const str
     snprintf(name, sizeof name, "ldc_upper[%u]", slot);
     gpu_uniform_vec(program, name, 3, upper);
     snprintf(name, sizeof name, "ldc_tolerance[%u]", slot);
-    gpu_uniform_float(program, name, options->ldc_tolerance / cube->cell_world);
+    gpu_uniform_float(program, name, options->ldc.tolerance / cube->cell_world);
 }
 
 static void bind(struct ldc_store *store, bool cells)
@@ -72,21 +72,21 @@ bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struc
         {"TRACER_LDC", "1"},
         {"LDC_CUBES", number_of_cubes},
         {"LDC_LEVEL_BITS", bits},
-        {"LDC_LAYERS_TOGETHER", options->ldc_layers_together == 1 ? "1" : "4"},
+        {"LDC_LAYERS_TOGETHER", options->bench.ldc_layers_together == 1 ? "1" : "4"},
     };
     size_t n = 4;
-    if (options->ldc_count_steps && rays->wave->kind == WAVE_CLOSEST)
+    if (options->bench.ldc_count_steps && rays->wave->kind == WAVE_CLOSEST)
         defines[n++] = (struct gpu_define){"LDC_COUNT_STEPS", "1"};
     if (layout.cells)
         defines[n++] = (struct gpu_define){"LDC_CELLS", "1"};
     if (layout.blocks)
         defines[n++] = (struct gpu_define){"LDC_BLOCKS", "1"};
-    if (options->ldc_tolerance > 0)
+    if (options->ldc.tolerance > 0)
         defines[n++] = (struct gpu_define){"LDC_TOLERANCE", "1"};
     const struct trace_program_source source = {
         .traverse = "ldc/traverse.glsl",
         .defines = defines,
-        .rays_together = options->ldc_rays_together ? options->ldc_rays_together : 1,
+        .rays_together = options->ldc.rays ? options->ldc.rays : 1,
         .rays_a_dispatch = store->device->facts.software ? 0 : DISPATCH_RAYS_MAX,
     };
     const struct gpu_program *program = trace_program_get(scene, rays->wave, &source, error);

@@ -14,13 +14,8 @@
 #include "trace/tracer.h"
 
 #include <epoxy/gl.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define RESOLUTION_MIN 16
-#define RESOLUTION_MAX 4096
-#define RESOLUTION_DEFAULT 1024
 
 /* What the next unit of an update does. */
 enum ldc_phase {
@@ -45,47 +40,15 @@ struct ldc {
 
 /* ---- options ---- */
 
-static bool is_one_of(uint32_t value, const uint32_t *choices, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        if (value == choices[i])
-            return true;
-    return false;
-}
-
 static bool check_options(const struct tracer_options *options, struct error *error)
 {
-    static const uint32_t blocks[] = {0, 2, 4, 8, 16, 32}, together[] = {0, 1, 4};
-    if (options->ldc_resolution != 0 &&
-        (options->ldc_resolution < RESOLUTION_MIN || options->ldc_resolution > RESOLUTION_MAX))
-        return error_set(error, ERROR_INVALID, "options.ldc_resolution", "%u cells; %d to %d are possible",
-                         options->ldc_resolution, RESOLUTION_MIN, RESOLUTION_MAX);
-    if (!is_one_of(options->ldc_block, blocks, sizeof(blocks) / sizeof(blocks[0])))
-        return error_set(error, ERROR_INVALID, "options.ldc_block",
-                         "a block is 2, 4, 8, 16 or 32 texels wide, not %u", options->ldc_block);
-    if (options->ldc_build > LDC_BUILD_LISTS)
-        return error_set(error, ERROR_INVALID, "options.ldc_build", "there is no way number %u to build a cube",
-                         (unsigned)options->ldc_build);
-    if (options->ldc_levels > LDC_LEVELS_CELLS)
-        return error_set(error, ERROR_INVALID, "options.ldc_levels", "there is no kind number %u of levels",
-                         (unsigned)options->ldc_levels);
-    if (options->ldc_levels == LDC_LEVELS_CELLS && options->ldc_tolerance > 0)
-        return error_set(error, ERROR_INVALID, "options.ldc_levels", "cells know planes only, no tolerance");
-    if (options->ldc_images > LDC_IMAGES_ONE)
-        return error_set(error, ERROR_INVALID, "options.ldc_images", "there is no choice number %u of images",
-                         (unsigned)options->ldc_images);
-    if (!(options->ldc_tolerance >= 0.0f && isfinite(options->ldc_tolerance)))
-        return error_set(error, ERROR_INVALID, "options.ldc_tolerance", "%g metres; 0 and more are possible",
-                         (double)options->ldc_tolerance);
-    if (!is_one_of(options->ldc_rays_together, together, sizeof(together) / sizeof(together[0])))
-        return error_set(error, ERROR_INVALID, "options.ldc_rays_together", "1 or 4 rays walk together, not %u",
-                         options->ldc_rays_together);
-    if (!is_one_of(options->ldc_layers_together, together, sizeof(together) / sizeof(together[0])))
+    const uint32_t together = options->bench.ldc_layers_together;
+    if (together != 0 && together != 1 && together != 4)
         return error_set(error, ERROR_INVALID, "options.ldc_layers_together",
-                         "1 or 4 layers are tested together, not %u", options->ldc_layers_together);
-    if (options->ldc_layers_max > LDC_LAYERS_MAX)
-        return error_set(error, ERROR_INVALID, "options.ldc_layers_max", "%u layers; at most %u can be kept",
-                         options->ldc_layers_max, LDC_LAYERS_MAX);
+                         "1 or 4 layers are tested together, not %u", together);
+    if (options->limits.ldc_layers > LDC_LAYERS_MAX)
+        return error_set(error, ERROR_INVALID, "options.ldc_layers", "%u layers; at most %u can be kept",
+                         options->limits.ldc_layers, LDC_LAYERS_MAX);
     return true;
 }
 
@@ -115,7 +78,7 @@ static struct tracer *ldc_create(struct gpu_device *device, const struct tracer_
         return NULL;
     }
     ldc_store_init(&ldc->store, device);
-    ldc->resolution = options->ldc_resolution ? options->ldc_resolution : RESOLUTION_DEFAULT;
+    ldc->resolution = options->ldc.resolution;
     ldc->timer = gpu_timer_create(device);
     if (!ldc->timer)
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a tracer's timer");

@@ -119,10 +119,10 @@ static void reference_destroy(struct tracer *tracer)
 static struct tracer *reference_create(struct gpu_device *device, const struct tracer_options *options,
                                        struct error *error)
 {
-    uint32_t width = options->reference_rays_a_call;
+    uint32_t width = options->bench.reference_rays;
     if (width != 0 && width != 1 && width != 4 && width != 8 && width != 16) {
-        error_set(error, ERROR_INVALID, "options.reference_rays_a_call",
-                  "1, 4, 8 or 16 rays go into a call, not %u", width);
+        error_set(error, ERROR_INVALID, "options.reference_rays", "1, 4, 8 or 16 rays go into a call, not %u",
+                  width);
         return NULL;
     }
     struct reference *reference = calloc(1, sizeof(*reference));

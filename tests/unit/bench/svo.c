@@ -105,7 +105,7 @@ static void end(struct stage *stage)
 static struct tracer *build(struct stage *stage, const struct tracer_impl *impl, uint32_t resolution)
 {
     struct error error = {0};
-    const struct tracer_options options = {.abuffer_resolution = resolution};
+    const struct tracer_options options = {.bench = {.baseline_side = resolution}};
     struct tracer *tracer = tracer_create(impl, device, &options, &error);
     must(tracer && tracer_update(tracer, &stage->gpu, &(struct tracer_update){0}, &error), &error);
     return tracer;

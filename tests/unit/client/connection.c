@@ -287,12 +287,13 @@ static void play_job(struct daemon *daemon)
 
 static struct fl_job *start_job(struct fl_scene *scene, uint32_t first, uint32_t last, uint32_t step)
 {
+    struct message_render wanted = fl_render_defaults();
+    wanted.width = wanted.height = EDGE;
+    wanted.first_frame = first;
+    wanted.last_frame = last;
+    wanted.frame_step = step;
     error = (struct fl_error){0};
-    return fl_render_start(
-        scene,
-        &(struct fl_job_options){
-            .width = EDGE, .height = EDGE, .first_frame = first, .last_frame = last, .frame_step = step},
-        &error);
+    return fl_render_start(scene, &wanted, &error);
 }
 
 TEST(every_frame_of_a_job_comes_once_and_in_order)

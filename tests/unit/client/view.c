@@ -24,11 +24,26 @@ static struct {
     uint32_t node;
 } seen;
 
+static struct message_render some_options(void)
+{
+    struct message_render options = fl_view_defaults();
+    options.width = options.height = EDGE;
+    options.credit = IN_FLIGHT;
+    options.exposure_stops = 1;
+    options.still_encoding = PROTOCOL_ENCODING_ZSTD;
+    options.pass_samples = 2;
+    options.weight = 5;
+    options.adapt = 1;
+    return options;
+}
+
+static struct message_render usual_options; /* some_options() */
 static int begin(void **state)
 {
     (void)state;
-    memset(&seen, 0, sizeof seen);
-    for (size_t i = 0; i < sizeof pixels; i++)
+    memset(&seen, 0, sizeof(seen));
+    usual_options = some_options();
+    for (size_t i = 0; i < sizeof(pixels); i++)
         pixels[i] = (uint8_t)i;
     return 0;
 }
@@ -141,20 +156,15 @@ static void play_view(struct daemon *daemon)
     }
 }
 
-static const struct fl_view_options some_options = {
-    .job = {.width = EDGE, .height = EDGE, .frames_in_flight = IN_FLIGHT, .exposure_stops = 1},
-    .still_encoding = PROTOCOL_ENCODING_ZSTD,
-    .pass_samples = 2,
-    .weight = 5,
-    .adapt = true};
 static const struct fl_view_camera some_camera = {
     .eye_world = {0, 0, 5}, .up_world = {0, 1, 0}, .fov_y = 0.7f, .time_s = 1.5f, .moving = true, .node = 9};
 
 static struct fl_view *start_view(struct fl_scene *scene)
 {
     error = (struct fl_error){0};
-    struct fl_view *view = fl_view_start(scene, &some_options, &error);
-    if (view == NULL)
+    const struct message_render options = some_options();
+    struct fl_view *view = fl_view_start(scene, &options, &error);
+    if (!view)
         fail_msg("%s", error.text);
     return view;
 }
@@ -183,7 +193,7 @@ static void end_view(struct viewing *viewing, struct fl_view *view)
 static struct fl_frame *next_frame(struct fl_view *view)
 {
     struct fl_frame *frame = fl_view_next(view, 10000, &error);
-    if (frame == NULL)
+    if (!frame)
         fail_msg("no frame: %s", error.text);
     return frame;
 }
@@ -194,7 +204,7 @@ TEST(cameras_are_sent_and_frames_name_them_with_their_times)
 {
     struct viewing viewing;
     struct fl_view *view = begin_view(&viewing, play_view);
-    assert_null(fl_view_start(&viewing.scene, &some_options, &error)); /* one at a time */
+    assert_null(fl_view_start(&viewing.scene, &usual_options, &error)); /* one at a time */
     fl_frame_destroy(next_frame(view));
     for (uint64_t i = 1; i <= 5; i++) {
         uint64_t command = 0;
@@ -279,11 +289,11 @@ TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
 {
     struct viewing viewing;
     struct fl_view *view = begin_view(&viewing, play_changes);
-    struct fl_view_options options = some_options;
+    struct message_render options = some_options();
     uint32_t number = 0;
-    options.job.tracer = PROTOCOL_TRACER_LDC;
+    options.tracer = PROTOCOL_TRACER_LDC;
     for (unsigned i = 0; i < 40; i++) {
-        options.job.width = i >= 20 ? 2 * EDGE : EDGE;
+        options.width = i >= 20 ? 2 * EDGE : EDGE;
         if (!fl_view_change(view, &options, &error) || !fl_view_look(view, &some_camera, NULL, &error))
             fail_msg("%s", error.text);
         for (unsigned frames = i >= 20 ? 2 : 1; frames > 0; frames--) {
@@ -295,7 +305,7 @@ TEST(a_changed_view_takes_frames_of_both_sizes_and_counts_on)
         }
     }
     for (unsigned i = 0; i < 20; i++) { /* faster than anything is answered */
-        options.job.width = EDGE;
+        options.width = EDGE;
         assert_true(fl_view_change(view, &options, &error));
     }
     assert_true(fl_view_look(view, &some_camera, NULL, &error));
@@ -311,13 +321,15 @@ TEST(a_job_runs_beside_a_view_and_each_gets_its_own_frames)
 {
     struct viewing viewing;
     struct fl_view *view = begin_view(&viewing, play_view);
-    const struct fl_job_options options = {.width = EDGE, .height = EDGE, .first_frame = 77, .last_frame = 77};
+    struct message_render options = fl_render_defaults();
+    options.width = options.height = EDGE;
+    options.first_frame = options.last_frame = 77;
     for (unsigned i = 0; i < 3; i++) {
         bool done = false;
         struct fl_job *job = fl_render_start(&viewing.scene, &options, &error);
         assert_non_null(job);
         struct fl_frame *frame = NULL;
-        for (unsigned tries = 0; frame == NULL && tries < 1000; tries++) {
+        for (unsigned tries = 0; !frame && tries < 1000; tries++) {
             frame = fl_render_poll(job, 10, &done, &error);
             assert_int_equal(error.code, FL_ERROR_NONE);
         }
@@ -372,7 +384,7 @@ TEST(a_refused_change_is_told_once_and_the_view_goes_on_as_it_was)
 {
     struct viewing viewing;
     struct fl_view *view = begin_view(&viewing, play_refused_change);
-    assert_true(fl_view_change(view, &some_options, &error));
+    assert_true(fl_view_change(view, &usual_options, &error));
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_REFUSED, "not in this build");
     assert_true(fl_view_look(view, &some_camera, NULL, &error));
@@ -506,8 +518,8 @@ TEST(a_frame_in_h264_is_left_to_the_caller)
 {
     struct daemon *daemon = start(play_h264);
     struct fl_scene scene = {.connection = connect_to(daemon), .scene = 1};
-    struct fl_view_options options = some_options;
-    options.job.encoding = PROTOCOL_ENCODING_H264;
+    struct message_render options = some_options();
+    options.encoding = PROTOCOL_ENCODING_H264;
     assert_false(fl_connection_can_h264(scene.connection)); /* the played daemon has not said so */
     struct fl_view *view = fl_view_start(&scene, &options, &error);
     struct fl_frame *frame = next_frame(view);
@@ -518,7 +530,7 @@ TEST(a_frame_in_h264_is_left_to_the_caller)
     fl_view_destroy(view);
     fl_connection_destroy(scene.connection);
     stop(daemon);
-    assert_int_equal(seen.first.quality, 80); /* where nothing is said: no worse than x264's own default */
+    assert_int_equal(seen.first.quality, 0); /* where nothing is said it is left to the daemon */
 }
 
 /* The first frame ends unfinished; the next one is whole. */
@@ -594,7 +606,7 @@ TEST(a_connection_that_is_lost_within_a_frame_is_told_and_nothing_waits_for_ever
     assert_true(fl_view_look(view, &some_camera, NULL, &error));
     assert_null(fl_view_next(view, 10000, &error));
     check_error(FL_ERROR_CONNECTION, "closed");
-    assert_false(fl_view_change(view, &some_options, &error));
+    assert_false(fl_view_change(view, &usual_options, &error));
     end_view(&viewing, view);
     assert_int_equal(seen.acks, 0);
 }

@@ -187,7 +187,7 @@ static void submit_job(uint64_t client, uint32_t request, unsigned tracer)
                           .depth = 2,
                           .seed = 5,
                           .tracer = tracer,
-                          .tracer_options.ldc_resolution = 64,
+                          .tracer_options.ldc.resolution = 64,
                           .primary = tracer == TRACER_LDC ? PRIMARY_TRACE : PRIMARY_RASTER},
                 .encoding = ENCODING_ZSTD,
                 .quality = 3,
@@ -341,7 +341,7 @@ static void submit_view(uint64_t client, uint32_t request, uint32_t view)
     job.frame.integrator = view == 1 ? INTEGRATOR_PATH : view == 2 ? INTEGRATOR_AO : INTEGRATOR_WHITTED;
     if (view == BATCH_VIEW) {
         job.frame.tracer = TRACER_LDC;
-        job.frame.tracer_options.ldc_resolution = 64;
+        job.frame.tracer_options.ldc.resolution = 64;
         job.path = CAMERA_ORBIT;
         job.orbit_turn = job.orbit_seconds = 1;
     }

@@ -45,14 +45,17 @@ static inline void *case_alloc(struct case_maker *maker, size_t bytes)
 
 static inline uint64_t case_int(struct case_maker *maker, const struct field_desc *field)
 {
-    uint64_t span = field->max - field->min;
+    uint64_t span = field->max - field->min, value = field->min;
     switch (maker->mode) {
     case CASE_LEAST:
         return field->min;
     case CASE_GREATEST:
         return field->max;
     default:
-        return field->min + (span == UINT64_MAX ? case_random(maker) : case_below(maker, span + 1));
+        do {
+            value = field->min + (span == UINT64_MAX ? case_random(maker) : case_below(maker, span + 1));
+        } while (!field_has_number(field, value));
+        return value;
     }
 }
 
@@ -96,7 +99,7 @@ static inline char *case_text(struct case_maker *maker, size_t max_bytes)
 static inline void case_fixed(struct case_maker *maker, const struct field_desc *field, char *place)
 {
     for (uint32_t i = 0; i < field->count; i++, place += field->width_bytes) {
-        float real;
+        float value;
         switch (field->kind) {
         case FIELD_INT:
             field_store_int(field, place, case_int(maker, field));
@@ -109,8 +112,8 @@ static inline void case_fixed(struct case_maker *maker, const struct field_desc 
                     : field->enumeration->values[case_below(maker, field->enumeration->value_count)].number);
             break;
         case FIELD_REAL:
-            real = case_real(maker, field);
-            memcpy(place, &real, 4);
+            value = case_real(maker, field);
+            memcpy(place, &value, 4);
             break;
         default:
             *place = (char)(maker->mode == CASE_LEAST ? 0 : case_random(maker));

@@ -26,7 +26,7 @@ TEST(every_value_of_every_enum_has_a_text_that_parses_back)
             assert_string_equal(protocol_##lower##_text(value), desc->values[k].text);                            \
         }                                                                                                         \
     }
-#include "protocol/messages.def"
+#include "protocol/words.def"
     for (size_t i = 0; i < protocol_enum_count; i++) {
         const struct enum_desc *desc = &protocol_enums[i];
         assert_int_equal(desc->values[0].number, 0); /* zero is the default, so it must be a value */

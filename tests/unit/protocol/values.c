@@ -37,7 +37,8 @@ static void try_wrong_int(const struct message *message, const struct field_desc
     uint64_t good = field_load_int(field, place);
     uint64_t type_max = field->width_bytes == 8 ? UINT64_MAX : (UINT64_C(1) << (8 * field->width_bytes)) - 1;
     uint64_t wrong[] = {field->min - 1, 0, field->max + 1, type_max};
-    bool meant[] = {field->min > 0, field->min > 0, field->max < type_max, field->max < type_max};
+    bool meant[] = {field->min > 0, field->min > 0 && !field->zero_is_default, field->max < type_max,
+                    field->max < type_max};
     if (field->kind == FIELD_ENUM) {
         wrong[0] = wrong[2] = field->enumeration->values[field->enumeration->value_count - 1].number + 1;
         meant[0] = meant[1] = false;

@@ -204,6 +204,7 @@ static inline struct message render_message(uint32_t last_frame, uint32_t credit
     struct message message = made(MESSAGE_RENDER);
     message.render.scene = 1;
     message.render.channel = 2;
+    message.render.width = message.render.height = 1;
     message.render.credit = credit;
     message.render.last_frame = last_frame;
     return message;

@@ -44,7 +44,7 @@ static inline struct hub_options usual_options(void)
                    .requests_in_flight = 64,
                    .scenes_per_client = 3,
                    .jobs_per_client = 4,
-                   .ldc_layers = 255,
+                   .tracers.ldc_layers = 255,
                    .blobs_per_client = 64,
                    .transaction_edits = 1000,
                    .transaction_bytes = 1 << 20,

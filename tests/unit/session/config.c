@@ -37,9 +37,9 @@ TEST(the_defaults_are_within_their_own_bounds)
     assert_int_equal(config.limits.unauthenticated_per_address, 8);
     assert_int_equal(config.limits.samples, 65536);
     assert_int_equal(config.limits.depth, SCENE_DEPTH_MAX);
-    assert_int_equal(config.limits.ldc_layers, 255);
-    assert_int_equal(config.limits.ldc_bytes, 0);
-    assert_int_equal(config.limits.abuffer_bytes, 0);
+    assert_int_equal(config.limits.tracers.ldc_layers, 255);
+    assert_int_equal(config.limits.tracers.ldc_mebibytes, 0);
+    assert_int_equal(config.limits.tracers.abuffer_mebibytes, 0);
     assert_int_equal(config.limits.upload_window_bytes, 16 << 20);
     assert_int_not_equal(config.scene_bytes, 0);
     assert_string_equal(config.device, "auto");
@@ -62,9 +62,13 @@ TEST(a_file_sets_numbers_with_units_texts_and_switches)
     assert_string_equal(config.listen, "unix:/a tcp:[::1]:0");
     assert_int_equal(config.log_level, 3);
     assert_int_equal(config.limits.blob_cache_bytes, 0);
-    assert_int_equal(config.limits.ldc_bytes, 96 << 20);
-    assert_int_equal(config.limits.abuffer_bytes, 1 << 30);
-    assert_int_equal(config.limits.ldc_layers, 12);
+    assert_int_equal(config.limits.tracers.ldc_mebibytes, 96);
+    assert_int_equal(config.limits.tracers.abuffer_mebibytes, 1024);
+    assert_int_equal(config.limits.tracers.ldc_layers, 12);
+    /* Whole MiB are told on; less than one is a limit still. */
+    assert_true(read_text(&config, "[memory]\nldc = 3145729\nabuffer = 1000\n", &error));
+    assert_int_equal(config.limits.tracers.ldc_mebibytes, 3);
+    assert_int_equal(config.limits.tracers.abuffer_mebibytes, 1);
 }
 
 TEST(a_mistake_is_reported_with_its_file_line_and_key)

@@ -2,6 +2,7 @@
 /* Batch jobs of a session, over a socketpair: their settings on the way to the engine, their frames on the way
  * back. */
 #include "tests/unit/session/answering_engine.h"
+#include "tests/unit/protocol/cases.h"
 
 #include "session/frames.h"
 #include "session/session.h"
@@ -142,6 +143,21 @@ SESSION_TEST(a_job_that_cannot_be_is_refused_by_its_field)
     expect_error(6, PROTOCOL_ERROR_CODE_INVALID);
 }
 
+/* The encoder would not let a wrong setting pass. */
+static void send_unchecked(uint32_t request, const struct message *message)
+{
+    static struct plain_bytes payload;
+    static uint8_t bytes[FRAMING_MESSAGE_MAX_BYTES];
+    struct message valid = *message;
+    struct writer writer;
+    memset(&valid.render.settings, 0, sizeof(valid.render.settings));
+    writer_init(&writer, bytes, sizeof(bytes));
+    assert_true(message_write(&writer, request, 0, &valid));
+    plain_encode(&payload, message);
+    memcpy(bytes + FRAMING_HEADER_BYTES, payload.data, payload.count);
+    send_bytes(bytes, writer.used_bytes);
+}
+
 SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
 {
     open_scene(1, 1);
@@ -154,7 +170,7 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
     message.render.focus = 7;
     message.render.shutter = 0.5f;
     message.render.pixel_filter = PROTOCOL_PIXEL_FILTER_TENT;
-    message.render.bvh_rays_together = 3;
+    message.render.settings.bvh.rays = 3;
     message.render.accumulate = 1;
     send_message(2, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 2);
@@ -167,16 +183,16 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
     assert_true(engine.job_clips[0].speed == 0.5f && engine.job_clips[0].loop);
     assert_true(engine.job_clips[1].clip == 5 && engine.job_clips[1].speed == 3.0f && !engine.job_clips[1].loop);
     assert_true(job->shutter == 0.5f && job->frame.filter == FILTER_TENT && job->frame.accumulate);
-    assert_int_equal(job->frame.tracer_options.bvh_rays_together, 3);
+    assert_int_equal(job->frame.tracer_options.bvh.rays, 3);
     while (receive()->type != MESSAGE_OK)
         continue;
     const uint32_t not_walked[] = {5, 6, 7};
     for (uint32_t i = 0; i < 3; i++) {
         message = render_message(0, 1);
-        message.render.bvh_rays_together = not_walked[i];
-        send_message(3 + i, 0, &message);
+        message.render.settings.bvh.rays = not_walked[i];
+        send_unchecked(3 + i, &message);
         expect_error(3 + i, PROTOCOL_ERROR_CODE_INVALID);
-        assert_string_equal(client.message.error.field, "render.bvh_rays_together");
+        assert_string_equal(client.message.error.field, "render.bvh_rays");
     }
 }
 
@@ -185,26 +201,26 @@ SESSION_TEST(settings_of_cubes_go_to_the_engine_with_the_daemons_limits)
     open_scene(1, 1);
     struct message message = render_message(0, 1);
     message.render.tracer = PROTOCOL_TRACER_LDC;
-    message.render.ldc_resolution = 16;
-    message.render.ldc_block = 32;
-    message.render.ldc_build = PROTOCOL_LDC_BUILD_LISTS;
-    message.render.ldc_levels = PROTOCOL_LDC_LEVELS_BLOCKS;
-    message.render.ldc_images = PROTOCOL_LDC_IMAGES_ONE;
-    message.render.ldc_tolerance = 0.25f;
-    message.render.ldc_rays_together = 4;
+    message.render.settings.ldc.resolution = 16;
+    message.render.settings.ldc.block = 32;
+    message.render.settings.ldc.build = PROTOCOL_LDC_BUILD_LISTS;
+    message.render.settings.ldc.levels = PROTOCOL_LDC_LEVELS_BLOCKS;
+    message.render.settings.ldc.images = PROTOCOL_LDC_IMAGES_ONE;
+    message.render.settings.ldc.tolerance = 0.25f;
+    message.render.settings.ldc.rays = 4;
     send_message(2, 0, &message);
     expect(MESSAGE_FRAME_BEGIN, 2);
     assert_int_equal(client.message.frame_begin.tracer, PROTOCOL_TRACER_LDC);
     const struct tracer_options *options = &engine.job.frame.tracer_options;
-    assert_int_equal(options->ldc_resolution, 16);
-    assert_int_equal(options->ldc_block, 32);
-    assert_int_equal(options->ldc_build, LDC_BUILD_LISTS);
-    assert_int_equal(options->ldc_levels, LDC_LEVELS_BLOCKS);
-    assert_int_equal(options->ldc_images, LDC_IMAGES_ONE);
-    assert_true(options->ldc_tolerance == 0.25f);
-    assert_int_equal(options->ldc_rays_together, 4);
-    assert_int_equal(options->ldc_layers_max, 7);
-    assert_int_equal(options->ldc_mebibytes_max, 3);
+    assert_int_equal(options->ldc.resolution, 16);
+    assert_int_equal(options->ldc.block, 32);
+    assert_int_equal(options->ldc.build, LDC_BUILD_LISTS);
+    assert_int_equal(options->ldc.levels, LDC_LEVELS_BLOCKS);
+    assert_int_equal(options->ldc.images, LDC_IMAGES_ONE);
+    assert_true(options->ldc.tolerance == 0.25f);
+    assert_int_equal(options->ldc.rays, 4);
+    assert_int_equal(options->limits.ldc_layers, 7);
+    assert_int_equal(options->limits.ldc_mebibytes, 3);
     while (receive()->type != MESSAGE_OK)
         continue;
 }
@@ -266,26 +282,29 @@ SESSION_TEST(settings_that_no_cube_has_are_refused_by_their_field)
 {
     static const struct {
         uint32_t resolution, block, rays;
-        const char *field, *remedy;
+        const char *field, *allowed;
     } cases[] = {
-        {1, 0, 0, "render.ldc_resolution", "16 to 4096"}, {15, 0, 0, "render.ldc_resolution", "16 to 4096"},
-        {0, 1, 0, "render.ldc_block", "16 or 32"},        {0, 24, 0, "render.ldc_block", "16 or 32"},
-        {0, 0, 2, "render.ldc_rays_together", ""},        {0, 0, 3, "render.ldc_rays_together", ""},
+        {1, 0, 0, "render.ldc_resolution", "16 to 4096"},
+        {15, 0, 0, "render.ldc_resolution", "16 to 4096"},
+        {0, 1, 0, "render.ldc_block", "16, 32"},
+        {0, 24, 0, "render.ldc_block", "16, 32"},
+        {0, 0, 2, "render.ldc_rays", "1, 4"},
+        {0, 0, 3, "render.ldc_rays", "1, 4"},
     };
     open_scene(1, 1);
     for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct message message = render_message(0, 1);
-        message.render.ldc_resolution = cases[i].resolution;
-        message.render.ldc_block = cases[i].block;
-        message.render.ldc_rays_together = cases[i].rays;
-        send_message(2 + i, 0, &message);
+        message.render.settings.ldc.resolution = cases[i].resolution;
+        message.render.settings.ldc.block = cases[i].block;
+        message.render.settings.ldc.rays = cases[i].rays;
+        send_unchecked(2 + i, &message);
         expect_error(2 + i, PROTOCOL_ERROR_CODE_INVALID);
         assert_string_equal(client.message.error.field, cases[i].field);
-        assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
+        assert_non_null(strstr(client.message.error.text, cases[i].allowed));
     }
     struct message message = render_message(0, 1);
-    message.render.ldc_levels = PROTOCOL_LDC_LEVELS_CELLS;
-    message.render.ldc_tolerance = 0.5f;
+    message.render.settings.ldc.levels = PROTOCOL_LDC_LEVELS_CELLS;
+    message.render.settings.ldc.tolerance = 0.5f;
     send_message(20, 0, &message);
     expect_error(20, PROTOCOL_ERROR_CODE_INVALID);
     assert_string_equal(client.message.error.field, "render.ldc_levels");
@@ -296,9 +315,9 @@ SESSION_TEST(settings_of_a_buffers_and_light_go_to_the_engine)
     open_scene(1, 1);
     struct message message = render_message(0, 1);
     message.render.tracer = PROTOCOL_TRACER_ABUFFER;
-    message.render.abuffer_resolution = 64;
-    message.render.abuffer_voxels = 64;
-    message.render.abuffer_search = PROTOCOL_ABUFFER_SEARCH_LINEAR1;
+    message.render.settings.abuffer.resolution = 64;
+    message.render.settings.abuffer.voxels = 64;
+    message.render.settings.abuffer.search = PROTOCOL_ABUFFER_SEARCH_LINEAR1;
     message.render.integrator = PROTOCOL_INTEGRATOR_PATH;
     message.render.brdf = PROTOCOL_BRDF_WARD;
     message.render.ao_distance = 2;
@@ -312,10 +331,10 @@ SESSION_TEST(settings_of_a_buffers_and_light_go_to_the_engine)
     assert_int_equal(client.message.frame_begin.tracer, PROTOCOL_TRACER_ABUFFER);
     assert_int_equal(client.message.frame_begin.layers, message.render.layers);
     const struct frame_request *request = &engine.job.frame;
-    assert_int_equal(request->tracer_options.abuffer_resolution, 64);
-    assert_int_equal(request->tracer_options.abuffer_voxels, 64);
-    assert_int_equal(request->tracer_options.abuffer_search, ABUFFER_SEARCH_LINEAR1);
-    assert_int_equal(request->tracer_options.abuffer_mebibytes_max, 1);
+    assert_int_equal(request->tracer_options.abuffer.resolution, 64);
+    assert_int_equal(request->tracer_options.abuffer.voxels, 64);
+    assert_int_equal(request->tracer_options.abuffer.search, ABUFFER_SEARCH_LINEAR1);
+    assert_int_equal(request->tracer_options.limits.abuffer_mebibytes, 1);
     assert_int_equal(request->integrator, INTEGRATOR_PATH);
     assert_int_equal(request->brdf, FRAME_BRDF_WARD);
     assert_true(request->ao_distance == 2 && request->ao_falloff == 0.5f && request->layer_opacity == 0.75f);
@@ -329,21 +348,21 @@ SESSION_TEST(settings_that_no_a_buffer_has_are_refused_by_their_field)
 {
     static const struct {
         uint32_t resolution, voxels;
-        const char *field, *remedy;
+        const char *field, *allowed;
     } cases[] = {
-        {1, 0, "render.abuffer_resolution", "16 to 4096"}, {15, 0, "render.abuffer_resolution", "16 to 4096"},
-        {0, 8, "render.abuffer_voxels", "16, 32, 64"},     {0, 100, "render.abuffer_voxels", "16, 32, 64"},
-        {32, 64, "render.abuffer_voxels", "higher"},
+        {1, 0, "render.abuffer_resolution", "16 to 4096"},  {15, 0, "render.abuffer_resolution", "16 to 4096"},
+        {0, 8, "render.abuffer_voxels", "16, 32, 64"},      {0, 100, "render.abuffer_voxels", "16, 32, 64"},
+        {32, 64, "render.abuffer_voxels", "the 32 texels"},
     };
     open_scene(1, 1);
     for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct message message = render_message(0, 1);
-        message.render.abuffer_resolution = cases[i].resolution;
-        message.render.abuffer_voxels = cases[i].voxels;
-        send_message(2 + i, 0, &message);
+        message.render.settings.abuffer.resolution = cases[i].resolution;
+        message.render.settings.abuffer.voxels = cases[i].voxels;
+        send_unchecked(2 + i, &message);
         expect_error(2 + i, PROTOCOL_ERROR_CODE_INVALID);
         assert_string_equal(client.message.error.field, cases[i].field);
-        assert_non_null(strstr(client.message.error.remedy, cases[i].remedy));
+        assert_non_null(strstr(client.message.error.text, cases[i].allowed));
     }
 }
 

@@ -309,9 +309,7 @@ static inline void start(const struct connection_limits *connection_limits)
                    .requests_in_flight = 64,
                    .scenes_per_client = 2,
                    .jobs_per_client = 2,
-                   .ldc_layers = 7,
-                   .ldc_bytes = (3 << 20) + 1, /* whole MiB are told on */
-                   .abuffer_bytes = 1000,      /* less than one is a limit still */
+                   .tracers = {.ldc_layers = 7, .ldc_mebibytes = 3, .abuffer_mebibytes = 1},
                    .blobs_per_client = 8,
                    .transaction_edits = 10,
                    .transaction_bytes = 64 << 10,

@@ -193,6 +193,7 @@ static struct message view_message(uint32_t credit)
     message.render.scene = 1;
     message.render.channel = CHANNEL;
     message.render.credit = credit;
+    message.render.width = message.render.height = 1;
     message.render.samples = 16;
     message.render.frames_per_second = 1; /* the link is never what holds frames back */
     message.render.encoding = PROTOCOL_ENCODING_JPEG;

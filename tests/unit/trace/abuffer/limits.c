@@ -281,7 +281,7 @@ TEST(more_than_is_allowed_is_refused_with_what_it_needs)
     uint64_t bytes = 28 * all.store.sample_count + 16 * texel_count_of(&all);
     uint32_t needed = (uint32_t)((bytes + (1 << 20) - 1) >> 20);
     assert_in_range(needed, 10, 100);
-    fixture.options.abuffer_mebibytes_max = needed;
+    fixture.options.limits.abuffer_mebibytes = needed;
     start_with(&fixture, 1000);
     build_and_read(&fixture, &some, 2 * RESOLUTION);
     expect_same(&all, &some);
@@ -290,7 +290,7 @@ TEST(more_than_is_allowed_is_refused_with_what_it_needs)
     for (uint32_t allowed = needed - 1; allowed > 0; allowed /= 2) {
         struct error error = {0};
         char expected[64];
-        fixture.options.abuffer_mebibytes_max = allowed;
+        fixture.options.limits.abuffer_mebibytes = allowed;
         place(&fixture, 2 * RESOLUTION, VOXELS);
         expect_refused(&fixture, ERROR_LIMIT, "abuffer");
         place(&fixture, 2 * RESOLUTION, VOXELS);
@@ -299,7 +299,7 @@ TEST(more_than_is_allowed_is_refused_with_what_it_needs)
         assert_non_null(strstr(error.text, expected));
     }
     /* It is no harm to the next one. */
-    fixture.options.abuffer_mebibytes_max = 0;
+    fixture.options.limits.abuffer_mebibytes = 0;
     build_and_read(&fixture, &some, 2 * RESOLUTION);
     expect_same(&all, &some);
     contents_free(&all);
@@ -313,12 +313,12 @@ TEST(texels_alone_may_be_more_than_is_allowed)
     const uint32_t resolution = 512; /* 12 MiB */
     struct fixture fixture;
     fixture_init(&fixture, stack_scene(1, FRONT_TO_BACK, false));
-    fixture.options.abuffer_mebibytes_max = 11;
+    fixture.options.limits.abuffer_mebibytes = 11;
     place(&fixture, resolution, VOXELS);
     uint64_t before = device->memory_used_bytes;
     expect_refused(&fixture, ERROR_LIMIT, "abuffer");
     assert_in_range(device->memory_used_bytes, before, before + ((uint64_t)1 << 20)); /* the list of instances */
-    fixture.options.abuffer_mebibytes_max = 64;
+    fixture.options.limits.abuffer_mebibytes = 64;
     build(&fixture, resolution, VOXELS);
     assert_in_range(fixture.store.sample_count, (resolution - 1) * (resolution - 1), UINT32_MAX);
     fixture_finish(&fixture);

@@ -9,7 +9,7 @@
 #define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
 #define NUMBER_ABUFFER 4
 
-static const struct tracer_options small = {.abuffer_resolution = RESOLUTION};
+static const struct tracer_options small = {.abuffer = {.resolution = RESOLUTION}};
 
 static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)
 {
@@ -65,13 +65,13 @@ ALL_TESTS(open_device, close_device)
 TEST(options_out_of_range_are_refused_by_name)
 {
     static const struct refused_options rows[] = {
-        {"options.abuffer_resolution", {.abuffer_resolution = 15}},
-        {"options.abuffer_resolution", {.abuffer_resolution = 4097}},
-        {"options.abuffer_voxels", {.abuffer_voxels = 8}},
-        {"options.abuffer_voxels", {.abuffer_voxels = 100}},
-        {"options.abuffer_voxels", {.abuffer_voxels = 512}},
-        {"options.abuffer_voxels", {.abuffer_resolution = 64, .abuffer_voxels = 128}},
-        {"options.abuffer_search", {.abuffer_search = ABUFFER_SEARCH_LINEAR1 + 1}},
+        {"options.abuffer_resolution", {.abuffer = {.resolution = 15}}},
+        {"options.abuffer_resolution", {.abuffer = {.resolution = 4097}}},
+        {"options.abuffer_voxels", {.abuffer = {.voxels = 8}}},
+        {"options.abuffer_voxels", {.abuffer = {.voxels = 100}}},
+        {"options.abuffer_voxels", {.abuffer = {.voxels = 512}}},
+        {"options.abuffer_voxels", {.abuffer = {.resolution = 64, .voxels = 128}}},
+        {"options.abuffer_search", {.abuffer = {.search = ABUFFER_SEARCH_LINEAR1 + 1}}},
     };
     expect_options_refused(NUMBER_ABUFFER, rows, sizeof(rows) / sizeof(rows[0]));
 }
@@ -188,7 +188,8 @@ TEST(an_empty_scene_is_missed)
 
 TEST(after_a_failure_the_next_update_starts_anew)
 {
-    static const struct tracer_options little = {.abuffer_resolution = RESOLUTION, .abuffer_mebibytes_max = 1};
+    static const struct tracer_options little = {.abuffer = {.resolution = RESOLUTION},
+                                                 .limits = {.abuffer_mebibytes = 1}};
     struct fixture fixture;
     struct error error = {0};
     float m[12];
@@ -218,8 +219,8 @@ TEST(voxels_follow_the_resolution)
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         struct fixture chosen, asked;
         const struct tracer_options options[2] = {
-            {.abuffer_resolution = rows[i].resolution},
-            {.abuffer_resolution = rows[i].resolution, .abuffer_voxels = (uint32_t)rows[i].voxels},
+            {.abuffer = {.resolution = rows[i].resolution}},
+            {.abuffer = {.resolution = rows[i].resolution, .voxels = (uint32_t)rows[i].voxels}},
         };
         fixture_init(&asked, scene_of_boxes(1), &options[1]);
         uint64_t bytes = asked.tracer->stats.device_bytes;

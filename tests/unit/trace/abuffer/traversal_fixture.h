@@ -21,9 +21,9 @@ static const struct form {
     const char *name;
     struct tracer_options options;
 } forms[] = {
-    {"dda", {.abuffer_search = ABUFFER_SEARCH_DDA}},
-    {"linear3", {.abuffer_search = ABUFFER_SEARCH_LINEAR3}},
-    {"linear1", {.abuffer_search = ABUFFER_SEARCH_LINEAR1}},
+    {"dda", {.abuffer = {.search = ABUFFER_SEARCH_DDA}}},
+    {"linear3", {.abuffer = {.search = ABUFFER_SEARCH_LINEAR3}}},
+    {"linear1", {.abuffer = {.search = ABUFFER_SEARCH_LINEAR1}}},
 };
 enum { DDA, LINEAR3, LINEAR1, FORM_COUNT };
 

@@ -69,14 +69,14 @@ static void input_finish(struct input *input)
 }
 
 /* The forms that elements are stored in. */
-static const struct bvh_settings packed = {.bounds = BVH_BOUNDS_OF_BOXES, .threads = 2};
-static const struct bvh_settings whole = {.bounds = BVH_BOUNDS_OF_BOXES, .whole = true, .threads = 2};
-static const struct bvh_settings of_spheres = {.bounds = BVH_BOUNDS_OF_SPHERES, .threads = 2};
-static const struct bvh_settings plain = {.bounds = BVH_BOUNDS_OF_SPHERES, .plain = true, .threads = 2};
-static const struct bvh_settings plain_boxes = {.bounds = BVH_BOUNDS_OF_BOXES, .plain = true, .threads = 2};
-static const struct bvh_settings *const forms[] = {&packed, &whole, &of_spheres, &plain, &plain_boxes};
+static const struct bvh_form packed = {.bounds = BVH_BOUNDS_OF_BOXES, .threads = 2};
+static const struct bvh_form whole = {.bounds = BVH_BOUNDS_OF_BOXES, .whole = true, .threads = 2};
+static const struct bvh_form of_spheres = {.bounds = BVH_BOUNDS_OF_SPHERES, .threads = 2};
+static const struct bvh_form plain = {.bounds = BVH_BOUNDS_OF_SPHERES, .plain = true, .threads = 2};
+static const struct bvh_form plain_boxes = {.bounds = BVH_BOUNDS_OF_BOXES, .plain = true, .threads = 2};
+static const struct bvh_form *const forms[] = {&packed, &whole, &of_spheres, &plain, &plain_boxes};
 
-static struct bvh_tree build(const struct input *input, const struct bvh_settings *settings)
+static struct bvh_tree build(const struct input *input, const struct bvh_form *settings)
 {
     struct bvh_tree tree;
     struct error error = {0};
@@ -88,7 +88,7 @@ static struct bvh_tree build(const struct input *input, const struct bvh_setting
 /* ---- what the device reads ---- */
 
 struct view {
-    const struct bvh_settings *settings;
+    const struct bvh_form *settings;
     const uint32_t *elements;
     uint32_t count;
     const struct bvh_grid *grid;
@@ -101,7 +101,7 @@ struct decoded {
     uint32_t end;  /* place behind its subtree */
 };
 
-static struct view view_of(const struct bvh_tree *tree, const struct bvh_settings *settings)
+static struct view view_of(const struct bvh_tree *tree, const struct bvh_form *settings)
 {
     return (struct view){settings, tree->elements, tree->element_count, &tree->grid};
 }
@@ -312,7 +312,7 @@ static void expect_copies_alike(const struct view *view)
     free(first);
 }
 
-static void expect_sound_in_form(const struct input *input, const struct bvh_settings *settings)
+static void expect_sound_in_form(const struct input *input, const struct bvh_form *settings)
 {
     struct bvh_tree tree = build(input, settings);
     const struct view view = view_of(&tree, settings);
@@ -492,7 +492,7 @@ TEST(a_tree_that_degenerates_to_a_list_is_built)
 TEST(the_tree_does_not_depend_on_the_threads)
 {
     struct input input = triangles(BVH_THREADED_PRIMITIVES + 10000, 10, 0.05f, 9);
-    struct bvh_settings settings = packed;
+    struct bvh_form settings = packed;
     settings.threads = 1;
     struct bvh_tree one = build(&input, &settings);
     for (settings.threads = 2; settings.threads < 5; settings.threads++) {
@@ -518,7 +518,7 @@ TEST(the_tree_does_not_depend_on_the_threads)
 TEST(a_large_tree_gives_signs_of_its_progress)
 {
     struct input input = triangles(BVH_THREADED_PRIMITIVES + 10000, 10, 0.05f, 9);
-    struct bvh_settings settings = packed;
+    struct bvh_form settings = packed;
     for (settings.threads = 1; settings.threads < 3; settings.threads++) {
         uint64_t before = progress_told();
         struct bvh_tree tree = build(&input, &settings);
@@ -588,7 +588,7 @@ TEST(a_shape_without_primitives_is_refused)
 {
     struct bvh_tree tree;
     struct error error = {0};
-    assert_false(bvh_tree_build(&tree, &(struct bvh_shape){0}, &(struct bvh_settings){.threads = 1}, &error));
+    assert_false(bvh_tree_build(&tree, &(struct bvh_shape){0}, &(struct bvh_form){.threads = 1}, &error));
     assert_int_equal(error.kind, ERROR_LIMIT);
     assert_null(tree.elements);
 }
@@ -692,7 +692,7 @@ static void expect_rest_unchanged(const struct bvh_top *top, const uint8_t *befo
     }
 }
 
-static void move_all_a_little(const struct bvh_settings *settings)
+static void move_all_a_little(const struct bvh_form *settings)
 {
     struct bvh_world_box boxes[INSTANCES];
     struct bvh_top top;

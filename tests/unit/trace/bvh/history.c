@@ -182,7 +182,7 @@ static void expect_same_answers(enum look look, const struct tracer_options *opt
         if (memcmp(&expected[i], &hits[i], sizeof *hits) != 0)
             fail_msg("ray %u, %u together: distance %.9g, primitive %u, instance %u; %.9g, %u, %u in the tree "
                      "that was refitted",
-                     i, options->bvh_rays_together, (double)expected[i].distance, expected[i].primitive,
+                     i, options->bvh.rays, (double)expected[i].distance, expected[i].primitive,
                      expected[i].instance, (double)hits[i].distance, hits[i].primitive, hits[i].instance);
         assert_true(expected[i].distance < 0 || expected[i].instance % 2 == 0); /* of two the first */
     }
@@ -192,7 +192,7 @@ static void expect_same_answers(enum look look, const struct tracer_options *opt
         tinted += (light[i] & 0xff) != 0 && (light[i] & 0xff) != 0xff;
         if (light[i] != other[i])
             fail_msg("ray %u, %u together: visibility %08x, %08x in the tree that was refitted", i,
-                     options->bvh_rays_together, light[i], other[i]);
+                     options->bvh.rays, light[i], other[i]);
     }
     assert_in_range(tinted, look == LOOK_TINTED ? RAY_COUNT / 8 : 0, RAY_COUNT);
     free(rays);
@@ -209,10 +209,10 @@ ALL_TESTS(open_device, close_device)
 TEST(answers_do_not_depend_on_how_instances_came_to_where_they_are)
 {
     static const struct tracer_options forms[] = {
-        {.bvh_rays_together = 1},
-        {.bvh_rays_together = 8},
-        {.bvh_rays_together = 3},
-        {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 2},
+        {.bvh = {.rays = 1}},
+        {.bvh = {.rays = 8}},
+        {.bvh = {.rays = 3}},
+        {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 2}},
     };
     for (size_t form = 0; form < sizeof forms / sizeof forms[0]; form++)
         expect_same_answers(LOOK_PLAIN, &forms[form]);

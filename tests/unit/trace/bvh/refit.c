@@ -180,9 +180,8 @@ ALL_TESTS(open_device, close_device)
 
 TEST(a_mesh_that_deforms_is_refitted)
 {
-    static const struct tracer_options forms[] = {{.bvh_rays_together = 1},
-                                                  {.bvh_rays_together = 4},
-                                                  {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 1}};
+    static const struct tracer_options forms[] = {
+        {.bvh = {.rays = 1}}, {.bvh = {.rays = 4}}, {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 1}}};
     for (size_t form = 0; form < sizeof forms / sizeof forms[0]; form++) {
         struct fixture fixture;
         fixture_init(&fixture, &forms[form], 0);
@@ -211,10 +210,10 @@ TEST(a_pose_that_stays_costs_nothing)
 TEST(a_mesh_that_deforms_while_the_shutter_is_open_is_met_at_each_rays_time)
 {
     static const struct tracer_options forms[] = {
-        {.bvh_rays_together = 1},
-        {.bvh_rays_together = 4},
-        {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 1},
-        {.bvh_layout = BVH_LAYOUT_PLAIN},
+        {.bvh = {.rays = 1}},
+        {.bvh = {.rays = 4}},
+        {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 1}},
+        {.bench = {.bvh_layout = BVH_LAYOUT_PLAIN}},
     };
     for (size_t form = 0; form < sizeof forms / sizeof forms[0]; form++) {
         struct fixture fixture;
@@ -230,7 +229,7 @@ TEST(a_mesh_that_deforms_while_the_shutter_is_open_is_met_at_each_rays_time)
 TEST(a_tree_that_is_worn_out_is_built_anew)
 {
     struct fixture fixture;
-    fixture_init(&fixture, &(struct tracer_options){.bvh_rays_together = 1}, 0);
+    fixture_init(&fixture, &(struct tracer_options){.bvh = {.rays = 1}}, 0);
     const struct tracer_stats *stats = &fixture.tracer->stats;
     pose(&fixture, 8, 8);
     assert_in_range(stats->nodes_rebuilt, TRIANGLES / 4, 4 * TRIANGLES);
@@ -248,7 +247,7 @@ TEST(answers_do_not_depend_on_earlier_poses)
 {
     for (uint32_t together = 0; together <= 8; together += 4) {
         struct fixture straight, roundabout;
-        const struct tracer_options options = {.bvh_rays_together = together};
+        const struct tracer_options options = {.bvh = {.rays = together}};
         fixture_init(&straight, &options, 0.3f);
         fixture_init(&roundabout, &options, 0);
         pose(&roundabout, 8, 8);

@@ -140,9 +140,12 @@ static void expect_like_brute_force(struct scene *scene, const struct ray *rays,
                                     uint32_t spurious_max)
 {
     static const struct tracer_options forms[] = {
-        {.bvh_rays_together = 1},         {.bvh_bounds = BVH_BOUNDS_SPHERE, .bvh_rays_together = 1},
-        {.bvh_layout = BVH_LAYOUT_PLAIN}, {.bvh_rays_together = 3},
-        {.bvh_rays_together = 4},         {.bvh_rays_together = 8},
+        {.bvh = {.rays = 1}},
+        {.bvh = {.bounds = BVH_BOUNDS_SPHERE, .rays = 1}},
+        {.bench = {.bvh_layout = BVH_LAYOUT_PLAIN}},
+        {.bvh = {.rays = 3}},
+        {.bvh = {.rays = 4}},
+        {.bvh = {.rays = 8}},
     };
     struct gpu_scene gpu;
     struct error error = {0};
@@ -387,7 +390,7 @@ TEST(rays_beside_one_that_is_no_number_hit_as_by_brute_force)
 TEST(an_impossible_packet_size_is_refused)
 {
     struct error error = {0};
-    assert_null(tracer_create(&tracer_bvh_impl, device, &(struct tracer_options){.bvh_rays_together = 5}, &error));
+    assert_null(tracer_create(&tracer_bvh_impl, device, &(struct tracer_options){.bvh = {.rays = 5}}, &error));
     assert_int_equal(error.kind, ERROR_INVALID);
-    assert_string_equal(error.field, "options.bvh_rays_together");
+    assert_string_equal(error.field, "options.bvh_rays");
 }

@@ -64,7 +64,7 @@ static uint32_t expect_like_oracle(struct fixture *fixture, unsigned which, cons
     struct oracle_cube cube = {.resolution = contents.cube.resolution, .cell_world = contents.cube.cell_world};
     memcpy(cube.lower_world, contents.cube.lower_world, sizeof(cube.lower_world));
     oracle_init(&oracle, &scene, &cube,
-                fixture->options.ldc_images == LDC_IMAGES_ONE ? ORACLE_ONE : ORACLE_LEANING, instances, count);
+                fixture->options.ldc.images == LDC_IMAGES_ONE ? ORACLE_ONE : ORACLE_LEANING, instances, count);
     for (uint32_t i = 0; i < 3 * oracle.resolution * oracle.resolution; i++) {
         const struct oracle_texel *expected = &oracle.texels[i];
         if (expected->open || !are_apart(expected))
@@ -129,7 +129,7 @@ TEST(what_deforms_is_where_it_went)
 /* The paper's cube: a surface is in the image that its normal leans to most, and in no other. */
 TEST(a_surface_is_in_one_image_if_that_is_asked_for)
 {
-    static const struct tracer_options one = {.ldc_images = LDC_IMAGES_ONE};
+    static const struct tracer_options one = {.ldc = {.images = LDC_IMAGES_ONE}};
     struct scene *(*const scenes[])(void) = {test_scene_soup, test_scene_spheres};
     for (size_t i = 0; i < sizeof(scenes) / sizeof(scenes[0]); i++) {
         uint32_t samples = expect_scene_like_oracle(scenes[i](), &one, NULL);
@@ -144,10 +144,10 @@ static void expect_both_builds_alike(struct fixture *fixture)
 {
     struct contents peeled, listed;
     place(fixture, TRACER_CUBE_STATIC, RESOLUTION);
-    fixture->options.ldc_build = LDC_BUILD_PEEL;
+    fixture->options.ldc.build = LDC_BUILD_PEEL;
     build(fixture, TRACER_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
     contents_read(&peeled, &fixture->store, TRACER_CUBE_STATIC);
-    fixture->options.ldc_build = LDC_BUILD_LISTS;
+    fixture->options.ldc.build = LDC_BUILD_LISTS;
     build(fixture, TRACER_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
     contents_read(&listed, &fixture->store, TRACER_CUBE_STATIC);
     expect_consistent(&peeled);

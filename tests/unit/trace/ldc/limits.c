@@ -21,9 +21,9 @@ static void build_and_read(struct fixture *fixture, struct contents *contents, u
 static void expect_both_builds_alike(struct fixture *fixture, uint32_t resolution)
 {
     struct contents peeled, listed;
-    fixture->options.ldc_build = LDC_BUILD_PEEL;
+    fixture->options.ldc.build = LDC_BUILD_PEEL;
     build_and_read(fixture, &peeled, resolution);
-    fixture->options.ldc_build = LDC_BUILD_LISTS;
+    fixture->options.ldc.build = LDC_BUILD_LISTS;
     build_and_read(fixture, &listed, resolution);
     expect_same(&peeled, &listed);
     contents_free(&peeled);
@@ -94,7 +94,7 @@ TEST(the_nearest_layers_are_kept)
     fixture_init(&fixture, test_scene_soup());
     build_and_read(&fixture, &all, 3 * RESOLUTION);
     for (uint32_t layers = 1; layers <= all.cube.layers_needed; layers++) {
-        fixture.options.ldc_layers_max = layers;
+        fixture.options.limits.ldc_layers = layers;
         expect_both_builds_alike(&fixture, 3 * RESOLUTION);
         build_and_read(&fixture, &some, 3 * RESOLUTION);
         assert_int_equal(some.cube.layers_needed, all.cube.layers_needed);
@@ -113,7 +113,7 @@ TEST(memory_limits_the_layers)
     struct error error = {0};
     fixture_init(&fixture, stack_scene(60, SHUFFLED, false));
     build_and_read(&fixture, &all, 2 * RESOLUTION);
-    fixture.options.ldc_mebibytes_max = 2;
+    fixture.options.limits.ldc_mebibytes = 2;
     expect_both_builds_alike(&fixture, 2 * RESOLUTION);
     build_and_read(&fixture, &some, 2 * RESOLUTION);
     assert_int_equal(some.cube.layers_needed, 60);
@@ -264,7 +264,7 @@ TEST(a_cube_may_be_empty)
     for (int form = 0; form < 2; form++) {
         place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
         fixture.store.cubes[TRACER_CUBE_STATIC].lower_world[2] += 100;
-        fixture.options.ldc_build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
+        fixture.options.ldc.build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
         build(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
         assert_int_equal(fixture.store.cubes[TRACER_CUBE_STATIC].sample_count, 0);
     }
@@ -286,7 +286,7 @@ TEST(what_lies_on_a_side_is_there)
     for (int form = 0; form < 2; form++) {
         struct ldc_cube *cube = &fixture.store.cubes[TRACER_CUBE_STATIC];
         *cube = (struct ldc_cube){.lower_world = {-1, -1, -1}, .cell_world = 2.0f / 30, .resolution = 30};
-        fixture.options.ldc_build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
+        fixture.options.ldc.build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
         build(&fixture, TRACER_CUBE_STATIC, fixture.instances, 1);
         assert_int_equal(cube->sample_count, 2 * 30 * 30);
         assert_int_equal(cube->layers_needed, 2);

@@ -12,7 +12,7 @@
 #define NUMBER_BVH 0
 #define NUMBER_LDC 3
 
-static const struct tracer_options small = {.ldc_resolution = RESOLUTION};
+static const struct tracer_options small = {.ldc = {.resolution = RESOLUTION}};
 
 static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)
 {
@@ -104,21 +104,21 @@ ALL_TESTS(open_device, close_device)
 TEST(options_out_of_range_are_refused_by_name)
 {
     static const struct refused_options rows[] = {
-        {"options.ldc_resolution", {.ldc_resolution = 15}},
-        {"options.ldc_resolution", {.ldc_resolution = 4097}},
-        {"options.ldc_block", {.ldc_block = 1}},
-        {"options.ldc_block", {.ldc_block = 12}},
-        {"options.ldc_block", {.ldc_block = 64}},
-        {"options.ldc_build", {.ldc_build = LDC_BUILD_LISTS + 1}},
-        {"options.ldc_levels", {.ldc_levels = LDC_LEVELS_CELLS + 1}},
-        {"options.ldc_images", {.ldc_images = LDC_IMAGES_ONE + 1}},
-        {"options.ldc_levels", {.ldc_levels = LDC_LEVELS_CELLS, .ldc_tolerance = 0.5f}},
-        {"options.ldc_tolerance", {.ldc_tolerance = -1.0f}},
-        {"options.ldc_tolerance", {.ldc_tolerance = NAN}},
-        {"options.ldc_tolerance", {.ldc_tolerance = INFINITY}},
-        {"options.ldc_rays_together", {.ldc_rays_together = 2}},
-        {"options.ldc_layers_together", {.ldc_layers_together = 3}},
-        {"options.ldc_layers_max", {.ldc_layers_max = 256}},
+        {"options.ldc_resolution", {.ldc = {.resolution = 15}}},
+        {"options.ldc_resolution", {.ldc = {.resolution = 4097}}},
+        {"options.ldc_block", {.ldc = {.block = 1}}},
+        {"options.ldc_block", {.ldc = {.block = 12}}},
+        {"options.ldc_block", {.ldc = {.block = 64}}},
+        {"options.ldc_build", {.ldc = {.build = LDC_BUILD_LISTS + 1}}},
+        {"options.ldc_levels", {.ldc = {.levels = LDC_LEVELS_CELLS + 1}}},
+        {"options.ldc_images", {.ldc = {.images = LDC_IMAGES_ONE + 1}}},
+        {"options.ldc_levels", {.ldc = {.levels = LDC_LEVELS_CELLS, .tolerance = 0.5f}}},
+        {"options.ldc_tolerance", {.ldc = {.tolerance = -1.0f}}},
+        {"options.ldc_tolerance", {.ldc = {.tolerance = NAN}}},
+        {"options.ldc_tolerance", {.ldc = {.tolerance = INFINITY}}},
+        {"options.ldc_rays", {.ldc = {.rays = 2}}},
+        {"options.ldc_layers_together", {.bench = {.ldc_layers_together = 3}}},
+        {"options.ldc_layers", {.limits = {.ldc_layers = 256}}},
     };
     expect_options_refused(NUMBER_LDC, rows, sizeof(rows) / sizeof(rows[0]));
 }
@@ -335,8 +335,8 @@ static struct scene *scene_of_squares(void)
 
 TEST(more_layers_than_may_be_kept_are_reported_and_the_nearest_stay)
 {
-    struct tracer_options options = {.ldc_resolution = RESOLUTION, .ldc_layers_max = 2};
-    for (options.ldc_build = LDC_BUILD_AUTO; options.ldc_build <= LDC_BUILD_LISTS; options.ldc_build++) {
+    struct tracer_options options = {.ldc = {.resolution = RESOLUTION}, .limits = {.ldc_layers = 2}};
+    for (options.ldc.build = LDC_BUILD_AUTO; options.ldc.build <= LDC_BUILD_LISTS; options.ldc.build++) {
         struct fixture fixture;
         fixture_init(&fixture, scene_of_squares(), &options);
         const struct tracer_cube *kept = cube(&fixture, TRACER_CUBE_STATIC);
@@ -370,7 +370,7 @@ TEST(after_a_failure_the_next_update_starts_anew)
 /* As a renderer that is switched between tracers asks for them. */
 TEST(a_tracer_that_was_away_builds_what_has_changed_meanwhile)
 {
-    static const struct tracer_options options = {.ldc_resolution = RESOLUTION};
+    static const struct tracer_options options = {.ldc = {.resolution = RESOLUTION}};
     struct change_history history = {0};
     struct tracer_set set = {.history = &history};
     struct fixture fixture = {.scene = scene_of_boxes(3), .memory_before_bytes = device->memory_used_bytes};

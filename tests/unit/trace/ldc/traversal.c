@@ -257,7 +257,7 @@ TEST(what_shares_cells_is_in_each_of_them_once)
         const float corners[3][3] = {{c - 4, 2, 2}, {2, c - 4, 2}, {2, 2, c - 4}};
         ldc_add_triangle(s, corners, 0);
     }
-    build(&fixture, &(struct tracer_options){.ldc_levels = LDC_LEVELS_CELLS});
+    build(&fixture, &(struct tracer_options){.ldc = {.levels = LDC_LEVELS_CELLS}});
     const struct ldc_cube *cube = &fixture.store.cubes[TRACER_CUBE_STATIC];
     uint32_t(*entries)[4] = malloc(cube->entry_count * sizeof *entries);
     uint32_t *times = calloc(s->count, sizeof *times);
@@ -385,9 +385,9 @@ TEST(a_tolerance_takes_depths_for_planes)
         const float o[3] = {test_uniform(&seed, 5, 45), test_uniform(&seed, 5, 45), 60};
         rays[i] = ray_from(o, (const float[3]){0, 0, -1}, 0, FAR);
     }
-    const struct tracer_options kinds[] = {{.ldc_tolerance = 0.01f},
-                                           {.ldc_tolerance = 0.01f, .ldc_levels = LDC_LEVELS_BLOCKS},
-                                           {.ldc_tolerance = 0.01f, .ldc_layers_together = 1}};
+    const struct tracer_options kinds[] = {{.ldc = {.tolerance = 0.01f}},
+                                           {.ldc = {.tolerance = 0.01f, .levels = LDC_LEVELS_BLOCKS, .block = 8}},
+                                           {.ldc = {.tolerance = 0.01f}, .bench = {.ldc_layers_together = 1}}};
     for (size_t f = 0; f < sizeof kinds / sizeof *kinds; f++) {
         build(&fixture, &kinds[f]);
         trace(&fixture, &kinds[f], WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
@@ -403,7 +403,7 @@ TEST(a_tolerance_takes_depths_for_planes)
         rays[i] =
             ray_from((const float[3]){2, test_uniform(&seed, 5, 45), 11.5f}, (const float[3]){1, 0, 0.5f}, 0, FAR);
     for (int wide = 0; wide < 2; wide++) {
-        const struct tracer_options options = {.ldc_tolerance = wide ? 1.5f : 0.1f};
+        const struct tracer_options options = {.ldc.tolerance = wide ? 1.5f : 0.1f};
         build(&fixture, &options);
         trace(&fixture, &options, WAVE_CLOSEST, rays, RAY_COUNT, hits, NULL);
         for (uint32_t i = 0; i < RAY_COUNT; i++)

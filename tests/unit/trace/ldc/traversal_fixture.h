@@ -20,15 +20,15 @@ static const struct form {
     const char *name;
     struct tracer_options options;
 } forms[] = {
-    {"cells", {0}},
-    {"cells, 4 rays", {.ldc_rays_together = 4}},
-    {"pyramid", {.ldc_levels = LDC_LEVELS_PYRAMID}},
+    {"cells", {.ldc = {0}}},
+    {"cells, 4 rays", {.ldc = {.rays = 4}}},
+    {"pyramid", {.ldc = {.levels = LDC_LEVELS_PYRAMID}}},
     {"pyramid, 4 rays, layers one by one",
-     {.ldc_levels = LDC_LEVELS_PYRAMID, .ldc_rays_together = 4, .ldc_layers_together = 1}},
-    {"blocks of 8", {.ldc_levels = LDC_LEVELS_BLOCKS}},
-    {"blocks of 2, 4 rays", {.ldc_levels = LDC_LEVELS_BLOCKS, .ldc_block = 2, .ldc_rays_together = 4}},
+     {.ldc = {.levels = LDC_LEVELS_PYRAMID, .rays = 4}, .bench = {.ldc_layers_together = 1}}},
+    {"blocks of 8", {.ldc = {.levels = LDC_LEVELS_BLOCKS, .block = 8}}},
+    {"blocks of 2, 4 rays", {.ldc = {.levels = LDC_LEVELS_BLOCKS, .block = 2, .rays = 4}}},
     {"blocks of 32, layers one by one",
-     {.ldc_levels = LDC_LEVELS_BLOCKS, .ldc_block = 32, .ldc_layers_together = 1}},
+     {.ldc = {.levels = LDC_LEVELS_BLOCKS, .block = 32}, .bench = {.ldc_layers_together = 1}}},
 };
 #define FORM_COUNT (sizeof forms / sizeof *forms)
 

@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: MIT */
+/* What tracers.def promises, held against every row of it. */
+#include "protocol/describe.h"
+#include "protocol/tracers.h"
+
+#include "tests/harness/test.h"
+
+#include <string.h>
+
+static const struct field_desc *first_field(void)
+{
+    return message_describe(MESSAGE_RENDER)->body()->fields;
+}
+
+TEST(every_setting_belongs_to_a_tracer_and_is_named_after_it)
+{
+    size_t settings = 0;
+    for (const struct field_desc *field = first_field(); field->name; field++) {
+        size_t owners = 0;
+        for (size_t i = 0; field->tracer && i < tracer_desc_count; i++)
+            owners += strcmp(tracer_descs[i].name, field->tracer) == 0;
+        if (!field->tracer)
+            continue;
+        settings++;
+        assert_int_equal(owners, 1);
+        assert_memory_equal(field->name, field->tracer, strlen(field->tracer));
+        assert_int_equal(field->name[strlen(field->tracer)], '_');
+        assert_true(field->doc[0] != '\0');
+    }
+    assert_int_equal(settings * sizeof(uint32_t), sizeof(struct tracer_settings));
+}
+
+TEST(tracers_have_the_numbers_and_names_of_their_enumeration)
+{
+    for (size_t i = 0; i < tracer_desc_count; i++) {
+        const struct tracer_desc *tracer = &tracer_descs[i];
+        assert_ptr_equal(tracer_describe(tracer->number), tracer);
+        assert_string_equal(protocol_tracer_text((enum protocol_tracer)tracer->number), tracer->name);
+    }
+    assert_null(tracer_describe(PROTOCOL_TRACER_COUNT));
+}
+
+TEST(zero_is_the_default_of_every_setting)
+{
+    struct setting_fault fault;
+    struct tracer_settings settings = {0};
+    struct message message;
+    assert_true(tracer_settings_check(&settings, "", &fault));
+    assert_string_equal(fault.text, "");
+    tracer_settings_resolve(&settings);
+    assert_true(tracer_settings_check(&settings, "", &fault));
+    message_init(&message, MESSAGE_RENDER);
+    assert_memory_equal(&settings, &message.render.settings, sizeof(settings));
+    assert_int_equal(settings.ldc.resolution, 1024);
+    assert_int_equal(settings.abuffer.voxels, 0); /* the tracer chooses */
+}
+
+static void expect_fault(const struct tracer_settings *settings, const char *prefix, const char *field,
+                         const char *text, const char *remedy)
+{
+    struct setting_fault fault;
+    assert_false(tracer_settings_check(settings, prefix, &fault));
+    assert_string_equal(fault.field, field);
+    if (!strstr(fault.text, text) || !strstr(fault.remedy, remedy))
+        fail_msg("got \"%s\" (%s)", fault.text, fault.remedy);
+}
+
+TEST(a_wrong_setting_is_told_with_its_name_and_what_is_allowed)
+{
+    expect_fault(&(struct tracer_settings){.ldc = {.resolution = 15}}, "render.", "render.ldc_resolution",
+                 "15 is not one of 16 to 4096 (0: 1024)", "");
+    expect_fault(&(struct tracer_settings){.ldc = {.block = 12}}, "--", "--ldc-block",
+                 "12 is not one of 2, 4, 8, 16, 32 (0: 8)", "");
+    expect_fault(&(struct tracer_settings){.bvh = {.rays = 5}}, "", "bvh_rays", "auto, 1, 2, 3, 4, 8", "");
+    expect_fault(&(struct tracer_settings){.abuffer = {.search = 9}}, "", "abuffer_search", "auto, dda", "");
+}
+
+TEST(settings_that_do_not_go_together_are_told_with_both_names)
+{
+    struct setting_fault fault;
+    struct tracer_settings settings = {.ldc = {.levels = PROTOCOL_LDC_LEVELS_CELLS, .tolerance = 1}};
+    expect_fault(&settings, "--", "--ldc-levels", "cells cannot be combined with --ldc-tolerance", "leave out");
+    settings.ldc.levels = PROTOCOL_LDC_LEVELS_PYRAMID;
+    assert_true(tracer_settings_check(&settings, "--", &fault));
+    settings.abuffer.voxels = 64;
+    assert_true(tracer_settings_check(&settings, "--", &fault)); /* of 1280 texels, the default */
+    settings.abuffer.resolution = 32;
+    expect_fault(&settings, "render.", "render.abuffer_voxels",
+                 "64 is more than the 32 texels of abuffer_resolution", "higher abuffer_resolution");
+}
