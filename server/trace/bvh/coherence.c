@@ -43,10 +43,8 @@ static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, co
     _Static_assert(TOGETHER_SOFTWARE == 8, "the define above");
     const struct gpu_program *program = gpu_program_get(
         device, &(struct gpu_program_source){.compute = "bvh/coherence.comp", .defines = defines}, error);
-    const uint64_t bytes_before = bvh->coherence.capacity_bytes;
-    if (!program || !gpu_buffer_reserve(device, &bvh->coherence, 2 * sizeof(uint32_t), error))
+    if (!program)
         return false;
-    bvh->base.stats.device_bytes += bvh->coherence.capacity_bytes - bytes_before;
     uint32_t groups = wave->ray_count / TOGETHER_SOFTWARE;
     uint32_t step = groups > COHERENCE_GROUPS ? groups / COHERENCE_GROUPS : 1;
     gpu_buffer_clear(device, &bvh->coherence, 0);
@@ -62,7 +60,7 @@ static bool measure_coherence(struct bvh *bvh, const struct gpu_scene *scene, co
     float leaves = wave->kind == WAVE_ANY ? WIDTH_TOGETHER_ANY : WIDTH_TOGETHER_CLOSEST;
     gpu_uniform_float(program, "width_together", leaves * bvh->leaf_extent_world);
     gpu_dispatch(device, program, groups / step);
-    gpu_buffer_read(device, &bvh->coherence, 0, counts, 2 * sizeof *counts);
+    gpu_buffer_read(device, &bvh->coherence, 0, counts, BVH_COHERENCE_BYTES);
     return true;
 }
 

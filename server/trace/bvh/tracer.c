@@ -228,7 +228,8 @@ static bool update_instances(struct bvh *bvh, const struct gpu_scene *scene, str
     uint64_t top_max = 2 * (uint64_t)scene->instance_count;
     if (top_max > BVH_LEAF_FIRST_MASK)
         return error_set(error, ERROR_LIMIT, NULL, "%u instances are too many", scene->instance_count);
-    if (!bvh_store_reserve_top(&bvh->store, (uint32_t)top_max, error))
+    if (!bvh_store_reserve_top(&bvh->store, (uint32_t)top_max, error) ||
+        !gpu_buffer_reserve(bvh->store.device, &bvh->coherence, BVH_COHERENCE_BYTES, error))
         return false;
     bool refitted = bvh->transforms && bvh->transform_count == scene->instance_count && refit_top(bvh, scene);
     if (!refitted && !rebuild_top(bvh, scene, error))

@@ -11,6 +11,8 @@
 /* Where an update is. */
 enum bvh_phase { BVH_IDLE, BVH_TREES, BVH_TOP };
 
+#define BVH_COHERENCE_BYTES (2 * sizeof(uint32_t))
+
 struct bvh {
     struct tracer base;
     enum bvh_phase phase;
@@ -20,7 +22,7 @@ struct bvh {
     uint32_t transform_count;
     struct gpu_buffer transform_buffer;
     float leaf_extent_world;     /* diagonal of a leaf's box, in the mean over what the instances show */
-    struct gpu_buffer coherence; /* what bvh/coherence.comp counts */
+    struct gpu_buffer coherence; /* what bvh/coherence.comp counts; there from the build on */
 };
 
 /* Of one wave. */
