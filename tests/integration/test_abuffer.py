@@ -52,7 +52,7 @@ class Options(Case):
         self.assertIn("FARLIGHT_", self.expect(self.dry_run(FARLIGHT_DEPTH="3", FARLIGHT_BOUNCES="2"), 2).stderr)
 
     def test_the_environment_gives_defaults(self):
-        for name, value in (("ABUFFER_RESOLUTION", "7"), ("VOXELS", "7"), ("SEARCH", "x"), ("AO_RAYS", "0"),
+        for name, value in (("ABUFFER_RESOLUTION", "7"), ("ABUFFER_VOXELS", "7"), ("ABUFFER_SEARCH", "x"), ("AO_RAYS", "0"),
                             ("AO_DISTANCE", "x"), ("AO_FALLOFF", "-1"), ("BRDF", "x"), ("LAYER_OPACITY", "2")):
             with self.subTest(name=name):
                 result = self.expect(self.dry_run(**{f"FARLIGHT_{name}": value}), 2)
