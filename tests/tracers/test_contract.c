@@ -5,7 +5,7 @@
 #define ROWS_MAX 64
 #define CHECKS_MAX 64
 #define TESTS_MAX 2048
-#define TRACER_NUMBERS_MAX 64
+#define TRACER_NUMBERS_MAX 256
 
 static const struct tracer_row *rows[ROWS_MAX];
 static const struct check *checks[CHECKS_MAX];
@@ -49,7 +49,10 @@ static void every_tracer_has_a_row_that_says_what_it_is(void **state)
 
 static void the_build_leaves_this_tracer_out(void **state)
 {
-    (void)state;
+    const struct contract_case *of = *state;
+    struct error error = {0};
+    tracer_find(of->tracer->number, "tracer", &error);
+    printf("skipped: %s\n", error.text);
     skip();
 }
 

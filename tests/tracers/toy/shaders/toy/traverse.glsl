@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// Every primitive of every instance, in an order that a setting chooses.
+#include "common/candidate.glsl"
+
+uniform uint instance_count;
+uniform uint toy_backward; // 1: the last instance first
+
+uint toy_instance(uint i)
+{
+    return toy_backward != 0u ? instance_count - 1u - i : i;
+}
+
+#ifdef ANY_HIT
+bool trace_any(trace_ray r, inout vec3 taken)
+{
+    for (uint k = 0u; k < instance_count; k++) {
+        uint i = toy_instance(k);
+        object_ray o = object_from_world_ray(r, i);
+        geometry g = geometry_at(instance_at(i).geometry);
+        for (uint p = g.first_primitive; p < g.first_primitive + g.primitive_count; p++) {
+#ifdef HAS_SPHERES
+            if (g.kind == GEOMETRY_SPHERES) {
+                if (visit_sphere_any(r, o, p, i, taken))
+                    return true;
+                continue;
+            }
+#endif
+            if (visit_triangle_any(r, o, p, i, taken))
+                return true;
+        }
+    }
+    return false;
+}
+#else
+void trace_closest(trace_ray r, inout candidate best)
+{
+    for (uint k = 0u; k < instance_count; k++) {
+        uint i = toy_instance(k);
+        object_ray o = object_from_world_ray(r, i);
+        geometry g = geometry_at(instance_at(i).geometry);
+        for (uint p = g.first_primitive; p < g.first_primitive + g.primitive_count; p++) {
+#ifdef HAS_SPHERES
+            if (g.kind == GEOMETRY_SPHERES) {
+                visit_sphere_closest(r, o, p, i, best);
+                continue;
+            }
+#endif
+            visit_triangle_closest(r, o, p, i, best);
+        }
+    }
+}
+#endif
