@@ -14,7 +14,7 @@ RELEASE = pathlib.Path(os.environ.get("FARLIGHT_BIN", ROOT / "build" / "release"
 TOY = RELEASE.parent / f"{RELEASE.name}-toy"
 os.environ["FARLIGHT_BIN"] = str(TOY)  # what farlight_test runs; each module of tests is a process of its own
 
-from farlight_test import Case, bundled_scenes, farlight, read_png  # pylint: disable=wrong-import-position
+from farlight_test import Case, bundled_scenes, farlight, long_test, read_png, LONG  # pylint: disable=wrong-import-position
 from farlight_test import tearDownModule  # pylint: disable=wrong-import-position,unused-import
 
 FOLDER = "tests/tracers/toy"
@@ -26,6 +26,8 @@ PICTURE = ("--size", "64x48", "--samples", "1", "--primary", "trace", "-q")
 
 def setUpModule():
     """A copy of the build of which only what reads the table of the tracers is compiled again."""
+    if not LONG:
+        return  # the class is skipped
     shutil.rmtree(TOY, ignore_errors=True)
     shutil.copytree(RELEASE, TOY, symlinks=True, ignore=shutil.ignore_patterns("out", "corpus", "unit", "bench", "*.json"))
     (TOY / "tests/tools").mkdir(parents=True, exist_ok=True)
@@ -35,10 +37,11 @@ def setUpModule():
             depends.with_suffix(".opp").unlink(missing_ok=True)
     for name in ("shader_sources.c", "shader_sources.o", *TARGETS):
         (TOY / name).unlink(missing_ok=True)
-    subprocess.run(["make", "-s", f"-j{os.cpu_count()}", f"B={TOY.relative_to(ROOT)}", f"EXTRA_TRACER={FOLDER}", "OPT=-O1",
+    subprocess.run(["make", "-s", f"-j{os.cpu_count()}", f"B={TOY.relative_to(ROOT)}", f"config={RELEASE.name}", f"EXTRA_TRACER={FOLDER}",
                     *(f"{TOY.relative_to(ROOT)}/{target}" for target in TARGETS)], cwd=ROOT, check=True)
 
 
+@long_test
 class AddedTracer(Case):
     def test_it_is_four_files(self):
         folder = ROOT / FOLDER

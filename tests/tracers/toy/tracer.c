@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A tracer with a folder of its own and nothing anywhere else: what the test that adds one adds. */
+/* A tracer that consists of its own folder alone: test_toy_tracer.py builds the product with it. */
 #include "gpu/program.h"
 #include "trace/program.h"
 #include "trace/tracer.h"
@@ -22,30 +22,31 @@ static void toy_destroy(struct tracer *tracer)
 }
 
 static enum tracer_progress toy_update(struct tracer *tracer, struct gpu_scene *scene,
-                                       const struct scene_changes *changes, struct stage_times *times,
-                                       struct error *error)
+                                       const struct tracer_update *update, struct error *error)
 {
-    (void)tracer, (void)scene, (void)changes, (void)times, (void)error;
+    (void)tracer, (void)scene, (void)update, (void)error;
     return TRACER_DONE;
 }
 
-static bool toy_trace(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, struct error *error)
+static bool toy_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
+                            const struct ray_range *rays, struct error *error)
 {
     const struct toy_settings *settings = &tracer->options.toy;
     const struct trace_program_source source = {.traverse = "toy/traverse.glsl",
                                                 .rays_a_dispatch = settings->batch};
-    const struct gpu_program *program = trace_program_get(scene, wave, &source, error);
+    const struct gpu_program *program = trace_program_get(scene, &state->wave, &source, error);
     if (!program)
         return false;
     gpu_uniform_uint(program, "toy_backward", settings->order == TOY_ORDER_BACKWARD);
-    return trace_program_run(program, scene, wave, &source, error);
+    trace_program_run(program, scene, rays, &source);
+    return true;
 }
 
 const struct tracer_impl tracer_toy_impl = {
     .name = "toy",
-    .depends_on = TRACER_NEEDS_SCENE,
+    .depends_on = CHANGED_GEOMETRY | CHANGED_INSTANCES,
     .create = toy_create,
     .destroy = toy_destroy,
     .update = toy_update,
-    .trace = toy_trace,
+    .trace_range = toy_trace_range,
 };
