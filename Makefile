@@ -428,7 +428,7 @@ install: all
 	install -m 755 $(B)/$(SONAME) $(DESTDIR)$(PREFIX)/lib
 	ln -sf $(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so
 	install -m 644 client/lib/farlight.h $(DESTDIR)$(PREFIX)/include/farlight/lib
-	install -m 644 $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.def) $(DESTDIR)$(PREFIX)/include/farlight/protocol
+	install -m 644 $(addprefix protocol/,messages.h messages.def tracers.h tracers.def words.h words.def) $(DESTDIR)$(PREFIX)/include/farlight/protocol
 	sed 's#@PREFIX@#$(PREFIX)#; s#@VERSION@#$(VERSION)#' conf/farlight.pc.in \
 	    >$(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc
 	install -m 644 client/cli/completion.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight

@@ -43,10 +43,10 @@ static bool check_int(const struct field_desc *field, const void *place, const s
         return true;
     }
     if (!field->zero_is_default) {
-        return check_fail(error, PROTOCOL_ERROR_CODE_INVALID, path,
-                          "%" PRIu64 " is not within %" PRIu64 " .. %" PRIu64, value, field->min, field->max);
+        return check_fail(error, PROTOCOL_ERROR_INVALID, path, "%" PRIu64 " is not within %" PRIu64 " .. %" PRIu64,
+                          value, field->min, field->max);
     }
-    return check_fail(error, PROTOCOL_ERROR_CODE_INVALID, path, "%" PRIu64 " is not one of %s (0: %s)", value,
+    return check_fail(error, PROTOCOL_ERROR_INVALID, path, "%" PRIu64 " is not one of %s (0: %s)", value,
                       field_allowed_text(field, allowed, sizeof(allowed)),
                       field_default_text(field, instead, sizeof(instead)));
 }
@@ -57,7 +57,7 @@ static bool check_enum(const struct field_desc *field, const void *place, const 
     uint32_t value = (uint32_t)field_load_int(field, place);
     char list[96];
     if (!enum_desc_text(field->enumeration, value)) {
-        return check_fail(error, PROTOCOL_ERROR_CODE_INVALID, path, "%" PRIu32 " is none of: %s", value,
+        return check_fail(error, PROTOCOL_ERROR_INVALID, path, "%" PRIu32 " is none of: %s", value,
                           protocol_enum_list(field->enumeration->name, list, sizeof(list)));
     }
     return true;
@@ -71,11 +71,11 @@ static bool check_reals(const struct field_desc *field, const void *place, const
         float value;
         memcpy(&value, (const char *)place + 4 * i, 4);
         if (!isfinite(value)) {
-            return check_fail(error, PROTOCOL_ERROR_CODE_INVALID, &path, "%g is no finite number", (double)value);
+            return check_fail(error, PROTOCOL_ERROR_INVALID, &path, "%g is no finite number", (double)value);
         }
         if (value < field->real_min || value > field->real_max) {
-            return check_fail(error, PROTOCOL_ERROR_CODE_INVALID, &path, "%.9g is not within %g .. %g",
-                              (double)value, (double)field->real_min, (double)field->real_max);
+            return check_fail(error, PROTOCOL_ERROR_INVALID, &path, "%.9g is not within %g .. %g", (double)value,
+                              (double)field->real_min, (double)field->real_max);
         }
     }
     return true;
@@ -101,7 +101,7 @@ bool check_count(const struct field_desc *field, uint64_t count, const struct pa
                  struct decode_error *error)
 {
     if (count > field->max) {
-        return check_fail(error, PROTOCOL_ERROR_CODE_INVALID, path, "%" PRIu64 " %s, at most %" PRIu64, count,
+        return check_fail(error, PROTOCOL_ERROR_INVALID, path, "%" PRIu64 " %s, at most %" PRIu64, count,
                           field->kind == FIELD_ARRAY ? "elements" : "bytes", field->max);
     }
     return true;
@@ -110,7 +110,7 @@ bool check_count(const struct field_desc *field, uint64_t count, const struct pa
 bool check_text(const uint8_t *bytes, size_t count, const struct path *path, struct decode_error *error)
 {
     if (!utf8_valid(bytes, count)) {
-        return check_fail(error, PROTOCOL_ERROR_CODE_INVALID, path, "no UTF-8 text without NUL");
+        return check_fail(error, PROTOCOL_ERROR_INVALID, path, "no UTF-8 text without NUL");
     }
     return true;
 }

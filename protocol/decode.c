@@ -44,8 +44,7 @@ static void *scratch_alloc(struct scratch *scratch, size_t bytes, size_t alignme
 
 static bool fail_truncated(struct decoder *decoder, const struct path *path, size_t wanted, size_t left)
 {
-    return check_fail(decoder->error, PROTOCOL_ERROR_CODE_PROTOCOL, path, "%zu bytes where %zu are left", wanted,
-                      left);
+    return check_fail(decoder->error, PROTOCOL_ERROR_PROTOCOL, path, "%zu bytes where %zu are left", wanted, left);
 }
 
 /* One fixed field out of `reader`, whose bytes are known to suffice. */
@@ -106,7 +105,7 @@ static bool decode_string(struct decoder *decoder, const struct field_desc *fiel
     }
     char *text = scratch_alloc(decoder->scratch, (size_t)count + 1, 1);
     if (!text) {
-        return check_fail(decoder->error, PROTOCOL_ERROR_CODE_LIMIT, path, "no room to decode it");
+        return check_fail(decoder->error, PROTOCOL_ERROR_LIMIT, path, "no room to decode it");
     }
     memcpy(text, bytes, count);
     text[count] = '\0';
@@ -142,13 +141,13 @@ static bool decode_array(struct decoder *decoder, const struct field_desc *field
     /* Nothing is reserved for elements that cannot have come. */
     size_t left = reader_left(&decoder->reader);
     if (count > left / record->wire_min_bytes) {
-        return check_fail(decoder->error, PROTOCOL_ERROR_CODE_PROTOCOL, path,
+        return check_fail(decoder->error, PROTOCOL_ERROR_PROTOCOL, path,
                           "%" PRIu32 " elements of at least %" PRIu32 " bytes where %zu are left", count,
                           record->wire_min_bytes, left);
     }
     char *elements = scratch_alloc(decoder->scratch, count * record->size_bytes, 8);
     if (!elements) {
-        return check_fail(decoder->error, PROTOCOL_ERROR_CODE_LIMIT, path, "no room to decode it");
+        return check_fail(decoder->error, PROTOCOL_ERROR_LIMIT, path, "no room to decode it");
     }
     for (uint32_t i = 0; i < count; i++) {
         struct path element = {path->parent, path->name, i};
@@ -174,7 +173,7 @@ static bool decode_bulk(struct decoder *decoder, const struct field_desc *field,
         return fail_truncated(decoder, path, pad + count, left);
     }
     if (!reader_zeros(&decoder->reader, pad)) {
-        return check_fail(decoder->error, PROTOCOL_ERROR_CODE_PROTOCOL, path, "padding is not zero");
+        return check_fail(decoder->error, PROTOCOL_ERROR_PROTOCOL, path, "padding is not zero");
     }
     const uint8_t *bytes = reader_view(&decoder->reader, count);
     memcpy(body + field->offset, &bytes, sizeof(bytes));
@@ -237,7 +236,7 @@ static bool decode_body(struct decoder *decoder, const struct message_desc *desc
         }
     }
     if (reader_left(&decoder->reader) != 0) {
-        return check_fail(decoder->error, PROTOCOL_ERROR_CODE_PROTOCOL, &root, "%zu bytes too many",
+        return check_fail(decoder->error, PROTOCOL_ERROR_PROTOCOL, &root, "%zu bytes too many",
                           reader_left(&decoder->reader));
     }
     return true;
@@ -253,11 +252,11 @@ bool message_decode(struct message *out, uint16_t type, const uint8_t *payload, 
     }
     memset(out, 0, sizeof(*out));
     if (!desc) {
-        return decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, NULL, "type 0x%04x is unknown", type);
+        return decode_error_set(error, PROTOCOL_ERROR_PROTOCOL, NULL, "type 0x%04x is unknown", type);
     }
     if (payload_bytes > desc->info.payload_max_bytes) {
-        return decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, desc->info.name,
-                                "%zu bytes, at most %" PRIu32, payload_bytes, desc->info.payload_max_bytes);
+        return decode_error_set(error, PROTOCOL_ERROR_PROTOCOL, desc->info.name, "%zu bytes, at most %" PRIu32,
+                                payload_bytes, desc->info.payload_max_bytes);
     }
     message_init(out, (enum message_type)type);
     reader_init(&decoder.reader, payload, payload_bytes);

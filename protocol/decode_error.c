@@ -7,7 +7,7 @@
 bool decode_error_set(struct decode_error *error, enum protocol_error_code code, const char *field,
                       const char *format, ...)
 {
-    if (!error || error->code != PROTOCOL_ERROR_CODE_NONE) {
+    if (!error || error->code != PROTOCOL_ERROR_NONE) {
         return false;
     }
     error->code = code;

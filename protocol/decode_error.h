@@ -10,7 +10,7 @@
  * code VERSION:  handshake only.
  * code LIMIT:    the caller's buffer or scratch is too small, or the message too large to be sent. */
 struct decode_error {
-    enum protocol_error_code code; /* PROTOCOL_ERROR_CODE_NONE: no error */
+    enum protocol_error_code code; /* PROTOCOL_ERROR_NONE: no error */
     char field[128];               /* "render.keys[3].fov_y"; empty: the message as a whole */
     char text[192];                /* "4 is not within 0.001 .. 3.1" */
 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* messages.def as constant data, for code that treats all messages alike: codec, printer, document, tests,
- * fuzzers. */
+/* words.def and messages.def as constant data, for code that treats all messages alike: codec, printer, document,
+ * tests, fuzzers. */
 #ifndef FARLIGHT_PROTOCOL_DESCRIBE_H
 #define FARLIGHT_PROTOCOL_DESCRIBE_H
 

@@ -75,7 +75,7 @@ static bool encode_array(struct encoder *encoder, const struct field_desc *field
         return false;
     }
     if (!elements && count > 0) {
-        return check_fail(&writer->error, PROTOCOL_ERROR_CODE_INVALID, path,
+        return check_fail(&writer->error, PROTOCOL_ERROR_INVALID, path,
                           "no elements where %" PRIu32 " are counted", count);
     }
     if (!writer_put_u32(writer, count)) {
@@ -100,8 +100,8 @@ static bool encode_bulk(struct encoder *encoder, const struct field_desc *field,
         return false;
     }
     if (!bytes && count > 0) {
-        return check_fail(&writer->error, PROTOCOL_ERROR_CODE_INVALID, path,
-                          "no bytes where %" PRIu32 " are counted", count);
+        return check_fail(&writer->error, PROTOCOL_ERROR_INVALID, path, "no bytes where %" PRIu32 " are counted",
+                          count);
     }
     writer_put_u32(writer, count);
     writer_put_zeros(writer, (0 - (writer->used_bytes - encoder->payload_start)) & 7);
@@ -144,7 +144,7 @@ bool message_encode(struct writer *writer, const struct message *message)
     }
     if (!desc) {
         writer->failed = true;
-        return decode_error_set(&writer->error, PROTOCOL_ERROR_CODE_INVALID, NULL, "type 0x%04x is unknown",
+        return decode_error_set(&writer->error, PROTOCOL_ERROR_INVALID, NULL, "type 0x%04x is unknown",
                                 (unsigned)message->type);
     }
     const struct struct_desc *body = desc->body();
@@ -154,8 +154,8 @@ bool message_encode(struct writer *writer, const struct message *message)
     bool ok = !writer->failed && encode_struct(&encoder, body, (const char *)message + MESSAGE_BODY_OFFSET, &root);
     size_t payload_bytes = writer->used_bytes - encoder.payload_start;
     if (ok && payload_bytes > desc->info.payload_max_bytes) {
-        ok = decode_error_set(&writer->error, PROTOCOL_ERROR_CODE_LIMIT, desc->info.name,
-                              "%zu bytes, at most %" PRIu32, payload_bytes, desc->info.payload_max_bytes);
+        ok = decode_error_set(&writer->error, PROTOCOL_ERROR_LIMIT, desc->info.name, "%zu bytes, at most %" PRIu32,
+                              payload_bytes, desc->info.payload_max_bytes);
     }
     if (!ok) {
         writer->failed = true;

@@ -41,21 +41,18 @@ static bool header_allowed(const struct framing_header *header, const struct mes
     uint32_t min = info ? info->payload_min_bytes : 0;
     const char *name = message_type_text(header->type);
     if (!info && (header->type & MESSAGE_TYPE_IGNORABLE) == 0) {
-        return decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, "type", "type 0x%04x is unknown",
-                                header->type);
+        return decode_error_set(error, PROTOCOL_ERROR_PROTOCOL, "type", "type 0x%04x is unknown", header->type);
     }
     if (header->flags != 0) {
-        return decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, "flags", "flags 0x%04x are not 0",
-                                header->flags);
+        return decode_error_set(error, PROTOCOL_ERROR_PROTOCOL, "flags", "flags 0x%04x are not 0", header->flags);
     }
     if (header->payload_bytes < min || header->payload_bytes > max) {
-        return decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, "payload_bytes",
+        return decode_error_set(error, PROTOCOL_ERROR_PROTOCOL, "payload_bytes",
                                 "%s: %" PRIu32 " bytes are not within %" PRIu32 " .. %" PRIu32, name,
                                 header->payload_bytes, min, max);
     }
     if (info && (info->from & accept) == 0) {
-        return decode_error_set(error, PROTOCOL_ERROR_CODE_DENIED, "type", "%s is not for this peer to send",
-                                name);
+        return decode_error_set(error, PROTOCOL_ERROR_DENIED, "type", "%s is not for this peer to send", name);
     }
     return true;
 }
@@ -86,7 +83,7 @@ enum framing_result framing_parse(struct frame *frame, const uint8_t *bytes, siz
     size_t end = FRAMING_HEADER_BYTES + header.payload_bytes;
     reader_init(&tail, bytes + end, total_bytes - end);
     if (!reader_zeros(&tail, total_bytes - end)) {
-        decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, "padding", "%s: padding is not zero",
+        decode_error_set(error, PROTOCOL_ERROR_PROTOCOL, "padding", "%s: padding is not zero",
                          message_type_text(header.type));
         return FRAMING_FATAL;
     }

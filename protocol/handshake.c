@@ -100,7 +100,7 @@ size_t handshake_reply_encode(uint8_t out[HANDSHAKE_REPLY_MAX_BYTES], const stru
 
 static enum handshake_result fatal(struct decode_error *error, const char *field, const char *text)
 {
-    decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, field, "%s", text);
+    decode_error_set(error, PROTOCOL_ERROR_PROTOCOL, field, "%s", text);
     return HANDSHAKE_FATAL;
 }
 
@@ -239,7 +239,7 @@ uint16_t handshake_choose_version(const struct handshake_hello *hello, struct de
 {
     uint16_t greatest = hello->version_max < HANDSHAKE_VERSION_MAX ? hello->version_max : HANDSHAKE_VERSION_MAX;
     if (greatest < hello->version_min || greatest < HANDSHAKE_VERSION_MIN) {
-        decode_error_set(error, PROTOCOL_ERROR_CODE_VERSION, "version",
+        decode_error_set(error, PROTOCOL_ERROR_VERSION, "version",
                          "the daemon speaks versions %u to %u, the client %u to %u", HANDSHAKE_VERSION_MIN,
                          HANDSHAKE_VERSION_MAX, hello->version_min, hello->version_max);
         return 0;
@@ -251,11 +251,11 @@ bool handshake_reply_accept(const struct handshake_hello *hello, const struct ha
                             struct decode_error *error)
 {
     if (reply->version == 0) {
-        return decode_error_set(error, PROTOCOL_ERROR_CODE_VERSION, "version", "%s",
+        return decode_error_set(error, PROTOCOL_ERROR_VERSION, "version", "%s",
                                 reply->text[0] != '\0' ? reply->text : "no version in common");
     }
     if (reply->version < hello->version_min || reply->version > hello->version_max) {
-        return decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, "version",
+        return decode_error_set(error, PROTOCOL_ERROR_PROTOCOL, "version",
                                 "%u was chosen where %u to %u were offered", reply->version, hello->version_min,
                                 hello->version_max);
     }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Structs and enums of every message, expanded from messages.def.
+/* Structs of every message, expanded from messages.def; their enums are in words.h.
  *
- *   enum protocol_<name>, PROTOCOL_<NAME>_<VALUE>, PROTOCOL_<NAME>_COUNT, protocol_<name>_text(), _parse()
  *   struct record_<name>, struct message_<name>, MESSAGE_<NAME>, struct message
  *
  * Memory: a message owns nothing. Decoded strings and arrays live in the caller's scratch (codec.h), bulk
@@ -17,13 +16,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* clang-format off */
-/* ---- enums: values are listed in ascending order from 0, so COUNT is also one past the greatest ---- */
-#define ENUMERATION(NAME, name, doc) enum protocol_##name {
-#define VALUE(NAME, VALUE_NAME, number, text, doc) PROTOCOL_##NAME##_##VALUE_NAME = (number),
-#define ENUMERATION_END(NAME, name) PROTOCOL_##NAME##_COUNT };
-#include "protocol/words.def"
+#include "protocol/words.h"
 
+/* clang-format off */
 /* ---- fields ---- */
 #define PROTOCOL_INT_u8 uint8_t
 #define PROTOCOL_INT_u16 uint16_t
@@ -83,16 +78,6 @@ static inline uint32_t protocol_pixel_format_bytes(enum protocol_pixel_format fo
 {
     return format == PROTOCOL_PIXEL_FORMAT_RGBA8 ? 4 : format == PROTOCOL_PIXEL_FORMAT_RGBA16F ? 8 : 16;
 }
-
-/* Per enum: the value's text ("bvh"; "?" outside the enum), and back (false: no such text; *out untouched). */
-#define ENUMERATION(NAME, name, doc)                                                                              \
-    const char *protocol_##name##_text(enum protocol_##name value);                                               \
-    bool protocol_##name##_parse(const char *text, enum protocol_##name *out);
-#include "protocol/words.def"
-
-/* For help texts and error messages: "bvh, naive" for the enum called "tracer". Writes at most out_bytes with
- * the NUL, cut off if too long; empty for an unknown enum. Returns out. */
-const char *protocol_enum_list(const char *enum_name, char *out, size_t out_bytes);
 
 #ifdef __cplusplus
 }

@@ -18,7 +18,7 @@ static uint8_t *reserve(struct writer *writer, size_t count)
     }
     if (count > writer->capacity_bytes - writer->used_bytes) {
         writer->failed = true;
-        decode_error_set(&writer->error, PROTOCOL_ERROR_CODE_LIMIT, NULL, "the buffer of %zu bytes is too small",
+        decode_error_set(&writer->error, PROTOCOL_ERROR_LIMIT, NULL, "the buffer of %zu bytes is too small",
                          writer->capacity_bytes);
         return NULL;
     }

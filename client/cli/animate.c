@@ -138,7 +138,7 @@ static bool complete_keys(struct animation *animation)
     size_t count = 0;
     if (!fl_camera_keys_load(animation->keys_path, &animation->keys, &count, &job->error))
         return false;
-    job->options.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
+    job->options.camera_path = PROTOCOL_CAMERA_KEYS;
     job->options.keys = animation->keys;
     job->options.keys_count = (uint32_t)count;
     return true;
@@ -164,7 +164,7 @@ static bool complete(struct animation *animation)
     /* Frames of a camera that stands still would all be alike, where nothing else moves. */
     job->is_orbit = job->is_orbit || (!job->camera && !job->script && job->clip_count == 0);
     if (job->is_orbit)
-        job->options.camera_path = PROTOCOL_CAMERA_PATH_ORBIT;
+        job->options.camera_path = PROTOCOL_CAMERA_ORBIT;
     return true;
 }
 

@@ -191,7 +191,7 @@ static bool complete_camera(struct cli_job *job)
         return cli_usage(job, "--look-at", "is where --eye is") == 0;
     if (is_zero(job->key.up_world) || is_degenerate(&job->key))
         return cli_usage(job, "--up", "must not be parallel to the view direction") == 0;
-    job->options.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
+    job->options.camera_path = PROTOCOL_CAMERA_KEYS;
     job->options.keys = &job->key;
     job->options.keys_count = 1;
     return true;

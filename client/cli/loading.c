@@ -92,12 +92,12 @@ bool cli_choose_camera(struct cli_job *job, const struct fl_scene *scene, struct
     if (options->keys_count > 0 || job->is_orbit)
         return true;
     if (job->camera) {
-        options->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        options->camera_path = PROTOCOL_CAMERA_NODE;
         return fl_scene_find_camera(scene, job->camera, &options->camera_node, error);
     }
     const struct fl_camera_info *first = fl_scene_camera(scene, 0);
     if (first) {
-        options->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        options->camera_path = PROTOCOL_CAMERA_NODE;
         options->camera_node = first->node;
     }
     return true;

@@ -11,9 +11,9 @@
 bool cli_daemon_is_lost(const struct fl_error *error)
 {
     /* What it says of its own state, it may say otherwise later, or another one at the same address. */
-    const bool is_passing = error->retryable || error->server_code == PROTOCOL_ERROR_CODE_SHUTTING_DOWN ||
-                            error->server_code == PROTOCOL_ERROR_CODE_DEVICE_LOST ||
-                            error->server_code == PROTOCOL_ERROR_CODE_BUSY;
+    const bool is_passing = error->retryable || error->server_code == PROTOCOL_ERROR_SHUTTING_DOWN ||
+                            error->server_code == PROTOCOL_ERROR_DEVICE_LOST ||
+                            error->server_code == PROTOCOL_ERROR_BUSY;
     return error->code == FL_ERROR_CONNECTION || (error->code == FL_ERROR_REFUSED && is_passing);
 }
 

@@ -275,7 +275,7 @@ static bool come_back(const struct serving *serving, struct cli_loading *loading
     attaching.scene = loading->scene_name;
     const bool attached = load_again(loading, &attaching, error);
     loading->job = &serving->job;
-    if (attached || error->server_code != PROTOCOL_ERROR_CODE_UNKNOWN_ID)
+    if (attached || error->server_code != PROTOCOL_ERROR_UNKNOWN_ID)
         return attached;
     cli_loading_close(loading);
     return load_again(loading, &serving->job, error);

@@ -56,7 +56,7 @@ static bool settle_target(const struct cli_channel *given, struct fl_scene *scen
         return true;
     if (!fl_scene_find_object(scene, given->kind, given->target, object, error))
         return false;
-    if (given->channel.path != PROTOCOL_CHANNEL_PATH_LIGHT_SIZE || fl_scene_light_has_size(scene, *object))
+    if (given->channel.path != PROTOCOL_CHANNEL_LIGHT_SIZE || fl_scene_light_has_size(scene, *object))
         return true;
     fl_error_set(error, FL_ERROR_ARGUMENT, "light",
                  "the light '%s' has no size: it is neither a rectangle nor a sphere", given->target);

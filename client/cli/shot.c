@@ -13,23 +13,23 @@
 /* ---- what the scene has ---- */
 
 static const struct shot_property light_properties[] = {
-    {"colour", PROTOCOL_CHANNEL_PATH_LIGHT_COLOUR, SHOT_NUMBERS, 3, 0, 1e12, 1, "[10, 9, 8]"},
-    {"size", PROTOCOL_CHANNEL_PATH_LIGHT_SIZE, SHOT_SIZE, 2, 0, 1e12, 1, "[0.5, 0.5]"},
+    {"colour", PROTOCOL_CHANNEL_LIGHT_COLOUR, SHOT_NUMBERS, 3, 0, 1e12, 1, "[10, 9, 8]"},
+    {"size", PROTOCOL_CHANNEL_LIGHT_SIZE, SHOT_SIZE, 2, 0, 1e12, 1, "[0.5, 0.5]"},
     {0}};
 static const struct shot_property material_properties[] = {
-    {"base_colour", PROTOCOL_CHANNEL_PATH_MATERIAL_BASE_COLOUR, SHOT_COLOUR, 4, 0, 1, 1, "[1, 0.5, 0.2]"},
-    {"emission", PROTOCOL_CHANNEL_PATH_MATERIAL_EMISSION, SHOT_NUMBERS, 3, 0, 1e6, 1, "[1, 1, 1]"},
-    {"metallic", PROTOCOL_CHANNEL_PATH_MATERIAL_METALLIC, SHOT_NUMBERS, 1, 0, 1, 1, "1"},
-    {"roughness", PROTOCOL_CHANNEL_PATH_MATERIAL_ROUGHNESS, SHOT_NUMBERS, 1, 0, 1, 1, "0.3"},
-    {"transmission", PROTOCOL_CHANNEL_PATH_MATERIAL_TRANSMISSION, SHOT_NUMBERS, 1, 0, 1, 1, "1"},
-    {"ior", PROTOCOL_CHANNEL_PATH_MATERIAL_IOR, SHOT_NUMBERS, 1, 1, 10, 1, "1.5"},
+    {"base_colour", PROTOCOL_CHANNEL_MATERIAL_BASE_COLOUR, SHOT_COLOUR, 4, 0, 1, 1, "[1, 0.5, 0.2]"},
+    {"emission", PROTOCOL_CHANNEL_MATERIAL_EMISSION, SHOT_NUMBERS, 3, 0, 1e6, 1, "[1, 1, 1]"},
+    {"metallic", PROTOCOL_CHANNEL_MATERIAL_METALLIC, SHOT_NUMBERS, 1, 0, 1, 1, "1"},
+    {"roughness", PROTOCOL_CHANNEL_MATERIAL_ROUGHNESS, SHOT_NUMBERS, 1, 0, 1, 1, "0.3"},
+    {"transmission", PROTOCOL_CHANNEL_MATERIAL_TRANSMISSION, SHOT_NUMBERS, 1, 0, 1, 1, "1"},
+    {"ior", PROTOCOL_CHANNEL_MATERIAL_IOR, SHOT_NUMBERS, 1, 1, 10, 1, "1.5"},
     {0}};
 static const struct shot_property node_properties[] = {
-    {"translation", PROTOCOL_CHANNEL_PATH_NODE_TRANSLATION, SHOT_NUMBERS, 3, -1e12, 1e12, 1, "[0, 1, 0]"},
-    {"rotation", PROTOCOL_CHANNEL_PATH_NODE_ROTATION, SHOT_TURN, 4, -1, 1, 1, "[0, 0, 0, 1]"},
-    {"rotation_degrees", PROTOCOL_CHANNEL_PATH_NODE_ROTATION, SHOT_ANGLES, 3, -3.6e6, 3.6e6, 1, "[0, 90, 0]"},
-    {"scale", PROTOCOL_CHANNEL_PATH_NODE_SCALE, SHOT_NUMBERS, 3, -1e6, 1e6, 1, "[1, 1, 1]"},
-    {"hidden", PROTOCOL_CHANNEL_PATH_NODE_HIDDEN, SHOT_FLAG, 1, 0, 1, 1, "true"},
+    {"translation", PROTOCOL_CHANNEL_NODE_TRANSLATION, SHOT_NUMBERS, 3, -1e12, 1e12, 1, "[0, 1, 0]"},
+    {"rotation", PROTOCOL_CHANNEL_NODE_ROTATION, SHOT_TURN, 4, -1, 1, 1, "[0, 0, 0, 1]"},
+    {"rotation_degrees", PROTOCOL_CHANNEL_NODE_ROTATION, SHOT_ANGLES, 3, -3.6e6, 3.6e6, 1, "[0, 90, 0]"},
+    {"scale", PROTOCOL_CHANNEL_NODE_SCALE, SHOT_NUMBERS, 3, -1e6, 1e6, 1, "[1, 1, 1]"},
+    {"hidden", PROTOCOL_CHANNEL_NODE_HIDDEN, SHOT_FLAG, 1, 0, 1, 1, "true"},
     {0}};
 
 static const struct group {
@@ -37,9 +37,9 @@ static const struct group {
     enum protocol_object_kind kind;
     const struct shot_property *properties;
 } groups[] = {
-    {"lights", PROTOCOL_OBJECT_KIND_LIGHT, light_properties},
-    {"materials", PROTOCOL_OBJECT_KIND_MATERIAL, material_properties},
-    {"nodes", PROTOCOL_OBJECT_KIND_NODE, node_properties},
+    {"lights", PROTOCOL_OBJECT_LIGHT, light_properties},
+    {"materials", PROTOCOL_OBJECT_MATERIAL, material_properties},
+    {"nodes", PROTOCOL_OBJECT_NODE, node_properties},
 };
 #define GROUP_COUNT (sizeof(groups) / sizeof(groups[0]))
 

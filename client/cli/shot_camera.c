@@ -10,13 +10,13 @@
 enum view { EYE, LOOK_AT, UP, FOV, APERTURE, FOCUS, EXPOSURE, VIEW_COUNT };
 
 static const struct shot_property properties[VIEW_COUNT] = {
-    {"eye", PROTOCOL_CHANNEL_PATH_VIEW_EYE, SHOT_NUMBERS, 3, -1e12, 1e12, 1, "[3, 2, 4]"},
-    {"look_at", PROTOCOL_CHANNEL_PATH_VIEW_LOOK_AT, SHOT_NUMBERS, 3, -1e12, 1e12, 1, "[0, 1, 0]"},
-    {"up", PROTOCOL_CHANNEL_PATH_VIEW_UP, SHOT_NUMBERS, 3, -1e6, 1e6, 1, "[0, 1, 0]"},
-    {"fov", PROTOCOL_CHANNEL_PATH_VIEW_FOV_Y, SHOT_NUMBERS, 1, 0.1, 177, RADIANS_PER_DEGREE, "40"},
-    {"aperture", PROTOCOL_CHANNEL_PATH_VIEW_APERTURE, SHOT_NUMBERS, 1, 0, 1e6, 1, "0.05"},
-    {"focus", PROTOCOL_CHANNEL_PATH_VIEW_FOCUS, SHOT_NUMBERS, 1, 0, 1e12, 1, "3.2"},
-    {"exposure", PROTOCOL_CHANNEL_PATH_VIEW_EXPOSURE, SHOT_NUMBERS, 1, -64, 64, 1, "-0.5"}};
+    {"eye", PROTOCOL_CHANNEL_VIEW_EYE, SHOT_NUMBERS, 3, -1e12, 1e12, 1, "[3, 2, 4]"},
+    {"look_at", PROTOCOL_CHANNEL_VIEW_LOOK_AT, SHOT_NUMBERS, 3, -1e12, 1e12, 1, "[0, 1, 0]"},
+    {"up", PROTOCOL_CHANNEL_VIEW_UP, SHOT_NUMBERS, 3, -1e6, 1e6, 1, "[0, 1, 0]"},
+    {"fov", PROTOCOL_CHANNEL_VIEW_FOV_Y, SHOT_NUMBERS, 1, 0.1, 177, RADIANS_PER_DEGREE, "40"},
+    {"aperture", PROTOCOL_CHANNEL_VIEW_APERTURE, SHOT_NUMBERS, 1, 0, 1e6, 1, "0.05"},
+    {"focus", PROTOCOL_CHANNEL_VIEW_FOCUS, SHOT_NUMBERS, 1, 0, 1e12, 1, "3.2"},
+    {"exposure", PROTOCOL_CHANNEL_VIEW_EXPOSURE, SHOT_NUMBERS, 1, -64, 64, 1, "-0.5"}};
 
 /* The value of the first key. */
 static const float *first_value(const struct fl_channel *channel)
@@ -34,7 +34,7 @@ static bool read_view(const struct shot_reader *reader, const struct shot_value 
         return false;
     memcpy(first, first_value(&channel), channel.width * sizeof(*first));
     return (!shot_is_keyed(at) && which != EXPOSURE) ||
-           shot_add_channel(reader, at, &channel, PROTOCOL_OBJECT_KIND_CAMERA, NULL);
+           shot_add_channel(reader, at, &channel, PROTOCOL_OBJECT_CAMERA, NULL);
 }
 
 /* ---- where it is ---- */
@@ -115,14 +115,14 @@ static bool read_dolly(const struct shot_reader *reader, const struct shot_value
         memcpy(values[i], reader->job->key.eye_world, sizeof(*values));
         memcpy(values[parts + i], to, sizeof(*values));
     }
-    const struct fl_channel channel = {.path = PROTOCOL_CHANNEL_PATH_VIEW_EYE,
+    const struct fl_channel channel = {.path = PROTOCOL_CHANNEL_VIEW_EYE,
                                        .interpolation =
                                            eases ? PROTOCOL_INTERPOLATION_BEZIER : PROTOCOL_INTERPOLATION_LINEAR,
                                        .width = 3,
                                        .key_count = 2,
                                        .times = times,
                                        .values = values[0]};
-    return shot_add_channel(reader, at, &channel, PROTOCOL_OBJECT_KIND_CAMERA, NULL);
+    return shot_add_channel(reader, at, &channel, PROTOCOL_OBJECT_CAMERA, NULL);
 }
 
 /* What cannot go together. */
@@ -191,17 +191,15 @@ static void override(const struct shot_reader *reader, const struct cli_job *bef
     }
     for (size_t i = 0; i < job->channel_count; i++) {
         const enum protocol_channel_path path = job->channels[i].channel.path;
-        const bool is_place = path == PROTOCOL_CHANNEL_PATH_VIEW_EYE ||
-                              path == PROTOCOL_CHANNEL_PATH_VIEW_LOOK_AT ||
-                              path == PROTOCOL_CHANNEL_PATH_VIEW_UP || path == PROTOCOL_CHANNEL_PATH_VIEW_FOV_Y;
-        const bool is_dropped = (is_place && given->camera) ||
-                                (path == PROTOCOL_CHANNEL_PATH_VIEW_UP && given->up) ||
-                                (path == PROTOCOL_CHANNEL_PATH_VIEW_FOV_Y && given->fov) ||
-                                (path == PROTOCOL_CHANNEL_PATH_VIEW_APERTURE && given->aperture) ||
-                                (path == PROTOCOL_CHANNEL_PATH_VIEW_FOCUS && given->focus);
+        const bool is_place = path == PROTOCOL_CHANNEL_VIEW_EYE || path == PROTOCOL_CHANNEL_VIEW_LOOK_AT ||
+                              path == PROTOCOL_CHANNEL_VIEW_UP || path == PROTOCOL_CHANNEL_VIEW_FOV_Y;
+        const bool is_dropped = (is_place && given->camera) || (path == PROTOCOL_CHANNEL_VIEW_UP && given->up) ||
+                                (path == PROTOCOL_CHANNEL_VIEW_FOV_Y && given->fov) ||
+                                (path == PROTOCOL_CHANNEL_VIEW_APERTURE && given->aperture) ||
+                                (path == PROTOCOL_CHANNEL_VIEW_FOCUS && given->focus);
         if (!is_dropped)
             job->channels[kept++] = job->channels[i];
-        else if (path == PROTOCOL_CHANNEL_PATH_VIEW_APERTURE)
+        else if (path == PROTOCOL_CHANNEL_VIEW_APERTURE)
             job->lens_changes = false;
     }
     job->channel_count = kept;

@@ -76,7 +76,7 @@ static void print_errors(const struct fl_frame *frame)
            "median", "99 %", "greatest");
     for (size_t i = 0; i < frame->wave_comparison_count; i++) {
         const struct record_wave_comparison *wave = &frame->wave_comparisons[i];
-        if (wave->kind == PROTOCOL_RAY_KIND_SHADOW)
+        if (wave->kind == PROTOCOL_RAY_SHADOW)
             continue; /* has neither */
         print_name(wave);
         print_error((double)wave->distance_median);
@@ -139,7 +139,7 @@ static json_t *wave_object(const struct record_wave_comparison *wave)
 {
     json_t *object = json_pack("{s:i,s:s}", "wave", (int)wave->wave, "kind", protocol_ray_kind_text(wave->kind));
     set_counts(object, wave);
-    if (wave->kind == PROTOCOL_RAY_KIND_SHADOW)
+    if (wave->kind == PROTOCOL_RAY_SHADOW)
         return object;
     set_real(object, "distance_median", (double)wave->distance_median);
     set_real(object, "distance_p99", (double)wave->distance_p99);

@@ -57,7 +57,7 @@ bool channel_send_failure(const struct channel *channel, uint32_t request, const
     copy_text(short_field, sizeof(short_field), field);
     copy_text(short_reason, sizeof(short_reason), reason);
     copy_text(short_remedy, sizeof(short_remedy), remedy ? remedy : "");
-    message.error.code = PROTOCOL_ERROR_CODE_INVALID;
+    message.error.code = PROTOCOL_ERROR_INVALID;
     message.error.field = short_field;
     message.error.text = short_reason;
     message.error.remedy = short_remedy;

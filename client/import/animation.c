@@ -28,7 +28,7 @@ static bool skin_valid(struct import_scene *scene, const char *name, uint32_t jo
         return import_fail(scene, name, "a skin of %u joints; 1 to %d are allowed", joint_count,
                            IMPORT_JOINTS_MAX);
     for (uint32_t i = 0; i < joint_count; i++)
-        if (joints[i] == 0 || joints[i] > scene->last_id[PROTOCOL_OBJECT_KIND_NODE])
+        if (joints[i] == 0 || joints[i] > scene->last_id[PROTOCOL_OBJECT_NODE])
             return import_fail(scene, name, "joint %u of a skin is not a node", i);
     if (joint_from_mesh && !all_within(joint_from_mesh, (size_t)joint_count * 12, 3e38f))
         return import_fail(scene, name, "a skin has a matrix that is not finite");
@@ -83,7 +83,7 @@ uint32_t import_add_channel(struct import_scene *scene, const struct message_set
     if (!edit)
         return 0;
     edit->message.set_channel = *channel;
-    return edit->message.set_channel.channel = import_next_id(scene, PROTOCOL_OBJECT_KIND_CHANNEL);
+    return edit->message.set_channel.channel = import_next_id(scene, PROTOCOL_OBJECT_CHANNEL);
 }
 
 void import_list_clip(struct import_scene *scene, uint32_t clip, const char *name, uint32_t channels,

@@ -265,7 +265,7 @@ uint32_t import_add_mesh(struct import_scene *scene, struct import_mesh *mesh)
             count = i + 1;
     edit->message.set_mesh.arrays_count = count;
     memset(mesh, 0, sizeof(*mesh));
-    return edit->message.set_mesh.mesh = import_next_id(scene, PROTOCOL_OBJECT_KIND_MESH);
+    return edit->message.set_mesh.mesh = import_next_id(scene, PROTOCOL_OBJECT_MESH);
 }
 
 static bool spheres_valid(struct import_scene *scene, const char *name, const float *spheres, uint32_t count,
@@ -303,5 +303,5 @@ uint32_t import_add_spheres(struct import_scene *scene, const char *name, float 
     edit->message.set_spheres.ranges_count = range_count;
     edit->message.set_spheres.arrays_count = 1;
     edit->blobs[0] = add_array(scene, spheres, count, 16);
-    return edit->message.set_spheres.spheres = import_next_id(scene, PROTOCOL_OBJECT_KIND_SPHERES);
+    return edit->message.set_spheres.spheres = import_next_id(scene, PROTOCOL_OBJECT_SPHERES);
 }

@@ -62,18 +62,18 @@ bool find_target(builder &b, const tinygltf::AnimationChannel &channel, target &
         if (holder == r.mesh_nodes.end())
             return false;
         const shown_mesh &mesh = mesh_of(r, r.model.nodes[node].mesh);
-        found = {PROTOCOL_CHANNEL_PATH_NODE_WEIGHTS, holder->second, mesh.target_count, mesh.file_targets,
+        found = {PROTOCOL_CHANNEL_NODE_WEIGHTS, holder->second, mesh.target_count, mesh.file_targets,
                  TINYGLTF_TYPE_SCALAR};
         return found.width > 0;
     }
     if (r.node_ids[node] == 0)
         return false; // not part of what is shown
     if (channel.target_path == "translation")
-        found = {PROTOCOL_CHANNEL_PATH_NODE_TRANSLATION, r.node_ids[node], 3, 3, TINYGLTF_TYPE_VEC3};
+        found = {PROTOCOL_CHANNEL_NODE_TRANSLATION, r.node_ids[node], 3, 3, TINYGLTF_TYPE_VEC3};
     else if (channel.target_path == "rotation")
-        found = {PROTOCOL_CHANNEL_PATH_NODE_ROTATION, r.node_ids[node], 4, 4, TINYGLTF_TYPE_VEC4};
+        found = {PROTOCOL_CHANNEL_NODE_ROTATION, r.node_ids[node], 4, 4, TINYGLTF_TYPE_VEC4};
     else if (channel.target_path == "scale")
-        found = {PROTOCOL_CHANNEL_PATH_NODE_SCALE, r.node_ids[node], 3, 3, TINYGLTF_TYPE_VEC3};
+        found = {PROTOCOL_CHANNEL_NODE_SCALE, r.node_ids[node], 3, 3, TINYGLTF_TYPE_VEC3};
     else
         import_note(r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(), "a channel of the unknown path '%.40s'",
                     channel.target_path.c_str());
@@ -205,7 +205,7 @@ void send_channel(builder &b, const target &to, protocol_interpolation interpola
     message_set_channel set = {};
 
     if (b.clip == 0)
-        b.clip = import_reserve_id(b.r.scene, PROTOCOL_OBJECT_KIND_CLIP);
+        b.clip = import_reserve_id(b.r.scene, PROTOCOL_OBJECT_CLIP);
     set.clip = b.clip;
     set.path = to.path;
     set.object = to.object;
@@ -232,7 +232,7 @@ void play(builder &b, const tinygltf::AnimationSampler &sampler, const target &t
         std::vector<float> values;
         const size_t key_count = accessor_count(b.r, sampler.input, TINYGLTF_TYPE_SCALAR, where);
         const bool good = read_values(b, sampler.output, to, *keys, key_count, parts, values, where + ".output");
-        if (good && to.path == PROTOCOL_CHANNEL_PATH_NODE_ROTATION)
+        if (good && to.path == PROTOCOL_CHANNEL_NODE_ROTATION)
             mend_rotations(values, parts);
         known = b.values.emplace(place_of_values, good ? append(b, values) : UINT32_MAX).first;
     }
@@ -281,15 +281,15 @@ void add_channel(builder &b, size_t index)
 // What a clip leaves alone of a node that it moves is said, too, so that nobody has to take a matrix apart.
 void add_constants(builder &b, int node, unsigned seen)
 {
-    const unsigned moved = 1u << PROTOCOL_CHANNEL_PATH_NODE_TRANSLATION |
-                           1u << PROTOCOL_CHANNEL_PATH_NODE_ROTATION | 1u << PROTOCOL_CHANNEL_PATH_NODE_SCALE;
+    const unsigned moved = 1u << PROTOCOL_CHANNEL_NODE_TRANSLATION | 1u << PROTOCOL_CHANNEL_NODE_ROTATION |
+                           1u << PROTOCOL_CHANNEL_NODE_SCALE;
     if ((seen & moved) == 0 || (seen & moved) == moved)
         return;
     const parts p = node_parts(b.r, size_t(node));
     const std::pair<protocol_channel_path, std::vector<float>> constants[] = {
-        {PROTOCOL_CHANNEL_PATH_NODE_TRANSLATION, {p.translation, p.translation + 3}},
-        {PROTOCOL_CHANNEL_PATH_NODE_ROTATION, {p.rotation, p.rotation + 4}},
-        {PROTOCOL_CHANNEL_PATH_NODE_SCALE, {p.scale, p.scale + 3}}};
+        {PROTOCOL_CHANNEL_NODE_TRANSLATION, {p.translation, p.translation + 3}},
+        {PROTOCOL_CHANNEL_NODE_ROTATION, {p.rotation, p.rotation + 4}},
+        {PROTOCOL_CHANNEL_NODE_SCALE, {p.scale, p.scale + 3}}};
     for (const auto &constant : constants) {
         if (seen & 1u << constant.first)
             continue;

@@ -114,7 +114,7 @@ uint32_t texture_id(reader &r, images &all, int texture, int image, bool colour)
     message_set_texture set = {};
     set.width = all.jobs[number].width;
     set.height = all.jobs[number].height;
-    set.format = colour ? PROTOCOL_TEXTURE_FORMAT_RGBA8_SRGB : PROTOCOL_TEXTURE_FORMAT_RGBA8_LINEAR;
+    set.format = colour ? PROTOCOL_TEXTURE_RGBA8_SRGB : PROTOCOL_TEXTURE_RGBA8_LINEAR;
     set.nearest = all.jobs[number].reason[0] != '\0';
     set.name = name.c_str();
     if (t.sampler >= 0) {
@@ -237,9 +237,9 @@ void alpha(const building &b)
     const std::string &mode = b.source.alphaMode;
 
     if (mode == "MASK")
-        b.set.alpha_mode = PROTOCOL_ALPHA_MODE_MASK;
+        b.set.alpha_mode = PROTOCOL_ALPHA_MASK;
     else if (mode == "BLEND")
-        b.set.alpha_mode = PROTOCOL_ALPHA_MODE_BLEND;
+        b.set.alpha_mode = PROTOCOL_ALPHA_BLEND;
     else if (mode != "OPAQUE")
         import_note(b.r.scene, PROTOCOL_SEVERITY_WARNING, b.where.c_str(),
                     "unknown alpha mode '%.32s' is treated as OPAQUE", mode.c_str());

@@ -31,7 +31,7 @@ void give_size(reader &r, const tinygltf::Light &light, const std::string &where
 
     if (!(radius > 0))
         return;
-    set.kind = PROTOCOL_LIGHT_KIND_SPHERE;
+    set.kind = PROTOCOL_LIGHT_SPHERE;
     set.size[0] = limited(r, where, "the light's radius", radius, 1e-6, 1e12);
     const double disc = 3.14159265358979 * double(set.size[0]) * double(set.size[0]);
     for (float &one : set.colour)
@@ -54,12 +54,12 @@ uint32_t light_id(reader &r, int index, const std::string &where)
     set.range = limited(r, here, "the light's range", light.range, 0, 1e12);
     set.name = light.name.c_str();
     if (light.type == "directional") {
-        set.kind = PROTOCOL_LIGHT_KIND_DIRECTIONAL;
+        set.kind = PROTOCOL_LIGHT_DIRECTIONAL;
     } else if (light.type == "point") {
-        set.kind = PROTOCOL_LIGHT_KIND_POINT;
+        set.kind = PROTOCOL_LIGHT_POINT;
         give_size(r, light, here, set);
     } else if (light.type == "spot") {
-        set.kind = PROTOCOL_LIGHT_KIND_SPOT;
+        set.kind = PROTOCOL_LIGHT_SPOT;
         set.outer_cone = limited(r, here, "the outer cone", light.spot.outerConeAngle, 0, 1.5707);
         set.inner_cone = limited(r, here, "the inner cone", light.spot.innerConeAngle, 0, double(set.outer_cone));
     } else {
@@ -106,7 +106,7 @@ void attach_mesh(reader &r, const tinygltf::Node &node, const std::string &where
     const shown_mesh &mesh = mesh_of(r, node.mesh);
     if (mesh.id == 0)
         return;
-    attachment one = {PROTOCOL_NODE_KIND_MESH, mesh.id, " mesh", 0, {}};
+    attachment one = {PROTOCOL_NODE_MESH, mesh.id, " mesh", 0, {}};
     if (node.skin >= 0 && mesh.has_joints)
         one.skin = skin_id(r, node.skin, mesh, where);
     if (!node.weights.empty())
@@ -123,11 +123,11 @@ std::vector<attachment> attachments_of(reader &r, size_t index)
     if (node.mesh >= 0)
         attach_mesh(r, node, where, found);
     if (node.camera >= 0)
-        found.push_back({PROTOCOL_NODE_KIND_CAMERA, camera_id(r, node.camera, where), " camera", 0, {}});
+        found.push_back({PROTOCOL_NODE_CAMERA, camera_id(r, node.camera, where), " camera", 0, {}});
     if (const tinygltf::Value *lights = extension(node.extensions, "KHR_lights_punctual")) {
         const uint32_t light = light_id(r, int(number(*lights, "light", -1)), where);
         if (light != 0)
-            found.push_back({PROTOCOL_NODE_KIND_LIGHT, light, " light", 0, {}});
+            found.push_back({PROTOCOL_NODE_LIGHT, light, " light", 0, {}});
     }
     return found;
 }
@@ -167,7 +167,7 @@ uint32_t add_one(reader &r, size_t index, uint32_t parent)
     r.node_ids[index] = id;
     for (const attachment &one : found) {
         const uint32_t holder = single ? id : add_node(r, id, identity(), &one, name + one.suffix, false);
-        if (one.kind == PROTOCOL_NODE_KIND_MESH)
+        if (one.kind == PROTOCOL_NODE_MESH)
             r.mesh_nodes[index] = holder;
     }
     return id;

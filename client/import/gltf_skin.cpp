@@ -172,7 +172,7 @@ uint32_t skin_id(reader &r, int index, const shown_mesh &mesh, const std::string
     for (int joint : skin.joints)
         if (joint < 0 || size_t(joint) >= r.model.nodes.size())
             fail(r, place("skins", size_t(index)), "joint node %d does not exist", joint);
-    return id = import_reserve_id(r.scene, PROTOCOL_OBJECT_KIND_SKIN);
+    return id = import_reserve_id(r.scene, PROTOCOL_OBJECT_SKIN);
 }
 
 void add_skins(reader &r)

@@ -106,7 +106,7 @@ static bool add_lot(struct import_scene *scene, const struct import_mesh *mesh, 
     for (uint32_t i = 0; i < lot.triangle_count; i++)
         memcpy(lot.indices + (size_t)i * 3, mesh->indices + (size_t)order[*first + i].position * 3, 12);
     *first = end;
-    return show(scene, PROTOCOL_NODE_KIND_MESH, import_add_mesh(scene, &lot), mesh->name);
+    return show(scene, PROTOCOL_NODE_MESH, import_add_mesh(scene, &lot), mesh->name);
 }
 
 bool import_add_grouped_mesh(struct import_scene *scene, struct import_mesh *mesh, const uint32_t *materials)
@@ -140,7 +140,7 @@ bool import_add_grouped_spheres(struct import_scene *scene, const char *name, co
         }
         for (uint32_t i = first; i < end; i++)
             memcpy(lot + (size_t)(i - first) * 4, spheres + (size_t)order[i].position * 4, 16);
-        added = show(scene, PROTOCOL_NODE_KIND_SPHERES,
+        added = show(scene, PROTOCOL_NODE_SPHERES,
                      import_add_spheres(scene, name, lot, end - first, ranges, range_count), name);
         first = end;
     }

@@ -65,7 +65,7 @@ struct import_scene {
     struct import_notice notes[IMPORT_NOTES_MAX];
     size_t note_count;
     uint32_t notes_lost; /* distinct ones beyond IMPORT_NOTES_MAX, about */
-    uint32_t last_id[PROTOCOL_OBJECT_KIND_COUNT];
+    uint32_t last_id[PROTOCOL_OBJECT_COUNT];
     uint64_t blob_bytes;
     char file[257]; /* the model's, as people named it; goes into `where` */
     bool failed;

@@ -284,7 +284,7 @@ uint32_t import_add_node(struct import_scene *scene, const struct message_set_no
     edit->message.set_node = *node;
     edit->message.set_node.name = import_copy_name(scene, node->name);
     edit->message.set_node.weights = import_copy_weights(scene, node->weights, node->weights_count);
-    return edit->message.set_node.node = import_next_id(scene, PROTOCOL_OBJECT_KIND_NODE);
+    return edit->message.set_node.node = import_next_id(scene, PROTOCOL_OBJECT_NODE);
 }
 
 uint32_t import_add_material(struct import_scene *scene, const struct message_set_material *material)
@@ -325,7 +325,7 @@ uint32_t import_add_material(struct import_scene *scene, const struct message_se
     edit->message.set_material.textures = textures;
     edit->message.set_material.textures_count = count;
     edit->message.set_material.name = import_copy_name(scene, material->name);
-    return edit->message.set_material.material = import_next_id(scene, PROTOCOL_OBJECT_KIND_MATERIAL);
+    return edit->message.set_material.material = import_next_id(scene, PROTOCOL_OBJECT_MATERIAL);
 }
 
 uint32_t import_add_light(struct import_scene *scene, const struct message_set_light *light)
@@ -343,7 +343,7 @@ uint32_t import_add_light(struct import_scene *scene, const struct message_set_l
         return 0;
     edit->message.set_light = *light;
     edit->message.set_light.name = import_copy_name(scene, light->name);
-    return edit->message.set_light.light = import_next_id(scene, PROTOCOL_OBJECT_KIND_LIGHT);
+    return edit->message.set_light.light = import_next_id(scene, PROTOCOL_OBJECT_LIGHT);
 }
 
 uint32_t import_add_camera(struct import_scene *scene, const struct message_set_camera *camera)
@@ -360,7 +360,7 @@ uint32_t import_add_camera(struct import_scene *scene, const struct message_set_
         return 0;
     edit->message.set_camera = *camera;
     edit->message.set_camera.name = import_copy_name(scene, camera->name);
-    return edit->message.set_camera.camera = import_next_id(scene, PROTOCOL_OBJECT_KIND_CAMERA);
+    return edit->message.set_camera.camera = import_next_id(scene, PROTOCOL_OBJECT_CAMERA);
 }
 
 uint32_t import_add_texture(struct import_scene *scene, const struct message_set_texture *texture, uint32_t texels)
@@ -380,7 +380,7 @@ uint32_t import_add_texture(struct import_scene *scene, const struct message_set
     edit->message.set_texture.name = import_copy_name(scene, texture->name);
     edit->message.set_texture.arrays_count = 1;
     edit->blobs[0] = texels;
-    return edit->message.set_texture.texture = import_next_id(scene, PROTOCOL_OBJECT_KIND_TEXTURE);
+    return edit->message.set_texture.texture = import_next_id(scene, PROTOCOL_OBJECT_TEXTURE);
 }
 
 void import_set_environment(struct import_scene *scene, const struct message_set_environment *environment,

@@ -459,7 +459,7 @@ static bool add_camera(struct nff *nff)
         matrix[row * 4 + 3] = nff->from[row];
     camera.fov_y = (float)((double)nff->angle_degrees * PI / 180);
     camera.near = fmaxf(nff->hither, 0);
-    return show(nff, PROTOCOL_NODE_KIND_CAMERA, import_add_camera(nff->scene, &camera), matrix, "view");
+    return show(nff, PROTOCOL_NODE_CAMERA, import_add_camera(nff->scene, &camera), matrix, "view");
 }
 
 /* NFF's lights do not weaken with distance, ours do: each is given the intensity that makes it as bright as NFF
@@ -473,7 +473,7 @@ static bool add_lights(struct nff *nff)
 
     for (size_t i = 0; i < nff->light_count; i++) {
         const struct light *light = &nff->lights[i];
-        struct message_set_light set = {.kind = PROTOCOL_LIGHT_KIND_POINT};
+        struct message_set_light set = {.kind = PROTOCOL_LIGHT_POINT};
         float matrix[12];
         double distance2 = 0;
         char name[32];
@@ -493,7 +493,7 @@ static bool add_lights(struct nff *nff)
                 (float)fmin((double)(light->coloured ? light->colour[c] : share) * PI * distance2, 1e12);
         snprintf(name, sizeof(name), "light %zu", i + 1);
         set.name = name;
-        if (!show(nff, PROTOCOL_NODE_KIND_LIGHT, import_add_light(nff->scene, &set), matrix, name))
+        if (!show(nff, PROTOCOL_NODE_LIGHT, import_add_light(nff->scene, &set), matrix, name))
             return false;
     }
     return true;

@@ -116,7 +116,7 @@ uint32_t add_texture(building &b, const std::string &key, const std::string &nam
     message_set_texture set = {};
     set.width = size.width;
     set.height = size.height;
-    set.format = colour ? PROTOCOL_TEXTURE_FORMAT_RGBA8_SRGB : PROTOCOL_TEXTURE_FORMAT_RGBA8_LINEAR;
+    set.format = colour ? PROTOCOL_TEXTURE_RGBA8_SRGB : PROTOCOL_TEXTURE_RGBA8_LINEAR;
     set.wrap_u = set.wrap_v = clamp ? PROTOCOL_WRAP_CLAMP : PROTOCOL_WRAP_REPEAT;
     set.nearest = size.marked;
     set.name = name.c_str();
@@ -282,7 +282,7 @@ void transparency(const tinyobj::material_t &m, message_set_material &set)
                                  : greatest(m.diffuse) > 0 ? unit(m.diffuse[c])
                                                            : 1;
     } else if (through > 0) {
-        set.alpha_mode = PROTOCOL_ALPHA_MODE_BLEND;
+        set.alpha_mode = PROTOCOL_ALPHA_BLEND;
         set.base_colour[3] = 1 - through;
     }
 }
@@ -292,7 +292,7 @@ void maps(building &b, const tinyobj::material_t &m, message_set_material &set, 
     if (!m.alpha_texname.empty()) {
         bool cutout = false;
         uses[BASE_COLOUR] = use_of(alpha_texture(b, m, cutout), m.alpha_texopt);
-        set.alpha_mode = cutout ? PROTOCOL_ALPHA_MODE_MASK : PROTOCOL_ALPHA_MODE_BLEND;
+        set.alpha_mode = cutout ? PROTOCOL_ALPHA_MASK : PROTOCOL_ALPHA_BLEND;
     } else if (!m.diffuse_texname.empty()) {
         uses[BASE_COLOUR] =
             use_of(plain_texture(b, m.diffuse_texname, true, m.diffuse_texopt.clamp), m.diffuse_texopt);

@@ -90,9 +90,9 @@ static bool count_id(struct fl_catalogue *catalogue, enum protocol_object_kind k
 static bool observe_node(struct fl_catalogue *catalogue, const struct message_set_node *node,
                          struct fl_error *error)
 {
-    count_id(catalogue, PROTOCOL_OBJECT_KIND_NODE, node->node);
+    count_id(catalogue, PROTOCOL_OBJECT_NODE, node->node);
     return keep(catalogue, FL_CATALOGUE_NODES, (struct fl_catalogue_entry){.id = node->node}, node->name, error) &&
-           (node->kind != PROTOCOL_NODE_KIND_LIGHT || node->name[0] == '\0' ||
+           (node->kind != PROTOCOL_NODE_LIGHT || node->name[0] == '\0' ||
             keep(catalogue, FL_CATALOGUE_LIGHT_NODES, (struct fl_catalogue_entry){.id = node->object}, node->name,
                  error));
 }
@@ -100,9 +100,8 @@ static bool observe_node(struct fl_catalogue *catalogue, const struct message_se
 static bool observe_light(struct fl_catalogue *catalogue, const struct message_set_light *light,
                           struct fl_error *error)
 {
-    const bool has_size =
-        light->kind == PROTOCOL_LIGHT_KIND_RECTANGLE || light->kind == PROTOCOL_LIGHT_KIND_SPHERE;
-    count_id(catalogue, PROTOCOL_OBJECT_KIND_LIGHT, light->light);
+    const bool has_size = light->kind == PROTOCOL_LIGHT_RECTANGLE || light->kind == PROTOCOL_LIGHT_SPHERE;
+    count_id(catalogue, PROTOCOL_OBJECT_LIGHT, light->light);
     return keep(catalogue, FL_CATALOGUE_LIGHTS,
                 (struct fl_catalogue_entry){.id = light->light, .has_size = has_size}, light->name, error);
 }
@@ -113,28 +112,28 @@ bool fl_catalogue_observe(struct fl_catalogue *catalogue, const struct message *
     case MESSAGE_SET_NODE:
         return observe_node(catalogue, &message->set_node, error);
     case MESSAGE_SET_MATERIAL:
-        return count_id(catalogue, PROTOCOL_OBJECT_KIND_MATERIAL, message->set_material.material) &&
+        return count_id(catalogue, PROTOCOL_OBJECT_MATERIAL, message->set_material.material) &&
                keep(catalogue, FL_CATALOGUE_MATERIALS,
                     (struct fl_catalogue_entry){.id = message->set_material.material}, message->set_material.name,
                     error);
     case MESSAGE_SET_LIGHT:
         return observe_light(catalogue, &message->set_light, error);
     case MESSAGE_SET_MESH:
-        return count_id(catalogue, PROTOCOL_OBJECT_KIND_MESH, message->set_mesh.mesh);
+        return count_id(catalogue, PROTOCOL_OBJECT_MESH, message->set_mesh.mesh);
     case MESSAGE_SET_SPHERES:
-        return count_id(catalogue, PROTOCOL_OBJECT_KIND_SPHERES, message->set_spheres.spheres);
+        return count_id(catalogue, PROTOCOL_OBJECT_SPHERES, message->set_spheres.spheres);
     case MESSAGE_SET_DISC:
-        return count_id(catalogue, PROTOCOL_OBJECT_KIND_DISC, message->set_disc.disc);
+        return count_id(catalogue, PROTOCOL_OBJECT_DISC, message->set_disc.disc);
     case MESSAGE_SET_TEXTURE:
-        return count_id(catalogue, PROTOCOL_OBJECT_KIND_TEXTURE, message->set_texture.texture);
+        return count_id(catalogue, PROTOCOL_OBJECT_TEXTURE, message->set_texture.texture);
     case MESSAGE_SET_CAMERA:
-        return count_id(catalogue, PROTOCOL_OBJECT_KIND_CAMERA, message->set_camera.camera);
+        return count_id(catalogue, PROTOCOL_OBJECT_CAMERA, message->set_camera.camera);
     case MESSAGE_SET_SKIN:
-        return count_id(catalogue, PROTOCOL_OBJECT_KIND_SKIN, message->set_skin.skin);
+        return count_id(catalogue, PROTOCOL_OBJECT_SKIN, message->set_skin.skin);
     case MESSAGE_SET_CLIP:
-        return count_id(catalogue, PROTOCOL_OBJECT_KIND_CLIP, message->set_clip.clip);
+        return count_id(catalogue, PROTOCOL_OBJECT_CLIP, message->set_clip.clip);
     case MESSAGE_SET_CHANNEL:
-        return count_id(catalogue, PROTOCOL_OBJECT_KIND_CHANNEL, message->set_channel.channel);
+        return count_id(catalogue, PROTOCOL_OBJECT_CHANNEL, message->set_channel.channel);
     case MESSAGE_IMPORT_CLIP:
         return keep_clip(catalogue, &message->import_clip, error);
     default:
@@ -219,10 +218,10 @@ static bool unknown_object(const struct fl_catalogue *catalogue, enum fl_catalog
 bool fl_catalogue_find(const struct fl_catalogue *catalogue, enum protocol_object_kind kind, const char *which,
                        uint32_t *id, struct fl_error *error)
 {
-    const enum fl_catalogue_list list = kind == PROTOCOL_OBJECT_KIND_NODE       ? FL_CATALOGUE_NODES
-                                        : kind == PROTOCOL_OBJECT_KIND_MATERIAL ? FL_CATALOGUE_MATERIALS
-                                        : kind == PROTOCOL_OBJECT_KIND_LIGHT    ? FL_CATALOGUE_LIGHTS
-                                                                                : FL_CATALOGUE_LIST_COUNT;
+    const enum fl_catalogue_list list = kind == PROTOCOL_OBJECT_NODE       ? FL_CATALOGUE_NODES
+                                        : kind == PROTOCOL_OBJECT_MATERIAL ? FL_CATALOGUE_MATERIALS
+                                        : kind == PROTOCOL_OBJECT_LIGHT    ? FL_CATALOGUE_LIGHTS
+                                                                           : FL_CATALOGUE_LIST_COUNT;
     if (list == FL_CATALOGUE_LIST_COUNT)
         return fl_error_set(error, FL_ERROR_ARGUMENT, "", "objects of this kind have no names");
     uint64_t index = 0;
@@ -278,7 +277,7 @@ bool fl_catalogue_find_clip(const struct fl_catalogue *catalogue, const char *wh
 
 uint32_t fl_catalogue_new_id(struct fl_catalogue *catalogue, enum protocol_object_kind kind)
 {
-    if ((unsigned)kind >= PROTOCOL_OBJECT_KIND_COUNT || catalogue->greatest_id[kind] == UINT32_MAX)
+    if ((unsigned)kind >= PROTOCOL_OBJECT_COUNT || catalogue->greatest_id[kind] == UINT32_MAX)
         return 0;
     return ++catalogue->greatest_id[kind];
 }

@@ -109,7 +109,7 @@ static bool send_channels(const struct clip *clip, uint32_t request, uint32_t id
     for (size_t i = 0; i < channel_count; i++) {
         struct message message = {.type = MESSAGE_SET_CHANNEL};
         struct message_set_channel *channel = &message.set_channel;
-        channel->channel = fl_scene_new_id(clip->scene, PROTOCOL_OBJECT_KIND_CHANNEL);
+        channel->channel = fl_scene_new_id(clip->scene, PROTOCOL_OBJECT_CHANNEL);
         channel->clip = id;
         channel->path = channels[i].path;
         channel->object = channels[i].object;
@@ -164,7 +164,7 @@ bool fl_scene_add_clip(struct fl_scene *scene, const char *name, const struct fl
 {
     struct clip made = {.scene = scene};
     const uint64_t deadline_ns = monotonic_now_ns() + ANSWER_NS;
-    const uint32_t id = fl_scene_new_id(scene, PROTOCOL_OBJECT_KIND_CLIP);
+    const uint32_t id = fl_scene_new_id(scene, PROTOCOL_OBJECT_CLIP);
     const bool added = gather(&made, channels, channel_count, error) && upload(&made, deadline_ns, error) &&
                        commit(&made, name, id, channels, channel_count, deadline_ns, error);
     free(made.numbers);

@@ -172,7 +172,7 @@ int fl_connection_consume(struct fl_connection *connection, const struct framing
         fl_error_set(error, FL_ERROR_CONNECTION, "", "the daemon ended the connection: %s",
                      message->goodbye.text[0] != '\0' ? message->goodbye.text
                                                       : protocol_error_code_text(message->goodbye.code));
-        error->retryable = message->goodbye.code == PROTOCOL_ERROR_CODE_SHUTTING_DOWN;
+        error->retryable = message->goodbye.code == PROTOCOL_ERROR_SHUTTING_DOWN;
         break;
     case MESSAGE_ERROR:
         if (header->request != 0)
@@ -254,7 +254,7 @@ bool fl_connection_answer(struct fl_connection *connection, uint32_t request, en
 static bool tell_key_needed(const struct fl_connection *connection, struct fl_error *error)
 {
     fl_error_set(error, FL_ERROR_REFUSED, connection->address, "the daemon accepts only clients with its key");
-    error->server_code = PROTOCOL_ERROR_CODE_DENIED;
+    error->server_code = PROTOCOL_ERROR_DENIED;
     return fl_error_remedy(error, "name the file with a copy of the key by --key or FARLIGHT_KEY");
 }
 
@@ -264,7 +264,7 @@ static bool read_key(struct sealed_key *key, const char *key_file, struct fl_err
     if (sealed_key_read(key, key_file, &why))
         return true;
     fl_error_set(error, FL_ERROR_FILE, key_file, "%s", why.text);
-    return fl_error_remedy(error, why.code == PROTOCOL_ERROR_CODE_DENIED
+    return fl_error_remedy(error, why.code == PROTOCOL_ERROR_DENIED
                                       ? "only its owner may read or write a key: run 'chmod 600'"
                                       : "a key file has 32 bytes; 'farlight key FILE' creates one");
 }

@@ -106,7 +106,7 @@ bool fl_importer_observe(struct fl_importer *importer, const struct message *mes
         return false;
     switch (message->type) {
     case MESSAGE_SET_NODE:
-        return message->set_node.kind != PROTOCOL_NODE_KIND_CAMERA ||
+        return message->set_node.kind != PROTOCOL_NODE_CAMERA ||
                remember_camera(importer, &message->set_node, error);
     case MESSAGE_SET_CAMERA:
         return remember_object(importer, &message->set_camera, error);

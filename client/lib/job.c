@@ -62,7 +62,7 @@ struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_rend
         .encoding = render->encoding,
         .layers = render->layers != 0 ? render->layers : FL_LAYERS_PICTURE,
     };
-    render->kind = PROTOCOL_JOB_KIND_BATCH;
+    render->kind = PROTOCOL_JOB_BATCH;
     render->scene = scene->scene;
     render->channel = job->channel;
     if (!fl_frame_queue_init(&job->done, render->credit, error) ||

@@ -336,7 +336,7 @@ static void take_clips_away(const struct fl_scene *scene)
     begin.edit_begin.scene = scene->scene;
     fl_connection_send_late(scene->connection, request, &begin);
     for (size_t i = 0; i < scene->clip_count; i++) {
-        remove.remove.kind = PROTOCOL_OBJECT_KIND_CLIP;
+        remove.remove.kind = PROTOCOL_OBJECT_CLIP;
         remove.remove.object = scene->clips[i];
         fl_connection_send_late(scene->connection, request, &remove);
     }

@@ -192,7 +192,7 @@ static bool tell_refusal(enum sealed_status status, struct fl_error *error)
     else if (status == SEALED_TOO_MANY)
         fl_error_remedy(error, "try again in a minute");
     if (error) {
-        error->server_code = PROTOCOL_ERROR_CODE_DENIED;
+        error->server_code = PROTOCOL_ERROR_DENIED;
         error->retryable = status == SEALED_TOO_MANY;
         error->retry_after_ms = status == SEALED_TOO_MANY ? 60000 : 0;
     }
@@ -202,7 +202,7 @@ static bool tell_refusal(enum sealed_status status, struct fl_error *error)
 static bool tell_broken_seal(const struct fl_stream *stream, const struct decode_error *why,
                              struct fl_error *error)
 {
-    if (why->code == PROTOCOL_ERROR_CODE_OUT_OF_MEMORY)
+    if (why->code == PROTOCOL_ERROR_OUT_OF_MEMORY)
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     return fl_error_set(error, FL_ERROR_PROTOCOL, "", "the data is not what %s has sealed: %s: %s", stream->peer,
                         why->field, why->text);

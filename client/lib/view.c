@@ -48,7 +48,7 @@ struct fl_view {
 struct message_render fl_view_defaults(void)
 {
     struct message_render render = fl_render_defaults();
-    render.kind = PROTOCOL_JOB_KIND_VIEW;
+    render.kind = PROTOCOL_JOB_VIEW;
     render.samples = DEFAULT_SAMPLES;
     render.frames_per_second = DEFAULT_FRAMES_PER_SECOND;
     render.credit = DEFAULT_FRAMES_IN_FLIGHT;
@@ -57,7 +57,7 @@ struct message_render fl_view_defaults(void)
 
 static void fill_render(struct message_render *render, const struct fl_view *view)
 {
-    render->kind = PROTOCOL_JOB_KIND_VIEW;
+    render->kind = PROTOCOL_JOB_VIEW;
     render->scene = view->scene;
     render->channel = view->channel;
     render->credit = (uint32_t)view->done.capacity;

@@ -248,8 +248,8 @@ bool session_can_h264(const struct session *session)
 static bool is_lost(const struct fl_error *error)
 {
     if (error->code == FL_ERROR_REFUSED)
-        return error->retryable || error->server_code == PROTOCOL_ERROR_CODE_DEVICE_LOST ||
-               error->server_code == PROTOCOL_ERROR_CODE_SHUTTING_DOWN;
+        return error->retryable || error->server_code == PROTOCOL_ERROR_DEVICE_LOST ||
+               error->server_code == PROTOCOL_ERROR_SHUTTING_DOWN;
     return error->code != FL_ERROR_NONE && error->code != FL_ERROR_ARGUMENT && error->code != FL_ERROR_INTERRUPTED;
 }
 

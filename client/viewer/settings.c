@@ -35,7 +35,7 @@ static bool change_view(struct settings *settings, enum action action)
             (int)settings->integrator, action == ACTION_NEXT_INTEGRATOR ? 1 : -1, PROTOCOL_INTEGRATOR_COUNT);
         return true;
     case ACTION_NEXT_TONE_MAP:
-        settings->tone_map = (enum protocol_tone_map)around((int)settings->tone_map, 1, PROTOCOL_TONE_MAP_COUNT);
+        settings->tone_map = (enum protocol_tone_map)around((int)settings->tone_map, 1, PROTOCOL_TONE_COUNT);
         return true;
     case ACTION_DARKER:
     case ACTION_BRIGHTER:

@@ -42,11 +42,11 @@ static bool settle(struct viewer *viewer, struct fl_error *error)
     tour_begin(&viewer->tour, fl_scene_camera_count(scene), fl_scene_clip_count(scene));
     viewer->tour.speed = options->speed;
     if (options->camera) {
-        job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        job->camera_path = PROTOCOL_CAMERA_NODE;
         if (!fl_scene_find_camera(scene, options->camera, &job->camera_node, error))
             return false;
     } else if (job->keys_count == 0 && first) {
-        job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+        job->camera_path = PROTOCOL_CAMERA_NODE;
         job->camera_node = first->node;
     }
     if (!options->clip)

@@ -16,7 +16,7 @@ bool viewer_follows(const struct viewer *viewer)
 
 uint32_t viewer_home_node(const struct viewer *viewer)
 {
-    return viewer->view.camera_path == PROTOCOL_CAMERA_PATH_NODE ? viewer->view.camera_node : 0;
+    return viewer->view.camera_path == PROTOCOL_CAMERA_NODE ? viewer->view.camera_node : 0;
 }
 
 void viewer_go(struct viewer *viewer, const struct viewer_camera *camera, uint32_t node)
@@ -64,13 +64,13 @@ static void fill_key(const struct viewer_camera *camera, struct record_camera_ke
 
 static void use_node(struct message_render *job, uint32_t node)
 {
-    job->camera_path = PROTOCOL_CAMERA_PATH_NODE;
+    job->camera_path = PROTOCOL_CAMERA_NODE;
     job->camera_node = node;
 }
 
 static void use_key(struct message_render *job, struct record_camera_key *key)
 {
-    job->camera_path = PROTOCOL_CAMERA_PATH_KEYS;
+    job->camera_path = PROTOCOL_CAMERA_KEYS;
     job->keys = key;
     job->keys_count = 1;
 }

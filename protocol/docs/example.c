@@ -151,15 +151,15 @@ static void print_transaction(struct record_blob_ref references[2])
     message.set_mesh.ranges = &range;
     message.set_mesh.ranges_count = 1;
     show("Client", 5, 0, &message);
-    print_node(1, PROTOCOL_NODE_KIND_MESH);
+    print_node(1, PROTOCOL_NODE_MESH);
     message = made(MESSAGE_SET_LIGHT);
     message.set_light.light = 1;
-    message.set_light.kind = PROTOCOL_LIGHT_KIND_DIRECTIONAL;
+    message.set_light.kind = PROTOCOL_LIGHT_DIRECTIONAL;
     for (int i = 0; i < 3; i++) {
         message.set_light.colour[i] = 3.1415927f;
     }
     show("Client", 5, 0, &message);
-    print_node(2, PROTOCOL_NODE_KIND_LIGHT);
+    print_node(2, PROTOCOL_NODE_LIGHT);
     message = made(MESSAGE_EDIT_COMMIT);
     show("Client", 5, 0, &message);
     print_ok(ANSWER_TO(5), 5, 1);
@@ -177,9 +177,9 @@ static void print_render(void)
     message.render.depth = 0;
     message.render.frame_step = 1;
     message.render.frames_per_second = 24;
-    message.render.tone_map = PROTOCOL_TONE_MAP_NONE;
+    message.render.tone_map = PROTOCOL_TONE_NONE;
     message.render.quality = 1;
-    message.render.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
+    message.render.camera_path = PROTOCOL_CAMERA_KEYS;
     message.render.keys = &key;
     message.render.keys_count = 1;
     show("Client", 6, 0, &message);

@@ -10,12 +10,12 @@
 
 static bool invalid(struct decode_error *error, const char *path, const char *what)
 {
-    return decode_error_set(error, PROTOCOL_ERROR_CODE_INVALID, path, "%s", what);
+    return decode_error_set(error, PROTOCOL_ERROR_INVALID, path, "%s", what);
 }
 
 static bool denied(struct decode_error *error, const char *path, const char *what)
 {
-    return decode_error_set(error, PROTOCOL_ERROR_CODE_DENIED, path, "%s", what);
+    return decode_error_set(error, PROTOCOL_ERROR_DENIED, path, "%s", what);
 }
 
 /* The open file, whatever its name leads to. */
@@ -32,13 +32,13 @@ static bool check(int fd, const char *path, struct decode_error *error)
         return denied(error, path, "belongs to another user");
     }
     if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-        return decode_error_set(error, PROTOCOL_ERROR_CODE_DENIED, path,
+        return decode_error_set(error, PROTOCOL_ERROR_DENIED, path,
                                 "is open to others (mode %04o): 'chmod 600' closes it",
                                 (unsigned)status.st_mode & 07777);
     }
     if (status.st_size != SEALED_KEY_BYTES) {
-        return decode_error_set(error, PROTOCOL_ERROR_CODE_INVALID, path,
-                                "has %lld bytes in place of the 32 of a key", (long long)status.st_size);
+        return decode_error_set(error, PROTOCOL_ERROR_INVALID, path, "has %lld bytes in place of the 32 of a key",
+                                (long long)status.st_size);
     }
     return true;
 }

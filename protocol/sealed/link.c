@@ -113,7 +113,7 @@ enum sealed_result sealed_link_handshake(struct sealed_link *link, struct decode
         link->out_end += out_bytes;
     }
     if (result == SEALED_CONSUMED && link->in_capacity < OPEN_BYTES && !widen(link)) {
-        decode_error_set(error, PROTOCOL_ERROR_CODE_OUT_OF_MEMORY, "", "no memory");
+        decode_error_set(error, PROTOCOL_ERROR_OUT_OF_MEMORY, "", "no memory");
         return SEALED_FATAL;
     }
     return result;

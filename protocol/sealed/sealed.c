@@ -126,7 +126,7 @@ enum sealed_result sealed_fatal(struct sealed *sealed, struct decode_error *erro
                                 const char *text)
 {
     sealed->stage = STAGE_BROKEN;
-    decode_error_set(error, PROTOCOL_ERROR_CODE_PROTOCOL, field, "%s", text);
+    decode_error_set(error, PROTOCOL_ERROR_PROTOCOL, field, "%s", text);
     return SEALED_FATAL;
 }
 
@@ -154,7 +154,7 @@ static enum sealed_result refused(struct sealed *sealed, unsigned status, struct
     }
     sealed->stage = STAGE_BROKEN;
     sealed->status = (enum sealed_status)status;
-    decode_error_set(error, PROTOCOL_ERROR_CODE_DENIED, "", "%s", sealed_status_text(sealed->status));
+    decode_error_set(error, PROTOCOL_ERROR_DENIED, "", "%s", sealed_status_text(sealed->status));
     return SEALED_REFUSED;
 }
 

@@ -4,7 +4,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-bool error_set(struct error *error, enum error_kind kind, const char *field, const char *format, ...)
+bool error_set(struct error *error, enum error_code kind, const char *field, const char *format, ...)
 {
     if (!error || error->kind != ERROR_NONE)
         return false;

@@ -3,31 +3,13 @@
 #ifndef FARLIGHT_BASE_ERROR_H
 #define FARLIGHT_BASE_ERROR_H
 
+#include "base/words.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Same numbers as the protocol's error_code (session asserts it). */
-enum error_kind {
-    ERROR_NONE = 0,
-    ERROR_PROTOCOL = 1,
-    ERROR_VERSION = 2,
-    ERROR_INVALID = 3,
-    ERROR_UNKNOWN_ID = 4,
-    ERROR_UNSUPPORTED = 5,
-    ERROR_LIMIT = 6,
-    ERROR_BUSY = 7,
-    ERROR_CANCELLED = 8,
-    ERROR_HASH_MISMATCH = 9,
-    ERROR_OUT_OF_MEMORY = 10,
-    ERROR_DEVICE_LOST = 11,
-    ERROR_INTERNAL = 12,
-    ERROR_DENIED = 13,
-    ERROR_SHUTTING_DOWN = 14,
-    ERROR_TIMEOUT = 15,
-};
-
 struct error {
-    enum error_kind kind;
+    enum error_code kind;
     bool retryable;
     uint32_t retry_after_ms; /* 0: unknown */
     char field[128];         /* what is at fault, as a path: "mesh 3.ranges[2].material" */
@@ -37,7 +19,7 @@ struct error {
 
 /* Fills *error (which may be NULL) and returns false, so that a caller can `return error_set(..)`.
  * The first error wins: an *error that is already set is left alone. `field` may be NULL. */
-bool error_set(struct error *error, enum error_kind kind, const char *field, const char *format, ...)
+bool error_set(struct error *error, enum error_code kind, const char *field, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
 /* Adds the remedy to an error that has just been set; returns false. */

@@ -11,8 +11,7 @@ void stage_times_begin(struct stage_times *times)
     times->count = 0;
 }
 
-static struct stage_span *last_of(struct stage_times *times, uint32_t count, enum stage_id stage,
-                                  enum stage_clock clock)
+static struct stage_span *last_of(struct stage_times *times, uint32_t count, enum stage stage, enum clock clock)
 {
     for (uint32_t i = count; i-- > 0;) {
         if (times->spans[i].stage == stage && times->spans[i].clock == clock)
@@ -36,7 +35,7 @@ static void make_room(struct stage_times *times)
     }
 }
 
-void stage_times_add(struct stage_times *times, enum stage_id stage, enum stage_clock clock, uint32_t wave,
+void stage_times_add(struct stage_times *times, enum stage stage, enum clock clock, uint32_t wave,
                      uint64_t start_ns, uint64_t duration_ns)
 {
     if (!times)
@@ -60,7 +59,7 @@ void stage_times_add(struct stage_times *times, enum stage_id stage, enum stage_
     };
 }
 
-uint64_t stage_times_sum_ns(const struct stage_times *times, enum stage_id stage, enum stage_clock clock)
+uint64_t stage_times_sum_ns(const struct stage_times *times, enum stage stage, enum clock clock)
 {
     uint64_t sum_ns = 0;
     for (uint32_t i = 0; i < times->count; i++) {
@@ -70,7 +69,7 @@ uint64_t stage_times_sum_ns(const struct stage_times *times, enum stage_id stage
     return sum_ns;
 }
 
-const char *stage_name(enum stage_id stage)
+const char *stage_name(enum stage stage)
 {
     static const char *const names[STAGE_COUNT] = {
         [STAGE_APPLY] = "apply",     [STAGE_BUILD] = "build",       [STAGE_UPLOAD] = "upload",

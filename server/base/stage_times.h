@@ -3,33 +3,15 @@
 #ifndef FARLIGHT_BASE_STAGE_TIMES_H
 #define FARLIGHT_BASE_STAGE_TIMES_H
 
+#include "base/words.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-/* Same numbers as the protocol's enum stage (session asserts it). */
-enum stage_id {
-    STAGE_APPLY,
-    STAGE_BUILD,
-    STAGE_UPLOAD,
-    STAGE_PRIMARY,
-    STAGE_TRACE,
-    STAGE_SHADE,
-    STAGE_RESOLVE,
-    STAGE_READBACK,
-    STAGE_ENCODE,
-    STAGE_QUEUE,
-    STAGE_SEND,
-    STAGE_FRAME,
-    STAGE_COMPARE,
-    STAGE_COUNT
-};
-
-enum stage_clock { STAGE_CPU, STAGE_GPU };
-
 struct stage_span {
-    enum stage_id stage;
-    enum stage_clock clock;
+    enum stage stage;
+    enum clock clock;
     /* Of trace and shade: number of the wave in its frame. Of a build by `ldc`: which cube, 0 the static one, 1
      * the dynamic one; on the GPU's clock these are all that there are of a build. */
     uint32_t wave;
@@ -48,9 +30,9 @@ struct stage_times {
 
 void stage_times_begin(struct stage_times *times); /* empties it, sets the origin to now */
 /* `start_ns` by clock_now_ns(). `times` may be NULL: nothing happens. */
-void stage_times_add(struct stage_times *times, enum stage_id stage, enum stage_clock clock, uint32_t wave,
+void stage_times_add(struct stage_times *times, enum stage stage, enum clock clock, uint32_t wave,
                      uint64_t start_ns, uint64_t duration_ns);
-uint64_t stage_times_sum_ns(const struct stage_times *times, enum stage_id stage, enum stage_clock clock);
-const char *stage_name(enum stage_id stage);
+uint64_t stage_times_sum_ns(const struct stage_times *times, enum stage stage, enum clock clock);
+const char *stage_name(enum stage stage);
 
 #endif

@@ -139,7 +139,7 @@ static struct job_tracks *find_tracks(struct timeline *timeline, const struct ti
     return oldest;
 }
 
-static enum track track_of(enum stage_id stage, bool gpu)
+static enum track track_of(enum stage stage, bool gpu)
 {
     if (gpu)
         return TRACK_GPU;
@@ -156,7 +156,7 @@ static void print_frame(struct timeline *timeline, const struct timeline_frame *
         const struct stage_span *span = &times->spans[i];
         events[i] = (struct trace_event){
             .name = stage_name(span->stage),
-            .gpu = span->clock == STAGE_GPU,
+            .gpu = span->clock == CLOCK_GPU,
             .rank = span->stage, /* frame contains its one stage */
             .process = frame->client,
             .start_ns = times->origin_ns + span->start_ns,
@@ -166,7 +166,7 @@ static void print_frame(struct timeline *timeline, const struct timeline_frame *
     }
     trace_sort_events(events, times->count);
     for (uint32_t i = 0; i < times->count; i++) {
-        enum track track = track_of((enum stage_id)events[i].rank, events[i].gpu);
+        enum track track = track_of((enum stage)events[i].rank, events[i].gpu);
         char name[64];
         snprintf(name, sizeof(name), "job %" PRIu32 ": %s", frame->job, names[track]);
         trace_place_event(writer, &job->tracks[track], name, &events[i]);

@@ -10,15 +10,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum encoding {
-    ENCODING_RAW,
-    ENCODING_ZSTD,
-    ENCODING_JPEG,
-    ENCODING_H264,
-    ENCODING_PREDICTED,
-    ENCODING_COUNT
-}; /* protocol's numbers */
-
 struct picture {
     uint32_t width, height;
     uint32_t bytes_per_pixel; /* 4, 8 or 16; four channels */

@@ -381,10 +381,10 @@ static void account(struct engine *engine, struct job *job, struct frame_result 
 {
     struct engine_scene *scene = job->scene;
     if (scene->apply_ns)
-        stage_times_add(&result->times, STAGE_APPLY, STAGE_CPU, 0, scene->apply_start_ns, scene->apply_ns);
+        stage_times_add(&result->times, STAGE_APPLY, CLOCK_CPU, 0, scene->apply_start_ns, scene->apply_ns);
     scene->apply_ns = 0;
-    if (!stage_times_sum_ns(&result->times, STAGE_FRAME, STAGE_CPU))
-        stage_times_add(&result->times, STAGE_FRAME, STAGE_CPU, 0, job->begin_ns, clock_now_ns() - job->begin_ns);
+    if (!stage_times_sum_ns(&result->times, STAGE_FRAME, CLOCK_CPU))
+        stage_times_add(&result->times, STAGE_FRAME, CLOCK_CPU, 0, job->begin_ns, clock_now_ns() - job->begin_ns);
     stage_totals_add_times(&engine->totals, &result->times);
     engine->frames++;
     engine->rays += result->primary_rays + result->shadow_rays + result->secondary_rays;

@@ -20,15 +20,15 @@ void engine_count_contents(struct engine_scene *from)
     from->triangles = from->spheres = 0;
     size_t cursor = 0;
     void *value;
-    while (hashmap_next(&scene->objects[SCENE_NODE], &cursor, NULL, &value)) {
-        enum scene_node_kind kind = ((const struct scene_node *)value)->kind;
+    while (hashmap_next(&scene->objects[OBJECT_NODE], &cursor, NULL, &value)) {
+        enum node_kind kind = ((const struct scene_node *)value)->kind;
         from->instances += kind == NODE_MESH || kind == NODE_SPHERES;
     }
     cursor = 0;
-    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, NULL, &value))
+    while (hashmap_next(&scene->objects[OBJECT_MESH], &cursor, NULL, &value))
         from->triangles += ((const struct scene_mesh *)value)->triangle_count;
     cursor = 0;
-    while (hashmap_next(&scene->objects[SCENE_SPHERES], &cursor, NULL, &value))
+    while (hashmap_next(&scene->objects[OBJECT_SPHERES], &cursor, NULL, &value))
         from->spheres += ((const struct scene_spheres *)value)->sphere_count;
 }
 
@@ -103,7 +103,7 @@ static void describe_cameras(struct engine_scene_description *description, const
     uint32_t nodes[ENGINE_DESCRIPTION_MAX];
     size_t cursor = 0;
     void *value;
-    while (hashmap_next(&scene->objects[SCENE_NODE], &cursor, NULL, &value)) {
+    while (hashmap_next(&scene->objects[OBJECT_NODE], &cursor, NULL, &value)) {
         const struct scene_node *node = value;
         if (node->kind == NODE_CAMERA)
             keep_first(nodes, &description->camera_count, node->base.id);
@@ -138,7 +138,7 @@ static void describe_clips(struct engine_scene_description *description, const s
     uint32_t numbers[ENGINE_DESCRIPTION_MAX];
     size_t cursor = 0;
     void *value;
-    while (hashmap_next(&scene->objects[SCENE_CLIP], &cursor, NULL, &value))
+    while (hashmap_next(&scene->objects[OBJECT_CLIP], &cursor, NULL, &value))
         keep_first(numbers, &description->clip_count, ((const struct scene_clip *)value)->base.id);
     for (uint32_t i = 0; i < description->clip_count; i++) {
         struct engine_clip_entry *entry = &description->clips[i];
@@ -146,7 +146,7 @@ static void describe_clips(struct engine_scene_description *description, const s
         memcpy(entry->name, scene_clip(scene, numbers[i])->base.name, sizeof entry->name);
     }
     cursor = 0;
-    while (hashmap_next(&scene->objects[SCENE_CHANNEL], &cursor, NULL, &value))
+    while (hashmap_next(&scene->objects[OBJECT_CHANNEL], &cursor, NULL, &value))
         describe_channel(description, numbers, scene, value);
 }
 
@@ -175,7 +175,7 @@ static const struct engine_scene_description *need_description(struct engine_sce
     from->description->revision = scene->revision;
     from->description->triangles = from->triangles;
     from->description->spheres = from->spheres;
-    from->description->nodes = (uint32_t)scene->objects[SCENE_NODE].count;
+    from->description->nodes = (uint32_t)scene->objects[OBJECT_NODE].count;
     describe_bounds(from->description, scene);
     describe_cameras(from->description, scene);
     describe_clips(from->description, scene);

@@ -137,11 +137,11 @@ static bool encode_pixels(struct encode_lane *lane, const struct picture *pictur
 }
 
 /* Appends to the queue. */
-static bool append_attachment(struct engine_frame *frame, enum frame_attachment which, size_t *added_bytes,
+static bool append_attachment(struct engine_frame *frame, enum attachment which, size_t *added_bytes,
                               struct error *error)
 {
     const struct frame_result *result = &frame->result;
-    if (!(result->attachments & which))
+    if (!(result->attachments & 1u << which))
         return true;
     const struct picture picture = {.width = result->width,
                                     .height = result->height,
@@ -189,8 +189,8 @@ static bool encode(struct encode_pool *pool, struct encode_lane *lane, struct en
     free(result->pixels);
     result->pixels = NULL;
     frame->encoded_ns = clock_now_ns();
-    stage_times_add(&result->times, STAGE_ENCODE, STAGE_CPU, 0, start_ns, frame->encoded_ns - start_ns);
-    stage_totals_add(pool->options.totals, STAGE_ENCODE, STAGE_CPU, frame->encoded_ns - start_ns);
+    stage_times_add(&result->times, STAGE_ENCODE, CLOCK_CPU, 0, start_ns, frame->encoded_ns - start_ns);
+    stage_totals_add(pool->options.totals, STAGE_ENCODE, CLOCK_CPU, frame->encoded_ns - start_ns);
     return true;
 }
 

@@ -327,8 +327,8 @@ struct engine_event *engine_next_event(struct engine *engine)
 
 void engine_report_sent(struct engine *engine, uint64_t queue_ns, uint64_t send_ns)
 {
-    stage_totals_add(&engine->totals, STAGE_QUEUE, STAGE_CPU, queue_ns);
-    stage_totals_add(&engine->totals, STAGE_SEND, STAGE_CPU, send_ns);
+    stage_totals_add(&engine->totals, STAGE_QUEUE, CLOCK_CPU, queue_ns);
+    stage_totals_add(&engine->totals, STAGE_SEND, CLOCK_CPU, send_ns);
 }
 
 bool engine_is_alive(const struct engine *engine, uint64_t *turns)

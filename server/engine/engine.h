@@ -46,19 +46,12 @@ struct engine_options {
     const struct engine_backend *backend; /* NULL: the GPU; for tests */
 };
 
-/* Which clients may attach to a scene, beside the one that opened it. */
-enum engine_sharing { SHARING_PRIVATE, SHARING_KEPT, SHARING_SHARED };
-
-/* Camera of a job over time, `time_s` and ten numbers that a spline goes through; enums have the protocol's
- * numbers. */
-enum camera_path { CAMERA_AUTO, CAMERA_NODE, CAMERA_KEYS, CAMERA_ORBIT };
+/* Camera of a job over time, `time_s` and ten numbers that a spline goes through. */
 struct camera_key {
     float time_s;
     float eye_world[3], look_at_world[3], up_world[3];
     float fov_y;
 };
-
-enum job_kind { JOB_BATCH, JOB_VIEW }; /* protocol's numbers */
 
 /* A job's terms; engine/shot.h makes the request and the poses of each frame from them. */
 struct engine_job {
@@ -117,7 +110,7 @@ struct engine_command {
     uint32_t request;
     uint32_t scene;
     char name[SCENE_NAME_MAX + 1]; /* scene_open, scene_attach */
-    enum engine_sharing sharing;   /* scene_open */
+    enum sharing sharing;          /* scene_open */
     uint64_t principal;  /* scene_open, _attach, _list, _trim, stats: the asking client's owner; kept scenes belong
                             to owners */
     uint64_t trim_bytes; /* scenes_trim */
@@ -154,7 +147,7 @@ struct engine_stats {
 struct engine_scene_entry {
     uint64_t revision, triangles;
     uint32_t clients;
-    enum engine_sharing sharing;
+    enum sharing sharing;
     char name[SCENE_NAME_MAX + 1];
 };
 struct engine_scene_list {

@@ -43,7 +43,7 @@ struct engine_scene {
     struct engine_scene *next;           /* of the engine's, in the order of their opening */
     struct engine_reference *references; /* NULL: it has no holder, and ends or lingers */
     uint64_t left_ns;                    /* since when it has had no holder */
-    enum engine_sharing sharing;
+    enum sharing sharing;
     uint64_t principal; /* the owner that opened it */
     struct scene *scene;
     struct frame_scene *shared; /* NULL until the first frame, and after the device was lost */

@@ -120,7 +120,7 @@ void job_output_put(struct job_output *output, uint64_t position, struct engine_
     event->client = output->options.client;
     event->request = output->options.request;
     if (event->frame)
-        atomic_store(&output->encode_ns, stage_times_sum_ns(&event->frame->result.times, STAGE_ENCODE, STAGE_CPU));
+        atomic_store(&output->encode_ns, stage_times_sum_ns(&event->frame->result.times, STAGE_ENCODE, CLOCK_CPU));
     atomic_fetch_sub(&output->unfinished, 1);
     pthread_mutex_lock(&output->lock);
     if (atomic_load(&output->closed)) {

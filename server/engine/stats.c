@@ -17,7 +17,7 @@ static void describe_scene(const struct engine *engine, struct engine_scene *fro
         .revision = scene->revision,
         .host_bytes = scene->host_bytes,
         .device_bytes = scene_device_bytes(engine, from),
-        .nodes = (uint32_t)scene->objects[SCENE_NODE].count,
+        .nodes = (uint32_t)scene->objects[OBJECT_NODE].count,
         .instances = from->instances,
         .triangles = from->triangles,
         .spheres = from->spheres,

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "engine/totals.h"
 
-void stage_totals_add(struct stage_totals *totals, enum stage_id stage, enum stage_clock clock,
-                      uint64_t duration_ns)
+void stage_totals_add(struct stage_totals *totals, enum stage stage, enum clock clock, uint64_t duration_ns)
 {
     /* Only sums: no reader draws conclusions from one about another, so the order does not matter. */
     struct stage_total *total = &totals->by_stage[stage][clock];

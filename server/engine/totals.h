@@ -14,8 +14,7 @@ struct stage_totals {
     struct stage_total by_stage[STAGE_COUNT][2]; /* by stage and clock */
 };
 
-void stage_totals_add(struct stage_totals *totals, enum stage_id stage, enum stage_clock clock,
-                      uint64_t duration_ns);
+void stage_totals_add(struct stage_totals *totals, enum stage stage, enum clock clock, uint64_t duration_ns);
 /* All spans of a frame. */
 void stage_totals_add_times(struct stage_totals *totals, const struct stage_times *times);
 

@@ -305,7 +305,7 @@ bool gpu_check(struct gpu_device *device, const char *what, struct error *error)
     device->lost = first == GL_CONTEXT_LOST;
     if (device->lost)
         return error_set(error, ERROR_DEVICE_LOST, NULL, "%s: the GL context was lost", what);
-    enum error_kind kind = first == GL_OUT_OF_MEMORY ? ERROR_OUT_OF_MEMORY : ERROR_INTERNAL;
+    enum error_code kind = first == GL_OUT_OF_MEMORY ? ERROR_OUT_OF_MEMORY : ERROR_INTERNAL;
     return error_set(error, kind, NULL, "%s: %s (0x%04x)", what, gl_error_name(first), first);
 }
 

@@ -26,7 +26,7 @@ struct gpu_program_cache {
     struct cached_program *first;
 };
 
-struct stage {
+struct shader_stage {
     GLenum type;
     const char *path;
     struct gpu_source_text text;
@@ -62,21 +62,21 @@ static bool make_key(char key[KEY_MAX], const struct gpu_program_source *source)
     return length < KEY_MAX;
 }
 
-static unsigned list_stages(struct stage stages[STAGE_MAX], const struct gpu_program_source *source)
+static unsigned list_stages(struct shader_stage stages[STAGE_MAX], const struct gpu_program_source *source)
 {
     unsigned count = 0;
     if (source->compute)
-        stages[count++] = (struct stage){.type = GL_COMPUTE_SHADER, .path = source->compute};
+        stages[count++] = (struct shader_stage){.type = GL_COMPUTE_SHADER, .path = source->compute};
     if (source->vertex)
-        stages[count++] = (struct stage){.type = GL_VERTEX_SHADER, .path = source->vertex};
+        stages[count++] = (struct shader_stage){.type = GL_VERTEX_SHADER, .path = source->vertex};
     if (source->geometry && count < STAGE_MAX)
-        stages[count++] = (struct stage){.type = GL_GEOMETRY_SHADER, .path = source->geometry};
+        stages[count++] = (struct shader_stage){.type = GL_GEOMETRY_SHADER, .path = source->geometry};
     if (source->fragment && count < STAGE_MAX)
-        stages[count++] = (struct stage){.type = GL_FRAGMENT_SHADER, .path = source->fragment};
+        stages[count++] = (struct shader_stage){.type = GL_FRAGMENT_SHADER, .path = source->fragment};
     return count;
 }
 
-static bool compile(struct stage *stage, struct error *error)
+static bool compile(struct shader_stage *stage, struct error *error)
 {
     char log[4096] = "", named[sizeof(((struct error *)0)->text)];
     const GLchar *text = stage->text.text;
@@ -93,7 +93,7 @@ static bool compile(struct stage *stage, struct error *error)
     return error_set(error, ERROR_INTERNAL, stage->path, "%s", named);
 }
 
-static bool link_program(GLuint program, struct stage *stages, unsigned stage_count, struct error *error)
+static bool link_program(GLuint program, struct shader_stage *stages, unsigned stage_count, struct error *error)
 {
     for (unsigned i = 0; i < stage_count; i++) {
         if (!compile(&stages[i], error))
@@ -114,7 +114,7 @@ static bool link_program(GLuint program, struct stage *stages, unsigned stage_co
     return error_set(error, ERROR_INTERNAL, stages[0].path, "%s", log);
 }
 
-static struct gpu_binary_key binary_key(const struct gpu_device *device, const struct stage *stages,
+static struct gpu_binary_key binary_key(const struct gpu_device *device, const struct shader_stage *stages,
                                         unsigned stage_count)
 {
     XXH3_state_t *state = XXH3_createState();
@@ -132,7 +132,7 @@ static struct gpu_binary_key binary_key(const struct gpu_device *device, const s
 }
 
 /* From the disk, else compiled. */
-static bool build(struct gpu_device *device, GLuint program, struct stage *stages, unsigned stage_count,
+static bool build(struct gpu_device *device, GLuint program, struct shader_stage *stages, unsigned stage_count,
                   struct error *error)
 {
     struct gpu_binary_key key = {0};
@@ -172,7 +172,7 @@ static const struct gpu_program *add_program(struct gpu_device *device, GLuint n
 static const struct gpu_program *create_program(struct gpu_device *device, const struct gpu_program_source *source,
                                                 const char *key, struct error *error)
 {
-    struct stage stages[STAGE_MAX];
+    struct shader_stage stages[STAGE_MAX];
     unsigned stage_count = list_stages(stages, source);
     const struct gpu_program *program = NULL;
     GLuint name = gpu_object_create(device->registry, GPU_PROGRAM);

@@ -11,7 +11,7 @@
 #define RING_SPANS 256
 
 struct span {
-    enum stage_id stage;
+    enum stage stage;
     uint32_t wave;
     uint64_t cpu_start_ns, cpu_duration_ns;
     unsigned queries[2]; /* begin, end; 0: the CPU alone measured it */
@@ -68,7 +68,7 @@ static struct span *add_span(struct gpu_timer *timer)
     return span;
 }
 
-void gpu_timer_begin(struct gpu_timer *timer, enum stage_id stage, uint32_t wave)
+void gpu_timer_begin(struct gpu_timer *timer, enum stage stage, uint32_t wave)
 {
     if (timer->open)
         gpu_timer_end(timer);
@@ -134,10 +134,10 @@ void gpu_timer_collect(struct gpu_timer *timer, struct stage_times *times)
     for (size_t i = 0; i < timer->span_count; i++) {
         const struct span *span = &timer->spans[i];
         uint64_t begin_ns, end_ns;
-        stage_times_add(times, span->stage, STAGE_CPU, span->wave, span->cpu_start_ns, span->cpu_duration_ns);
+        stage_times_add(times, span->stage, CLOCK_CPU, span->wave, span->cpu_start_ns, span->cpu_duration_ns);
         if (span->queries[1] && query_time(span->queries[0], &begin_ns) && query_time(span->queries[1], &end_ns) &&
             end_ns >= begin_ns)
-            stage_times_add(times, span->stage, STAGE_GPU, span->wave, begin_ns + cpu_from_gpu_ns,
+            stage_times_add(times, span->stage, CLOCK_GPU, span->wave, begin_ns + cpu_from_gpu_ns,
                             end_ns - begin_ns);
     }
     timer->span_count = 0;

@@ -12,7 +12,7 @@ struct gpu_timer *gpu_timer_create(struct gpu_device *device); /* NULL: out of m
 void gpu_timer_destroy(struct gpu_timer *timer);               /* accepts NULL */
 /* Spans may not nest. Those beyond the ring's size are measured on the CPU alone. Each span is also
  * measured with the CPU clock, and both reach the stage times. */
-void gpu_timer_begin(struct gpu_timer *timer, enum stage_id stage, uint32_t wave);
+void gpu_timer_begin(struct gpu_timer *timer, enum stage stage, uint32_t wave);
 void gpu_timer_end(struct gpu_timer *timer);
 /* Waits until the GPU is through with the spans, adds every span since the last collect to `times` (may be NULL).
  * A query without a result is left out, never reported as 0. */

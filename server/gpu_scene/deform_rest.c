@@ -57,7 +57,7 @@ static bool can_deform(const struct scene *scene)
     size_t cursor = 0;
     uint64_t id;
     void *value;
-    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, &id, &value)) {
+    while (hashmap_next(&scene->objects[OBJECT_MESH], &cursor, &id, &value)) {
         const struct scene_mesh *mesh = value;
         if (mesh->influence_count || mesh->target_count)
             return true;
@@ -78,7 +78,7 @@ uint64_t gpu_scene_deform_signature(const struct scene *scene)
     void *value;
     if (!can_deform(scene))
         return 0;
-    while (hashmap_next(&scene->objects[SCENE_NODE], &cursor, &id, &value)) {
+    while (hashmap_next(&scene->objects[OBJECT_NODE], &cursor, &id, &value)) {
         const struct scene_node *node = value;
         if (deformed_mesh(scene, node))
             signature += gpu_scene_mix(gpu_scene_mix(id + 1) + ((uint64_t)node->object << 32 | node->skin));
@@ -111,7 +111,7 @@ static void inherit(struct deform_use *use, struct gpu_scene_deform *old)
 
 bool gpu_scene_deform_list(struct gpu_scene_deform *deform, const struct scene *scene, struct error *error)
 {
-    const struct hashmap *nodes = &scene->objects[SCENE_NODE];
+    const struct hashmap *nodes = &scene->objects[OBJECT_NODE];
     struct deform_use *uses = NULL;
     uint32_t count = 0;
     if (can_deform(scene)) {

@@ -50,7 +50,7 @@ static bool find_only_deformed(const struct gpu_scene *gpu, const struct scene *
     bool ok = true;
     for (uint32_t i = 0; ok && i < deform->use_count; i++)
         ok = hashmap_put(meshes, deform->uses[i].mesh_id, &deform->uses[i]);
-    while (ok && meshes->count > 0 && hashmap_next(&scene->objects[SCENE_NODE], &cursor, &id, &value)) {
+    while (ok && meshes->count > 0 && hashmap_next(&scene->objects[OBJECT_NODE], &cursor, &id, &value)) {
         const struct scene_node *node = value;
         const struct scene_mesh *mesh = node->kind == NODE_MESH ? scene_mesh(scene, node->object) : NULL;
         if (mesh && !scene_node_deforms(node, mesh))
@@ -64,7 +64,7 @@ static void add_meshes(struct gpu_scene *gpu, const struct scene *scene, const s
     size_t cursor = 0;
     uint64_t id;
     void *value;
-    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, &id, &value)) {
+    while (hashmap_next(&scene->objects[OBJECT_MESH], &cursor, &id, &value)) {
         const struct scene_mesh *mesh = value;
         if (hashmap_get(only_deformed, id))
             continue;
@@ -82,7 +82,7 @@ static void add_sphere_sets(struct gpu_scene *gpu, const struct scene *scene)
     size_t cursor = 0;
     uint64_t id;
     void *value;
-    while (hashmap_next(&scene->objects[SCENE_SPHERES], &cursor, &id, &value)) {
+    while (hashmap_next(&scene->objects[OBJECT_SPHERES], &cursor, &id, &value)) {
         const struct scene_spheres *set = value;
         struct gpu_scene_geometry *geometry = &gpu->geometries[gpu->geometry_count++];
         *geometry =
@@ -99,7 +99,7 @@ static bool list_geometries(struct gpu_scene *gpu, const struct scene *scene, st
 {
     const struct gpu_scene_deform *deform = &gpu->state->deform;
     struct hashmap only_deformed = {0};
-    size_t total = scene->objects[SCENE_MESH].count + scene->objects[SCENE_SPHERES].count + deform->use_count;
+    size_t total = scene->objects[OBJECT_MESH].count + scene->objects[OBJECT_SPHERES].count + deform->use_count;
     free(gpu->geometries);
     gpu->geometry_count = 0;
     gpu->geometries = calloc(total ? total : 1, sizeof(*gpu->geometries));
@@ -378,7 +378,7 @@ static void refresh_pointers(struct gpu_scene *gpu, const struct scene *scene)
 bool gpu_scene_upload_geometry(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
                                struct error *error)
 {
-    uint64_t signature = gpu_scene_signature(scene, SCENE_MESH) * 3 + gpu_scene_signature(scene, SCENE_SPHERES) +
+    uint64_t signature = gpu_scene_signature(scene, OBJECT_MESH) * 3 + gpu_scene_signature(scene, OBJECT_SPHERES) +
                          gpu_scene_deform_signature(scene) * 5;
     if (gpu->state->any_update && signature == gpu->state->shapes_signature) {
         refresh_pointers(gpu, scene);
@@ -446,7 +446,7 @@ void gpu_scene_classify_geometry(struct gpu_scene *gpu, const struct scene *scen
     uint64_t id;
     void *value;
     uint32_t ignored = 0;
-    while (hashmap_next(&scene->objects[SCENE_DISC], &cursor, &id, &value))
+    while (hashmap_next(&scene->objects[OBJECT_DISC], &cursor, &id, &value))
         classify_material(gpu, scene, pose, ((const struct scene_disc *)value)->material, &ignored);
 }
 

@@ -82,10 +82,10 @@ static void posed_finish(struct posed *posed)
 }
 
 static bool posed_init(struct posed *posed, const struct scene *scene, const struct scene_motion *motion,
-                       enum scene_node_kind kind)
+                       enum node_kind kind)
 {
     *posed = (struct posed){.pose_count = motion ? motion->pose_count : 1};
-    if (scene->objects[kind == NODE_MESH ? SCENE_MESH : SCENE_SPHERES].count == 0)
+    if (scene->objects[kind == NODE_MESH ? OBJECT_MESH : OBJECT_SPHERES].count == 0)
         return true;
     for (uint32_t p = 0; p < posed->pose_count; p++)
         if (!scene_flatten(scene, motion ? &motion->poses[p] : NULL, kind, &posed->list[p], &posed->count[p]))
@@ -268,8 +268,8 @@ static void pack_disc(const struct gpu_scene *gpu, const struct scene_disc *in, 
 bool gpu_scene_upload_discs(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
                             struct error *error)
 {
-    uint64_t signature = gpu_scene_signature(scene, SCENE_DISC), id;
-    size_t count = scene->objects[SCENE_DISC].count, cursor = 0, n = 0;
+    uint64_t signature = gpu_scene_signature(scene, OBJECT_DISC), id;
+    size_t count = scene->objects[OBJECT_DISC].count, cursor = 0, n = 0;
     void *value;
     if (gpu->state->any_update && signature == gpu->state->discs_signature)
         return true;
@@ -278,7 +278,7 @@ bool gpu_scene_upload_discs(struct gpu_scene *gpu, const struct scene *scene, st
     bool ok = sorted && discs;
     if (!ok)
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %zu discs", count);
-    while (ok && hashmap_next(&scene->objects[SCENE_DISC], &cursor, &id, &value))
+    while (ok && hashmap_next(&scene->objects[OBJECT_DISC], &cursor, &id, &value))
         sorted[n++] = value;
     if (ok)
         qsort(sorted, n, sizeof(*sorted), by_id);

@@ -70,7 +70,7 @@ static bool pack_lights(struct gpu_scene *gpu, const struct scene *scene, const 
     struct scene_instance *list = NULL;
     size_t count = 0;
     *packed = NULL;
-    if (scene->objects[SCENE_LIGHT].count == 0 || scene_flatten(scene, pose, NODE_LIGHT, &list, &count))
+    if (scene->objects[OBJECT_LIGHT].count == 0 || scene_flatten(scene, pose, NODE_LIGHT, &list, &count))
         *packed = calloc(count + 1, sizeof(**packed));
     gpu->light_count = 0;
     for (size_t i = 0; *packed && i < count; i++) {

@@ -66,7 +66,7 @@ bool gpu_scene_index_materials(struct gpu_scene *gpu, const struct scene *scene,
     if (indices->count == 0)
         indices->count = 1; /* the default material */
     bool ok = drop_stale(indices, scene);
-    while (ok && hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value)) {
+    while (ok && hashmap_next(&scene->objects[OBJECT_MATERIAL], &cursor, &id, &value)) {
         if (hashmap_get(&indices->index_by_id, id))
             continue;
         uint32_t index = indices->free_count ? indices->free[--indices->free_count] : indices->count++;
@@ -196,7 +196,7 @@ bool gpu_scene_upload_materials(struct gpu_scene *gpu, const struct scene *scene
     const struct scene_pose *pose = motion ? &motion->poses[0] : NULL;
     struct gpu_scene_state *state = gpu->state;
     uint32_t count = state->material_indices.count, slot_count = 1;
-    size_t slot_max = 1 + scene->objects[SCENE_MATERIAL].count * MATERIAL_TEXTURE_COUNT, cursor = 0;
+    size_t slot_max = 1 + scene->objects[OBJECT_MATERIAL].count * MATERIAL_TEXTURE_COUNT, cursor = 0;
     struct material *packed = calloc(count, sizeof(*packed));
     struct texture_slot *slots = calloc(slot_max, sizeof(*slots));
     uint64_t id;
@@ -206,7 +206,7 @@ bool gpu_scene_upload_materials(struct gpu_scene *gpu, const struct scene *scene
         error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for %u materials", count);
     else
         pack_default(&packed[0]);
-    while (ok && hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value))
+    while (ok && hashmap_next(&scene->objects[OBJECT_MATERIAL], &cursor, &id, &value))
         pack_material(gpu, scene_pose_material(pose, value), &packed[gpu_scene_material_index(gpu, (uint32_t)id)],
                       slots, &slot_count);
     if (ok && !same_surfaces(gpu, packed, count, slots, slot_count))

@@ -66,7 +66,7 @@ uint64_t gpu_scene_mix(uint64_t x)
     return x ^ (x >> 31);
 }
 
-uint64_t gpu_scene_signature(const struct scene *scene, enum scene_object_kind kind)
+uint64_t gpu_scene_signature(const struct scene *scene, enum object_kind kind)
 {
     uint64_t signature = 0, id;
     size_t cursor = 0;
@@ -176,7 +176,7 @@ bool gpu_scene_update(struct gpu_scene *gpu, const struct scene *scene, const st
     gpu->instances_revision = scene->instances_revision;
     gpu->shading_revision = scene->shading_revision;
     gpu->lights_revision = scene->lights_revision;
-    stage_times_add(times, STAGE_UPLOAD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    stage_times_add(times, STAGE_UPLOAD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return true;
 }
 

@@ -43,7 +43,7 @@ struct gpu_scene_state {
 /* Spreads an id and a revision over 64 bits. */
 uint64_t gpu_scene_mix(uint64_t x);
 /* Changes when an object of the kind is added, removed or set again; 0 for none. */
-uint64_t gpu_scene_signature(const struct scene *scene, enum scene_object_kind kind);
+uint64_t gpu_scene_signature(const struct scene *scene, enum object_kind kind);
 
 /* What the device's texel buffers do not hold is refused: "5 `what`; this device's ..." */
 bool gpu_scene_check_texels(const struct gpu_scene *gpu, uint64_t count, const char *what, struct error *error);

@@ -148,7 +148,7 @@ static bool lay_out(struct gpu_scene *gpu, const struct scene *scene, struct tex
     hashmap_finish(indices);
     hashmap_init(indices);
     *texel_count = 0;
-    while (hashmap_next(&scene->objects[SCENE_TEXTURE], &cursor, &id, &value)) {
+    while (hashmap_next(&scene->objects[OBJECT_TEXTURE], &cursor, &id, &value)) {
         const struct scene_texture *texture = value;
         uint32_t levels;
         uint64_t texels = chain_texels(texture->width, texture->height, &levels);
@@ -212,12 +212,12 @@ static void pack_all(struct pack_job *job, uint64_t texel_count)
 static bool pack_texels(struct gpu_scene *gpu, const struct scene *scene, const struct texture_info *infos,
                         uint64_t texel_count, struct error *error)
 {
-    size_t cursor = 0, count = scene->objects[SCENE_TEXTURE].count;
+    size_t cursor = 0, count = scene->objects[OBJECT_TEXTURE].count;
     uint64_t id;
     void *value;
     struct srgb_tables *tables = create_tables();
     struct pack_job job = {.tables = tables, .infos = infos, .list = calloc(count, sizeof(*job.list))};
-    while (job.list && hashmap_next(&scene->objects[SCENE_TEXTURE], &cursor, &id, &value)) {
+    while (job.list && hashmap_next(&scene->objects[OBJECT_TEXTURE], &cursor, &id, &value)) {
         job.list[job.count++] = value;
     }
     bool ok = tables && job.list;
@@ -238,8 +238,8 @@ static bool pack_texels(struct gpu_scene *gpu, const struct scene *scene, const 
 bool gpu_scene_upload_textures(struct gpu_scene *gpu, const struct scene *scene, struct scene_changes *changes,
                                struct error *error)
 {
-    uint64_t signature = gpu_scene_signature(scene, SCENE_TEXTURE), texel_count = 0;
-    size_t count = scene->objects[SCENE_TEXTURE].count;
+    uint64_t signature = gpu_scene_signature(scene, OBJECT_TEXTURE), texel_count = 0;
+    size_t count = scene->objects[OBJECT_TEXTURE].count;
     if (gpu->state->any_update && signature == gpu->state->textures_signature)
         return true;
     struct texture_info *infos = calloc(count ? count : 1, sizeof(*infos));

@@ -14,7 +14,7 @@ static bool read_key(struct auth_keys *keys, const char *path, bool read_only, s
     if (!path[0])
         return true;
     if (!sealed_key_read(&keys->keys[keys->count], path, &why)) {
-        bool denied = why.code == PROTOCOL_ERROR_CODE_DENIED;
+        bool denied = why.code == PROTOCOL_ERROR_DENIED;
         error_set(error, denied ? ERROR_DENIED : ERROR_INVALID, path, "%s", why.text);
         return !denied && error_remedy(error, "'farlight key FILE' makes one");
     }

@@ -99,7 +99,7 @@ void connection_finish(struct connection *connection, enum protocol_error_code c
     if (connection->state != CONNECTION_OPEN)
         return;
     out_queue_drop_all_bulk(&connection->out);
-    if (code != PROTOCOL_ERROR_CODE_NONE)
+    if (code != PROTOCOL_ERROR_NONE)
         queue_error(connection, code, field, text);
     struct message message;
     message_init(&message, MESSAGE_GOODBYE);
@@ -217,7 +217,7 @@ static bool process_message(struct connection *connection, size_t *offset)
     if (message_decode(&message, frame.header.type, frame.payload, frame.header.payload_bytes,
                        &connection->scratch, &error))
         connection->handler->message(connection->context, &frame.header, &message);
-    else if (error.code == PROTOCOL_ERROR_CODE_INVALID)
+    else if (error.code == PROTOCOL_ERROR_INVALID)
         connection->handler->invalid(connection->context, &frame.header, &error);
     else
         connection_finish(connection, error.code, error.field, error.text);

@@ -116,7 +116,7 @@ bool sealing_open_next(struct connection *connection)
     case SEALED_FATAL:
     case SEALED_REFUSED:
         sealed_link_drop_input(connection->link);
-        connection_finish(connection, PROTOCOL_ERROR_CODE_PROTOCOL, error.field, error.text);
+        connection_finish(connection, PROTOCOL_ERROR_PROTOCOL, error.field, error.text);
         return false;
     case SEALED_NEED_MORE:
     case SEALED_NEED_ROOM:

@@ -52,7 +52,7 @@ static void check_open(struct connection *connection, uint64_t now_ns)
     if (connection_incoming_bytes(connection) < progress_due_bytes(connection, now_ns)) {
         snprintf(text, sizeof text, "a message arrived at less than %u bytes a second",
                  limits->progress_bytes_per_s);
-        connection_finish(connection, PROTOCOL_ERROR_CODE_TIMEOUT, "", text);
+        connection_finish(connection, PROTOCOL_ERROR_TIMEOUT, "", text);
         return;
     }
     /* A client that has not read for that long will not read any more. */
@@ -64,7 +64,7 @@ static void check_open(struct connection *connection, uint64_t now_ns)
     }
     if (is_idle(connection, now_ns)) {
         snprintf(text, sizeof text, "no message for %u seconds", limits->idle_ms / 1000);
-        connection_finish(connection, PROTOCOL_ERROR_CODE_TIMEOUT, "", text);
+        connection_finish(connection, PROTOCOL_ERROR_TIMEOUT, "", text);
     }
 }
 

@@ -16,7 +16,7 @@
 #define AO_RAYS_DEFAULT 8               /* lambda of the paper on voxels and A-buffers */
 #define AO_DISTANCE_DEFAULT (1 / 10.0f) /* of the scene's diagonal */
 
-void context_span_begin(struct render_context *context, enum stage_id stage)
+void context_span_begin(struct render_context *context, enum stage stage)
 {
     gpu_timer_begin(context->timer, stage, context->wave_number);
     context->span_count++;
@@ -59,11 +59,11 @@ void context_collect(struct render_context *context)
     context->span_count = 0;
 }
 
-void context_add_cpu_time(struct render_context *context, enum stage_id stage, uint64_t start_ns)
+void context_add_cpu_time(struct render_context *context, enum stage stage, uint64_t start_ns)
 {
     const struct stage_span span = {
         .stage = stage,
-        .clock = STAGE_CPU,
+        .clock = CLOCK_CPU,
         .wave = context->wave_number,
         .start_ns = start_ns - context->times.origin_ns,
         .duration_ns = clock_now_ns() - start_ns,

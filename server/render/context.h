@@ -38,7 +38,7 @@ struct render_context {
     struct gpu_buffer uniform_buffer;
     bool spread;     /* each pixel has its samples in places of its own; else jitter_pixel's */
     bool has_filter; /* the uniforms have the places of `filter` */
-    enum frame_filter filter;
+    enum pixel_filter filter;
     uint32_t wave_capacity; /* rays that the buffers below hold */
     /* The wave in hand: ray, path and, once traced, hit of each. */
     struct gpu_buffer rays, paths, hits;
@@ -57,13 +57,13 @@ struct render_context {
 };
 
 /* Spans of this frame; the ring is emptied before it is full. */
-void context_span_begin(struct render_context *context, enum stage_id stage);
+void context_span_begin(struct render_context *context, enum stage stage);
 void context_span_end(struct render_context *context);
 void context_collect(struct render_context *context);
 /* Spans of this frame that were not measured by its timer. */
 void context_add_times(struct render_context *context, const struct stage_times *spans);
 /* What the host has done for a stage since then. */
-void context_add_cpu_time(struct render_context *context, enum stage_id stage, uint64_t start_ns);
+void context_add_cpu_time(struct render_context *context, enum stage stage, uint64_t start_ns);
 /* A compute program of shaders/render with no defines, in use. */
 const struct gpu_program *context_use(struct render_context *context, const char *compute, struct error *error);
 /* `defines` ends with {0}. */

@@ -6,14 +6,14 @@ struct scene_features scene_features_of(const struct scene *scene)
     struct scene_features features = {0};
     uint64_t id;
     void *value;
-    for (size_t cursor = 0; hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value);) {
+    for (size_t cursor = 0; hashmap_next(&scene->objects[OBJECT_MATERIAL], &cursor, &id, &value);) {
         const struct scene_material *material = value;
         for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
             features.textures |= material->textures[i].texture != 0;
         features.anisotropy |= material->anisotropy > 0.0f;
         features.bump |= material->textures[MATERIAL_BUMP].texture != 0;
     }
-    for (size_t cursor = 0; hashmap_next(&scene->objects[SCENE_LIGHT], &cursor, &id, &value);) {
+    for (size_t cursor = 0; hashmap_next(&scene->objects[OBJECT_LIGHT], &cursor, &id, &value);) {
         const struct scene_light *light = value;
         features.area_lights |= light->kind == LIGHT_RECTANGLE || light->kind == LIGHT_SPHERE;
     }

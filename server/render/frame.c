@@ -230,7 +230,7 @@ bool frame_step_waits(const struct frame_renderer *renderer)
 static size_t attached_bytes(const struct frame_request *request)
 {
     size_t count = (size_t)__builtin_popcount(request->attachments);
-    return count * request->width * request->height * frame_format_bytes(FRAME_DEPTH32F);
+    return count * request->width * request->height * frame_format_bytes(PIXEL_FORMAT_DEPTH32F);
 }
 
 static bool hand_out(struct frame_renderer *renderer, struct frame_result *result, struct error *error)
@@ -241,7 +241,7 @@ static bool hand_out(struct frame_renderer *renderer, struct frame_result *resul
                                                 &renderer->result.comparison_count, error))
         return false;
     context_collect(context);
-    stage_times_add(&context->times, STAGE_FRAME, STAGE_CPU, 0, context->times.origin_ns,
+    stage_times_add(&context->times, STAGE_FRAME, CLOCK_CPU, 0, context->times.origin_ns,
                     clock_now_ns() - context->times.origin_ns);
     *result = renderer->result;
     result->pixels = renderer->picture.pixels;

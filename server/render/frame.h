@@ -15,33 +15,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Protocol's numbers, here to enum frame_layer. The last two are of attachments alone. */
-enum frame_format { FRAME_RGBA8, FRAME_RGBA16F, FRAME_RGBA32F, FRAME_DEPTH32F, FRAME_NORMAL8 };
-enum frame_tone_map { TONE_NEUTRAL, TONE_ACES, TONE_NONE };
-enum frame_primary { PRIMARY_RASTER, PRIMARY_TRACE };
-enum frame_integrator {
-    INTEGRATOR_WHITTED,
-    INTEGRATOR_DISTRIBUTED,
-    INTEGRATOR_RAYCAST,
-    INTEGRATOR_AO,
-    INTEGRATOR_PATH
-};
-enum frame_brdf { FRAME_BRDF_GGX, FRAME_BRDF_WARD };
-enum frame_layer { /* bits of frame_request.layers are 1 << these */
-                   LAYER_BEAUTY,
-                   LAYER_ALBEDO,
-                   LAYER_NORMAL,
-                   LAYER_DEPTH,
-                   LAYER_POSITION,
-                   LAYER_AO,
-                   LAYER_ID,
-                   LAYER_COUNT
-};
-enum frame_attachment { /* protocol's bits */
-                        ATTACHMENT_DEPTH = 1,
-                        ATTACHMENT_NORMALS = 2
-};
-enum frame_filter { FILTER_BLACKMAN_HARRIS, FILTER_GAUSSIAN, FILTER_TENT, FILTER_BOX }; /* of pixels */
+/* Formats of attachments alone, which follow those of the wire. */
+enum { PIXEL_FORMAT_DEPTH32F = PIXEL_FORMAT_COUNT, PIXEL_FORMAT_NORMAL8 };
 
 struct frame_camera {
     float world_from_view[12]; /* rigid; looks along -z, y up */
@@ -57,20 +32,20 @@ struct frame_request {
     struct frame_camera camera;
     unsigned tracer; /* protocol's number */
     struct tracer_options tracer_options;
-    enum frame_integrator integrator;
-    enum frame_primary primary;
-    enum frame_tone_map tone_map;
-    enum frame_format format;
+    enum integrator_kind integrator;
+    enum primary_kind primary;
+    enum tone_map tone_map;
+    enum pixel_format format;
     float exposure_stops;
     float aperture; /* diameter of the lens, metres; 0: everything is sharp, or the camera has none */
     float focus;    /* distance along the view of the plane that is sharp, metres; 0: middle of the scene */
-    enum frame_filter filter;
-    enum frame_brdf brdf; /* of rough surfaces; integrator path */
+    enum pixel_filter filter;
+    enum brdf brdf;       /* of rough surfaces; integrator path */
     float ao_distance;    /* metres; 0: a tenth of the scene's diagonal */
     float ao_falloff;     /* as a power of 1 - distance / ao_distance; 0: all counts the same */
     uint32_t ao_rays;     /* a sample; 0: 8 */
     float layer_opacity;  /* of opaque surfaces, integrator raycast; 0: 0.5 */
-    uint32_t layers;      /* bits; 0: the picture alone. More than it need FRAME_RGBA32F */
+    uint32_t layers;      /* bits; 0: the picture alone. More than it need PIXEL_FORMAT_RGBA32F */
     uint32_t attachments; /* bits; beside the picture alone, in any format of it */
     /* RGBA8 of the picture alone: it comes as these planes, which are less to read back, and which its encoder
      * need not make of it. */
@@ -97,7 +72,7 @@ struct frame_request {
  *   linear formats  mean radiance of the samples times 2^exposure_stops, premultiplied by alpha
  *   RGBA8           the same divided by alpha, tone-mapped, sRGB
  *   planes          that, without alpha
- *   layers          those beside the beauty are what protocol/messages.def says of them (LAYER), and know of no
+ *   layers          those beside the beauty are what protocol/words.def says of them (LAYER), and know of no
  *                   exposure
  *   attachments     those layers in 4 bytes a pixel, see frame_result_attachment()
  *   alpha           1 where there is a surface (what blended surfaces leave open goes on to what lies behind) and
@@ -117,7 +92,7 @@ struct frame_result {
     size_t size_bytes;
     uint32_t width, height;
     uint32_t samples; /* held per pixel, with those of the frames before that it goes on from */
-    enum frame_format format;
+    enum pixel_format format;
     enum ycbcr ycbcr; /* in place of the RGBA8; base/ycbcr.h says how the planes lie in size_bytes */
     uint64_t revision;
     uint64_t primary_rays, shadow_rays, secondary_rays, splits;
@@ -131,7 +106,7 @@ void frame_result_finish(struct frame_result *result);
 /* Of width x height: DEPTH f32, metres along the view to the first surface that the pixel's first sample met, 0
  * where there is none; NORMALS 4 u8, (n / 2 + 1/2) * 255 of the mean of the samples in world space, then 255, all
  * 0 where there is none. Valid as long as the pixels; `which` is one of the result's attachments. */
-const uint8_t *frame_result_attachment(const struct frame_result *result, enum frame_attachment which);
+const uint8_t *frame_result_attachment(const struct frame_result *result, enum attachment which);
 
 /* What a scene has on the device, whoever looks at it: its copy, its light, and each tracer that was asked for. */
 struct frame_scene;

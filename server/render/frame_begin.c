@@ -92,7 +92,7 @@ static bool update_scene(struct frame_renderer *renderer, const struct scene *sc
     context->features = scene_features_of(scene);
     uint64_t start_ns = clock_now_ns();
     updated = environment_update(context->environment, renderer->device, scene, &renderer->shared->copy, error);
-    stage_times_add(&context->times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    stage_times_add(&context->times, STAGE_BUILD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return updated;
 }
 

@@ -12,11 +12,11 @@ void frame_result_finish(struct frame_result *result)
     *result = (struct frame_result){0};
 }
 
-const uint8_t *frame_result_attachment(const struct frame_result *result, enum frame_attachment which)
+const uint8_t *frame_result_attachment(const struct frame_result *result, enum attachment which)
 {
-    size_t bytes = (size_t)result->width * result->height * frame_format_bytes(FRAME_DEPTH32F);
+    size_t bytes = (size_t)result->width * result->height * frame_format_bytes(PIXEL_FORMAT_DEPTH32F);
     /* As planes they come in the order of their layers. */
-    bool is_second = which == ATTACHMENT_DEPTH && result->attachments & ATTACHMENT_NORMALS;
+    bool is_second = which == ATTACHMENT_DEPTH && result->attachments & 1u << ATTACHMENT_NORMALS;
     return result->pixels + result->size_bytes + (is_second ? bytes : 0);
 }
 

@@ -35,7 +35,7 @@ static bool check_integrator(const struct frame_request *request, struct error *
     if (!integrator_by_number(request->integrator))
         return error_set(error, ERROR_UNSUPPORTED, "integrator", "there is no integrator number %u",
                          (unsigned)request->integrator);
-    if (request->brdf > FRAME_BRDF_WARD)
+    if (request->brdf > BRDF_WARD)
         return error_set(error, ERROR_UNSUPPORTED, "brdf", "there is no reflection model number %u",
                          (unsigned)request->brdf);
     if (!(request->ao_distance >= 0.0f && isfinite(request->ao_distance)))
@@ -60,35 +60,36 @@ uint32_t frame_request_layers(const struct frame_request *request)
 
 uint32_t frame_request_planes(const struct frame_request *request)
 {
-    return frame_request_layers(request) | (request->attachments & ATTACHMENT_DEPTH ? 1u << LAYER_DEPTH : 0) |
-           (request->attachments & ATTACHMENT_NORMALS ? 1u << LAYER_NORMAL : 0);
+    return frame_request_layers(request) |
+           (request->attachments & 1u << ATTACHMENT_DEPTH ? 1u << LAYER_DEPTH : 0) |
+           (request->attachments & 1u << ATTACHMENT_NORMALS ? 1u << LAYER_NORMAL : 0);
 }
 
-uint32_t frame_format_bytes(enum frame_format format)
+uint32_t frame_format_bytes(unsigned format)
 {
     switch (format) {
-    case FRAME_RGBA8:
-    case FRAME_DEPTH32F:
-    case FRAME_NORMAL8:
+    case PIXEL_FORMAT_RGBA8:
+    case PIXEL_FORMAT_DEPTH32F:
+    case PIXEL_FORMAT_NORMAL8:
         return 4;
-    case FRAME_RGBA16F:
+    case PIXEL_FORMAT_RGBA16F:
         return 8;
-    case FRAME_RGBA32F:
+    case PIXEL_FORMAT_RGBA32F:
         return 16;
     }
     return 0;
 }
 
-enum frame_format frame_request_plane_format(const struct frame_request *request, enum frame_layer layer)
+unsigned frame_request_plane_format(const struct frame_request *request, enum layer layer)
 {
-    if (request->attachments & ATTACHMENT_DEPTH && layer == LAYER_DEPTH)
-        return FRAME_DEPTH32F;
-    if (request->attachments & ATTACHMENT_NORMALS && layer == LAYER_NORMAL)
-        return FRAME_NORMAL8;
+    if (request->attachments & 1u << ATTACHMENT_DEPTH && layer == LAYER_DEPTH)
+        return PIXEL_FORMAT_DEPTH32F;
+    if (request->attachments & 1u << ATTACHMENT_NORMALS && layer == LAYER_NORMAL)
+        return PIXEL_FORMAT_NORMAL8;
     return request->format;
 }
 
-uint64_t frame_request_plane_bytes(const struct frame_request *request, enum frame_layer layer, uint32_t rows)
+uint64_t frame_request_plane_bytes(const struct frame_request *request, enum layer layer, uint32_t rows)
 {
     if (layer == LAYER_BEAUTY && request->ycbcr != YCBCR_NONE)
         return (uint64_t)ycbcr_row_bytes(request->width) * ycbcr_row_count(rows);
@@ -99,7 +100,7 @@ uint64_t frame_request_bytes(const struct frame_request *request)
 {
     uint64_t bytes = 0;
     for (uint32_t left = frame_request_planes(request); left; left &= left - 1)
-        bytes += frame_request_plane_bytes(request, (enum frame_layer)__builtin_ctz(left), request->height);
+        bytes += frame_request_plane_bytes(request, (enum layer)__builtin_ctz(left), request->height);
     return bytes;
 }
 
@@ -108,15 +109,15 @@ static bool check_layers(const struct frame_request *request, struct error *erro
     if (request->layers >= 1u << LAYER_COUNT)
         return error_set(error, ERROR_UNSUPPORTED, "layers", "there is no layer number %d",
                          31 - __builtin_clz(request->layers));
-    if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != FRAME_RGBA32F)
+    if (frame_request_layers(request) != 1u << LAYER_BEAUTY && request->format != PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "layers", "layers beside the beauty need the format rgba32f");
-    if (request->attachments & ~(uint32_t)(ATTACHMENT_DEPTH | ATTACHMENT_NORMALS))
+    if (request->attachments & ~(uint32_t)(1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS))
         return error_set(error, ERROR_UNSUPPORTED, "attachments", "there is no such set of attachments: %#x",
                          request->attachments);
     if (request->attachments && frame_request_layers(request) != 1u << LAYER_BEAUTY)
         return error_set(error, ERROR_UNSUPPORTED, "attachments", "they go with the beauty alone");
     if (request->ycbcr != YCBCR_NONE &&
-        (request->format != FRAME_RGBA8 || frame_request_layers(request) != 1u << LAYER_BEAUTY))
+        (request->format != PIXEL_FORMAT_RGBA8 || frame_request_layers(request) != 1u << LAYER_BEAUTY))
         return error_set(error, ERROR_UNSUPPORTED, "format", "Y'CbCr is made of the beauty alone, as rgba8");
     return true;
 }
@@ -132,7 +133,7 @@ bool frame_request_check(const struct frame_request *request, struct error *erro
     if (request->filter > FILTER_BOX)
         return error_set(error, ERROR_UNSUPPORTED, "pixel_filter", "there is no pixel filter number %u",
                          (unsigned)request->filter);
-    if (request->format > FRAME_RGBA32F)
+    if (request->format > PIXEL_FORMAT_RGBA32F)
         return error_set(error, ERROR_UNSUPPORTED, "format", "there is no pixel format number %u",
                          (unsigned)request->format);
     return check_integrator(request, error) && check_layers(request, error) && check_camera(request, error);

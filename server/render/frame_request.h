@@ -13,10 +13,10 @@ uint32_t frame_request_layers(const struct frame_request *request);
 /* All that there is a plane for in the picture: layers and those that attachments are made of. */
 uint32_t frame_request_planes(const struct frame_request *request);
 /* Of a plane's pixels on the host, that of the beauty where the request attaches what it is. */
-enum frame_format frame_request_plane_format(const struct frame_request *request, enum frame_layer layer);
-uint32_t frame_format_bytes(enum frame_format format); /* of a pixel */
+unsigned frame_request_plane_format(const struct frame_request *request, enum layer layer);
+uint32_t frame_format_bytes(unsigned format); /* of a pixel */
 /* Of a plane's rows on the host; a multiple of 8, or all that there are. As Y'CbCr an odd last one has two. */
-uint64_t frame_request_plane_bytes(const struct frame_request *request, enum frame_layer layer, uint32_t rows);
+uint64_t frame_request_plane_bytes(const struct frame_request *request, enum layer layer, uint32_t rows);
 /* Of the frame's pixels, all planes. */
 uint64_t frame_request_bytes(const struct frame_request *request);
 /* Whether their samples may be added up: they are alike but for their number and for what becomes of the sum. */

@@ -12,7 +12,7 @@ _Static_assert(LAYER_BIT_BEAUTY == 1 << LAYER_BEAUTY && LAYER_BIT_ALBEDO == 1 <<
                    LAYER_BIT_ID == 1 << LAYER_ID && LAYER_ID + 1 == LAYER_COUNT,
                "shaders know the layers by other numbers");
 
-bool layers_of_first_sample(enum frame_layer layer)
+bool layers_of_first_sample(enum layer layer)
 {
     return layer == LAYER_DEPTH || layer == LAYER_POSITION || layer == LAYER_ID;
 }
@@ -136,14 +136,14 @@ static bool gather_ao(struct layers *layers, struct render_context *context, uin
 }
 
 /* Whether the slice in hand has anything to add: other samples than the first have only zeros for some. */
-static bool adds(const struct render_context *context, enum frame_layer layer)
+static bool adds(const struct render_context *context, enum layer layer)
 {
     return context->uniforms.sample_index == 0 || !layers_of_first_sample(layer);
 }
 
 static bool any_adds(const struct layers *layers, const struct render_context *context)
 {
-    for (enum frame_layer layer = LAYER_ALBEDO; layer < LAYER_COUNT; layer++)
+    for (enum layer layer = LAYER_ALBEDO; layer < LAYER_COUNT; layer++)
         if (layers->wanted & 1u << layer && adds(context, layer))
             return true;
     return false;
@@ -179,7 +179,7 @@ bool layers_accumulate(struct layers *layers, struct picture *picture, struct re
                        struct error *error)
 {
     for (uint32_t plane = 0; plane < picture->plane_count; plane++) {
-        enum frame_layer layer = picture_plane_layer(picture, plane);
+        enum layer layer = picture_plane_layer(picture, plane);
         if (layer == LAYER_BEAUTY || !adds(context, layer))
             continue;
         uint32_t first_sum = plane_of(layers, 1u << layer) * layers->plane_samples;

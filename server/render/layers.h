@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What a picture's samples saw beside its light: layers of the first surface that each ray met, also where that
  * lets light through. One sample of the slice in hand after the other is noted in sums of the slice, which reach
- * the picture when the slice does; what a layer holds is said in protocol/messages.def, ENUMERATION(LAYER). */
+ * the picture when the slice does; what a layer holds is said in protocol/words.def, ENUMERATION(LAYER). */
 #ifndef FARLIGHT_RENDER_LAYERS_H
 #define FARLIGHT_RENDER_LAYERS_H
 
@@ -30,7 +30,7 @@ bool layers_step(struct layers *layers, struct render_context *context, bool *do
 bool layers_accumulate(struct layers *layers, struct picture *picture, struct render_context *context,
                        struct error *error);
 /* Whether the layer holds the first sample of each pixel in place of the mean of all. */
-bool layers_of_first_sample(enum frame_layer layer);
+bool layers_of_first_sample(enum layer layer);
 uint64_t layers_device_bytes(const struct layers *layers);
 void layers_finish(struct layers *layers, struct gpu_device *device);
 

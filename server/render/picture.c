@@ -19,12 +19,12 @@ static void free_bands(struct picture *picture, struct gpu_device *device)
     picture->band_count = 0;
 }
 
-enum frame_layer picture_plane_layer(const struct picture *picture, uint32_t plane)
+enum layer picture_plane_layer(const struct picture *picture, uint32_t plane)
 {
     uint32_t left = picture->layers;
     for (; plane > 0; plane--)
         left &= left - 1;
-    return (enum frame_layer)__builtin_ctz(left);
+    return (enum layer)__builtin_ctz(left);
 }
 
 struct gpu_buffer *picture_band(const struct picture *picture, uint32_t plane, uint32_t band)

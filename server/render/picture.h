@@ -41,7 +41,7 @@ bool picture_copy_band(struct picture *picture, struct render_context *context, 
                        uint32_t plane, uint32_t band, struct error *error);
 bool picture_take_band(struct picture *picture, struct render_context *context, struct gpu_readback *copy,
                        uint32_t plane, uint32_t band, struct error *error);
-enum frame_layer picture_plane_layer(const struct picture *picture, uint32_t plane);
+enum layer picture_plane_layer(const struct picture *picture, uint32_t plane);
 struct gpu_buffer *picture_band(const struct picture *picture, uint32_t plane, uint32_t band);
 uint64_t picture_device_bytes(const struct picture *picture);
 uint32_t picture_band_first_row(const struct picture *picture, uint32_t band);

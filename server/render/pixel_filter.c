@@ -6,7 +6,7 @@
 #define PI 3.14159265358979323846
 #define GAUSSIAN_SIGMA 0.5
 
-double pixel_filter_radius(enum frame_filter filter)
+double pixel_filter_radius(enum pixel_filter filter)
 {
     switch (filter) {
     case FILTER_BLACKMAN_HARRIS:
@@ -15,6 +15,7 @@ double pixel_filter_radius(enum frame_filter filter)
     case FILTER_TENT:
         return 1.0;
     case FILTER_BOX:
+    case FILTER_COUNT:
         break;
     }
     return 0.5;
@@ -28,7 +29,7 @@ static double blackman_harris_integral(double x, double radius)
            0.01168 * sin(3.0 * k * x) / (3.0 * k);
 }
 
-double pixel_filter_share(enum frame_filter filter, double distance)
+double pixel_filter_share(enum pixel_filter filter, double distance)
 {
     double radius = pixel_filter_radius(filter), x = fmin(fmax(distance, 0.0), radius);
     switch (filter) {
@@ -39,12 +40,13 @@ double pixel_filter_share(enum frame_filter filter, double distance)
     case FILTER_TENT:
         return x * (2.0 - x);
     case FILTER_BOX:
+    case FILTER_COUNT:
         break;
     }
     return x / radius;
 }
 
-void pixel_filter_places(float *places, enum frame_filter filter)
+void pixel_filter_places(float *places, enum pixel_filter filter)
 {
     for (int i = 0; i < PIXEL_FILTER_INTERVALS; i++) {
         double beyond = (double)i / PIXEL_FILTER_INTERVALS, share = 1.0 - beyond * beyond;

@@ -14,11 +14,11 @@
 #define PIXEL_FILTER_INTERVALS 64
 
 /* From the centre to where the filter ends, pixels. */
-double pixel_filter_radius(enum frame_filter filter);
+double pixel_filter_radius(enum pixel_filter filter);
 /* The share of samples whose x lies within `distance` of the centre, 0..1. */
-double pixel_filter_share(enum frame_filter filter, double distance);
+double pixel_filter_share(enum pixel_filter filter, double distance);
 /* PIXEL_FILTER_INTERVALS + 1 places. */
-void pixel_filter_places(float *places, enum frame_filter filter);
+void pixel_filter_places(float *places, enum pixel_filter filter);
 /* From a number in [0, 1) to an offset from the centre, pixels; ascending. */
 float pixel_filter_offset(const float *places, float number);
 

@@ -9,7 +9,7 @@
 #include <math.h>
 
 /* Of the sum of a layer's samples what its pixels show. */
-static float scale_of(const struct picture *picture, const struct frame_request *request, enum frame_layer layer)
+static float scale_of(const struct picture *picture, const struct frame_request *request, enum layer layer)
 {
     float mean = 1.0f / (float)picture->samples;
     if (layer == LAYER_BEAUTY)
@@ -17,15 +17,15 @@ static float scale_of(const struct picture *picture, const struct frame_request 
     return layers_of_first_sample(layer) ? 1.0f : mean;
 }
 
-static const struct gpu_program *use_pixels(struct render_context *context, enum frame_layer layer,
-                                            uint32_t pixel_count, struct error *error)
+static const struct gpu_program *use_pixels(struct render_context *context, enum layer layer, uint32_t pixel_count,
+                                            struct error *error)
 {
-    static const char *const numbers[] = {[FRAME_RGBA8] = "0",
-                                          [FRAME_RGBA16F] = "1",
-                                          [FRAME_RGBA32F] = "2",
-                                          [FRAME_DEPTH32F] = "3",
-                                          [FRAME_NORMAL8] = "4"};
-    enum frame_format format = frame_request_plane_format(&context->request, layer);
+    static const char *const numbers[] = {[PIXEL_FORMAT_RGBA8] = "0",
+                                          [PIXEL_FORMAT_RGBA16F] = "1",
+                                          [PIXEL_FORMAT_RGBA32F] = "2",
+                                          [PIXEL_FORMAT_DEPTH32F] = "3",
+                                          [PIXEL_FORMAT_NORMAL8] = "4"};
+    unsigned format = frame_request_plane_format(&context->request, layer);
     const struct gpu_define defines[] = {{"FORMAT", numbers[format]}, {0}};
     const struct gpu_program *program = context_use_with(context, "render/resolve.comp", defines, error);
     if (program)
@@ -46,7 +46,7 @@ static const struct gpu_program *use_ycbcr(struct render_context *context, uint3
 bool picture_resolve_band(struct picture *picture, struct render_context *context, uint32_t plane, uint32_t band,
                           struct error *error)
 {
-    enum frame_layer layer = picture_plane_layer(picture, plane);
+    enum layer layer = picture_plane_layer(picture, plane);
     const struct frame_request *request = &context->request;
     uint32_t rows = picture_band_row_count(picture, band), pixel_count = rows * picture->width;
     bool as_ycbcr = layer == LAYER_BEAUTY && request->ycbcr != YCBCR_NONE;

@@ -8,7 +8,7 @@
 
 #define BOUNCES_APART 8u /* the last family of a kind is of all bounces that follow */
 
-_Static_assert(RAY_KIND_COUNT *BOUNCES_APART <= WAVE_FAMILIES, "a family for each kind and bounce");
+_Static_assert(RAY_COUNT *BOUNCES_APART <= WAVE_FAMILIES, "a family for each kind and bounce");
 
 /* Rays of one kind and bounce cost about the same from slice to slice. */
 static unsigned family_of(const struct render_context *context, enum ray_kind kind)

@@ -70,7 +70,7 @@ bool clip_check(const struct scene_clip *clip, const struct edit_place *place)
 bool channel_check(const struct scene_channel *channel, const struct edit_place *place)
 {
     const struct channel_row *row = channel_row(channel->path);
-    enum scene_object_kind kind;
+    enum object_kind kind;
     if (!row)
         return edit_error(place, ERROR_INVALID, ".path", "%u is no path", (unsigned)channel->path);
     if ((unsigned)channel->interpolation > INTERPOLATION_BEZIER)

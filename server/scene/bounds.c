@@ -58,7 +58,7 @@ static bool afford(const struct scene_mesh *mesh, uint64_t *left)
     return true;
 }
 
-static bool extend_by_kind(const struct scene *scene, const struct scene_pose *pose, enum scene_node_kind kind,
+static bool extend_by_kind(const struct scene *scene, const struct scene_pose *pose, enum node_kind kind,
                            float lower[3], float upper[3])
 {
     struct scene_instance *instances;
@@ -97,7 +97,7 @@ static bool extend_by_discs(const struct scene *scene, float lower[3], float upp
     size_t cursor = 0;
     void *value;
     bool found = false;
-    while (hashmap_next(&scene->objects[SCENE_DISC], &cursor, NULL, &value)) {
+    while (hashmap_next(&scene->objects[OBJECT_DISC], &cursor, NULL, &value)) {
         const struct scene_disc *disc = value;
         float disc_lower[3], disc_upper[3];
         for (int axis = 0; axis < 3; axis++) {

@@ -32,18 +32,18 @@ const struct channel_row *channel_row(enum channel_path path)
     return &rows[path];
 }
 
-bool channel_object_kind(enum channel_target target, enum scene_object_kind *kind)
+bool channel_object_kind(enum channel_target target, enum object_kind *kind)
 {
     switch (target) {
     case TARGET_NODE:
     case TARGET_WEIGHTS:
-        *kind = SCENE_NODE;
+        *kind = OBJECT_NODE;
         return true;
     case TARGET_LIGHT:
-        *kind = SCENE_LIGHT;
+        *kind = OBJECT_LIGHT;
         return true;
     case TARGET_MATERIAL:
-        *kind = SCENE_MATERIAL;
+        *kind = OBJECT_MATERIAL;
         return true;
     case TARGET_VIEW:
         break;

@@ -18,7 +18,7 @@ struct channel_row {
 /* NULL: no such path. */
 const struct channel_row *channel_row(enum channel_path path);
 /* Kind of the object that a target is; false for the view. */
-bool channel_object_kind(enum channel_target target, enum scene_object_kind *kind);
+bool channel_object_kind(enum channel_target target, enum object_kind *kind);
 /* Floats of one key. */
 uint32_t channel_key_floats(const struct scene_channel *channel);
 /* The channel's numbers in its clip, which must have them. */

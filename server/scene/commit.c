@@ -12,28 +12,28 @@
 static bool content_check(struct scene_edit *edit, const struct edit_place *place)
 {
     switch (edit->object) {
-    case SCENE_MESH:
+    case OBJECT_MESH:
         return mesh_check(&edit->set.mesh, place);
-    case SCENE_SPHERES:
+    case OBJECT_SPHERES:
         return spheres_check(&edit->set.spheres, place);
-    case SCENE_TEXTURE:
+    case OBJECT_TEXTURE:
         return texture_check(&edit->set.texture, place);
-    case SCENE_LIGHT:
+    case OBJECT_LIGHT:
         return light_check(&edit->set.light, place);
-    case SCENE_CAMERA:
+    case OBJECT_CAMERA:
         return camera_check(&edit->set.camera, place);
-    case SCENE_DISC:
+    case OBJECT_DISC:
         return disc_check(&edit->set.disc, place);
-    case SCENE_NODE:
+    case OBJECT_NODE:
         return node_check(&edit->set.node, place);
-    case SCENE_SKIN:
+    case OBJECT_SKIN:
         return skin_check(&edit->set.skin, place);
-    case SCENE_CLIP:
+    case OBJECT_CLIP:
         return clip_check(&edit->set.clip, place);
-    case SCENE_CHANNEL:
+    case OBJECT_CHANNEL:
         return channel_check(&edit->set.channel, place);
-    case SCENE_MATERIAL:
-    case SCENE_OBJECT_KIND_COUNT:
+    case OBJECT_MATERIAL:
+    case OBJECT_COUNT:
         break;
     }
     return true;
@@ -47,7 +47,7 @@ static bool take_edit(struct draft *draft, struct scene_edit *edit)
         draft->last_environment = edit;
         return environment_check(&edit->set.environment, &place);
     }
-    if ((unsigned)edit->object >= SCENE_OBJECT_KIND_COUNT)
+    if ((unsigned)edit->object >= OBJECT_COUNT)
         return edit_error(&place, ERROR_INVALID, ".kind", "%u is no kind of object", (unsigned)edit->object);
     uint32_t id = edit_object_id(edit);
     if (!id)
@@ -66,27 +66,27 @@ struct size {
     uint64_t host_bytes, table_bytes, nodes;
 };
 
-static void add_object(struct size *size, enum scene_object_kind kind, const void *object)
+static void add_object(struct size *size, enum object_kind kind, const void *object)
 {
     size->host_bytes += object_bytes(kind, object);
     size->table_bytes += object_table_bytes(kind, object);
-    size->nodes += kind == SCENE_NODE;
+    size->nodes += kind == OBJECT_NODE;
 }
 
-static void take_object(struct size *size, enum scene_object_kind kind, const void *object)
+static void take_object(struct size *size, enum object_kind kind, const void *object)
 {
     size->host_bytes -= object_bytes(kind, object);
     size->table_bytes -= object_table_bytes(kind, object);
-    size->nodes -= kind == SCENE_NODE;
+    size->nodes -= kind == OBJECT_NODE;
 }
 
 /* After the transaction. */
 static struct size draft_size(const struct draft *draft)
 {
     const struct scene *scene = draft->scene;
-    struct size size = {scene->host_bytes, scene->table_bytes, scene->objects[SCENE_NODE].count};
-    for (int k = 0; k < SCENE_OBJECT_KIND_COUNT; k++) {
-        enum scene_object_kind kind = (enum scene_object_kind)k;
+    struct size size = {scene->host_bytes, scene->table_bytes, scene->objects[OBJECT_NODE].count};
+    for (int k = 0; k < OBJECT_COUNT; k++) {
+        enum object_kind kind = (enum object_kind)k;
         size_t cursor = 0;
         uint64_t id;
         void *value;
@@ -99,10 +99,9 @@ static struct size draft_size(const struct draft *draft)
                 take_object(&size, kind, now);
         }
     }
-    for (int k = 0; k < SCENE_OBJECT_KIND_COUNT; k++) {
+    for (int k = 0; k < OBJECT_COUNT; k++) {
         for (size_t i = 0; i < draft->fallen[k].count; i++)
-            take_object(&size, (enum scene_object_kind)k,
-                        hashmap_get(&scene->objects[k], draft->fallen[k].ids[i]));
+            take_object(&size, (enum object_kind)k, hashmap_get(&scene->objects[k], draft->fallen[k].ids[i]));
     }
     if (draft->last_environment)
         size.host_bytes +=
@@ -117,7 +116,7 @@ static bool limits_check(const struct draft *draft, const struct size *size)
     const struct scene *scene = draft->scene;
     const struct scene_limits *limits = &scene->limits;
     uint64_t nodes_max = limits->nodes ? limits->nodes : NODES_MAX_DEFAULT;
-    if (size->nodes > nodes_max && size->nodes > scene->objects[SCENE_NODE].count) {
+    if (size->nodes > nodes_max && size->nodes > scene->objects[OBJECT_NODE].count) {
         error_set(draft->error, ERROR_LIMIT, "edits", "the scene would have %llu nodes; %llu are allowed",
                   (unsigned long long)size->nodes, (unsigned long long)nodes_max);
         return error_remedy(draft->error, "remove nodes, or raise limits.nodes in the daemon's configuration");
@@ -181,21 +180,21 @@ static void give_room_back(struct draft *draft)
 static void touch_node(struct scene *scene, const struct scene_node *node)
 {
     bool alone = node->child_count == 0;
-    if (!alone || scene->objects[SCENE_SKIN].count || node->kind == NODE_MESH || node->kind == NODE_SPHERES)
+    if (!alone || scene->objects[OBJECT_SKIN].count || node->kind == NODE_MESH || node->kind == NODE_SPHERES)
         scene->instances_revision = scene->revision;
     if (!alone || node->kind == NODE_LIGHT)
         scene->lights_revision = scene->revision;
 }
 
-static void touch_kind(struct scene *scene, enum scene_object_kind kind)
+static void touch_kind(struct scene *scene, enum object_kind kind)
 {
-    if (kind == SCENE_MESH || kind == SCENE_SPHERES || kind == SCENE_DISC)
+    if (kind == OBJECT_MESH || kind == OBJECT_SPHERES || kind == OBJECT_DISC)
         scene->geometry_revision = scene->revision;
-    else if (kind == SCENE_MATERIAL || kind == SCENE_TEXTURE)
+    else if (kind == OBJECT_MATERIAL || kind == OBJECT_TEXTURE)
         scene->shading_revision = scene->revision;
-    else if (kind == SCENE_LIGHT)
+    else if (kind == OBJECT_LIGHT)
         scene->lights_revision = scene->revision;
-    else if (kind == SCENE_SKIN)
+    else if (kind == OBJECT_SKIN)
         scene->instances_revision = scene->revision;
 }
 
@@ -208,7 +207,7 @@ static void touch_mesh(struct scene *scene, const struct scene_mesh *mesh)
 
 static void count_child(struct scene *scene, uint32_t parent, int change)
 {
-    struct scene_node *node = parent ? hashmap_get(&scene->objects[SCENE_NODE], parent) : NULL;
+    struct scene_node *node = parent ? hashmap_get(&scene->objects[OBJECT_NODE], parent) : NULL;
     if (node)
         node->child_count += (uint32_t)change;
 }
@@ -216,7 +215,7 @@ static void count_child(struct scene *scene, uint32_t parent, int change)
 static void apply_set(struct scene *scene, struct scene_edit *edit)
 {
     struct scene_object *object = hashmap_get(&scene->objects[edit->object], edit_object_id(edit));
-    if (edit->object == SCENE_NODE) {
+    if (edit->object == OBJECT_NODE) {
         struct scene_node *node = (struct scene_node *)object, *next = &edit->set.node;
         next->child_count = node->child_count;
         if (object->revision) {
@@ -226,7 +225,7 @@ static void apply_set(struct scene *scene, struct scene_edit *edit)
         count_child(scene, next->parent, +1);
         touch_node(scene, next);
     }
-    if (edit->object == SCENE_MESH) {
+    if (edit->object == OBJECT_MESH) {
         touch_mesh(scene, (const struct scene_mesh *)object);
         touch_mesh(scene, &edit->set.mesh);
     }
@@ -238,12 +237,12 @@ static void apply_set(struct scene *scene, struct scene_edit *edit)
     memset(&edit->set, 0, sizeof edit->set);
 }
 
-static void apply_remove(struct scene *scene, enum scene_object_kind kind, uint32_t id)
+static void apply_remove(struct scene *scene, enum object_kind kind, uint32_t id)
 {
     struct scene_object *object = hashmap_remove(&scene->objects[kind], id);
     if (!object)
         return; /* made and removed by the same transaction */
-    if (kind == SCENE_NODE) {
+    if (kind == OBJECT_NODE) {
         const struct scene_node *node = (const struct scene_node *)object;
         touch_node(scene, node);
         count_child(scene, node->parent, -1);
@@ -274,9 +273,9 @@ static void apply(struct draft *draft, const struct size *size)
             memset(&edit->set, 0, sizeof edit->set);
         }
     }
-    for (int k = 0; k < SCENE_OBJECT_KIND_COUNT; k++) {
+    for (int k = 0; k < OBJECT_COUNT; k++) {
         for (size_t i = 0; i < draft->fallen[k].count; i++)
-            apply_remove(scene, (enum scene_object_kind)k, draft->fallen[k].ids[i]);
+            apply_remove(scene, (enum object_kind)k, draft->fallen[k].ids[i]);
     }
 }
 

@@ -6,21 +6,21 @@
 
 static bool removes_nodes(const struct draft *draft)
 {
-    return draft->fallen[SCENE_NODE].count || draft_removes_any(draft, SCENE_NODE);
+    return draft->fallen[OBJECT_NODE].count || draft_removes_any(draft, OBJECT_NODE);
 }
 
 static bool channels_fall(struct draft *draft)
 {
     size_t cursor = 0;
     const struct scene_channel *channel;
-    while ((channel = draft_next_untouched(draft, SCENE_CHANNEL, &cursor))) {
-        enum scene_object_kind kind;
+    while ((channel = draft_next_untouched(draft, OBJECT_CHANNEL, &cursor))) {
+        enum object_kind kind;
         const struct channel_row *row = channel_row(channel->path);
         bool has_object = row && channel_object_kind(row->target, &kind);
-        if (draft_find(draft, SCENE_CLIP, channel->clip) &&
+        if (draft_find(draft, OBJECT_CLIP, channel->clip) &&
             (!has_object || draft_remaining(draft, kind, channel->object)))
             continue;
-        if (!draft_note_fallen(draft, SCENE_CHANNEL, channel->base.id))
+        if (!draft_note_fallen(draft, OBJECT_CHANNEL, channel->base.id))
             return false;
     }
     return true;
@@ -31,7 +31,7 @@ static uint32_t first_gone(const struct draft *draft, const struct scene_skin *s
 {
     const uint32_t *joints = (const uint32_t *)(const void *)skin->joints->data;
     uint32_t i = 0;
-    while (i < skin->joint_count && draft_remaining(draft, SCENE_NODE, joints[i]))
+    while (i < skin->joint_count && draft_remaining(draft, OBJECT_NODE, joints[i]))
         i++;
     return i;
 }
@@ -40,10 +40,10 @@ static bool skins_fall(struct draft *draft, struct hashmap *falling)
 {
     size_t cursor = 0;
     const struct scene_skin *skin;
-    while ((skin = draft_next_untouched(draft, SCENE_SKIN, &cursor))) {
+    while ((skin = draft_next_untouched(draft, OBJECT_SKIN, &cursor))) {
         if (first_gone(draft, skin) == skin->joint_count)
             continue;
-        if (!draft_note_fallen(draft, SCENE_SKIN, skin->base.id))
+        if (!draft_note_fallen(draft, OBJECT_SKIN, skin->base.id))
             return false;
         if (!hashmap_put(falling, skin->base.id, draft))
             return error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory for a table of skins");
@@ -54,13 +54,13 @@ static bool skins_fall(struct draft *draft, struct hashmap *falling)
 /* The edit that removes a node or one above it. */
 static const struct scene_edit *removal_of(const struct draft *draft, uint32_t node)
 {
-    const struct scene_edit *edit = hashmap_get(&draft->last[SCENE_NODE], node);
+    const struct scene_edit *edit = hashmap_get(&draft->last[OBJECT_NODE], node);
     for (int depth = 0; depth < SCENE_DEPTH_MAX && !(edit && edit->kind == EDIT_REMOVE); depth++) {
         const struct scene_node *below = scene_node(draft->scene, node);
         if (!below)
             break;
         node = below->parent;
-        edit = hashmap_get(&draft->last[SCENE_NODE], node);
+        edit = hashmap_get(&draft->last[OBJECT_NODE], node);
     }
     return edit;
 }
@@ -81,13 +81,13 @@ static bool users_check(struct draft *draft, const struct hashmap *falling)
 {
     size_t cursor = 0;
     const struct scene_node *node;
-    while ((node = draft_next_untouched(draft, SCENE_NODE, &cursor))) {
+    while ((node = draft_next_untouched(draft, OBJECT_NODE, &cursor))) {
         if (node->skin && hashmap_get(falling, node->skin))
             return skin_in_use(draft, node);
     }
     for (size_t i = 0; i < draft->edit_count; i++) {
         const struct scene_edit *edit = &draft->edits[i];
-        if (edit->kind == EDIT_SET && edit->object == SCENE_NODE && draft_counts(draft, edit) &&
+        if (edit->kind == EDIT_SET && edit->object == OBJECT_NODE && draft_counts(draft, edit) &&
             edit->set.node.skin && hashmap_get(falling, edit->set.node.skin))
             return skin_in_use(draft, &edit->set.node);
     }
@@ -97,8 +97,8 @@ static bool users_check(struct draft *draft, const struct hashmap *falling)
 bool companions_check(struct draft *draft)
 {
     bool nodes = removes_nodes(draft);
-    if ((nodes || draft_removes_any(draft, SCENE_LIGHT) || draft_removes_any(draft, SCENE_MATERIAL) ||
-         draft_removes_any(draft, SCENE_CLIP)) &&
+    if ((nodes || draft_removes_any(draft, OBJECT_LIGHT) || draft_removes_any(draft, OBJECT_MATERIAL) ||
+         draft_removes_any(draft, OBJECT_CLIP)) &&
         !channels_fall(draft))
         return false;
     if (!nodes)

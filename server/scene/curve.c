@@ -119,6 +119,7 @@ static void between_keys(const struct curve *curve, const struct span *span, con
             break;
         case INTERPOLATION_STEP:
         case INTERPOLATION_LINEAR:
+        case INTERPOLATION_COUNT:
             value[i] = a + (b - a) * span->share;
             break;
         }

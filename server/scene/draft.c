@@ -5,14 +5,14 @@
 
 void draft_finish(struct draft *draft)
 {
-    for (int kind = 0; kind < SCENE_OBJECT_KIND_COUNT; kind++) {
+    for (int kind = 0; kind < OBJECT_COUNT; kind++) {
         hashmap_finish(&draft->last[kind]);
         free(draft->fallen[kind].ids);
     }
     hashmap_finish(&draft->fallen_nodes);
 }
 
-const void *draft_find(const struct draft *draft, enum scene_object_kind kind, uint32_t id)
+const void *draft_find(const struct draft *draft, enum object_kind kind, uint32_t id)
 {
     const struct scene_edit *edit = hashmap_get(&draft->last[kind], id);
     if (edit)
@@ -32,24 +32,25 @@ struct edit_place draft_place(const struct draft *draft, const struct scene_edit
     return (struct edit_place){(size_t)(edit - draft->edits), edit, draft->error};
 }
 
-const void *draft_remaining(const struct draft *draft, enum scene_object_kind kind, uint32_t id)
+const void *draft_remaining(const struct draft *draft, enum object_kind kind, uint32_t id)
 {
-    bool fell = kind == SCENE_NODE && hashmap_get(&draft->fallen_nodes, id);
+    bool fell = kind == OBJECT_NODE && hashmap_get(&draft->fallen_nodes, id);
     return fell ? NULL : draft_find(draft, kind, id);
 }
 
-const void *draft_next_untouched(const struct draft *draft, enum scene_object_kind kind, size_t *cursor)
+const void *draft_next_untouched(const struct draft *draft, enum object_kind kind, size_t *cursor)
 {
     uint64_t id;
     void *object;
     while (hashmap_next(&draft->scene->objects[kind], cursor, &id, &object)) {
-        if (!hashmap_get(&draft->last[kind], id) && !(kind == SCENE_NODE && hashmap_get(&draft->fallen_nodes, id)))
+        if (!hashmap_get(&draft->last[kind], id) &&
+            !(kind == OBJECT_NODE && hashmap_get(&draft->fallen_nodes, id)))
             return object;
     }
     return NULL;
 }
 
-bool draft_removes_any(const struct draft *draft, enum scene_object_kind kind)
+bool draft_removes_any(const struct draft *draft, enum object_kind kind)
 {
     size_t cursor = 0;
     void *value;
@@ -60,7 +61,7 @@ bool draft_removes_any(const struct draft *draft, enum scene_object_kind kind)
     return false;
 }
 
-bool draft_note_fallen(struct draft *draft, enum scene_object_kind kind, uint32_t id)
+bool draft_note_fallen(struct draft *draft, enum object_kind kind, uint32_t id)
 {
     struct draft_list *list = &draft->fallen[kind];
     if (list->count == list->capacity) {
@@ -71,7 +72,7 @@ bool draft_note_fallen(struct draft *draft, enum scene_object_kind kind, uint32_
             list->capacity = capacity;
         }
     }
-    if (list->count == list->capacity || (kind == SCENE_NODE && !hashmap_put(&draft->fallen_nodes, id, draft)))
+    if (list->count == list->capacity || (kind == OBJECT_NODE && !hashmap_put(&draft->fallen_nodes, id, draft)))
         return error_set(draft->error, ERROR_OUT_OF_MEMORY, "edits", "no memory for a list of %ss that go along",
                          object_kind_name(kind));
     list->ids[list->count++] = id;

@@ -18,24 +18,24 @@ struct draft {
     struct scene *scene;
     struct scene_edit *edits;
     size_t edit_count;
-    struct hashmap last[SCENE_OBJECT_KIND_COUNT];      /* struct scene_edit *, by object id */
-    struct scene_edit *last_environment;               /* NULL: unchanged */
-    struct draft_list fallen[SCENE_OBJECT_KIND_COUNT]; /* companions of removed objects: companions.c */
-    struct hashmap fallen_nodes;                       /* the same of nodes, by id; NULL is never stored */
+    struct hashmap last[OBJECT_COUNT];      /* struct scene_edit *, by object id */
+    struct scene_edit *last_environment;    /* NULL: unchanged */
+    struct draft_list fallen[OBJECT_COUNT]; /* companions of removed objects: companions.c */
+    struct hashmap fallen_nodes;            /* the same of nodes, by id; NULL is never stored */
     struct error *error;
 };
 void draft_finish(struct draft *draft);
 
 /* The object after all edits, or NULL. Nodes that fall with a removed one are still found. */
-const void *draft_find(const struct draft *draft, enum scene_object_kind kind, uint32_t id);
+const void *draft_find(const struct draft *draft, enum object_kind kind, uint32_t id);
 /* The same, where those that fall are not found any more. */
-const void *draft_remaining(const struct draft *draft, enum scene_object_kind kind, uint32_t id);
+const void *draft_remaining(const struct draft *draft, enum object_kind kind, uint32_t id);
 /* Goes through all objects of a kind that this transaction neither sets nor removes and that do not fall; *cursor
  * starts at 0. NULL: no more. */
-const void *draft_next_untouched(const struct draft *draft, enum scene_object_kind kind, size_t *cursor);
-bool draft_removes_any(const struct draft *draft, enum scene_object_kind kind);
+const void *draft_next_untouched(const struct draft *draft, enum object_kind kind, size_t *cursor);
+bool draft_removes_any(const struct draft *draft, enum object_kind kind);
 /* False: out of memory, which *draft->error says. */
-bool draft_note_fallen(struct draft *draft, enum scene_object_kind kind, uint32_t id);
+bool draft_note_fallen(struct draft *draft, enum object_kind kind, uint32_t id);
 /* Whether an edit is the one that counts for its object. */
 bool draft_counts(const struct draft *draft, const struct scene_edit *edit);
 /* Where an error about this edit belongs. */

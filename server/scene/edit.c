@@ -9,15 +9,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-const char *object_kind_name(enum scene_object_kind kind)
+const char *object_kind_name(enum object_kind kind)
 {
-    static const char *const names[SCENE_OBJECT_KIND_COUNT] = {
-        [SCENE_NODE] = "node",         [SCENE_MESH] = "mesh",       [SCENE_SPHERES] = "spheres",
-        [SCENE_MATERIAL] = "material", [SCENE_TEXTURE] = "texture", [SCENE_LIGHT] = "light",
-        [SCENE_CAMERA] = "camera",     [SCENE_DISC] = "disc",       [SCENE_SKIN] = "skin",
-        [SCENE_CLIP] = "clip",         [SCENE_CHANNEL] = "channel",
+    static const char *const names[OBJECT_COUNT] = {
+        [OBJECT_NODE] = "node",         [OBJECT_MESH] = "mesh",       [OBJECT_SPHERES] = "spheres",
+        [OBJECT_MATERIAL] = "material", [OBJECT_TEXTURE] = "texture", [OBJECT_LIGHT] = "light",
+        [OBJECT_CAMERA] = "camera",     [OBJECT_DISC] = "disc",       [OBJECT_SKIN] = "skin",
+        [OBJECT_CLIP] = "clip",         [OBJECT_CHANNEL] = "channel",
     };
-    return (unsigned)kind < SCENE_OBJECT_KIND_COUNT ? names[kind] : "object";
+    return (unsigned)kind < OBJECT_COUNT ? names[kind] : "object";
 }
 
 uint32_t edit_object_id(const struct scene_edit *edit)
@@ -28,7 +28,7 @@ uint32_t edit_object_id(const struct scene_edit *edit)
     return edit->kind == EDIT_REMOVE ? edit->id : edit->set.node.base.id;
 }
 
-bool edit_error(const struct edit_place *place, enum error_kind kind, const char *path, const char *format, ...)
+bool edit_error(const struct edit_place *place, enum error_code kind, const char *path, const char *format, ...)
 {
     char field[sizeof place->error->field], text[sizeof place->error->text];
     if (place->edit->kind == EDIT_SET_ENVIRONMENT)
@@ -97,15 +97,15 @@ bool ranges_check(const struct material_range *ranges, uint32_t range_count, uin
     return true;
 }
 
-size_t object_struct_bytes(enum scene_object_kind kind)
+size_t object_struct_bytes(enum object_kind kind)
 {
-    static const size_t sizes[SCENE_OBJECT_KIND_COUNT] = {
-        [SCENE_NODE] = sizeof(struct scene_node),       [SCENE_MESH] = sizeof(struct scene_mesh),
-        [SCENE_SPHERES] = sizeof(struct scene_spheres), [SCENE_MATERIAL] = sizeof(struct scene_material),
-        [SCENE_TEXTURE] = sizeof(struct scene_texture), [SCENE_LIGHT] = sizeof(struct scene_light),
-        [SCENE_CAMERA] = sizeof(struct scene_camera),   [SCENE_DISC] = sizeof(struct scene_disc),
-        [SCENE_SKIN] = sizeof(struct scene_skin),       [SCENE_CLIP] = sizeof(struct scene_clip),
-        [SCENE_CHANNEL] = sizeof(struct scene_channel),
+    static const size_t sizes[OBJECT_COUNT] = {
+        [OBJECT_NODE] = sizeof(struct scene_node),       [OBJECT_MESH] = sizeof(struct scene_mesh),
+        [OBJECT_SPHERES] = sizeof(struct scene_spheres), [OBJECT_MATERIAL] = sizeof(struct scene_material),
+        [OBJECT_TEXTURE] = sizeof(struct scene_texture), [OBJECT_LIGHT] = sizeof(struct scene_light),
+        [OBJECT_CAMERA] = sizeof(struct scene_camera),   [OBJECT_DISC] = sizeof(struct scene_disc),
+        [OBJECT_SKIN] = sizeof(struct scene_skin),       [OBJECT_CLIP] = sizeof(struct scene_clip),
+        [OBJECT_CHANNEL] = sizeof(struct scene_channel),
     };
     return sizes[kind];
 }
@@ -142,40 +142,40 @@ static uint64_t channel_pose_bytes(const struct scene_channel *channel)
     return bytes * MOTION_POSES_MAX;
 }
 
-uint64_t object_table_bytes(enum scene_object_kind kind, const void *object)
+uint64_t object_table_bytes(enum object_kind kind, const void *object)
 {
     /* Its slot in the table, at the table's usual load. */
     const uint64_t slot_bytes = 32;
     uint64_t range_count = 0, weight_count = 0, pose_bytes = 0;
-    if (kind == SCENE_MESH) {
+    if (kind == OBJECT_MESH) {
         range_count = ((const struct scene_mesh *)object)->range_count;
         weight_count = ((const struct scene_mesh *)object)->weight_count;
-    } else if (kind == SCENE_SPHERES) {
+    } else if (kind == OBJECT_SPHERES) {
         range_count = ((const struct scene_spheres *)object)->range_count;
-    } else if (kind == SCENE_NODE) {
+    } else if (kind == OBJECT_NODE) {
         weight_count = ((const struct scene_node *)object)->weight_count;
-    } else if (kind == SCENE_CHANNEL) {
+    } else if (kind == OBJECT_CHANNEL) {
         pose_bytes = channel_pose_bytes(object);
     }
     return object_struct_bytes(kind) + slot_bytes + range_count * sizeof(struct material_range) +
            weight_count * sizeof(float) + pose_bytes;
 }
 
-uint64_t object_bytes(enum scene_object_kind kind, const void *object)
+uint64_t object_bytes(enum object_kind kind, const void *object)
 {
     uint64_t bytes = object_table_bytes(kind, object);
-    if (kind == SCENE_MESH) {
+    if (kind == OBJECT_MESH) {
         const struct scene_mesh *mesh = object;
         for (int i = 0; i < MESH_ARRAY_COUNT; i++)
             bytes += blob_bytes(mesh->arrays[i]);
-    } else if (kind == SCENE_SPHERES) {
+    } else if (kind == OBJECT_SPHERES) {
         bytes += blob_bytes(((const struct scene_spheres *)object)->centres_radii);
-    } else if (kind == SCENE_TEXTURE) {
+    } else if (kind == OBJECT_TEXTURE) {
         bytes += blob_bytes(((const struct scene_texture *)object)->texels);
-    } else if (kind == SCENE_SKIN) {
+    } else if (kind == OBJECT_SKIN) {
         const struct scene_skin *skin = object;
         bytes += blob_bytes(skin->joints) + blob_bytes(skin->joint_from_mesh);
-    } else if (kind == SCENE_CLIP) {
+    } else if (kind == OBJECT_CLIP) {
         bytes += blob_bytes(((const struct scene_clip *)object)->floats);
     }
     return bytes;
@@ -199,32 +199,32 @@ static void release_mesh(struct scene_mesh *mesh)
     mesh->range_count = mesh->weight_count = 0;
 }
 
-void object_release(enum scene_object_kind kind, void *object)
+void object_release(enum object_kind kind, void *object)
 {
-    if (kind == SCENE_NODE) {
+    if (kind == OBJECT_NODE) {
         struct scene_node *node = object;
         free(node->weights);
         node->weights = NULL;
         node->weight_count = 0;
-    } else if (kind == SCENE_MESH) {
+    } else if (kind == OBJECT_MESH) {
         release_mesh(object);
-    } else if (kind == SCENE_SPHERES) {
+    } else if (kind == OBJECT_SPHERES) {
         struct scene_spheres *spheres = object;
         blob_unref(spheres->centres_radii);
         free(spheres->ranges);
         spheres->centres_radii = NULL;
         spheres->ranges = NULL;
         spheres->range_count = 0;
-    } else if (kind == SCENE_TEXTURE) {
+    } else if (kind == OBJECT_TEXTURE) {
         struct scene_texture *texture = object;
         blob_unref(texture->texels);
         texture->texels = NULL;
-    } else if (kind == SCENE_SKIN) {
+    } else if (kind == OBJECT_SKIN) {
         struct scene_skin *skin = object;
         blob_unref(skin->joints);
         blob_unref(skin->joint_from_mesh);
         skin->joints = skin->joint_from_mesh = NULL;
-    } else if (kind == SCENE_CLIP) {
+    } else if (kind == OBJECT_CLIP) {
         struct scene_clip *clip = object;
         blob_unref(clip->floats);
         clip->floats = NULL;

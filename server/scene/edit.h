@@ -12,11 +12,11 @@ struct edit_place {
     struct error *error;
 };
 
-const char *object_kind_name(enum scene_object_kind kind);
+const char *object_kind_name(enum object_kind kind);
 /* Identifier of what the edit sets or removes; 0 for the environment. */
 uint32_t edit_object_id(const struct scene_edit *edit);
 /* `path` names the part of the edit: ".ranges[2].material", or "" for the whole edit. Returns false. */
-bool edit_error(const struct edit_place *place, enum error_kind kind, const char *path, const char *format, ...)
+bool edit_error(const struct edit_place *place, enum error_code kind, const char *path, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
 /* Each looks at one object alone, no references; bounds are filled in. */
@@ -46,12 +46,12 @@ bool array_size_check(const struct blob *blob, uint64_t count, uint64_t element_
 size_t first_bad_float(const float *values, size_t count, float greatest);
 
 /* Host memory that an object counts for. */
-uint64_t object_bytes(enum scene_object_kind kind, const void *object);
-uint64_t object_table_bytes(enum scene_object_kind kind, const void *object); /* of them: without blobs */
+uint64_t object_bytes(enum object_kind kind, const void *object);
+uint64_t object_table_bytes(enum object_kind kind, const void *object); /* of them: without blobs */
 uint64_t environment_bytes(const struct scene_environment *environment);
 /* Size of the struct of a kind. */
-size_t object_struct_bytes(enum scene_object_kind kind);
+size_t object_struct_bytes(enum object_kind kind);
 /* Releases blobs and ranges of an object and forgets them, not the struct. */
-void object_release(enum scene_object_kind kind, void *object);
+void object_release(enum object_kind kind, void *object);
 
 #endif

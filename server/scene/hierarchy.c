@@ -64,7 +64,7 @@ void hierarchy_finish(struct hierarchy *hierarchy)
 bool hierarchy_of_scene(struct hierarchy *hierarchy, const struct scene *scene)
 {
     *hierarchy = (struct hierarchy){0};
-    const struct hashmap *map = &scene->objects[SCENE_NODE];
+    const struct hashmap *map = &scene->objects[OBJECT_NODE];
     if (!map->count)
         return true;
     const struct scene_node **nodes = malloc(map->count * sizeof *nodes);

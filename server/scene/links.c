@@ -75,7 +75,7 @@ static bool first_unordered(struct ascents *ascents, const struct scene_channel 
 static bool channel_fits(struct ascents *ascents, const struct scene_channel *channel,
                          const struct scene_clip *clip, const struct edit_place *whose)
 {
-    bool own = whose->edit->object == SCENE_CHANNEL;
+    bool own = whose->edit->object == OBJECT_CHANNEL;
     char text[160];
     const char *path = own ? ".first_time" : ".arrays[0] (times and values)";
     uint64_t value_floats = (uint64_t)channel->key_count * channel_key_floats(channel);
@@ -104,8 +104,8 @@ static bool channels_of_set_clips(struct draft *draft, struct ascents *ascents)
 {
     size_t cursor = 0;
     const struct scene_channel *channel;
-    while (draft->last[SCENE_CLIP].count && (channel = draft_next_untouched(draft, SCENE_CHANNEL, &cursor))) {
-        const struct scene_edit *edit = hashmap_get(&draft->last[SCENE_CLIP], channel->clip);
+    while (draft->last[OBJECT_CLIP].count && (channel = draft_next_untouched(draft, OBJECT_CHANNEL, &cursor))) {
+        const struct scene_edit *edit = hashmap_get(&draft->last[OBJECT_CLIP], channel->clip);
         if (!edit || edit->kind != EDIT_SET)
             continue;
         struct edit_place place = draft_place(draft, edit);
@@ -119,21 +119,21 @@ static bool channels_of_set_clips(struct draft *draft, struct ascents *ascents)
 
 static bool node_fits(struct draft *draft, const struct scene_node *node, const struct scene_edit *whose)
 {
-    const struct scene_mesh *mesh = draft_find(draft, SCENE_MESH, node->object);
-    const struct scene_skin *skin = draft_find(draft, SCENE_SKIN, node->skin);
+    const struct scene_mesh *mesh = draft_find(draft, OBJECT_MESH, node->object);
+    const struct scene_skin *skin = draft_find(draft, OBJECT_SKIN, node->skin);
     if (!mesh || !skin || mesh->joint_places <= skin->joint_count)
         return true;
     struct edit_place place = draft_place(draft, whose);
-    const char *path = whose->object == SCENE_NODE   ? ".skin"
-                       : whose->object == SCENE_MESH ? ".arrays[7] (joints)"
-                                                     : ".joint_count";
+    const char *path = whose->object == OBJECT_NODE   ? ".skin"
+                       : whose->object == OBJECT_MESH ? ".arrays[7] (joints)"
+                                                      : ".joint_count";
     edit_error(&place, ERROR_INVALID, path,
                "mesh %u refers to joint %u, but skin %u has %u; node %u shows that mesh with that skin",
                node->object, mesh->joint_places - 1, node->skin, skin->joint_count, node->base.id);
     return error_remedy(draft->error, "change the node, the mesh or the skin in the same transaction");
 }
 
-static const struct scene_edit *set_edit(const struct draft *draft, enum scene_object_kind kind, uint32_t id)
+static const struct scene_edit *set_edit(const struct draft *draft, enum object_kind kind, uint32_t id)
 {
     const struct scene_edit *edit = hashmap_get(&draft->last[kind], id);
     return edit && edit->kind == EDIT_SET ? edit : NULL;
@@ -143,15 +143,15 @@ static bool nodes_of_set_objects(struct draft *draft)
 {
     size_t cursor = 0;
     const struct scene_node *node;
-    bool any_skin = draft->scene->objects[SCENE_SKIN].count > 0;
-    if (!any_skin || !(draft->last[SCENE_MESH].count || draft->last[SCENE_SKIN].count))
+    bool any_skin = draft->scene->objects[OBJECT_SKIN].count > 0;
+    if (!any_skin || !(draft->last[OBJECT_MESH].count || draft->last[OBJECT_SKIN].count))
         return true;
-    while ((node = draft_next_untouched(draft, SCENE_NODE, &cursor))) {
+    while ((node = draft_next_untouched(draft, OBJECT_NODE, &cursor))) {
         if (!node->skin)
             continue;
-        const struct scene_edit *edit = set_edit(draft, SCENE_MESH, node->object);
+        const struct scene_edit *edit = set_edit(draft, OBJECT_MESH, node->object);
         if (!edit)
-            edit = set_edit(draft, SCENE_SKIN, node->skin);
+            edit = set_edit(draft, OBJECT_SKIN, node->skin);
         if (edit && !node_fits(draft, node, edit))
             return false;
     }
@@ -164,13 +164,13 @@ static bool set_objects_check(struct draft *draft, struct ascents *ascents)
         const struct scene_edit *edit = &draft->edits[i];
         if (edit->kind != EDIT_SET || !draft_counts(draft, edit))
             continue;
-        if (edit->object == SCENE_NODE && edit->set.node.skin && !node_fits(draft, &edit->set.node, edit))
+        if (edit->object == OBJECT_NODE && edit->set.node.skin && !node_fits(draft, &edit->set.node, edit))
             return false;
-        if (edit->object != SCENE_CHANNEL)
+        if (edit->object != OBJECT_CHANNEL)
             continue;
         const struct scene_channel *channel = &edit->set.channel;
         struct edit_place place = draft_place(draft, edit);
-        if (!channel_fits(ascents, channel, draft_find(draft, SCENE_CLIP, channel->clip), &place))
+        if (!channel_fits(ascents, channel, draft_find(draft, OBJECT_CLIP, channel->clip), &place))
             return false;
     }
     return true;

@@ -79,7 +79,7 @@ static void fill_instance(struct scene_instance *instance, const struct scene *s
         *instance = (struct scene_instance){.node = node, .singular = true};
 }
 
-bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enum scene_node_kind kind,
+bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enum node_kind kind,
                    struct scene_instance **instances, size_t *count)
 {
     *instances = NULL;

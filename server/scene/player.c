@@ -97,7 +97,7 @@ bool player_init(struct player *player, const struct scene *scene, const struct 
     *player = (struct player){.scene = scene, .uses = uses, .use_count = use_count};
     if (!uses_check(scene, uses, use_count, error))
         return false;
-    const struct hashmap *channels = &scene->objects[SCENE_CHANNEL];
+    const struct hashmap *channels = &scene->objects[OBJECT_CHANNEL];
     if (!use_count || !channels->count)
         return true;
     player->durations_s = calloc(use_count, sizeof *player->durations_s);
@@ -128,7 +128,7 @@ double scene_clip_duration_s(const struct scene *scene, uint32_t clip_id)
     double duration_s = 0.0;
     size_t cursor = 0;
     void *value;
-    while (clip && hashmap_next(&scene->objects[SCENE_CHANNEL], &cursor, NULL, &value)) {
+    while (clip && hashmap_next(&scene->objects[OBJECT_CHANNEL], &cursor, NULL, &value)) {
         const struct scene_channel *channel = value;
         if (channel->clip == clip_id)
             duration_s = fmax(duration_s, last_key_s(channel, clip));

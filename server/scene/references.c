@@ -8,27 +8,28 @@
 
 /* One reference of an object, in the order that next_reference() gives. */
 struct reference {
-    enum scene_object_kind kind; /* of what is referred to */
-    uint32_t id;                 /* never 0 */
+    enum object_kind kind; /* of what is referred to */
+    uint32_t id;           /* never 0 */
     char path[48];
 };
 
-static bool node_kind_object(enum scene_node_kind kind, enum scene_object_kind *object)
+static bool node_kind_object(enum node_kind kind, enum object_kind *object)
 {
     switch (kind) {
     case NODE_MESH:
-        *object = SCENE_MESH;
+        *object = OBJECT_MESH;
         return true;
     case NODE_SPHERES:
-        *object = SCENE_SPHERES;
+        *object = OBJECT_SPHERES;
         return true;
     case NODE_LIGHT:
-        *object = SCENE_LIGHT;
+        *object = OBJECT_LIGHT;
         return true;
     case NODE_CAMERA:
-        *object = SCENE_CAMERA;
+        *object = OBJECT_CAMERA;
         return true;
     case NODE_GROUP:
+    case NODE_COUNT:
         break;
     }
     return false;
@@ -41,7 +42,7 @@ static bool next_in_ranges(const struct material_range *ranges, uint32_t count, 
         uint32_t i = (*cursor)++;
         if (!ranges[i].material)
             continue;
-        *reference = (struct reference){.kind = SCENE_MATERIAL, .id = ranges[i].material};
+        *reference = (struct reference){.kind = OBJECT_MATERIAL, .id = ranges[i].material};
         snprintf(reference->path, sizeof reference->path, ".ranges[%u].material", i);
         return true;
     }
@@ -54,7 +55,7 @@ static bool next_in_material(const struct scene_material *material, uint32_t *cu
         uint32_t i = (*cursor)++;
         if (!material->textures[i].texture)
             continue;
-        *reference = (struct reference){.kind = SCENE_TEXTURE, .id = material->textures[i].texture};
+        *reference = (struct reference){.kind = OBJECT_TEXTURE, .id = material->textures[i].texture};
         snprintf(reference->path, sizeof reference->path, ".textures[%u].texture", i);
         return true;
     }
@@ -69,7 +70,7 @@ static bool next_in_node(const struct scene_node *node, uint32_t *cursor, struct
             return true;
         (*cursor)++;
     }
-    *reference = (struct reference){.kind = SCENE_SKIN, .id = node->skin, .path = ".skin"};
+    *reference = (struct reference){.kind = OBJECT_SKIN, .id = node->skin, .path = ".skin"};
     return *cursor == 2 && node->skin;
 }
 
@@ -79,7 +80,7 @@ static bool next_in_skin(const struct scene_skin *skin, uint32_t *cursor, struct
         return false;
     uint32_t i = (*cursor)++;
     const uint32_t *joints = (const uint32_t *)(const void *)skin->joints->data;
-    *reference = (struct reference){.kind = SCENE_NODE, .id = joints[i]};
+    *reference = (struct reference){.kind = OBJECT_NODE, .id = joints[i]};
     snprintf(reference->path, sizeof reference->path, ".arrays[0] (joints)[%u]", i);
     return true;
 }
@@ -88,7 +89,7 @@ static bool next_in_channel(const struct scene_channel *channel, uint32_t *curso
 {
     const struct channel_row *row = channel_row(channel->path);
     if ((*cursor)++ == 0) {
-        *reference = (struct reference){.kind = SCENE_CLIP, .id = channel->clip, .path = ".clip"};
+        *reference = (struct reference){.kind = OBJECT_CLIP, .id = channel->clip, .path = ".clip"};
         return true;
     }
     *reference = (struct reference){.id = channel->object, .path = ".object"};
@@ -96,35 +97,35 @@ static bool next_in_channel(const struct scene_channel *channel, uint32_t *curso
 }
 
 /* *cursor starts at 0. False: no more references. */
-static bool next_reference(enum scene_object_kind kind, const void *object, uint32_t *cursor,
+static bool next_reference(enum object_kind kind, const void *object, uint32_t *cursor,
                            struct reference *reference)
 {
     switch (kind) {
-    case SCENE_NODE:
+    case OBJECT_NODE:
         return next_in_node(object, cursor, reference);
-    case SCENE_MESH: {
+    case OBJECT_MESH: {
         const struct scene_mesh *mesh = object;
         return next_in_ranges(mesh->ranges, mesh->range_count, cursor, reference);
     }
-    case SCENE_SPHERES: {
+    case OBJECT_SPHERES: {
         const struct scene_spheres *spheres = object;
         return next_in_ranges(spheres->ranges, spheres->range_count, cursor, reference);
     }
-    case SCENE_MATERIAL:
+    case OBJECT_MATERIAL:
         return next_in_material(object, cursor, reference);
-    case SCENE_DISC:
+    case OBJECT_DISC:
         *reference =
-            (struct reference){SCENE_MATERIAL, ((const struct scene_disc *)object)->material, ".material"};
+            (struct reference){OBJECT_MATERIAL, ((const struct scene_disc *)object)->material, ".material"};
         return (*cursor)++ == 0 && reference->id;
-    case SCENE_SKIN:
+    case OBJECT_SKIN:
         return next_in_skin(object, cursor, reference);
-    case SCENE_CHANNEL:
+    case OBJECT_CHANNEL:
         return next_in_channel(object, cursor, reference);
-    case SCENE_TEXTURE:
-    case SCENE_LIGHT:
-    case SCENE_CAMERA:
-    case SCENE_CLIP:
-    case SCENE_OBJECT_KIND_COUNT:
+    case OBJECT_TEXTURE:
+    case OBJECT_LIGHT:
+    case OBJECT_CAMERA:
+    case OBJECT_CLIP:
+    case OBJECT_COUNT:
         break;
     }
     return false;
@@ -133,7 +134,7 @@ static bool next_reference(enum scene_object_kind kind, const void *object, uint
 static bool set_check(struct draft *draft, const struct scene_edit *edit)
 {
     struct edit_place place = draft_place(draft, edit);
-    if (edit->object == SCENE_NODE && edit->set.node.kind == NODE_GROUP && edit->set.node.object)
+    if (edit->object == OBJECT_NODE && edit->set.node.kind == NODE_GROUP && edit->set.node.object)
         return edit_error(&place, ERROR_INVALID, ".object", "a group shows nothing, so this must be 0");
     struct reference reference;
     uint32_t cursor = 0;
@@ -148,7 +149,7 @@ static bool set_check(struct draft *draft, const struct scene_edit *edit)
 }
 
 /* All remaining objects of `user` are asked whether they refer to something that this transaction removes. */
-static bool users_check(struct draft *draft, enum scene_object_kind user)
+static bool users_check(struct draft *draft, enum object_kind user)
 {
     size_t cursor = 0;
     const struct scene_object *object;
@@ -172,15 +173,16 @@ static bool users_check(struct draft *draft, enum scene_object_kind user)
 
 static bool removals_check(struct draft *draft)
 {
-    bool removes_shown = draft_removes_any(draft, SCENE_MESH) || draft_removes_any(draft, SCENE_SPHERES) ||
-                         draft_removes_any(draft, SCENE_LIGHT) || draft_removes_any(draft, SCENE_CAMERA) ||
-                         draft_removes_any(draft, SCENE_SKIN);
-    if (removes_shown && !users_check(draft, SCENE_NODE))
+    bool removes_shown = draft_removes_any(draft, OBJECT_MESH) || draft_removes_any(draft, OBJECT_SPHERES) ||
+                         draft_removes_any(draft, OBJECT_LIGHT) || draft_removes_any(draft, OBJECT_CAMERA) ||
+                         draft_removes_any(draft, OBJECT_SKIN);
+    if (removes_shown && !users_check(draft, OBJECT_NODE))
         return false;
-    if (draft_removes_any(draft, SCENE_MATERIAL) &&
-        !(users_check(draft, SCENE_MESH) && users_check(draft, SCENE_SPHERES) && users_check(draft, SCENE_DISC)))
+    if (draft_removes_any(draft, OBJECT_MATERIAL) &&
+        !(users_check(draft, OBJECT_MESH) && users_check(draft, OBJECT_SPHERES) &&
+          users_check(draft, OBJECT_DISC)))
         return false;
-    return !draft_removes_any(draft, SCENE_TEXTURE) || users_check(draft, SCENE_MATERIAL);
+    return !draft_removes_any(draft, OBJECT_TEXTURE) || users_check(draft, OBJECT_MATERIAL);
 }
 
 bool references_check(struct draft *draft)

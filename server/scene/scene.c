@@ -21,11 +21,11 @@ void scene_destroy(struct scene *scene)
 {
     if (!scene)
         return;
-    for (int kind = 0; kind < SCENE_OBJECT_KIND_COUNT; kind++) {
+    for (int kind = 0; kind < OBJECT_COUNT; kind++) {
         size_t cursor = 0;
         void *object;
         while (hashmap_next(&scene->objects[kind], &cursor, NULL, &object)) {
-            object_release((enum scene_object_kind)kind, object);
+            object_release((enum object_kind)kind, object);
             free(object);
         }
         hashmap_finish(&scene->objects[kind]);
@@ -36,45 +36,45 @@ void scene_destroy(struct scene *scene)
 
 const struct scene_node *scene_node(const struct scene *scene, uint32_t id)
 {
-    return hashmap_get(&scene->objects[SCENE_NODE], id);
+    return hashmap_get(&scene->objects[OBJECT_NODE], id);
 }
 
 const struct scene_mesh *scene_mesh(const struct scene *scene, uint32_t id)
 {
-    return hashmap_get(&scene->objects[SCENE_MESH], id);
+    return hashmap_get(&scene->objects[OBJECT_MESH], id);
 }
 
 const struct scene_spheres *scene_spheres(const struct scene *scene, uint32_t id)
 {
-    return hashmap_get(&scene->objects[SCENE_SPHERES], id);
+    return hashmap_get(&scene->objects[OBJECT_SPHERES], id);
 }
 
 const struct scene_material *scene_material(const struct scene *scene, uint32_t id)
 {
-    return hashmap_get(&scene->objects[SCENE_MATERIAL], id);
+    return hashmap_get(&scene->objects[OBJECT_MATERIAL], id);
 }
 
 const struct scene_texture *scene_texture(const struct scene *scene, uint32_t id)
 {
-    return hashmap_get(&scene->objects[SCENE_TEXTURE], id);
+    return hashmap_get(&scene->objects[OBJECT_TEXTURE], id);
 }
 
 const struct scene_light *scene_light(const struct scene *scene, uint32_t id)
 {
-    return hashmap_get(&scene->objects[SCENE_LIGHT], id);
+    return hashmap_get(&scene->objects[OBJECT_LIGHT], id);
 }
 
 const struct scene_camera *scene_camera(const struct scene *scene, uint32_t id)
 {
-    return hashmap_get(&scene->objects[SCENE_CAMERA], id);
+    return hashmap_get(&scene->objects[OBJECT_CAMERA], id);
 }
 
 const struct scene_skin *scene_skin(const struct scene *scene, uint32_t id)
 {
-    return hashmap_get(&scene->objects[SCENE_SKIN], id);
+    return hashmap_get(&scene->objects[OBJECT_SKIN], id);
 }
 
 const struct scene_clip *scene_clip(const struct scene *scene, uint32_t id)
 {
-    return hashmap_get(&scene->objects[SCENE_CLIP], id);
+    return hashmap_get(&scene->objects[OBJECT_CLIP], id);
 }

@@ -18,26 +18,6 @@
 #define MESH_TARGETS_MAX 1024
 #define SKIN_JOINTS_MAX 65536
 
-/* The enums have the protocol's numbers (session asserts it). */
-enum scene_object_kind {
-    SCENE_NODE,
-    SCENE_MESH,
-    SCENE_SPHERES,
-    SCENE_MATERIAL,
-    SCENE_TEXTURE,
-    SCENE_LIGHT,
-    SCENE_CAMERA,
-    SCENE_DISC,
-    SCENE_SKIN,
-    SCENE_CLIP,
-    SCENE_CHANNEL,
-    SCENE_OBJECT_KIND_COUNT
-};
-enum scene_node_kind { NODE_GROUP, NODE_MESH, NODE_SPHERES, NODE_LIGHT, NODE_CAMERA };
-enum scene_alpha_mode { ALPHA_OPAQUE, ALPHA_MASK, ALPHA_BLEND };
-enum scene_texture_format { TEXTURE_RGBA8_SRGB, TEXTURE_RGBA8_LINEAR };
-enum scene_wrap { WRAP_REPEAT, WRAP_CLAMP, WRAP_MIRROR };
-enum scene_light_kind { LIGHT_POINT, LIGHT_SPOT, LIGHT_DIRECTIONAL, LIGHT_RECTANGLE, LIGHT_SPHERE };
 /* Positions in a mesh's `arrays`, and in a material's `textures`. */
 enum mesh_array {
     MESH_POSITIONS,   /* 3 f32 a vertex */
@@ -80,7 +60,7 @@ struct scene_object {
 struct scene_node {
     struct scene_object base;
     uint32_t parent; /* 0: the root */
-    enum scene_node_kind kind;
+    enum node_kind kind;
     uint32_t object; /* mesh, spheres, light, camera */
     bool hidden;
     float parent_from_node[12]; /* 3x4 row-major */
@@ -125,7 +105,7 @@ struct texture_use {
 
 struct scene_material {
     struct scene_object base;
-    enum scene_alpha_mode alpha_mode;
+    enum alpha_mode alpha_mode;
     bool double_sided, unlit;
     float base_colour[4], emission[3];
     float metallic, roughness, transmission, ior, alpha_cutoff;
@@ -136,15 +116,15 @@ struct scene_material {
 struct scene_texture {
     struct scene_object base;
     uint32_t width, height;
-    enum scene_texture_format format;
-    enum scene_wrap wrap_u, wrap_v;
+    enum texture_format format;
+    enum wrap wrap_u, wrap_v;
     bool nearest;
     struct blob *texels; /* width x height x 4 bytes, rows from the top */
 };
 
 struct scene_light {
     struct scene_object base;
-    enum scene_light_kind kind;
+    enum light_kind kind;
     float colour[3];
     float range;                  /* metres, 0: unlimited */
     float inner_cone, outer_cone; /* radians, half angles */
@@ -176,37 +156,6 @@ struct scene_clip {
     struct blob *floats; /* times and values of its channels; checked: finite */
 };
 
-/* The enums have the protocol's numbers. */
-enum channel_path {
-    CHANNEL_NODE_TRANSLATION,
-    CHANNEL_NODE_ROTATION, /* unit quaternion x y z w */
-    CHANNEL_NODE_SCALE,
-    CHANNEL_NODE_WEIGHTS,
-    CHANNEL_NODE_HIDDEN,
-    CHANNEL_LIGHT_COLOUR = 16,
-    CHANNEL_LIGHT_SIZE,
-    CHANNEL_MATERIAL_BASE_COLOUR = 32,
-    CHANNEL_MATERIAL_EMISSION,
-    CHANNEL_MATERIAL_METALLIC,
-    CHANNEL_MATERIAL_ROUGHNESS,
-    CHANNEL_MATERIAL_TRANSMISSION,
-    CHANNEL_MATERIAL_IOR,
-    CHANNEL_VIEW_EYE = 48,
-    CHANNEL_VIEW_LOOK_AT,
-    CHANNEL_VIEW_UP,
-    CHANNEL_VIEW_FOV_Y,
-    CHANNEL_VIEW_APERTURE,
-    CHANNEL_VIEW_FOCUS,
-    CHANNEL_VIEW_EXPOSURE
-};
-enum interpolation {
-    INTERPOLATION_STEP,
-    INTERPOLATION_LINEAR,       /* rotations: slerp */
-    INTERPOLATION_CUBIC_SPLINE, /* Hermite; a key has in-tangent, value, out-tangent (glTF 2.0, appendix C) */
-    INTERPOLATION_CATMULL_ROM,
-    INTERPOLATION_BEZIER /* a key has the control value before it, its own, the control value after it */
-};
-
 struct scene_channel {
     struct scene_object base;
     uint32_t clip;
@@ -232,8 +181,8 @@ enum scene_edit_kind { EDIT_SET, EDIT_REMOVE, EDIT_SET_ENVIRONMENT };
 
 struct scene_edit {
     enum scene_edit_kind kind;
-    enum scene_object_kind object; /* for set and remove */
-    uint32_t id;                   /* for remove */
+    enum object_kind object; /* for set and remove */
+    uint32_t id;             /* for remove */
     union {
         struct scene_node node;
         struct scene_mesh mesh;
@@ -260,8 +209,8 @@ struct scene_limits {
 
 struct scene {
     char name[SCENE_NAME_MAX + 1];
-    uint64_t revision;                               /* of the last transaction; 0: empty */
-    struct hashmap objects[SCENE_OBJECT_KIND_COUNT]; /* struct scene_node * and so on, by id */
+    uint64_t revision;                    /* of the last transaction; 0: empty */
+    struct hashmap objects[OBJECT_COUNT]; /* struct scene_node * and so on, by id */
     struct scene_environment environment;
     struct scene_limits limits;
     uint64_t host_bytes;  /* blobs that objects hold, counted per object, and tables */
@@ -305,7 +254,7 @@ struct scene_instance {
 };
 /* Below, `pose` says where things are; NULL: as they were committed. */
 /* Instances of one kind in the order of node ids; an array to free(). False: out of memory. */
-bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enum scene_node_kind kind,
+bool scene_flatten(const struct scene *scene, const struct scene_pose *pose, enum node_kind kind,
                    struct scene_instance **instances, size_t *count);
 /* World transform of one node (hidden or not); false if the node does not exist. */
 bool scene_world_from_node(const struct scene *scene, const struct scene_pose *pose, uint32_t node,

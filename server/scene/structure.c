@@ -19,7 +19,7 @@ struct walk {
 
 static struct scene_edit *node_edit(const struct draft *draft, uint32_t id)
 {
-    return hashmap_get(&draft->last[SCENE_NODE], id);
+    return hashmap_get(&draft->last[OBJECT_NODE], id);
 }
 
 /* Whether nodes appear, disappear or change their parent; if not, the hierarchy is as sound as it was. */
@@ -28,7 +28,7 @@ static bool is_restructured(const struct draft *draft)
     size_t cursor = 0;
     uint64_t id;
     void *value;
-    while (hashmap_next(&draft->last[SCENE_NODE], &cursor, &id, &value)) {
+    while (hashmap_next(&draft->last[OBJECT_NODE], &cursor, &id, &value)) {
         const struct scene_edit *edit = value;
         const struct scene_node *now = scene_node(draft->scene, (uint32_t)id);
         if (edit->kind == EDIT_REMOVE || !now || now->parent != edit->set.node.parent)
@@ -40,7 +40,7 @@ static bool is_restructured(const struct draft *draft)
 static bool collect(struct walk *walk)
 {
     const struct draft *draft = walk->draft;
-    const struct hashmap *now = &draft->scene->objects[SCENE_NODE], *edited = &draft->last[SCENE_NODE];
+    const struct hashmap *now = &draft->scene->objects[OBJECT_NODE], *edited = &draft->last[OBJECT_NODE];
     const struct scene_node **nodes = malloc((now->count + edited->count) * sizeof *nodes);
     if (!nodes)
         return false;
@@ -63,7 +63,7 @@ static bool collect(struct walk *walk)
 
 /* An error about the current chain. The hierarchy was valid before, so an edit in the chain or above is at fault:
  * the one nearest to the start of the traversal is named. */
-static bool chain_error(struct walk *walk, enum error_kind kind, const char *what)
+static bool chain_error(struct walk *walk, enum error_code kind, const char *what)
 {
     uint32_t position = walk->chain[0];
     for (size_t steps = 0; steps <= 2 * SCENE_DEPTH_MAX && position != HIERARCHY_NONE; steps++) {
@@ -154,7 +154,7 @@ static bool note_fallen(struct walk *walk)
 {
     for (size_t i = 0; i < walk->hierarchy.count; i++) {
         if (walk->state[i] == FALLEN &&
-            !draft_note_fallen(walk->draft, SCENE_NODE, walk->hierarchy.nodes[i]->base.id))
+            !draft_note_fallen(walk->draft, OBJECT_NODE, walk->hierarchy.nodes[i]->base.id))
             return false;
     }
     return true;

@@ -292,7 +292,7 @@ void dispatch_invalid(void *context, const struct framing_header *header, const 
     struct session *session = context;
     const struct dispatch_row *row = dispatch_find(header->type);
     struct error error = {0};
-    error_set(&error, (enum error_kind)decode_error->code, decode_error->field, "%s", decode_error->text);
+    error_set(&error, (enum error_code)decode_error->code, decode_error->field, "%s", decode_error->text);
     if (!row || (row->rule == DISPATCH_ANY && row->kind != REQUEST_UPLOAD)) {
         session_fail(session, &error);
         return;

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void begin_set(struct scene_edit *edit, enum scene_object_kind kind, struct scene_object *base, uint32_t id,
+static void begin_set(struct scene_edit *edit, enum object_kind kind, struct scene_object *base, uint32_t id,
                       const char *name)
 {
     edit->kind = EDIT_SET;
@@ -63,9 +63,9 @@ static bool take_blob(const struct session *session, const struct record_blob_re
 static bool from_node(const struct message_set_node *message, struct scene_edit *edit, struct error *error)
 {
     struct scene_node *node = &edit->set.node;
-    begin_set(edit, SCENE_NODE, &node->base, message->node, message->name);
+    begin_set(edit, OBJECT_NODE, &node->base, message->node, message->name);
     node->parent = message->parent;
-    node->kind = (enum scene_node_kind)message->kind;
+    node->kind = (enum node_kind)message->kind;
     node->object = message->object;
     node->hidden = message->hidden;
     memcpy(node->parent_from_node, message->parent_from_node, sizeof node->parent_from_node);
@@ -77,7 +77,7 @@ static bool from_mesh(const struct session *session, const struct message_set_me
                       struct scene_edit *edit, struct error *error)
 {
     struct scene_mesh *mesh = &edit->set.mesh;
-    begin_set(edit, SCENE_MESH, &mesh->base, message->mesh, message->name);
+    begin_set(edit, OBJECT_MESH, &mesh->base, message->mesh, message->name);
     mesh->vertex_count = message->vertex_count;
     mesh->triangle_count = message->triangle_count;
     mesh->influence_count = message->influence_count;
@@ -96,7 +96,7 @@ static bool from_spheres(const struct session *session, const struct message_set
                          struct scene_edit *edit, struct error *error)
 {
     struct scene_spheres *spheres = &edit->set.spheres;
-    begin_set(edit, SCENE_SPHERES, &spheres->base, message->spheres, message->name);
+    begin_set(edit, OBJECT_SPHERES, &spheres->base, message->spheres, message->name);
     spheres->sphere_count = message->sphere_count;
     return take_blob(session, message->arrays, message->arrays_count, 0, "set_spheres", message->spheres,
                      &spheres->centres_radii, error) &&
@@ -106,7 +106,7 @@ static bool from_spheres(const struct session *session, const struct message_set
 static void from_disc(const struct message_set_disc *message, struct scene_edit *edit)
 {
     struct scene_disc *disc = &edit->set.disc;
-    begin_set(edit, SCENE_DISC, &disc->base, message->disc, message->name);
+    begin_set(edit, OBJECT_DISC, &disc->base, message->disc, message->name);
     disc->material = message->material;
     memcpy(disc->centre_world, message->centre_world, sizeof disc->centre_world);
     memcpy(disc->normal_world, message->normal_world, sizeof disc->normal_world);
@@ -116,8 +116,8 @@ static void from_disc(const struct message_set_disc *message, struct scene_edit 
 static void from_material(const struct message_set_material *message, struct scene_edit *edit)
 {
     struct scene_material *material = &edit->set.material;
-    begin_set(edit, SCENE_MATERIAL, &material->base, message->material, message->name);
-    material->alpha_mode = (enum scene_alpha_mode)message->alpha_mode;
+    begin_set(edit, OBJECT_MATERIAL, &material->base, message->material, message->name);
+    material->alpha_mode = (enum alpha_mode)message->alpha_mode;
     material->double_sided = message->double_sided;
     material->unlit = message->unlit;
     memcpy(material->base_colour, message->base_colour, sizeof material->base_colour);
@@ -145,7 +145,7 @@ static bool from_texture(const struct session *session, const struct message_set
                          struct scene_edit *edit, struct error *error)
 {
     struct scene_texture *texture = &edit->set.texture;
-    begin_set(edit, SCENE_TEXTURE, &texture->base, message->texture, message->name);
+    begin_set(edit, OBJECT_TEXTURE, &texture->base, message->texture, message->name);
     uint32_t limit_texels = session->hub->options.limits.texture_edge_texels;
     if (message->width > limit_texels || message->height > limit_texels) {
         error_set(error, ERROR_LIMIT, "set_texture", "texture %u has %u x %u texels, the limit is %u a side",
@@ -154,9 +154,9 @@ static bool from_texture(const struct session *session, const struct message_set
     }
     texture->width = message->width;
     texture->height = message->height;
-    texture->format = (enum scene_texture_format)message->format;
-    texture->wrap_u = (enum scene_wrap)message->wrap_u;
-    texture->wrap_v = (enum scene_wrap)message->wrap_v;
+    texture->format = (enum texture_format)message->format;
+    texture->wrap_u = (enum wrap)message->wrap_u;
+    texture->wrap_v = (enum wrap)message->wrap_v;
     texture->nearest = message->nearest;
     return take_blob(session, message->arrays, message->arrays_count, 0, "set_texture", message->texture,
                      &texture->texels, error);
@@ -165,8 +165,8 @@ static bool from_texture(const struct session *session, const struct message_set
 static void from_light(const struct message_set_light *message, struct scene_edit *edit)
 {
     struct scene_light *light = &edit->set.light;
-    begin_set(edit, SCENE_LIGHT, &light->base, message->light, message->name);
-    light->kind = (enum scene_light_kind)message->kind;
+    begin_set(edit, OBJECT_LIGHT, &light->base, message->light, message->name);
+    light->kind = (enum light_kind)message->kind;
     memcpy(light->colour, message->colour, sizeof light->colour);
     light->range = message->range;
     light->inner_cone = message->inner_cone;
@@ -177,7 +177,7 @@ static void from_light(const struct message_set_light *message, struct scene_edi
 static void from_camera(const struct message_set_camera *message, struct scene_edit *edit)
 {
     struct scene_camera *camera = &edit->set.camera;
-    begin_set(edit, SCENE_CAMERA, &camera->base, message->camera, message->name);
+    begin_set(edit, OBJECT_CAMERA, &camera->base, message->camera, message->name);
     camera->fov_y = message->fov_y;
     camera->height = message->height;
     camera->near = message->near;
@@ -206,7 +206,7 @@ static bool from_skin(const struct session *session, const struct message_set_sk
                       struct scene_edit *edit, struct error *error)
 {
     struct scene_skin *skin = &edit->set.skin;
-    begin_set(edit, SCENE_SKIN, &skin->base, message->skin, message->name);
+    begin_set(edit, OBJECT_SKIN, &skin->base, message->skin, message->name);
     skin->joint_count = message->joint_count;
     return take_blob(session, message->arrays, message->arrays_count, 0, "set_skin", message->skin, &skin->joints,
                      error) &&
@@ -218,7 +218,7 @@ static bool from_clip(const struct session *session, const struct message_set_cl
                       struct scene_edit *edit, struct error *error)
 {
     struct scene_clip *clip = &edit->set.clip;
-    begin_set(edit, SCENE_CLIP, &clip->base, message->clip, message->name);
+    begin_set(edit, OBJECT_CLIP, &clip->base, message->clip, message->name);
     return take_blob(session, message->arrays, message->arrays_count, 0, "set_clip", message->clip, &clip->floats,
                      error);
 }
@@ -226,7 +226,7 @@ static bool from_clip(const struct session *session, const struct message_set_cl
 static void from_channel(const struct message_set_channel *message, struct scene_edit *edit)
 {
     struct scene_channel *channel = &edit->set.channel;
-    begin_set(edit, SCENE_CHANNEL, &channel->base, message->channel, "");
+    begin_set(edit, OBJECT_CHANNEL, &channel->base, message->channel, "");
     channel->clip = message->clip;
     channel->path = (enum channel_path)message->path;
     channel->object = message->object;
@@ -273,7 +273,7 @@ bool edit_from_message(const struct session *session, const struct message *mess
         return true;
     case MESSAGE_REMOVE:
         edit->kind = EDIT_REMOVE;
-        edit->object = (enum scene_object_kind)message->remove.kind;
+        edit->object = (enum object_kind)message->remove.kind;
         edit->id = message->remove.object;
         return true;
     default:

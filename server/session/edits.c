@@ -69,12 +69,12 @@ static bool account(struct session *session, struct transaction *transaction, co
 {
     uint64_t limit_bytes = session->hub->options.limits.transaction_bytes;
     uint64_t bytes = sizeof *edit;
-    if (edit->kind == EDIT_SET && edit->object == SCENE_NODE)
+    if (edit->kind == EDIT_SET && edit->object == OBJECT_NODE)
         bytes += edit->set.node.weight_count * sizeof *edit->set.node.weights;
-    if (edit->kind == EDIT_SET && edit->object == SCENE_MESH)
+    if (edit->kind == EDIT_SET && edit->object == OBJECT_MESH)
         bytes += edit->set.mesh.range_count * sizeof *edit->set.mesh.ranges +
                  edit->set.mesh.weight_count * sizeof *edit->set.mesh.weights;
-    if (edit->kind == EDIT_SET && edit->object == SCENE_SPHERES)
+    if (edit->kind == EDIT_SET && edit->object == OBJECT_SPHERES)
         bytes += edit->set.spheres.range_count * sizeof *edit->set.spheres.ranges;
     if (bytes > limit_bytes || session->transaction_bytes > limit_bytes - bytes) {
         error_set(error, ERROR_LIMIT, "transaction",

@@ -238,8 +238,8 @@ static void send_end(struct pending_frame *pending, bool abandoned, uint64_t now
     struct stage_times *times = &frame->result.times;
     uint64_t queue_ns = pending->begun_ns > frame->encoded_ns ? pending->begun_ns - frame->encoded_ns : 0;
     uint64_t send_ns = now_ns - pending->begun_ns;
-    stage_times_add(times, STAGE_QUEUE, STAGE_CPU, 0, frame->encoded_ns, queue_ns);
-    stage_times_add(times, STAGE_SEND, STAGE_CPU, 0, pending->begun_ns, send_ns);
+    stage_times_add(times, STAGE_QUEUE, CLOCK_CPU, 0, frame->encoded_ns, queue_ns);
+    stage_times_add(times, STAGE_SEND, CLOCK_CPU, 0, pending->begun_ns, send_ns);
     struct record_stage_time stages[STAGE_SPANS_MAX];
     for (uint32_t i = 0; i < times->count; i++) {
         const struct stage_span *span = &times->spans[i];

@@ -36,7 +36,7 @@ static bool check_layers(const struct message_render *render, struct error *erro
 {
     if (!render->layers || render->layers == BEAUTY_ALONE)
         return true;
-    if (render->kind == PROTOCOL_JOB_KIND_VIEW) {
+    if (render->kind == PROTOCOL_JOB_VIEW) {
         error_set(error, ERROR_UNSUPPORTED, "render.layers", "a view shows the picture alone");
         return error_remedy(error, "a batch of one frame has layers; a view may have attachments");
     }
@@ -56,7 +56,7 @@ static bool check_layers(const struct message_render *render, struct error *erro
 struct job *job_replaced_by(const struct session *session, const struct message_render *render)
 {
     struct job *job = jobs_find(session, render->channel);
-    return render->kind == PROTOCOL_JOB_KIND_VIEW && job && job->view && !job->cancelled ? job : NULL;
+    return render->kind == PROTOCOL_JOB_VIEW && job && job->view && !job->cancelled ? job : NULL;
 }
 
 static bool check_limits(const struct session *session, const struct message_render *render, struct error *error)
@@ -115,9 +115,9 @@ static bool check_room(const struct session *session, const struct message_rende
 
 static bool check_camera(const struct message_render *render, struct error *error)
 {
-    if (render->camera_path == PROTOCOL_CAMERA_PATH_KEYS && !render->keys_count)
+    if (render->camera_path == PROTOCOL_CAMERA_KEYS && !render->keys_count)
         return error_set(error, ERROR_INVALID, "render.keys", "camera path keys needs at least one key");
-    if (render->camera_path == PROTOCOL_CAMERA_PATH_NODE && !render->camera_node)
+    if (render->camera_path == PROTOCOL_CAMERA_NODE && !render->camera_node)
         return error_set(error, ERROR_INVALID, "render.camera_node", "camera path node needs a node");
     for (uint32_t i = 1; i < render->keys_count; i++) {
         if (!(render->keys[i].time_s > render->keys[i - 1].time_s))
@@ -132,7 +132,7 @@ static bool check_encoding(const struct session *session, const struct message_r
                            enum protocol_encoding encoding, const char *field, struct error *error)
 {
     bool is_stream = encoding == PROTOCOL_ENCODING_H264;
-    if (is_stream && render->kind != PROTOCOL_JOB_KIND_VIEW) {
+    if (is_stream && render->kind != PROTOCOL_JOB_VIEW) {
         error_set(error, ERROR_UNSUPPORTED, field, "frames of a batch stand alone, and h264 is a stream");
         return error_remedy(error, "choose raw, zstd, predicted or jpeg");
     }
@@ -162,7 +162,7 @@ static bool check_tracers(const struct message_render *render, struct error *err
 /* What is different with views. */
 static bool check_kind(const struct session *session, const struct message_render *render, struct error *error)
 {
-    if (render->kind == PROTOCOL_JOB_KIND_BATCH) {
+    if (render->kind == PROTOCOL_JOB_BATCH) {
         if (render->attachments) {
             error_set(error, ERROR_UNSUPPORTED, "render.attachments", "frames of a batch have none");
             return error_remedy(error, "a batch has layers");
@@ -250,7 +250,7 @@ static bool fill_keys(struct engine_job *job, const struct message_render *rende
 /* All but keys and clips, which are there already. */
 static void fill_rest(struct engine_job *job, const struct session *session, const struct message_render *render)
 {
-    bool is_view = render->kind == PROTOCOL_JOB_KIND_VIEW;
+    bool is_view = render->kind == PROTOCOL_JOB_VIEW;
     *job = (struct engine_job){
         .keys = job->keys,
         .key_count = job->key_count,
@@ -272,15 +272,15 @@ static void fill_rest(struct engine_job *job, const struct session *session, con
                 .seed = render->seed,
                 .tracer = render->tracer,
                 .tracer_options = tracer_options_of(&render->settings, &session->hub->options.limits.tracers),
-                .integrator = (enum frame_integrator)render->integrator,
-                .primary = (enum frame_primary)render->primary,
-                .tone_map = (enum frame_tone_map)render->tone_map,
-                .format = (enum frame_format)render->format,
+                .integrator = (enum integrator_kind)render->integrator,
+                .primary = (enum primary_kind)render->primary,
+                .tone_map = (enum tone_map)render->tone_map,
+                .format = (enum pixel_format)render->format,
                 .exposure_stops = render->exposure_stops,
                 .aperture = render->aperture,
                 .focus = render->focus,
-                .filter = (enum frame_filter)render->pixel_filter,
-                .brdf = (enum frame_brdf)render->brdf,
+                .filter = (enum pixel_filter)render->pixel_filter,
+                .brdf = (enum brdf)render->brdf,
                 .ao_distance = render->ao_distance,
                 .ao_falloff = render->ao_falloff,
                 .ao_rays = render->ao_rays,

@@ -33,7 +33,7 @@ static uint64_t allowed_credit(struct job *job)
 /* A job of its own. NULL: out of memory. */
 static struct job *job_create(struct session *session, uint32_t request, const struct message_render *render)
 {
-    bool is_view = render->kind == PROTOCOL_JOB_KIND_VIEW;
+    bool is_view = render->kind == PROTOCOL_JOB_VIEW;
     struct job *job = calloc(1, sizeof *job);
     struct view_terms terms = view_terms_of(render);
     struct session_view *view = job && is_view ? session_view_create(&terms) : NULL;

@@ -60,7 +60,7 @@ static bool add(struct session *session, uint32_t scene, const char *field, stru
 }
 
 static void submit(struct session *session, struct request *request, enum engine_command_kind kind, uint32_t scene,
-                   const char *name, enum engine_sharing sharing)
+                   const char *name, enum sharing sharing)
 {
     request->scene = scene;
     struct engine_command *command = hub_command(kind, session->number, request->id);
@@ -76,7 +76,7 @@ static void submit(struct session *session, struct request *request, enum engine
 void scenes_open(struct session *session, struct request *request, const struct message_scene_open *open)
 {
     struct error error = {0};
-    enum engine_sharing sharing = (enum engine_sharing)open->sharing;
+    enum sharing sharing = (enum sharing)open->sharing;
     /* No other client is ever the same user. */
     if (sharing == SHARING_KEPT && !session->identity.known)
         sharing = SHARING_PRIVATE;

@@ -434,7 +434,7 @@ struct session *session_create(struct hub *hub, uint64_t number, int fd, bool se
 
 void session_stop(struct session *session)
 {
-    connection_finish(session->connection, PROTOCOL_ERROR_CODE_SHUTTING_DOWN, "", "the daemon stops");
+    connection_finish(session->connection, PROTOCOL_ERROR_SHUTTING_DOWN, "", "the daemon stops");
 }
 
 void session_close(struct session *session)

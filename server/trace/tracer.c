@@ -4,12 +4,11 @@
 #include <stdio.h>
 #include <string.h>
 
-/* By the protocol's numbers; a tracer that a build leaves out is NULL. */
-static const struct tracer_impl *const tracers[] = {
+/* A tracer that a build leaves out is NULL. */
+static const struct tracer_impl *const tracers[TRACER_COUNT] = {
 #define TRACER(NAME, name, number, use, needs, doc) [number] = &tracer_##name##_impl,
 #include "protocol/tracers.def"
 };
-#define TRACER_COUNT (sizeof(tracers) / sizeof(tracers[0]))
 
 /* The options begin with what struct tracer_settings has. */
 _Static_assert(offsetof(struct tracer_options, limits) == sizeof(struct tracer_settings), "words alone");

@@ -25,15 +25,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* The choices of the settings: LDC_BUILD_PEEL and its like. */
-#define CHOICES(PREFIX, name, doc) enum {
-#define CHOICE(PREFIX, VALUE_NAME, number, text, doc) PREFIX##_##VALUE_NAME = (number),
-#define CHOICES_END(PREFIX, name)                                                                                 \
-    PREFIX##_COUNT                                                                                                \
-    }                                                                                                             \
-    ;
-#include "protocol/tracers.def"
-
 /* What only benchmarks and tests choose; zero is the default of each. */
 struct tracer_bench {
     enum { BVH_LAYOUT_FAST, BVH_LAYOUT_PLAIN } bvh_layout; /* plain: sphere links in a storage buffer */

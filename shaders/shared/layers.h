@@ -4,7 +4,7 @@
 #define FARLIGHT_SHARED_LAYERS_H
 #include "shared/path.h"
 
-/* Sets of layers: 1 << enum frame_layer (server/render/frame.h). */
+/* Sets of layers: 1 << LAYER_BEAUTY and so on (protocol/words.def). */
 #define LAYER_BIT_BEAUTY 1u
 #define LAYER_BIT_ALBEDO 2u
 #define LAYER_BIT_NORMAL 4u

@@ -12,7 +12,6 @@
 
 #include <unistd.h>
 
-#define ABUFFER 4
 #define AO_RAYS 128u
 
 enum { DDA, LINEAR3, LINEAR1, SEARCH_COUNT };
@@ -44,7 +43,7 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
 {
     struct frame_result expected = render(fixture, exact_tracer(), &searches[0].options, name);
     for (int i = 0; i < SEARCH_COUNT; i++) {
-        struct frame_result got = render(fixture, ABUFFER, &searches[i].options, name);
+        struct frame_result got = render(fixture, TRACER_ABUFFER, &searches[i].options, name);
         double reached = psnr(&got, &expected);
         printf("%s, %s: PSNR %.1f dB\n", name, searches[i].name, reached);
         frame_result_finish(&got);
@@ -110,7 +109,7 @@ static void expect_occlusion_like_the_references(struct fixture *fixture, const 
 {
     struct frame_request *request = &fixture->request;
     request->width = request->height = SIDE / 2;
-    request->format = FRAME_RGBA8;
+    request->format = PIXEL_FORMAT_RGBA8;
     request->integrator = INTEGRATOR_AO;
     request->samples = 1;
     request->ao_rays = AO_RAYS;
@@ -208,7 +207,7 @@ static void expect_rays_agree(struct fixture *fixture, const char *name, float c
         char searched[96];
         snprintf(searched, sizeof(searched), "%s, %s", name, searches[i].name);
         fixture->request.tracer_options = searches[i].options;
-        struct agreement found = compare_rays(fixture, ABUFFER, searched, cell_metres);
+        struct agreement found = compare_rays(fixture, TRACER_ABUFFER, searched, cell_metres);
         expect_agreement(searched, &found, &rays_asked[i]);
     }
 }
@@ -221,5 +220,5 @@ static void request_whitted(struct fixture *fixture)
 
 TEST(secondary_rays_agree_with_the_reference)
 {
-    with_pairs_of_shapes(state, ABUFFER, request_whitted, expect_rays_agree);
+    with_pairs_of_shapes(state, TRACER_ABUFFER, request_whitted, expect_rays_agree);
 }

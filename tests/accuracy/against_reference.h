@@ -8,19 +8,17 @@
 
 #include "trace/tracer.h"
 
-#define BVH 0
-#define REFERENCE 2
 #define SIDE 192u
 
 /* The reference, or bvh where a build leaves it out: their hits are the same. */
 static inline unsigned exact_tracer(void)
 {
-    return tracer_impl_by_number(REFERENCE) ? REFERENCE : BVH;
+    return tracer_impl_by_number(TRACER_REFERENCE) ? TRACER_REFERENCE : TRACER_BVH;
 }
 
 /* ---- pictures ---- */
 
-/* In dB, of the colours of two pictures of FRAME_RGBA8. */
+/* In dB, of the colours of two pictures of PIXEL_FORMAT_RGBA8. */
 static inline double psnr(const struct frame_result *a, const struct frame_result *b)
 {
     double sum = 0, count = 0;
@@ -39,7 +37,7 @@ static inline void request_picture(struct fixture *fixture, uint32_t depth)
 {
     struct frame_request *request = &fixture->request;
     request->width = request->height = SIDE;
-    request->format = FRAME_RGBA8;
+    request->format = PIXEL_FORMAT_RGBA8;
     request->depth = depth;
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
 }

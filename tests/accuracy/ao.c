@@ -4,8 +4,6 @@
 #include "tests/accuracy/render_fixture.h"
 #include "tests/harness/test.h"
 
-#define TRACER_BVH 0
-#define TRACER_REFERENCE 2
 #define FAR_AWAY 1000.0f
 static const unsigned tracers[] = {TRACER_NAIVE, TRACER_BVH, TRACER_REFERENCE};
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
@@ -241,7 +239,7 @@ static void refuse(struct fixture *fixture, const char *field)
     assert_string_equal(error.field, field);
     fixture->request.ao_distance = fixture->request.ao_falloff = fixture->request.layer_opacity = 0.0f;
     fixture->request.ao_rays = 0;
-    fixture->request.brdf = FRAME_BRDF_GGX;
+    fixture->request.brdf = BRDF_GGX;
     fixture->request.integrator = INTEGRATOR_AO;
 }
 
@@ -263,8 +261,8 @@ TEST(impossible_requests_are_refused_with_the_field)
     refuse(fixture, "layer_opacity");
     fixture->request.ao_rays = 1u << 20;
     refuse(fixture, "ao_rays");
-    fixture->request.brdf = (enum frame_brdf)2;
+    fixture->request.brdf = (enum brdf)2;
     refuse(fixture, "brdf");
-    fixture->request.integrator = (enum frame_integrator)5;
+    fixture->request.integrator = (enum integrator_kind)5;
     refuse(fixture, "integrator");
 }

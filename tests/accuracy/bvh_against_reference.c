@@ -32,10 +32,8 @@
 #define MEDIAN_MAX 1e-6
 /* Edges are a few rounding steps wide, so few rays meet one; many would mean that something else is called one. */
 #define EDGES_MAX (RAY_COUNT / 1000)
-#define BVH 0
-#define REFERENCE 2
 
-enum ray_kind { RAYS_PRIMARY, RAYS_BOUNCE, RAYS_SHADOW, RAYS_INSIDE, RAYS_AT_VERTICES };
+enum rays_tried { RAYS_PRIMARY, RAYS_BOUNCE, RAYS_SHADOW, RAYS_INSIDE, RAYS_AT_VERTICES };
 static const char *const kind_names[] = {"primary rays", "bounced rays", "shadow rays", "rays from inside",
                                          "rays at vertices"};
 
@@ -210,7 +208,7 @@ static void make_at_vertices(struct arena *arena)
 /* ---- tracing ---- */
 
 static void *trace(struct arena *arena, struct tracer *tracer, const struct ray *rays, uint32_t count,
-                   enum ray_kind kind)
+                   enum rays_tried kind)
 {
     struct error error = {0};
     bool any = kind == RAYS_SHADOW;
@@ -246,8 +244,8 @@ static void arena_init(struct arena *arena, struct scene *scene)
     *arena = (struct arena){.scene = scene, .rays = malloc(RAY_COUNT * sizeof(struct ray))};
     gpu_scene_init(&arena->gpu, device);
     expect_ok(gpu_scene_update(&arena->gpu, scene, NULL, &changes, NULL, &error), &error);
-    arena->bvh = make_tracer(arena, BVH);
-    arena->reference = make_tracer(arena, REFERENCE);
+    arena->bvh = make_tracer(arena, TRACER_BVH);
+    arena->reference = make_tracer(arena, TRACER_REFERENCE);
     make_primary(arena);
     arena->primary_hits = trace(arena, arena->reference, arena->rays, RAY_COUNT, RAYS_PRIMARY);
 }
@@ -289,7 +287,7 @@ static bool visibilities_agree(uint32_t a, uint32_t b)
     return true;
 }
 
-static bool agree(const struct arena *arena, enum ray_kind kind, const struct ray *ray, const void *a,
+static bool agree(const struct arena *arena, enum rays_tried kind, const struct ray *ray, const void *a,
                   uint32_t index_a, const void *b, uint32_t index_b)
 {
     if (kind == RAYS_SHADOW)
@@ -298,7 +296,7 @@ static bool agree(const struct arena *arena, enum ray_kind kind, const struct ra
 }
 
 /* Does the reference give bvh's answer to the ray moved a little? */
-static bool is_answered_nearby(struct arena *arena, enum ray_kind kind, uint32_t ray, const void *bvh_answers,
+static bool is_answered_nearby(struct arena *arena, enum rays_tried kind, uint32_t ray, const void *bvh_answers,
                                uint32_t tries)
 {
     struct ray *moved = calloc(tries, sizeof(*moved));
@@ -320,7 +318,7 @@ static bool is_answered_nearby(struct arena *arena, enum ray_kind kind, uint32_t
     return found;
 }
 
-static bool is_on_edge(struct arena *arena, enum ray_kind kind, uint32_t ray, const void *bvh_answers)
+static bool is_on_edge(struct arena *arena, enum rays_tried kind, uint32_t ray, const void *bvh_answers)
 {
     return is_answered_nearby(arena, kind, ray, bvh_answers, EDGE_TRIES_FEW) ||
            is_answered_nearby(arena, kind, ray, bvh_answers, EDGE_TRIES_MANY);
@@ -347,7 +345,7 @@ static double median_error(const struct hit *reference, const struct hit *bvh, u
     return median;
 }
 
-static void compare(struct arena *arena, enum ray_kind kind)
+static void compare(struct arena *arena, enum rays_tried kind)
 {
     void *reference = trace(arena, arena->reference, arena->rays, RAY_COUNT, kind);
     void *bvh = trace(arena, arena->bvh, arena->rays, RAY_COUNT, kind);
@@ -388,7 +386,7 @@ static void compare(struct arena *arena, enum ray_kind kind)
 static int open_device_beside_embree(void **state)
 {
     struct error error = {0};
-    if (tracer_find(REFERENCE, "tracer", &error))
+    if (tracer_find(TRACER_REFERENCE, "tracer", &error))
         return open_device(state);
     test_skip_file("%s", error.text);
     return 0;
@@ -537,7 +535,7 @@ TEST(embree_keeps_to_the_memory_limit_and_its_books_are_right_afterwards)
     assert_true(needed > 0);
     tracer_destroy(arena.reference);
     assert_true(device->memory_used_bytes == used - needed);
-    arena.reference = tracer_create(tracer_impl_by_number(REFERENCE), device, NULL, &error);
+    arena.reference = tracer_create(tracer_impl_by_number(TRACER_REFERENCE), device, NULL, &error);
     for (uint64_t part = 0; part < 8; part++) {
         error = (struct error){0};
         device->memory_limit_bytes = used - needed + part * needed / 8;

@@ -182,7 +182,7 @@ TEST(both_integrators_look_through_it)
     fixture->request.samples = 16;
     fixture->request.aperture = 0.2f;
     fixture->request.focus = 6.2f;
-    fixture->request.format = FRAME_RGBA8;
+    fixture->request.format = PIXEL_FORMAT_RGBA8;
     double means[2];
     for (int i = 0; i < 2; i++) {
         fixture->request.integrator = i ? INTEGRATOR_DISTRIBUTED : INTEGRATOR_WHITTED;

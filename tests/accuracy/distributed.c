@@ -7,11 +7,10 @@
 #include "tests/harness/test.h"
 
 enum { EDGE = 16, PIXELS = EDGE * EDGE };
-#define TRACER_REFERENCE 2
 
 /* ---- scenes ---- */
 
-static void a_lamp(struct fixture *fixture, enum scene_light_kind kind, float x, float y, float z, float power)
+static void a_lamp(struct fixture *fixture, enum light_kind kind, float x, float y, float z, float power)
 {
     struct scene_light *light = fixture_light(fixture, kind, x, y, z, power);
     light->size[0] = light->size[1] = 0.8f;

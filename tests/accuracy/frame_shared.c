@@ -4,9 +4,6 @@
 #include "tests/accuracy/render_fixture.h"
 #include "tests/harness/test.h"
 
-#define TRACER_BVH 0
-#define TRACER_LDC 3
-
 static uint32_t build_scene(struct fixture *fixture)
 {
     struct scene_material *ground = fixture_material(fixture), *mirror = fixture_material(fixture),
@@ -65,8 +62,8 @@ enum { VIEWS = 6, PASSES = 3 };
 static struct frame_request view_request(struct fixture *fixture, uint32_t view)
 {
     static const struct {
-        enum frame_integrator integrator;
-        enum frame_primary primary;
+        enum integrator_kind integrator;
+        enum primary_kind primary;
         unsigned tracer;
         uint32_t width, height, samples, layers;
         bool accumulate, compare;
@@ -212,7 +209,7 @@ TEST(another_revision_waits_for_the_frames_of_the_one_before)
     assert_non_null(fixture->scene);
     fixture->next_id = 1;
     assert_int_equal(build_scene(fixture), node);
-    struct scene_edit *edit = fixture_edit(fixture, SCENE_NODE);
+    struct scene_edit *edit = fixture_edit(fixture, OBJECT_NODE);
     edit->kind = EDIT_REMOVE;
     edit->id = node;
     fixture_commit(fixture);
@@ -312,11 +309,11 @@ TEST(pictures_that_are_copied_behind_are_the_same)
     struct frame_renderer *other = another_renderer(fixture);
     static const struct {
         uint32_t width, height, layers;
-        enum frame_format format;
+        enum pixel_format format;
     } forms[3] = {
-        {700, 900, 0, FRAME_RGBA8},
-        {50, 40, 0, FRAME_RGBA16F},
-        {600, 500, 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH | 1u << LAYER_ID, FRAME_RGBA32F},
+        {700, 900, 0, PIXEL_FORMAT_RGBA8},
+        {50, 40, 0, PIXEL_FORMAT_RGBA16F},
+        {600, 500, 1u << LAYER_BEAUTY | 1u << LAYER_DEPTH | 1u << LAYER_ID, PIXEL_FORMAT_RGBA32F},
     };
     build_scene(fixture);
     for (int i = 0; i < 3; i++) {
@@ -346,7 +343,7 @@ TEST(pictures_that_are_copied_behind_are_the_same)
         assert_false(frame_step_waits(fixture->renderer));
         assert_int_equal(behind[i].size_bytes, at_once[i].size_bytes);
         assert_memory_equal(behind[i].pixels, at_once[i].pixels, at_once[i].size_bytes);
-        assert_true(stage_times_sum_ns(&behind[i].times, STAGE_READBACK, STAGE_CPU) > 0);
+        assert_true(stage_times_sum_ns(&behind[i].times, STAGE_READBACK, CLOCK_CPU) > 0);
         frame_result_finish(&at_once[i]);
         frame_result_finish(&behind[i]);
     }

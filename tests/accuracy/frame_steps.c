@@ -9,12 +9,6 @@
 
 #include <time.h>
 
-#define TRACER_BVH 0
-#define TRACER_REFERENCE 2
-#define TRACER_LDC 3
-#define TRACER_ABUFFER 4
-#define TRACER_COUNT 5
-
 /* A tracer that takes so long for a ray: on software GL slow ones take a few microseconds. At that, so many rays
  * are 50 ms, in which a cancel is to be served; other work on the machine makes steps of fewer rays. */
 #define RAY_NS 4000u
@@ -119,9 +113,9 @@ TEST(no_step_is_long_where_rays_are_slow)
     struct fixture *fixture = *state;
     static const struct form {
         const char *name;
-        enum frame_integrator integrator;
+        enum integrator_kind integrator;
         uint32_t samples, ao_rays, layers;
-        enum frame_primary primary;
+        enum primary_kind primary;
     } forms[] = {
         {"whitted", INTEGRATOR_WHITTED, 1, 0, 0, PRIMARY_RASTER},
         {"whitted, traced", INTEGRATOR_WHITTED, 2, 0, 0, PRIMARY_TRACE},
@@ -183,7 +177,7 @@ static void a_field(struct fixture *fixture, uint32_t material)
         uint32_t a = i / COLUMNS * (COLUMNS + 1) + i % COLUMNS, b = a + COLUMNS + 1;
         memcpy(indices[i], (uint32_t[6]){a, a + 1, b, a + 1, b + 1, b}, sizeof(indices[i]));
     }
-    struct scene_mesh *mesh = &fixture_edit(fixture, SCENE_MESH)->set.mesh;
+    struct scene_mesh *mesh = &fixture_edit(fixture, OBJECT_MESH)->set.mesh;
     mesh->base.id = fixture->next_id++;
     mesh->vertex_count = VERTICES;
     mesh->triangle_count = TRIANGLES;
@@ -347,7 +341,7 @@ TEST(structures_built_in_steps_are_the_same)
         print_message("%s: %u pieces\n", way->name, count);
         assert_true(count > 2 || !way->has_pieces);
         expect_same(&pieces, &whole);
-        assert_true(stage_times_sum_ns(&pieces.times, STAGE_BUILD, STAGE_CPU) > 0);
+        assert_true(stage_times_sum_ns(&pieces.times, STAGE_BUILD, CLOCK_CPU) > 0);
         frame_result_finish(&whole);
         frame_result_finish(&pieces);
     }

@@ -23,7 +23,7 @@ static void build_scene(struct fixture *fixture)
         fixture_sphere(fixture, 1.1f * cosf(angle), 1.1f * sinf(angle), 0.0f, 0.45f, glow->base.id);
     }
     fixture_commit(fixture);
-    fixture->request.format = FRAME_RGBA8;
+    fixture->request.format = PIXEL_FORMAT_RGBA8;
     fixture->request.samples = 4;
     fixture->request.depth = 2;
 }
@@ -56,7 +56,7 @@ static struct frame_result convert(struct fixture *fixture, enum ycbcr kind)
     fixture->request.ycbcr = kind;
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.ycbcr, kind);
-    assert_int_equal(result.format, FRAME_RGBA8);
+    assert_int_equal(result.format, PIXEL_FORMAT_RGBA8);
     fixture->request.ycbcr = YCBCR_NONE;
     return result;
 }
@@ -93,7 +93,7 @@ TEST(attachments_lie_behind_planes_as_behind_pixels)
     build_scene(fixture);
     fixture->request.width = 37;
     fixture->request.height = 23;
-    fixture->request.attachments = ATTACHMENT_DEPTH | ATTACHMENT_NORMALS;
+    fixture->request.attachments = 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS;
     struct frame_result pixels = fixture_render(fixture), planes = convert(fixture, YCBCR_VIDEO);
     assert_planes(&planes, &(struct exact_picture){pixels.pixels, 37, 23, YCBCR_VIDEO});
     assert_memory_equal(frame_result_attachment(&planes, ATTACHMENT_DEPTH),
@@ -125,7 +125,7 @@ TEST(only_what_is_shown_in_8_bits_is_converted)
     struct error error = {0};
     build_scene(fixture);
     fixture->request.ycbcr = YCBCR_JPEG;
-    fixture->request.format = FRAME_RGBA16F;
+    fixture->request.format = PIXEL_FORMAT_RGBA16F;
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_int_equal(error.kind, ERROR_UNSUPPORTED);
     assert_string_equal(error.field, "format");

@@ -5,16 +5,12 @@
 #include "trace/tracer.h"
 #include "tests/harness/test.h"
 
-#define BVH 0
-#define REFERENCE 2
-#define LDC 3
-#define ABUFFER 4
 #define ALL ((1u << LAYER_COUNT) - 1)
 #define BIT(layer) (1u << (layer))
 /* Places some metres from the origin, in floats: a few roundings of 2^-24 of 10 m. */
 #define ROUNDING_METRES 5e-6
 
-static const float *pixel_of(const struct frame_result *result, enum frame_layer layer, uint32_t x, uint32_t y)
+static const float *pixel_of(const struct frame_result *result, enum layer layer, uint32_t x, uint32_t y)
 {
     assert_true(result->layers & BIT(layer));
     size_t plane = (size_t)__builtin_popcount(result->layers & (BIT(layer) - 1));
@@ -76,7 +72,7 @@ static void expect_plane(struct fixture *fixture, const float normal[3], const f
             assert_near(pixel_of(&result, LAYER_DEPTH, x, y)[k], depth, tolerance);
         assert_near(n[0] * normal[0] + n[1] * normal[1] + n[2] * normal[2], 1, 1e-3); /* 12 or more bits each */
         for (int layer = LAYER_NORMAL; layer <= LAYER_POSITION; layer++)
-            assert_true(pixel_of(&result, (enum frame_layer)layer, x, y)[3] == 1.0f);
+            assert_true(pixel_of(&result, (enum layer)layer, x, y)[3] == 1.0f);
     }
     frame_result_finish(&result);
 }
@@ -92,11 +88,11 @@ TEST(planes_are_where_they_are_and_look_to_the_eye)
     const float at[12] = {c, 0, s, 0, 0, 1, 0, 0.3f, -s, 0, c, -1}, normal[3] = {s, 0, c}, middle[3] = {0, 0, -1};
     uint32_t node = fixture->next_id + 1;
     fixture_square(fixture, 5, 0, at);
-    const unsigned tracers[] = {BVH, TRACER_NAIVE, REFERENCE};
+    const unsigned tracers[] = {TRACER_BVH, TRACER_NAIVE, TRACER_REFERENCE};
     for (int way = 0; way < 4; way++) { /* which side, and how first hits are found */
         if (way == 2) {
             const float away[12] = {-c, 0, -s, 0, 0, 1, 0, 0.3f, s, 0, -c, -1};
-            memcpy(fixture_edit(fixture, SCENE_NODE)->set.node.parent_from_node, away, sizeof(away));
+            memcpy(fixture_edit(fixture, OBJECT_NODE)->set.node.parent_from_node, away, sizeof(away));
             fixture->edits[0].set.node.base.id = node;
             fixture->edits[0].set.node.kind = NODE_MESH;
             fixture->edits[0].set.node.object = node - 1;
@@ -138,11 +134,11 @@ TEST(sampled_structures_have_layers_too)
     fixture_square(fixture, 5, material, at);
     fixture->request.primary = PRIMARY_TRACE;
     fixture->request.tracer_options.ldc.resolution = fixture->request.tracer_options.abuffer.resolution = 256;
-    for (unsigned tracer = LDC; tracer <= ABUFFER; tracer++) {
+    for (unsigned tracer = TRACER_LDC; tracer <= TRACER_ABUFFER; tracer++) {
         fixture->request.tracer = tracer;
         expect_plane(fixture, normal, middle, 10.0 / 256); /* a cell */
         struct frame_result result = render(fixture, BIT(LAYER_ALBEDO) | BIT(LAYER_ID));
-        float node = tracer == ABUFFER ? (float)(fixture->next_id - 1) : 0; /* cubes do not know it */
+        float node = tracer == TRACER_ABUFFER ? (float)(fixture->next_id - 1) : 0; /* cubes do not know it */
         for (uint32_t i = 0; i < 32; i++) {
             const float *albedo = pixel_of(&result, LAYER_ALBEDO, i, 31 - i);
             const float *id = pixel_of(&result, LAYER_ID, i, i);
@@ -159,7 +155,7 @@ TEST(albedo_is_the_textures_colour_and_covers_what_is_seen)
     struct fixture *fixture = *state;
     static const uint8_t texels[4][4] = {
         {255, 0, 0, 255}, {0, 255, 0, 255}, {0, 0, 255, 255}, {51, 102, 204, 255}};
-    struct scene_texture *texture = &fixture_edit(fixture, SCENE_TEXTURE)->set.texture;
+    struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
     texture->width = texture->height = 2;
     texture->format = TEXTURE_RGBA8_LINEAR;
@@ -231,14 +227,14 @@ TEST(identifiers_are_the_clients)
     uint32_t square_node = fixture->next_id - 1, square = square_node - 1;
     fixture_sphere(fixture, 0, 0, 0, 0.3f, materials[1]);
     uint32_t sphere_node = fixture->next_id - 1;
-    struct scene_disc *disc = &fixture_edit(fixture, SCENE_DISC)->set.disc;
+    struct scene_disc *disc = &fixture_edit(fixture, OBJECT_DISC)->set.disc;
     disc->base.id = fixture->next_id++;
     disc->material = materials[2];
     disc->normal_world[2] = 1;
     disc->centre_world[0] = 1;
     disc->radius = 0.4f;
     fixture_commit(fixture);
-    const unsigned tracers[] = {BVH, TRACER_NAIVE, BVH};
+    const unsigned tracers[] = {TRACER_BVH, TRACER_NAIVE, TRACER_BVH};
     for (int i = 0; i < 3; i++) {
         fixture->request.tracer = tracers[i];
         fixture->request.primary = i == 2 ? PRIMARY_TRACE : PRIMARY_RASTER;
@@ -252,9 +248,9 @@ TEST(identifiers_are_the_clients)
         frame_result_finish(&result);
     }
     /* What shows something goes before it. */
-    const struct scene_edit removed[] = {{.object = SCENE_NODE, .id = square_node},
-                                         {.object = SCENE_MESH, .id = square},
-                                         {.object = SCENE_MATERIAL, .id = materials[0]}};
+    const struct scene_edit removed[] = {{.object = OBJECT_NODE, .id = square_node},
+                                         {.object = OBJECT_MESH, .id = square},
+                                         {.object = OBJECT_MATERIAL, .id = materials[0]}};
     for (int i = 0; i < 3; i++) {
         struct scene_edit *edit = fixture_edit(fixture, removed[i].object);
         *edit = removed[i];
@@ -282,7 +278,7 @@ TEST(openness_is_that_of_the_integrator_ao)
     fixture->request.ao_distance = 1.5f;
     fixture->request.ao_rays = 24;
     for (int falloff = 0; falloff < 2; falloff++) {
-        fixture->request.tracer = BVH;
+        fixture->request.tracer = TRACER_BVH;
         fixture->request.ao_falloff = (float)falloff;
         fixture->request.integrator = INTEGRATOR_AO;
         struct frame_result result = render(fixture, BIT(LAYER_BEAUTY) | BIT(LAYER_AO));
@@ -313,8 +309,8 @@ TEST(openness_is_that_of_the_integrator_ao)
 static void expect_attached(const struct frame_result *result, const struct frame_result *layers)
 {
     const size_t count = (size_t)result->width * result->height;
-    bool has_depth = result->attachments & ATTACHMENT_DEPTH,
-         has_normals = result->attachments & ATTACHMENT_NORMALS;
+    bool has_depth = result->attachments & 1u << ATTACHMENT_DEPTH,
+         has_normals = result->attachments & 1u << ATTACHMENT_NORMALS;
     const uint8_t *depths = has_depth ? frame_result_attachment(result, ATTACHMENT_DEPTH) : NULL;
     const uint8_t *normals = has_normals ? frame_result_attachment(result, ATTACHMENT_NORMALS) : NULL;
     for (uint32_t i = 0; i < count; i++) {
@@ -336,13 +332,13 @@ TEST(attachments_are_those_layers_beside_a_picture_that_stays_as_it_is)
     struct fixture *fixture = *state;
     add_glass(fixture);
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
-    fixture->request.tracer = BVH;
+    fixture->request.tracer = TRACER_BVH;
     fixture->request.tracer_options.bvh.rays = 1;
     fixture->request.samples = 3;
     struct frame_result layers = render(fixture, BIT(LAYER_NORMAL) | BIT(LAYER_DEPTH));
     fixture->request.layers = 0;
-    for (int format = FRAME_RGBA8; format <= FRAME_RGBA32F; format++) {
-        fixture->request.format = (enum frame_format)format;
+    for (int format = PIXEL_FORMAT_RGBA8; format <= PIXEL_FORMAT_RGBA32F; format++) {
+        fixture->request.format = (enum pixel_format)format;
         fixture->request.attachments = 0;
         struct frame_result alone = fixture_render(fixture);
         for (uint32_t attachments = 1; attachments <= 3; attachments++) {
@@ -379,10 +375,10 @@ TEST(neither_the_picture_nor_the_layers_depend_on_each_other)
     add_glass(fixture);
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
     fixture->request.samples = 3;
-    fixture->request.tracer = BVH;
+    fixture->request.tracer = TRACER_BVH;
     fixture->request.tracer_options.bvh.rays = 1; /* else it follows the slices, and rounding at edges */
     for (int integrator = INTEGRATOR_WHITTED; integrator <= INTEGRATOR_PATH; integrator++) {
-        fixture->request.integrator = (enum frame_integrator)integrator;
+        fixture->request.integrator = (enum integrator_kind)integrator;
         frame_renderer_set_capacity(fixture->renderer, 0, 0);
         struct frame_result alone = render(fixture, 0), together = render(fixture, ALL);
         struct frame_result beside = render(fixture, ALL & ~BIT(LAYER_BEAUTY));
@@ -406,7 +402,7 @@ TEST(frames_that_go_on_hold_what_one_of_all_samples_does)
     struct fixture *fixture = *state;
     add_mirrors(fixture);
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
-    fixture->request.tracer = BVH;
+    fixture->request.tracer = TRACER_BVH;
     fixture->request.accumulate = true;
     fixture->request.samples = 6;
     struct frame_result at_once = render(fixture, ALL), last = {0};
@@ -435,7 +431,7 @@ TEST(places_agree_with_depths_through_a_lens)
     struct fixture *fixture = *state;
     add_mirrors(fixture);
     fixture_look(fixture, 1.5f, 2.2f, 5.5f, 0.7f);
-    fixture->request.tracer = BVH;
+    fixture->request.tracer = TRACER_BVH;
     fixture->request.samples = 8;
     fixture->request.aperture = 0.2f;
     struct frame_result result = render(fixture, BIT(LAYER_DEPTH) | BIT(LAYER_POSITION));
@@ -471,7 +467,7 @@ TEST(layers_that_there_are_not_or_no_pixel_holds_are_refused)
     fixture->request.layers = BIT(LAYER_COUNT);
     expect_refused(fixture, "number 7");
     fixture->request.layers = BIT(LAYER_DEPTH);
-    fixture->request.format = FRAME_RGBA16F;
+    fixture->request.format = PIXEL_FORMAT_RGBA16F;
     expect_refused(fixture, "rgba32f");
     fixture->request.layers = BIT(LAYER_BEAUTY);
     struct frame_result result = fixture_render(fixture);

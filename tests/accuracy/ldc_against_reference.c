@@ -7,7 +7,6 @@
 #include "tests/accuracy/against_reference.h"
 #include "tests/harness/test.h"
 
-#define LDC 3
 #define RESOLUTION 1024u
 /* What is asked of the tracer's pictures, in dB. */
 #define PSNR_MIN 38.0
@@ -26,14 +25,14 @@ static struct frame_result render(struct fixture *fixture, unsigned tracer, cons
     char kept[128];
     fixture->request.tracer = tracer;
     struct frame_result result = fixture_render(fixture);
-    snprintf(kept, sizeof(kept), "ldc_%s_%s", name, tracer == LDC ? "ldc" : "exact");
+    snprintf(kept, sizeof(kept), "ldc_%s_%s", name, tracer == TRACER_LDC ? "ldc" : "exact");
     fixture_keep(&result, kept);
     return result;
 }
 
 static void expect_like_the_reference(struct fixture *fixture, const char *name, double psnr_min)
 {
-    struct frame_result got = render(fixture, LDC, name), expected = render(fixture, exact_tracer(), name);
+    struct frame_result got = render(fixture, TRACER_LDC, name), expected = render(fixture, exact_tracer(), name);
     double reached = psnr(&got, &expected);
     printf("%s: PSNR %.1f dB\n", name, reached);
     for (int i = 0; i < TRACER_CUBES_MAX; i++)
@@ -105,13 +104,13 @@ TEST(what_moves_is_seen_with_what_stands_still)
     turned(m, 0.4f, 0, 0, 0.6f, 0);
     uint32_t node = fixture_node(fixture, NODE_MESH, mesh, m);
     request_cubes(fixture);
-    struct frame_result before = render(fixture, LDC, "before it moves");
+    struct frame_result before = render(fixture, TRACER_LDC, "before it moves");
     assert_int_equal(before.cubes[TRACER_CUBE_DYNAMIC].resolution, 0);
     frame_result_finish(&before);
     for (int step = 0; step < 2; step++) {
         turned(m, 0.4f, 0.3f, 0.4f, 0.3f + 0.2f * (float)step, 0.5f);
         set_node(fixture, node, mesh, m);
-        struct frame_result after = render(fixture, LDC, "after it moved");
+        struct frame_result after = render(fixture, TRACER_LDC, "after it moved");
         assert_int_equal(after.cubes[TRACER_CUBE_DYNAMIC].resolution, RESOLUTION);
         assert_int_equal(after.cubes[TRACER_CUBE_STATIC].rebuilt, step == 0);
         assert_true(after.cubes[TRACER_CUBE_DYNAMIC].rebuilt);
@@ -128,14 +127,15 @@ TEST(switching_to_another_tracer_and_back_builds_nothing)
     static const struct {
         unsigned tracer;
         bool builds;
-    } frames[] = {{LDC, true}, {BVH, false}, {LDC, false}, {BVH, false}, {LDC, false}};
+    } frames[] = {
+        {TRACER_LDC, true}, {TRACER_BVH, false}, {TRACER_LDC, false}, {TRACER_BVH, false}, {TRACER_LDC, false}};
     add_mirrors(fixture);
     request_cubes(fixture);
     fixture->request.tracer_options.ldc.resolution = 128;
     for (size_t i = 0; i < sizeof(frames) / sizeof(frames[0]); i++) {
         struct frame_result result = render(fixture, frames[i].tracer, "switched");
         assert_int_equal(result.cubes[TRACER_CUBE_STATIC].rebuilt, frames[i].builds);
-        assert_int_equal(result.cubes[TRACER_CUBE_STATIC].resolution, frames[i].tracer == LDC ? 128 : 0);
+        assert_int_equal(result.cubes[TRACER_CUBE_STATIC].resolution, frames[i].tracer == TRACER_LDC ? 128 : 0);
         frame_result_finish(&result);
     }
 }
@@ -145,7 +145,7 @@ TEST(a_picture_of_other_cubes_begins_anew)
 {
     struct fixture *fixture = *state;
     add_mirrors(fixture);
-    fixture->request.tracer = LDC;
+    fixture->request.tracer = TRACER_LDC;
     fixture->request.accumulate = true;
     fixture->request.tracer_options.ldc.resolution = 64;
     for (uint32_t i = 1; i <= 2; i++) {
@@ -176,9 +176,9 @@ TEST(what_moves_while_the_shutter_is_open_is_refused_at_once)
     fixture->request.tracer_options.ldc.resolution = 64;
     for (int compare = 0; compare < 2; compare++) {
         struct error error = {0};
-        fixture->request.tracer = compare ? BVH : LDC;
+        fixture->request.tracer = compare ? TRACER_BVH : TRACER_LDC;
         fixture->request.compare = compare;
-        fixture->request.compare_with = LDC;
+        fixture->request.compare_with = TRACER_LDC;
         assert_false(frame_begin(fixture->renderer, fixture->scene, &open, &fixture->request, &error));
         assert_int_equal(error.kind, ERROR_UNSUPPORTED);
         assert_string_equal(error.field, "shutter");
@@ -192,11 +192,11 @@ TEST(what_moves_while_the_shutter_is_open_is_refused_at_once)
 static void expect_rays_agree(struct fixture *fixture, const char *name, float cell_metres)
 {
     static const struct agreement asked = {.agreed = 0.99, .median_cells = 0.25, .most_cells = INFINITY};
-    struct agreement found = compare_rays(fixture, LDC, name, cell_metres);
+    struct agreement found = compare_rays(fixture, TRACER_LDC, name, cell_metres);
     expect_agreement(name, &found, &asked);
 }
 
 TEST(secondary_rays_agree_with_the_reference)
 {
-    with_pairs_of_shapes(state, LDC, request_cubes, expect_rays_agree);
+    with_pairs_of_shapes(state, TRACER_LDC, request_cubes, expect_rays_agree);
 }

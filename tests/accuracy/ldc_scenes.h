@@ -71,7 +71,7 @@ static inline uint32_t add_shape_mesh(struct fixture *fixture, enum shape shape,
         else
             memcpy(out, (uint32_t[6]){a, b, a + 1, a + 1, b, b + 1}, 6 * sizeof(*out));
     }
-    struct scene_mesh *mesh = &fixture_edit(fixture, SCENE_MESH)->set.mesh;
+    struct scene_mesh *mesh = &fixture_edit(fixture, OBJECT_MESH)->set.mesh;
     mesh->base.id = fixture->next_id++;
     mesh->vertex_count = vertices;
     mesh->triangle_count = triangles;
@@ -94,7 +94,7 @@ static inline uint32_t add_shape_mesh(struct fixture *fixture, enum shape shape,
 static inline void set_node(struct fixture *fixture, uint32_t node, uint32_t mesh,
                             const float parent_from_node[12])
 {
-    struct scene_node *edit = &fixture_edit(fixture, SCENE_NODE)->set.node;
+    struct scene_node *edit = &fixture_edit(fixture, OBJECT_NODE)->set.node;
     edit->base.id = node;
     edit->kind = NODE_MESH;
     edit->object = mesh;
@@ -140,7 +140,7 @@ static inline uint32_t add_texture(struct fixture *fixture, bool holes)
             texels[y][x][3] = holes && odd ? 0 : 255;
         }
     }
-    struct scene_texture *texture = &fixture_edit(fixture, SCENE_TEXTURE)->set.texture;
+    struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
     texture->width = texture->height = TEXELS;
     texture->format = TEXTURE_RGBA8_SRGB;
@@ -211,7 +211,7 @@ static inline uint32_t add_hills(struct fixture *fixture, bool normals)
             texels[y][x][3] = 255;
         }
     }
-    struct scene_texture *texture = &fixture_edit(fixture, SCENE_TEXTURE)->set.texture;
+    struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
     texture->width = texture->height = TEXELS;
     texture->format = TEXTURE_RGBA8_LINEAR;

@@ -143,7 +143,7 @@ static inline void test_add_skin(struct test_edits *edits)
     test_node(edits, 13, 0, NODE_GROUP, 0, m);
     for (uint32_t j = 0; j < TEST_JOINTS; j++)
         test_transform(bind[j], 1, 1, 1, (int)j, -0.2f * (float)(j + 1), 0.1f * (float)j, -0.1f, 0);
-    struct scene_skin *skin = &test_add(edits, SCENE_SKIN)->set.skin;
+    struct scene_skin *skin = &test_add(edits, OBJECT_SKIN)->set.skin;
     skin->base.id = 30;
     skin->joint_count = TEST_JOINTS;
     skin->joints = test_blob(nodes, sizeof(nodes));

@@ -136,7 +136,7 @@ TEST(no_material_outshines_a_furnace)
                 material->transmission = kinds[k].transmission;
                 material->ior = kinds[k].ior;
                 material->roughness = 0.2f * (float)step;
-                fixture->request.brdf = ward ? FRAME_BRDF_WARD : FRAME_BRDF_GGX;
+                fixture->request.brdf = ward ? BRDF_WARD : BRDF_GGX;
                 fixture->request.samples = 64;
                 struct frame_result result = fixture_render(fixture);
                 double values[64], least = 1.0;
@@ -200,10 +200,10 @@ TEST(frames_of_few_samples_add_up_to_one_of_many)
     fixture->request.accumulate = true;
     fixture->request.samples = 6;
     struct frame_result whole = fixture_render(fixture);
-    fixture->request.brdf = FRAME_BRDF_WARD; /* another picture: begins from new */
+    fixture->request.brdf = BRDF_WARD; /* another picture: begins from new */
     parts = fixture_render(fixture);
     assert_int_equal(parts.samples, 6);
-    fixture->request.brdf = FRAME_BRDF_GGX;
+    fixture->request.brdf = BRDF_GGX;
     fixture->request.samples = 2;
     for (int i = 0; i < 3; i++) {
         frame_result_finish(&parts);

@@ -5,9 +5,6 @@
 
 #include "tests/accuracy/render_fixture.h"
 
-#define TRACER_BVH 0
-#define TRACER_REFERENCE 2
-#define TRACER_LDC 3
 #define PI 3.14159265358979323846
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 

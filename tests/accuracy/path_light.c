@@ -58,13 +58,13 @@ static double below_a_ball(const double place[2])
     return (double)(HALF * HALF) / squared * (double)HEIGHT / sqrt(squared);
 }
 
-static void a_lamp_of(struct fixture *fixture, enum scene_light_kind kind, float radiance)
+static void a_lamp_of(struct fixture *fixture, enum light_kind kind, float radiance)
 {
     struct scene_light *light = fixture_light(fixture, kind, 0.0f, 0.0f, HEIGHT, radiance);
     light->size[0] = light->size[1] = kind == LIGHT_RECTANGLE ? 2.0f * HALF : HALF;
 }
 
-static void a_lamp(struct fixture *fixture, enum scene_light_kind kind)
+static void a_lamp(struct fixture *fixture, enum light_kind kind)
 {
     a_lamp_of(fixture, kind, 1.0f);
 }
@@ -111,7 +111,7 @@ TEST(lights_illuminate_a_floor_as_their_closed_forms_say)
     static const unsigned tracers[] = {TRACER_REFERENCE, TRACER_BVH};
     static const struct {
         const char *name;
-        enum scene_light_kind kind;
+        enum light_kind kind;
         double (*form)(const double place[2]);
     } lamps[] = {{"rectangle", LIGHT_RECTANGLE, below_a_rectangle}, {"sphere", LIGHT_SPHERE, below_a_ball}};
     for (size_t l = 0; l < COUNT(lamps); l++)
@@ -169,7 +169,7 @@ TEST(shadow_rays_and_rays_that_go_on_find_the_same_light)
                     a_lamp(fixture, LIGHT_RECTANGLE);
                 else
                     a_glowing_square(fixture);
-                fixture->request.brdf = ward ? FRAME_BRDF_WARD : FRAME_BRDF_GGX;
+                fixture->request.brdf = ward ? BRDF_WARD : BRDF_GGX;
                 fixture->request.samples = way < 2 ? 32 : 128;
                 ways[way] = mean_of_seeds(fixture, whole);
             }
@@ -221,7 +221,7 @@ TEST(point_lights_contribute_as_in_whitted)
 TEST(lights_are_visible_in_mirrors_and_not_directly)
 {
     struct fixture *fixture = *state;
-    static const enum scene_light_kind kinds[] = {LIGHT_RECTANGLE, LIGHT_SPHERE};
+    static const enum light_kind kinds[] = {LIGHT_RECTANGLE, LIGHT_SPHERE};
     for (size_t k = 0; k < COUNT(kinds); k++) {
         path_begin(fixture, TRACER_REFERENCE, 1);
         struct scene_material *mirror = a_floor(fixture, 5.0f); /* the lamp is between */

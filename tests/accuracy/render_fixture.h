@@ -14,7 +14,6 @@
 #include <string.h>
 
 #define FIXTURE_EDITS_MAX 128
-#define TRACER_NAIVE 1 /* the protocol's number */
 
 /* Objects get the numbers 1, 2, .. in the order in which they are added. */
 struct fixture {
@@ -28,7 +27,7 @@ struct fixture {
     struct frame_request request; /* 32x32, one sample, naive, raster, linear floats; from (0,0,5) to the origin */
 };
 
-static inline struct scene_edit *fixture_edit(struct fixture *fixture, enum scene_object_kind object)
+static inline struct scene_edit *fixture_edit(struct fixture *fixture, enum object_kind object)
 {
     assert_true(fixture->edit_count < FIXTURE_EDITS_MAX);
     struct scene_edit *edit = &fixture->edits[fixture->edit_count++];
@@ -85,17 +84,21 @@ static inline int fixture_clear(void **state)
     assert_non_null(fixture->scene);
     fixture->edit_count = 0;
     fixture->next_id = 1;
-    fixture->request = (struct frame_request){
-        .width = 32, .height = 32, .samples = 1, .depth = 4, .tracer = TRACER_NAIVE, .format = FRAME_RGBA32F};
+    fixture->request = (struct frame_request){.width = 32,
+                                              .height = 32,
+                                              .samples = 1,
+                                              .depth = 4,
+                                              .tracer = TRACER_NAIVE,
+                                              .format = PIXEL_FORMAT_RGBA32F};
     fixture_look(fixture, 0.0f, 0.0f, 5.0f, 0.6f);
     return 0;
 }
 
-static inline uint32_t fixture_node(struct fixture *fixture, enum scene_node_kind kind, uint32_t object,
+static inline uint32_t fixture_node(struct fixture *fixture, enum node_kind kind, uint32_t object,
                                     const float parent_from_node[12])
 {
     static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    struct scene_node *node = &fixture_edit(fixture, SCENE_NODE)->set.node;
+    struct scene_node *node = &fixture_edit(fixture, OBJECT_NODE)->set.node;
     node->base.id = fixture->next_id++;
     node->kind = kind;
     node->object = object;
@@ -106,7 +109,7 @@ static inline uint32_t fixture_node(struct fixture *fixture, enum scene_node_kin
 /* White, Lambert and nothing else (an index of refraction of 1 reflects nothing); change the rest yourself. */
 static inline struct scene_material *fixture_material(struct fixture *fixture)
 {
-    struct scene_material *material = &fixture_edit(fixture, SCENE_MATERIAL)->set.material;
+    struct scene_material *material = &fixture_edit(fixture, OBJECT_MATERIAL)->set.material;
     material->base.id = fixture->next_id++;
     for (int i = 0; i < 4; i++)
         material->base_colour[i] = 1.0f;
@@ -120,7 +123,7 @@ static inline void fixture_sphere(struct fixture *fixture, float x, float y, flo
                                   uint32_t material)
 {
     const float centre_radius[4] = {x, y, z, radius};
-    struct scene_spheres *spheres = &fixture_edit(fixture, SCENE_SPHERES)->set.spheres;
+    struct scene_spheres *spheres = &fixture_edit(fixture, OBJECT_SPHERES)->set.spheres;
     spheres->base.id = fixture->next_id++;
     spheres->sphere_count = 1;
     spheres->centres_radii = fixture_blob(centre_radius, sizeof(centre_radius));
@@ -138,7 +141,7 @@ static inline struct scene_mesh *fixture_square(struct fixture *fixture, float h
     const float positions[12] = {-half, -half, 0, half, -half, 0, half, half, 0, -half, half, 0};
     const float texcoords[8] = {0, 1, 1, 1, 1, 0, 0, 0};
     const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    struct scene_mesh *mesh = &fixture_edit(fixture, SCENE_MESH)->set.mesh;
+    struct scene_mesh *mesh = &fixture_edit(fixture, OBJECT_MESH)->set.mesh;
     mesh->base.id = fixture->next_id++;
     mesh->vertex_count = 4;
     mesh->triangle_count = 2;
@@ -153,12 +156,12 @@ static inline struct scene_mesh *fixture_square(struct fixture *fixture, float h
     return mesh;
 }
 
-static inline struct scene_light *fixture_light(struct fixture *fixture, enum scene_light_kind kind, float x,
-                                                float y, float z, float power)
+static inline struct scene_light *fixture_light(struct fixture *fixture, enum light_kind kind, float x, float y,
+                                                float z, float power)
 {
     /* along -z of the node, as lights shine */
     const float parent_from_node[12] = {1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z};
-    struct scene_light *light = &fixture_edit(fixture, SCENE_LIGHT)->set.light;
+    struct scene_light *light = &fixture_edit(fixture, OBJECT_LIGHT)->set.light;
     light->base.id = fixture->next_id++;
     light->kind = kind;
     light->colour[0] = light->colour[1] = light->colour[2] = power;
@@ -170,7 +173,7 @@ static inline struct scene_light *fixture_light(struct fixture *fixture, enum sc
 
 static inline void fixture_environment(struct fixture *fixture, float r, float g, float b)
 {
-    struct scene_edit *edit = fixture_edit(fixture, SCENE_NODE);
+    struct scene_edit *edit = fixture_edit(fixture, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
     edit->set.environment.colour[0] = r;
     edit->set.environment.colour[1] = g;
@@ -225,7 +228,7 @@ static inline void fixture_keep(const struct frame_result *result, const char *n
 {
     const char *folder = getenv("FARLIGHT_TEST_PICTURES");
     char path[512];
-    if (!folder || result->format != FRAME_RGBA8)
+    if (!folder || result->format != PIXEL_FORMAT_RGBA8)
         return;
     snprintf(path, sizeof(path), "%s/%s.ppm", folder, name);
     FILE *file = fopen(path, "wb");

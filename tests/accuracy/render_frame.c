@@ -29,7 +29,7 @@ static void build_mixture(struct fixture *fixture)
     fixture_square(fixture, 3.0f, plain->base.id, floor_transform);
     const float veil_transform[12] = {1, 0, 0, 0.9f, 0, 1, 0, 0.2f, 0, 0, 1, 0.8f};
     fixture_square(fixture, 0.4f, veil->base.id, veil_transform);
-    struct scene_disc *disc = &fixture_edit(fixture, SCENE_DISC)->set.disc;
+    struct scene_disc *disc = &fixture_edit(fixture, OBJECT_DISC)->set.disc;
     disc->base.id = fixture->next_id++;
     disc->material = plain->base.id;
     disc->normal_world[2] = 1.0f;
@@ -103,7 +103,7 @@ TEST(they_agree_where_transforms_mirror_and_stretch)
     fixture_commit(fixture);
     const float transform[12] = {-1.5f, 0, 0, -0.2f, 0, 0.5f, 0.2f, 0.4f, 0, 0, 1, 0.5f};
     const float centre_radius[8] = {0.0f, 0.0f, 0.0f, 0.3f, 0.4f, 0.2f, 0.1f, 0.1f};
-    struct scene_spheres *spheres = &fixture_edit(fixture, SCENE_SPHERES)->set.spheres;
+    struct scene_spheres *spheres = &fixture_edit(fixture, OBJECT_SPHERES)->set.spheres;
     spheres->base.id = fixture->next_id++;
     spheres->sphere_count = 2;
     spheres->centres_radii = fixture_blob(centre_radius, sizeof(centre_radius));
@@ -118,7 +118,7 @@ TEST(holes_are_cut_out_of_rasterised_triangles_too)
     uint8_t texels[4 * 4 * 4];
     for (int i = 0; i < 16; i++)
         memset(texels + i * 4, (i + i / 4) % 2 ? 255 : 0, 4);
-    struct scene_texture *texture = &fixture_edit(fixture, SCENE_TEXTURE)->set.texture;
+    struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
     texture->width = texture->height = 4;
     texture->nearest = true;
@@ -197,9 +197,9 @@ TEST(formats_say_the_same)
     build_mixture(fixture);
     fixture->request.exposure_stops = 1.0f;
     struct frame_result floats = fixture_render(fixture);
-    fixture->request.format = FRAME_RGBA16F;
+    fixture->request.format = PIXEL_FORMAT_RGBA16F;
     struct frame_result halves = fixture_render(fixture);
-    fixture->request.format = FRAME_RGBA8;
+    fixture->request.format = PIXEL_FORMAT_RGBA8;
     fixture->request.tone_map = TONE_NONE;
     struct frame_result bytes = fixture_render(fixture);
     fixture_keep(&bytes, "mixture");
@@ -217,7 +217,7 @@ TEST(formats_say_the_same)
         double srgb = clamped <= 0.0031308 ? 12.92 * clamped : 1.055 * pow(clamped, 1 / 2.4) - 0.055;
         assert_near(bytes.pixels[i * 4], srgb * 255.0, 0.6);
     }
-    fixture->request.format = FRAME_RGBA32F;
+    fixture->request.format = PIXEL_FORMAT_RGBA32F;
     fixture->request.exposure_stops = 0.0f;
     struct frame_result plain = fixture_render(fixture);
     assert_near(fixture_pixel(&floats, 50, 40)[1], 2.0f * fixture_pixel(&plain, 50, 40)[1], 1e-6);
@@ -240,7 +240,7 @@ TEST(an_edit_between_two_frames_is_seen_by_the_second)
     assert_near(fixture_pixel(&result, 16, 16)[0], 1.0, 1e-6);
     uint64_t revision = result.revision;
     frame_result_finish(&result);
-    struct scene_node *moved = &fixture_edit(fixture, SCENE_NODE)->set.node;
+    struct scene_node *moved = &fixture_edit(fixture, OBJECT_NODE)->set.node;
     *moved = *scene_node(fixture->scene, node);
     moved->parent_from_node[3] = 1.0f;
     result = fixture_render(fixture);
@@ -273,12 +273,12 @@ TEST(every_stage_of_the_frame_is_timed)
     struct fixture *fixture = *state;
     build_mixture(fixture);
     struct frame_result result = fixture_render(fixture);
-    static const enum stage_id stages[] = {STAGE_PRIMARY, STAGE_TRACE,    STAGE_SHADE,
-                                           STAGE_RESOLVE, STAGE_READBACK, STAGE_FRAME};
+    static const enum stage stages[] = {STAGE_PRIMARY, STAGE_TRACE,    STAGE_SHADE,
+                                        STAGE_RESOLVE, STAGE_READBACK, STAGE_FRAME};
     for (size_t i = 0; i < sizeof(stages) / sizeof(stages[0]); i++)
-        if (stage_times_sum_ns(&result.times, stages[i], STAGE_CPU) == 0)
+        if (stage_times_sum_ns(&result.times, stages[i], CLOCK_CPU) == 0)
             fail_msg("stage %s took no time", stage_name(stages[i]));
-    assert_true(stage_times_sum_ns(&result.times, STAGE_TRACE, STAGE_GPU) > 0);
+    assert_true(stage_times_sum_ns(&result.times, STAGE_TRACE, CLOCK_GPU) > 0);
     assert_int_equal(result.primary_rays, 96 * 72);
     assert_true(result.shadow_rays > 0 && result.secondary_rays > 0);
     assert_true(frame_renderer_device_bytes(fixture->renderer) > 96 * 72 * 16);
@@ -303,7 +303,7 @@ TEST(a_picture_of_several_bands_has_no_seam)
     struct fixture *fixture = *state;
     fixture->request.width = 4096;
     fixture->request.height = 1040; /* bands hold 256 Ki pixels: 64 rows, and the rest */
-    fixture->request.format = FRAME_RGBA8;
+    fixture->request.format = PIXEL_FORMAT_RGBA8;
     fixture->request.camera.fov_y = 2.0f;
     struct frame_result result = fixture_render(fixture);
     assert_int_equal(result.size_bytes, 4096 * 1040 * 4);

@@ -96,7 +96,7 @@ static double an_edge(struct fixture *fixture)
 }
 
 /* What a pixel with its centre `distance` pixels right of the edge is. */
-static double edge_value(enum frame_filter filter, double distance)
+static double edge_value(enum pixel_filter filter, double distance)
 {
     double share = pixel_filter_share(filter, fabs(distance)) / 2.0;
     return distance < 0.0 ? 0.5 - share : 0.5 + share;
@@ -106,7 +106,7 @@ TEST(samples_are_as_dense_as_the_filter_is_high)
 {
     struct fixture *fixture = *state;
     an_edge(fixture);
-    for (enum frame_filter filter = FILTER_BLACKMAN_HARRIS; filter <= FILTER_BOX; filter++)
+    for (enum pixel_filter filter = FILTER_BLACKMAN_HARRIS; filter <= FILTER_BOX; filter++)
         for (int traced = 0; traced < 2; traced++) {
             fixture->request.filter = filter;
             fixture->request.primary = traced ? PRIMARY_TRACE : PRIMARY_RASTER;
@@ -129,7 +129,7 @@ TEST(samples_are_as_dense_as_the_filter_is_high)
 }
 
 /* Filters as the protocol describes them, by the formulas, not by pixel_filter.c. */
-static double height_of(enum frame_filter filter, double x)
+static double height_of(enum pixel_filter filter, double x)
 {
     const double pi = 3.14159265358979;
     if (fabs(x) > pixel_filter_radius(filter))
@@ -144,6 +144,7 @@ static double height_of(enum frame_filter filter, double x)
     case FILTER_TENT:
         return 1.0 - fabs(x);
     case FILTER_BOX:
+    case FILTER_COUNT:
         break;
     }
     return 1.0;
@@ -152,7 +153,7 @@ static double height_of(enum frame_filter filter, double x)
 TEST(the_filters_are_those_of_the_protocol)
 {
     static const double radii[] = {1.5, 1.5, 1.0, 0.5};
-    for (enum frame_filter filter = FILTER_BLACKMAN_HARRIS; filter <= FILTER_BOX; filter++) {
+    for (enum pixel_filter filter = FILTER_BLACKMAN_HARRIS; filter <= FILTER_BOX; filter++) {
         enum { STEPS = 20000 };
         double radius = radii[filter], whole = 0.0, sum = 0.0;
         float places[PIXEL_FILTER_INTERVALS + 1];
@@ -389,7 +390,7 @@ TEST(impossible_lenses_and_filters_are_refused_with_the_field)
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_string_equal(error.field, "focus");
     fixture->request = good;
-    fixture->request.filter = (enum frame_filter)17;
+    fixture->request.filter = (enum pixel_filter)17;
     error = (struct error){0};
     assert_false(frame_begin(fixture->renderer, fixture->scene, NULL, &fixture->request, &error));
     assert_string_equal(error.field, "pixel_filter");

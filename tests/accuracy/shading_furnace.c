@@ -38,7 +38,7 @@ static void add_globe(struct fixture *fixture, uint32_t material, const float pa
         memcpy(indices[2 * i], (uint32_t[]){a, below, below + 1}, sizeof(indices[0]));
         memcpy(indices[2 * i + 1], (uint32_t[]){a, below + 1, a + 1}, sizeof(indices[0]));
     }
-    struct scene_mesh *mesh = &fixture_edit(fixture, SCENE_MESH)->set.mesh;
+    struct scene_mesh *mesh = &fixture_edit(fixture, OBJECT_MESH)->set.mesh;
     mesh->base.id = fixture->next_id++;
     mesh->vertex_count = VERTICES;
     mesh->triangle_count = TRIANGLES;
@@ -67,7 +67,7 @@ static struct texture_use normal_texture(struct fixture *fixture, double x, doub
 {
     const uint8_t texel[4] = {(uint8_t)lrint((x + 1.0) / 2.0 * 255.0), 128,
                               (uint8_t)lrint((z + 1.0) / 2.0 * 255.0), 255};
-    struct scene_texture *texture = &fixture_edit(fixture, SCENE_TEXTURE)->set.texture;
+    struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
     texture->width = texture->height = 1;
     texture->format = TEXTURE_RGBA8_LINEAR;

@@ -133,12 +133,11 @@ TEST(depth_counts_the_bounces_after_the_first_hit)
     }
 }
 
-static void render_grey(struct fixture *fixture, const float radiance[3], enum frame_tone_map tone_map,
-                        uint8_t pixel[4])
+static void render_grey(struct fixture *fixture, const float radiance[3], enum tone_map tone_map, uint8_t pixel[4])
 {
     fixture_clear((void **)&fixture);
     fixture_environment(fixture, radiance[0], radiance[1], radiance[2]);
-    fixture->request.format = FRAME_RGBA8;
+    fixture->request.format = PIXEL_FORMAT_RGBA8;
     fixture->request.tone_map = tone_map;
     struct frame_result result = fixture_render(fixture);
     memcpy(pixel, result.pixels, 4);
@@ -150,7 +149,7 @@ TEST(tone_maps_have_their_known_values)
     /* Computed from the published formulas and rounded to 8-bit sRGB. */
     static const struct {
         float radiance[3];
-        enum frame_tone_map tone_map;
+        enum tone_map tone_map;
         uint8_t expected[3];
     } cases[] = {
         {{0.5f, 0.25f, 1.0f}, TONE_NONE, {188, 137, 255}},   {{2.0f, 0.002f, 0.0f}, TONE_NONE, {255, 7, 0}},

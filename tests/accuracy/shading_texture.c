@@ -8,7 +8,7 @@
 static struct texture_use one_texture(struct fixture *fixture, uint32_t width, uint32_t height,
                                       const uint8_t *texels, float strength)
 {
-    struct scene_texture *texture = &fixture_edit(fixture, SCENE_TEXTURE)->set.texture;
+    struct scene_texture *texture = &fixture_edit(fixture, OBJECT_TEXTURE)->set.texture;
     texture->base.id = fixture->next_id++;
     texture->width = width;
     texture->height = height;
@@ -24,7 +24,7 @@ static void light_from(struct fixture *fixture, float x, float y)
     const float eye[3] = {x, y, 1.0f}, target[3] = {0}, up[3] = {0.1f, 1.0f, 0.3f};
     struct frame_camera camera; /* a camera looks along -z as a light shines */
     assert_true(frame_camera_look_at(&camera, eye, target, up, 1.0f));
-    struct scene_light *light = &fixture_edit(fixture, SCENE_LIGHT)->set.light;
+    struct scene_light *light = &fixture_edit(fixture, OBJECT_LIGHT)->set.light;
     light->base.id = fixture->next_id++;
     light->kind = LIGHT_DIRECTIONAL;
     light->colour[0] = light->colour[1] = light->colour[2] = (float)PI;

@@ -38,7 +38,7 @@ static inline void test_commit(struct test_edits *edits)
     edits->count = 0;
 }
 
-static inline struct scene_edit *test_add(struct test_edits *edits, enum scene_object_kind kind)
+static inline struct scene_edit *test_add(struct test_edits *edits, enum object_kind kind)
 {
     if (edits->count == TEST_EDITS_MAX)
         test_commit(edits);
@@ -74,7 +74,7 @@ static inline float test_uniform(uint64_t *state, float low, float high)
 static inline struct scene_material *test_material(struct test_edits *edits, uint32_t id, float red, float green,
                                                    float blue)
 {
-    struct scene_material *material = &test_add(edits, SCENE_MATERIAL)->set.material;
+    struct scene_material *material = &test_add(edits, OBJECT_MATERIAL)->set.material;
     material->base.id = id;
     material->base_colour[0] = red;
     material->base_colour[1] = green;
@@ -102,7 +102,7 @@ static inline struct material_range *test_ranges(const struct material_range *ra
 static inline struct scene_mesh *test_mesh(struct test_edits *edits, uint32_t id, const float (*positions)[3],
                                            uint32_t vertex_count, const uint32_t *indices, uint32_t triangle_count)
 {
-    struct scene_mesh *mesh = &test_add(edits, SCENE_MESH)->set.mesh;
+    struct scene_mesh *mesh = &test_add(edits, OBJECT_MESH)->set.mesh;
     mesh->base.id = id;
     mesh->vertex_count = vertex_count;
     mesh->triangle_count = triangle_count;
@@ -114,7 +114,7 @@ static inline struct scene_mesh *test_mesh(struct test_edits *edits, uint32_t id
 static inline struct scene_spheres *test_spheres(struct test_edits *edits, uint32_t id,
                                                  const float (*centres_radii)[4], uint32_t count)
 {
-    struct scene_spheres *spheres = &test_add(edits, SCENE_SPHERES)->set.spheres;
+    struct scene_spheres *spheres = &test_add(edits, OBJECT_SPHERES)->set.spheres;
     spheres->base.id = id;
     spheres->sphere_count = count;
     spheres->centres_radii = test_blob(centres_radii, count * sizeof(*centres_radii));
@@ -122,11 +122,10 @@ static inline struct scene_spheres *test_spheres(struct test_edits *edits, uint3
 }
 
 static inline struct scene_node *test_node(struct test_edits *edits, uint32_t id, uint32_t parent,
-                                           enum scene_node_kind kind, uint32_t object,
-                                           const float parent_from_node[12])
+                                           enum node_kind kind, uint32_t object, const float parent_from_node[12])
 {
     static const float identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    struct scene_node *node = &test_add(edits, SCENE_NODE)->set.node;
+    struct scene_node *node = &test_add(edits, OBJECT_NODE)->set.node;
     node->base.id = id;
     node->parent = parent;
     node->kind = kind;
@@ -246,13 +245,12 @@ static inline struct scene *test_scene_spheres(void)
 }
 
 static inline void test_texture(struct test_edits *edits, uint32_t id, uint32_t width, uint32_t height,
-                                enum scene_texture_format format, enum scene_wrap wrap_u, enum scene_wrap wrap_v,
-                                uint64_t seed)
+                                enum texture_format format, enum wrap wrap_u, enum wrap wrap_v, uint64_t seed)
 {
     uint32_t *texels = malloc((size_t)width * height * 4);
     for (uint32_t i = 0; i < width * height; i++)
         texels[i] = test_random(&seed);
-    struct scene_texture *texture = &test_add(edits, SCENE_TEXTURE)->set.texture;
+    struct scene_texture *texture = &test_add(edits, OBJECT_TEXTURE)->set.texture;
     texture->base.id = id;
     texture->width = width;
     texture->height = height;
@@ -294,7 +292,7 @@ static inline struct scene *test_scene_translucent(void)
     test_node(&edits, 2, 0, NODE_SPHERES, 20, NULL);
     test_transform(m, 1, -0.8f, 1.1f, 2, 0.5f, 1.5f, 0.5f, 0);
     test_node(&edits, 3, 0, NODE_MESH, 10, m);
-    struct scene_disc *disc = &test_add(&edits, SCENE_DISC)->set.disc;
+    struct scene_disc *disc = &test_add(&edits, OBJECT_DISC)->set.disc;
     disc->base.id = 1;
     disc->material = 5;
     disc->centre_world[1] = -1.2f;

@@ -6,7 +6,6 @@
 
 #include "render/frame_state.h"
 
-#define TRACER_BVH 0 /* the protocol's number */
 #define STEPS 3u     /* of a wave, by the tracer that advances in a way of its own */
 
 /* ---- tracers that count ---- */
@@ -141,7 +140,7 @@ struct ids {
 
 static void set_disc(struct fixture *fixture, uint32_t id, uint32_t material, float radius)
 {
-    struct scene_disc *disc = &fixture_edit(fixture, SCENE_DISC)->set.disc;
+    struct scene_disc *disc = &fixture_edit(fixture, OBJECT_DISC)->set.disc;
     disc->base.id = id;
     disc->material = material;
     disc->normal_world[2] = 1.0f;
@@ -149,10 +148,10 @@ static void set_disc(struct fixture *fixture, uint32_t id, uint32_t material, fl
     disc->radius = radius;
 }
 
-static void move_node(struct fixture *fixture, uint32_t id, enum scene_node_kind kind, uint32_t object, float x)
+static void move_node(struct fixture *fixture, uint32_t id, enum node_kind kind, uint32_t object, float x)
 {
     const float moved[12] = {1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, kind == NODE_LIGHT ? 3.0f : 0.0f};
-    struct scene_node *node = &fixture_edit(fixture, SCENE_NODE)->set.node;
+    struct scene_node *node = &fixture_edit(fixture, OBJECT_NODE)->set.node;
     node->base.id = id;
     node->kind = kind;
     node->object = object;

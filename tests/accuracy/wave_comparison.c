@@ -11,8 +11,6 @@
 
 #include <time.h>
 
-#define TRACER_BVH 0 /* the protocol's number */
-
 /* ---- a tracer that is wrong ---------------------------------------------------------------------- */
 
 enum wrong_way {
@@ -127,7 +125,7 @@ static void build_scene(struct fixture *fixture)
     fixture_square(fixture, 1.1f, plain->base.id, wall_transform);
     const float veil_transform[12] = {1, 0, 0, 0.9f, 0, 1, 0, 0.2f, 0, 0, 1, 0.8f};
     fixture_square(fixture, 0.4f, veil->base.id, veil_transform);
-    struct scene_disc *disc = &fixture_edit(fixture, SCENE_DISC)->set.disc;
+    struct scene_disc *disc = &fixture_edit(fixture, OBJECT_DISC)->set.disc;
     disc->base.id = fixture->next_id++;
     disc->material = plain->base.id;
     disc->normal_world[2] = 1.0f;
@@ -245,8 +243,8 @@ TEST(comparing_changes_no_byte_of_the_picture)
     assert_memory_equal(compared.pixels, plain.pixels, plain.size_bytes);
     assert_int_equal(plain.comparison_count, 0);
     assert_null(plain.comparisons);
-    assert_int_equal(stage_times_sum_ns(&plain.times, STAGE_COMPARE, STAGE_CPU), 0);
-    assert_true(stage_times_sum_ns(&compared.times, STAGE_COMPARE, STAGE_CPU) > 0);
+    assert_int_equal(stage_times_sum_ns(&plain.times, STAGE_COMPARE, CLOCK_CPU), 0);
+    assert_true(stage_times_sum_ns(&compared.times, STAGE_COMPARE, CLOCK_CPU) > 0);
     frame_result_finish(&compared);
     frame_result_finish(&plain);
 }
@@ -402,14 +400,14 @@ TEST(a_slow_reference_costs_the_frames_tracer_nothing)
     for (uint32_t i = 0; i < result.comparison_count; i++)
         second_ns += result.comparisons[i].second_ns;
     assert_true(second_ns >= result.comparison_count * (uint64_t)SLOW_NS);
-    uint64_t compare_ns = stage_times_sum_ns(&result.times, STAGE_COMPARE, STAGE_CPU);
+    uint64_t compare_ns = stage_times_sum_ns(&result.times, STAGE_COMPARE, CLOCK_CPU);
     assert_true(compare_ns >= slept_ns);
     /* The stages of the frame are apart from each other: no sleep is in two of them. */
-    static const enum stage_id others[] = {STAGE_BUILD, STAGE_UPLOAD, STAGE_PRIMARY, STAGE_TRACE, STAGE_SHADE};
+    static const enum stage others[] = {STAGE_BUILD, STAGE_UPLOAD, STAGE_PRIMARY, STAGE_TRACE, STAGE_SHADE};
     uint64_t sum_ns = compare_ns;
     for (size_t i = 0; i < sizeof(others) / sizeof(others[0]); i++)
-        sum_ns += stage_times_sum_ns(&result.times, others[i], STAGE_CPU);
-    assert_true(sum_ns <= stage_times_sum_ns(&result.times, STAGE_FRAME, STAGE_CPU));
+        sum_ns += stage_times_sum_ns(&result.times, others[i], CLOCK_CPU);
+    assert_true(sum_ns <= stage_times_sum_ns(&result.times, STAGE_FRAME, CLOCK_CPU));
     frame_result_finish(&result);
 }
 

@@ -219,8 +219,8 @@ static void measure_form(struct bench *bench, const struct form *form)
         bench->plain_primary = rates[WAVE_PRIMARY];
     printf("%-32s %7.2f %6.2f %7.2f %7.2f   %6.0f %6.0f %7.1f   %5.0f %5.0f\n", form->name, rates[WAVE_PRIMARY],
            rates[WAVE_PRIMARY] / bench->plain_primary, rates[WAVE_BOUNCE], rates[WAVE_SHADOW],
-           (double)stage_times_sum_ns(&times, STAGE_BUILD, STAGE_CPU) * 1e-6,
-           (double)stage_times_sum_ns(&times, STAGE_UPLOAD, STAGE_CPU) * 1e-6,
+           (double)stage_times_sum_ns(&times, STAGE_BUILD, CLOCK_CPU) * 1e-6,
+           (double)stage_times_sum_ns(&times, STAGE_UPLOAD, CLOCK_CPU) * 1e-6,
            (double)tracer->stats.device_bytes / (1 << 20), compile_ms[WAVE_PRIMARY], compile_ms[WAVE_SHADOW]);
     fflush(stdout);
     tracer_destroy(tracer);

@@ -70,7 +70,7 @@ static uint64_t move_all(struct scene *scene, uint32_t count, float time)
     uint32_t side = (uint32_t)ceilf(sqrtf((float)count));
     for (uint32_t i = 0; i < count; i++) {
         edits[i].kind = EDIT_SET;
-        edits[i].object = SCENE_NODE;
+        edits[i].object = OBJECT_NODE;
         struct scene_node *node = &edits[i].set.node;
         node->base.id = i + 1;
         node->kind = NODE_MESH;
@@ -100,7 +100,8 @@ static json_t *bench_instances(struct gpu_device *device, uint32_t count, uint32
     test_commit(&edits);
     move_all(edits.scene, count, 0);
     float middle = 1.5f * sqrtf((float)count);
-    struct frame_request request = {.width = 640, .height = 480, .samples = 1, .depth = 3, .format = FRAME_RGBA8};
+    struct frame_request request = {
+        .width = 640, .height = 480, .samples = 1, .depth = 3, .format = PIXEL_FORMAT_RGBA8};
     frame_camera_look_at(&request.camera, (float[3]){middle, 1.2f * middle, 3 * middle},
                          (float[3]){middle, 0, middle}, (float[3]){0, 1, 0}, 0.8f);
     struct bench_runs apply = {0}, upload = {0}, build = {0}, whole = {0}, together = {0};
@@ -114,8 +115,8 @@ static json_t *bench_instances(struct gpu_device *device, uint32_t count, uint32
             continue;
         require(progress == FRAME_DONE, &error);
         uint64_t frame_ns = clock_now_ns() - start_ns + apply_ns;
-        uint64_t upload_ns = stage_times_sum_ns(&result.times, STAGE_UPLOAD, STAGE_CPU);
-        uint64_t build_ns = stage_times_sum_ns(&result.times, STAGE_BUILD, STAGE_CPU);
+        uint64_t upload_ns = stage_times_sum_ns(&result.times, STAGE_UPLOAD, CLOCK_CPU);
+        uint64_t build_ns = stage_times_sum_ns(&result.times, STAGE_BUILD, CLOCK_CPU);
         bytes = result.uploaded_bytes;
         frame_result_finish(&result);
         if (frame < 2)

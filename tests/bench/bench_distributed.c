@@ -20,7 +20,7 @@
 
 static const struct form {
     const char *name;
-    enum frame_integrator integrator;
+    enum integrator_kind integrator;
     uint32_t samples;
     float aperture;
     bool moves;
@@ -80,8 +80,8 @@ static void note(json_t *form, const struct frame_result *result, uint64_t frame
 {
     json_array_append_new(json_object_get(form, "frame_ns"), json_integer((json_int_t)frame_ns));
     json_t *stages = json_object_get(form, "stages_ns");
-    for (enum stage_id stage = 0; stage < STAGE_COUNT; stage++) {
-        uint64_t ns = stage_times_sum_ns(&result->times, stage, STAGE_CPU);
+    for (enum stage stage = 0; stage < STAGE_COUNT; stage++) {
+        uint64_t ns = stage_times_sum_ns(&result->times, stage, CLOCK_CPU);
         if (stage == STAGE_FRAME || ns == 0)
             continue;
         json_t *runs = json_object_get(stages, stage_name(stage));

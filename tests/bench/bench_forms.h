@@ -11,9 +11,6 @@
 #include <jansson.h>
 
 #define BENCH_FORMS_MAX 12
-#define BENCH_TRACER_REFERENCE 2u /* the protocol's numbers */
-#define BENCH_TRACER_LDC 3u
-#define BENCH_TRACER_ABUFFER 4u
 #define BENCH_TRACER_RIVAL 1000u /* none of the protocol's: an impl of the benchmark's own */
 
 struct bench_form {
@@ -30,7 +27,7 @@ struct bench_forms {
     struct bench_scene_options scene_options;
     struct bench_scene scene;
     uint32_t width, height, depth, rays_each, ao_rays;
-    enum frame_integrator integrator;
+    enum integrator_kind integrator;
     unsigned runs;
     bool waves[BENCH_WAVE_KINDS];
     bool plays; /* the model's first clip */

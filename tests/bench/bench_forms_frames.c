@@ -16,7 +16,7 @@
 /* The first compiles and builds; in the second it is seen what moves, and what stands still is built once more. */
 #define WARM_UPS 2u
 
-static const enum stage_id shown[] = {STAGE_UPLOAD, STAGE_PRIMARY, STAGE_TRACE, STAGE_SHADE, STAGE_RESOLVE};
+static const enum stage shown[] = {STAGE_UPLOAD, STAGE_PRIMARY, STAGE_TRACE, STAGE_SHADE, STAGE_RESOLVE};
 enum { SHOWN = sizeof shown / sizeof shown[0] };
 
 struct frames {
@@ -33,7 +33,7 @@ static bool pose(struct frames *frames, unsigned run, struct scene_motion *motio
     uint64_t clip;
     void *value;
     size_t cursor = 0;
-    if (!hashmap_next(&scene->objects[SCENE_CLIP], &cursor, &clip, &value))
+    if (!hashmap_next(&scene->objects[OBJECT_CLIP], &cursor, &clip, &value))
         return error_set(error, ERROR_INVALID, "--play", "the model has no clip");
     const struct clip_use use = {.clip = (uint32_t)clip, .speed = 1, .loop = true};
     return scene_motion_evaluate(motion, scene, &use, 1, STEP_S * run, 0, error);
@@ -84,9 +84,9 @@ static bool run_once(struct frames *frames, unsigned i, unsigned run, struct err
     if (run < warm_ups(frames))
         return true;
     bench_add(&frames->whole[i], frame_ns);
-    bench_add(&frames->build[i], stage_times_sum_ns(&result.times, STAGE_BUILD, STAGE_CPU));
+    bench_add(&frames->build[i], stage_times_sum_ns(&result.times, STAGE_BUILD, CLOCK_CPU));
     for (int k = 0; k < SHOWN; k++)
-        bench_add(&frames->stages[i][k], stage_times_sum_ns(&result.times, shown[k], STAGE_CPU));
+        bench_add(&frames->stages[i][k], stage_times_sum_ns(&result.times, shown[k], CLOCK_CPU));
     return true;
 }
 
@@ -151,7 +151,7 @@ static json_t *describe(const struct frames *frames, unsigned i, const struct fr
 
 static bool render_truth(struct frames *frames, struct frame_result *truth, struct error *error)
 {
-    const struct bench_form reference = {.tracer = BENCH_TRACER_REFERENCE};
+    const struct bench_form reference = {.tracer = TRACER_REFERENCE};
     struct scene_motion motion = {0};
     const bool plays = frames->bench->plays;
     const bool done = (!plays || pose(frames, warm_ups(frames) + frames->bench->runs - 1, &motion, error)) &&

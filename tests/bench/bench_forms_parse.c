@@ -41,7 +41,7 @@ static bool set_key(struct bench_form *form, const char *key, const char *value)
 {
     static const char *const searches[] = {"auto", "dda", "linear3", "linear1"};
     struct tracer_options *options = &form->options;
-    const bool is_ldc = form->tracer == BENCH_TRACER_LDC, is_abuffer = form->tracer == BENCH_TRACER_ABUFFER;
+    const bool is_ldc = form->tracer == TRACER_LDC, is_abuffer = form->tracer == TRACER_ABUFFER;
     const struct {
         const char *key;
         uint32_t *number;

@@ -30,7 +30,7 @@ static bool make(struct bench_forms *bench, struct bench_form *form, struct erro
 
 static bool is_rasterised(const struct bench_form *form)
 {
-    return form->rival || form->tracer == BENCH_TRACER_LDC || form->tracer == BENCH_TRACER_ABUFFER;
+    return form->rival || form->tracer == TRACER_LDC || form->tracer == TRACER_ABUFFER;
 }
 
 /* All that there is counts as changed. What is rasterised keeps its buffers, as it does for what moves; others,
@@ -48,7 +48,7 @@ static bool build(struct bench_forms *bench, struct bench_form *form, uint64_t *
     const bool done = tracer_update(form->made, &bench->scene.gpu, &(struct tracer_update){0}, error);
     glFinish();
     *time_ns = clock_now_ns() - start_ns;
-    if (done && form->tracer == BENCH_TRACER_LDC && !form->made->stats.cubes[TRACER_CUBE_STATIC].rebuilt)
+    if (done && form->tracer == TRACER_LDC && !form->made->stats.cubes[TRACER_CUBE_STATIC].rebuilt)
         return error_set(error, ERROR_INTERNAL, NULL, "%s: it was not built", form->name);
     return done;
 }
@@ -167,7 +167,7 @@ static bool begin(struct waves *waves, struct bench_forms *bench, struct error *
     const size_t most = (size_t)pixels * bench->rays_each;
     *waves = (struct waves){.bench = bench,
                             .contest = {.device = bench->device, .scene = &bench->scene, .runs = bench->runs},
-                            .reference = {.name = "reference", .tracer = BENCH_TRACER_REFERENCE},
+                            .reference = {.name = "reference", .tracer = TRACER_REFERENCE},
                             .camera_rays = malloc(pixels * sizeof *waves->camera_rays),
                             .camera_hits = malloc(pixels * sizeof *waves->camera_hits),
                             .truth = malloc(most * sizeof *waves->truth),
@@ -196,7 +196,7 @@ static bool examine(struct waves *waves, struct bench_form *form, const struct b
     if (!bench_contest_hits(&waves->contest, form->made, wave, waves->hits, error))
         return false;
     compare(object, waves->truth, waves->hits, wave->ray_count);
-    return (form->tracer != BENCH_TRACER_LDC && form->tracer != BENCH_TRACER_ABUFFER) ||
+    return (form->tracer != TRACER_LDC && form->tracer != TRACER_ABUFFER) ||
            count_steps(&waves->contest, form, wave, waves->hits, object, error);
 }
 

@@ -83,7 +83,7 @@ static json_t *describe(const struct bench_form *form, const struct sampled *sam
 static bool begin(struct bench_forms *bench, struct sampled *sampled, struct error *error)
 {
     for (unsigned i = 0; i < bench->form_count; i++) {
-        if (bench->forms[i].tracer != BENCH_TRACER_LDC)
+        if (bench->forms[i].tracer != TRACER_LDC)
             return error_set(error, ERROR_INVALID, "--form", "%s has no samples", bench->forms[i].name);
         ldc_store_init(&sampled[i].store, bench->device);
         sampled[i].builder = ldc_builder_create(bench->device, error);

@@ -79,7 +79,7 @@ static float *copy_weights(const float *weights, uint32_t count)
 
 static void remake_mesh(struct test_edits *edits, const struct scene_mesh *from)
 {
-    struct scene_mesh *mesh = &test_add(edits, SCENE_MESH)->set.mesh;
+    struct scene_mesh *mesh = &test_add(edits, OBJECT_MESH)->set.mesh;
     *mesh = *from;
     for (int i = 0; i < MESH_ARRAY_COUNT; i++)
         mesh->arrays[i] = blob_ref(from->arrays[i]);
@@ -90,7 +90,7 @@ static void remake_mesh(struct test_edits *edits, const struct scene_mesh *from)
 
 static void remake_spheres(struct test_edits *edits, const struct scene_spheres *from)
 {
-    struct scene_spheres *spheres = &test_add(edits, SCENE_SPHERES)->set.spheres;
+    struct scene_spheres *spheres = &test_add(edits, OBJECT_SPHERES)->set.spheres;
     *spheres = *from;
     spheres->centres_radii = blob_ref(from->centres_radii);
     spheres->ranges = test_ranges(&(struct material_range){0, from->sphere_count, MATERIAL_ID}, 1);
@@ -100,7 +100,7 @@ static void remake_spheres(struct test_edits *edits, const struct scene_spheres 
 /* In several transactions, if it is many: each stands on what is there. */
 bool bench_make_alike(struct scene *scene, enum bench_material material, struct error *error)
 {
-    static const enum scene_object_kind kinds[] = {SCENE_MESH, SCENE_SPHERES};
+    static const enum object_kind kinds[] = {OBJECT_MESH, OBJECT_SPHERES};
     struct test_edits edits = {.scene = scene};
     if (material == BENCH_MIRROR)
         add_mirror(&edits);
@@ -117,7 +117,7 @@ bool bench_make_alike(struct scene *scene, enum bench_material material, struct 
         while (found < count && hashmap_next(&scene->objects[kinds[i]], &cursor, &key, &value))
             ids[found++] = key;
         for (size_t k = 0; k < found; k++) {
-            if (kinds[i] == SCENE_MESH)
+            if (kinds[i] == OBJECT_MESH)
                 remake_mesh(&edits, scene_mesh(scene, (uint32_t)ids[k]));
             else
                 remake_spheres(&edits, scene_spheres(scene, (uint32_t)ids[k]));

@@ -21,7 +21,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { ALL = PHASE_IDLE, SHADOW = PHASE_RESOLVE + 1, STAGES, TRACERS = 5 };
+enum { ALL = PHASE_IDLE, SHADOW = PHASE_RESOLVE + 1, STAGES };
 static const char *const stage_names[STAGES] = {
     [ALL] = "all",           [PHASE_BUILD] = "build",     [PHASE_SAMPLE] = "sample", [PHASE_RASTER] = "raster",
     [PHASE_SLICE] = "slice", [PHASE_PRIMARY] = "primary", [PHASE_LAYERS] = "layers", [PHASE_SHADE] = "shade",
@@ -141,7 +141,7 @@ static bool step(struct bench *bench, struct steps *steps, bool *whole, struct e
     return progress != FRAME_FAILED;
 }
 
-static bool measure(struct bench *bench, unsigned tracer, enum frame_integrator integrator, struct error *error)
+static bool measure(struct bench *bench, unsigned tracer, enum integrator_kind integrator, struct error *error)
 {
     const struct frame_request request = {.width = bench->width,
                                           .height = bench->height,
@@ -180,11 +180,11 @@ static bool measure(struct bench *bench, unsigned tracer, enum frame_integrator 
 
 static bool measure_all(struct bench *bench, struct error *error)
 {
-    for (unsigned tracer = 0; tracer < TRACERS; tracer++) {
+    for (unsigned tracer = 0; tracer < TRACER_COUNT; tracer++) {
         const struct tracer_impl *impl = tracer_impl_by_number(tracer);
         bool asked =
             impl && (bench->tracers ? bench_is_named(bench->tracers, impl->name) : impl != &tracer_naive_impl);
-        for (enum frame_integrator i = 0; asked && (int)i < INTEGRATORS; i++)
+        for (enum integrator_kind i = 0; asked && (int)i < INTEGRATORS; i++)
             if ((!bench->integrators || bench_is_named(bench->integrators, integrator_names[i])) &&
                 !measure(bench, tracer, i, error))
                 return false;

@@ -83,7 +83,7 @@ static bool take_edit(struct loading *loading, const struct message *message, st
     struct scene_edit *edit = &loading->edits[loading->edit_count++];
     if (!edit_from_message(&loading->session, message, edit, error))
         return false;
-    if (message->type == MESSAGE_SET_NODE && message->set_node.kind == PROTOCOL_NODE_KIND_CAMERA &&
+    if (message->type == MESSAGE_SET_NODE && message->set_node.kind == PROTOCOL_NODE_CAMERA &&
         loading->model->camera == 0)
         loading->model->camera = message->set_node.node;
     return true;

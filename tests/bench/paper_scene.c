@@ -21,7 +21,7 @@ static void add_materials(struct test_edits *edits)
             uint8_t grey = (x / 2 + y / 2) % 2 ? 200 : 110;
             memcpy(texels[y][x], (uint8_t[4]){grey, (uint8_t)(grey - 10), (uint8_t)(grey - 40), 255}, 4);
         }
-    struct scene_texture *texture = &test_add(edits, SCENE_TEXTURE)->set.texture;
+    struct scene_texture *texture = &test_add(edits, OBJECT_TEXTURE)->set.texture;
     texture->base.id = 1;
     texture->width = texture->height = TEXTURE_EDGE;
     texture->texels = test_blob(texels, sizeof(texels));
@@ -136,7 +136,7 @@ static void add_lights(struct test_edits *edits)
                                       {6.0f, 7.0f, 5.0f, 0.5f, 14.0f, 16.0f, 22.0f},
                                       {1.0f, 9.0f, -6.0f, 0.8f, 12.0f, 12.0f, 12.0f}};
     for (uint32_t i = 0; i < 3; i++) {
-        struct scene_light *light = &test_add(edits, SCENE_LIGHT)->set.light;
+        struct scene_light *light = &test_add(edits, OBJECT_LIGHT)->set.light;
         light->base.id = 1 + i;
         light->kind = LIGHT_SPHERE;
         light->size[0] = lamps[i][3];
@@ -144,7 +144,7 @@ static void add_lights(struct test_edits *edits)
         const float at[12] = {1, 0, 0, lamps[i][0], 0, 1, 0, lamps[i][1], 0, 0, 1, lamps[i][2]};
         test_node(edits, NODE_LIGHTS + i, 0, NODE_LIGHT, 1 + i, at);
     }
-    struct scene_edit *sky = test_add(edits, SCENE_NODE);
+    struct scene_edit *sky = test_add(edits, OBJECT_NODE);
     sky->kind = EDIT_SET_ENVIRONMENT;
     memcpy(sky->set.environment.colour, (float[3]){0.18f, 0.24f, 0.32f}, sizeof(sky->set.environment.colour));
 }
@@ -164,7 +164,7 @@ struct scene *paper_scene_create(void)
     test_node(&edits, NODE_FLAKE, 0, NODE_SPHERES, OBJECT_FLAKE, NULL);
     add_loose(&edits);
     add_blob(&edits);
-    struct scene_disc *disc = &test_add(&edits, SCENE_DISC)->set.disc;
+    struct scene_disc *disc = &test_add(&edits, OBJECT_DISC)->set.disc;
     disc->base.id = 1;
     disc->material = MATERIAL_GROUND;
     disc->normal_world[1] = 1.0f;

@@ -18,7 +18,7 @@
 
 struct recorded_scene {
     struct scene *scene; /* NULL: this place is free */
-    enum engine_sharing sharing;
+    enum sharing sharing;
     uint64_t principal;
 };
 
@@ -64,7 +64,7 @@ static struct engine_event *say(enum engine_event_kind kind, uint64_t client, ui
     return event;
 }
 
-static void say_failed(uint64_t client, uint32_t request, enum error_kind kind, const char *field)
+static void say_failed(uint64_t client, uint32_t request, enum error_code kind, const char *field)
 {
     error_set(&say(ENGINE_FAILED, client, request)->error, kind, field, "so says the recorder");
 }
@@ -202,7 +202,7 @@ static void describe(const struct engine_command *command, const struct scene *s
     struct engine_scene_description *made = calloc(1, sizeof *made);
     FUZZ_REQUIRE(made != NULL);
     made->revision = scene->revision;
-    made->nodes = (uint32_t)scene->objects[SCENE_NODE].count;
+    made->nodes = (uint32_t)scene->objects[OBJECT_NODE].count;
     made->upper_world[0] = 1;
     made->camera_count = made->clip_count = 3;
     for (uint32_t i = 0; i < 3; i++) {

@@ -13,7 +13,7 @@ static void check_refusal(const struct message *message, const struct decode_err
 {
     static const struct message zero;
     FUZZ_REQUIRE(memcmp(message, &zero, sizeof zero) == 0);
-    FUZZ_REQUIRE(error->code == PROTOCOL_ERROR_CODE_PROTOCOL || error->code == PROTOCOL_ERROR_CODE_INVALID);
+    FUZZ_REQUIRE(error->code == PROTOCOL_ERROR_PROTOCOL || error->code == PROTOCOL_ERROR_INVALID);
     FUZZ_REQUIRE(error->text[0] != '\0');
 }
 
@@ -27,7 +27,7 @@ static void check_round_trip(const struct message *message, size_t payload_bytes
     writer_init(&first, first_bytes, sizeof first_bytes);
     if (!message_encode(&first, message)) {
         /* Only this: the fixed part came short, and with the defaults it no longer fits. */
-        FUZZ_REQUIRE(first.error.code == PROTOCOL_ERROR_CODE_LIMIT);
+        FUZZ_REQUIRE(first.error.code == PROTOCOL_ERROR_LIMIT);
         FUZZ_REQUIRE(payload_bytes + desc->body()->wire_fixed_bytes + 8 > desc->info.payload_max_bytes);
         return;
     }

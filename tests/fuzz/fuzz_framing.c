@@ -33,13 +33,13 @@ static enum framing_result check_piece(const uint8_t *bytes, size_t count, uint3
     enum framing_result result = framing_parse(&frame, copy, count, accept, &error);
     if (result == FRAMING_NEED_MORE) {
         FUZZ_REQUIRE(frame.need_bytes > count && frame.need_bytes <= FRAMING_MESSAGE_MAX_BYTES);
-        FUZZ_REQUIRE(error.code == PROTOCOL_ERROR_CODE_NONE);
+        FUZZ_REQUIRE(error.code == PROTOCOL_ERROR_NONE);
     } else if (result == FRAMING_CONSUMED) {
         FUZZ_REQUIRE(whole == FRAMING_CONSUMED && frame.consumed_bytes == whole_frame->consumed_bytes);
         FUZZ_REQUIRE(frame.consumed_bytes <= count && frame.info == whole_frame->info);
         decode(&frame);
     } else {
-        FUZZ_REQUIRE(whole == FRAMING_FATAL && error.code != PROTOCOL_ERROR_CODE_NONE);
+        FUZZ_REQUIRE(whole == FRAMING_FATAL && error.code != PROTOCOL_ERROR_NONE);
     }
     free(copy);
     return result;

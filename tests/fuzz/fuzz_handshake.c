@@ -12,7 +12,7 @@ static void check_hello(const uint8_t *data, size_t size)
     size_t consumed;
     uint8_t bytes[HANDSHAKE_HELLO_MAX_BYTES];
     enum handshake_result result = handshake_hello_parse(&hello, data, size, &consumed, &error);
-    FUZZ_REQUIRE((result == HANDSHAKE_FATAL) == (error.code != PROTOCOL_ERROR_CODE_NONE));
+    FUZZ_REQUIRE((result == HANDSHAKE_FATAL) == (error.code != PROTOCOL_ERROR_NONE));
     FUZZ_REQUIRE(result != HANDSHAKE_NEED_MORE || size < HANDSHAKE_HELLO_MAX_BYTES);
     if (result != HANDSHAKE_CONSUMED) {
         FUZZ_REQUIRE(consumed == 0);
@@ -35,7 +35,7 @@ static void check_reply(const uint8_t *data, size_t size)
     size_t consumed;
     uint8_t bytes[HANDSHAKE_REPLY_MAX_BYTES];
     enum handshake_result result = handshake_reply_parse(&reply, data, size, &consumed, &error);
-    FUZZ_REQUIRE((result == HANDSHAKE_FATAL) == (error.code != PROTOCOL_ERROR_CODE_NONE));
+    FUZZ_REQUIRE((result == HANDSHAKE_FATAL) == (error.code != PROTOCOL_ERROR_NONE));
     FUZZ_REQUIRE(result != HANDSHAKE_NEED_MORE || size < HANDSHAKE_REPLY_MAX_BYTES);
     if (result != HANDSHAKE_CONSUMED) {
         FUZZ_REQUIRE(consumed == 0);

@@ -66,7 +66,7 @@ static void take_weights(struct input *input, float **weights, uint32_t *count)
 
 static void make_node(struct input *input, struct scene_node *node)
 {
-    static const enum scene_node_kind kinds[] = {NODE_MESH, NODE_GROUP, NODE_MESH, NODE_LIGHT};
+    static const enum node_kind kinds[] = {NODE_MESH, NODE_GROUP, NODE_MESH, NODE_LIGHT};
     node->parent = take(input) % 2 ? 0 : take_id(input);
     node->kind = kinds[take(input) % 4];
     node->object = node->kind == NODE_GROUP ? 0 : take_id(input);
@@ -131,8 +131,8 @@ static void make_clip(struct input *input, struct scene_clip *clip)
 
 static void make_edit(struct input *input, struct scene_edit *edit)
 {
-    static const enum scene_object_kind kinds[] = {SCENE_NODE, SCENE_MESH,    SCENE_SKIN,  SCENE_CLIP,
-                                                   SCENE_NODE, SCENE_CHANNEL, SCENE_LIGHT, SCENE_MATERIAL};
+    static const enum object_kind kinds[] = {OBJECT_NODE, OBJECT_MESH,    OBJECT_SKIN,  OBJECT_CLIP,
+                                             OBJECT_NODE, OBJECT_CHANNEL, OBJECT_LIGHT, OBJECT_MATERIAL};
     unsigned what = take(input);
     *edit = (struct scene_edit){.kind = what >= 208 ? EDIT_REMOVE : EDIT_SET, .object = kinds[what % 8]};
     edit->id = take_id(input);
@@ -140,22 +140,22 @@ static void make_edit(struct input *input, struct scene_edit *edit)
         return;
     edit->set.node.base.id = edit->id;
     switch (edit->object) {
-    case SCENE_NODE:
+    case OBJECT_NODE:
         make_node(input, &edit->set.node);
         break;
-    case SCENE_MESH:
+    case OBJECT_MESH:
         make_mesh(input, &edit->set.mesh);
         break;
-    case SCENE_SKIN:
+    case OBJECT_SKIN:
         edit->set.skin.joint_count = 2 + take(input) % 4;
         edit->set.skin.joints = take_array(input, edit->set.skin.joint_count, 4, IDS + 1);
         if (take(input) % 2)
             edit->set.skin.joint_from_mesh = take_array(input, edit->set.skin.joint_count, 48, 0);
         break;
-    case SCENE_CLIP:
+    case OBJECT_CLIP:
         make_clip(input, &edit->set.clip);
         break;
-    case SCENE_CHANNEL:
+    case OBJECT_CHANNEL:
         make_channel(input, &edit->set.channel);
         break;
     default:
@@ -166,12 +166,12 @@ static void make_edit(struct input *input, struct scene_edit *edit)
 static void check_accounts(const struct scene *scene)
 {
     uint64_t host_bytes = 0, table_bytes = 0;
-    for (int kind = 0; kind < SCENE_OBJECT_KIND_COUNT; kind++) {
+    for (int kind = 0; kind < OBJECT_COUNT; kind++) {
         size_t cursor = 0;
         void *object;
         while (hashmap_next(&scene->objects[kind], &cursor, NULL, &object)) {
-            host_bytes += object_bytes((enum scene_object_kind)kind, object);
-            table_bytes += object_table_bytes((enum scene_object_kind)kind, object);
+            host_bytes += object_bytes((enum object_kind)kind, object);
+            table_bytes += object_table_bytes((enum object_kind)kind, object);
         }
     }
     FUZZ_REQUIRE(host_bytes == scene->host_bytes);
@@ -227,7 +227,7 @@ static struct blob *array_of(const void *data, size_t bytes)
     return blob;
 }
 
-static void set(struct scene_edit *edit, enum scene_object_kind kind, uint32_t id)
+static void set(struct scene_edit *edit, enum object_kind kind, uint32_t id)
 {
     *edit = (struct scene_edit){.kind = EDIT_SET, .object = kind};
     edit->set.node.base.id = id;
@@ -242,13 +242,13 @@ static struct scene *make_scene(void)
     static const float turning[10] = {0, 1, 0, 0, 0, 1, 0, 1, 0, 0};
     struct scene_edit edits[7];
     for (uint32_t i = 0; i < 3; i++) {
-        set(&edits[i], SCENE_NODE, i + 1);
+        set(&edits[i], OBJECT_NODE, i + 1);
         float *m = edits[i].set.node.parent_from_node;
         m[0] = m[5] = m[10] = 1;
     }
     edits[2].set.node.kind = NODE_MESH;
     edits[2].set.node.object = edits[2].set.node.skin = 1;
-    set(&edits[3], SCENE_MESH, 1);
+    set(&edits[3], OBJECT_MESH, 1);
     struct scene_mesh *mesh = &edits[3].set.mesh;
     mesh->vertex_count = 3;
     mesh->triangle_count = 1;
@@ -260,12 +260,12 @@ static struct scene *make_scene(void)
     mesh->arrays[MESH_JOINTS] = array_of(places, sizeof places);
     mesh->arrays[MESH_WEIGHTS] = array_of(weights, sizeof weights);
     mesh->arrays[MESH_TARGET_POSITIONS] = array_of(triangle, sizeof triangle);
-    set(&edits[4], SCENE_SKIN, 1);
+    set(&edits[4], OBJECT_SKIN, 1);
     edits[4].set.skin.joint_count = 2;
     edits[4].set.skin.joints = array_of(joints, sizeof joints);
-    set(&edits[5], SCENE_CLIP, 1);
+    set(&edits[5], OBJECT_CLIP, 1);
     edits[5].set.clip.floats = array_of(turning, sizeof turning);
-    set(&edits[6], SCENE_CHANNEL, 1);
+    set(&edits[6], OBJECT_CHANNEL, 1);
     edits[6].set.channel = (struct scene_channel){.base.id = 1,
                                                   .clip = 1,
                                                   .path = CHANNEL_NODE_ROTATION,

@@ -23,7 +23,7 @@ static bool hear(struct sealed_link *link, size_t room)
         FUZZ_REQUIRE((bytes == 0 && result == SEALED_CONSUMED) == sealed_has_opened_last(link->sealed));
     }
     if (result == SEALED_REFUSED || result == SEALED_FATAL) {
-        FUZZ_REQUIRE(error.code != PROTOCOL_ERROR_CODE_NONE && error.text[0] != '\0');
+        FUZZ_REQUIRE(error.code != PROTOCOL_ERROR_NONE && error.text[0] != '\0');
         FUZZ_REQUIRE(!sealed_is_open(link->sealed));
     }
     return result == SEALED_NEED_MORE;

@@ -74,7 +74,7 @@ static void set_node(struct talk *talk, uint32_t request, uint32_t node, enum pr
     struct message_set_node *set = &begin(talk, MESSAGE_SET_NODE)->set_node;
     set->node = node;
     set->kind = kind;
-    set->object = kind == PROTOCOL_NODE_KIND_GROUP ? 0 : 1;
+    set->object = kind == PROTOCOL_NODE_GROUP ? 0 : 1;
     set->parent_from_node[0] = set->parent_from_node[5] = set->parent_from_node[10] = 1;
     set->name = "a node";
     end(talk, request);
@@ -109,12 +109,12 @@ static void put_up(struct talk *talk, uint32_t request)
     begin(talk, MESSAGE_SET_MATERIAL)->set_material.material = 1;
     end(talk, request + 3);
     set_mesh(talk, request + 3, references);
-    set_node(talk, request + 3, 1, PROTOCOL_NODE_KIND_MESH);
+    set_node(talk, request + 3, 1, PROTOCOL_NODE_MESH);
     struct message_set_light *light = &begin(talk, MESSAGE_SET_LIGHT)->set_light;
     light->light = 1;
-    light->kind = PROTOCOL_LIGHT_KIND_DIRECTIONAL;
+    light->kind = PROTOCOL_LIGHT_DIRECTIONAL;
     end(talk, request + 3);
-    set_node(talk, request + 3, 2, PROTOCOL_NODE_KIND_LIGHT);
+    set_node(talk, request + 3, 2, PROTOCOL_NODE_LIGHT);
     commit(talk, request + 3);
 }
 
@@ -125,7 +125,7 @@ static struct message_render *begin_render(struct talk *talk, enum protocol_job_
     struct message_render *render = &begin(talk, MESSAGE_RENDER)->render;
     render->scene = 1;
     render->kind = kind;
-    render->channel = kind == PROTOCOL_JOB_KIND_VIEW ? VIEW_CHANNEL : BATCH_CHANNEL;
+    render->channel = kind == PROTOCOL_JOB_VIEW ? VIEW_CHANNEL : BATCH_CHANNEL;
     render->credit = 2;
     render->width = render->height = 2;
     render->samples = 4;
@@ -190,17 +190,17 @@ void recorded_session(recorded_say_fn *say, void *context)
     struct talk talk = {.say = say, .context = context};
     open_scene(&talk, 1, PROTOCOL_SHARING_SHARED, SCENE_NAME);
     put_up(&talk, 2);
-    begin_render(&talk, PROTOCOL_JOB_KIND_BATCH);
+    begin_render(&talk, PROTOCOL_JOB_BATCH);
     end(&talk, 10);
     give_credit(&talk, BATCH_CHANNEL, 3);
-    begin_render(&talk, PROTOCOL_JOB_KIND_VIEW)->pass_samples = 2;
+    begin_render(&talk, PROTOCOL_JOB_VIEW)->pass_samples = 2;
     end(&talk, 11);
     acknowledge(&talk, 0);
     look(&talk, 1, true);
     give_credit(&talk, VIEW_CHANNEL, 4);
     acknowledge(&talk, 1);
     look(&talk, 3, false);
-    struct message_render *render = begin_render(&talk, PROTOCOL_JOB_KIND_VIEW);
+    struct message_render *render = begin_render(&talk, PROTOCOL_JOB_VIEW);
     render->credit = 9;
     render->width = 3;
     end(&talk, 12);
@@ -224,7 +224,7 @@ void recorded_onlooker(recorded_say_fn *say, void *context)
     end(&talk, 2);
     begin(&talk, MESSAGE_SCENE_DESCRIBE)->scene_describe.scene = 1;
     end(&talk, 3);
-    begin_render(&talk, PROTOCOL_JOB_KIND_VIEW)->adapt = 1;
+    begin_render(&talk, PROTOCOL_JOB_VIEW)->adapt = 1;
     end(&talk, 4);
     look(&talk, 7, true);
     acknowledge(&talk, 0);
@@ -250,21 +250,21 @@ void recorded_blunders(recorded_say_fn *say, void *context)
     upload(&talk, 4, &reference, noise); /* not that hash */
     begin_edit(&talk, 5, 1);
     set_mesh(&talk, 5, (struct record_blob_ref[]){reference, reference}); /* not held */
-    set_node(&talk, 5, 1, PROTOCOL_NODE_KIND_GROUP);
+    set_node(&talk, 5, 1, PROTOCOL_NODE_GROUP);
     commit(&talk, 5);
     begin_edit(&talk, 6, 9); /* no such scene */
     commit(&talk, 6);
     begin_edit(&talk, 7, 1);
-    set_node(&talk, 7, 1, PROTOCOL_NODE_KIND_MESH); /* no such mesh */
+    set_node(&talk, 7, 1, PROTOCOL_NODE_MESH); /* no such mesh */
     cancel(&talk, 8, 7);
-    set_node(&talk, 7, 2, PROTOCOL_NODE_KIND_GROUP);
+    set_node(&talk, 7, 2, PROTOCOL_NODE_GROUP);
     commit(&talk, 7);
     cancel(&talk, 9, 9);
     begin(&talk, MESSAGE_SCENE_ATTACH)->scene_attach.scene = 1;
     end(&talk, 10);
-    begin_render(&talk, PROTOCOL_JOB_KIND_BATCH)->last_frame = 0;
+    begin_render(&talk, PROTOCOL_JOB_BATCH)->last_frame = 0;
     end(&talk, 11);
-    begin_render(&talk, PROTOCOL_JOB_KIND_BATCH)->width = 8192;
+    begin_render(&talk, PROTOCOL_JOB_BATCH)->width = 8192;
     end(&talk, 12);
     cancel(&talk, 13, 11);
     cancel(&talk, 14, 13);

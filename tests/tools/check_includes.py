@@ -39,7 +39,7 @@ MAY_INCLUDE = {
     "server/encode": (BASE, "protocol/pixels"),
     "server/net": (BASE, "protocol", "protocol/sealed"),
     "server/engine": (BASE, GPU, SCENE, "server/render", "server/encode"),
-    "server/session": (BASE, SCENE, "server/render", "server/encode", "server/net", "server/engine", "protocol"),
+    "server/session": (BASE, SCENE, "server/encode", "server/net", "server/engine", "protocol"),
     "server": (BASE, GPU, "server/engine", "server/session"),
     "client/lib": ("protocol", "protocol/sealed", "protocol/common", "protocol/pixels"),
     "client/helper": ("protocol",),

@@ -37,7 +37,7 @@ static void invert_alpha(struct test_edits *edits, const struct scene_texture *t
     uint8_t *texels = malloc(bytes);
     for (size_t i = 0; i < bytes; i++)
         texels[i] = i % 4 == 3 ? (uint8_t)(255 - texture->texels->data[i]) : texture->texels->data[i];
-    struct scene_texture *inverted = &test_add(edits, SCENE_TEXTURE)->set.texture;
+    struct scene_texture *inverted = &test_add(edits, OBJECT_TEXTURE)->set.texture;
     *inverted = *texture;
     inverted->texels = test_blob(texels, bytes);
     free(texels);
@@ -48,7 +48,7 @@ static void removes_an_instance_shows_another_and_adds_a_disc(struct fixture *fi
     struct test_edits *edits = &fixture->edits;
     const struct scene_node *third = scene_node(fixture->scene, 3);
     const struct scene_texture *texture = scene_texture(fixture->scene, 1);
-    struct scene_edit *edit = test_add(edits, SCENE_NODE);
+    struct scene_edit *edit = test_add(edits, OBJECT_NODE);
     edit->kind = EDIT_REMOVE;
     edit->id = 100;
     test_node(edits, 3, third->parent, third->kind, third->object, third->parent_from_node);
@@ -57,7 +57,7 @@ static void removes_an_instance_shows_another_and_adds_a_disc(struct fixture *fi
     struct scene_material *cut_away = test_material(edits, 2, 0.35f, 0.45f, 0.55f);
     cut_away->alpha_mode = ALPHA_MASK;
     cut_away->base_colour[3] = 0.2f;
-    struct scene_disc *disc = &test_add(edits, SCENE_DISC)->set.disc;
+    struct scene_disc *disc = &test_add(edits, OBJECT_DISC)->set.disc;
     disc->base.id = 9;
     disc->centre_world[1] = -0.4f;
     disc->normal_world[1] = 1.0f;

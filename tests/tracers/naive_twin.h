@@ -112,7 +112,7 @@ static inline void twin_init_moving(struct twin *twin, const struct scene *scene
 {
     *twin = (struct twin){.scene = scene, .pose_count = motion ? motion->pose_count : 1};
     for (int kind = 0; kind < 2; kind++) {
-        enum scene_node_kind node_kind = kind == 0 ? NODE_MESH : NODE_SPHERES;
+        enum node_kind node_kind = kind == 0 ? NODE_MESH : NODE_SPHERES;
         for (uint32_t p = 0; p < twin->pose_count; p++)
             if (!scene_flatten(scene, twin_pose(motion, p), node_kind, &twin->posed[kind][p],
                                &twin->instance_counts[kind]))
@@ -192,7 +192,7 @@ static inline void twin_normal_to_world(double normal[3], const float object_fro
     memcpy(normal, out, sizeof(out));
 }
 
-static inline int twin_wrap(long i, int size, enum scene_wrap wrap)
+static inline int twin_wrap(long i, int size, enum wrap wrap)
 {
     if (wrap == WRAP_CLAMP)
         return i < 0 ? 0 : i >= size ? size - 1 : (int)i;
@@ -473,7 +473,7 @@ static inline void twin_discs(struct twin_answer *answer)
     size_t cursor = 0;
     uint64_t id;
     void *value;
-    while (hashmap_next(&answer->twin->scene->objects[SCENE_DISC], &cursor, &id, &value)) {
+    while (hashmap_next(&answer->twin->scene->objects[OBJECT_DISC], &cursor, &id, &value)) {
         const struct scene_disc *disc = value;
         struct twin_crossing crossing = {.hit = {.material = disc->material, .colour = {1, 1, 1, 1}}};
         double slope = 0, height = 0, squared = 0;

@@ -15,7 +15,7 @@ static struct scene *scene_of_panes(void)
     float m[12];
     for (uint32_t i = 0; i < 16; i++)
         texels[i] = ((i + i / 4) % 2 ? 0xff000000u : 0u) | 0x00c0a080u;
-    struct scene_texture *texture = &test_add(&edits, SCENE_TEXTURE)->set.texture;
+    struct scene_texture *texture = &test_add(&edits, OBJECT_TEXTURE)->set.texture;
     texture->base.id = 1;
     texture->width = texture->height = 4;
     texture->format = TEXTURE_RGBA8_SRGB;
@@ -47,7 +47,7 @@ static struct scene *scene_of_panes(void)
     test_transform(m, 1, 0.7f, 1, 1, -1.3f, -0.9f, 0, 0);
     test_node(&edits, 4, 0, NODE_MESH, 12, m);
     test_node(&edits, 5, 0, NODE_SPHERES, 20, NULL);
-    struct scene_disc *disc = &test_add(&edits, SCENE_DISC)->set.disc;
+    struct scene_disc *disc = &test_add(&edits, OBJECT_DISC)->set.disc;
     disc->base.id = 1;
     disc->material = 5;
     disc->centre_world[1] = -1.2f;

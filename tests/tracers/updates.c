@@ -154,7 +154,7 @@ CHECK(without_a_change_nothing_is_built, 0)
     add_box(&fixture.edits, 2, 2, 0, 0); /* to where it is */
     fixture_update(&fixture);
     expect_nothing_built(&fixture, 0);
-    struct scene_light *light = &test_add(&fixture.edits, SCENE_LIGHT)->set.light;
+    struct scene_light *light = &test_add(&fixture.edits, OBJECT_LIGHT)->set.light;
     light->base.id = 50;
     light->colour[0] = 1.0f;
     test_node(&fixture.edits, 50, 0, NODE_LIGHT, 50, NULL);
@@ -204,7 +204,7 @@ CHECK(an_empty_scene_is_missed_and_filled_and_emptied_again, CHECK_FORMS)
         assert_int_equal(answers.visibilities[i], 0xffffffff);
     }
     answers_finish(&answers);
-    struct scene_disc *disc = &test_add(&fixture.edits, SCENE_DISC)->set.disc;
+    struct scene_disc *disc = &test_add(&fixture.edits, OBJECT_DISC)->set.disc;
     disc->base.id = 1;
     disc->centre_world[2] = -2;
     disc->normal_world[2] = 1;

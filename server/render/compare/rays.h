@@ -13,14 +13,13 @@
 #ifndef FARLIGHT_RENDER_COMPARE_RAYS_H
 #define FARLIGHT_RENDER_COMPARE_RAYS_H
 
+#include "base/words.h"
 #include "shared/hit.h"
 #include "shared/ray.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-enum ray_kind { RAY_PRIMARY, RAY_SECONDARY, RAY_SHADOW, RAY_KIND_COUNT }; /* protocol's numbers */
 
 /* Waves of a frame, and kinds of ray in each; what lies beyond is counted with the last wave. The wire's number.
  */

@@ -121,7 +121,7 @@ static bool voxels_run(struct abuffer_task *task, uint32_t first, uint32_t end, 
  * once, so many times as many. */
 #define HARDWARE_TIMES 64u
 
-static const struct stage {
+static const struct stage_functions {
     abuffer_stage_begin *begin;
     abuffer_stage_run *run;
     abuffer_stage_end *end; /* NULL: nothing */

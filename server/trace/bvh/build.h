@@ -85,8 +85,6 @@ struct bvh_refit_plan {
     uint32_t step_count;
 };
 
-enum bvh_bounds { BVH_BOUNDS_OF_BOXES, BVH_BOUNDS_OF_SPHERES };
-
 struct bvh_form {
     enum bvh_bounds bounds;
     bool plain;              /* one order for every direction */

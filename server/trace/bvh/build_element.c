@@ -22,7 +22,7 @@ uint32_t bvh_octants(const struct bvh_form *settings)
 
 bool bvh_is_packed(const struct bvh_form *settings)
 {
-    return settings->bounds == BVH_BOUNDS_OF_BOXES && !settings->plain && !settings->whole;
+    return settings->bounds == BVH_BOUNDS_BOX && !settings->plain && !settings->whole;
 }
 
 uint32_t bvh_element_words(const struct bvh_form *settings)

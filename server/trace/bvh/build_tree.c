@@ -223,7 +223,7 @@ static void survey(struct work *work)
 {
     const struct bvh_baked *baked = &work->baked;
     struct bvh_tree *tree = work->tree;
-    bool has_grid = work->settings->bounds == BVH_BOUNDS_OF_BOXES && !work->settings->plain;
+    bool has_grid = work->settings->bounds == BVH_BOUNDS_BOX && !work->settings->plain;
     uint32_t step = baked->element_count / SURVEYED_ELEMENTS + 1, count = 0, leaf_count = 0;
     float cost_sum = 0, extent_sum = 0;
     for (uint32_t e = 0; e < baked->element_count; e += step, count++) {
@@ -319,7 +319,7 @@ static bool build(struct work *work)
     if (is_stopped(work) ||
         !bvh_binary_build(&work->binary, work->boxes, count, &costs, threads, work->settings->stop))
         return false;
-    if (work->settings->bounds == BVH_BOUNDS_OF_SPHERES && !make_spheres(work))
+    if (work->settings->bounds == BVH_BOUNDS_SPHERE && !make_spheres(work))
         return false;
     if (is_stopped(work) ||
         !bvh_bake(&work->baked, &work->binary, work->binary.areas, bvh_octants(work->settings), threads))

@@ -91,7 +91,7 @@ bool bvh_refit_write(struct bvh_refit *refit, struct gpu_device *device, const s
                      const struct bvh_form *settings, const struct bvh_grid *grid, struct error *error)
 {
     struct gpu_define defines[2] = {{NULL, NULL}};
-    if (settings->bounds == BVH_BOUNDS_OF_SPHERES)
+    if (settings->bounds == BVH_BOUNDS_SPHERE)
         defines[0] = (struct gpu_define){"BVH_SPHERES", "1"};
     else if (bvh_is_packed(settings))
         defines[0] = (struct gpu_define){"BVH_PACKED", "1"};

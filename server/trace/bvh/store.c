@@ -329,7 +329,7 @@ static bool finish_run(struct bvh_store *store, struct stage_times *times, struc
     uint64_t elements = 0, texels = 0, built_ns;
     bool ok = bvh_jobs_finish(build->run, &built_ns, error);
     build->run = NULL;
-    stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, build->start_ns, built_ns - build->start_ns);
+    stage_times_add(times, STAGE_BUILD, CLOCK_CPU, 0, build->start_ns, built_ns - build->start_ns);
     for (uint32_t i = 0; i < build->count; i++) {
         elements += build->jobs[i].tree.element_count;
         texels += build->jobs[i].tree.primitive_texels;
@@ -369,7 +369,7 @@ static enum tracer_progress go_on_building(struct bvh_store *store, const struct
     if (build->run && !finish_run(store, times, error))
         return TRACER_FAILED;
     enum tracer_progress progress = upload_trees(store, scene, step_end_ns, report, error);
-    stage_times_add(times, STAGE_UPLOAD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    stage_times_add(times, STAGE_UPLOAD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return progress;
 }
 

@@ -198,7 +198,7 @@ bool bvh_store_deform(struct bvh_store *store, struct gpu_scene *scene, struct b
         return error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for a scene of %u geometries",
                          scene->geometry_count);
     bool ok = deforming.count == 0 || refit(store, scene, &deforming, report, error);
-    stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    stage_times_add(times, STAGE_BUILD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
     ok = ok && (deforming.count == 0 || rebuild(store, scene, &deforming, report, times, error));
     free(deforming.list);
     return ok;

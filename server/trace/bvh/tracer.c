@@ -31,7 +31,7 @@ static struct bvh_form settings_of(const struct tracer_options *options)
     /* Boxes are twice as fast as spheres (bench_bvh), so `auto` is boxes. */
     bool spheres = plain || options->bvh.bounds == BVH_BOUNDS_SPHERE;
     return (struct bvh_form){
-        .bounds = spheres ? BVH_BOUNDS_OF_SPHERES : BVH_BOUNDS_OF_BOXES,
+        .bounds = spheres ? BVH_BOUNDS_SPHERE : BVH_BOUNDS_BOX,
         .plain = plain,
         .threads = build_threads(),
     };
@@ -236,9 +236,9 @@ static bool update_instances(struct bvh *bvh, const struct gpu_scene *scene, str
         return false;
     survey_leaves(bvh, scene);
     uint64_t built_ns = clock_now_ns();
-    stage_times_add(times, STAGE_BUILD, STAGE_CPU, 0, start_ns, built_ns - start_ns);
+    stage_times_add(times, STAGE_BUILD, CLOCK_CPU, 0, start_ns, built_ns - start_ns);
     bool ok = upload_top(bvh, !refitted, error);
-    stage_times_add(times, STAGE_UPLOAD, STAGE_CPU, 0, built_ns, clock_now_ns() - built_ns);
+    stage_times_add(times, STAGE_UPLOAD, CLOCK_CPU, 0, built_ns, clock_now_ns() - built_ns);
     return ok;
 }
 
@@ -404,7 +404,7 @@ static bool bvh_trace_range(struct tracer *tracer, struct gpu_scene *scene, stru
     const uint32_t together = ((struct bvh_state *)state)->rays_together;
     struct gpu_define defines[9] = {{"TRACER_BVH", "1"}};
     size_t n = 1;
-    if (settings->bounds == BVH_BOUNDS_OF_SPHERES)
+    if (settings->bounds == BVH_BOUNDS_SPHERE)
         defines[n++] = (struct gpu_define){"BVH_SPHERES", "1"};
     if (settings->plain)
         defines[n++] = (struct gpu_define){"BVH_PLAIN", "1"};

@@ -38,7 +38,7 @@ void ldc_sample_defines(const struct ldc_task *task, struct gpu_define defines[L
     size_t n = 0, cursor = 0;
     bool textures = false, bump = false;
     uint64_t id;
-    for (void *value; hashmap_next(&task->scene->scene->objects[SCENE_MATERIAL], &cursor, &id, &value);) {
+    for (void *value; hashmap_next(&task->scene->scene->objects[OBJECT_MATERIAL], &cursor, &id, &value);) {
         const struct scene_material *material = value;
         for (int i = 0; i < MATERIAL_TEXTURE_COUNT; i++)
             textures |= material->textures[i].texture != 0;

@@ -42,12 +42,12 @@ static void take_material(struct opacity_material *out, const struct scene *scen
 bool opacity_materials_init(struct opacity_materials *materials, const struct scene *scene,
                             const struct scene_pose *pose)
 {
-    size_t count = scene->objects[SCENE_MATERIAL].count + 1, cursor = 0;
+    size_t count = scene->objects[OBJECT_MATERIAL].count + 1, cursor = 0;
     uint64_t id;
     void *value;
     *materials = (struct opacity_materials){.list = calloc(count, sizeof(*materials->list)), .count = 1};
     bool ok = materials->list != NULL;
-    while (ok && hashmap_next(&scene->objects[SCENE_MATERIAL], &cursor, &id, &value)) {
+    while (ok && hashmap_next(&scene->objects[OBJECT_MATERIAL], &cursor, &id, &value)) {
         take_material(&materials->list[materials->count++], scene, scene_pose_material(pose, value));
         ok = hashmap_put(&materials->index_by_id, id, (void *)(uintptr_t)materials->count);
     }

@@ -17,12 +17,12 @@ struct opacity_texture {
     struct blob *texels; /* NULL: no texture */
     uint32_t width, height;
     bool is_srgb, nearest, second_set;
-    enum scene_wrap wrap_u, wrap_v;
+    enum wrap wrap_u, wrap_v;
     float uv_transform[6];
 };
 
 struct opacity_material {
-    enum scene_alpha_mode alpha_mode;
+    enum alpha_mode alpha_mode;
     float base_colour[4];
     float alpha_cutoff;
     float transmission; /* of what is not metal */

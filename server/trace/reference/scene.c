@@ -269,7 +269,7 @@ static int by_id(const void *a, const void *b)
 /* The materials of the discs, by their ids, in the order in which gpu_scene has the discs. */
 static uint32_t *list_disc_materials(const struct gpu_scene *scene)
 {
-    const struct hashmap *discs = &scene->scene->objects[SCENE_DISC];
+    const struct hashmap *discs = &scene->scene->objects[OBJECT_DISC];
     const struct scene_disc **sorted = calloc(discs->count + 1, sizeof(const struct scene_disc *));
     uint32_t *materials = calloc(discs->count + 1, sizeof(*materials));
     size_t cursor = 0, count = 0;

@@ -18,10 +18,11 @@ static void make_table(void)
     }
 }
 
-static float wrap_coordinate(float u, enum scene_wrap wrap)
+static float wrap_coordinate(float u, enum wrap wrap)
 {
     switch (wrap) {
     case WRAP_REPEAT:
+    case WRAP_COUNT:
         break;
     case WRAP_CLAMP:
         return fminf(fmaxf(u, 0.0f), 1.0f);
@@ -32,7 +33,7 @@ static float wrap_coordinate(float u, enum scene_wrap wrap)
 }
 
 /* Of a texel at most one beyond the edge. Beyond a mirrored edge lies the edge itself once more. */
-static int wrap_neighbour(int i, int size, enum scene_wrap wrap)
+static int wrap_neighbour(int i, int size, enum wrap wrap)
 {
     if (wrap == WRAP_REPEAT)
         i = i < 0 ? i + size : i >= size ? i - size : i;

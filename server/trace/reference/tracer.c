@@ -35,7 +35,7 @@ bool reference_check(struct reference *reference, const char *what, struct error
                          "Embree's structures, %s; %llu of %llu bytes of device memory are in use without them",
                          what, (unsigned long long)(gpu->memory_used_bytes - reference->taken_bytes),
                          (unsigned long long)gpu->memory_limit_bytes);
-    enum error_kind kind = code == RTC_ERROR_OUT_OF_MEMORY     ? ERROR_OUT_OF_MEMORY
+    enum error_code kind = code == RTC_ERROR_OUT_OF_MEMORY     ? ERROR_OUT_OF_MEMORY
                            : code == RTC_ERROR_UNSUPPORTED_CPU ? ERROR_UNSUPPORTED
                                                                : ERROR_INTERNAL;
     return error_set(error, kind, NULL, "Embree, %s: %s (error %d)", what, reference->failure_text, (int)code);
@@ -160,7 +160,7 @@ static enum tracer_progress reference_update(struct tracer *tracer, struct gpu_s
         reference_scene_finish(reference);
         book_memory(reference, &second);
     }
-    stage_times_add(update->times, STAGE_BUILD, STAGE_CPU, 0, start_ns, clock_now_ns() - start_ns);
+    stage_times_add(update->times, STAGE_BUILD, CLOCK_CPU, 0, start_ns, clock_now_ns() - start_ns);
     return tracer_progress_of(ok);
 }
 

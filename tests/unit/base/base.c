@@ -103,16 +103,16 @@ TEST(stage_spans_beyond_the_last_are_added_to_one_of_their_kind)
     static struct stage_times times;
     stage_times_begin(&times);
     for (uint32_t wave = 0; wave < STAGE_SPANS_MAX + 10; wave++)
-        stage_times_add(&times, STAGE_TRACE, STAGE_GPU, wave, times.origin_ns + wave, 2);
+        stage_times_add(&times, STAGE_TRACE, CLOCK_GPU, wave, times.origin_ns + wave, 2);
     assert_int_equal(times.count, STAGE_SPANS_MAX);
     assert_int_equal(times.spans[5].start_ns, 5);
-    assert_int_equal(stage_times_sum_ns(&times, STAGE_TRACE, STAGE_GPU), 2 * (STAGE_SPANS_MAX + 10));
-    assert_int_equal(stage_times_sum_ns(&times, STAGE_TRACE, STAGE_CPU), 0);
-    stage_times_add(&times, STAGE_SEND, STAGE_CPU, 0, times.origin_ns, 77); /* the first of its kind finds room */
+    assert_int_equal(stage_times_sum_ns(&times, STAGE_TRACE, CLOCK_GPU), 2 * (STAGE_SPANS_MAX + 10));
+    assert_int_equal(stage_times_sum_ns(&times, STAGE_TRACE, CLOCK_CPU), 0);
+    stage_times_add(&times, STAGE_SEND, CLOCK_CPU, 0, times.origin_ns, 77); /* the first of its kind finds room */
     assert_int_equal(times.count, STAGE_SPANS_MAX);
-    assert_int_equal(stage_times_sum_ns(&times, STAGE_SEND, STAGE_CPU), 77);
-    assert_int_equal(stage_times_sum_ns(&times, STAGE_TRACE, STAGE_GPU), 2 * (STAGE_SPANS_MAX + 10));
-    stage_times_add(NULL, STAGE_TRACE, STAGE_GPU, 0, 0, 1);
+    assert_int_equal(stage_times_sum_ns(&times, STAGE_SEND, CLOCK_CPU), 77);
+    assert_int_equal(stage_times_sum_ns(&times, STAGE_TRACE, CLOCK_GPU), 2 * (STAGE_SPANS_MAX + 10));
+    stage_times_add(NULL, STAGE_TRACE, CLOCK_GPU, 0, 0, 1);
     assert_string_equal(stage_name(STAGE_READBACK), "readback");
 }
 

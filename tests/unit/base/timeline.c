@@ -43,10 +43,10 @@ static void add_frame(struct timeline *timeline, const char *name, uint64_t orig
     static struct stage_times times;
     times.origin_ns = origin_ns;
     times.count = 0;
-    stage_times_add(&times, STAGE_FRAME, STAGE_CPU, 0, origin_ns, 1000);
-    stage_times_add(&times, STAGE_TRACE, STAGE_CPU, 2, origin_ns + 100, 300);
-    stage_times_add(&times, STAGE_TRACE, STAGE_GPU, 2, origin_ns + 150, 1234567);
-    stage_times_add(&times, STAGE_SEND, STAGE_CPU, 0, origin_ns + 1000, 5000);
+    stage_times_add(&times, STAGE_FRAME, CLOCK_CPU, 0, origin_ns, 1000);
+    stage_times_add(&times, STAGE_TRACE, CLOCK_CPU, 2, origin_ns + 100, 300);
+    stage_times_add(&times, STAGE_TRACE, CLOCK_GPU, 2, origin_ns + 150, 1234567);
+    stage_times_add(&times, STAGE_SEND, CLOCK_CPU, 0, origin_ns + 1000, 5000);
     timeline_frame(timeline, &(struct timeline_frame){
                                  .client = 7, .client_name = name, .job = 3, .frame = frame, .times = &times});
 }

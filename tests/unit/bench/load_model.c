@@ -44,7 +44,7 @@ static uint64_t triangles_of(const struct scene *scene)
     uint64_t triangles = 0;
     size_t cursor = 0;
     void *value;
-    while (hashmap_next(&scene->objects[SCENE_MESH], &cursor, NULL, &value))
+    while (hashmap_next(&scene->objects[OBJECT_MESH], &cursor, NULL, &value))
         triangles += ((const struct scene_mesh *)value)->triangle_count;
     return triangles;
 }
@@ -54,7 +54,7 @@ static uint64_t spheres_of(const struct scene *scene)
     uint64_t spheres = 0;
     size_t cursor = 0;
     void *value;
-    while (hashmap_next(&scene->objects[SCENE_SPHERES], &cursor, NULL, &value))
+    while (hashmap_next(&scene->objects[OBJECT_SPHERES], &cursor, NULL, &value))
         spheres += ((const struct scene_spheres *)value)->sphere_count;
     return spheres;
 }
@@ -72,11 +72,11 @@ static void expect_what_the_importer_counts(const char *path)
         fail_msg("%s: %s", path, failed.text);
     assert_int_equal(triangles_of(model.scene), info->triangles);
     assert_int_equal(spheres_of(model.scene), info->spheres);
-    assert_int_equal(model.scene->objects[SCENE_NODE].count, info->nodes);
-    assert_int_equal(model.scene->objects[SCENE_MESH].count, info->meshes);
-    assert_int_equal(model.scene->objects[SCENE_MATERIAL].count, info->materials);
-    assert_int_equal(model.scene->objects[SCENE_TEXTURE].count, info->textures);
-    assert_int_equal(model.scene->objects[SCENE_LIGHT].count, info->lights);
+    assert_int_equal(model.scene->objects[OBJECT_NODE].count, info->nodes);
+    assert_int_equal(model.scene->objects[OBJECT_MESH].count, info->meshes);
+    assert_int_equal(model.scene->objects[OBJECT_MATERIAL].count, info->materials);
+    assert_int_equal(model.scene->objects[OBJECT_TEXTURE].count, info->textures);
+    assert_int_equal(model.scene->objects[OBJECT_LIGHT].count, info->lights);
     assert_int_equal(model.blob_bytes, info->import.offered_bytes);
     assert_int_equal(model.scene->revision, 1);
     fl_model_info_destroy(info);

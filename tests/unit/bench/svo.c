@@ -20,7 +20,7 @@
 /* The first is a mesh, the second a sphere; they are apart. */
 static const float centres_radii[2][4] = {{0, 0, 0, 1}, {2.5f, 0.7f, 0.4f, 0.8f}};
 
-struct stage {
+struct fixture {
     struct scene *scene;
     struct gpu_scene gpu;
     struct gpu_buffer rays, answers;
@@ -80,11 +80,11 @@ static void cast_rays(struct ray *rays)
     }
 }
 
-static void begin(struct stage *stage)
+static void begin(struct fixture *stage)
 {
     struct error error = {0};
     struct scene_changes changes;
-    *stage = (struct stage){.scene = two_spheres(), .cast = malloc(RAYS * sizeof *stage->cast)};
+    *stage = (struct fixture){.scene = two_spheres(), .cast = malloc(RAYS * sizeof *stage->cast)};
     cast_rays(stage->cast);
     gpu_scene_init(&stage->gpu, device);
     must(gpu_scene_update(&stage->gpu, stage->scene, NULL, &changes, NULL, &error) &&
@@ -93,7 +93,7 @@ static void begin(struct stage *stage)
          &error);
 }
 
-static void end(struct stage *stage)
+static void end(struct fixture *stage)
 {
     gpu_buffer_finish(device, &stage->rays);
     gpu_buffer_finish(device, &stage->answers);
@@ -102,7 +102,7 @@ static void end(struct stage *stage)
     free(stage->cast);
 }
 
-static struct tracer *build(struct stage *stage, const struct tracer_impl *impl, uint32_t resolution)
+static struct tracer *build(struct fixture *stage, const struct tracer_impl *impl, uint32_t resolution)
 {
     struct error error = {0};
     const struct tracer_options options = {.bench = {.baseline_side = resolution}};
@@ -111,7 +111,7 @@ static struct tracer *build(struct stage *stage, const struct tracer_impl *impl,
     return tracer;
 }
 
-static void trace(struct stage *stage, struct tracer *tracer, enum wave_kind kind, void *answers, size_t bytes)
+static void trace(struct fixture *stage, struct tracer *tracer, enum wave_kind kind, void *answers, size_t bytes)
 {
     struct error error = {0};
     const struct wave wave = {.kind = kind,
@@ -177,7 +177,7 @@ static int truth_of(const struct ray *ray, float margin, float *distance)
 
 static void hits_are_of(const struct tracer_impl *impl, float off_most_cells, float off_usual_cells)
 {
-    struct stage stage;
+    struct fixture stage;
     begin(&stage);
     struct tracer *tracer = build(&stage, impl, RESOLUTION);
     struct hit *hits = malloc(RAYS * sizeof *hits);
@@ -225,7 +225,7 @@ TEST(planes_are_hit_nearer_to_it)
 TEST(rays_to_anything_are_stopped_where_it_is)
 {
     static const struct tracer_impl *const impls[] = {&svo_cells_impl, &svo_planes_impl, &svo_tiles_impl};
-    struct stage stage;
+    struct fixture stage;
     begin(&stage);
     uint32_t *visibility = malloc(RAYS * sizeof *visibility);
     for (int which = 0; which < 3; which++) {
@@ -249,7 +249,7 @@ TEST(rays_to_anything_are_stopped_where_it_is)
 TEST(every_resolution_has_the_leaves_of_its_surface)
 {
     static const uint32_t resolutions[] = {16, 100, 512, 1024};
-    struct stage stage;
+    struct fixture stage;
     begin(&stage);
     for (int i = 0; i < 4; i++) {
         struct tracer *tracer = build(&stage, &svo_cells_impl, resolutions[i]);

@@ -58,34 +58,34 @@ EACH_TEST(empty, NULL)
 
 TEST(an_object_is_found_by_name_before_number)
 {
-    see_node(10, "arm", PROTOCOL_NODE_KIND_GROUP, 0);
-    see_node(20, "", PROTOCOL_NODE_KIND_GROUP, 0);
-    see_node(30, "0", PROTOCOL_NODE_KIND_GROUP, 0);
-    see_node(40, "arm", PROTOCOL_NODE_KIND_GROUP, 0);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_NODE, "arm"), 10);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_NODE, "0"), 30);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_NODE, "1"), 20);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_NODE, "4"), 0);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_NODE, ""), 0);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_MATERIAL, "arm"), 0);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_MESH, "0"), 0);
+    see_node(10, "arm", PROTOCOL_NODE_GROUP, 0);
+    see_node(20, "", PROTOCOL_NODE_GROUP, 0);
+    see_node(30, "0", PROTOCOL_NODE_GROUP, 0);
+    see_node(40, "arm", PROTOCOL_NODE_GROUP, 0);
+    assert_int_equal(find(PROTOCOL_OBJECT_NODE, "arm"), 10);
+    assert_int_equal(find(PROTOCOL_OBJECT_NODE, "0"), 30);
+    assert_int_equal(find(PROTOCOL_OBJECT_NODE, "1"), 20);
+    assert_int_equal(find(PROTOCOL_OBJECT_NODE, "4"), 0);
+    assert_int_equal(find(PROTOCOL_OBJECT_NODE, ""), 0);
+    assert_int_equal(find(PROTOCOL_OBJECT_MATERIAL, "arm"), 0);
+    assert_int_equal(find(PROTOCOL_OBJECT_MESH, "0"), 0);
 }
 
 TEST(a_light_is_also_known_by_the_node_that_shows_it)
 {
-    see_light(7, "", PROTOCOL_LIGHT_KIND_POINT);
-    see_light(8, "lamp", PROTOCOL_LIGHT_KIND_SPHERE);
-    see_node(1, "ceiling", PROTOCOL_NODE_KIND_LIGHT, 7);
-    see_node(2, "lamp", PROTOCOL_NODE_KIND_LIGHT, 7);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_LIGHT, "ceiling"), 7);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_LIGHT, "lamp"), 8);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_LIGHT, "0"), 7);
+    see_light(7, "", PROTOCOL_LIGHT_POINT);
+    see_light(8, "lamp", PROTOCOL_LIGHT_SPHERE);
+    see_node(1, "ceiling", PROTOCOL_NODE_LIGHT, 7);
+    see_node(2, "lamp", PROTOCOL_NODE_LIGHT, 7);
+    assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "ceiling"), 7);
+    assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "lamp"), 8);
+    assert_int_equal(find(PROTOCOL_OBJECT_LIGHT, "0"), 7);
 }
 
 TEST(only_some_lights_have_a_size)
 {
-    for (int kind = 0; kind < PROTOCOL_LIGHT_KIND_COUNT; kind++) {
-        bool has_size = kind == PROTOCOL_LIGHT_KIND_RECTANGLE || kind == PROTOCOL_LIGHT_KIND_SPHERE;
+    for (int kind = 0; kind < PROTOCOL_LIGHT_COUNT; kind++) {
+        bool has_size = kind == PROTOCOL_LIGHT_RECTANGLE || kind == PROTOCOL_LIGHT_SPHERE;
         see_light(10 + (uint32_t)kind, "", (enum protocol_light_kind)kind);
         assert_int_equal(fl_catalogue_light_has_size(&catalogue, 10 + (uint32_t)kind), has_size);
     }
@@ -110,9 +110,9 @@ TEST(what_is_not_there_is_answered_with_what_is)
         char name[129];
         memset(name, 'a' + (int)i % 26, 128);
         name[128 - i] = '\0';
-        see_node(i + 1, name, PROTOCOL_NODE_KIND_GROUP, 0);
+        see_node(i + 1, name, PROTOCOL_NODE_GROUP, 0);
     }
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_NODE, "?"), 0);
+    assert_int_equal(find(PROTOCOL_OBJECT_NODE, "?"), 0);
     assert_memory_equal(error.remedy, "it has 100 nodes: 'aaa", 22);
     assert_string_equal(error.remedy + strlen(error.remedy) - 5, "', ..");
 }
@@ -137,13 +137,13 @@ TEST(a_clip_tells_its_identifier_and_length)
 
 TEST(a_new_identifier_is_one_that_the_import_has_not_used)
 {
-    see_node(9, "a", PROTOCOL_NODE_KIND_GROUP, 0);
-    see_node(4, "b", PROTOCOL_NODE_KIND_GROUP, 0);
-    assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_KIND_NODE), 10);
-    assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_KIND_NODE), 11);
-    assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_KIND_CLIP), 1);
-    see_node(UINT32_MAX, "c", PROTOCOL_NODE_KIND_GROUP, 0);
-    assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_KIND_NODE), 0);
+    see_node(9, "a", PROTOCOL_NODE_GROUP, 0);
+    see_node(4, "b", PROTOCOL_NODE_GROUP, 0);
+    assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_NODE), 10);
+    assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_NODE), 11);
+    assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_CLIP), 1);
+    see_node(UINT32_MAX, "c", PROTOCOL_NODE_GROUP, 0);
+    assert_int_equal(fl_catalogue_new_id(&catalogue, PROTOCOL_OBJECT_NODE), 0);
 }
 
 TEST_WITH(a_flood_of_names_is_held_in_bounded_memory, empty, empty)
@@ -154,14 +154,14 @@ TEST_WITH(a_flood_of_names_is_held_in_bounded_memory, empty, empty)
     for (uint32_t i = 1; i <= (1u << 20) + 10; i++) {
         snprintf(name, 9, "%08u", i);
         name[8] = 'x';
-        see_node(i, name, PROTOCOL_NODE_KIND_GROUP, 0);
+        see_node(i, name, PROTOCOL_NODE_GROUP, 0);
     }
     assert_in_range(catalogue.text_capacity, 1, 64u << 20);
     assert_int_equal(catalogue.lists[FL_CATALOGUE_NODES].count, 1u << 20);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_NODE, "1048575"), 1u << 20);
+    assert_int_equal(find(PROTOCOL_OBJECT_NODE, "1048575"), 1u << 20);
     snprintf(name, 9, "%08u", 200000);
     name[8] = 'x';
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_NODE, name), 200000);
-    assert_int_equal(find(PROTOCOL_OBJECT_KIND_NODE, "1048576"), 0);
+    assert_int_equal(find(PROTOCOL_OBJECT_NODE, name), 200000);
+    assert_int_equal(find(PROTOCOL_OBJECT_NODE, "1048576"), 0);
     assert_non_null(strstr(error.remedy, "only its first 1048576 nodes can be named"));
 }

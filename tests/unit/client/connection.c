@@ -146,7 +146,7 @@ static void play_goodbye(struct daemon *daemon)
 {
     struct framing_header header;
     struct message message, goodbye = {.type = MESSAGE_GOODBYE};
-    goodbye.goodbye.code = PROTOCOL_ERROR_CODE_SHUTTING_DOWN;
+    goodbye.goodbye.code = PROTOCOL_ERROR_SHUTTING_DOWN;
     goodbye.goodbye.text = "maintenance";
     greet(daemon);
     take(daemon, &header, &message);
@@ -195,7 +195,7 @@ static void play_refusal(struct daemon *daemon)
 {
     struct framing_header header;
     struct message message, refusal = {.type = MESSAGE_ERROR};
-    refusal.error.code = PROTOCOL_ERROR_CODE_BUSY;
+    refusal.error.code = PROTOCOL_ERROR_BUSY;
     refusal.error.retryable = 1;
     refusal.error.retry_after_ms = 250;
     refusal.error.field = "stats";
@@ -216,7 +216,7 @@ TEST(a_refusal_keeps_its_code_field_remedy_and_the_connection)
         error = (struct fl_error){0};
         assert_false(fl_stats(connection, &reply, &error));
         check_error(FL_ERROR_REFUSED, "too many at once");
-        assert_int_equal(error.server_code, PROTOCOL_ERROR_CODE_BUSY);
+        assert_int_equal(error.server_code, PROTOCOL_ERROR_BUSY);
         assert_true(error.retryable);
         assert_int_equal(error.retry_after_ms, 250);
         assert_string_equal(error.field, "stats");
@@ -270,7 +270,7 @@ static void play_job(struct daemon *daemon)
             credit = message.credit.total;
         } else if (message.type == MESSAGE_CANCEL && message.cancel.target_request == request) {
             struct message refusal = {.type = MESSAGE_ERROR}, done = {.type = MESSAGE_OK};
-            refusal.error.code = PROTOCOL_ERROR_CODE_CANCELLED;
+            refusal.error.code = PROTOCOL_ERROR_CANCELLED;
             tell(daemon, request, &refusal);
             tell(daemon, header.request, &done);
             request = 0;

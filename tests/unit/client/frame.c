@@ -419,7 +419,7 @@ TEST(comparisons_of_waves_arrive)
     struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
     const struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
     struct record_wave_comparison waves[2] = {{.rays = 960, .both_hit = 960},
-                                              {.kind = PROTOCOL_RAY_KIND_SHADOW, .rays = 7, .both_missed = 7}};
+                                              {.kind = PROTOCOL_RAY_SHADOW, .rays = 7, .both_missed = 7}};
     const struct message_frame_end last = {.frame = 3, .comparisons = waves, .comparisons_count = 2};
     assert_true(begin(&assembly, &message));
     assert_true(give(&assembly, pixels, PIXELS_BYTES, 0));
@@ -427,7 +427,7 @@ TEST(comparisons_of_waves_arrive)
     assert_non_null(frame);
     assert_int_equal(frame->wave_comparison_count, 2);
     assert_int_equal(frame->wave_comparisons[0].both_hit, 960);
-    assert_int_equal(frame->wave_comparisons[1].kind, PROTOCOL_RAY_KIND_SHADOW);
+    assert_int_equal(frame->wave_comparisons[1].kind, PROTOCOL_RAY_SHADOW);
     assert_int_equal(frame->stage_count, 0);
     fl_frame_destroy(frame);
 }

@@ -54,7 +54,7 @@ static void tell_list(struct daemon *daemon, uint32_t request)
 static void tell_unknown(struct daemon *daemon, uint32_t request)
 {
     struct message message = {.type = MESSAGE_ERROR};
-    message.error.code = PROTOCOL_ERROR_CODE_UNKNOWN_ID;
+    message.error.code = PROTOCOL_ERROR_UNKNOWN_ID;
     message.error.field = "scene_attach.name";
     message.error.text = "no such scene";
     message.error.remedy = "";
@@ -152,7 +152,7 @@ TEST(an_attached_scene_is_known_as_a_loaded_one)
     assert_true(info->duration_s == 1.5f);
     assert_false(fl_scene_find_clip(scene, "nothing", &found, NULL, &error));
     assert_int_equal(error.code, FL_ERROR_ARGUMENT);
-    assert_false(fl_scene_find_object(scene, PROTOCOL_OBJECT_KIND_MATERIAL, "brass", &found, &error));
+    assert_false(fl_scene_find_object(scene, PROTOCOL_OBJECT_MATERIAL, "brass", &found, &error));
     struct fl_scene_bounds bounds;
     assert_true(fl_scene_get_bounds(scene, &bounds, &error));
     assert_false(bounds.empty);
@@ -174,7 +174,7 @@ TEST(a_missing_scene_is_reported)
     struct fl_connection *connection = connect_to(daemon);
     assert_null(fl_scene_attach(connection, "other", &error));
     check_error(FL_ERROR_REFUSED, "no such scene");
-    assert_int_equal(error.server_code, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    assert_int_equal(error.server_code, PROTOCOL_ERROR_UNKNOWN_ID);
     struct fl_scene *scene = attach(connection); /* the connection is as good as before */
     fl_scene_destroy(scene);
     fl_connection_destroy(connection);
@@ -204,7 +204,7 @@ TEST(a_clip_added_to_a_scene_of_others_is_taken_away_again)
     struct fl_connection *connection = connect_to(daemon);
     struct fl_scene *scene = attach(connection);
     static const float times[2] = {0, 1}, values[6] = {0};
-    const struct fl_channel channel = {.path = PROTOCOL_CHANNEL_PATH_VIEW_EYE,
+    const struct fl_channel channel = {.path = PROTOCOL_CHANNEL_VIEW_EYE,
                                        .interpolation = PROTOCOL_INTERPOLATION_LINEAR,
                                        .width = 3,
                                        .key_count = 2,

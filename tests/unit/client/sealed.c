@@ -129,7 +129,7 @@ TEST(a_wrong_key_is_reported_with_a_remedy)
     struct daemon *daemon = start(play_other_key);
     assert_null(connect_sealed(daemon));
     check_error(FL_ERROR_REFUSED, "another key");
-    assert_int_equal(error.server_code, PROTOCOL_ERROR_CODE_DENIED);
+    assert_int_equal(error.server_code, PROTOCOL_ERROR_DENIED);
     assert_false(error.retryable);
     assert_string_equal(error.field, daemon->address);
     assert_non_null(strstr(error.remedy, "--key"));

@@ -136,7 +136,7 @@ static void play_view(struct daemon *daemon)
     uint32_t request = 0, number = 0;
     greet(daemon);
     while (look(daemon, &header, &message)) {
-        if (message.type == MESSAGE_RENDER && message.render.kind == PROTOCOL_JOB_KIND_VIEW) {
+        if (message.type == MESSAGE_RENDER && message.render.kind == PROTOCOL_JOB_VIEW) {
             const struct message_frame_begin frame = some_frame(number++, seen.last_command);
             if (request != 0)
                 tell_ok(daemon, request);
@@ -224,7 +224,7 @@ TEST(cameras_are_sent_and_frames_name_them_with_their_times)
         fl_frame_destroy(frame);
     }
     end_view(&viewing, view);
-    assert_int_equal(seen.first.kind, PROTOCOL_JOB_KIND_VIEW);
+    assert_int_equal(seen.first.kind, PROTOCOL_JOB_VIEW);
     assert_int_equal(seen.first.samples, 64);
     assert_int_equal(seen.first.frames_per_second, 60);
     assert_int_equal(seen.first.still_encoding, PROTOCOL_ENCODING_ZSTD);
@@ -354,7 +354,7 @@ TEST(a_job_runs_beside_a_view_and_each_gets_its_own_frames)
 static void tell_refusal(struct daemon *daemon, uint32_t request)
 {
     struct message refusal = {.type = MESSAGE_ERROR};
-    refusal.error.code = PROTOCOL_ERROR_CODE_UNSUPPORTED;
+    refusal.error.code = PROTOCOL_ERROR_UNSUPPORTED;
     refusal.error.field = "tracer";
     refusal.error.text = "not in this build";
     tell(daemon, request, &refusal);

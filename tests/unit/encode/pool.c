@@ -134,8 +134,8 @@ TEST(what_is_attached_lies_behind_the_picture)
         assert_true(encode_pool_submit(fixture.pool, fixture.output, fixture.lane, position, made));
         struct engine_event *event = next(&fixture);
         const struct engine_frame *frame = event->frame;
-        assert_int_equal(frame->depth_bytes > 0, (attachments & ATTACHMENT_DEPTH) != 0);
-        assert_int_equal(frame->normal_bytes > 0, (attachments & ATTACHMENT_NORMALS) != 0);
+        assert_int_equal(frame->depth_bytes > 0, (attachments & 1u << ATTACHMENT_DEPTH) != 0);
+        assert_int_equal(frame->normal_bytes > 0, (attachments & 1u << ATTACHMENT_NORMALS) != 0);
         assert_true(frame->depth_bytes < 200 && frame->normal_bytes < 200); /* planes that are the same all over */
         size_t picture_bytes = frame->size_bytes - frame->depth_bytes - frame->normal_bytes;
         if (frame->encoding == ENCODING_RAW)

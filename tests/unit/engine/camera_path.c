@@ -269,7 +269,7 @@ TEST(an_orbit_turns_about_its_own_up_axis)
 TEST(an_orbit_without_a_key_keeps_the_distance_of_the_automatic_camera)
 {
     struct scene *scene = empty_scene();
-    struct scene_edit disc = {.kind = EDIT_SET, .object = SCENE_DISC};
+    struct scene_edit disc = {.kind = EDIT_SET, .object = OBJECT_DISC};
     disc.set.disc.base.id = 1;
     disc.set.disc.centre_world[0] = 100;
     disc.set.disc.normal_world[1] = 1;
@@ -314,9 +314,9 @@ TEST(a_camera_node_gives_its_place_without_its_scale_or_mirror)
     const float parent[12] = {0, 0, 4, 1, 0, 3, 0, 2, 2, 0, 0, 3},
                 child[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 5};
     struct scene_edit edits[] = {
-        {.kind = EDIT_SET, .object = SCENE_CAMERA},
-        {.kind = EDIT_SET, .object = SCENE_NODE},
-        {.kind = EDIT_SET, .object = SCENE_NODE},
+        {.kind = EDIT_SET, .object = OBJECT_CAMERA},
+        {.kind = EDIT_SET, .object = OBJECT_NODE},
+        {.kind = EDIT_SET, .object = OBJECT_NODE},
     };
     edits[0].set.camera = (struct scene_camera){.base.id = 4, .fov_y = 0.9f, .near = 0.25f};
     edits[1].set.node = (struct scene_node){.base.id = 1};

@@ -12,8 +12,6 @@
 #include <epoxy/gl.h>
 
 #define FRAMES 4
-#define TRACER_BVH 0
-#define TRACER_LDC 3 /* the protocol's numbers */
 
 static struct engine *engine;
 
@@ -144,7 +142,7 @@ static void make_scene(uint64_t client, float radius)
     struct scene_edit *edits = calloc(5, sizeof *edits);
     assert_non_null(edits);
     for (int i = 0; i < 5; i++)
-        edits[i].object = i < 2 ? SCENE_NODE : i == 2 ? SCENE_MESH : i == 3 ? SCENE_SPHERES : SCENE_MATERIAL;
+        edits[i].object = i < 2 ? OBJECT_NODE : i == 2 ? OBJECT_MESH : i == 3 ? OBJECT_SPHERES : OBJECT_MATERIAL;
     for (int i = 0; i < 2; i++) {
         struct scene_node *node = &edits[i].set.node;
         *node = (struct scene_node){.base.id = (uint32_t)i + 1, .kind = i ? NODE_SPHERES : NODE_MESH, .object = 1};
@@ -208,7 +206,7 @@ static void collect(uint64_t digests[2][FRAMES], unsigned jobs)
         if (event->kind == ENGINE_FRAME) {
             unsigned *frame = &next[event->client - 1];
             assert_int_equal(event->frame->frame, *frame);
-            assert_true(stage_times_sum_ns(&event->frame->result.times, STAGE_FRAME, STAGE_CPU) > 0);
+            assert_true(stage_times_sum_ns(&event->frame->result.times, STAGE_FRAME, CLOCK_CPU) > 0);
             assert_int_equal(event->frame->result.revision, 1);
             digests[event->client - 1][(*frame)++] = event->frame->digest;
         } else {
@@ -364,7 +362,7 @@ static void collect_views(struct view_frame frames[VIEWS][FRAMES], uint32_t firs
         jobs -= event->kind == ENGINE_DONE;
         if (event->kind == ENGINE_FRAME) {
             const struct frame_result *result = &event->frame->result;
-            uint64_t frame_ns = stage_times_sum_ns(&result->times, STAGE_FRAME, STAGE_CPU);
+            uint64_t frame_ns = stage_times_sum_ns(&result->times, STAGE_FRAME, CLOCK_CPU);
             frames[view][next[view]++] = (struct view_frame){event->frame->digest, result->times.origin_ns,
                                                              result->times.origin_ns + frame_ns, result->samples};
         }
@@ -553,7 +551,7 @@ static void make_field(uint64_t client)
     make_scene(client, 0.5f);
     struct scene_edit *edits = calloc(1, sizeof *edits);
     assert_non_null(edits);
-    edits[0].object = SCENE_MESH;
+    edits[0].object = OBJECT_MESH;
     struct scene_mesh *mesh = &edits[0].set.mesh;
     *mesh = (struct scene_mesh){
         .base.id = 1, .vertex_count = 3 * FIELD_TRIANGLES, .triangle_count = FIELD_TRIANGLES, .range_count = 1};
@@ -689,7 +687,7 @@ TEST(what_comes_while_a_structure_is_built_leaves_it_right)
     wait_until_held();
     struct scene_edit *edit = calloc(1, sizeof *edit);
     assert_non_null(edit);
-    *edit = (struct scene_edit){.kind = EDIT_REMOVE, .object = SCENE_NODE, .id = 1};
+    *edit = (struct scene_edit){.kind = EDIT_REMOVE, .object = OBJECT_NODE, .id = 1};
     submit((struct engine_command){
         .kind = ENGINE_COMMIT, .client = 1, .request = 15, .scene = 1, .edits = edit, .edit_count = 1});
     atomic_store(&watched.gate, true);

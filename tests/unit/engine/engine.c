@@ -30,10 +30,10 @@ TEST(frames_come_in_order_with_what_they_cost)
         assert_null(got->result.pixels);
         assert_true(got->time_s == (float)((frame - 10) / 24.0));
         assert_true(got->encoded_ns <= clock_now_ns());
-        assert_true(stage_times_sum_ns(&got->result.times, STAGE_FRAME, STAGE_CPU) > 0);
-        assert_true(stage_times_sum_ns(&got->result.times, STAGE_ENCODE, STAGE_CPU) > 0);
+        assert_true(stage_times_sum_ns(&got->result.times, STAGE_FRAME, CLOCK_CPU) > 0);
+        assert_true(stage_times_sum_ns(&got->result.times, STAGE_ENCODE, CLOCK_CPU) > 0);
         /* The commit is reported once. */
-        assert_int_equal(stage_times_sum_ns(&got->result.times, STAGE_APPLY, STAGE_CPU) > 0, frame == 10);
+        assert_int_equal(stage_times_sum_ns(&got->result.times, STAGE_APPLY, CLOCK_CPU) > 0, frame == 10);
         engine_event_destroy(event);
     }
     expect_done(engine, 1, 3);
@@ -49,7 +49,7 @@ TEST(layers_are_encoded_as_one_picture)
     for (uint32_t encoding = ENCODING_RAW; encoding <= ENCODING_ZSTD; encoding++) {
         struct engine_command *made = render(1, 2 + encoding, 0, 0);
         made->job.encoding = (enum encoding)encoding;
-        made->job.frame.format = FRAME_RGBA32F;
+        made->job.frame.format = PIXEL_FORMAT_RGBA32F;
         made->job.frame.layers = layers;
         submit(engine, made);
         struct engine_event *event = expect_frame(engine, 1, 2 + encoding, 0);

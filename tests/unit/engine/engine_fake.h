@@ -61,7 +61,7 @@ static struct {
         frames_abandoned;
     atomic_int fail_steps;      /* the next steps that fail */
     atomic_uint fail_seed;      /* of these, those of frames of that seed; 0: all */
-    atomic_int fail_kind;       /* enum error_kind */
+    atomic_int fail_kind;       /* enum error_code */
     atomic_int fail_from_frame; /* frames from this number on fail; 0: none */
     atomic_bool no_device;
     atomic_bool holds_steps; /* as long as it is set, a step does not end */
@@ -237,7 +237,7 @@ static inline enum frame_progress fake_step(struct frame_renderer *renderer, str
     if ((atomic_load(&fake.fail_steps) > 0 && is_meant) ||
         (fail_from && atomic_load(&fake.frames_begun) >= fail_from)) {
         atomic_fetch_sub(&fake.fail_steps, 1);
-        error_set(error, (enum error_kind)atomic_load(&fake.fail_kind), "fake", "as the test wants");
+        error_set(error, (enum error_code)atomic_load(&fake.fail_kind), "fake", "as the test wants");
         return FRAME_FAILED;
     }
     unsigned let_through = atomic_load(&fake.gate_seed);
@@ -392,7 +392,7 @@ static inline uint64_t expect_done(struct engine *engine, uint64_t client, uint3
     return revision;
 }
 
-static inline void expect_failed(struct engine *engine, uint64_t client, uint32_t request, enum error_kind kind,
+static inline void expect_failed(struct engine *engine, uint64_t client, uint32_t request, enum error_code kind,
                                  const char *field)
 {
     struct engine_event *event = expect_event(engine, ENGINE_FAILED, client, request);

@@ -24,7 +24,7 @@ TEST(jobs_that_cannot_be_are_refused_with_their_field)
     expect_failed(engine, 1, 3, ERROR_INVALID, "render.last_frame");
     made = render(1, 4, 0, 0);
     made->job.encoding = ENCODING_JPEG;
-    made->job.frame.format = FRAME_RGBA16F;
+    made->job.frame.format = PIXEL_FORMAT_RGBA16F;
     submit(engine, made);
     expect_failed(engine, 1, 4, ERROR_UNSUPPORTED, "render.encoding");
     made = render(1, 5, 0, 0);
@@ -285,11 +285,11 @@ TEST(stats_add_up)
     assert_int_equal(stats->scenes[1].nodes, 1);
     assert_int_equal(stats->scenes[1].revision, 1);
     assert_true(stats->host_bytes > 0);
-    assert_int_equal(stats->stages[STAGE_ENCODE][STAGE_CPU].count, 4);
-    assert_int_equal(stats->stages[STAGE_FRAME][STAGE_CPU].count, 4);
-    assert_int_equal(stats->stages[STAGE_SEND][STAGE_CPU].count, 2);
-    assert_int_equal(stats->stages[STAGE_SEND][STAGE_CPU].total_ns, 77);
-    assert_int_equal(stats->stages[STAGE_QUEUE][STAGE_CPU].greatest_ns, 50);
+    assert_int_equal(stats->stages[STAGE_ENCODE][CLOCK_CPU].count, 4);
+    assert_int_equal(stats->stages[STAGE_FRAME][CLOCK_CPU].count, 4);
+    assert_int_equal(stats->stages[STAGE_SEND][CLOCK_CPU].count, 2);
+    assert_int_equal(stats->stages[STAGE_SEND][CLOCK_CPU].total_ns, 77);
+    assert_int_equal(stats->stages[STAGE_QUEUE][CLOCK_CPU].greatest_ns, 50);
     assert_int_equal(stats->scenes[1].instances, 0);
     engine_event_destroy(event);
     /* What a scene holds is counted anew after a transaction. */
@@ -298,7 +298,7 @@ TEST(stats_add_up)
     made->scene = 2;
     made->edits = calloc(2, sizeof *made->edits);
     made->edit_count = 2;
-    made->edits[0].object = SCENE_SPHERES;
+    made->edits[0].object = OBJECT_SPHERES;
     made->edits[0].set.spheres =
         (struct scene_spheres){.base.id = 7, .sphere_count = 1, .centres_radii = blob_create(sizeof sphere)};
     memcpy(made->edits[0].set.spheres.centres_radii->data, sphere, sizeof sphere);

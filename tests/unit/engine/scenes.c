@@ -15,7 +15,7 @@ static uint64_t principal_of(uint64_t client)
 }
 
 static void submit_open(struct engine *engine, uint64_t client, uint32_t request, const char *name,
-                        enum engine_sharing sharing)
+                        enum sharing sharing)
 {
     struct engine_command *made = command(ENGINE_SCENE_OPEN, client, request);
     made->scene = request;
@@ -27,7 +27,7 @@ static void submit_open(struct engine *engine, uint64_t client, uint32_t request
 
 /* A scene has the number of the request that opened it. */
 static void open_as(struct engine *engine, uint64_t client, uint32_t request, const char *name,
-                    enum engine_sharing sharing)
+                    enum sharing sharing)
 {
     submit_open(engine, client, request, name, sharing);
     assert_int_equal(expect_done(engine, client, request), 0);
@@ -294,7 +294,7 @@ TEST(a_cancel_ends_only_what_its_client_waits_for)
 /* ---- lingering --------------------------------------------------------------------------------------- */
 
 /* Opens it, changes it once, and goes. */
-static void leave(struct engine *engine, uint64_t client, const char *name, enum engine_sharing sharing)
+static void leave(struct engine *engine, uint64_t client, const char *name, enum sharing sharing)
 {
     open_as(engine, client, 1, name, sharing);
     submit_commit(engine, client, 2, 1);
@@ -603,7 +603,7 @@ TEST(a_description_names_cameras_and_clips)
     engine_event_destroy(event);
 
     struct draft_list list = {0};
-    add_set(&list, SCENE_CAMERA, 4)->set.camera =
+    add_set(&list, OBJECT_CAMERA, 4)->set.camera =
         (struct scene_camera){.base = {.id = 4, .name = "lens"}, .fov_y = 0.75f};
     strcpy(add_shown(&list, 9, NODE_CAMERA, 4)->base.name, "tower");
     add_shown(&list, 7, NODE_CAMERA, 4);
@@ -646,7 +646,7 @@ TEST(a_description_names_cameras_and_clips)
 
     /* After a change it is another. */
     struct draft_list removal = {0};
-    add_remove(&removal, SCENE_NODE, 9);
+    add_remove(&removal, OBJECT_NODE, 9);
     submit_edits(engine, 5, &removal);
     event = describe(engine, 6);
     assert_int_equal(event->description->revision, 2);
@@ -665,7 +665,7 @@ TEST(of_many_cameras_the_first_are_told)
     while (next > 0) {
         struct draft_list list = {0};
         if (!has_camera)
-            add_set(&list, SCENE_CAMERA, 1)->set.camera = (struct scene_camera){.base.id = 1, .fov_y = 1};
+            add_set(&list, OBJECT_CAMERA, 1)->set.camera = (struct scene_camera){.base.id = 1, .fov_y = 1};
         has_camera = true;
         while (next > 0 && list.count < EDITS_MAX)
             add_shown(&list, next--, NODE_CAMERA, 1);

@@ -15,7 +15,7 @@
 static void add_turning(struct draft_list *list, double degrees)
 {
     add_mesh(list, 1);
-    add_set(list, SCENE_CAMERA, 1)->set.camera.fov_y = 1;
+    add_set(list, OBJECT_CAMERA, 1)->set.camera.fov_y = 1;
     add_node(list, 1, 0);
     add_shown(list, 2, NODE_MESH, 1)->parent = 1;
     add_shown(list, 3, NODE_CAMERA, 1);
@@ -136,7 +136,7 @@ static struct shot shot_at(const struct engine_job *job, const struct scene *sce
     return shot;
 }
 
-static void expect_refused(const struct engine_job *job, const struct scene *scene, enum error_kind kind,
+static void expect_refused(const struct engine_job *job, const struct scene *scene, enum error_code kind,
                            const char *field)
 {
     struct error error = {0};
@@ -228,7 +228,7 @@ TEST(a_lens_is_sharp_where_it_looks)
     }
     /* An orthographic camera has no lens. */
     struct draft_list list = {0};
-    add_set(&list, SCENE_CAMERA, 1)->set.camera.height = 1;
+    add_set(&list, OBJECT_CAMERA, 1)->set.camera.height = 1;
     expect_commit(scene, &list);
     struct engine_job job = job_of(CAMERA_NODE, &use, 1);
     job.frame.aperture = 0.1f;
@@ -345,7 +345,7 @@ TEST(a_view_through_a_camera_of_the_scene_shows_what_a_job_along_it_does)
     }
     static const struct {
         uint32_t node;
-        enum error_kind kind;
+        enum error_code kind;
     } refused[] = {{99, ERROR_UNKNOWN_ID}, {1, ERROR_INVALID}};
     for (size_t i = 0; i < 2; i++) {
         struct error error = {0};
@@ -455,7 +455,7 @@ TEST(a_clip_that_goes_ends_the_job_and_says_which)
     struct engine_command *removal = command(ENGINE_COMMIT, 1, 11);
     removal->edits = calloc(1, sizeof *removal->edits);
     assert_non_null(removal->edits);
-    removal->edits[0] = (struct scene_edit){.kind = EDIT_REMOVE, .object = SCENE_CLIP, .id = 2};
+    removal->edits[0] = (struct scene_edit){.kind = EDIT_REMOVE, .object = OBJECT_CLIP, .id = 2};
     removal->edit_count = 1;
     submit(engine, removal);
     expect_silence(engine);

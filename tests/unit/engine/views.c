@@ -600,7 +600,7 @@ TEST_WITH(a_frame_is_begun_so_that_it_comes_when_the_encoder_is_free, NULL, NULL
     struct engine_event *event = event_create(ENGINE_FRAME, 1, 1);
     event->frame = calloc(1, sizeof *event->frame);
     stage_times_begin(&event->frame->result.times);
-    stage_times_add(&event->frame->result.times, STAGE_ENCODE, STAGE_CPU, 0, 0, 5 * MS);
+    stage_times_add(&event->frame->result.times, STAGE_ENCODE, CLOCK_CPU, 0, 0, 5 * MS);
     job_output_put(job.output, position, event);
     assert_int_equal(view_due_ns(&job), 7 * MS);
     job_output_reserve(job.output);

@@ -279,15 +279,15 @@ TEST(a_timer_reports_each_span_by_both_clocks)
     uint64_t passed_ns = clock_now_ns() - start_ns, last_wave = 0;
     size_t cpu = 0, gpu = 0;
     for (uint32_t i = 0; i < times.count; i++) {
-        cpu += times.spans[i].clock == STAGE_CPU;
-        gpu += times.spans[i].clock == STAGE_GPU;
+        cpu += times.spans[i].clock == CLOCK_CPU;
+        gpu += times.spans[i].clock == CLOCK_GPU;
         last_wave = times.spans[i].wave > last_wave ? times.spans[i].wave : last_wave;
         assert_in_range(times.spans[i].start_ns, 0, passed_ns + 1000000000);
     }
     assert_in_range(cpu, 200, 300);
     assert_in_range(gpu, 200, 300);
     assert_in_range(last_wave, 200, 299);
-    uint64_t sum_ns = stage_times_sum_ns(&times, STAGE_TRACE, STAGE_GPU);
+    uint64_t sum_ns = stage_times_sum_ns(&times, STAGE_TRACE, CLOCK_GPU);
     assert_in_range(sum_ns, 1, passed_ns);
     stage_times_begin(&times);
     gpu_timer_collect(timer, &times); /* nothing since */

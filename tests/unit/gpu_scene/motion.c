@@ -422,7 +422,7 @@ TEST(materials_and_lights_follow_the_first_pose)
     float m[12];
     struct light light;
     fixture_init(&fixture, test_scene_soup());
-    *(&test_add(&fixture.edits, SCENE_LIGHT)->set.light) =
+    *(&test_add(&fixture.edits, OBJECT_LIGHT)->set.light) =
         (struct scene_light){.base.id = 1, .kind = LIGHT_POINT, .colour = {1, 2, 3}};
     test_node(&fixture.edits, 50, 0, NODE_LIGHT, 1, NULL);
     test_commit(&fixture.edits);

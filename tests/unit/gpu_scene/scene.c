@@ -164,8 +164,8 @@ TEST(materials_keep_their_indices)
     test_commit(&fixture.edits);
     update(&fixture);
     for (uint32_t id = 50; id < 60; id++)
-        *test_add(&fixture.edits, SCENE_MATERIAL) =
-            (struct scene_edit){.kind = EDIT_REMOVE, .object = SCENE_MATERIAL, .id = id};
+        *test_add(&fixture.edits, OBJECT_MATERIAL) =
+            (struct scene_edit){.kind = EDIT_REMOVE, .object = OBJECT_MATERIAL, .id = id};
     test_material(&fixture.edits, 70, 0.7f, 0.7f, 0.7f);
     test_commit(&fixture.edits);
     update(&fixture);
@@ -187,7 +187,7 @@ TEST(a_texture_is_halved_in_linear_light_down_to_one_texel)
     static const uint8_t texels[3][2][4] = {
         {{0, 0, 0, 0}, {255, 255, 255, 255}}, {{255, 10, 0, 255}, {0, 10, 0, 0}}, {{0, 0, 0, 0}, {0, 0, 0, 0}}};
     for (uint32_t id = 1; id <= 2; id++) {
-        struct scene_texture *texture = &test_add(&fixture.edits, SCENE_TEXTURE)->set.texture;
+        struct scene_texture *texture = &test_add(&fixture.edits, OBJECT_TEXTURE)->set.texture;
         texture->base.id = id;
         texture->width = 2;
         texture->height = 3;
@@ -217,10 +217,10 @@ TEST(lights_go_along_minus_z_of_their_nodes)
     struct light back[2];
     float m[12];
     fixture_init(&fixture, test_scene_create());
-    struct scene_light *spot = &test_add(&fixture.edits, SCENE_LIGHT)->set.light;
+    struct scene_light *spot = &test_add(&fixture.edits, OBJECT_LIGHT)->set.light;
     *spot = (struct scene_light){
         .base.id = 1, .kind = LIGHT_SPOT, .colour = {1, 2, 3}, .range = 9, .inner_cone = 0.3f, .outer_cone = 0.6f};
-    struct scene_light *rectangle = &test_add(&fixture.edits, SCENE_LIGHT)->set.light;
+    struct scene_light *rectangle = &test_add(&fixture.edits, OBJECT_LIGHT)->set.light;
     *rectangle = (struct scene_light){.base.id = 2, .kind = LIGHT_RECTANGLE, .size = {2, 4}};
     test_transform(m, 2, 2, 2, 1, 1.5707963f, 5, 6, 7); /* z to x */
     test_node(&fixture.edits, 1, 0, NODE_LIGHT, 1, m);
@@ -247,7 +247,7 @@ TEST(an_environment_image_is_there_until_it_is_taken_away)
     struct fixture fixture;
     uint16_t half_floats[2 * 1 * 4] = {0x3c00};
     fixture_init(&fixture, test_scene_create());
-    struct scene_edit *edit = test_add(&fixture.edits, SCENE_NODE);
+    struct scene_edit *edit = test_add(&fixture.edits, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
     edit->set.environment = (struct scene_environment){
         .colour = {1, 1, 1}, .width = 2, .height = 1, .texels = test_blob(half_floats, sizeof(half_floats))};
@@ -255,7 +255,7 @@ TEST(an_environment_image_is_there_until_it_is_taken_away)
     update(&fixture);
     assert_true(fixture.gpu.has_environment_image && (fixture.changes.bits & CHANGED_LIGHTS));
     assert_int_equal(fixture.gpu.environment.width, 2);
-    edit = test_add(&fixture.edits, SCENE_NODE);
+    edit = test_add(&fixture.edits, OBJECT_NODE);
     edit->kind = EDIT_SET_ENVIRONMENT;
     edit->set.environment = (struct scene_environment){.colour = {0.5f, 0.5f, 0.5f}, .rotation = 1};
     test_commit(&fixture.edits);

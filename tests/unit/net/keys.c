@@ -84,12 +84,9 @@ TEST_WITH(what_is_no_key_file_is_refused_by_its_reason, make_folder, remove_fold
         enum protocol_error_code code;
         const char *what;
     } cases[] = {
-        {32, 0640, PROTOCOL_ERROR_CODE_DENIED, "mode 0640"},
-        {32, 0604, PROTOCOL_ERROR_CODE_DENIED, "open to others"},
-        {32, 0602, PROTOCOL_ERROR_CODE_DENIED, "chmod 600"},
-        {31, 0600, PROTOCOL_ERROR_CODE_INVALID, "31 bytes"},
-        {33, 0600, PROTOCOL_ERROR_CODE_INVALID, "33 bytes"},
-        {0, 0600, PROTOCOL_ERROR_CODE_INVALID, "0 bytes"},
+        {32, 0640, PROTOCOL_ERROR_DENIED, "mode 0640"}, {32, 0604, PROTOCOL_ERROR_DENIED, "open to others"},
+        {32, 0602, PROTOCOL_ERROR_DENIED, "chmod 600"}, {31, 0600, PROTOCOL_ERROR_INVALID, "31 bytes"},
+        {33, 0600, PROTOCOL_ERROR_INVALID, "33 bytes"}, {0, 0600, PROTOCOL_ERROR_INVALID, "0 bytes"},
     };
     struct sealed_key key, none = {0};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -107,7 +104,7 @@ TEST_WITH(what_is_no_key_file_is_refused_by_its_reason, make_folder, remove_fold
     assert_false(sealed_key_read(&key, folder, &error));
     error = (struct decode_error){0};
     assert_false(sealed_key_read(&key, other_path, &error));
-    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_INVALID);
+    assert_int_equal(error.code, PROTOCOL_ERROR_INVALID);
     /* Nobody writes to the pipe: that must not be waited for. */
     error = (struct decode_error){0};
     assert_int_equal(mkfifo(other_path, 0600), 0);
@@ -125,7 +122,7 @@ TEST_WITH(a_key_file_of_another_user_is_refused, make_folder, remove_folder)
         skip();
     }
     assert_false(sealed_key_read(&key, path, &error));
-    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_DENIED);
+    assert_int_equal(error.code, PROTOCOL_ERROR_DENIED);
     assert_non_null(strstr(error.text, "another user"));
 }
 

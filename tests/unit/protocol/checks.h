@@ -33,7 +33,7 @@ static inline bool decode_copy(struct message *out, uint16_t type, const uint8_t
         struct message zero;
         memset(&zero, 0, sizeof zero);
         assert_memory_equal(out, &zero, sizeof zero);
-        assert_int_not_equal(error->code, PROTOCOL_ERROR_CODE_NONE);
+        assert_int_not_equal(error->code, PROTOCOL_ERROR_NONE);
         assert_true(error->text[0] != '\0');
         free(copy);
         copy = NULL;

@@ -140,7 +140,7 @@ TEST(every_prefix_of_every_message_is_refused)
                 if (decode_copy(&back, (uint16_t)message.type, encoded, length, &error)) {
                     fail_msg("%s: %zu of %zu bytes were taken", protocol_messages[i].info.name, length, count);
                 }
-                assert_int_equal(error.code, PROTOCOL_ERROR_CODE_PROTOCOL);
+                assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
             }
         }
     }
@@ -156,7 +156,7 @@ TEST(bytes_after_the_last_field_are_refused)
             size_t count = encode_both(&message);
             memset(encoded + count, 0, extra);
             assert_false(decode_copy(&back, (uint16_t)message.type, encoded, count + extra, &error));
-            assert_int_equal(error.code, PROTOCOL_ERROR_CODE_PROTOCOL);
+            assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
             assert_string_equal(error.field, protocol_messages[i].info.name);
         }
     }
@@ -225,7 +225,7 @@ TEST(a_shorter_fixed_part_gets_defaults_and_a_longer_one_is_read_past)
                 encode_fixed_part(&message, fixed_bytes + part, 0);
                 assert_false(decode_copy(&back, desc->info.type, plain.data, plain.count, &error));
                 assert_string_equal(error.field, path);
-                assert_int_equal(error.code, PROTOCOL_ERROR_CODE_PROTOCOL);
+                assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
             }
             memcpy((char *)&expected + MESSAGE_BODY_OFFSET + field->offset,
                    (char *)&message + MESSAGE_BODY_OFFSET + field->offset, size);
@@ -276,7 +276,7 @@ TEST(the_stated_scratch_suffices_and_less_is_refused_safely)
             if (message_decode(&back, (uint16_t)message.type, encoded, count, &scratch, &error)) {
                 assert_true(scratch.used_bytes <= less); /* another alignment may need less */
             } else {
-                assert_int_equal(error.code, PROTOCOL_ERROR_CODE_LIMIT);
+                assert_int_equal(error.code, PROTOCOL_ERROR_LIMIT);
             }
             free(memory);
         }
@@ -295,7 +295,7 @@ TEST(a_buffer_of_any_smaller_size_is_not_written_beyond)
             assert_non_null(memory);
             writer_init(&writer, memory, less);
             assert_false(message_encode(&writer, &message));
-            assert_int_equal(writer.error.code, PROTOCOL_ERROR_CODE_LIMIT);
+            assert_int_equal(writer.error.code, PROTOCOL_ERROR_LIMIT);
             assert_false(writer_put_u8(&writer, 0));
             free(memory);
         }
@@ -329,7 +329,7 @@ TEST(a_message_above_the_control_maximum_is_not_sent)
     message.stats_reply.clients_count = 256;
     writer_init(&writer, large, sizeof large);
     assert_false(message_encode(&writer, &message));
-    assert_int_equal(writer.error.code, PROTOCOL_ERROR_CODE_LIMIT);
+    assert_int_equal(writer.error.code, PROTOCOL_ERROR_LIMIT);
     assert_string_equal(writer.error.field, "stats_reply");
     message.stats_reply.clients_count = 10;
     writer_init(&writer, large, sizeof large);
@@ -345,7 +345,7 @@ TEST(unknown_types_are_neither_sent_nor_decoded)
     assert_false(message_encode(&writer, &message));
     assert_int_equal(message_payload_bytes(&message), 0);
     assert_false(decode_copy(&back, 0x7ffe, encoded, 2, &error));
-    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_PROTOCOL);
+    assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
     assert_string_equal(message_type_text(0x7ffe), "unknown");
     assert_null(message_lookup(0x7ffe));
 }

@@ -100,7 +100,7 @@ TEST(a_message_of_the_wrong_side_is_denied_before_its_payload)
                 assert_int_equal(result, FRAMING_NEED_MORE);
             } else {
                 assert_int_equal(result, FRAMING_FATAL);
-                assert_int_equal(error.code, PROTOCOL_ERROR_CODE_DENIED);
+                assert_int_equal(error.code, PROTOCOL_ERROR_DENIED);
                 assert_string_equal(error.field, "type");
                 assert_non_null(strstr(error.text, info->name));
             }
@@ -118,7 +118,7 @@ static void expect_fatal(const struct framing_header *header, const char *field)
         fail_msg("type 0x%04x, %u bytes, flags %u: %s was taken", header->type, header->payload_bytes,
                  header->flags, field);
     }
-    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_PROTOCOL);
+    assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
     assert_string_equal(error.field, field);
     assert_int_equal(framing_parse(&frame, bytes, sizeof bytes, ACCEPT_ALL, NULL), FRAMING_FATAL);
 }
@@ -196,7 +196,7 @@ TEST(a_message_that_does_not_fit_leaves_the_buffer_as_it_was)
             assert_true(writer_put_u64(&writer, 1));
             assert_false(message_write(&writer, 1, 2, &message));
             assert_int_equal(writer.used_bytes, 8);
-            assert_int_equal(writer.error.code, PROTOCOL_ERROR_CODE_LIMIT);
+            assert_int_equal(writer.error.code, PROTOCOL_ERROR_LIMIT);
             free(memory);
         }
         writer_init(&writer, stream, count);

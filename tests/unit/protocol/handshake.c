@@ -217,7 +217,7 @@ static void expect_fatal_hello(size_t at, uint8_t value, size_t known, const cha
             continue;
         }
         assert_int_equal(result, HANDSHAKE_FATAL);
-        assert_int_equal(error.code, PROTOCOL_ERROR_CODE_PROTOCOL);
+        assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
         assert_string_equal(error.field, field);
         assert_int_equal(consumed, 0);
     }
@@ -241,11 +241,11 @@ TEST(a_version_without_overlap_is_named)
     struct handshake_reply reply = some_reply();
     struct decode_error error = {0};
     assert_int_equal(handshake_choose_version(&hello, &error), HANDSHAKE_VERSION_MAX);
-    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_NONE);
+    assert_int_equal(error.code, PROTOCOL_ERROR_NONE);
     hello.version_min = HANDSHAKE_VERSION_MAX + 1;
     hello.version_max = 900;
     assert_int_equal(handshake_choose_version(&hello, &error), 0);
-    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_VERSION);
+    assert_int_equal(error.code, PROTOCOL_ERROR_VERSION);
     assert_non_null(strstr(error.text, "900"));
     assert_int_equal(handshake_choose_version(&hello, NULL), 0);
 
@@ -253,12 +253,12 @@ TEST(a_version_without_overlap_is_named)
     reply.version = 0;
     memset(&error, 0, sizeof error);
     assert_false(handshake_reply_accept(&hello, &reply, &error));
-    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_VERSION);
+    assert_int_equal(error.code, PROTOCOL_ERROR_VERSION);
     assert_string_equal(error.text, "none in common");
     reply.version = 4; /* 1 to 3 were offered */
     memset(&error, 0, sizeof error);
     assert_false(handshake_reply_accept(&hello, &reply, &error));
-    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_PROTOCOL);
+    assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
     reply.version = 3;
     assert_true(handshake_reply_accept(&hello, &reply, NULL));
 }

@@ -752,7 +752,7 @@ TEST(a_link_takes_little_memory_until_the_peer_is_known)
     memset(space, 'S', bytes);
     sealed_link_came(link, bytes);
     assert_int_equal(sealed_link_handshake(link, &error), SEALED_FATAL);
-    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_PROTOCOL);
+    assert_int_equal(error.code, PROTOCOL_ERROR_PROTOCOL);
     sealed_link_destroy(link);
 }
 

@@ -20,7 +20,7 @@ static void expect_both_refuse(const struct message *message, const char *path, 
             fail_msg("%s: a wrong value was sent", path);
         }
         assert_string_equal(writer.error.field, path);
-        assert_int_equal(writer.error.code, PROTOCOL_ERROR_CODE_INVALID);
+        assert_int_equal(writer.error.code, PROTOCOL_ERROR_INVALID);
         assert_int_equal(writer.used_bytes, 0);
     }
     plain_encode(&plain, message);
@@ -28,7 +28,7 @@ static void expect_both_refuse(const struct message *message, const char *path, 
         fail_msg("%s: a wrong value was taken", path);
     }
     assert_string_equal(error.field, path);
-    assert_int_equal(error.code, PROTOCOL_ERROR_CODE_INVALID);
+    assert_int_equal(error.code, PROTOCOL_ERROR_INVALID);
 }
 
 static void try_wrong_int(const struct message *message, const struct field_desc *field, char *place,

@@ -23,8 +23,8 @@ static struct scene *animated_scene(void)
     add_shown(&list, 3, NODE_MESH, 1)->skin = 1;
     add_targets(add_joints(add_mesh(&list, 1), two_joints, halves), lifts, 2);
     add_skin(&list, 1, (uint32_t[]){1, 2}, 2);
-    add_set(&list, SCENE_LIGHT, 1);
-    add_set(&list, SCENE_MATERIAL, 1);
+    add_set(&list, OBJECT_LIGHT, 1);
+    add_set(&list, OBJECT_MATERIAL, 1);
     add_clip(&list, 1, keys, 8);
     add_channel(&list, 1, 1, CHANNEL_NODE_TRANSLATION, 1, 3, 2);
     add_channel(&list, 2, 1, CHANNEL_LIGHT_COLOUR, 1, 3, 2);
@@ -115,16 +115,16 @@ TEST(skins_clips_and_channels_make_sense_alone)
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 5).joint_count");
     add_skin(&list, 5, joints, 2)->joint_count = 3;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 5).arrays[0] (joints)");
-    add_set(&list, SCENE_SKIN, 5)->set.skin.joint_count = 2;
+    add_set(&list, OBJECT_SKIN, 5)->set.skin.joint_count = 2;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 5).arrays[0] (joints)");
     add_skin(&list, 5, joints, 2)->joint_from_mesh = make_blob(matrices, 48);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 5).arrays[1] (joint_from_mesh)");
     matrices[23] = INFINITY;
     add_skin(&list, 5, joints, 2)->joint_from_mesh = make_blob(matrices, 96);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 5).arrays[1] (joint_from_mesh)");
-    add_set(&list, SCENE_CLIP, 5);
+    add_set(&list, OBJECT_CLIP, 5);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (clip 5).arrays[0] (times and values)");
-    add_set(&list, SCENE_CLIP, 5)->set.clip.floats = make_blob(keys, 7);
+    add_set(&list, OBJECT_CLIP, 5)->set.clip.floats = make_blob(keys, 7);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (clip 5).arrays[0] (times and values)");
     add_clip(&list, 5, (float[]){0, NAN}, 2);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (clip 5).arrays[0] (times and values)");
@@ -167,15 +167,15 @@ TEST(skins_and_channels_refer_to_what_is_there)
         expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (channel 5).object");
     }
     /* What goes in the same transaction is not there. */
-    add_remove(&list, SCENE_NODE, 3);
+    add_remove(&list, OBJECT_NODE, 3);
     add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 3, 3, 2);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[1] (channel 5).object");
-    add_remove(&list, SCENE_NODE, 1); /* with it goes node 2 */
-    add_remove(&list, SCENE_NODE, 3);
+    add_remove(&list, OBJECT_NODE, 1); /* with it goes node 2 */
+    add_remove(&list, OBJECT_NODE, 3);
     add_channel(&list, 5, 1, CHANNEL_NODE_SCALE, 2, 3, 2);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[2] (channel 5).object");
-    add_remove(&list, SCENE_NODE, 1);
-    add_remove(&list, SCENE_NODE, 3);
+    add_remove(&list, OBJECT_NODE, 1);
+    add_remove(&list, OBJECT_NODE, 3);
     add_skin(&list, 1, (uint32_t[]){2}, 1);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[2] (skin 1).arrays[0] (joints)[0]");
     scene_destroy(scene);
@@ -210,10 +210,10 @@ TEST(channels_have_their_numbers_in_their_clips)
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (clip 1).arrays[0] (times and values)");
     add_clip(&list, 1, keys, 4);
     for (uint32_t channel = 1; channel <= 4; channel++)
-        add_remove(&list, SCENE_CHANNEL, channel);
+        add_remove(&list, OBJECT_CHANNEL, channel);
     add_channel(&list, 9, 1, CHANNEL_NODE_SCALE, 1, 3, 1);
     expect_commit(scene, &list);
-    assert_int_equal(scene->objects[SCENE_CHANNEL].count, 1);
+    assert_int_equal(scene->objects[OBJECT_CHANNEL].count, 1);
     scene_destroy(scene);
 }
 
@@ -275,34 +275,34 @@ TEST(what_changes_something_removed_goes_along)
 {
     struct scene *scene = animated_scene();
     struct draft_list list = {0};
-    const struct hashmap *channels = &scene->objects[SCENE_CHANNEL];
-    add_remove(&list, SCENE_LIGHT, 1);
+    const struct hashmap *channels = &scene->objects[OBJECT_CHANNEL];
+    add_remove(&list, OBJECT_LIGHT, 1);
     expect_commit(scene, &list);
     assert_null(hashmap_get(channels, 2));
-    add_remove(&list, SCENE_MATERIAL, 1);
+    add_remove(&list, OBJECT_MATERIAL, 1);
     expect_commit(scene, &list);
     assert_null(hashmap_get(channels, 3));
     assert_int_equal(channels->count, 2);
     /* The joints go, node 2 with the one above it: so do the skin and channel 1, but not while node 3 needs it. */
-    add_remove(&list, SCENE_NODE, 1);
+    add_remove(&list, OBJECT_NODE, 1);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1)");
-    add_remove(&list, SCENE_NODE, 2);
+    add_remove(&list, OBJECT_NODE, 2);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 2)");
-    add_remove(&list, SCENE_NODE, 1);
+    add_remove(&list, OBJECT_NODE, 1);
     add_shown(&list, 3, NODE_MESH, 1)->skin = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (node 1)");
-    add_remove(&list, SCENE_NODE, 1);
+    add_remove(&list, OBJECT_NODE, 1);
     add_shown(&list, 3, NODE_MESH, 1);
     expect_commit(scene, &list);
-    assert_int_equal(scene->objects[SCENE_SKIN].count, 0);
+    assert_int_equal(scene->objects[OBJECT_SKIN].count, 0);
     assert_int_equal(channels->count, 1);
     /* The clip takes the last channel along. */
-    add_remove(&list, SCENE_CLIP, 1);
+    add_remove(&list, OBJECT_CLIP, 1);
     expect_commit(scene, &list);
     assert_int_equal(channels->count, 0);
     /* Nothing is counted that is not there any more. */
-    add_remove(&list, SCENE_NODE, 3);
-    add_remove(&list, SCENE_MESH, 1);
+    add_remove(&list, OBJECT_NODE, 3);
+    add_remove(&list, OBJECT_MESH, 1);
     expect_commit(scene, &list);
     assert_int_equal(scene->host_bytes, 0);
     assert_int_equal(scene->table_bytes, 0);
@@ -313,13 +313,13 @@ TEST(a_skin_in_use_is_not_removed)
 {
     struct scene *scene = animated_scene();
     struct draft_list list = {0};
-    add_remove(&list, SCENE_SKIN, 1);
+    add_remove(&list, OBJECT_SKIN, 1);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (skin 1)");
-    add_remove(&list, SCENE_SKIN, 1);
+    add_remove(&list, OBJECT_SKIN, 1);
     add_shown(&list, 3, NODE_MESH, 1)->skin = 1;
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[1] (node 3).skin");
-    add_remove(&list, SCENE_SKIN, 1);
-    add_remove(&list, SCENE_NODE, 3);
+    add_remove(&list, OBJECT_SKIN, 1);
+    add_remove(&list, OBJECT_NODE, 3);
     expect_commit(scene, &list);
     scene_destroy(scene);
 }
@@ -388,7 +388,7 @@ TEST(revisions_tell_what_moved)
     struct scene before = *scene;
     add_clip(&list, 1, keys, 8);
     add_channel(&list, 9, 1, CHANNEL_NODE_SCALE, 2, 3, 2);
-    add_remove(&list, SCENE_CHANNEL, 2);
+    add_remove(&list, OBJECT_CHANNEL, 2);
     expect_commit(scene, &list);
     assert_int_equal(scene->geometry_revision, before.geometry_revision);
     assert_int_equal(scene->instances_revision, before.instances_revision);

@@ -147,7 +147,7 @@ TEST(targets_are_added_before_joints_move)
     /* A mesh that nothing deforms is as it is given. */
     add_mesh(&list, 1);
     add_shown(&list, 2, NODE_MESH, 1);
-    add_remove(&list, SCENE_NODE, 3);
+    add_remove(&list, OBJECT_NODE, 3);
     expect_commit(scene, &list);
     assert_false(scene_node_deforms(scene_node(scene, 2), scene_mesh(scene, 1)));
     deform(scene, NULL, 2, positions, NULL);

@@ -21,7 +21,7 @@ struct draft_list {
     size_t count;
 };
 
-static inline struct scene_edit *add_set(struct draft_list *list, enum scene_object_kind kind, uint32_t id)
+static inline struct scene_edit *add_set(struct draft_list *list, enum object_kind kind, uint32_t id)
 {
     assert_true(list->count < EDITS_MAX);
     struct scene_edit *edit = &list->edits[list->count++];
@@ -30,7 +30,7 @@ static inline struct scene_edit *add_set(struct draft_list *list, enum scene_obj
     return edit;
 }
 
-static inline void add_remove(struct draft_list *list, enum scene_object_kind kind, uint32_t id)
+static inline void add_remove(struct draft_list *list, enum object_kind kind, uint32_t id)
 {
     assert_true(list->count < EDITS_MAX);
     list->edits[list->count++] = (struct scene_edit){.kind = EDIT_REMOVE, .object = kind, .id = id};
@@ -38,13 +38,13 @@ static inline void add_remove(struct draft_list *list, enum scene_object_kind ki
 
 static inline struct scene_node *add_node(struct draft_list *list, uint32_t id, uint32_t parent)
 {
-    struct scene_node *node = &add_set(list, SCENE_NODE, id)->set.node;
+    struct scene_node *node = &add_set(list, OBJECT_NODE, id)->set.node;
     node->parent = parent;
     node->parent_from_node[0] = node->parent_from_node[5] = node->parent_from_node[10] = 1.0f;
     return node;
 }
 
-static inline struct scene_node *add_shown(struct draft_list *list, uint32_t id, enum scene_node_kind kind,
+static inline struct scene_node *add_shown(struct draft_list *list, uint32_t id, enum node_kind kind,
                                            uint32_t object)
 {
     struct scene_node *node = add_node(list, id, 0);
@@ -67,7 +67,7 @@ static const uint32_t square_indices[6] = {0, 1, 2, 0, 2, 3};
 /* Two triangles. */
 static inline struct scene_mesh *add_mesh(struct draft_list *list, uint32_t id)
 {
-    struct scene_mesh *mesh = &add_set(list, SCENE_MESH, id)->set.mesh;
+    struct scene_mesh *mesh = &add_set(list, OBJECT_MESH, id)->set.mesh;
     mesh->vertex_count = 4;
     mesh->triangle_count = 2;
     mesh->arrays[MESH_POSITIONS] = make_blob(square, sizeof square);
@@ -85,7 +85,7 @@ static inline void add_range(struct scene_mesh *mesh, uint32_t first, uint32_t c
 static inline struct scene_spheres *add_spheres(struct draft_list *list, uint32_t id, const float *numbers,
                                                 uint32_t count)
 {
-    struct scene_spheres *spheres = &add_set(list, SCENE_SPHERES, id)->set.spheres;
+    struct scene_spheres *spheres = &add_set(list, OBJECT_SPHERES, id)->set.spheres;
     spheres->sphere_count = count;
     spheres->centres_radii = make_blob(numbers, count * 16);
     return spheres;
@@ -111,18 +111,18 @@ static inline void expect_commit(struct scene *scene, struct draft_list *list)
 /* What may not change when a transaction is refused. */
 struct snapshot {
     struct scene scene;
-    size_t counts[SCENE_OBJECT_KIND_COUNT];
+    size_t counts[OBJECT_COUNT];
 };
 
 static inline struct snapshot snapshot_of(const struct scene *scene)
 {
     struct snapshot snapshot = {.scene = *scene};
-    for (int kind = 0; kind < SCENE_OBJECT_KIND_COUNT; kind++)
+    for (int kind = 0; kind < OBJECT_COUNT; kind++)
         snapshot.counts[kind] = scene->objects[kind].count;
     return snapshot;
 }
 
-static inline void expect_refusal(struct scene *scene, struct draft_list *list, enum error_kind kind,
+static inline void expect_refusal(struct scene *scene, struct draft_list *list, enum error_code kind,
                                   const char *field)
 {
     struct error error = {0};
@@ -154,7 +154,7 @@ static inline struct scene *new_scene(void)
 static inline struct scene_skin *add_skin(struct draft_list *list, uint32_t id, const uint32_t *joints,
                                           uint32_t count)
 {
-    struct scene_skin *skin = &add_set(list, SCENE_SKIN, id)->set.skin;
+    struct scene_skin *skin = &add_set(list, OBJECT_SKIN, id)->set.skin;
     skin->joint_count = count;
     skin->joints = make_blob(joints, count * sizeof *joints);
     return skin;
@@ -162,7 +162,7 @@ static inline struct scene_skin *add_skin(struct draft_list *list, uint32_t id, 
 
 static inline struct scene_clip *add_clip(struct draft_list *list, uint32_t id, const float *floats, size_t count)
 {
-    struct scene_clip *clip = &add_set(list, SCENE_CLIP, id)->set.clip;
+    struct scene_clip *clip = &add_set(list, OBJECT_CLIP, id)->set.clip;
     clip->floats = make_blob(floats, count * sizeof *floats);
     return clip;
 }
@@ -172,7 +172,7 @@ static inline struct scene_channel *add_channel(struct draft_list *list, uint32_
                                                 enum channel_path path, uint32_t object, uint32_t width,
                                                 uint32_t key_count)
 {
-    struct scene_channel *channel = &add_set(list, SCENE_CHANNEL, id)->set.channel;
+    struct scene_channel *channel = &add_set(list, OBJECT_CHANNEL, id)->set.channel;
     channel->clip = clip;
     channel->path = path;
     channel->object = object;

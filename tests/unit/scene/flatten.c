@@ -36,16 +36,16 @@ static struct scene *scene_with_camera(void)
 {
     struct scene *scene = scene_create("test", NULL);
     assert_non_null(scene);
-    struct scene_edit edit = {.kind = EDIT_SET, .object = SCENE_CAMERA};
+    struct scene_edit edit = {.kind = EDIT_SET, .object = OBJECT_CAMERA};
     edit.set.camera.base.id = 1;
     edit.set.camera.fov_y = 1;
     commit(scene, &edit, 1);
     return scene;
 }
 
-static struct scene_edit node_edit(uint32_t id, uint32_t parent, enum scene_node_kind kind, const float m[12])
+static struct scene_edit node_edit(uint32_t id, uint32_t parent, enum node_kind kind, const float m[12])
 {
-    struct scene_edit edit = {.kind = EDIT_SET, .object = SCENE_NODE};
+    struct scene_edit edit = {.kind = EDIT_SET, .object = OBJECT_NODE};
     edit.set.node.base.id = id;
     edit.set.node.parent = parent;
     edit.set.node.kind = kind;
@@ -203,7 +203,7 @@ TEST(the_bounds_are_those_of_visible_geometry_and_discs_stand_in)
     struct scene *scene = scene_with_camera();
     float lower[3], upper[3];
     assert_false(scene_bounds(scene, NULL, lower, upper));
-    struct scene_edit disc = {.kind = EDIT_SET, .object = SCENE_DISC};
+    struct scene_edit disc = {.kind = EDIT_SET, .object = OBJECT_DISC};
     disc.set.disc.base.id = 1;
     disc.set.disc.normal_world[1] = 1;
     disc.set.disc.radius = 9;
@@ -214,7 +214,7 @@ TEST(the_bounds_are_those_of_visible_geometry_and_discs_stand_in)
     const float moved[12] = {0, -2, 0, 10, 2, 0, 0, 0, 0, 0, 2, 0},
                 far_away[12] = {1, 0, 0, 1e6f, 0, 1, 0, 0, 0, 0, 1, 0};
     struct scene_edit edits[] = {
-        {.kind = EDIT_SET, .object = SCENE_SPHERES},
+        {.kind = EDIT_SET, .object = OBJECT_SPHERES},
         node_edit(1, 0, NODE_SPHERES, moved),
         node_edit(2, 0, NODE_SPHERES, far_away),
     };

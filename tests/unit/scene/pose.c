@@ -226,10 +226,10 @@ TEST(lights_materials_and_the_view_stay_within_what_the_protocol_allows)
     const uint32_t widths[] = {3, 2, 4, 3, 1, 1, 1, 1, 3, 3, 3, 1, 1, 1, 1};
     /* From far below to far above. */
     add_clip(&list, 1, (float[]){0, 2, -3e38f, -3e38f, -3e38f, -3e38f, 3e38f, 3e38f, 3e38f, 3e38f}, 10);
-    struct scene_light *light = &add_set(&list, SCENE_LIGHT, 1)->set.light;
+    struct scene_light *light = &add_set(&list, OBJECT_LIGHT, 1)->set.light;
     light->kind = LIGHT_SPHERE;
     light->size[0] = 1;
-    add_set(&list, SCENE_MATERIAL, 1)->set.material.alpha_cutoff = 0.25f;
+    add_set(&list, OBJECT_MATERIAL, 1)->set.material.alpha_cutoff = 0.25f;
     for (uint32_t i = 0; i < 15; i++) {
         enum channel_path path = i < 2 ? lights[i] : i < 8 ? materials[i - 2] : views[i - 8];
         add_channel(&list, i + 1, 1, path, i < 8, widths[i], 2)->first_value = 6 - widths[i];

@@ -19,8 +19,8 @@ TEST(an_edit_may_refer_to_what_a_later_one_makes)
     add_node(&list, 3, 2);
     add_shown(&list, 2, NODE_MESH, 7);
     add_range(add_mesh(&list, 7), 0, 2, 5);
-    add_set(&list, SCENE_MATERIAL, 5)->set.material.textures[MATERIAL_BASE_COLOUR].texture = 9;
-    struct scene_texture *texture = &add_set(&list, SCENE_TEXTURE, 9)->set.texture;
+    add_set(&list, OBJECT_MATERIAL, 5)->set.material.textures[MATERIAL_BASE_COLOUR].texture = 9;
+    struct scene_texture *texture = &add_set(&list, OBJECT_TEXTURE, 9)->set.texture;
     texture->width = texture->height = 1;
     texture->texels = make_blob("\1\2\3\4", 4);
     expect_commit(scene, &list);
@@ -40,17 +40,17 @@ TEST(the_last_edit_of_an_object_counts)
     add_mesh(&list, 1);
     add_mesh(&list, 1);
     add_mesh(&list, 2);
-    add_remove(&list, SCENE_MESH, 2);
+    add_remove(&list, OBJECT_MESH, 2);
     expect_commit(scene, &list);
-    assert_int_equal(scene->objects[SCENE_MESH].count, 1);
+    assert_int_equal(scene->objects[OBJECT_MESH].count, 1);
     uint64_t one_mesh = scene->host_bytes;
-    add_remove(&list, SCENE_MESH, 1);
+    add_remove(&list, OBJECT_MESH, 1);
     add_mesh(&list, 1);
     expect_commit(scene, &list);
-    assert_int_equal(scene->objects[SCENE_MESH].count, 1);
+    assert_int_equal(scene->objects[OBJECT_MESH].count, 1);
     assert_int_equal(scene_mesh(scene, 1)->base.revision, 2);
     assert_int_equal(scene->host_bytes, one_mesh);
-    add_remove(&list, SCENE_MESH, 1);
+    add_remove(&list, OBJECT_MESH, 1);
     expect_commit(scene, &list);
     assert_int_equal(scene->host_bytes, 0);
     scene_destroy(scene);
@@ -73,9 +73,9 @@ TEST(references_to_nothing_are_refused_and_named)
     add_range(mesh, 0, 1, 0);
     add_range(mesh, 1, 1, 8);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (mesh 3).ranges[1].material");
-    add_set(&list, SCENE_MATERIAL, 6)->set.material.textures[MATERIAL_NORMAL].texture = 2;
+    add_set(&list, OBJECT_MATERIAL, 6)->set.material.textures[MATERIAL_NORMAL].texture = 2;
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (material 6).textures[1].texture");
-    struct scene_disc *disc = &add_set(&list, SCENE_DISC, 1)->set.disc;
+    struct scene_disc *disc = &add_set(&list, OBJECT_DISC, 1)->set.disc;
     disc->material = 5;
     disc->normal_world[1] = disc->radius = 1;
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (disc 1).material");
@@ -90,24 +90,24 @@ TEST(what_is_in_use_is_not_removed)
     struct draft_list list = {0};
     add_shown(&list, 1, NODE_MESH, 7);
     add_range(add_mesh(&list, 7), 0, 2, 5);
-    add_set(&list, SCENE_MATERIAL, 5)->set.material.textures[MATERIAL_BUMP].texture = 9;
-    struct scene_texture *texture = &add_set(&list, SCENE_TEXTURE, 9)->set.texture;
+    add_set(&list, OBJECT_MATERIAL, 5)->set.material.textures[MATERIAL_BUMP].texture = 9;
+    struct scene_texture *texture = &add_set(&list, OBJECT_TEXTURE, 9)->set.texture;
     texture->width = texture->height = 1;
     texture->texels = make_blob("\1\2\3\4", 4);
     expect_commit(scene, &list);
-    add_remove(&list, SCENE_MESH, 7);
+    add_remove(&list, OBJECT_MESH, 7);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 7)");
-    add_remove(&list, SCENE_MATERIAL, 5);
+    add_remove(&list, OBJECT_MATERIAL, 5);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (material 5)");
-    add_remove(&list, SCENE_TEXTURE, 9);
+    add_remove(&list, OBJECT_TEXTURE, 9);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (texture 9)");
-    add_remove(&list, SCENE_LIGHT, 1);
+    add_remove(&list, OBJECT_LIGHT, 1);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[0] (light 1)");
     /* Everything together goes, in any order. */
-    add_remove(&list, SCENE_TEXTURE, 9);
-    add_remove(&list, SCENE_MESH, 7);
-    add_remove(&list, SCENE_NODE, 1);
-    add_remove(&list, SCENE_MATERIAL, 5);
+    add_remove(&list, OBJECT_TEXTURE, 9);
+    add_remove(&list, OBJECT_MESH, 7);
+    add_remove(&list, OBJECT_NODE, 1);
+    add_remove(&list, OBJECT_MATERIAL, 5);
     expect_commit(scene, &list);
     assert_int_equal(scene->host_bytes, 0);
     scene_destroy(scene);
@@ -152,7 +152,7 @@ TEST(arrays_must_fit_their_counts)
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (mesh 1).vertex_count");
     add_spheres(&list, 2, square, 3)->sphere_count = 2;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (spheres 2).arrays[0] (centres and radii)");
-    struct scene_texture *texture = &add_set(&list, SCENE_TEXTURE, 9)->set.texture;
+    struct scene_texture *texture = &add_set(&list, OBJECT_TEXTURE, 9)->set.texture;
     texture->width = texture->height = 65536; /* wraps to 0 in 32 bits */
     texture->texels = make_blob(square, 4);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (texture 9).arrays[0] (texels)");
@@ -234,16 +234,16 @@ TEST(lights_cameras_and_discs_make_sense)
 {
     struct scene *scene = new_scene();
     struct draft_list list = {0};
-    struct scene_light *light = &add_set(&list, SCENE_LIGHT, 1)->set.light;
+    struct scene_light *light = &add_set(&list, OBJECT_LIGHT, 1)->set.light;
     light->kind = LIGHT_SPOT;
     light->inner_cone = 0.5f;
     light->outer_cone = 0.4f;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (light 1).outer_cone");
-    add_set(&list, SCENE_LIGHT, 1)->set.light.kind = LIGHT_RECTANGLE;
+    add_set(&list, OBJECT_LIGHT, 1)->set.light.kind = LIGHT_RECTANGLE;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (light 1).size");
-    add_set(&list, SCENE_CAMERA, 2);
+    add_set(&list, OBJECT_CAMERA, 2);
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (camera 2).height");
-    struct scene_disc *disc = &add_set(&list, SCENE_DISC, 3)->set.disc;
+    struct scene_disc *disc = &add_set(&list, OBJECT_DISC, 3)->set.disc;
     disc->normal_world[0] = 0.99f;
     disc->radius = 1;
     expect_refusal(scene, &list, ERROR_INVALID, "edits[0] (disc 3).normal_world");
@@ -331,22 +331,22 @@ TEST(a_removed_node_takes_along_what_hangs_below_it)
     add_mesh(&list, 1);
     expect_commit(scene, &list);
     /* A new child of what goes is refused, a moved one stays. */
-    add_remove(&list, SCENE_NODE, 2);
+    add_remove(&list, OBJECT_NODE, 2);
     add_node(&list, 6, 3);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[1] (node 6).parent");
-    add_remove(&list, SCENE_NODE, 2);
+    add_remove(&list, OBJECT_NODE, 2);
     add_node(&list, 6, 2);
     expect_refusal(scene, &list, ERROR_UNKNOWN_ID, "edits[1] (node 6).parent");
-    add_remove(&list, SCENE_NODE, 2);
-    add_remove(&list, SCENE_MESH, 1); /* its only user falls with node 2 */
+    add_remove(&list, OBJECT_NODE, 2);
+    add_remove(&list, OBJECT_MESH, 1); /* its only user falls with node 2 */
     expect_commit(scene, &list);
-    assert_int_equal(scene->objects[SCENE_NODE].count, 2);
+    assert_int_equal(scene->objects[OBJECT_NODE].count, 2);
     assert_null(scene_node(scene, 4));
     assert_int_equal(scene_node(scene, 1)->child_count, 1);
     add_node(&list, 5, 0);
-    add_remove(&list, SCENE_NODE, 1);
+    add_remove(&list, OBJECT_NODE, 1);
     expect_commit(scene, &list);
-    assert_int_equal(scene->objects[SCENE_NODE].count, 1);
+    assert_int_equal(scene->objects[OBJECT_NODE].count, 1);
     assert_non_null(scene_node(scene, 5));
     scene_destroy(scene);
 }
@@ -363,7 +363,7 @@ TEST(limits_are_kept_and_reported)
     add_node(&list, 3, 0);
     expect_refusal(scene, &list, ERROR_LIMIT, "edits");
     add_node(&list, 3, 0);
-    add_remove(&list, SCENE_NODE, 1);
+    add_remove(&list, OBJECT_NODE, 1);
     expect_commit(scene, &list);
     const float spheres[4 * 60] = {[3] = 1};
     float numbers[4 * 60];
@@ -415,9 +415,9 @@ TEST(revisions_tell_what_a_transaction_touched)
     struct scene *scene = new_scene();
     struct draft_list list = {0};
     add_mesh(&list, 1);
-    add_set(&list, SCENE_LIGHT, 1);
-    add_set(&list, SCENE_CAMERA, 1)->set.camera.fov_y = 1;
-    add_set(&list, SCENE_MATERIAL, 1);
+    add_set(&list, OBJECT_LIGHT, 1);
+    add_set(&list, OBJECT_CAMERA, 1)->set.camera.fov_y = 1;
+    add_set(&list, OBJECT_MATERIAL, 1);
     add_shown(&list, 1, NODE_MESH, 1);
     add_shown(&list, 2, NODE_LIGHT, 1);
     add_shown(&list, 3, NODE_CAMERA, 1);
@@ -440,7 +440,7 @@ TEST(revisions_tell_what_a_transaction_touched)
     add_node(&list, 4, 0); /* others hang below it */
     expect_commit(scene, &list);
     expect_touched(scene, (struct revisions){.instances = 1, .lights = 1});
-    add_set(&list, SCENE_MATERIAL, 1);
+    add_set(&list, OBJECT_MATERIAL, 1);
     expect_commit(scene, &list);
     expect_touched(scene, (struct revisions){.shading = 1});
     list.edits[0] = (struct scene_edit){.kind = EDIT_SET_ENVIRONMENT};
@@ -448,7 +448,7 @@ TEST(revisions_tell_what_a_transaction_touched)
     expect_commit(scene, &list);
     expect_touched(scene, (struct revisions){.lights = 1});
     assert_int_equal(scene->environment.revision, scene->revision);
-    add_remove(&list, SCENE_NODE, 1);
+    add_remove(&list, OBJECT_NODE, 1);
     expect_commit(scene, &list);
     expect_touched(scene, (struct revisions){.instances = 1});
     scene_destroy(scene);
@@ -461,7 +461,7 @@ TEST(a_mesh_of_871_thousand_triangles_is_checked)
     const uint32_t triangles = 871414, vertices = 437645;
     struct scene *scene = new_scene();
     struct draft_list list = {0};
-    struct scene_mesh *mesh = &add_set(&list, SCENE_MESH, 1)->set.mesh;
+    struct scene_mesh *mesh = &add_set(&list, OBJECT_MESH, 1)->set.mesh;
     mesh->vertex_count = vertices;
     mesh->triangle_count = triangles;
     mesh->arrays[MESH_POSITIONS] = blob_create(vertices * 12ul);

@@ -65,12 +65,12 @@ SESSION_TEST(a_failed_transaction_has_one_answer_and_what_follows_it_is_skipped)
     begin_edit(2, 9); /* no such scene */
     send_node(2, 1);
     commit(2);
-    expect_error(2, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    expect_error(2, PROTOCOL_ERROR_UNKNOWN_ID);
     begin_edit(3, 1);
     for (uint32_t node = 1; node <= 12; node++) /* two more than fit */
         send_node(3, node);
     commit(3);
-    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(3, PROTOCOL_ERROR_LIMIT);
     expect_alive(4);
     begin_edit(3, 1); /* the number is free again */
     send_node(3, 1);
@@ -89,7 +89,7 @@ SESSION_TEST(edits_count_until_their_transaction_is_answered)
     commit(2);
     begin_edit(3, 1);
     send_node(3, 11);
-    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(3, PROTOCOL_ERROR_LIMIT);
     assert_string_not_equal(client.message.error.remedy, "");
     release_commit();
     expect(MESSAGE_OK, 2);
@@ -113,7 +113,7 @@ SESSION_TEST(edits_take_no_more_memory_than_the_limit)
     send_message(2, 0, &message);
     begin_edit(3, 1);
     send_message(3, 0, &message);
-    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(3, PROTOCOL_ERROR_LIMIT);
     assert_non_null(strstr(client.message.error.remedy, "memory.transactions"));
     commit(2);
     expect(MESSAGE_OK, 2);
@@ -133,7 +133,7 @@ SESSION_TEST(a_mesh_with_a_blob_that_is_not_held_names_it)
     message.set_mesh.arrays = &reference;
     message.set_mesh.arrays_count = 1;
     send_message(2, 0, &message);
-    expect_error(2, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    expect_error(2, PROTOCOL_ERROR_UNKNOWN_ID);
     assert_non_null(strstr(client.message.error.text, "abcd0000"));
     assert_string_equal(client.message.error.field, "set_mesh 5.arrays[0]");
 }
@@ -158,11 +158,11 @@ SESSION_TEST(a_blob_with_another_hash_is_refused_and_can_be_sent_again)
     struct record_blob_ref reference = reference_to(data, sizeof data);
     assert_int_equal(offer(1, reference), 1);
     send_piece(2, &reference, wrong, 0, 1000);
-    expect_error(2, PROTOCOL_ERROR_CODE_HASH_MISMATCH);
+    expect_error(2, PROTOCOL_ERROR_HASH_MISMATCH);
     send_piece(3, &reference, data, 0, 500);
     send_piece(3, &reference, data, 400, 500); /* not where it belongs */
     send_piece(3, &reference, data, 500, 500); /* of a request that has its answer */
-    expect_error(3, PROTOCOL_ERROR_CODE_INVALID);
+    expect_error(3, PROTOCOL_ERROR_INVALID);
     send_piece(4, &reference, data, 0, 500);
     send_piece(4, &reference, data, 500, 500);
     expect(MESSAGE_OK, 4);
@@ -177,7 +177,7 @@ SESSION_TEST(a_size_that_is_only_declared_takes_no_room_from_others)
     send_piece(2, &large, data, 0, 8);
     assert_int_equal(offer(3, beyond), 1);
     send_piece(4, &beyond, data, 0, 8);
-    expect_error(4, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(4, PROTOCOL_ERROR_LIMIT);
     struct record_blob_ref whole = reference_to(data, sizeof data);
     assert_int_equal(offer(5, whole), 1);
     for (size_t offset = 0; offset < sizeof data; offset += 131072) {
@@ -215,7 +215,7 @@ SESSION_TEST(blob_data_on_another_channel_ends_the_connection)
     message.blob_data.data_bytes = sizeof data;
     memcpy(message.blob_data.hash, reference.hash, sizeof reference.hash);
     send_message(2, 7, &message);
-    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect_error(0, PROTOCOL_ERROR_PROTOCOL);
     expect(MESSAGE_GOODBYE, 0);
     expect_end();
 }
@@ -237,7 +237,7 @@ static void send_skinned(uint32_t request, struct record_blob_ref *joints_and_ma
     struct record_morph_weight weights[] = {{0.25f}, {-4}};
     struct message message = made(MESSAGE_SET_NODE);
     message.set_node.node = 7;
-    message.set_node.kind = PROTOCOL_NODE_KIND_MESH;
+    message.set_node.kind = PROTOCOL_NODE_MESH;
     message.set_node.object = 3;
     message.set_node.skin = 5;
     message.set_node.weights = weights;
@@ -267,7 +267,7 @@ static void send_skinned(uint32_t request, struct record_blob_ref *joints_and_ma
     message.set_channel = (struct message_set_channel){
         .channel = 8,
         .clip = 6,
-        .path = PROTOCOL_CHANNEL_PATH_LIGHT_SIZE,
+        .path = PROTOCOL_CHANNEL_LIGHT_SIZE,
         .object = 9,
         .interpolation = PROTOCOL_INTERPOLATION_BEZIER,
         .width = 2,
@@ -294,21 +294,21 @@ SESSION_TEST(skins_clips_and_channels_become_edits)
         usleep(1000);
     assert_int_equal(kept->edit_count, 5);
     const struct scene_node *node = &kept->edits[0].set.node;
-    assert_true(kept->edits[0].object == SCENE_NODE && node->skin == 5 && node->weight_count == 2);
+    assert_true(kept->edits[0].object == OBJECT_NODE && node->skin == 5 && node->weight_count == 2);
     assert_true(node->weights[0] == 0.25f && node->weights[1] == -4.0f);
     const struct scene_mesh *mesh = &kept->edits[1].set.mesh;
     assert_true(mesh->influence_count == 4 && mesh->target_count == 2);
     assert_true(mesh->weight_count == 1 && mesh->weights[0] == -4.0f);
     const struct scene_skin *skin = &kept->edits[2].set.skin;
-    assert_true(kept->edits[2].object == SCENE_SKIN && skin->base.id == 5 && skin->joint_count == 1);
+    assert_true(kept->edits[2].object == OBJECT_SKIN && skin->base.id == 5 && skin->joint_count == 1);
     assert_string_equal(skin->base.name, "bones");
     assert_memory_equal(skin->joints->data, &joint, 4);
     assert_memory_equal(skin->joint_from_mesh->data, matrix, sizeof matrix);
     const struct scene_clip *clip = &kept->edits[3].set.clip;
-    assert_true(kept->edits[3].object == SCENE_CLIP && clip->base.id == 6);
+    assert_true(kept->edits[3].object == OBJECT_CLIP && clip->base.id == 6);
     assert_memory_equal(clip->floats->data, numbers, sizeof numbers);
     const struct scene_channel *channel = &kept->edits[4].set.channel;
-    assert_true(kept->edits[4].object == SCENE_CHANNEL && channel->base.id == 8 && channel->clip == 6);
+    assert_true(kept->edits[4].object == OBJECT_CHANNEL && channel->base.id == 8 && channel->clip == 6);
     assert_true(channel->path == CHANNEL_LIGHT_SIZE && channel->object == 9);
     assert_true(channel->interpolation == INTERPOLATION_BEZIER && channel->width == 2);
     assert_true(channel->key_count == 1 && channel->first_time == 1 && channel->first_value == 2);
@@ -322,7 +322,7 @@ SESSION_TEST(skins_clips_and_channels_become_edits)
     message.set_skin.arrays = joints_and_matrices;
     message.set_skin.arrays_count = 2;
     send_message(3, 0, &message);
-    expect_error(3, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    expect_error(3, PROTOCOL_ERROR_UNKNOWN_ID);
     assert_string_equal(client.message.error.field, "set_skin 5.arrays[1]");
 }
 
@@ -343,5 +343,5 @@ SESSION_TEST(weights_count_as_memory_of_a_transaction)
         message.set_node.weights_count = 1024;
         send_message(2, 0, &message);
     }
-    expect_error(2, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(2, PROTOCOL_ERROR_LIMIT);
 }

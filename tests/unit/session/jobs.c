@@ -62,7 +62,7 @@ SESSION_TEST(a_cancelled_job_has_one_answer_and_nothing_follows_it)
     message = made(MESSAGE_CANCEL);
     message.cancel.target_request = 2;
     send_message(3, 0, &message);
-    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect_error(2, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 3);
     send_message(4, 0, &message); /* it is gone already */
     expect(MESSAGE_OK, 4);
@@ -122,25 +122,25 @@ SESSION_TEST(a_job_that_cannot_be_is_refused_by_its_field)
     struct message message = render_message(0, 1);
     message.render.scene = 3;
     send_message(2, 0, &message);
-    expect_error(2, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    expect_error(2, PROTOCOL_ERROR_UNKNOWN_ID);
     message = render_message(0, 1);
     message.render.width = 1024;
     send_message(3, 0, &message);
-    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(3, PROTOCOL_ERROR_LIMIT);
     message = render_message(0, 1);
     message.render.first_frame = 1;
     send_message(4, 0, &message);
-    expect_error(4, PROTOCOL_ERROR_CODE_INVALID);
+    expect_error(4, PROTOCOL_ERROR_INVALID);
     assert_string_equal(client.message.error.field, "render.last_frame");
     message = render_message(0, 1);
     message.render.encoding = PROTOCOL_ENCODING_JPEG;
     message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA32F;
     send_message(5, 0, &message);
-    expect_error(5, PROTOCOL_ERROR_CODE_UNSUPPORTED);
+    expect_error(5, PROTOCOL_ERROR_UNSUPPORTED);
     message = render_message(0, 1);
-    message.render.camera_path = PROTOCOL_CAMERA_PATH_KEYS;
+    message.render.camera_path = PROTOCOL_CAMERA_KEYS;
     send_message(6, 0, &message);
-    expect_error(6, PROTOCOL_ERROR_CODE_INVALID);
+    expect_error(6, PROTOCOL_ERROR_INVALID);
 }
 
 /* The encoder would not let a wrong setting pass. */
@@ -169,7 +169,7 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
     message.render.aperture = 0.125f;
     message.render.focus = 7;
     message.render.shutter = 0.5f;
-    message.render.pixel_filter = PROTOCOL_PIXEL_FILTER_TENT;
+    message.render.pixel_filter = PROTOCOL_FILTER_TENT;
     message.render.settings.bvh.rays = 3;
     message.render.accumulate = 1;
     send_message(2, 0, &message);
@@ -191,7 +191,7 @@ SESSION_TEST(a_job_takes_its_clips_and_its_lens_along)
         message = render_message(0, 1);
         message.render.settings.bvh.rays = not_walked[i];
         send_unchecked(3 + i, &message);
-        expect_error(3 + i, PROTOCOL_ERROR_CODE_INVALID);
+        expect_error(3 + i, PROTOCOL_ERROR_INVALID);
         assert_string_equal(client.message.error.field, "render.bvh_rays");
     }
 }
@@ -256,13 +256,12 @@ SESSION_TEST(layers_that_pixels_or_messages_do_not_hold_are_refused)
         enum protocol_error_code code;
         const char *remedy;
     } cases[] = {
-        {3, 16, PROTOCOL_PIXEL_FORMAT_RGBA8, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_CODE_UNSUPPORTED, "rgba32f"},
-        {2, 16, PROTOCOL_PIXEL_FORMAT_RGBA16F, PROTOCOL_ENCODING_ZSTD, PROTOCOL_ERROR_CODE_UNSUPPORTED, "rgba32f"},
-        {64, 16, PROTOCOL_PIXEL_FORMAT_RGBA8, PROTOCOL_ENCODING_JPEG, PROTOCOL_ERROR_CODE_UNSUPPORTED, "zstd"},
-        {2, 16, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_JPEG, PROTOCOL_ERROR_CODE_UNSUPPORTED, "zstd"},
+        {3, 16, PROTOCOL_PIXEL_FORMAT_RGBA8, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_UNSUPPORTED, "rgba32f"},
+        {2, 16, PROTOCOL_PIXEL_FORMAT_RGBA16F, PROTOCOL_ENCODING_ZSTD, PROTOCOL_ERROR_UNSUPPORTED, "rgba32f"},
+        {64, 16, PROTOCOL_PIXEL_FORMAT_RGBA8, PROTOCOL_ENCODING_JPEG, PROTOCOL_ERROR_UNSUPPORTED, "zstd"},
+        {2, 16, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_JPEG, PROTOCOL_ERROR_UNSUPPORTED, "zstd"},
         /* 8192 x 8192 x 16 bytes are 1 GiB */
-        {15, 8192, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_CODE_LIMIT,
-         "fewer layers"},
+        {15, 8192, PROTOCOL_PIXEL_FORMAT_RGBA32F, PROTOCOL_ENCODING_RAW, PROTOCOL_ERROR_LIMIT, "fewer layers"},
     };
     open_scene(1, 1);
     for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -298,7 +297,7 @@ SESSION_TEST(settings_that_no_cube_has_are_refused_by_their_field)
         message.render.settings.ldc.block = cases[i].block;
         message.render.settings.ldc.rays = cases[i].rays;
         send_unchecked(2 + i, &message);
-        expect_error(2 + i, PROTOCOL_ERROR_CODE_INVALID);
+        expect_error(2 + i, PROTOCOL_ERROR_INVALID);
         assert_string_equal(client.message.error.field, cases[i].field);
         assert_non_null(strstr(client.message.error.text, cases[i].allowed));
     }
@@ -306,7 +305,7 @@ SESSION_TEST(settings_that_no_cube_has_are_refused_by_their_field)
     message.render.settings.ldc.levels = PROTOCOL_LDC_LEVELS_CELLS;
     message.render.settings.ldc.tolerance = 0.5f;
     send_message(20, 0, &message);
-    expect_error(20, PROTOCOL_ERROR_CODE_INVALID);
+    expect_error(20, PROTOCOL_ERROR_INVALID);
     assert_string_equal(client.message.error.field, "render.ldc_levels");
 }
 
@@ -336,7 +335,7 @@ SESSION_TEST(settings_of_a_buffers_and_light_go_to_the_engine)
     assert_int_equal(request->tracer_options.abuffer.search, ABUFFER_SEARCH_LINEAR1);
     assert_int_equal(request->tracer_options.limits.abuffer_mebibytes, 1);
     assert_int_equal(request->integrator, INTEGRATOR_PATH);
-    assert_int_equal(request->brdf, FRAME_BRDF_WARD);
+    assert_int_equal(request->brdf, BRDF_WARD);
     assert_true(request->ao_distance == 2 && request->ao_falloff == 0.5f && request->layer_opacity == 0.75f);
     assert_int_equal(request->ao_rays, 256);
     assert_int_equal(request->layers, message.render.layers);
@@ -360,7 +359,7 @@ SESSION_TEST(settings_that_no_a_buffer_has_are_refused_by_their_field)
         message.render.settings.abuffer.resolution = cases[i].resolution;
         message.render.settings.abuffer.voxels = cases[i].voxels;
         send_unchecked(2 + i, &message);
-        expect_error(2 + i, PROTOCOL_ERROR_CODE_INVALID);
+        expect_error(2 + i, PROTOCOL_ERROR_INVALID);
         assert_string_equal(client.message.error.field, cases[i].field);
         assert_non_null(strstr(client.message.error.text, cases[i].allowed));
     }
@@ -381,7 +380,7 @@ SESSION_TEST(layers_count_as_pictures_in_the_memory_for_frames)
         message.render.layers = request == 4 ? 127 : 0;
         send_message(request, 0, &message);
     }
-    expect_error(4, PROTOCOL_ERROR_CODE_BUSY);
+    expect_error(4, PROTOCOL_ERROR_BUSY);
     expect_alive(6);
 }
 
@@ -421,13 +420,13 @@ SESSION_TEST(a_job_whose_frames_have_no_room_waits_for_others_to_end)
     send_message(2, 0, &message);
     message.render.channel = 3;
     send_message(3, 0, &message);
-    expect_error(3, PROTOCOL_ERROR_CODE_BUSY);
+    expect_error(3, PROTOCOL_ERROR_BUSY);
     assert_int_equal(client.message.error.retryable, 1);
     assert_non_null(strstr(client.message.error.remedy, "memory.frames"));
     message = made(MESSAGE_CANCEL);
     message.cancel.target_request = 2;
     send_message(4, 0, &message);
-    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect_error(2, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 4);
     message = render_message(0, 1);
     message.render.width = message.render.height = 512;
@@ -437,7 +436,7 @@ SESSION_TEST(a_job_whose_frames_have_no_room_waits_for_others_to_end)
     message = made(MESSAGE_CANCEL);
     message.cancel.target_request = 5;
     send_message(6, 0, &message);
-    expect_error(5, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect_error(5, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 6);
     assert_int_equal(served.hub.frame_bytes, 0);
 }

@@ -26,7 +26,7 @@ static void expect_served(struct client *client)
 
 static void expect_limit(struct client *client, uint32_t request, const char *field, const char *option)
 {
-    expect_error(client, request, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(client, request, PROTOCOL_ERROR_LIMIT);
     assert_string_equal(client->message.error.field, field);
     if (!strstr(client->message.error.remedy, option))
         fail_msg("\"%s\" does not name %s", client->message.error.remedy, option);
@@ -301,7 +301,7 @@ TEST(a_message_may_be_slow_but_not_slower_than_the_limit)
     }
     assert_true(clock_now_ns() - begun_ns > 3 * 200 * UINT64_C(1000000));
     expect_ok(within, 2);
-    expect_error(slower, 0, PROTOCOL_ERROR_CODE_TIMEOUT);
+    expect_error(slower, 0, PROTOCOL_ERROR_TIMEOUT);
     assert_non_null(strstr(slower->message.error.text, "at less than 300 bytes a second"));
     expect(slower, MESSAGE_GOODBYE, 0);
     expect_served(within);
@@ -507,7 +507,7 @@ TEST(upload_credit_limits_what_is_sent_ahead)
     assert_int_equal(client->upload_credit, 2000);
     assert_int_equal(offer(client, 3, more), 1);
     send_blob(client, 4, &more, data);
-    expect_error(client, 0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect_error(client, 0, PROTOCOL_ERROR_PROTOCOL);
     assert_string_equal(client->message.error.field, "blob_data");
     assert_non_null(strstr(client->message.error.text, "credit"));
     expect(client, MESSAGE_GOODBYE, 0);

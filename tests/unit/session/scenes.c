@@ -76,7 +76,7 @@ static void commit_sphere(struct client *client, uint32_t scene)
     send_message(client, 3, 0, &message);
     message = made(MESSAGE_SET_NODE);
     message.set_node.node = 1;
-    message.set_node.kind = PROTOCOL_NODE_KIND_SPHERES;
+    message.set_node.kind = PROTOCOL_NODE_SPHERES;
     message.set_node.object = 1;
     for (int axis = 0; axis < 3; axis++)
         message.set_node.parent_from_node[5 * axis] = 1;
@@ -140,7 +140,7 @@ TEST(a_view_at_rest_shows_what_another_client_changes)
     commit_sphere(one, 1);
     attach(other, 7, "model");
     struct message message = made(MESSAGE_RENDER);
-    message.render.kind = PROTOCOL_JOB_KIND_VIEW;
+    message.render.kind = PROTOCOL_JOB_VIEW;
     message.render.scene = 7;
     message.render.channel = 20;
     message.render.credit = 1000;
@@ -195,7 +195,7 @@ TEST(contents_of_a_scene_are_reported)
                     told->upper_world[axis] == sphere[axis] + 0.5f);
     message.scene_describe.scene = 5;
     send_message(other, 6, 0, &message);
-    expect_error(other, 6, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    expect_error(other, 6, PROTOCOL_ERROR_UNKNOWN_ID);
     assert_string_equal(other->message.error.field, "scene_describe.scene");
 
     message = made(MESSAGE_SCENE_LIST);
@@ -218,15 +218,15 @@ TEST(scenes_that_cannot_be_attached_are_refused_by_field)
     struct client *one = come(false), *other = come(true);
     open_scene_as(one, 1, "kept", PROTOCOL_SHARING_KEPT);
     submit_attach(other, 1, "kept");
-    expect_error(other, 101, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    expect_error(other, 101, PROTOCOL_ERROR_UNKNOWN_ID);
     assert_string_equal(other->message.error.field, "scene_attach.name");
     attach(one, 2, "kept");
     submit_attach(one, 2, "kept");
-    expect_error(one, 102, PROTOCOL_ERROR_CODE_INVALID);
+    expect_error(one, 102, PROTOCOL_ERROR_INVALID);
     assert_string_equal(one->message.error.field, "scene_attach.scene");
     open_scene_as(one, 3, "", PROTOCOL_SHARING_PRIVATE);
     submit_attach(one, 4, "kept");
-    expect_error(one, 104, PROTOCOL_ERROR_CODE_LIMIT); /* attached ones count as well */
+    expect_error(one, 104, PROTOCOL_ERROR_LIMIT); /* attached ones count as well */
     /* The number of one that failed is free. */
     open_scene_as(other, 1, "", PROTOCOL_SHARING_PRIVATE);
     cut(one, NULL);
@@ -301,7 +301,7 @@ TEST_WITH(lingering_scenes_are_evicted_for_blobs, set_up_with_few_blobs, tear_do
     cut(one, witness);
     assert_int_equal(offer(witness, 1, references[1]), 1);
     send_blob(witness, 2, &references[1], spheres[1]);
-    expect_error(witness, 2, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(witness, 2, PROTOCOL_ERROR_LIMIT);
     assert_int_equal(witness->message.error.retryable, 1);
     /* The scene ends, and trying again does it; how soon is not said. */
     for (int tries = 0;; tries++) {
@@ -316,7 +316,7 @@ TEST_WITH(lingering_scenes_are_evicted_for_blobs, set_up_with_few_blobs, tear_do
         usleep(1000);
     }
     submit_attach(witness, 1, "shared");
-    expect_error(witness, 101, PROTOCOL_ERROR_CODE_UNKNOWN_ID);
+    expect_error(witness, 101, PROTOCOL_ERROR_UNKNOWN_ID);
     cut(witness, NULL);
 }
 
@@ -385,16 +385,16 @@ TEST_WITH(a_reader_looks_and_changes_nothing, set_up_for_readers, tear_down)
     assert_int_equal(render_frame(reader, 20, 1), 1);
 
     submit_open(reader, 2, "", PROTOCOL_SHARING_PRIVATE);
-    expect_error(reader, 102, PROTOCOL_ERROR_CODE_DENIED);
+    expect_error(reader, 102, PROTOCOL_ERROR_DENIED);
     assert_true(reader->message.error.remedy[0] != '\0');
     struct record_blob_ref reference = reference_to(sphere, sizeof sphere);
     struct message message = made(MESSAGE_BLOB_OFFER);
     message.blob_offer.blobs = &reference;
     message.blob_offer.blobs_count = 1;
     send_message(reader, 21, 0, &message);
-    expect_error(reader, 21, PROTOCOL_ERROR_CODE_DENIED);
+    expect_error(reader, 21, PROTOCOL_ERROR_DENIED);
     send_blob(reader, 22, &reference, sphere);
-    expect_error(reader, 22, PROTOCOL_ERROR_CODE_DENIED);
+    expect_error(reader, 22, PROTOCOL_ERROR_DENIED);
     /* One answer to a whole transaction, whose edits are on their way when it is refused. */
     message = made(MESSAGE_EDIT_BEGIN);
     message.edit_begin.scene = 1;
@@ -404,7 +404,7 @@ TEST_WITH(a_reader_looks_and_changes_nothing, set_up_for_readers, tear_down)
     send_message(reader, 23, 0, &message);
     message = made(MESSAGE_EDIT_COMMIT);
     send_message(reader, 23, 0, &message);
-    expect_error(reader, 23, PROTOCOL_ERROR_CODE_DENIED);
+    expect_error(reader, 23, PROTOCOL_ERROR_DENIED);
     assert_int_equal(render_frame(reader, 24, 1), 1); /* as before */
     cut(reader, NULL);
     cut(writer, NULL);

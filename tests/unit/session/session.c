@@ -85,7 +85,7 @@ SESSION_TEST(garbage_is_answered_by_an_error_and_closes_the_connection)
     uint8_t bytes[64];
     memset(bytes, 0xff, sizeof bytes);
     send_bytes(bytes, sizeof bytes);
-    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect_error(0, PROTOCOL_ERROR_PROTOCOL);
     expect(MESSAGE_GOODBYE, 0);
     expect_end();
 }
@@ -95,7 +95,7 @@ SESSION_TEST(a_request_number_in_flight_cannot_be_used_again)
     open_scene(1, 1);
     begin_edit(2, 1);
     begin_edit(2, 1);
-    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect_error(0, PROTOCOL_ERROR_PROTOCOL);
     expect(MESSAGE_GOODBYE, 0);
     expect_end();
 }
@@ -106,7 +106,7 @@ SESSION_TEST(the_65th_request_in_flight_is_refused_and_can_be_retried)
     for (uint32_t request = 2; request <= 65; request++)
         begin_edit(request, 1);
     begin_edit(66, 1);
-    expect_error(66, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(66, PROTOCOL_ERROR_LIMIT);
     assert_int_equal(client.message.error.retryable, 1);
     send_node(66, 1);
     commit(66);
@@ -169,7 +169,7 @@ TEST(a_client_with_an_unfinished_message_is_disconnected)
     framing_header_encode(header,
                           &(struct framing_header){.type = MESSAGE_PING, .payload_bytes = 10, .request = 1});
     send_bytes(header, sizeof header);
-    expect_error(0, PROTOCOL_ERROR_CODE_TIMEOUT);
+    expect_error(0, PROTOCOL_ERROR_TIMEOUT);
     expect(MESSAGE_GOODBYE, 0);
     expect_closed_within_5_s();
 }
@@ -219,9 +219,9 @@ TEST(a_silent_client_is_disconnected_unless_it_waits)
     message = made(MESSAGE_CANCEL);
     message.cancel.target_request = 2;
     send_message(4, 0, &message);
-    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect_error(2, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 4);
-    expect_error(0, PROTOCOL_ERROR_CODE_TIMEOUT);
+    expect_error(0, PROTOCOL_ERROR_TIMEOUT);
     expect(MESSAGE_GOODBYE, 0);
     expect_closed_within_5_s();
 }
@@ -272,7 +272,7 @@ TEST(a_changed_record_is_reported_and_closes_the_connection)
     greet();
     uint8_t record[21] = {17};
     send_plainly(record, sizeof record);
-    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect_error(0, PROTOCOL_ERROR_PROTOCOL);
     assert_string_equal(client.message.error.field, "record");
     expect(MESSAGE_GOODBYE, 0);
     expect_end();

@@ -23,7 +23,7 @@ static struct {
     atomic_uint gone;
 } engine;
 
-static void say(enum engine_event_kind kind, uint32_t request, enum error_kind error)
+static void say(enum engine_event_kind kind, uint32_t request, enum error_code error)
 {
     struct engine_event *made = calloc(1, sizeof *made);
     assert_non_null(made);
@@ -168,7 +168,7 @@ static void say_frame_of(uint32_t request, uint32_t number, uint64_t command, si
 static void say_frame_with(uint32_t request, uint32_t number, size_t depth_bytes, size_t normal_bytes)
 {
     struct engine_event *made = frame_of(request, number, 0, FRAME_BYTES);
-    made->frame->result.attachments = ATTACHMENT_DEPTH | ATTACHMENT_NORMALS;
+    made->frame->result.attachments = 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS;
     made->frame->depth_bytes = depth_bytes;
     made->frame->normal_bytes = normal_bytes;
     assert_true(queue_push(engine.events, made));
@@ -189,7 +189,7 @@ static void say_large_frame(uint32_t request, uint32_t number)
 static struct message view_message(uint32_t credit)
 {
     struct message message = made(MESSAGE_RENDER);
-    message.render.kind = PROTOCOL_JOB_KIND_VIEW;
+    message.render.kind = PROTOCOL_JOB_VIEW;
     message.render.scene = 1;
     message.render.channel = CHANNEL;
     message.render.credit = credit;
@@ -403,7 +403,7 @@ SESSION_TEST(a_camera_of_no_view_is_ignored_and_one_out_of_order_is_not)
     send_camera(5, false);
     told_and_forgotten(ENGINE_VIEW_LOOK);
     send_camera(5, false);
-    expect_error(0, PROTOCOL_ERROR_CODE_PROTOCOL);
+    expect_error(0, PROTOCOL_ERROR_PROTOCOL);
     assert_string_equal(client.message.error.field, "view_camera.command");
     expect(MESSAGE_GOODBYE, 0);
     engine_command_destroy(start);
@@ -643,7 +643,7 @@ SESSION_TEST(a_view_takes_the_place_of_another_on_its_channel)
     told_and_forgotten(ENGINE_JOB_START);
     message.render.channel = CHANNEL + 2;
     send_message(5, 0, &message);
-    expect_error(5, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(5, PROTOCOL_ERROR_LIMIT);
     engine_command_destroy(start);
 }
 
@@ -692,12 +692,12 @@ SESSION_TEST(a_frame_under_way_of_a_view_that_was_replaced_still_takes_room)
     say(ENGINE_DONE, 2, ERROR_NONE);
     say(ENGINE_FAILED, 4, ERROR_OUT_OF_MEMORY); /* so that it is known when the one before is done */
     uint64_t bytes = 0;
-    expect_error_within_frame(4, PROTOCOL_ERROR_CODE_OUT_OF_MEMORY, &bytes);
+    expect_error_within_frame(4, PROTOCOL_ERROR_OUT_OF_MEMORY, &bytes);
     message = view_message(1); /* room for its frames is there but for that one */
     message.render.channel = CHANNEL + 1;
     message.render.width = message.render.height = LESS_THAN_ALL_EDGE;
     send_message(5, 0, &message);
-    expect_error_within_frame(5, PROTOCOL_ERROR_CODE_BUSY, &bytes);
+    expect_error_within_frame(5, PROTOCOL_ERROR_BUSY, &bytes);
     while (bytes < LARGE_FRAME_BYTES) {
         expect(MESSAGE_FRAME_DATA, 2);
         bytes += client.message.frame_data.data_bytes;
@@ -721,11 +721,11 @@ SESSION_TEST(a_view_that_cannot_be_leaves_the_one_that_is)
     struct message message = view_message(0);
     message.render.width = 4096; /* more than the limit: the session says so itself */
     send_message(3, 0, &message);
-    expect_error(3, PROTOCOL_ERROR_CODE_LIMIT);
+    expect_error(3, PROTOCOL_ERROR_LIMIT);
     engine_command_destroy(replace_view(4, 17));
     engine_command_destroy(replace_view(5, 18));
     say(ENGINE_FAILED, 4, ERROR_UNSUPPORTED); /* as the engine does here */
-    expect_error(4, PROTOCOL_ERROR_CODE_UNSUPPORTED);
+    expect_error(4, PROTOCOL_ERROR_UNSUPPORTED);
     say_frame(2, 1, 0);
     take_frame(2, 1);
     say(ENGINE_DONE, 2, ERROR_NONE);
@@ -739,11 +739,11 @@ SESSION_TEST(a_view_that_fails_leaves_its_channel_to_the_next)
     start_view_with_credit();
     engine_command_destroy(replace_view(3, 17));
     say(ENGINE_FAILED, 2, ERROR_OUT_OF_MEMORY);
-    expect_error(2, PROTOCOL_ERROR_CODE_OUT_OF_MEMORY);
+    expect_error(2, PROTOCOL_ERROR_OUT_OF_MEMORY);
     say_frame(3, 0, 0);
     take_frame(3, 0);
     say(ENGINE_FAILED, 3, ERROR_OUT_OF_MEMORY);
-    expect_error(3, PROTOCOL_ERROR_CODE_OUT_OF_MEMORY);
+    expect_error(3, PROTOCOL_ERROR_OUT_OF_MEMORY);
     /* The channel is free. */
     while (queue_length(engine.commands))
         told_and_forgotten(ENGINE_JOB_CREDIT);
@@ -766,7 +766,7 @@ SESSION_TEST(a_cancelled_view_is_answered_and_nothing_follows)
     say_frame(2, 1, 0); /* was on its way */
     say(ENGINE_FAILED, 2, ERROR_CANCELLED);
     say(ENGINE_DONE, 3, ERROR_NONE);
-    expect_error(2, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect_error(2, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 3);
     send_camera(1, false);
     expect_alive(9);
@@ -786,7 +786,7 @@ SESSION_TEST(a_view_may_be_cancelled_while_another_takes_its_place)
     say(ENGINE_FAILED, 3, ERROR_CANCELLED);
     say(ENGINE_DONE, 4, ERROR_NONE);
     expect(MESSAGE_OK, 2);
-    expect_error(3, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect_error(3, PROTOCOL_ERROR_CANCELLED);
     expect(MESSAGE_OK, 4);
 }
 
@@ -817,23 +817,23 @@ SESSION_TEST(a_view_that_cannot_be_is_refused_by_its_field)
     open_scene(1, 1);
     struct message message = view_message(1);
     message.render.layers = 1u << PROTOCOL_LAYER_DEPTH;
-    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.layers");
+    expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.layers");
     message = view_message(1);
     message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
     message.render.encoding = PROTOCOL_ENCODING_RAW;
     message.render.still_encoding = PROTOCOL_ENCODING_JPEG;
-    expect_refused(3, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.still_encoding");
+    expect_refused(3, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.still_encoding");
     message = view_message(1);
     message.render.encoding = PROTOCOL_ENCODING_RAW; /* whose quality is none */
     message.render.still_encoding = PROTOCOL_ENCODING_JPEG;
-    expect_refused(6, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.still_encoding");
+    expect_refused(6, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.still_encoding");
     message = made(MESSAGE_RENDER); /* a batch has its channel to itself */
     message.render.scene = 1;
     message.render.channel = CHANNEL;
     send_message(4, 0, &message);
     expect_told_start(4, JOB_BATCH);
     message = view_message(1);
-    expect_refused(5, &message, PROTOCOL_ERROR_CODE_INVALID, "render.channel");
+    expect_refused(5, &message, PROTOCOL_ERROR_INVALID, "render.channel");
 }
 
 TEST_WITH(video_needs_the_word_of_both_sides_and_a_view_of_8_bits, set_up_ungreeted, tear_down)
@@ -849,12 +849,12 @@ TEST_WITH(video_needs_the_word_of_both_sides_and_a_view_of_8_bits, set_up_ungree
     message = view_message(1);
     message.render.format = PROTOCOL_PIXEL_FORMAT_RGBA16F;
     message.render.encoding = PROTOCOL_ENCODING_H264;
-    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.encoding");
+    expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.encoding");
     message = made(MESSAGE_RENDER);
     message.render.scene = 1;
     message.render.channel = CHANNEL;
     message.render.encoding = PROTOCOL_ENCODING_H264;
-    expect_refused(3, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.encoding");
+    expect_refused(3, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.encoding");
     assert_true(strlen(client.message.error.remedy) > 0);
     message = view_message(1);
     message.render.encoding = message.render.still_encoding = PROTOCOL_ENCODING_H264;
@@ -871,12 +871,12 @@ SESSION_TEST(what_a_view_attaches_is_told_on_and_announced)
     message.render.scene = 1;
     message.render.channel = CHANNEL;
     message.render.attachments = 1;
-    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.attachments");
+    expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.attachments");
     message = view_message(4);
     message.render.attachments = 3;
     send_message(3, 0, &message);
     struct engine_command *command = told(ENGINE_JOB_START);
-    assert_int_equal(command->job.frame.attachments, ATTACHMENT_DEPTH | ATTACHMENT_NORMALS);
+    assert_int_equal(command->job.frame.attachments, 1u << ATTACHMENT_DEPTH | 1u << ATTACHMENT_NORMALS);
     engine_command_destroy(command);
     say_frame_with(3, 1, 30, 20);
     struct message_frame_begin begin;
@@ -892,11 +892,11 @@ SESSION_TEST(video_without_the_word_for_it_is_refused)
     open_scene(1, 1);
     struct message message = view_message(1);
     message.render.encoding = PROTOCOL_ENCODING_H264;
-    expect_refused(2, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.encoding");
+    expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.encoding");
     assert_true(strlen(client.message.error.remedy) > 0);
     message = view_message(1);
     message.render.still_encoding = PROTOCOL_ENCODING_H264;
-    expect_refused(3, &message, PROTOCOL_ERROR_CODE_UNSUPPORTED, "render.still_encoding");
+    expect_refused(3, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.still_encoding");
 }
 
 /* What frames of 512 x 512 may take: 7 of them, the limit is 10 MiB. */
@@ -908,14 +908,14 @@ SESSION_TEST(views_have_room_for_their_frames_or_are_refused)
     send_message(2, 0, &message);
     expect_told_start(2, JOB_VIEW);
     message.render.channel = CHANNEL + 1;
-    expect_refused(3, &message, PROTOCOL_ERROR_CODE_BUSY, "render");
+    expect_refused(3, &message, PROTOCOL_ERROR_BUSY, "render");
     message.render.channel = CHANNEL; /* in the place of the first it fits */
     send_message(4, 0, &message);
     expect_told_start(4, JOB_VIEW);
     say(ENGINE_DONE, 2, ERROR_NONE);
     expect(MESSAGE_OK, 2);
     say(ENGINE_FAILED, 4, ERROR_CANCELLED);
-    expect_error(4, PROTOCOL_ERROR_CODE_CANCELLED);
+    expect_error(4, PROTOCOL_ERROR_CANCELLED);
     message.render.channel = CHANNEL + 1;
     send_message(5, 0, &message);
     expect_told_start(5, JOB_VIEW);
@@ -972,7 +972,7 @@ static void start_or_refuse(struct engine_command *command)
     play.views[place].made = 0;
 }
 
-static void end_view(uint32_t request, enum error_kind why)
+static void end_view(uint32_t request, enum error_code why)
 {
     for (unsigned i = 0; i < VIEWS; i++) {
         if (play.views[i].wishes && play.views[i].request == request) {

@@ -257,7 +257,7 @@ TEST(a_build_that_is_left_leaves_nothing)
     fixture_finish(&fixture);
 }
 
-static void expect_refused(struct fixture *fixture, enum error_kind kind, const char *field)
+static void expect_refused(struct fixture *fixture, enum error_code kind, const char *field)
 {
     struct error error = {0};
     assert_false(try_build(fixture, &error));

@@ -7,13 +7,12 @@
 
 #define RESOLUTION 64u
 #define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
-#define NUMBER_ABUFFER 4
 
 static const struct tracer_options small = {.abuffer = {.resolution = RESOLUTION}};
 
 static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)
 {
-    fixture_init_by(fixture, NUMBER_ABUFFER, scene, options);
+    fixture_init_by(fixture, TRACER_ABUFFER, scene, options);
 }
 
 static const struct tracer_cube *cube(const struct fixture *fixture)
@@ -30,8 +29,8 @@ static void expect_built(const struct fixture *fixture, bool expected)
         timed[fixture->times.spans[i].clock] |= fixture->times.spans[i].duration_ns > 0;
     }
     assert_int_equal(cube(fixture)->rebuilt, expected);
-    assert_int_equal(timed[STAGE_CPU], expected);
-    assert_int_equal(timed[STAGE_GPU], expected);
+    assert_int_equal(timed[CLOCK_CPU], expected);
+    assert_int_equal(timed[CLOCK_GPU], expected);
     assert_int_equal(fixture->tracer->stats.uploaded_bytes > 0, expected);
     assert_int_equal(fixture->tracer->stats.nodes_rebuilt, expected ? fixture->tracer->stats.nodes : 0);
 }
@@ -73,7 +72,7 @@ TEST(options_out_of_range_are_refused_by_name)
         {"options.abuffer_voxels", {.abuffer = {.resolution = 64, .voxels = 128}}},
         {"options.abuffer_search", {.abuffer = {.search = ABUFFER_SEARCH_LINEAR1 + 1}}},
     };
-    expect_options_refused(NUMBER_ABUFFER, rows, sizeof(rows) / sizeof(rows[0]));
+    expect_options_refused(TRACER_ABUFFER, rows, sizeof(rows) / sizeof(rows[0]));
 }
 
 TEST(it_says_how_large_it_is)

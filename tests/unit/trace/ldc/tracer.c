@@ -9,14 +9,12 @@
 
 #define RESOLUTION 64u
 #define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
-#define NUMBER_BVH 0
-#define NUMBER_LDC 3
 
 static const struct tracer_options small = {.ldc = {.resolution = RESOLUTION}};
 
 static void fixture_init(struct fixture *fixture, struct scene *scene, const struct tracer_options *options)
 {
-    fixture_init_by(fixture, NUMBER_LDC, scene, options);
+    fixture_init_by(fixture, TRACER_LDC, scene, options);
 }
 
 static const struct tracer_cube *cube(const struct fixture *fixture, unsigned which)
@@ -37,8 +35,8 @@ static void expect_built(const struct fixture *fixture, bool static_cube, bool d
     }
     for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
         assert_int_equal(cube(fixture, i)->rebuilt, expected[i]);
-        assert_int_equal(timed[i][STAGE_CPU], expected[i]);
-        assert_int_equal(timed[i][STAGE_GPU], expected[i]);
+        assert_int_equal(timed[i][CLOCK_CPU], expected[i]);
+        assert_int_equal(timed[i][CLOCK_GPU], expected[i]);
     }
     /* Samples are made on the device; what goes there is a few words an instance of what is built. */
     uint64_t uploaded_bytes = fixture->tracer->stats.uploaded_bytes;
@@ -120,7 +118,7 @@ TEST(options_out_of_range_are_refused_by_name)
         {"options.ldc_layers_together", {.bench = {.ldc_layers_together = 3}}},
         {"options.ldc_layers", {.limits = {.ldc_layers = 256}}},
     };
-    expect_options_refused(NUMBER_LDC, rows, sizeof(rows) / sizeof(rows[0]));
+    expect_options_refused(TRACER_LDC, rows, sizeof(rows) / sizeof(rows[0]));
 }
 
 TEST(the_size_of_a_cell_is_that_of_the_longest_side)
@@ -226,7 +224,7 @@ TEST(new_objects_are_static_and_settle_what_stood_still)
     for (int i = 0; i < 3; i++)
         expect_distance(distance_below(&fixture, 2 * (float)i, 0), (double)distances[i]);
     expect_distance(distance_below(&fixture, 8, 0), 9.5);
-    struct scene_edit *edit = test_add(&fixture.edits, SCENE_NODE);
+    struct scene_edit *edit = test_add(&fixture.edits, OBJECT_NODE);
     edit->kind = EDIT_REMOVE;
     edit->id = 9;
     update(&fixture);
@@ -382,9 +380,9 @@ TEST(a_tracer_that_was_away_builds_what_has_changed_meanwhile)
         unsigned tracer;
         bool moves, static_cube, dynamic_cube;
     } frames[] = {
-        {NUMBER_LDC, false, true, false}, {NUMBER_BVH, false, false, false}, {NUMBER_LDC, false, false, false},
-        {NUMBER_BVH, true, false, false}, {NUMBER_LDC, false, true, true},   {NUMBER_BVH, true, false, false},
-        {NUMBER_LDC, false, false, true}, {NUMBER_LDC, false, false, false},
+        {TRACER_LDC, false, true, false}, {TRACER_BVH, false, false, false}, {TRACER_LDC, false, false, false},
+        {TRACER_BVH, true, false, false}, {TRACER_LDC, false, true, true},   {TRACER_BVH, true, false, false},
+        {TRACER_LDC, false, false, true}, {TRACER_LDC, false, false, false},
     };
     for (size_t i = 0; i < sizeof(frames) / sizeof(frames[0]); i++) {
         if (frames[i].moves) {
@@ -401,7 +399,7 @@ TEST(a_tracer_that_was_away_builds_what_has_changed_meanwhile)
             progress = tracer_set_bring(&set, fixture.tracer, &fixture.gpu,
                                         &(struct tracer_update){.times = &fixture.times}, 0, &error);
         expect_ok(progress == TRACER_DONE, &error);
-        if (frames[i].tracer == NUMBER_LDC)
+        if (frames[i].tracer == TRACER_LDC)
             expect_built(&fixture, frames[i].static_cube, frames[i].dynamic_cube);
         tracer_set_give(&set, fixture.tracer);
     }
