@@ -266,7 +266,7 @@ static bool complete_scene(struct cli_job *job)
         return cli_usage(job, "--environment", "cannot go with --scene: that has its light already") == 0;
     if (job->server)
         return true;
-    cli_usage(job, "--scene", "no daemon is named that has it");
+    cli_usage(job, "--scene", "no address of a daemon is given, and a shared scene is on one");
     return fl_error_remedy(&job->error, "add --server ADDRESS");
 }
 
