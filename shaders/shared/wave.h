@@ -11,9 +11,9 @@ struct wave_state {
 };
 SHARED_SIZE(wave_state, 16)
 
-/* How many rays of a wave there are, where only the device knows (trace/wave.h), and the work groups that a dispatch
- * with one invocation a ray needs at 64 a group, over two axes as common/dispatch.glsl counts them. The last three
- * words are what an indirect dispatch reads. */
+/* How many rays of a wave there are, where only the device knows (trace/wave.h), and the work groups that a
+ * dispatch with one invocation a ray needs at 64 a group, over two axes as common/dispatch.glsl counts them. The
+ * last three words are what an indirect dispatch reads. */
 struct wave_counts {
     uint ray_count;
     uint groups_x, groups_y, groups_z;

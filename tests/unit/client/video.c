@@ -445,10 +445,13 @@ TEST(a_frame_that_does_not_fit_ends_the_video_and_nothing_is_left)
         uint32_t first[2], second[2];
         enum protocol_pixel_format format;
         const char *text, *remedy;
-    } rows[] = {
-        {{64, 64}, {64, 32}, PROTOCOL_PIXEL_FORMAT_RGBA8, "64x32 pixels, but the video has 64x64", "size"},
-        {{64, 64}, {64, 64}, PROTOCOL_PIXEL_FORMAT_RGBA16F, "rgba16f pixels", "rgba8"},
-        {{0, 0}, {8192, 4368}, PROTOCOL_PIXEL_FORMAT_RGBA8, "H.264 cannot encode pictures of 8192x4368", "smaller"}};
+    } rows[] = {{{64, 64}, {64, 32}, PROTOCOL_PIXEL_FORMAT_RGBA8, "64x32 pixels, but the video has 64x64", "size"},
+                {{64, 64}, {64, 64}, PROTOCOL_PIXEL_FORMAT_RGBA16F, "rgba16f pixels", "rgba8"},
+                {{0, 0},
+                 {8192, 4368},
+                 PROTOCOL_PIXEL_FORMAT_RGBA8,
+                 "H.264 cannot encode pictures of 8192x4368",
+                 "smaller"}};
     need(false);
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct fl_video *video = fl_video_start(&(struct fl_video_options){.path = path_of("a.mp4")}, &error);
