@@ -213,6 +213,10 @@ enum tracer_progress tracer_trace_step(struct tracer *tracer, struct gpu_scene *
 static bool trace_at_once(struct tracer *tracer, struct gpu_scene *scene, const struct wave *wave, bool surfaces,
                           struct error *error)
 {
+    if (tracer->state && !trace_state_fits(tracer->state, tracer->impl, &tracer->options)) {
+        trace_state_destroy(tracer->state); /* benchmarks change options between two waves */
+        tracer->state = NULL;
+    }
     if (!tracer->state)
         tracer->state = trace_state_create(tracer->impl, tracer->device, &tracer->options, error);
     return tracer->state && tracer_trace_begin(tracer, scene, wave, tracer->state, error) &&
