@@ -6,7 +6,7 @@
 
 #include "render/frame_state.h"
 
-#define STEPS 3u     /* of a wave, by the tracer that advances in a way of its own */
+#define STEPS 3u /* of a wave, by the tracer that advances in a way of its own */
 
 /* ---- tracers that count ---- */
 

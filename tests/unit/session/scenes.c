@@ -140,6 +140,7 @@ TEST(a_view_at_rest_shows_what_another_client_changes)
     commit_sphere(one, 1);
     attach(other, 7, "model");
     struct message message = made(MESSAGE_RENDER);
+    message.render.width = message.render.height = 1;
     message.render.kind = PROTOCOL_JOB_VIEW;
     message.render.scene = 7;
     message.render.channel = 20;

@@ -749,6 +749,7 @@ SESSION_TEST(a_view_that_fails_leaves_its_channel_to_the_next)
         told_and_forgotten(ENGINE_JOB_CREDIT);
     struct message message = made(MESSAGE_RENDER);
     message.render.scene = 1;
+    message.render.width = message.render.height = 1;
     message.render.channel = CHANNEL;
     send_message(4, 0, &message);
     expect_told_start(4, JOB_BATCH);
@@ -829,6 +830,7 @@ SESSION_TEST(a_view_that_cannot_be_is_refused_by_its_field)
     expect_refused(6, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.still_encoding");
     message = made(MESSAGE_RENDER); /* a batch has its channel to itself */
     message.render.scene = 1;
+    message.render.width = message.render.height = 1;
     message.render.channel = CHANNEL;
     send_message(4, 0, &message);
     expect_told_start(4, JOB_BATCH);
@@ -852,6 +854,7 @@ TEST_WITH(video_needs_the_word_of_both_sides_and_a_view_of_8_bits, set_up_ungree
     expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.encoding");
     message = made(MESSAGE_RENDER);
     message.render.scene = 1;
+    message.render.width = message.render.height = 1;
     message.render.channel = CHANNEL;
     message.render.encoding = PROTOCOL_ENCODING_H264;
     expect_refused(3, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.encoding");
@@ -869,6 +872,7 @@ SESSION_TEST(what_a_view_attaches_is_told_on_and_announced)
     open_scene(1, 1);
     struct message message = made(MESSAGE_RENDER); /* a batch has layers */
     message.render.scene = 1;
+    message.render.width = message.render.height = 1;
     message.render.channel = CHANNEL;
     message.render.attachments = 1;
     expect_refused(2, &message, PROTOCOL_ERROR_UNSUPPORTED, "render.attachments");
