@@ -127,7 +127,7 @@ class Parts(OneDaemon):
             self.assertEqual(got, {frame: whole[frame] for frame in frames})
         got, result = self.animate("part9", self.model, *self.RANGE, "--shard", "9/9")
         self.assertEqual(got, {})
-        self.assertIn("none falls to part 9", result.stderr)
+        self.assertIn("part 9 has none", result.stderr)
 
     def test_resuming_makes_what_is_missing_and_leaves_the_rest_alone(self):
         whole, _ = self.animate("whole", self.model, *self.RANGE)
@@ -140,7 +140,7 @@ class Parts(OneDaemon):
         kept = {frame: (folder / f"{frame:04d}.exr").stat() for frame in (16, 22, 25, 28)}
         again, result = self.animate("whole", self.model, *self.RANGE, "--resume")
         self.assertEqual(again, whole)
-        self.assertIn("4 of 8 frames are there already", result.stderr)
+        self.assertIn("4 of 8 frames exist already", result.stderr)
         for frame, before in kept.items():
             after = (folder / f"{frame:04d}.exr").stat()
             self.assertEqual((after.st_ino, after.st_mtime_ns), (before.st_ino, before.st_mtime_ns))

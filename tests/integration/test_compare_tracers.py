@@ -140,12 +140,12 @@ class Limits(Case):
 
     def test_each_mistake_is_2_and_named(self):
         cases = ((["--tracers", "bvh"], "bvh"), (["--tracers", "bvh,magic"], "magic"),
-                 (["--tracers", "bvh,naive,bvh"], "two tracers"), (["--tracers", ",naive"], "two tracers"),
+                 (["--tracers", "bvh,naive,bvh"], "a pair of tracers"), (["--tracers", ",naive"], "a pair of tracers"),
                  (["--tracers", "bvh,naive", "--fail-above", "agree=101%"], "--fail-above"),
                  (["--tracers", "bvh,naive", "--fail-above", "agree=nan"], "--fail-above"),
                  (["--tracers", "bvh,naive", "--fail-above", "nothing=1"], "nothing"),
                  (["--tracers", "bvh,naive", "--far", "0"], "--far"),
-                 (["--tracers", "bvh,naive", "--tracer", "bvh"], "--tracer"), (["--tracer", "bvh"], "two tracers"),
+                 (["--tracers", "bvh,naive", "--tracer", "bvh"], "--tracer"), (["--tracer", "bvh"], "a pair of tracers"),
                  (["--tracers", "bvh,naive", "-o", self.folder / "x.exr"], "PNG"),
                  (["--tracers", "bvh,naive", "-o", self.folder / "no" / "x.png"], "no"),
                  (["--tracers", "bvh,naive", "--encoding", "jpeg"], "jpeg"))
