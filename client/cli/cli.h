@@ -268,19 +268,21 @@ json_t *cli_waves_json(const struct fl_frame *frame);      /* an object a wave a
 json_t *cli_wave_total_json(const struct fl_frame *frame); /* all of them together */
 double cli_wave_agreement(const struct fl_frame *frame);   /* likewise; see fl_wave_agreement */
 
-/* ---- cubes.c: what the tracers ldc and abuffer made of a scene ---- */
+/* ---- structure.c: what a tracer says of its structure (structure_row in protocol/messages.def) ---- */
 
-/* What a tracer's records are: "cubes" or "lists"; and which one that is: "static", "dynamic", or "" of only one.
+#define CLI_WARNED_MAX 16u
+
+/* Sets "structure", an object of all rows, lengths as "static/cell_metres"; and "warnings", an array of strings.
  */
-const char *cli_cube_title(enum protocol_tracer tracer);
-const char *cli_cube_name(enum protocol_tracer tracer, enum protocol_cube_part part);
-/* "1024 cells of 1.2 mm; 6 layers, 812345 samples", "1280 texels of 1.2 mm; 812345 samples, at most 9 in a list"
- */
-void cli_cube_print(FILE *out, enum protocol_tracer tracer, const struct record_layered_cube *cube);
-json_t *cli_cubes_json(const struct fl_frame *frame);
-/* On standard error, where a limit keeps surfaces from the picture; once for each part of the scene. */
-void cli_cubes_warn(const struct fl_frame *frame, bool warned[PROTOCOL_CUBE_PART_COUNT],
-                    struct cli_progress *progress);
+void cli_structure_set_json(json_t *object, const struct fl_frame *frame);
+
+/* Names of rows whose warning was printed. */
+struct cli_warned {
+    char names[CLI_WARNED_MAX][FL_STRUCTURE_NAME_BYTES];
+    size_t count;
+};
+/* On standard error, what the picture lacks; each row's once. */
+void cli_structure_warn(const struct fl_frame *frame, struct cli_warned *warned, struct cli_progress *progress);
 
 /* ---- timings.c ---- */
 

@@ -224,7 +224,7 @@ static struct fl_frame *render(struct tracer_comparison *comparison, const char 
 static bool render_both(struct tracer_comparison *comparison, struct fl_error *error)
 {
     struct message_render *wanted = &comparison->job.options;
-    bool warned[PROTOCOL_CUBE_PART_COUNT] = {false};
+    struct cli_warned warned = {0};
     char what[100];
     snprintf(what, sizeof(what), "rays of %s and %s", protocol_tracer_text(comparison->tracer),
              protocol_tracer_text(comparison->reference));
@@ -235,14 +235,14 @@ static bool render_both(struct tracer_comparison *comparison, struct fl_error *e
     comparison->frame = render(comparison, comparison->paths[1], error);
     if (!comparison->frame)
         return false;
-    cli_cubes_warn(comparison->frame, warned, &comparison->progress);
+    cli_structure_warn(comparison->frame, &warned, &comparison->progress);
     snprintf(what, sizeof(what), "picture of %s", protocol_tracer_text(comparison->reference));
     cli_progress_step(&comparison->progress, 1, STEPS, what);
     wanted->compare = false;
     wanted->tracer = comparison->reference;
     struct fl_frame *reference = render(comparison, comparison->paths[0], error);
     if (reference)
-        cli_cubes_warn(reference, warned, &comparison->progress);
+        cli_structure_warn(reference, &warned, &comparison->progress);
     fl_frame_destroy(reference);
     return reference && fl_exporter_wait(comparison->exporter, error);
 }
@@ -268,14 +268,11 @@ static bool is_within(const struct tracer_comparison *comparison)
            cli_limits_hold(&comparison->limits, &comparison->figures);
 }
 
-static void print_cubes(const struct fl_frame *frame)
+static void print_structure(const struct fl_frame *frame)
 {
-    for (size_t i = 0; i < frame->cube_count; i++) {
-        const char *name = cli_cube_name(frame->tracer, frame->cubes[i].part);
-        printf("  %s%s: ", name, name[0] != '\0' ? " cube" : cli_cube_title(frame->tracer));
-        cli_cube_print(stdout, frame->tracer, &frame->cubes[i]);
-        putchar('\n');
-    }
+    struct fl_structure_part part;
+    for (size_t at = 0; fl_structure_next(frame, &at, &part);)
+        printf("  structure%s%s: %s\n", part.name[0] != '\0' ? " " : "", part.name, part.text);
 }
 
 static void print_text(const struct tracer_comparison *comparison)
@@ -288,7 +285,7 @@ static void print_text(const struct tracer_comparison *comparison)
     cli_print_name(comparison->job.model);
     printf(", %ux%u, %u sample%s a pixel, %s\n", frame->width, frame->height, frame->samples,
            frame->samples == 1 ? "" : "s", protocol_integrator_text(frame->integrator));
-    print_cubes(frame);
+    print_structure(frame);
     cli_print_waves(frame, comparison->reference, comparison->far_share);
     if (agreement < comparison->least_agreement)
         printf("  over the limit: agree %.6g %%, at least %.6g %%\n", agreement * 100,
@@ -312,8 +309,7 @@ static void print_json(const struct tracer_comparison *comparison)
     fl_text_utf8(comparison->job.model, model, sizeof(model));
     json_object_set_new(object, "model", json_string(model));
     json_object_set_new(object, "picture", picture ? json_string(picture) : json_null());
-    if (frame->cube_count > 0)
-        json_object_set_new(object, "cubes", cli_cubes_json(frame));
+    cli_structure_set_json(object, frame);
     json_object_set_new(object, "least_agreement",
                         comparison->least_agreement > 0 ? json_real(comparison->least_agreement) : json_null());
     json_dumpf(object, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9));

@@ -24,12 +24,12 @@ struct session {
     bool was_loaded; /* the daemon was there and took the scene, at least once */
     bool has_set;    /* which frames are wanted is known */
     struct fl_frame_set set;
-    size_t run;                            /* of the set, the one that is being rendered */
-    bool begun;                            /* of this run a frame has been written */
-    uint64_t next;                         /* once begun: its first frame that has not */
-    uint32_t done;                         /* frames written */
-    unsigned failures;                     /* lost connections since the last frame */
-    bool warned[PROTOCOL_CUBE_PART_COUNT]; /* that something is missing from the picture */
+    size_t run;        /* of the set, the one that is being rendered */
+    bool begun;        /* of this run a frame has been written */
+    uint64_t next;     /* once begun: its first frame that has not */
+    uint32_t done;     /* frames written */
+    unsigned failures; /* lost connections since the last frame */
+    struct cli_warned warned;
     struct cli_timings *timings;
     struct cli_trace_file *trace; /* NULL: none is wanted */
     struct cli_progress progress;
@@ -126,7 +126,7 @@ static bool write_frame(struct session *session, const struct fl_frame *frame, s
     const uint64_t begin_ns = monotonic_now_ns();
     cli_trace_frame(session->trace, frame, begin_ns);
     cli_timings_frame(session->timings, frame);
-    cli_cubes_warn(frame, session->warned, &session->progress);
+    cli_structure_warn(frame, &session->warned, &session->progress);
     const bool written = cli_sinks_write(&session->sinks, frame, error);
     add_export(session, frame->frame, begin_ns);
     session->sink_failed = !written;

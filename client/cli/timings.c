@@ -10,11 +10,18 @@
 #define STAGES PROTOCOL_STAGE_COUNT
 #define CLOCKS PROTOCOL_CLOCK_COUNT
 #define WAVES_SHOWN 32u
-#define PARTS PROTOCOL_CUBE_PART_COUNT
+#define PARTS_SHOWN 8u
 
 struct sum {
     uint64_t ns;
     bool measured; /* no result is not 0 */
+};
+
+struct part {
+    bool seen;
+    struct fl_structure_part last; /* of the last frame that has it */
+    uint64_t builds;
+    struct sum build[CLOCKS];
 };
 
 struct cli_timings {
@@ -25,10 +32,7 @@ struct cli_timings {
     uint64_t pixels_bytes, wait_ns, receive_ns, decode_ns;
     struct sum stages[STAGES][CLOCKS];
     struct sum waves[2][WAVES_SHOWN][CLOCKS]; /* trace, shade */
-    struct sum cubes[PARTS][CLOCKS];          /* build, of those below */
-    struct record_layered_cube cube[PARTS];   /* of the last frame that has it; resolution 0: none has */
-    uint64_t cube_builds[PARTS];
-    enum protocol_tracer tracer; /* of the first frame */
+    struct part parts[PARTS_SHOWN];           /* of the structure, by their numbers */
     char title[160];
 };
 
@@ -55,15 +59,6 @@ static void add(struct sum *sum, uint64_t ns)
     sum->measured = true;
 }
 
-/* Whether a span of building is a cube's: its wave is the cube's number then. */
-static bool is_rebuilt(const struct fl_frame *frame, uint32_t part)
-{
-    for (size_t i = 0; i < frame->cube_count; i++)
-        if ((uint32_t)frame->cubes[i].part == part && frame->cubes[i].rebuilt)
-            return true;
-    return false;
-}
-
 static void add_stages(struct cli_timings *timings, const struct fl_frame *frame)
 {
     for (size_t i = 0; i < frame->stage_count; i++) {
@@ -72,24 +67,36 @@ static void add_stages(struct cli_timings *timings, const struct fl_frame *frame
         const bool is_trace = time->stage == PROTOCOL_STAGE_TRACE;
         if ((is_trace || time->stage == PROTOCOL_STAGE_SHADE) && time->wave < WAVES_SHOWN)
             add(&timings->waves[is_trace ? 0 : 1][time->wave][time->clock], time->duration_ns);
-        if (time->stage == PROTOCOL_STAGE_BUILD && is_rebuilt(frame, time->wave))
-            add(&timings->cubes[time->wave][time->clock], time->duration_ns);
     }
 }
 
-static void add_cubes(struct cli_timings *timings, const struct fl_frame *frame)
+static void add_builds(struct part *part, const struct fl_frame *frame)
 {
-    for (size_t i = 0; i < frame->cube_count; i++) {
-        const struct record_layered_cube *cube = &frame->cubes[i];
-        timings->cube[cube->part] = *cube;
-        timings->cube_builds[cube->part] += cube->rebuilt;
+    for (size_t i = 0; i < frame->stage_count; i++) {
+        const struct record_stage_time *time = &frame->stages[i];
+        if (time->stage == PROTOCOL_STAGE_BUILD && time->wave == part->last.number)
+            add(&part->build[time->clock], time->duration_ns);
+    }
+}
+
+static void add_structure(struct cli_timings *timings, const struct fl_frame *frame)
+{
+    struct fl_structure_part next;
+    for (size_t at = 0; fl_structure_next(frame, &at, &next);) {
+        if (next.number >= PARTS_SHOWN)
+            continue;
+        struct part *part = &timings->parts[next.number];
+        part->seen = true;
+        part->last = next;
+        if (!next.built)
+            continue;
+        part->builds++;
+        add_builds(part, frame);
     }
 }
 
 static void add_frame(struct cli_timings *timings, const struct fl_frame *frame)
 {
-    if (timings->frames == 0)
-        timings->tracer = frame->tracer;
     if (timings->frames++ == 0)
         snprintf(timings->title, sizeof(timings->title), "%ux%u, %u sample%s, %s, %s, %s %s", frame->width,
                  frame->height, frame->samples, frame->samples == 1 ? "" : "s",
@@ -107,7 +114,7 @@ static void add_frame(struct cli_timings *timings, const struct fl_frame *frame)
     timings->receive_ns += frame->receive_ns;
     timings->decode_ns += frame->decode_ns;
     add_stages(timings, frame);
-    add_cubes(timings, frame);
+    add_structure(timings, frame);
 }
 
 /* ---- JSON ---- */
@@ -162,8 +169,7 @@ static void print_frame(struct cli_timings *timings, const struct fl_frame *fram
     set(object, "receive_ns", frame->receive_ns);
     set(object, "decode_ns", frame->decode_ns);
     json_object_set_new(object, "stages", stages_array(frame));
-    if (frame->cube_count > 0)
-        json_object_set_new(object, "cubes", cli_cubes_json(frame));
+    cli_structure_set_json(object, frame);
     print_object(timings, object);
 }
 
@@ -214,12 +220,12 @@ static void print_row(const struct cli_timings *timings, const char *indent, con
     fputc('\n', timings->out);
 }
 
-/* Where there is only one, the row above says the same. */
-static void print_cube_row(const struct cli_timings *timings, enum protocol_cube_part part)
+/* Of a structure without parts, the row above says the same. */
+static void print_part_rows(const struct cli_timings *timings)
 {
-    const char *name = cli_cube_name(timings->tracer, part);
-    if (name[0] != '\0')
-        print_row(timings, "  ", name, timings->cubes[part]);
+    for (unsigned i = 0; i < PARTS_SHOWN; i++)
+        if (timings->parts[i].last.name[0] != '\0')
+            print_row(timings, "  ", timings->parts[i].last.name, timings->parts[i].build);
 }
 
 static void print_stages(const struct cli_timings *timings)
@@ -228,8 +234,7 @@ static void print_stages(const struct cli_timings *timings)
     for (unsigned stage = 0; stage < STAGES; stage++) {
         print_row(timings, "", protocol_stage_text((enum protocol_stage)stage), timings->stages[stage]);
         if (stage == PROTOCOL_STAGE_BUILD)
-            for (unsigned part = 0; part < PARTS; part++)
-                print_cube_row(timings, (enum protocol_cube_part)part);
+            print_part_rows(timings);
         if (stage != PROTOCOL_STAGE_TRACE && stage != PROTOCOL_STAGE_SHADE)
             continue;
         for (unsigned wave = 0; wave < WAVES_SHOWN; wave++) {
@@ -265,17 +270,19 @@ static void print_rays(const struct cli_timings *timings)
             (double)timings->structure_bytes * 1e-6);
 }
 
-static void print_cubes(const struct cli_timings *timings)
+static void print_structure(const struct cli_timings *timings)
 {
-    for (unsigned part = 0; part < PARTS; part++) {
-        if (timings->cube[part].resolution == 0)
+    const char *title = "structure";
+    for (unsigned i = 0; i < PARTS_SHOWN; i++) {
+        const struct part *part = &timings->parts[i];
+        if (!part->seen)
             continue;
-        fprintf(timings->out, "  %-9s%-8s",
-                part == 0 || timings->cube[0].resolution == 0 ? cli_cube_title(timings->tracer) : "",
-                cli_cube_name(timings->tracer, (enum protocol_cube_part)part));
-        cli_cube_print(timings->out, timings->tracer, &timings->cube[part]);
-        fprintf(timings->out, "; sampled for %" PRIu64 " of %" PRIu64 " frame%s\n", timings->cube_builds[part],
-                timings->frames, timings->frames == 1 ? "" : "s");
+        fprintf(timings->out, "  %-9s %-8s%s", title, part->last.name, part->last.text);
+        if (part->last.is_kept)
+            fprintf(timings->out, "; built for %" PRIu64 " of %" PRIu64 " frame%s", part->builds, timings->frames,
+                    timings->frames == 1 ? "" : "s");
+        fputc('\n', timings->out);
+        title = "";
     }
 }
 
@@ -304,7 +311,7 @@ static void print_table(struct cli_timings *timings, const struct cli_client_tim
                 timings->frames == 1 ? "" : "s", timings->frames == 1 ? "" : ", means of one");
         print_stages(timings);
         print_rays(timings);
-        print_cubes(timings);
+        print_structure(timings);
     }
     fprintf(timings->out, "  %-16s%12s  all frames together\n", "client", "ms");
     print_part(timings, "start", times->start_ns, "daemon started or reached");

@@ -305,8 +305,9 @@ struct fl_frame {
     struct record_stage_time *stages;
     size_t wave_comparison_count;                    /* 0: the job does not compare */
     struct record_wave_comparison *wave_comparisons; /* ascending by wave and kind of ray; see messages.def */
-    size_t cube_count;                               /* 0: the tracer does not sample the scene */
-    struct record_layered_cube cubes[PROTOCOL_CUBE_PART_COUNT]; /* static before dynamic; see messages.def */
+    size_t structure_count;
+    struct record_structure_row
+        *structure; /* what the tracer says of its structure; with the strings, one block */
     /* Of a view. Times of the daemon's clock are as fl_ping's answer has it; `command_sent_ns`,
      * `begun_ns` and `whole_ns` are of this process' monotonic clock. */
     uint64_t command; /* the last one that it shows; 0: none yet, and the times of it are 0 */
@@ -323,6 +324,19 @@ struct fl_frame {
     size_t pixels_bytes; /* layers times width * height * 4, 8 or 16 */
     uint8_t *pixels;     /* rows from the top, without gaps, in `format` */
 };
+
+#define FL_STRUCTURE_NAME_BYTES 64
+
+/* A part of a frame's structure, as a line for people. */
+struct fl_structure_part {
+    uint32_t number;
+    char name[FL_STRUCTURE_NAME_BYTES]; /* empty: the structure has no parts */
+    char text[512];                     /* "resolution 128, cell 1.2 mm" */
+    bool is_kept;                       /* from frame to frame, unless it has to be built again */
+    bool built;                         /* for this frame */
+};
+/* The part whose rows begin at *at (0: the first), which moves behind them; false: there is none. */
+FL_API bool fl_structure_next(const struct fl_frame *frame, size_t *at, struct fl_structure_part *part);
 
 /* One job at a time per connection. */
 FL_API struct fl_job *fl_render_start(struct fl_scene *scene, const struct message_render *wanted,

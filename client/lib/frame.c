@@ -35,6 +35,7 @@ void fl_frame_destroy(struct fl_frame *frame)
     free(frame->pixels);
     free(frame->stages);
     free(frame->wave_comparisons);
+    free(frame->structure);
     free(frame->encoded);
     free(frame->depth);
     free(frame->normals);
@@ -322,6 +323,28 @@ static void *copy(const void *data, size_t bytes)
     return made;
 }
 
+/* The strings lie behind the rows. */
+static bool copy_structure(struct fl_frame *frame, const struct message_frame_end *end)
+{
+    size_t bytes = end->structure_count * sizeof(*frame->structure);
+    for (uint32_t i = 0; i < end->structure_count; i++)
+        bytes += strlen(end->structure[i].name) + strlen(end->structure[i].warning) + 2;
+    struct record_structure_row *rows = bytes > 0 ? malloc(bytes) : NULL;
+    if (bytes > 0 && !rows)
+        return false;
+    char *string = (char *)(rows + end->structure_count);
+    for (uint32_t i = 0; i < end->structure_count; i++) {
+        rows[i] = end->structure[i];
+        rows[i].name = string;
+        string = stpcpy(string, end->structure[i].name) + 1;
+        rows[i].warning = string;
+        string = stpcpy(string, end->structure[i].warning) + 1;
+    }
+    frame->structure = rows;
+    frame->structure_count = end->structure_count;
+    return true;
+}
+
 static bool take_costs(struct fl_frame *frame, const struct message_frame_end *end, struct fl_error *error)
 {
     frame->primary_rays = end->primary_rays;
@@ -332,13 +355,11 @@ static bool take_costs(struct fl_frame *frame, const struct message_frame_end *e
     frame->structure_bytes = end->structure_bytes;
     frame->stages = copy(end->stages, end->stages_count * sizeof(*frame->stages));
     frame->wave_comparisons = copy(end->comparisons, end->comparisons_count * sizeof(*frame->wave_comparisons));
-    if ((end->stages_count > 0 && !frame->stages) || (end->comparisons_count > 0 && !frame->wave_comparisons))
+    if ((end->stages_count > 0 && !frame->stages) || (end->comparisons_count > 0 && !frame->wave_comparisons) ||
+        !copy_structure(frame, end))
         return fl_error_set(error, FL_ERROR_MEMORY, "", "out of memory");
     frame->stage_count = end->stages_count;
     frame->wave_comparison_count = end->comparisons_count;
-    for (; frame->cube_count < end->cubes_count && frame->cube_count < PROTOCOL_CUBE_PART_COUNT;
-         frame->cube_count++)
-        frame->cubes[frame->cube_count] = end->cubes[frame->cube_count];
     return true;
 }
 

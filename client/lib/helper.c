@@ -117,8 +117,8 @@ static void describe_costs(struct message_frame_end *end, const struct fl_frame 
     end->structure_bytes = frame->structure_bytes;
     end->stages = frame->stages;
     end->stages_count = (uint32_t)frame->stage_count;
-    end->cubes = (struct record_layered_cube *)(uintptr_t)frame->cubes; /* only read */
-    end->cubes_count = (uint32_t)frame->cube_count;
+    end->structure = frame->structure;
+    end->structure_count = (uint32_t)frame->structure_count;
 }
 
 static bool send_pixels(struct fl_helper *helper, const struct fl_frame *frame, struct fl_error *error)

@@ -93,18 +93,17 @@ void add_count(std::vector<entry> &entries, const char *name, uint64_t value)
     add_text(entries, name, std::to_string(value));
 }
 
-// What a tracer sampled, and how finely.
-void add_cubes(std::vector<entry> &entries, enum protocol_tracer tracer, const struct message_frame_end &end)
+void add_structure(std::vector<entry> &entries, const struct message_frame_end &end)
 {
-    for (uint32_t i = 0; i < end.cubes_count; i++) {
-        const struct record_layered_cube &cube = end.cubes[i];
-        const bool has_parts = tracer != PROTOCOL_TRACER_ABUFFER;
-        const std::string part =
-            has_parts ? std::string("cube/") + protocol_cube_part_text(cube.part) + "/" : "abuffer/";
-        add_number(entries, (part + "cell_metres").c_str(), static_cast<double>(cube.cell_metres));
-        add_count(entries, (part + "resolution").c_str(), cube.resolution);
-        add_count(entries, (part + "layers_needed").c_str(), cube.layers_needed);
-        add_count(entries, (part + "layers_kept").c_str(), cube.layers_kept);
+    for (uint32_t i = 0; i < end.structure_count; i++) {
+        const struct record_structure_row &row = end.structure[i];
+        const std::string name = std::string("structure/") + row.name;
+        if (row.unit == PROTOCOL_UNIT_METRES)
+            add_number(entries, (name + "_metres").c_str(), static_cast<double>(row.measure));
+        else
+            add_count(entries, name.c_str(), row.number);
+        if (row.warning[0])
+            add_text(entries, (name + "/warning").c_str(), row.warning);
     }
 }
 
@@ -150,7 +149,7 @@ std::vector<entry> collect(const struct image &image)
     add_count(entries, "primary_rays", end.primary_rays);
     add_count(entries, "shadow_rays", end.shadow_rays);
     add_count(entries, "secondary_rays", end.secondary_rays);
-    add_cubes(entries, begin.tracer, end);
+    add_structure(entries, end);
     add_stages(entries, end);
     return entries;
 }

@@ -12,6 +12,7 @@
 #define ROW 12.0 /* of the timeline */
 #define TIMELINE_FRAMES 8u
 #define TIMELINE_LEAST_NS 20e6
+#define STRUCTURE_SHARE_MAX 0.6 /* of the width of the window: longer lines are left out */
 
 static const struct hud_colour panel = {14, 17, 22, 205}, ink = {232, 236, 241, 255}, faint = {148, 158, 170, 255},
                                accent = {255, 190, 92, 255}, alarm = {255, 110, 92, 255},
@@ -130,7 +131,7 @@ static struct corner draw_scene(struct layout *layout)
     const struct hud_state *state = layout->state;
     const struct settings *settings = state->settings;
     const double s = layout->scale, line = LINE * s;
-    struct row rows[8];
+    struct row rows[6 + HUD_STRUCTURE_MAX];
     size_t count = 0;
     snprintf(rows[count].value, HUD_TEXT_MAX, "%s, %s", protocol_tracer_text(settings->tracer),
              protocol_integrator_text(settings->integrator));
@@ -148,6 +149,11 @@ static struct corner draw_scene(struct layout *layout)
     }
     print_samples(state, rows[count].value, HUD_TEXT_MAX);
     rows[count++].name = "picture";
+    for (size_t i = 0; i < HUD_STRUCTURE_MAX && state->structure[i]; i++) {
+        snprintf(rows[count].value, HUD_TEXT_MAX, "%s", state->structure[i]);
+        if (text_width(layout, HUD_PLAIN, rows[count].value) < STRUCTURE_SHARE_MAX * state->width)
+            rows[count++].name = "structure";
+    }
     double names = 0, widest = text_width(layout, HUD_BOLD, state->scene);
     for (size_t i = 0; i < count; i++)
         names = fmax(names, text_width(layout, HUD_PLAIN, rows[i].name));

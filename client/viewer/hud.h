@@ -11,6 +11,7 @@
 
 #define HUD_MARKS_MAX 2048u
 #define HUD_TEXT_MAX 128u
+#define HUD_STRUCTURE_MAX 2u
 
 struct hud_colour {
     uint8_t r, g, b, a; /* straight */
@@ -50,7 +51,8 @@ struct hud_state {
     uint64_t now_ns;
     uint32_t picture_width, picture_height, samples, samples_wanted;
     bool moving;
-    uint64_t revision, wire_bytes; /* of the last frame */
+    uint64_t revision, wire_bytes;            /* of the last frame */
+    const char *structure[HUD_STRUCTURE_MAX]; /* what its tracer says of its parts; NULL: no more */
     enum protocol_encoding encoding;
     unsigned quality;
     enum { HUD_HEAT_NONE, HUD_HEAT_WAITING, HUD_HEAT_SHOWN } heat;

@@ -84,6 +84,8 @@ void viewer_hud(struct viewer *viewer, struct hud_state *state)
                                                                      : HUD_HEAT_NONE,
                                 .heat_figures = viewer->heat_figures,
                                 .heat_top = HEAT_TOP};
+    for (size_t i = 0; i < viewer->structure_count; i++)
+        state->structure[i] = viewer->structure[i];
     fill_names(viewer, state);
     fill_status(viewer, state);
     if (viewer->notice_ns > state->now_ns)

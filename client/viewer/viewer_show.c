@@ -3,6 +3,7 @@
 #include "viewer/viewer_state.h"
 #include "protocol/common/clock.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #define LOOK_PAUSE_NS 4000000ull   /* between cameras: no screen shows more */
@@ -103,14 +104,25 @@ static bool decode(struct viewer *viewer, struct fl_frame *frame)
     return false;
 }
 
+static void take_structure(struct viewer *viewer, const struct fl_frame *frame)
+{
+    struct fl_structure_part part;
+    viewer->structure_count = 0;
+    for (size_t at = 0; viewer->structure_count < HUD_STRUCTURE_MAX && fl_structure_next(frame, &at, &part);)
+        snprintf(viewer->structure[viewer->structure_count++], HUD_TEXT_MAX, "%.20s%s%.100s", part.name,
+                 part.name[0] != '\0' ? ": " : "", part.text);
+}
+
 static void take(struct viewer *viewer, struct fl_frame *frame)
 {
     if (!decode(viewer, frame))
         return;
     metrics_add(&viewer->metrics, frame, monotonic_now_ns());
+    take_structure(viewer, frame);
     viewer->frame = *frame;
     viewer->frame.stages = NULL;
     viewer->frame.wave_comparisons = NULL;
+    viewer->frame.structure = NULL;
     viewer->frame.encoded = NULL;
     viewer->frame.depth = NULL;
     viewer->frame.normals = NULL;

@@ -97,7 +97,7 @@ struct frame_result {
     uint64_t revision;
     uint64_t primary_rays, shadow_rays, secondary_rays, splits;
     uint64_t uploaded_bytes, structure_bytes;
-    struct tracer_cube cubes[TRACER_CUBES_MAX]; /* of a sampled structure */
+    struct structure_rows structure; /* what the tracer says of it */
     struct stage_times times;
     struct wave_comparison *comparisons; /* owned; ascending by wave and kind; NULL: nothing was compared */
     uint32_t comparison_count;

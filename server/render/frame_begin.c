@@ -285,7 +285,7 @@ bool frame_build(struct frame_renderer *renderer, struct error *error)
         renderer->built = true;
         renderer->result.uploaded_bytes += stats->uploaded_bytes;
         renderer->result.structure_bytes = stats->device_bytes;
-        memcpy(renderer->result.cubes, stats->cubes, sizeof(renderer->result.cubes));
+        tracer_tell(renderer->tracer, &renderer->result.structure);
     }
     if (renderer->second)
         progress = bring(renderer, renderer->second, error);

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define CELL_METRES_MAX 3e38f /* the message's */
+#define MEASURE_MAX 3e38f /* the message's */
 
 /* Lives until the last message that refers to its bytes is gone. */
 struct pending_frame {
@@ -209,26 +209,21 @@ static uint32_t fill_comparisons(struct record_wave_comparison *records, const s
     return count;
 }
 
-/* Those that hold anything. */
-static uint32_t fill_cubes(struct record_layered_cube *records, const struct frame_result *result)
+static uint32_t fill_structure(struct record_structure_row *records, const struct frame_result *result)
 {
-    uint32_t count = 0;
-    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
-        const struct tracer_cube *from = &result->cubes[i];
-        if (!from->resolution)
-            continue;
-        records[count++] = (struct record_layered_cube){
-            .part = (enum protocol_cube_part)i,
-            .resolution = from->resolution,
-            .cell_metres = from->cell_metres < CELL_METRES_MAX ? from->cell_metres : CELL_METRES_MAX,
-            .layers_needed = from->layers_needed,
-            .layers_kept = from->layers_kept,
-            .samples = from->samples,
-            .samples_lost = from->samples_lost,
-            .rebuilt = from->rebuilt ? 1 : 0,
+    const struct structure_rows *from = &result->structure;
+    for (uint32_t i = 0; i < from->count; i++) {
+        const struct structure_row *row = &from->rows[i];
+        records[i] = (struct record_structure_row){
+            .name = row->name,
+            .part = row->part,
+            .unit = (enum protocol_unit)row->unit,
+            .number = row->number,
+            .measure = row->measure < MEASURE_MAX ? row->measure : MEASURE_MAX,
+            .warning = row->warning,
         };
     }
-    return count;
+    return from->count;
 }
 
 static void send_end(struct pending_frame *pending, bool abandoned, uint64_t now_ns)
@@ -252,7 +247,7 @@ static void send_end(struct pending_frame *pending, bool abandoned, uint64_t now
         };
     }
     struct record_wave_comparison comparisons[COMPARISONS_MAX];
-    struct record_layered_cube cubes[TRACER_CUBES_MAX];
+    struct record_structure_row structure[STRUCTURE_ROWS_MAX];
     struct message message;
     message_init(&message, MESSAGE_FRAME_END);
     message.frame_end.frame = frame->frame;
@@ -267,8 +262,8 @@ static void send_end(struct pending_frame *pending, bool abandoned, uint64_t now
     message.frame_end.stages_count = times->count;
     message.frame_end.comparisons = comparisons;
     message.frame_end.comparisons_count = fill_comparisons(comparisons, &frame->result);
-    message.frame_end.cubes = cubes;
-    message.frame_end.cubes_count = fill_cubes(cubes, &frame->result);
+    message.frame_end.structure = structure;
+    message.frame_end.structure_count = fill_structure(structure, &frame->result);
     session_send(job->session, pending->request, job->channel, &message);
     const struct hub_options *hub = &job->session->hub->options;
     timeline_frame(hub->timeline, &(struct timeline_frame){.client = job->session->number,

@@ -103,12 +103,18 @@ uint64_t tracer_device_bytes(const struct tracer *tracer)
     return tracer->stats.device_bytes + (tracer->state ? trace_state_device_bytes(tracer->state) : 0);
 }
 
+void tracer_tell(const struct tracer *tracer, struct structure_rows *rows)
+{
+    *rows = (struct structure_rows){0};
+    if (tracer->impl->tell)
+        tracer->impl->tell(tracer, rows);
+}
+
 /* What the stats say of the last update. */
 static void begin_stats(struct tracer_stats *stats)
 {
     stats->uploaded_bytes = stats->nodes_rebuilt = stats->nodes_refitted = 0;
-    for (int i = 0; i < TRACER_CUBES_MAX; i++)
-        stats->cubes[i].rebuilt = false;
+    stats->parts_built = 0;
 }
 
 enum tracer_progress tracer_update_step(struct tracer *tracer, struct gpu_scene *scene,

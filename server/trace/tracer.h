@@ -18,6 +18,7 @@
 #include "gpu_scene/scene.h"
 #include "protocol/tracers.h"
 #include "trace/step.h"
+#include "trace/structure.h"
 #include "trace/view.h"
 #include "trace/wave.h"
 
@@ -53,26 +54,13 @@ struct tracer_options tracer_options_of(const struct tracer_settings *settings,
 /* Whether one tracer serves both, and a picture by either goes on from one by the other. */
 bool tracer_options_same(const struct tracer_options *a, const struct tracer_options *b);
 
-enum { TRACER_CUBE_STATIC, TRACER_CUBE_DYNAMIC, TRACER_CUBES_MAX };
-
-/* A sampled structure: what of the scene is in it, and how finely. */
-struct tracer_cube {
-    uint32_t resolution;    /* cells along the longest side; 0: there is no such cube */
-    float cell_metres;      /* size of a cell, world space */
-    uint32_t layers_needed; /* greatest depth complexity of an image's texels */
-    uint32_t layers_kept; /* fewer than are needed: there was no room for more, and the farther ones are missing */
-    uint64_t samples;
-    uint64_t samples_lost; /* of those that are missing; at most, as it is not known which coincide */
-    bool rebuilt;          /* by the last update */
-};
-
 struct tracer_stats {
     uint64_t device_bytes;   /* of the structure */
     uint64_t uploaded_bytes; /* by the last update */
     uint64_t nodes;          /* elements of the structure */
     uint64_t nodes_rebuilt;  /* by the last update */
     uint64_t nodes_refitted;
-    struct tracer_cube cubes[TRACER_CUBES_MAX]; /* `ldc` */
+    uint32_t parts_built; /* by the last update: a bit for each part of the structure */
     uint64_t walk_ns; /* `reference`: of the last wave or part, in Embree alone, without the copies from and to the
                          device */
 };
@@ -143,6 +131,9 @@ struct tracer_impl {
     /* Drops an update that is not done, and all that was built; the next one is a first one. NULL: an update is
      * always one step. */
     void (*abandon)(struct tracer *tracer);
+    /* Adds what the structure says of itself, as the last update left it: STRUCTURE_ROWS_MAX rows at most. NULL:
+     * nothing. */
+    void (*tell)(const struct tracer *tracer, struct structure_rows *rows);
     /* Whether the next step of the update would only wait, for threads of the tracer's own. NULL: never. */
     bool (*waits)(struct tracer *tracer);
 
@@ -211,6 +202,8 @@ bool tracer_update(struct tracer *tracer, struct gpu_scene *scene, const struct 
                    struct error *error);
 /* The next update takes everything as changed. */
 void tracer_outdate(struct tracer *tracer);
+/* What the structure says of itself, as the last update left it. */
+void tracer_tell(const struct tracer *tracer, struct structure_rows *rows);
 
 /* ---- tracing, resumable ---- */
 

@@ -4,6 +4,7 @@
 #ifndef FARLIGHT_TESTS_AGAINST_REFERENCE_H
 #define FARLIGHT_TESTS_AGAINST_REFERENCE_H
 
+#include "tests/fixtures/structure.h"
 #include "tests/accuracy/ldc_scenes.h"
 
 #include "trace/tracer.h"
@@ -157,7 +158,8 @@ static inline void with_pairs_of_shapes(void **state, unsigned tracer, void (*re
             fixture->request.width = fixture->request.height = 16; /* for the size of a cell */
             struct frame_result result = fixture_render(fixture);
             fixture->request.width = fixture->request.height = SIDE;
-            float cell_metres = result.cubes[TRACER_CUBE_STATIC].cell_metres;
+            float cell_metres =
+                structure_row(&result.structure, tracer == TRACER_LDC ? "static/cell" : "cell").measure;
             frame_result_finish(&result);
             check(fixture, name, cell_metres);
         }

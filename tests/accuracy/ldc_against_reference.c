@@ -35,8 +35,8 @@ static void expect_like_the_reference(struct fixture *fixture, const char *name,
     struct frame_result got = render(fixture, TRACER_LDC, name), expected = render(fixture, exact_tracer(), name);
     double reached = psnr(&got, &expected);
     printf("%s: PSNR %.1f dB\n", name, reached);
-    for (int i = 0; i < TRACER_CUBES_MAX; i++)
-        assert_int_equal(got.cubes[i].samples_lost, 0);
+    assert_int_equal(structure_row(&got.structure, "static/samples_lost").number, 0);
+    assert_int_equal(structure_row(&got.structure, "dynamic/samples_lost").number, 0);
     frame_result_finish(&got);
     frame_result_finish(&expected);
     if (!(reached >= psnr_min))
@@ -105,15 +105,15 @@ TEST(what_moves_is_seen_with_what_stands_still)
     uint32_t node = fixture_node(fixture, NODE_MESH, mesh, m);
     request_cubes(fixture);
     struct frame_result before = render(fixture, TRACER_LDC, "before it moves");
-    assert_int_equal(before.cubes[TRACER_CUBE_DYNAMIC].resolution, 0);
+    assert_int_equal(structure_row(&before.structure, "dynamic/resolution").number, 0);
     frame_result_finish(&before);
     for (int step = 0; step < 2; step++) {
         turned(m, 0.4f, 0.3f, 0.4f, 0.3f + 0.2f * (float)step, 0.5f);
         set_node(fixture, node, mesh, m);
         struct frame_result after = render(fixture, TRACER_LDC, "after it moved");
-        assert_int_equal(after.cubes[TRACER_CUBE_DYNAMIC].resolution, RESOLUTION);
-        assert_int_equal(after.cubes[TRACER_CUBE_STATIC].rebuilt, step == 0);
-        assert_true(after.cubes[TRACER_CUBE_DYNAMIC].rebuilt);
+        assert_int_equal(structure_row(&after.structure, "dynamic/resolution").number, RESOLUTION);
+        assert_int_equal(structure_row(&after.structure, "static/built").number, step == 0);
+        assert_true(structure_row(&after.structure, "dynamic/built").number);
         frame_result_finish(&after);
     }
     expect_like_the_reference(fixture, "two cubes", PSNR_MIN);
@@ -134,8 +134,9 @@ TEST(switching_to_another_tracer_and_back_builds_nothing)
     fixture->request.tracer_options.ldc.resolution = 128;
     for (size_t i = 0; i < sizeof(frames) / sizeof(frames[0]); i++) {
         struct frame_result result = render(fixture, frames[i].tracer, "switched");
-        assert_int_equal(result.cubes[TRACER_CUBE_STATIC].rebuilt, frames[i].builds);
-        assert_int_equal(result.cubes[TRACER_CUBE_STATIC].resolution, frames[i].tracer == TRACER_LDC ? 128 : 0);
+        assert_int_equal(structure_row(&result.structure, "static/built").number, frames[i].builds);
+        assert_int_equal(structure_row(&result.structure, "static/resolution").number,
+                         frames[i].tracer == TRACER_LDC ? 128 : 0);
         frame_result_finish(&result);
     }
 }

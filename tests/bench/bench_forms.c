@@ -41,22 +41,16 @@ static const char usage[] =
 
 /* ---- JSON ---- */
 
-json_t *bench_cubes_json(const struct tracer_cube cubes[TRACER_CUBES_MAX])
+json_t *bench_structure_json(const struct structure_rows *rows)
 {
-    static const char *const parts[] = {"static", "dynamic"};
-    json_t *list = json_array();
-    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
-        const struct tracer_cube *cube = &cubes[i];
-        if (cube->resolution == 0)
-            continue;
-        json_array_append_new(list, json_pack("{s:s, s:i, s:f, s:i, s:i, s:I, s:I, s:b}", "part", parts[i],
-                                              "resolution", (int)cube->resolution, "cell_metres",
-                                              (double)cube->cell_metres, "layers_needed", (int)cube->layers_needed,
-                                              "layers_kept", (int)cube->layers_kept, "samples",
-                                              (json_int_t)cube->samples, "samples_lost",
-                                              (json_int_t)cube->samples_lost, "rebuilt", cube->rebuilt ? 1 : 0));
+    json_t *object = json_object();
+    for (uint32_t i = 0; i < rows->count; i++) {
+        const struct structure_row *row = &rows->rows[i];
+        json_object_set_new(object, row->name,
+                            row->unit == UNIT_METRES ? json_real((double)row->measure)
+                                                     : json_integer((json_int_t)row->number));
     }
-    return list;
+    return object;
 }
 
 json_t *bench_times_json(const struct bench_runs *runs)

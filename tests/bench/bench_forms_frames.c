@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames: {"name", "cubes", "structure_bytes", "primary_rays", "shadow_rays", "secondary_rays", "frame_ns": [..],
- * "build_ns": [..], "stages_ns": {STAGE: [..]}, "psnr_db"}: whole pictures by an integrator with rasterised first
- * hits, from begin to the pixels on the host, what building took of that, and the peak signal to noise ratio of
- * the last run's 8-bit colours beside the reference's of the same moment. */
+/* Frames: {"name", "structure", "structure_bytes", "primary_rays", "shadow_rays", "secondary_rays", "frame_ns":
+ * [..], "build_ns": [..], "stages_ns": {STAGE: [..]}, "psnr_db"}: whole pictures by an integrator with rasterised
+ * first hits, from begin to the pixels on the host, what building took of that, and the peak signal to noise ratio
+ * of the last run's 8-bit colours beside the reference's of the same moment. */
 #include "tests/bench/bench_forms.h"
 
 #include "base/clock.h"
@@ -142,11 +142,12 @@ static json_t *describe(const struct frames *frames, unsigned i, const struct fr
     for (int k = 0; k < SHOWN; k++)
         json_object_set_new(stages, stage_name(shown[k]), bench_times_json(&frames->stages[i][k]));
     return json_pack("{s:s, s:o, s:I, s:I, s:I, s:I, s:o, s:o, s:o, s:o}", "name", frames->bench->forms[i].name,
-                     "cubes", bench_cubes_json(last->cubes), "structure_bytes", (json_int_t)last->structure_bytes,
-                     "primary_rays", (json_int_t)last->primary_rays, "shadow_rays", (json_int_t)last->shadow_rays,
-                     "secondary_rays", (json_int_t)last->secondary_rays, "frame_ns",
-                     bench_times_json(&frames->whole[i]), "build_ns", bench_times_json(&frames->build[i]),
-                     "stages_ns", stages, "psnr_db", isfinite(psnr) ? json_real(psnr) : json_null());
+                     "structure", bench_structure_json(&last->structure), "structure_bytes",
+                     (json_int_t)last->structure_bytes, "primary_rays", (json_int_t)last->primary_rays,
+                     "shadow_rays", (json_int_t)last->shadow_rays, "secondary_rays",
+                     (json_int_t)last->secondary_rays, "frame_ns", bench_times_json(&frames->whole[i]), "build_ns",
+                     bench_times_json(&frames->build[i]), "stages_ns", stages, "psnr_db",
+                     isfinite(psnr) ? json_real(psnr) : json_null());
 }
 
 static bool render_truth(struct frames *frames, struct frame_result *truth, struct error *error)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Builds: {"name", "cubes", "bytes", "build_ns": [..]}; of octrees also "octree": what the last build counted.
+/* Builds: {"name", "structure", "bytes", "build_ns": [..]}; of octrees also "octree": what the last build counted.
  * Waves: the same, and "waves": [{"kind", "rays", "hits_ns": [..], "walk_ns": [..]}]: rays to hits on the device,
  * surfaces included, and the walk alone (of any-hit waves there is none). Closest-hit waves beside the reference
  * also have "agree" (share of the rays that hit with both or miss with both), "only_form", "only_reference", and
@@ -48,15 +48,17 @@ static bool build(struct bench_forms *bench, struct bench_form *form, uint64_t *
     const bool done = tracer_update(form->made, &bench->scene.gpu, &(struct tracer_update){0}, error);
     glFinish();
     *time_ns = clock_now_ns() - start_ns;
-    if (done && form->tracer == TRACER_LDC && !form->made->stats.cubes[TRACER_CUBE_STATIC].rebuilt)
+    if (done && form->tracer == TRACER_LDC && form->made->stats.parts_built == 0)
         return error_set(error, ERROR_INTERNAL, NULL, "%s: it was not built", form->name);
     return done;
 }
 
 static json_t *describe(const struct bench_form *form, const struct bench_runs *builds)
 {
+    struct structure_rows structure;
+    tracer_tell(form->made, &structure);
     json_t *object =
-        json_pack("{s:s, s:o, s:I, s:o}", "name", form->name, "cubes", bench_cubes_json(form->made->stats.cubes),
+        json_pack("{s:s, s:o, s:I, s:o}", "name", form->name, "structure", bench_structure_json(&structure),
                   "bytes", (json_int_t)form->made->stats.device_bytes, "build_ns", bench_times_json(builds));
     if (form->rival && form->rival != &plain_pass_impl) {
         const struct svo_build_facts facts = svo_facts(form->made);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Samples: {"name", "cubes", "bytes", "build_ns": [..]} of a cube's samples alone, from triangles to packed and
- * sorted samples with their surfaces: what peeling and lists do each in its way. What leads over emptiness, which
- * is built behind either, is left out. */
+/* Samples: {"name", "structure", "bytes", "build_ns": [..]} of a cube's samples alone, from triangles to packed
+ * and sorted samples with their surfaces: what peeling and lists do each in its way. What leads over emptiness,
+ * which is built behind either, is left out. */
 #include "tests/bench/bench_forms.h"
 
 #include "base/clock.h"
@@ -39,11 +39,11 @@ static bool build(struct bench_forms *bench, const struct bench_form *form, stru
                   const uint32_t *instances, bool counts, struct error *error)
 {
     struct gpu_scene *gpu = &bench->scene.gpu;
-    place(&sampled->store.cubes[TRACER_CUBE_STATIC], gpu, form->options.ldc.resolution);
+    place(&sampled->store.cubes[LDC_CUBE_STATIC], gpu, form->options.ldc.resolution);
     glFinish();
     const uint64_t start_ns = clock_now_ns();
     gpu_scene_bind(gpu);
-    enum tracer_progress progress = ldc_build_begin(sampled->builder, &sampled->store, TRACER_CUBE_STATIC, gpu,
+    enum tracer_progress progress = ldc_build_begin(sampled->builder, &sampled->store, LDC_CUBE_STATIC, gpu,
                                                     instances, gpu->instance_count, &form->options, error);
     while (progress == TRACER_MORE)
         progress = ldc_build_go_on(sampled->builder, true, error);
@@ -73,10 +73,10 @@ static bool build_all(struct bench_forms *bench, struct sampled *sampled, const 
 
 static json_t *describe(const struct bench_form *form, const struct sampled *sampled)
 {
-    const struct tracer_cube cubes[TRACER_CUBES_MAX] = {
-        ldc_cube_stats(&sampled->store.cubes[TRACER_CUBE_STATIC], true)};
-    return json_pack("{s:s, s:o, s:I, s:o}", "name", form->name, "cubes", bench_cubes_json(cubes), "bytes",
-                     (json_int_t)(ldc_store_bytes(&sampled->store) + ldc_builder_bytes(sampled->builder)),
+    struct structure_rows structure = {0};
+    ldc_cube_tell(&sampled->store, LDC_CUBE_STATIC, true, &structure);
+    return json_pack("{s:s, s:o, s:I, s:o}", "name", form->name, "structure", bench_structure_json(&structure),
+                     "bytes", (json_int_t)(ldc_store_bytes(&sampled->store) + ldc_builder_bytes(sampled->builder)),
                      "build_ns", bench_times_json(&sampled->runs));
 }
 

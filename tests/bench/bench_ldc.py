@@ -142,7 +142,7 @@ def measure_variants(bench, scenes):
     results = []
     for scene in scenes[:1] if bench.tiny else scenes[:1] + scenes[-1:]:
         resolution = resolutions(bench)[RESOLUTIONS.index(USUAL)]
-        cell = form_of(scene, resolution)["cubes"][0]["cell_metres"]
+        cell = form_of(scene, resolution)["structure"]["static/cell"]
         model = ["--family", 1000 if bench.tiny else 147000] if scene["scene"] == "family" else ["--model", scene["scene"]]
         for what, options in variants(resolution, cell).items():
             forms = [argument for each in options for argument in ldc(resolution, **each)]
@@ -175,13 +175,13 @@ def at(result, usual):
 
 
 def error_cells(form, wave, which="error_median"):
-    return wave[which] / form["cubes"][0]["cell_metres"] if which in wave and form["cubes"] else None
+    cell = form["structure"].get("static/cell")
+    return wave[which] / cell if which in wave and cell else None
 
 
 def same_samples(result):
     """What of it the figures tell; the tests compare the samples themselves."""
-    facts = [[(cube["layers_needed"], cube["layers_kept"], cube["samples"]) for cube in form["cubes"]]
-             for form in result["forms"]]
+    facts = [form["structure"] for form in result["forms"]]
     return all(fact == facts[0] for fact in facts)
 
 
@@ -199,7 +199,8 @@ def depth_rows(results):
             peel, lists = result["forms"]
             yield row(f"ldc build, peeling / one pass, {result['depth']} layers", PEEL_WANTED[result["depth"]],
                       paired_ratio(peel["build_ns"], lists["build_ns"]),
-                      f"{peel['cubes'][0]['resolution']} cells, {peel['cubes'][0]['samples'] / 1e6:.1f} M samples")
+                      f"{peel['structure']['static/resolution']} cells, "
+                      f"{peel['structure']['static/samples'] / 1e6:.1f} M samples")
 
 
 def growth_row(results):

@@ -19,7 +19,7 @@ def show_table1(rows):
         a = [milliseconds(runs) for runs in builds]
         b = [after_build_ms(form) for form in forms]
         trace = [milliseconds(form["stages_ns"]["trace"]) for form in forms]
-        needed = max(cube["layers_needed"] for cube in forms[1]["cubes"])
+        needed = max(forms[1]["structure"].get(f"{part}/layers_needed", 0) for part in ("static", "dynamic"))
         cells = [f"{with_spread(a[i])} | {with_spread(b[i])} | {significant(trace[i]['median'])}" for i in range(2)]
         growth = " ".join(significant(x[1]["median"] / x[0]["median"]) for x in (a, b, trace))
         lines.append((name, got["instead"], got["frames"]["triangles"], needed, *cells, growth,
@@ -38,15 +38,15 @@ def show_scenes(results):
         for form in result["forms"]:
             if form is bvh:
                 continue
-            cube = form["cubes"][0]
+            said = form["structure"]
             waves = []
             for kind in ("reflection", "bounce", "shadow"):
                 rays = wave_of(form, kind)["rays"]
                 waves += [with_spread(figure([rays * 1e3 / ns for ns in wave_of(form, kind)["hits_ns"]])),
                           significant(ratio(bvh, form, kind)["median"])]
             looked = wave_of(form, "reflection")
-            lines.append((result["title"], result["triangles"], cube["resolution"], f"{cube['layers_needed']}",
-                          f"{cube['samples'] / 1e6:.2f}", f"{form['bytes'] / (1 << 20):.0f}", *waves,
+            lines.append((result["title"], result["triangles"], said["static/resolution"], said["static/layers_needed"],
+                          f"{said['static/samples'] / 1e6:.2f}", f"{form['bytes'] / (1 << 20):.0f}", *waves,
                           *(significant(looked[what]) for what in LOOKED_AT)))
     header = [("scene", "triangles", "cells", "layers", "samples", "memory", "reflection", "/ bvh", "bounce", "/ bvh",
                "shadow", "/ bvh", *(["reflection"] * 3)),
@@ -58,14 +58,14 @@ def show_accuracy(scenes, pictures):
     closed = {(result["title"], result["how"]): result for result in pictures}
     lines = []
     for result in scenes:
-        for i, form in enumerate(form for form in result["forms"] if form["cubes"]):
+        for i, form in enumerate(form for form in result["forms"] if "static/cell" in form["structure"]):
             cells = []
             for kind in ACCURACY_WAVES:
                 wave = wave_of(form, kind)
                 cells += [f"{100 * wave['agree']:.3f}", *(significant(error_cells(form, wave, which)) for which in
                                                           ("error_median", "error_p99"))]
             same = [closed.get((result["title"], how)) for how in PICTURES]
-            lines.append((result["title"], form["cubes"][0]["resolution"], *cells,
+            lines.append((result["title"], form["structure"]["static/resolution"], *cells,
                           *(significant(picture["forms"][i]["psnr_db"] if picture else None) for picture in same)))
     header = [("scene", "cells", *(["reflection"] * 3), *(["bounce"] * 3), *PICTURES),
               ("", "", *(["agree %", "error, cells", "of 99 %"] * 2), *(["PSNR, dB"] * len(PICTURES)))]
@@ -86,10 +86,10 @@ def show_depths(results):
     lines = []
     for result in results:
         peel, lists = result["forms"]
-        cube = lists["cubes"][0]
+        said = lists["structure"]
         faster = paired_ratio(peel["build_ns"], lists["build_ns"])
-        lines.append((result["title"], result["triangles"], cube["resolution"], cube["layers_needed"],
-                      f"{cube['samples'] / 1e6:.2f}", with_spread(milliseconds(peel["build_ns"])),
+        lines.append((result["title"], result["triangles"], said["static/resolution"], said["static/layers_needed"],
+                      f"{said['static/samples'] / 1e6:.2f}", with_spread(milliseconds(peel["build_ns"])),
                       with_spread(milliseconds(lists["build_ns"])), with_spread(faster),
                       "one pass" if faster["median"] > 1 else "peeling", "yes" if same_samples(result) else "NO"))
     header = [("scene", "triangles", "cells", "layers", "samples", "peeling", "one pass", "peeling", "the faster", "same"),

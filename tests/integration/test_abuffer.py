@@ -122,17 +122,17 @@ class Lists(Case):
         for resolution in (128, 512):
             frame, = frames_of(self.render(*ABUFFER, "--abuffer-resolution", resolution, "--timings=json"))
             self.assertEqual(frame["tracer"], "abuffer")
-            lists, = frame["cubes"]
-            self.assertEqual((lists["part"], lists["resolution"], lists["rebuilt"]), ("static", resolution, True))
-            self.assertEqual((lists["layers_kept"], lists["samples_lost"]), (lists["layers_needed"], 0))
-            self.assertGreater(lists["samples"], resolution * resolution / 4, "the floor is below much of one image")
-            texels[resolution] = lists["cell_metres"]
+            said = frame["structure"]
+            self.assertEqual((said["resolution"], said["built"]), (resolution, True))
+            self.assertGreater(said["longest_list"], 1)
+            self.assertGreater(said["samples"], resolution * resolution / 4, "the floor is below much of one image")
+            texels[resolution] = said["cell_metres"]
         # The box is the same; a texel or two of it may be a margin.
         self.assertAlmostEqual(texels[128] / texels[512], 4, delta=0.1)
 
     def test_the_table_says_it_to_people(self):
         text = self.render(*ABUFFER, "--abuffer-resolution", "128", "--timings").stdout
-        self.assertRegex(text, r"lists +128 texels of [0-9.]+ m?m; \d+ samples, at most \d+ in a list; sampled for 1 of 1 frame")
+        self.assertRegex(text, r"structure +resolution 128, cell [0-9.]+ m?m, samples \d+, longest list \d+; built for 1 of 1 frame\n")
 
     def test_a_scene_that_needs_more_than_it_may_is_refused_with_the_remedy(self):
         result = self.render(*ABUFFER, status=1, env={**os.environ, "FARLIGHT_MEMORY_ABUFFER": "1M"})
@@ -143,18 +143,17 @@ class Lists(Case):
     def test_exr_metadata_holds_the_size_of_a_texel(self):
         path = self.folder / "x.exr"
         self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", path, *SIZE, *SMALL), 0)
-        self.assertIn("farlight/abuffer/cell_metres", farlight_test.exr_attributes(path))
+        self.assertIn("farlight/structure/cell_metres", farlight_test.exr_attributes(path))
 
 
 class Animations(Case):
     def test_what_moves_is_drawn_anew_and_what_stands_still_is_not(self):
         result = self.expect(farlight("animate", bundled_scenes() / "carousel.glb", "--clip", "ride", "--frames", "1-3",
                                       "--fps", "8", "-o", self.folder / "%d.png", *SIZE, *SMALL, "--timings=json"), 0)
-        self.assertEqual([[lists["rebuilt"] for lists in frame["cubes"]] for frame in frames_of(result)], [[True]] * 3)
+        self.assertEqual([frame["structure"]["built"] for frame in frames_of(result)], [True] * 3)
         result = self.expect(farlight("animate", bundled_scenes() / "teapot.glb", "--orbit", "--frames", "1-3",
                                       "-o", self.folder / "%d.png", *SIZE, *SMALL, "--timings=json"), 0)
-        self.assertEqual([[lists["rebuilt"] for lists in frame["cubes"]] for frame in frames_of(result)],
-                         [[True], [False], [False]])
+        self.assertEqual([frame["structure"]["built"] for frame in frames_of(result)], [True, False, False])
 
     def test_what_moves_while_the_shutter_is_open_is_refused(self):
         result = self.expect(farlight("animate", bundled_scenes() / "carousel.glb", "--clip", "ride", "--frames", "1-2",
@@ -171,8 +170,7 @@ class Comparison(Case):
         if "libembree-dev" in result.stderr:
             self.skipTest("this farlightd was built without Embree")
         report = json.loads(self.expect(result, 0).stdout)
-        lists, = report["cubes"]
-        self.assertEqual((report["tracer"], report["integrator"], lists["resolution"]), ("abuffer", "whitted", 1280))
+        self.assertEqual((report["tracer"], report["integrator"], report["structure"]["resolution"]), ("abuffer", "whitted", 1280))
         for kind in ("primary", "secondary"):
             waves = [wave for wave in report["waves"] if wave["kind"] == kind]
             agreed, rays = (sum(wave[key] for wave in waves for key in keys) for keys in
@@ -182,7 +180,7 @@ class Comparison(Case):
         text = self.expect(farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "abuffer,bvh", "--abuffer-search",
                                     "linear1", *SIZE), 0).stdout
         self.assertIn("abuffer against bvh", text)
-        self.assertIn("lists: 1280 texels of ", text)
+        self.assertIn("structure: resolution 1280, cell ", text)
 
 
 if __name__ == "__main__":

@@ -131,15 +131,16 @@ class Benchmark(unittest.TestCase):
         self.assertEqual([row["name"] for row in data["table1"]], ["bunny", "skinned figure"])
         still, figure = data["table1"]
         self.assertEqual([f["name"] for f in still["builds"]["forms"]], ["ldc:resolution=32", "ldc:resolution=64"])
-        self.assertEqual([c["part"] for c in figure["frames"]["forms"][0]["cubes"] if c["rebuilt"]], ["dynamic"])
+        self.assertEqual({name: value for name, value in figure["frames"]["forms"][0]["structure"].items() if name.endswith("built")},
+                         {"static/built": 0, "dynamic/built": 1})
         for scene in data["scenes"]:
-            self.assertEqual([f["cubes"][0]["resolution"] for f in scene["forms"] if f["cubes"]][:2], [32, 64])
+            self.assertEqual([f["structure"].get("static/resolution") for f in scene["forms"]][:2], [32, 64])
             bvh = bench_ldc.form_of(scene, "bvh")
             self.assertEqual([w["agree"] for w in bvh["waves"] if "agree" in w], [1, 1])
         sheets = {r["depth"]: r for r in data["depths"] if "depth" in r}
         for depth, result in sheets.items():
             self.assertTrue(bench_ldc.same_samples(result))
-            self.assertEqual([f["cubes"][0]["layers_needed"] for f in result["forms"]], [depth, depth])
+            self.assertEqual([f["structure"]["static/layers_needed"] for f in result["forms"]], [depth, depth])
         text = (self.out / "bench.txt").read_text()
         for row in data["wanted"]:
             self.assertIn(row["line"], text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The tracer `ldc` as a person meets it: options, what a frame says of its cubes, comparison, animation."""
+"""The tracer `ldc` as a person meets it: options, what a frame says of its structure, comparison, animation."""
 import json
 import os
 
@@ -92,7 +92,7 @@ class Pictures(Case):
         self.assertLess(errors[-1], 10)
 
 
-class Cubes(Case):
+class Structure(Case):
     def render(self, *arguments, **options):
         return self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", self.folder / "x.png", *SIZE, *arguments,
                                     **options), 0)
@@ -101,37 +101,43 @@ class Cubes(Case):
         cells = {}
         for resolution in (128, 512):
             frame, = frames_of(self.render(*LDC, "--ldc-resolution", resolution, "--timings=json"))
-            cube, = frame["cubes"]
-            self.assertEqual((cube["part"], cube["resolution"], cube["rebuilt"]), ("static", resolution, True))
-            self.assertEqual((cube["layers_kept"], cube["samples_lost"]), (cube["layers_needed"], 0))
-            self.assertGreater(cube["samples"], 0)
-            cells[resolution] = cube["cell_metres"]
+            said = frame["structure"]
+            self.assertEqual({name.split("/")[0] for name in said}, {"static"})
+            self.assertEqual((said["static/resolution"], said["static/built"]), (resolution, True))
+            self.assertEqual((said["static/layers_kept"], said["static/samples_lost"]), (said["static/layers_needed"], 0))
+            self.assertGreater(said["static/samples"], 0)
+            self.assertEqual(frame["warnings"], [])
+            cells[resolution] = said["static/cell_metres"]
         # The box is the same; a cell or two of it may be a margin.
         self.assertAlmostEqual(cells[128] / cells[512], 4, delta=0.1)
         frame, = frames_of(self.render("--timings=json"))
-        self.assertNotIn("cubes", frame)
+        self.assertEqual(set(frame["structure"]), {"nodes", "nodes_rebuilt", "nodes_refitted"})
 
     def test_the_table_says_it_to_people(self):
         text = self.render(*LDC, "--ldc-resolution", "128", "--timings").stdout
-        self.assertRegex(text, r"cubes +static +128 cells of [0-9.]+ m?m; \d+ layers?, \d+ samples; sampled for 1 of 1 frame")
+        self.assertRegex(text, r"structure +static +resolution 128, cell [0-9.]+ m?m, layers needed \d+, layers kept \d+, "
+                               r"samples \d+, samples lost 0; built for 1 of 1 frame\n")
 
     def test_layers_that_a_limit_takes_away_are_told_with_the_remedy(self):
         result = self.render(*LDC, "--ldc-resolution", "128", "--timings=json",
                              env={**os.environ, "FARLIGHT_LIMITS_LDC_LAYERS": "1"})
-        cube, = frames_of(result)[0]["cubes"]
-        self.assertEqual(cube["layers_kept"], 1)
-        self.assertGreater(cube["layers_needed"], 1)
-        self.assertGreater(cube["samples_lost"], 0)
-        for words in ("warning: frame 0: the static cube has 1 of ", f"{cube['samples_lost']} samples", "limits.ldc_layers"):
-            self.assertIn(words, result.stderr)
+        frame, = frames_of(result)
+        said = frame["structure"]
+        self.assertEqual(said["static/layers_kept"], 1)
+        self.assertGreater(said["static/layers_needed"], 1)
+        self.assertGreater(said["static/samples_lost"], 0)
+        warning, = frame["warnings"]
+        self.assertIn(f"warning: frame 0: {warning}", result.stderr)
+        for words in ("the static cube has 1 of ", f"{said['static/samples_lost']} samples", "limits.ldc_layers"):
+            self.assertIn(words, warning)
 
     def test_memory_is_a_limit_too(self):
         arguments = ["render", bundled_scenes() / "cornell.glb", "-o", self.folder / "x.png", *SIZE, *LDC, "--ldc-resolution",
                      "512", "--timings=json"]
         result = self.expect(farlight(*arguments, env={**os.environ, "FARLIGHT_MEMORY_LDC": "12M"}), 0)
-        cube, = frames_of(result)[0]["cubes"]
-        self.assertLess(cube["layers_kept"], cube["layers_needed"])
-        self.assertGreater(cube["samples_lost"], 0)
+        said = frames_of(result)[0]["structure"]
+        self.assertLess(said["static/layers_kept"], said["static/layers_needed"])
+        self.assertGreater(said["static/samples_lost"], 0)
         self.assertIn("memory.ldc", result.stderr)
         result = self.expect(farlight(*arguments, env={**os.environ, "FARLIGHT_MEMORY_LDC": "1M"}), 1)
         self.assertIn("no room for one layer", result.stderr)
@@ -140,7 +146,7 @@ class Cubes(Case):
     def test_exr_metadata_holds_the_size_of_a_cell(self):
         path = self.folder / "x.exr"
         self.expect(farlight("render", bundled_scenes() / "teapot.glb", "-o", path, *SIZE, *LDC), 0)
-        self.assertIn(b"farlight/cube/static/cell_metres", path.read_bytes()[:65536])
+        self.assertIn(b"farlight/structure/static/cell_metres", path.read_bytes()[:65536])
 
 
 class Animations(Case):
@@ -149,8 +155,9 @@ class Animations(Case):
                                       "--fps", "8", "-o", self.folder / "%d.png", *SIZE, *LDC, "--ldc-resolution", "256",
                                       "--timings=json"), 0)
         frames = frames_of(result)
-        self.assertEqual([{c["part"] for c in frame["cubes"]} for frame in frames], [{"static", "dynamic"}] * 4)
-        rebuilt = [{c["part"] for c in frame["cubes"] if c["rebuilt"]} for frame in frames]
+        parts = ("static", "dynamic")
+        self.assertTrue(all(f"{part}/resolution" in frame["structure"] for frame in frames for part in parts))
+        rebuilt = [{part for part in parts if frame["structure"][f"{part}/built"]} for frame in frames]
         self.assertEqual(rebuilt[-1], {"dynamic"})
         self.assertGreater(build_ms(frames[0], 0), 1)
         self.assertGreater(build_ms(frames[-1], 1), 1)
@@ -174,8 +181,7 @@ class Comparison(Case):
         if "libembree-dev" in result.stderr:
             self.skipTest("this farlightd was built without Embree")
         report = json.loads(self.expect(result, 0).stdout)
-        cube, = report["cubes"]
-        self.assertEqual((cube["part"], cube["resolution"]), ("static", 1024))
+        self.assertEqual(report["structure"]["static/resolution"], 1024)
         self.assertIn("secondary", {wave["kind"] for wave in report["waves"]})
         for kind in ("primary", "secondary"):
             waves = [wave for wave in report["waves"] if wave["kind"] == kind]
@@ -184,7 +190,7 @@ class Comparison(Case):
             self.assertGreater(rays, 1000)
             self.assertGreaterEqual(agreed / rays, 0.99, kind)
         text = self.expect(farlight("compare", bundled_scenes() / "teapot.glb", "--tracers", "ldc,bvh", *SIZE), 0).stdout
-        self.assertIn("static cube: 1024 cells of ", text)
+        self.assertIn("structure static: resolution 1024, cell ", text)
 
 
 if __name__ == "__main__":

@@ -110,16 +110,6 @@ static void fill_stats(struct abuffer *abuffer)
     const struct abuffer_store *store = &abuffer->store;
     stats->nodes = store->sample_count;
     stats->device_bytes = abuffer_store_bytes(store) + abuffer_builder_bytes(abuffer->builder);
-    stats->cubes[TRACER_CUBE_STATIC] = (struct tracer_cube){0};
-    if (store->resolution > 0)
-        stats->cubes[TRACER_CUBE_STATIC] = (struct tracer_cube){
-            .resolution = store->resolution,
-            .cell_metres = store->cell_world,
-            .layers_needed = store->depth_max,
-            .layers_kept = store->depth_max,
-            .samples = store->sample_count,
-            .rebuilt = true,
-        };
 }
 
 static enum tracer_progress do_step(struct abuffer *abuffer, struct gpu_scene *scene, struct stage_times *times,
@@ -149,8 +139,10 @@ static enum tracer_progress abuffer_update(struct tracer *tracer, struct gpu_sce
         abuffer_store_finish(&abuffer->store);
         abuffer_builder_clear(abuffer->builder);
     }
-    if (progress == TRACER_DONE)
+    if (progress == TRACER_DONE) {
         stats->nodes_rebuilt = abuffer->store.sample_count;
+        stats->parts_built = 1;
+    }
     fill_stats(abuffer);
     return progress;
 }
@@ -161,6 +153,18 @@ static void abuffer_abandon(struct tracer *tracer)
     abuffer_build_abandon(abuffer->builder);
     abuffer_builder_clear(abuffer->builder);
     fill_stats(abuffer);
+}
+
+static void abuffer_tell(const struct tracer *tracer, struct structure_rows *rows)
+{
+    const struct abuffer_store *store = &((const struct abuffer *)tracer)->store;
+    if (store->resolution == 0)
+        return;
+    structure_number(rows, "resolution", store->resolution);
+    structure_metres(rows, "cell", store->cell_world);
+    structure_number(rows, "samples", store->sample_count);
+    structure_number(rows, "longest_list", store->depth_max);
+    structure_built(rows, tracer->stats.parts_built != 0);
 }
 
 static bool abuffer_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
@@ -185,6 +189,7 @@ const struct tracer_impl tracer_abuffer_impl = {
     .destroy = abuffer_destroy,
     .update = abuffer_update,
     .abandon = abuffer_abandon,
+    .tell = abuffer_tell,
     .trace_range = abuffer_trace_range,
     .surfaces = abuffer_make_surfaces,
 };

@@ -331,6 +331,13 @@ static void bvh_abandon(struct tracer *tracer)
     fill_stats(bvh);
 }
 
+static void bvh_tell(const struct tracer *tracer, struct structure_rows *rows)
+{
+    structure_number(rows, "nodes", tracer->stats.nodes);
+    structure_number(rows, "nodes_rebuilt", tracer->stats.nodes_rebuilt);
+    structure_number(rows, "nodes_refitted", tracer->stats.nodes_refitted);
+}
+
 static bool bvh_waits(struct tracer *tracer)
 {
     return bvh_store_waits(&((struct bvh *)tracer)->store);
@@ -442,6 +449,7 @@ const struct tracer_impl tracer_bvh_impl = {
     .destroy = bvh_destroy,
     .update = bvh_update,
     .abandon = bvh_abandon,
+    .tell = bvh_tell,
     .waits = bvh_waits,
     .state_create = bvh_state_create,
     .state_destroy = bvh_state_destroy,

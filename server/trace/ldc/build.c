@@ -132,7 +132,7 @@ static void place_cube(struct ldc_store *store, unsigned which)
     cube->sample_count = cube->quad_count = 0;
     cube->layers_needed = cube->layers_kept = 0;
     cube->samples_lost = 0;
-    for (unsigned behind = which + 1; behind < TRACER_CUBES_MAX; behind++)
+    for (unsigned behind = which + 1; behind < LDC_CUBES_MAX; behind++)
         store->cubes[behind].resolution = 0;
 }
 

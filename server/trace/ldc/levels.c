@@ -163,7 +163,7 @@ void ldc_levels_begin(struct ldc_levels *levels, struct ldc_store *store, unsign
                       const struct tracer_options *options)
 {
     *levels = (struct ldc_levels){.store = store, .options = options, .which = which};
-    if (which == TRACER_CUBE_STATIC)
+    if (which == LDC_CUBE_STATIC)
         store->no_cells = false;
     begin_cube(levels, which);
 }

@@ -22,7 +22,7 @@ static void part_finish(struct ldc_part *part)
 
 void ldc_parts_finish(struct ldc_parts *parts)
 {
-    for (int i = 0; i < TRACER_CUBES_MAX; i++)
+    for (int i = 0; i < LDC_CUBES_MAX; i++)
         part_finish(&parts->parts[i]);
     free(parts->records);
     hashmap_finish(&parts->record_by_node);
@@ -133,10 +133,9 @@ static void part_add(struct ldc_part *part, uint32_t instance, const struct ldc_
 }
 
 /* Deals the instances out. Those of empty geometries belong nowhere. */
-static bool deal_out(struct ldc_parts *parts, struct ldc_part fresh[TRACER_CUBES_MAX],
-                     const struct gpu_scene *scene)
+static bool deal_out(struct ldc_parts *parts, struct ldc_part fresh[LDC_CUBES_MAX], const struct gpu_scene *scene)
 {
-    for (int i = 0; i < TRACER_CUBES_MAX; i++)
+    for (int i = 0; i < LDC_CUBES_MAX; i++)
         if (!part_reserve(&fresh[i], scene->instance_count))
             return false;
     for (uint32_t i = 0; i < scene->instance_count; i++) {
@@ -149,7 +148,7 @@ static bool deal_out(struct ldc_parts *parts, struct ldc_part fresh[TRACER_CUBES
         if (geometry->device.primitive_count == 0)
             continue;
         bool dynamic = moves || geometry->node != 0;
-        part_add(&fresh[dynamic ? TRACER_CUBE_DYNAMIC : TRACER_CUBE_STATIC], i, &member);
+        part_add(&fresh[dynamic ? LDC_CUBE_DYNAMIC : LDC_CUBE_STATIC], i, &member);
     }
     return true;
 }
@@ -161,16 +160,16 @@ static bool same_part(const struct ldc_part *a, const struct ldc_part *b)
 }
 
 bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene, uint32_t resolution,
-                      bool geometry_changed, bool stale[TRACER_CUBES_MAX], struct error *error)
+                      bool geometry_changed, bool stale[LDC_CUBES_MAX], struct error *error)
 {
-    struct ldc_part fresh[TRACER_CUBES_MAX] = {0};
+    struct ldc_part fresh[LDC_CUBES_MAX] = {0};
     bool crowded = parts->record_count > RECORDS_KEPT && parts->record_count / 2 > scene->instance_count;
     bool ok = (!geometry_changed && !crowded) || settle(parts);
     parts->updates++;
     if (!(ok && deal_out(parts, fresh, scene)))
         ok = error_set(error, ERROR_OUT_OF_MEMORY, NULL, "no memory for the parts of a scene of %u instances",
                        scene->instance_count);
-    for (int i = 0; i < TRACER_CUBES_MAX; i++) {
+    for (int i = 0; i < LDC_CUBES_MAX; i++) {
         ok = ok && axes_box_place(&fresh[i].box, scene, fresh[i].instances, fresh[i].count, resolution, error);
         stale[i] = !same_part(&parts->parts[i], &fresh[i]);
         part_finish(&parts->parts[i]);

@@ -12,7 +12,7 @@
 #include "base/hashmap.h"
 #include "trace/raster/box.h"
 #include "gpu_scene/scene.h"
-#include "trace/tracer.h"
+#include "trace/ldc/store.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -34,7 +34,7 @@ struct ldc_part {
 
 /* All-zero is empty. */
 struct ldc_parts {
-    struct ldc_part parts[TRACER_CUBES_MAX];
+    struct ldc_part parts[LDC_CUBES_MAX];
     struct ldc_record *records; /* of each node that was seen */
     uint32_t record_count, record_capacity;
     struct hashmap record_by_node; /* value: its number, plus 1 */
@@ -45,6 +45,6 @@ void ldc_parts_finish(struct ldc_parts *parts); /* leaves it empty */
 /* Brings the parts to the scene; `stale` says whose instances or box are others than before. On failure (no
  * memory, or an instance is larger than numbers can tell) nothing is known of them: finish. */
 bool ldc_parts_update(struct ldc_parts *parts, const struct gpu_scene *scene, uint32_t resolution,
-                      bool geometry_changed, bool stale[TRACER_CUBES_MAX], struct error *error);
+                      bool geometry_changed, bool stale[LDC_CUBES_MAX], struct error *error);
 
 #endif

@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "trace/ldc/store.h"
 
+#include "ldc/layout.h"
+
 #include <epoxy/gl.h>
+#include <stdio.h>
 
 void ldc_store_init(struct ldc_store *store, struct gpu_device *device)
 {
@@ -25,19 +28,34 @@ uint64_t ldc_store_bytes(const struct ldc_store *store)
            store->surface.capacity_bytes + store->nodes.capacity_bytes + store->entries.capacity_bytes;
 }
 
-struct tracer_cube ldc_cube_stats(const struct ldc_cube *cube, bool rebuilt)
+static void warn_of_lost_samples(const struct ldc_cube *cube, const char *name, struct structure_row *row)
 {
+    snprintf(row->warning, sizeof(row->warning),
+             "the %s cube has %u of %u layers: %llu samples of what lies farther are missing (%s)", name,
+             cube->layers_kept, cube->layers_needed, (unsigned long long)cube->samples_lost,
+             cube->layers_kept >= LDC_LAYERS_MAX
+                 ? "no more can be kept: choose another tracer"
+                 : "raise limits.ldc_layers or memory.ldc in the daemon's configuration, or choose a lower "
+                   "--ldc-resolution");
+}
+
+void ldc_cube_tell(const struct ldc_store *store, unsigned which, bool built, struct structure_rows *rows)
+{
+    static const char *const names[LDC_CUBES_MAX] = {"static", "dynamic"};
+    const struct ldc_cube *cube = &store->cubes[which];
     if (cube->resolution == 0)
-        return (struct tracer_cube){0};
-    return (struct tracer_cube){
-        .resolution = cube->resolution,
-        .cell_metres = cube->cell_world,
-        .layers_needed = cube->layers_needed,
-        .layers_kept = cube->layers_kept,
-        .samples = cube->sample_count,
-        .samples_lost = cube->samples_lost,
-        .rebuilt = rebuilt,
-    };
+        return;
+    rows->part = which;
+    rows->part_name = names[which];
+    structure_number(rows, "resolution", cube->resolution);
+    structure_metres(rows, "cell", cube->cell_world);
+    structure_number(rows, "layers_needed", cube->layers_needed);
+    struct structure_row *kept = structure_number(rows, "layers_kept", cube->layers_kept);
+    if (cube->layers_kept < cube->layers_needed)
+        warn_of_lost_samples(cube, names[which], kept);
+    structure_number(rows, "samples", cube->sample_count);
+    structure_number(rows, "samples_lost", cube->samples_lost);
+    structure_built(rows, built);
 }
 
 bool ldc_store_grow(struct gpu_device *device, struct gpu_buffer *buffer, uint64_t kept_bytes, uint64_t size_bytes,

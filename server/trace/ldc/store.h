@@ -7,10 +7,12 @@
 #include "base/error.h"
 #include "gpu/buffer.h"
 #include "gpu/device.h"
-#include "trace/tracer.h"
+#include "trace/structure.h"
 
 #include <stdbool.h>
 #include <stdint.h>
+
+enum { LDC_CUBE_STATIC, LDC_CUBE_DYNAMIC, LDC_CUBES_MAX };
 
 /* Where a cube stands and where its parts begin in the buffers. */
 struct ldc_cube {
@@ -28,15 +30,15 @@ struct ldc_cube {
 struct ldc_store {
     struct gpu_device *device;
     struct gpu_buffer texels, quads, geometry, surface, nodes, entries;
-    bool no_cells;                           /* ldc_levels.c: they were too many, and there are ranges */
-    struct ldc_cube cubes[TRACER_CUBES_MAX]; /* the static one first: what moves lies behind it */
+    bool no_cells;                        /* ldc_levels.c: they were too many, and there are ranges */
+    struct ldc_cube cubes[LDC_CUBES_MAX]; /* the static one first: what moves lies behind it */
 };
 
 void ldc_store_init(struct ldc_store *store, struct gpu_device *device);
 void ldc_store_finish(struct ldc_store *store); /* leaves it empty */
 uint64_t ldc_store_bytes(const struct ldc_store *store);
-/* What is told of a cube; all zero where there is none. */
-struct tracer_cube ldc_cube_stats(const struct ldc_cube *cube, bool rebuilt);
+/* What the tracer says of a cube; nothing where there is none. */
+void ldc_cube_tell(const struct ldc_store *store, unsigned which, bool built, struct structure_rows *rows);
 /* Makes room for size_bytes; the first kept_bytes stay what they are. On failure so does all of the buffer. */
 bool ldc_store_grow(struct gpu_device *device, struct gpu_buffer *buffer, uint64_t kept_bytes, uint64_t size_bytes,
                     struct error *error);

@@ -58,9 +58,9 @@ bool ldc_intersect(struct ldc_store *store, struct gpu_scene *scene, const struc
                    const struct tracer_options *options, struct error *error)
 {
     static const struct ldc_cube nothing = {.cell_world = 1};
-    const struct ldc_cube *cubes[TRACER_CUBES_MAX] = {&nothing};
+    const struct ldc_cube *cubes[LDC_CUBES_MAX] = {&nothing};
     unsigned cube_count = 0;
-    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++)
+    for (unsigned i = 0; i < LDC_CUBES_MAX; i++)
         if (store->cubes[i].resolution)
             cubes[cube_count++] = &store->cubes[i];
     cube_count = cube_count ? cube_count : 1;

@@ -28,9 +28,9 @@ enum ldc_phase {
 struct ldc {
     struct tracer base;
     enum ldc_phase phase;
-    unsigned which;               /* the cube in hand */
-    bool stale[TRACER_CUBES_MAX]; /* to be built by this update */
-    struct ldc_levels levels;     /* in hand */
+    unsigned which;            /* the cube in hand */
+    bool stale[LDC_CUBES_MAX]; /* to be built by this update */
+    struct ldc_levels levels;  /* in hand */
     struct ldc_store store;
     struct ldc_builder *builder;
     struct ldc_parts parts;
@@ -106,7 +106,7 @@ static void reset(struct ldc *ldc)
 /* Goes on to the next of the cubes that are to be built and have something in them, from ldc->which on. */
 static enum tracer_progress find_cube(struct ldc *ldc)
 {
-    for (; ldc->which < TRACER_CUBES_MAX; ldc->which++) {
+    for (; ldc->which < LDC_CUBES_MAX; ldc->which++) {
         const struct ldc_part *part = &ldc->parts.parts[ldc->which];
         struct ldc_cube *cube = &ldc->store.cubes[ldc->which];
         if (!ldc->stale[ldc->which])
@@ -135,7 +135,7 @@ static enum tracer_progress end_cube(struct ldc *ldc)
     struct tracer_stats *stats = &ldc->base.stats;
     stats->nodes_rebuilt += ldc->store.cubes[ldc->which].node_count;
     stats->uploaded_bytes += (uint64_t)ldc->parts.parts[ldc->which].count * AXES_INSTANCE_BYTES;
-    stats->cubes[ldc->which].rebuilt = true;
+    stats->parts_built |= 1u << ldc->which;
     ldc->which++;
     return find_cube(ldc);
 }
@@ -188,10 +188,9 @@ static void fill_stats(struct ldc *ldc)
 {
     struct tracer_stats *stats = &ldc->base.stats;
     stats->nodes = 0;
-    for (int i = 0; i < TRACER_CUBES_MAX; i++) {
+    for (int i = 0; i < LDC_CUBES_MAX; i++) {
         const struct ldc_cube *cube = &ldc->store.cubes[i];
         stats->nodes += cube->resolution ? cube->node_count : 0;
-        stats->cubes[i] = ldc_cube_stats(cube, stats->cubes[i].rebuilt);
     }
     stats->device_bytes =
         ldc_store_bytes(&ldc->store) + ldc_builder_bytes(ldc->builder) + ldc_levels_bytes(&ldc->levels);
@@ -204,7 +203,7 @@ static enum tracer_progress begin_update(struct ldc *ldc, const struct gpu_scene
     bool any = changed & CHANGED_SURFACES;
     if (!ldc_parts_update(&ldc->parts, scene, ldc->resolution, changed & CHANGED_GEOMETRY, ldc->stale, error))
         return TRACER_FAILED;
-    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
+    for (unsigned i = 0; i < LDC_CUBES_MAX; i++) {
         any = any || ldc->stale[i]; /* what lies behind a cube goes with it */
         ldc->stale[i] = any;
     }
@@ -236,6 +235,12 @@ static void ldc_abandon(struct tracer *tracer)
     fill_stats(ldc);
 }
 
+static void ldc_tell(const struct tracer *tracer, struct structure_rows *rows)
+{
+    for (unsigned i = 0; i < LDC_CUBES_MAX; i++)
+        ldc_cube_tell(&((const struct ldc *)tracer)->store, i, tracer->stats.parts_built >> i & 1, rows);
+}
+
 static bool ldc_trace_range(struct tracer *tracer, struct gpu_scene *scene, struct trace_state *state,
                             const struct ray_range *rays, struct error *error)
 {
@@ -259,6 +264,7 @@ const struct tracer_impl tracer_ldc_impl = {
     .destroy = ldc_destroy,
     .update = ldc_update,
     .abandon = ldc_abandon,
+    .tell = ldc_tell,
     .trace_range = ldc_trace_range,
     .surfaces = ldc_make_surfaces,
 };

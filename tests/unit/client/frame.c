@@ -432,24 +432,31 @@ TEST(comparisons_of_waves_arrive)
     fl_frame_destroy(frame);
 }
 
-TEST(cubes_arrive_and_no_more_than_there_is_room_for)
+TEST(what_a_tracer_says_of_its_structure_outlives_the_message)
 {
     struct fl_assembly assembly = some_assembly(PROTOCOL_ENCODING_RAW);
     const struct message_frame_begin message = some_begin(PROTOCOL_ENCODING_RAW, PIXELS_BYTES);
-    struct record_layered_cube cubes[3] = {
-        {.resolution = 1024, .cell_metres = 0.5f, .layers_needed = 9, .layers_kept = 8, .samples_lost = 4},
-        {.part = PROTOCOL_CUBE_PART_DYNAMIC, .rebuilt = 1}};
-    const struct message_frame_end last = {.frame = 3, .cubes = cubes, .cubes_count = 3};
+    char name[] = "static/cell", warning[] = "4 samples are missing";
+    struct record_structure_row rows[2] = {
+        {.unit = PROTOCOL_UNIT_METRES, .measure = 0.5f, .name = name, .warning = ""},
+        {.part = 1, .unit = PROTOCOL_UNIT_BUILT, .number = 1, .name = "dynamic/built", .warning = warning}};
+    const struct message_frame_end last = {.frame = 3, .structure = rows, .structure_count = 2};
     assert_true(begin(&assembly, &message));
     assert_true(give(&assembly, pixels, PIXELS_BYTES, 0));
     struct fl_frame *frame = fl_assembly_end(&assembly, &last, 2, &error);
     assert_non_null(frame);
-    assert_int_equal(frame->cube_count, 2);
-    assert_true(frame->cubes[0].resolution == 1024 && frame->cubes[0].cell_metres == 0.5f);
-    assert_true(frame->cubes[0].layers_needed == 9 && frame->cubes[0].layers_kept == 8);
-    assert_int_equal(frame->cubes[0].samples_lost, 4);
-    assert_int_equal(frame->cubes[1].part, PROTOCOL_CUBE_PART_DYNAMIC);
-    assert_int_equal(frame->cubes[1].rebuilt, 1);
+    memset(name, 'x', sizeof(name));
+    memset(warning, 'x', sizeof(warning));
+    memset(rows, 0, sizeof(rows));
+    assert_int_equal(frame->structure_count, 2);
+    assert_string_equal(frame->structure[0].name, "static/cell");
+    assert_true(frame->structure[0].measure == 0.5f);
+    assert_string_equal(frame->structure[0].warning, "");
+    assert_int_equal(frame->structure[1].part, 1);
+    assert_int_equal(frame->structure[1].unit, PROTOCOL_UNIT_BUILT);
+    assert_int_equal(frame->structure[1].number, 1);
+    assert_string_equal(frame->structure[1].name, "dynamic/built");
+    assert_string_equal(frame->structure[1].warning, "4 samples are missing");
     fl_frame_destroy(frame);
 }
 

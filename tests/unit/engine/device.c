@@ -2,6 +2,7 @@
 /* The engine with the real renderer: frames of clients that take turns are those that each would get alone. */
 #include "engine/backend.h"
 #include "engine/view_wishes.h"
+#include "tests/fixtures/structure.h"
 #include "tests/harness/test.h"
 
 #include <poll.h>
@@ -269,9 +270,9 @@ static void collect_jobs(uint64_t (*digests)[FRAMES], uint32_t first, unsigned j
         const uint32_t job = event->request - first;
         assert_in_range(job, 0, jobs - 1);
         if (event->kind == ENGINE_FRAME) {
-            const struct tracer_cube *cube = &event->frame->result.cubes[TRACER_CUBE_STATIC];
-            *cubes += cube->resolution > 0;
-            *built += cube->rebuilt;
+            const struct structure_rows *structure = &event->frame->result.structure;
+            *cubes += structure_row(structure, "static/resolution").number > 0;
+            *built += structure_row(structure, "static/built").number != 0;
             digests[job][next[job]++] = event->frame->digest;
         } else {
             assert_int_equal(event->kind, ENGINE_DONE);

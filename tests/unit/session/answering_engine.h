@@ -23,7 +23,7 @@ static struct {
     uint32_t job_request, next_frame, last_frame;
     struct engine_job job; /* the last one, but for what it owns */
     struct clip_use job_clips[16];
-    struct tracer_cube cubes[TRACER_CUBES_MAX]; /* of the frames that it renders */
+    struct structure_rows structure; /* of the frames that it renders */
     uint64_t credit_seen, commits;
     atomic_uint edits, gone, frames_sent;
 } engine;
@@ -61,7 +61,7 @@ static inline void render(const struct engine_command *command)
         frame->shutter_s = engine.job.shutter / 8;
         frame->result.layers = engine.job.frame.layers ? engine.job.frame.layers : 1;
         frame->result.samples = 5; /* with those of frames before */
-        memcpy(frame->result.cubes, engine.cubes, sizeof engine.cubes);
+        frame->result.structure = engine.structure;
         frame->size_bytes = FRAME_BYTES;
         frame->bytes = malloc(FRAME_BYTES);
         for (size_t i = 0; i < FRAME_BYTES; i++)

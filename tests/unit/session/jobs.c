@@ -384,30 +384,34 @@ SESSION_TEST(layers_count_as_pictures_in_the_memory_for_frames)
     expect_alive(6);
 }
 
-SESSION_TEST(cubes_of_a_frame_are_told)
+SESSION_TEST(a_frame_tells_what_the_tracer_says_of_its_structure)
 {
     open_scene(1, 1);
-    engine.cubes[TRACER_CUBE_DYNAMIC] = (struct tracer_cube){.resolution = 512,
-                                                             .cell_metres = INFINITY, /* the scene is too large */
-                                                             .layers_needed = 300,
-                                                             .layers_kept = 255,
-                                                             .samples = 1 << 20,
-                                                             .samples_lost = 77,
-                                                             .rebuilt = true};
+    structure_number(&engine.structure, "nodes", UINT64_MAX);
+    engine.structure.part = 1;
+    engine.structure.part_name = "dynamic";
+    structure_metres(&engine.structure, "cell", INFINITY); /* the scene is too large */
+    strcpy(structure_number(&engine.structure, "layers_kept", 255)->warning, "45 layers are missing");
+    structure_built(&engine.structure, true);
     struct message message = render_message(0, 1);
     send_message(2, 0, &message);
     while (receive()->type != MESSAGE_FRAME_END)
         continue;
-    assert_int_equal(client.message.frame_end.cubes_count, 1);
-    const struct record_layered_cube *cube = &client.message.frame_end.cubes[0];
-    assert_int_equal(cube->part, PROTOCOL_CUBE_PART_DYNAMIC);
-    assert_int_equal(cube->resolution, 512);
-    assert_true(cube->cell_metres > 1e38f && isfinite(cube->cell_metres));
-    assert_int_equal(cube->layers_needed, 300);
-    assert_int_equal(cube->layers_kept, 255);
-    assert_int_equal(cube->samples, 1 << 20);
-    assert_int_equal(cube->samples_lost, 77);
-    assert_int_equal(cube->rebuilt, 1);
+    assert_int_equal(client.message.frame_end.structure_count, 4);
+    const struct record_structure_row *row = client.message.frame_end.structure;
+    assert_string_equal(row[0].name, "nodes");
+    assert_int_equal(row[0].part, 0);
+    assert_int_equal(row[0].unit, PROTOCOL_UNIT_NUMBER);
+    assert_true(row[0].number == UINT64_MAX);
+    assert_string_equal(row[1].name, "dynamic/cell");
+    assert_int_equal(row[1].part, 1);
+    assert_int_equal(row[1].unit, PROTOCOL_UNIT_METRES);
+    assert_true(row[1].measure > 1e38f && isfinite(row[1].measure));
+    assert_string_equal(row[1].warning, "");
+    assert_string_equal(row[2].warning, "45 layers are missing");
+    assert_string_equal(row[3].name, "dynamic/built");
+    assert_int_equal(row[3].unit, PROTOCOL_UNIT_BUILT);
+    assert_int_equal(row[3].number, 1);
     expect(MESSAGE_OK, 2);
 }
 

@@ -223,6 +223,10 @@ TEST(the_overlay_shows_its_figures_within_the_window)
     check_within(&shown);
     assert_true(tells("teapot.glb") && tells("bvh, whitted") && tells("refining: 3 of 16 samples"));
     assert_true(tells("8.0 ms") && tells("640x360") && tells("trace") && !tells("errors"));
+    shown.structure[0] = "nodes 10806";
+    hud_layout(&hud, &shown, measure, NULL);
+    check_within(&shown);
+    assert_true(tells("structure") && tells("nodes 10806"));
     settings.help = settings.error_map = true;
     shown.heat = HUD_HEAT_SHOWN;
     shown.heat_figures.mean = 0.125;

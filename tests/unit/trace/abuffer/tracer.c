@@ -3,6 +3,7 @@
  * other time, says how large it is, and is at hand again after a failure. */
 #include "tests/unit/trace/abuffer/scenes.h"
 #include "tests/unit/trace/tracer_fixture.h"
+#include "tests/fixtures/structure.h"
 #include "tests/harness/test.h"
 
 #define RESOLUTION 64u
@@ -15,11 +16,6 @@ static void fixture_init(struct fixture *fixture, struct scene *scene, const str
     fixture_init_by(fixture, TRACER_ABUFFER, scene, options);
 }
 
-static const struct tracer_cube *cube(const struct fixture *fixture)
-{
-    return &fixture->tracer->stats.cubes[TRACER_CUBE_STATIC];
-}
-
 /* Whether the last update built it, by what it says and by where its time went. */
 static void expect_built(const struct fixture *fixture, bool expected)
 {
@@ -28,7 +24,7 @@ static void expect_built(const struct fixture *fixture, bool expected)
         assert_int_equal(fixture->times.spans[i].stage, STAGE_BUILD);
         timed[fixture->times.spans[i].clock] |= fixture->times.spans[i].duration_ns > 0;
     }
-    assert_int_equal(cube(fixture)->rebuilt, expected);
+    assert_int_equal(told(fixture->tracer, "built"), expected);
     assert_int_equal(timed[CLOCK_CPU], expected);
     assert_int_equal(timed[CLOCK_GPU], expected);
     assert_int_equal(fixture->tracer->stats.uploaded_bytes > 0, expected);
@@ -37,7 +33,7 @@ static void expect_built(const struct fixture *fixture, bool expected)
 
 static void expect_distance(const struct fixture *fixture, float distance, double expected)
 {
-    if (!(fabs((double)distance - expected) < (double)cube(fixture)->cell_metres))
+    if (!(fabs((double)distance - expected) < (double)told_metres(fixture->tracer, "cell")))
         fail_msg("%g metres, where it is %g", (double)distance, expected);
 }
 
@@ -80,20 +76,18 @@ TEST(it_says_how_large_it_is)
     struct fixture fixture;
     fixture_init(&fixture, scene_of_boxes(3), &small); /* 8 x 2 x 2 */
     expect_built(&fixture, true);
-    assert_int_equal(cube(&fixture)->resolution, RESOLUTION);
-    assert_float_equal(cube(&fixture)->cell_metres, 8.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
-    assert_int_equal(cube(&fixture)->layers_needed,
+    assert_int_equal(told(fixture.tracer, "resolution"), RESOLUTION);
+    assert_float_equal(told_metres(fixture.tracer, "cell"), 8.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
+    assert_int_equal(told(fixture.tracer, "longest_list"),
                      6); /* along x: a side to the left and one to the right of each */
-    assert_int_equal(cube(&fixture)->layers_kept, 6);
-    assert_int_equal(cube(&fixture)->samples_lost, 0);
     /* Sides of 2 x 2 of 8: along x six of them, along the others three times two. */
-    double side = 2 / (double)cube(&fixture)->cell_metres;
-    assert_in_range(cube(&fixture)->samples, 18 * (side - 1) * (side - 1), 18 * (side + 1) * (side + 1));
-    assert_int_equal(fixture.tracer->stats.nodes, cube(&fixture)->samples);
+    double side = 2 / (double)told_metres(fixture.tracer, "cell");
+    assert_in_range(told(fixture.tracer, "samples"), 18 * (side - 1) * (side - 1), 18 * (side + 1) * (side + 1));
+    assert_int_equal(fixture.tracer->stats.nodes, told(fixture.tracer, "samples"));
     assert_in_range(fixture.tracer->stats.device_bytes, 3 * RESOLUTION * RESOLUTION * 8, UINT64_MAX);
     add_box(&fixture.edits, 4, 30);
     update(&fixture);
-    assert_float_equal(cube(&fixture)->cell_metres, 32.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
+    assert_float_equal(told_metres(fixture.tracer, "cell"), 32.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
     expect_distance(&fixture, distance_below(&fixture, 30, 0), 9);
     fixture_finish(&fixture);
 }
@@ -127,7 +121,7 @@ TEST(what_deforms_is_built_where_it_went)
 {
     struct fixture fixture;
     fixture_init(&fixture, scene_of_a_crumpled_body(), &small);
-    uint64_t samples = cube(&fixture)->samples;
+    uint64_t samples = told(fixture.tracer, "samples");
     for (int p = 0; p < 3; p++) {
         const float weights[TEST_TARGETS] = {0.4f * (float)p, 0};
         scene_motion_finish(&fixture.motion);
@@ -135,8 +129,8 @@ TEST(what_deforms_is_built_where_it_went)
         test_pose_weights(&fixture.motion.poses[0], 1, weights, TEST_TARGETS);
         update(&fixture);
         expect_built(&fixture, true);
-        assert_true(cube(&fixture)->samples != samples);
-        samples = cube(&fixture)->samples;
+        assert_true(told(fixture.tracer, "samples") != samples);
+        samples = told(fixture.tracer, "samples");
         update(&fixture);
         expect_built(&fixture, false);
     }
@@ -148,23 +142,23 @@ TEST(cutouts_are_part_of_it)
 {
     struct fixture fixture;
     fixture_init(&fixture, scene_of_cut_bodies(), &small);
-    uint64_t cut = cube(&fixture)->samples;
+    uint64_t cut = told(fixture.tracer, "samples");
     test_material(&fixture.edits, 1, 0.4f, 0.5f, 0.6f);
     update(&fixture);
     expect_built(&fixture, true);
-    uint64_t whole = cube(&fixture)->samples;
+    uint64_t whole = told(fixture.tracer, "samples");
     assert_true(whole > cut);
     struct scene_material *cutout = test_material(&fixture.edits, 1, 0.4f, 0.5f, 0.6f);
     cutout->alpha_mode = ALPHA_MASK;
     cutout->base_colour[3] = 0.25f;
     update(&fixture);
     expect_built(&fixture, true);
-    assert_int_equal(cube(&fixture)->samples, cut);
+    assert_int_equal(told(fixture.tracer, "samples"), cut);
     cutout = test_material(&fixture.edits, 1, 0.9f, 0.5f, 0.6f); /* of another colour */
     cutout->alpha_mode = ALPHA_MASK;
     cutout->base_colour[3] = 0.25f;
     update(&fixture);
-    assert_int_equal(cube(&fixture)->samples, cut);
+    assert_int_equal(told(fixture.tracer, "samples"), cut);
     fixture_finish(&fixture);
 }
 
@@ -172,7 +166,7 @@ TEST(an_empty_scene_is_missed)
 {
     struct fixture fixture;
     fixture_init(&fixture, test_scene_create(), &small);
-    assert_int_equal(cube(&fixture)->resolution, 0);
+    assert_int_equal(told(fixture.tracer, "resolution"), 0);
     assert_true(distance_below(&fixture, 0, 0) < 0);
     add_box_mesh(&fixture.edits, 1);
     add_box(&fixture.edits, 1, 0);
@@ -180,7 +174,7 @@ TEST(an_empty_scene_is_missed)
     expect_distance(&fixture, distance_below(&fixture, 0, 0), 9);
     test_node(&fixture.edits, 1, 0, NODE_MESH, 1, NULL)->hidden = true;
     update(&fixture);
-    assert_int_equal(cube(&fixture)->resolution, 0);
+    assert_int_equal(told(fixture.tracer, "resolution"), 0);
     assert_true(distance_below(&fixture, 0, 0) < 0);
     fixture_finish(&fixture);
 }
@@ -200,7 +194,7 @@ TEST(after_a_failure_the_next_update_starts_anew)
     assert_false(try_update(&fixture, &error));
     assert_int_equal(error.kind, ERROR_LIMIT);
     assert_string_equal(error.field, "abuffer");
-    assert_int_equal(cube(&fixture)->resolution, 0);
+    assert_int_equal(told(fixture.tracer, "resolution"), 0);
     for (uint32_t i = 0; i < 40; i++)
         test_node(&fixture.edits, i + 2, 0, NODE_MESH, 1, m)->hidden = true;
     update(&fixture);

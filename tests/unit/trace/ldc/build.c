@@ -93,10 +93,10 @@ static uint32_t expect_scene_like_oracle(struct scene *scene, const struct trace
         fixture_update(&fixture, &motion);
         scene_motion_finish(&motion);
     }
-    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
-    build(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
+    place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
+    build(&fixture, LDC_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
     uint32_t compared =
-        expect_like_oracle(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
+        expect_like_oracle(&fixture, LDC_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
     print_message("%u samples, %u layers, %u texels compared\n", fixture.store.cubes[0].sample_count,
                   fixture.store.cubes[0].layers_needed, compared);
     assert_in_range(compared, COMPARED_MIN, 3 * RESOLUTION * RESOLUTION);
@@ -143,13 +143,13 @@ TEST(a_surface_is_in_one_image_if_that_is_asked_for)
 static void expect_both_builds_alike(struct fixture *fixture)
 {
     struct contents peeled, listed;
-    place(fixture, TRACER_CUBE_STATIC, RESOLUTION);
+    place(fixture, LDC_CUBE_STATIC, RESOLUTION);
     fixture->options.ldc.build = LDC_BUILD_PEEL;
-    build(fixture, TRACER_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
-    contents_read(&peeled, &fixture->store, TRACER_CUBE_STATIC);
+    build(fixture, LDC_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
+    contents_read(&peeled, &fixture->store, LDC_CUBE_STATIC);
     fixture->options.ldc.build = LDC_BUILD_LISTS;
-    build(fixture, TRACER_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
-    contents_read(&listed, &fixture->store, TRACER_CUBE_STATIC);
+    build(fixture, LDC_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
+    contents_read(&listed, &fixture->store, LDC_CUBE_STATIC);
     expect_consistent(&peeled);
     expect_consistent(&listed);
     expect_same(&peeled, &listed);

@@ -12,9 +12,9 @@
 
 static void build_and_read(struct fixture *fixture, struct contents *contents, uint32_t resolution)
 {
-    place(fixture, TRACER_CUBE_STATIC, resolution);
-    build(fixture, TRACER_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
-    contents_read(contents, &fixture->store, TRACER_CUBE_STATIC);
+    place(fixture, LDC_CUBE_STATIC, resolution);
+    build(fixture, LDC_CUBE_STATIC, fixture->instances, fixture->gpu.instance_count);
+    contents_read(contents, &fixture->store, LDC_CUBE_STATIC);
     expect_consistent(contents);
 }
 
@@ -41,7 +41,7 @@ TEST(many_layers_are_sorted)
             struct fixture fixture;
             fixture_init(&fixture, stack_scene(counts[i], (enum stack_order)order, false));
             expect_both_builds_alike(&fixture, RESOLUTION);
-            const struct ldc_cube *cube = &fixture.store.cubes[TRACER_CUBE_STATIC];
+            const struct ldc_cube *cube = &fixture.store.cubes[LDC_CUBE_STATIC];
             assert_int_equal(cube->layers_needed, counts[i]);
             assert_int_equal(cube->layers_kept, counts[i]);
             assert_int_equal(cube->samples_lost, 0);
@@ -126,11 +126,11 @@ TEST(memory_limits_the_layers)
     contents_free(&all);
     contents_free(&some);
     /* Not even one layer. */
-    place(&fixture, TRACER_CUBE_STATIC, 512);
-    assert_false(try_build(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count, &error));
+    place(&fixture, LDC_CUBE_STATIC, 512);
+    assert_false(try_build(&fixture, LDC_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count, &error));
     assert_int_equal(error.kind, ERROR_OUT_OF_MEMORY);
-    assert_int_equal(fixture.store.cubes[TRACER_CUBE_STATIC].resolution, 0);
-    assert_int_equal(fixture.store.cubes[TRACER_CUBE_STATIC].sample_count, 0);
+    assert_int_equal(fixture.store.cubes[LDC_CUBE_STATIC].resolution, 0);
+    assert_int_equal(fixture.store.cubes[LDC_CUBE_STATIC].sample_count, 0);
     fixture_finish(&fixture);
 }
 
@@ -161,17 +161,17 @@ TEST(images_that_a_device_cannot_read_are_refused)
     struct error error = {0};
     struct fixture fixture;
     fixture_init(&fixture, stack_scene(3, FRONT_TO_BACK, false));
-    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
-    build(&fixture, TRACER_CUBE_STATIC, fixture.instances, 1);
+    place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
+    build(&fixture, LDC_CUBE_STATIC, fixture.instances, 1);
     device->facts.texture_buffer_texels_max = 2 * 3 * RESOLUTION * RESOLUTION;
-    place(&fixture, TRACER_CUBE_DYNAMIC, RESOLUTION);
-    build(&fixture, TRACER_CUBE_DYNAMIC, fixture.instances, 1);
-    place(&fixture, TRACER_CUBE_DYNAMIC, RESOLUTION + 1);
-    assert_false(try_build(&fixture, TRACER_CUBE_DYNAMIC, fixture.instances, 1, &error));
+    place(&fixture, LDC_CUBE_DYNAMIC, RESOLUTION);
+    build(&fixture, LDC_CUBE_DYNAMIC, fixture.instances, 1);
+    place(&fixture, LDC_CUBE_DYNAMIC, RESOLUTION + 1);
+    assert_false(try_build(&fixture, LDC_CUBE_DYNAMIC, fixture.instances, 1, &error));
     device->facts.texture_buffer_texels_max = texels_max;
     assert_int_equal(error.kind, ERROR_LIMIT);
     assert_string_equal(error.field, "options.ldc_resolution");
-    assert_int_equal(fixture.store.cubes[TRACER_CUBE_DYNAMIC].resolution, 0);
+    assert_int_equal(fixture.store.cubes[LDC_CUBE_DYNAMIC].resolution, 0);
     fixture_finish(&fixture);
 }
 
@@ -185,11 +185,11 @@ TEST(more_fragments_than_can_be_counted_are_noticed)
     struct fixture fixture;
     fixture_init(&fixture, stack_scene(1, FRONT_TO_BACK, false));
     struct ldc_builder *builder = fixture.builder;
-    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
+    place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
     struct ldc_task task = {
         .builder = builder,
         .store = &fixture.store,
-        .cube = &fixture.store.cubes[TRACER_CUBE_STATIC],
+        .cube = &fixture.store.cubes[LDC_CUBE_STATIC],
         .scene = &fixture.gpu,
         .options = &fixture.options,
         .texel_count = texels,
@@ -216,30 +216,30 @@ TEST(cubes_leave_each_other_alone)
     struct contents before, after, moving, alone;
     fixture_init(&fixture, test_scene_soup());
     uint32_t half = fixture.gpu.instance_count / 2, rest = fixture.gpu.instance_count - half;
-    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
-    build(&fixture, TRACER_CUBE_STATIC, fixture.instances, half);
-    contents_read(&before, &fixture.store, TRACER_CUBE_STATIC);
+    place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
+    build(&fixture, LDC_CUBE_STATIC, fixture.instances, half);
+    contents_read(&before, &fixture.store, LDC_CUBE_STATIC);
     for (uint32_t times = 1; times <= 4; times++) { /* it grows, and the buffers with it */
-        place(&fixture, TRACER_CUBE_DYNAMIC, times * RESOLUTION);
-        build(&fixture, TRACER_CUBE_DYNAMIC, fixture.instances + half, rest);
+        place(&fixture, LDC_CUBE_DYNAMIC, times * RESOLUTION);
+        build(&fixture, LDC_CUBE_DYNAMIC, fixture.instances + half, rest);
     }
-    contents_read(&after, &fixture.store, TRACER_CUBE_STATIC);
+    contents_read(&after, &fixture.store, LDC_CUBE_STATIC);
     expect_consistent(&after);
     expect_same(&before, &after);
-    contents_read(&moving, &fixture.store, TRACER_CUBE_DYNAMIC);
+    contents_read(&moving, &fixture.store, LDC_CUBE_DYNAMIC);
     expect_consistent(&moving);
     assert_true(moving.cube.sample_count > before.cube.sample_count);
     /* As it would be without the other. */
-    fixture.store.cubes[TRACER_CUBE_STATIC].resolution = 0;
-    place(&fixture, TRACER_CUBE_DYNAMIC, 4 * RESOLUTION);
-    build(&fixture, TRACER_CUBE_DYNAMIC, fixture.instances + half, rest);
-    contents_read(&alone, &fixture.store, TRACER_CUBE_DYNAMIC);
+    fixture.store.cubes[LDC_CUBE_STATIC].resolution = 0;
+    place(&fixture, LDC_CUBE_DYNAMIC, 4 * RESOLUTION);
+    build(&fixture, LDC_CUBE_DYNAMIC, fixture.instances + half, rest);
+    contents_read(&alone, &fixture.store, LDC_CUBE_DYNAMIC);
     assert_int_equal(alone.cube.first_sample, 0);
     expect_same(&alone, &moving);
     /* What lies behind the static one goes with it. */
-    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
-    build(&fixture, TRACER_CUBE_STATIC, fixture.instances, half);
-    assert_int_equal(fixture.store.cubes[TRACER_CUBE_DYNAMIC].resolution, 0);
+    place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
+    build(&fixture, LDC_CUBE_STATIC, fixture.instances, half);
+    assert_int_equal(fixture.store.cubes[LDC_CUBE_DYNAMIC].resolution, 0);
     contents_free(&before);
     contents_free(&after);
     contents_free(&moving);
@@ -252,9 +252,9 @@ TEST(a_cube_may_be_empty)
     struct fixture fixture;
     struct contents contents;
     fixture_init(&fixture, test_scene_soup());
-    place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
-    build(&fixture, TRACER_CUBE_STATIC, fixture.instances, 0);
-    contents_read(&contents, &fixture.store, TRACER_CUBE_STATIC);
+    place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
+    build(&fixture, LDC_CUBE_STATIC, fixture.instances, 0);
+    contents_read(&contents, &fixture.store, LDC_CUBE_STATIC);
     expect_consistent(&contents);
     assert_int_equal(contents.cube.sample_count, 0);
     assert_int_equal(contents.cube.layers_needed, 0);
@@ -262,11 +262,11 @@ TEST(a_cube_may_be_empty)
     contents_free(&contents);
     /* Nor does anything come in that lies beside it. */
     for (int form = 0; form < 2; form++) {
-        place(&fixture, TRACER_CUBE_STATIC, RESOLUTION);
-        fixture.store.cubes[TRACER_CUBE_STATIC].lower_world[2] += 100;
+        place(&fixture, LDC_CUBE_STATIC, RESOLUTION);
+        fixture.store.cubes[LDC_CUBE_STATIC].lower_world[2] += 100;
         fixture.options.ldc.build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
-        build(&fixture, TRACER_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
-        assert_int_equal(fixture.store.cubes[TRACER_CUBE_STATIC].sample_count, 0);
+        build(&fixture, LDC_CUBE_STATIC, fixture.instances, fixture.gpu.instance_count);
+        assert_int_equal(fixture.store.cubes[LDC_CUBE_STATIC].sample_count, 0);
     }
     fixture_finish(&fixture);
 }
@@ -284,10 +284,10 @@ TEST(what_lies_on_a_side_is_there)
     test_commit(&edits);
     fixture_init(&fixture, edits.scene);
     for (int form = 0; form < 2; form++) {
-        struct ldc_cube *cube = &fixture.store.cubes[TRACER_CUBE_STATIC];
+        struct ldc_cube *cube = &fixture.store.cubes[LDC_CUBE_STATIC];
         *cube = (struct ldc_cube){.lower_world = {-1, -1, -1}, .cell_world = 2.0f / 30, .resolution = 30};
         fixture.options.ldc.build = form == 0 ? LDC_BUILD_PEEL : LDC_BUILD_LISTS;
-        build(&fixture, TRACER_CUBE_STATIC, fixture.instances, 1);
+        build(&fixture, LDC_CUBE_STATIC, fixture.instances, 1);
         assert_int_equal(cube->sample_count, 2 * 30 * 30);
         assert_int_equal(cube->layers_needed, 2);
     }

@@ -5,7 +5,9 @@
 #include "tests/unit/trace/tracer_fixture.h"
 
 #include "render/tracer_set.h"
+#include "tests/fixtures/structure.h"
 #include "tests/harness/test.h"
+#include "trace/ldc/store.h"
 
 #define RESOLUTION 64u
 #define MARGIN_CELLS 2u /* of the resolution, no part of the scene: one on either side */
@@ -17,24 +19,20 @@ static void fixture_init(struct fixture *fixture, struct scene *scene, const str
     fixture_init_by(fixture, TRACER_LDC, scene, options);
 }
 
-static const struct tracer_cube *cube(const struct fixture *fixture, unsigned which)
-{
-    return &fixture->tracer->stats.cubes[which];
-}
-
 /* Which cubes the last update built, by what it says and by where its time went. */
 static void expect_built(const struct fixture *fixture, bool static_cube, bool dynamic_cube)
 {
-    const bool expected[TRACER_CUBES_MAX] = {static_cube, dynamic_cube};
-    bool timed[TRACER_CUBES_MAX][2] = {{false}}; /* by the CPU's clock and by the GPU's */
+    const bool expected[LDC_CUBES_MAX] = {static_cube, dynamic_cube};
+    bool timed[LDC_CUBES_MAX][2] = {{false}}; /* by the CPU's clock and by the GPU's */
     for (uint32_t i = 0; i < fixture->times.count; i++) {
         const struct stage_span *span = &fixture->times.spans[i];
         assert_int_equal(span->stage, STAGE_BUILD);
-        assert_in_range(span->wave, 0, TRACER_CUBES_MAX - 1);
+        assert_in_range(span->wave, 0, LDC_CUBES_MAX - 1);
         timed[span->wave][span->clock] |= span->duration_ns > 0;
     }
-    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++) {
-        assert_int_equal(cube(fixture, i)->rebuilt, expected[i]);
+    for (unsigned i = 0; i < LDC_CUBES_MAX; i++) {
+        assert_int_equal(told(fixture->tracer, i == LDC_CUBE_STATIC ? "static/built" : "dynamic/built"),
+                         expected[i]);
         assert_int_equal(timed[i][CLOCK_CPU], expected[i]);
         assert_int_equal(timed[i][CLOCK_GPU], expected[i]);
     }
@@ -44,7 +42,7 @@ static void expect_built(const struct fixture *fixture, bool static_cube, bool d
     assert_in_range(uploaded_bytes, 0, 64 * (uint64_t)fixture->gpu.instance_count);
     uint64_t nodes = fixture->tracer->stats.nodes, rebuilt = fixture->tracer->stats.nodes_rebuilt;
     assert_int_equal(rebuilt == 0, !static_cube && !dynamic_cube);
-    if (static_cube && (dynamic_cube || cube(fixture, TRACER_CUBE_DYNAMIC)->resolution == 0))
+    if (static_cube && (dynamic_cube || told(fixture->tracer, "dynamic/resolution") == 0))
         assert_int_equal(rebuilt, nodes);
 }
 
@@ -126,18 +124,17 @@ TEST(the_size_of_a_cell_is_that_of_the_longest_side)
     struct fixture fixture;
     fixture_init(&fixture, scene_of_boxes(3), &small); /* 5 x 1 x 1 */
     expect_built(&fixture, true, false);
-    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->resolution, RESOLUTION);
-    assert_int_equal(cube(&fixture, TRACER_CUBE_DYNAMIC)->resolution, 0);
-    assert_float_equal(cube(&fixture, TRACER_CUBE_STATIC)->cell_metres, 5.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
-    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->layers_needed,
+    assert_int_equal(told(fixture.tracer, "static/resolution"), RESOLUTION);
+    assert_int_equal(told(fixture.tracer, "dynamic/resolution"), 0);
+    assert_float_equal(told_metres(fixture.tracer, "static/cell"), 5.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
+    assert_int_equal(told(fixture.tracer, "static/layers_needed"),
                      6); /* along x: each box has a side to the left and one to the right */
-    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->layers_kept, 6);
-    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->samples_lost, 0);
+    assert_int_equal(told(fixture.tracer, "static/layers_kept"), 6);
+    assert_int_equal(told(fixture.tracer, "static/samples_lost"), 0);
     assert_in_range(fixture.tracer->stats.device_bytes, 3 * RESOLUTION * RESOLUTION * 16, UINT64_MAX);
     add_box(&fixture.edits, 4, 1, 19.5f, 0, 0); /* the scene is four times as long */
     update(&fixture);
-    assert_float_equal(cube(&fixture, TRACER_CUBE_STATIC)->cell_metres, 20.5f / (RESOLUTION - MARGIN_CELLS),
-                       1e-5f);
+    assert_float_equal(told_metres(fixture.tracer, "static/cell"), 20.5f / (RESOLUTION - MARGIN_CELLS), 1e-5f);
     expect_distance(distance_below(&fixture, 19.5f, 0), 9.5);
     fixture_finish(&fixture);
 }
@@ -149,15 +146,14 @@ TEST(what_begins_to_move_leaves_the_static_cube_once)
     add_box(&fixture.edits, 3, 1, 4, 0, 1);
     update(&fixture);
     expect_built(&fixture, true, true);
-    float static_cell = cube(&fixture, TRACER_CUBE_STATIC)->cell_metres;
+    float static_cell = told_metres(fixture.tracer, "static/cell");
     assert_float_equal(static_cell, 3.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
     for (int step = 0; step < 3; step++) {
         add_box(&fixture.edits, 3, 1, 4, (float)step, 2);
         update(&fixture);
         expect_built(&fixture, false, true);
-        assert_float_equal(cube(&fixture, TRACER_CUBE_STATIC)->cell_metres, static_cell, 0);
-        assert_float_equal(cube(&fixture, TRACER_CUBE_DYNAMIC)->cell_metres, 1.0f / (RESOLUTION - MARGIN_CELLS),
-                           1e-6f);
+        assert_float_equal(told_metres(fixture.tracer, "static/cell"), static_cell, 0);
+        assert_float_equal(told_metres(fixture.tracer, "dynamic/cell"), 1.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
         expect_distance(distance_below(&fixture, 4, (float)step), 7.5);
         expect_distance(distance_below(&fixture, 0, 0), 9.5);
         if (step > 0)
@@ -180,7 +176,7 @@ TEST(what_has_moved_back_stays_dynamic)
     expect_distance(distance_below(&fixture, 0, 0), 9.5);
     add_box(&fixture.edits, 2, 1, 2, 0, 3); /* the last one: nothing is left in the static cube */
     update(&fixture);
-    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->resolution, 0);
+    assert_int_equal(told(fixture.tracer, "static/resolution"), 0);
     expect_built(&fixture, false, true);
     expect_distance(distance_below(&fixture, 0, 0), 9.5);
     expect_distance(distance_below(&fixture, 2, 0), 6.5);
@@ -196,7 +192,7 @@ TEST(what_was_hidden_and_comes_back_is_dynamic)
         update(&fixture);
         expect_built(&fixture, turn == 0, false);
         assert_true(distance_below(&fixture, 0, 0) < 0);
-        assert_int_equal(cube(&fixture, TRACER_CUBE_DYNAMIC)->resolution, 0);
+        assert_int_equal(told(fixture.tracer, "dynamic/resolution"), 0);
         add_box(&fixture.edits, 1, 1, 0, 0, 0);
         update(&fixture);
         expect_built(&fixture, false, true);
@@ -218,8 +214,7 @@ TEST(new_objects_are_static_and_settle_what_stood_still)
     test_node(&fixture.edits, 9, 0, NODE_MESH, 11, (const float[12]){1, 0, 0, 8, 0, 1, 0, 0, 0, 0, 1, 0});
     update(&fixture); /* the first box has settled, the second was on the move until now */
     expect_built(&fixture, true, true);
-    assert_float_equal(cube(&fixture, TRACER_CUBE_DYNAMIC)->cell_metres, 1.0f / (RESOLUTION - MARGIN_CELLS),
-                       1e-6f);
+    assert_float_equal(told_metres(fixture.tracer, "dynamic/cell"), 1.0f / (RESOLUTION - MARGIN_CELLS), 1e-6f);
     static const float distances[] = {8.5f, 8.5f, 9.5f};
     for (int i = 0; i < 3; i++)
         expect_distance(distance_below(&fixture, 2 * (float)i, 0), (double)distances[i]);
@@ -257,7 +252,7 @@ TEST(a_skinned_mesh_is_dynamic_from_the_first)
     struct fixture fixture;
     fixture_init(&fixture, test_scene_deformed(), &small);
     expect_built(&fixture, true, true); /* rigid nodes 6 and 7; skins and targets 2, 4, 5 */
-    float static_cell = cube(&fixture, TRACER_CUBE_STATIC)->cell_metres;
+    float static_cell = told_metres(fixture.tracer, "static/cell");
     for (uint32_t turn = 0; turn < 2; turn++) {
         scene_motion_finish(&fixture.motion);
         test_motion_init(&fixture.motion, 1);
@@ -266,7 +261,7 @@ TEST(a_skinned_mesh_is_dynamic_from_the_first)
         test_pose_node(&fixture.motion.poses[0], 11, m);
         update(&fixture);
         expect_built(&fixture, false, true);
-        assert_float_equal(cube(&fixture, TRACER_CUBE_STATIC)->cell_metres, static_cell, 0);
+        assert_float_equal(told_metres(fixture.tracer, "static/cell"), static_cell, 0);
     }
     fixture_finish(&fixture);
 }
@@ -309,7 +304,7 @@ TEST(flat_and_tiny_and_huge_scenes_have_cells)
         test_commit(&edits);
         struct fixture fixture;
         fixture_init(&fixture, edits.scene, &small);
-        float cell = cube(&fixture, TRACER_CUBE_STATIC)->cell_metres;
+        float cell = told_metres(fixture.tracer, "static/cell");
         assert_float_equal(cell / rows[i].longest, 1.0f / (RESOLUTION - MARGIN_CELLS), 1e-5f);
         fixture_finish(&fixture);
     }
@@ -337,10 +332,10 @@ TEST(more_layers_than_may_be_kept_are_reported_and_the_nearest_stay)
     for (options.ldc.build = LDC_BUILD_AUTO; options.ldc.build <= LDC_BUILD_LISTS; options.ldc.build++) {
         struct fixture fixture;
         fixture_init(&fixture, scene_of_squares(), &options);
-        const struct tracer_cube *kept = cube(&fixture, TRACER_CUBE_STATIC);
-        assert_int_equal(kept->layers_needed, 6);
-        assert_int_equal(kept->layers_kept, 2);
-        assert_int_equal(kept->samples_lost, 2 * kept->samples);
+        assert_int_equal(told(fixture.tracer, "static/layers_needed"), 6);
+        assert_int_equal(told(fixture.tracer, "static/layers_kept"), 2);
+        assert_int_equal(told(fixture.tracer, "static/samples_lost"), 2 * told(fixture.tracer, "static/samples"));
+        assert_non_null(strstr(told_row(fixture.tracer, "static/layers_kept").warning, "2 of 6 layers"));
         expect_distance(distance_below(&fixture, 0, 0), 9.75); /* z = 0.25, the second from below: least depths */
         struct ray up = {{0.013f, 0.017f, -10, 0}, {0, 0, 1, 1e9f}};
         expect_distance(trace_one(&fixture, up).distance, 10);
@@ -357,7 +352,7 @@ TEST(after_a_failure_the_next_update_starts_anew)
     assert_false(try_update(&fixture, &error));
     assert_int_equal(error.kind, ERROR_LIMIT);
     assert_string_equal(error.field, "scene");
-    assert_int_equal(cube(&fixture, TRACER_CUBE_STATIC)->resolution, 0);
+    assert_int_equal(told(fixture.tracer, "static/resolution"), 0);
     add_box(&fixture.edits, 3, 1, 4, 0, 0);
     update(&fixture);
     expect_built(&fixture, true, false);

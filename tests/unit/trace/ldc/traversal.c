@@ -83,7 +83,7 @@ static struct verdict judge(const struct fixture *fixture, const struct ray *ray
 {
     struct verdict verdict = {.nearest_sure = INFINITY};
     const double t_min = ray->origin_t_min[3], t_max = ray->direction_t_max[3];
-    for (int which = 0; which < TRACER_CUBES_MAX; which++) {
+    for (int which = 0; which < LDC_CUBES_MAX; which++) {
         const struct ldc_samples *s = &fixture->samples[which];
         for (size_t i = 0; i < s->count; i++) {
             const struct crossing c = cross(s, &s->list[i], ray);
@@ -109,9 +109,9 @@ static void expect_crossing(const struct fixture *fixture, const struct ray *ray
         return;
     }
     assert_int_equal(hit->instance, HIT_NO_PRIMITIVE - 1);
-    const uint32_t behind = fixture->store.cubes[TRACER_CUBE_DYNAMIC].first_sample;
-    const bool is_dynamic = fixture->samples[TRACER_CUBE_DYNAMIC].resolution && hit->primitive >= behind;
-    const struct ldc_samples *s = &fixture->samples[is_dynamic ? TRACER_CUBE_DYNAMIC : TRACER_CUBE_STATIC];
+    const uint32_t behind = fixture->store.cubes[LDC_CUBE_DYNAMIC].first_sample;
+    const bool is_dynamic = fixture->samples[LDC_CUBE_DYNAMIC].resolution && hit->primitive >= behind;
+    const struct ldc_samples *s = &fixture->samples[is_dynamic ? LDC_CUBE_DYNAMIC : LDC_CUBE_STATIC];
     const size_t index = hit->primitive - (is_dynamic ? behind : 0);
     assert_true(index < s->count);
     const struct crossing c = cross(s, &s->list[index], ray);
@@ -180,7 +180,7 @@ TEST(rays_cross_samples_as_by_brute_force)
     for (size_t r = 0; r < sizeof resolutions / sizeof *resolutions; r++) {
         struct fixture fixture;
         fixture_init(&fixture, NULL);
-        struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+        struct ldc_samples *s = &fixture.samples[LDC_CUBE_STATIC];
         start_samples(s, resolutions[r], 4, -2, -1, -3);
         add_sphere(s, (const float[3]){0, 1, -1}, 1.2f, 24, 0);
         add_soup(s, 40, 0.6f, 5 + r);
@@ -196,18 +196,18 @@ TEST(two_cubes_are_traversed_as_one)
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
     struct fixture fixture;
     fixture_init(&fixture, NULL);
-    start_samples(&fixture.samples[TRACER_CUBE_STATIC], 70, 4, -2, -2, -2);
-    add_soup(&fixture.samples[TRACER_CUBE_STATIC], 30, 0.8f, 21);
-    start_samples(&fixture.samples[TRACER_CUBE_DYNAMIC], 45, 1.5f, -0.5f, 0.2f, -1);
-    add_sphere(&fixture.samples[TRACER_CUBE_DYNAMIC], (const float[3]){0.2f, 0.9f, -0.3f}, 0.6f, 16, 0);
-    random_rays(rays, RAY_COUNT, &fixture.samples[TRACER_CUBE_STATIC], 22);
+    start_samples(&fixture.samples[LDC_CUBE_STATIC], 70, 4, -2, -2, -2);
+    add_soup(&fixture.samples[LDC_CUBE_STATIC], 30, 0.8f, 21);
+    start_samples(&fixture.samples[LDC_CUBE_DYNAMIC], 45, 1.5f, -0.5f, 0.2f, -1);
+    add_sphere(&fixture.samples[LDC_CUBE_DYNAMIC], (const float[3]){0.2f, 0.9f, -0.3f}, 0.6f, 16, 0);
+    random_rays(rays, RAY_COUNT, &fixture.samples[LDC_CUBE_STATIC], 22);
     expect_like_brute_force(&fixture, rays, RAY_COUNT, RAY_COUNT / 8);
     fixture_finish(&fixture);
     /* And where only what moves is there. */
     fixture_init(&fixture, NULL);
-    start_samples(&fixture.samples[TRACER_CUBE_DYNAMIC], 45, 4, -2, -2, -2);
-    add_soup(&fixture.samples[TRACER_CUBE_DYNAMIC], 30, 0.8f, 23);
-    random_rays(rays, RAY_COUNT, &fixture.samples[TRACER_CUBE_DYNAMIC], 24);
+    start_samples(&fixture.samples[LDC_CUBE_DYNAMIC], 45, 4, -2, -2, -2);
+    add_soup(&fixture.samples[LDC_CUBE_DYNAMIC], 30, 0.8f, 23);
+    random_rays(rays, RAY_COUNT, &fixture.samples[LDC_CUBE_DYNAMIC], 24);
     expect_like_brute_force(&fixture, rays, RAY_COUNT, RAY_COUNT / 8);
     fixture_finish(&fixture);
     free(rays);
@@ -219,18 +219,18 @@ TEST(where_cells_do_not_fit_a_pyramid_is_traversed)
     struct ray *rays = malloc(RAY_COUNT * sizeof *rays);
     struct fixture fixture;
     fixture_init(&fixture, NULL);
-    start_samples(&fixture.samples[TRACER_CUBE_STATIC], 40, 4, -2, -2, -2);
-    add_soup(&fixture.samples[TRACER_CUBE_STATIC], 3, 0.8f, 25);
-    start_samples(&fixture.samples[TRACER_CUBE_DYNAMIC], 70, 4, -2, -2, -2);
-    add_sphere(&fixture.samples[TRACER_CUBE_DYNAMIC], (const float[3]){0.2f, 0.1f, -0.3f}, 1.4f, 20, 0);
-    random_rays(rays, RAY_COUNT, &fixture.samples[TRACER_CUBE_DYNAMIC], 26);
+    start_samples(&fixture.samples[LDC_CUBE_STATIC], 40, 4, -2, -2, -2);
+    add_soup(&fixture.samples[LDC_CUBE_STATIC], 3, 0.8f, 25);
+    start_samples(&fixture.samples[LDC_CUBE_DYNAMIC], 70, 4, -2, -2, -2);
+    add_sphere(&fixture.samples[LDC_CUBE_DYNAMIC], (const float[3]){0.2f, 0.1f, -0.3f}, 1.4f, 20, 0);
+    random_rays(rays, RAY_COUNT, &fixture.samples[LDC_CUBE_DYNAMIC], 26);
     build(&fixture, &forms[0].options);
     assert_false(fixture.store.no_cells);
     const uint64_t texels_max = device->facts.texture_buffer_texels_max;
-    device->facts.texture_buffer_texels_max = 4ull * fixture.store.cubes[TRACER_CUBE_DYNAMIC].entry_count;
-    build_levels(&fixture, TRACER_CUBE_STATIC, &forms[0].options);
+    device->facts.texture_buffer_texels_max = 4ull * fixture.store.cubes[LDC_CUBE_DYNAMIC].entry_count;
+    build_levels(&fixture, LDC_CUBE_STATIC, &forms[0].options);
     assert_false(fixture.store.no_cells);
-    build_levels(&fixture, TRACER_CUBE_DYNAMIC, &forms[0].options);
+    build_levels(&fixture, LDC_CUBE_DYNAMIC, &forms[0].options);
     assert_true(fixture.store.no_cells);
     expect_like_brute_force(&fixture, rays, RAY_COUNT, RAY_COUNT / 8);
     device->facts.texture_buffer_texels_max = texels_max;
@@ -249,7 +249,7 @@ TEST(what_shares_cells_is_in_each_of_them_once)
     struct error error = {0};
     struct fixture fixture;
     fixture_init(&fixture, NULL);
-    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    struct ldc_samples *s = &fixture.samples[LDC_CUBE_STATIC];
     start_samples(s, 24, n, 0, 0, 0);
     for (int i = 0; i < layers; i++) {
         /* Where u and v are a texel's middle the depth is nearly a whole number: four cells are passed. */
@@ -258,7 +258,7 @@ TEST(what_shares_cells_is_in_each_of_them_once)
         ldc_add_triangle(s, corners, 0);
     }
     build(&fixture, &(struct tracer_options){.ldc = {.levels = LDC_LEVELS_CELLS}});
-    const struct ldc_cube *cube = &fixture.store.cubes[TRACER_CUBE_STATIC];
+    const struct ldc_cube *cube = &fixture.store.cubes[LDC_CUBE_STATIC];
     uint32_t(*entries)[4] = malloc(cube->entry_count * sizeof *entries);
     uint32_t *times = calloc(s->count, sizeof *times);
     gpu_buffer_read(device, &fixture.store.entries, 0, entries, cube->entry_count * sizeof *entries);
@@ -285,7 +285,7 @@ TEST(blocks_of_many_layers_hold_all_of_them)
     struct ray rays[rays_along * rays_along];
     struct fixture fixture;
     fixture_init(&fixture, NULL);
-    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    struct ldc_samples *s = &fixture.samples[LDC_CUBE_STATIC];
     start_samples(s, n, n, 0, 0, 0);
     for (uint32_t v = 0; v < n; v++)
         for (uint32_t u = 0; u < n; u++)
@@ -308,7 +308,7 @@ TEST(rays_along_axes_and_borders_cross_samples_as_by_brute_force)
     struct fixture fixture;
     uint64_t seed = 31;
     fixture_init(&fixture, NULL);
-    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    struct ldc_samples *s = &fixture.samples[LDC_CUBE_STATIC];
     start_samples(s, 48, 48, 0, 0, 0);
     add_sphere(s, (const float[3]){24, 24, 24}, 15, 20, 0);
     add_soup(s, 20, 8, 33);
@@ -337,7 +337,7 @@ TEST(what_lies_in_the_sides_of_the_cube_is_hit)
     struct fixture fixture;
     uint64_t seed = 41;
     fixture_init(&fixture, NULL);
-    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    struct ldc_samples *s = &fixture.samples[LDC_CUBE_STATIC];
     start_samples(s, 37, 37, 0, 0, 0);
     add_box(s, (const float[3]){0, 0, 0}, (const float[3]){37, 37, 37}, 0);
     for (uint32_t i = 0; i < RAY_COUNT; i++) {
@@ -377,7 +377,7 @@ TEST(a_tolerance_takes_depths_for_planes)
     struct fixture fixture;
     uint64_t seed = 101;
     fixture_init(&fixture, NULL);
-    struct ldc_samples *s = &fixture.samples[TRACER_CUBE_STATIC];
+    struct ldc_samples *s = &fixture.samples[LDC_CUBE_STATIC];
     start_samples(s, 50, 50, 0, 0, 0);
     add_quad(s, (const float[3]){1, 1, 10}, (const float[3]){49, 1, 34}, (const float[3]){49, 49, 34},
              (const float[3]){1, 49, 10}, 0); /* z = 9.5 + x / 2 */

@@ -38,7 +38,7 @@ struct fixture {
     struct scene *scene;
     struct gpu_scene gpu; /* has the materials, and no geometry that a tracer would see */
     struct ldc_store store;
-    struct ldc_samples samples[TRACER_CUBES_MAX];
+    struct ldc_samples samples[LDC_CUBES_MAX];
 };
 
 static inline void start_samples(struct ldc_samples *s, uint32_t resolution, float size, float x, float y, float z)
@@ -61,7 +61,7 @@ static inline void fixture_finish(struct fixture *fixture)
     ldc_store_finish(&fixture->store);
     gpu_scene_finish(&fixture->gpu);
     scene_destroy(fixture->scene);
-    for (int i = 0; i < TRACER_CUBES_MAX; i++)
+    for (int i = 0; i < LDC_CUBES_MAX; i++)
         free(fixture->samples[i].list);
 }
 
@@ -82,10 +82,10 @@ static inline void build_levels(struct fixture *fixture, unsigned which, const s
 static inline void build(struct fixture *fixture, const struct tracer_options *options)
 {
     struct error error = {0};
-    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++)
+    for (unsigned i = 0; i < LDC_CUBES_MAX; i++)
         if (fixture->samples[i].resolution)
             expect_ok(ldc_upload(&fixture->samples[i], &fixture->store, i, &error), &error);
-    for (unsigned i = 0; i < TRACER_CUBES_MAX; i++)
+    for (unsigned i = 0; i < LDC_CUBES_MAX; i++)
         build_levels(fixture, i, options);
 }
 

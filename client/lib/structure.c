@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: MIT */
+#include "lib/farlight.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+/* What a daemon sends must not control a terminal. */
+static char printable(char c)
+{
+    return (unsigned char)c < 0x20 || c == 0x7f ? '?' : c;
+}
+
+/* Behind the name of the part. */
+static const char *own_name(const struct record_structure_row *row)
+{
+    const char *slash = strchr(row->name, '/');
+    return slash ? slash + 1 : row->name;
+}
+
+static void append(char *text, size_t text_bytes, const char *more)
+{
+    const size_t length = strlen(text);
+    snprintf(text + length, text_bytes - length, "%s", more);
+}
+
+/* A length, with a unit that suits it. */
+static void print_length(char *text, size_t text_bytes, double metres)
+{
+    if (metres >= 1000)
+        snprintf(text, text_bytes, "%.4g km", metres * 1e-3);
+    else if (metres >= 0.1)
+        snprintf(text, text_bytes, "%.4g m", metres);
+    else
+        snprintf(text, text_bytes, "%.4g mm", metres * 1e3);
+}
+
+/* "layers kept 6" */
+static void append_row(char *text, size_t text_bytes, const struct record_structure_row *row)
+{
+    char name[FL_STRUCTURE_NAME_BYTES], value[32];
+    snprintf(name, sizeof(name), "%s%s", text[0] != '\0' ? ", " : "", own_name(row));
+    for (char *c = name; *c != '\0'; c++)
+        *c = *c == '_' ? ' ' : printable(*c);
+    if (row->unit == PROTOCOL_UNIT_METRES)
+        print_length(value, sizeof(value), (double)row->measure);
+    else
+        snprintf(value, sizeof(value), "%" PRIu64, row->number);
+    append(text, text_bytes, name);
+    append(text, text_bytes, " ");
+    append(text, text_bytes, value);
+}
+
+bool fl_structure_next(const struct fl_frame *frame, size_t *at, struct fl_structure_part *part)
+{
+    if (*at >= frame->structure_count)
+        return false;
+    const struct record_structure_row *row = &frame->structure[*at];
+    *part = (struct fl_structure_part){.number = row->part};
+    snprintf(part->name, sizeof(part->name), "%.*s", (int)(own_name(row) - row->name), row->name);
+    if (part->name[0] != '\0')
+        part->name[strlen(part->name) - 1] = '\0'; /* the slash */
+    for (char *c = part->name; *c != '\0'; c++)
+        *c = printable(*c);
+    for (; *at < frame->structure_count && frame->structure[*at].part == part->number; ++*at) {
+        row = &frame->structure[*at];
+        if (row->unit != PROTOCOL_UNIT_BUILT) {
+            append_row(part->text, sizeof(part->text), row);
+            continue;
+        }
+        part->is_kept = true;
+        part->built = row->number != 0;
+    }
+    return true;
+}
