@@ -50,7 +50,8 @@ SERVER_PKGS := epoxy egl libzstd libsodium libxxhash libturbojpeg inih cglm
 # The daemon loads this one when it needs it, so that only its headers are needed here.
 SERVER_LOADED_PKGS := libavcodec libavutil
 CLIENT_PKGS := libzstd libsodium libxxhash libturbojpeg jansson
-IMPORT_PKGS := OpenImageIO tinygltf tinyobjloader libsodium libseccomp
+IMPORT_PKGS := tinygltf tinyobjloader libsodium libseccomp
+TEXTURE_PKGS := OpenImageIO
 EXPORT_PKGS := OpenImageIO libjxl libseccomp
 VIDEO_PKGS := libavformat libavcodec libavutil libseccomp
 VIEWER_PKGS := sdl2 SDL2_ttf libavcodec libswscale libavutil
@@ -78,7 +79,9 @@ endif
 LIB_SRC := $(call sources,client/lib,c)
 CLI_SRC := $(call sources,client/cli,c)
 IMPORT_C := $(call sources,client/import,c)
-IMPORT_CXX := $(call sources,client/import,cpp)
+# Modules of the helper programs need hundreds of libraries, and are loaded only when they are used.
+TEXTURE_CXX := client/import/texture.cpp
+IMPORT_CXX := $(filter-out $(TEXTURE_CXX),$(call sources,client/import,cpp))
 EXPORT_C := $(call sources,client/output,c)
 EXPORT_CXX := $(call sources,client/output,cpp)
 VIDEO_C := $(call sources,client/video,c)
@@ -122,10 +125,11 @@ VIEWER_OBJ := $(call obj,$(VIEWER_C) $(addprefix client/cli/,image_path.c interr
 SONAME := libfarlight.so.$(firstword $(subst ., ,$(VERSION)))
 LIB_PIC := $(patsubst %.c,$(B)/pic/%.o,$(LIB_SRC) $(PROTOCOL_SRC) $(SEALED_SRC) $(PIXELS_SRC) $(COMMON_SRC))
 
+MODULES := $(B)/farlight-textures.so
 PROGRAMS := $(B)/farlightd $(B)/farlight $(B)/farlight-import $(B)/farlight-export $(B)/farlight-video $(B)/farlight-view
 
 .PHONY: all
-all: $(PROGRAMS) $(B)/$(SONAME) $(B)/protocol.md $(B)/shot.schema.json $(B)/man/farlight.1
+all: $(PROGRAMS) $(MODULES) $(B)/$(SONAME) $(B)/protocol.md $(B)/shot.schema.json $(B)/man/farlight.1
 ifneq ($(EMBREE),1)
 	@echo 'built without Embree: the tracer reference is left out (its header is in the package libembree-dev)'
 endif
@@ -138,7 +142,7 @@ $(EMBREE_STAMP):
 $(B)/server/trace/tracer.o: $(EMBREE_STAMP)
 $(B)/shader_sources.o: INCLUDES = -Iserver
 $(B)/client/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS)
-$(B)/client/import/%.opp $(B)/client/import/%.o: INCLUDES = -Iclient $(IMPORT_CFLAGS)
+$(B)/client/import/%.opp $(B)/client/import/%.o $(B)/pic/client/import/%.opp: INCLUDES = -Iclient $(IMPORT_CFLAGS)
 $(B)/client/output/%.opp $(B)/client/output/%.o: INCLUDES = -Iclient $(EXPORT_CFLAGS)
 $(B)/client/video/%.o: INCLUDES = -Iclient $(VIDEO_CFLAGS)
 $(B)/client/viewer/%.o: INCLUDES = -Iclient $(CLIENT_CFLAGS) $(VIEWER_CFLAGS)
@@ -147,7 +151,7 @@ SERVER_CFLAGS = $(eval SERVER_CFLAGS := $(call pkg_cflags,$(SERVER_PKGS) $(SERVE
 CLIENT_CFLAGS = $(eval CLIENT_CFLAGS := $(call pkg_cflags,$(CLIENT_PKGS)))$(CLIENT_CFLAGS)
 TEST_CFLAGS = $(eval TEST_CFLAGS := $(call pkg_cflags,$(TEST_PKGS)))$(TEST_CFLAGS)
 # Others' C++ headers are system headers: our warnings are for our own files.
-IMPORT_CFLAGS = $(eval IMPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(IMPORT_PKGS))))$(IMPORT_CFLAGS)
+IMPORT_CFLAGS = $(eval IMPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(IMPORT_PKGS) $(TEXTURE_PKGS))))$(IMPORT_CFLAGS)
 VIDEO_CFLAGS = $(eval VIDEO_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(VIDEO_PKGS))))$(VIDEO_CFLAGS)
 VIEWER_CFLAGS = $(eval VIEWER_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(VIEWER_PKGS))))$(VIEWER_CFLAGS)
 EXPORT_CFLAGS = $(eval EXPORT_CFLAGS := $(patsubst -I%,-isystem %,$(call pkg_cflags,$(EXPORT_PKGS))))$(EXPORT_CFLAGS)
@@ -159,6 +163,9 @@ $(B)/%.opp: %.cpp
 	@mkdir -p $(@D)
 	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
 
+$(B)/pic/%.opp: %.cpp
+	@mkdir -p $(@D)
+	$(call say,CXX)$(CXX) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CXXFLAGS_ALL) -fPIC $(WARN) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
 $(B)/pic/protocol/%.o: VISIBILITY = -fvisibility=default
 $(B)/pic/%.o: %.c
 	@mkdir -p $(@D)
@@ -196,8 +203,12 @@ $(B)/farlight: $(CLI_OBJ) $(LIB_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CC) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(CLIENT_LIBS) -o $@
 $(B)/helper.a: $(HELPER_OBJ)
 	$(call say,AR)rm -f $@ && $(AR) rcs $@ $^
-$(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ)
-	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) -o $@
+# Programs find their modules beside them, or where `make install` puts them.
+MODULE_PATH := -Wl,--enable-new-dtags,-rpath,'$$ORIGIN:$$ORIGIN/../lib/farlight'
+$(B)/farlight-import: $(IMPORT_OBJ) $(PROTOCOL_OBJ) | $(B)/farlight-textures.so
+	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(IMPORT_LIBS) $(MODULE_PATH) -o $@
+$(B)/farlight-textures.so: $(patsubst %.cpp,$(B)/pic/%.opp,$(TEXTURE_CXX))
+	$(call say,LINK)$(CXX) -shared $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(call pkg_libs,$(TEXTURE_PKGS)) -o $@
 $(B)/farlight-export: $(EXPORT_OBJ) $(PROTOCOL_OBJ)
 	$(call say,LINK)$(CXX) $(OPT) $(LDFLAGS_ALL) $(LDFLAGS) $^ $(EXPORT_LIBS) -o $@
 $(B)/farlight-video: $(VIDEO_OBJ) $(PROTOCOL_OBJ)
@@ -259,13 +270,14 @@ $(B)/tests/fuzz/kept_%.o: tests/fuzz/fuzz_%.c
 	@mkdir -p $(@D)
 	$(call say,CC)$(CC) $(CPPFLAGS_ALL) $(INCLUDES) $(OPT) $(CFLAGS_ALL) $(WARN_C) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 # The importer without its main() and its sandbox.
-READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o sandbox.o send.o),$(IMPORT_OBJ))
+READERS_OBJ := $(filter-out $(addprefix $(B)/client/import/,main.o send.o),$(IMPORT_OBJ)) $(call obj,$(TEXTURE_CXX))
+READERS_LIBS = $(IMPORT_LIBS) $(call pkg_libs,$(TEXTURE_PKGS))
 # Sessions that begin, break and end, with memory that runs out.
 $(B)/tests/unit/fault_tests: $(SERVING_OBJ) $(B)/tests/fuzz/recorded_session.o
 $(B)/tests/unit/fault_tests: TEST_LIBS += $(SERVING_WRAP) -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
 # What the fuzzers have found.
 $(B)/tests/unit/corpus_tests: $(KEPT_OBJ) $(SERVING_OBJ) $(READERS_OBJ)
-$(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(IMPORT_LIBS) -lstdc++
+$(B)/tests/unit/corpus_tests: TEST_LIBS += $(SERVING_WRAP) $(READERS_LIBS) -lstdc++
 # What the daemon encodes is decoded by the library itself.
 $(B)/tests/unit/media_tests: $(patsubst %,$(B)/client/viewer/%.o,camera decode heat hud input metrics paint pixmap replay settings tour window)
 $(B)/tests/unit/media_tests: TEST_LIBS += $(VIEWER_LIBS) -Wl,--wrap=libav_load
@@ -425,6 +437,8 @@ install: all
 	install -d $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include/farlight/lib \
 	    $(DESTDIR)$(PREFIX)/include/farlight/protocol $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
+	install -d $(DESTDIR)$(PREFIX)/lib/farlight
+	install -m 644 $(MODULES) $(DESTDIR)$(PREFIX)/lib/farlight
 	install -m 755 $(B)/$(SONAME) $(DESTDIR)$(PREFIX)/lib
 	ln -sf $(SONAME) $(DESTDIR)$(PREFIX)/lib/libfarlight.so
 	install -m 644 client/lib/farlight.h $(DESTDIR)$(PREFIX)/include/farlight/lib
@@ -451,7 +465,7 @@ uninstall:
 	    $(DESTDIR)$(PREFIX)/lib/pkgconfig/farlight.pc $(DESTDIR)$(PREFIX)/share/bash-completion/completions/farlight
 	rm -f $(addprefix $(DESTDIR)$(PREFIX)/lib/systemd/system/farlightd.,service socket) \
 	    $(DESTDIR)$(PREFIX)/lib/sysusers.d/farlight.conf
-	rm -rf $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)$(PREFIX)/share/farlight $(DESTDIR)$(PREFIX)/include/farlight
+	rm -rf $(DESTDIR)$(PREFIX)/lib/farlight $(DESTDIR)$(PREFIX)/share/doc/farlight $(DESTDIR)$(PREFIX)/share/farlight $(DESTDIR)$(PREFIX)/include/farlight
 
 # What was rendered and measured stays.
 clean:
@@ -503,7 +517,7 @@ $(B)/tests/fuzz/fuzz_scene $(B)/tests/fuzz/fuzz_sealed: FUZZ_LIBS = $(call pkg_l
 $(B)/tests/fuzz/fuzz_session: $(SERVING_OBJ) $(SERVER_OBJ)
 $(B)/tests/fuzz/fuzz_session: FUZZ_LIBS = $(SERVER_LIBS) $(SERVING_WRAP)
 $(addprefix $(B)/tests/fuzz/fuzz_,gltf nff obj): $(READERS_OBJ)
-$(addprefix $(B)/tests/fuzz/fuzz_,gltf nff obj): FUZZ_LIBS = $(IMPORT_LIBS)
+$(addprefix $(B)/tests/fuzz/fuzz_,gltf nff obj): FUZZ_LIBS = $(READERS_LIBS)
 # OpenImageIO loses memory with broken images; the importer lives for one model only.
 run-fuzz-gltf run-fuzz-obj: FUZZ_FLAGS = -detect_leaks=0
 .PHONY: fuzz fuzz-keep $(addprefix run-fuzz-,$(FUZZERS)) $(addprefix keep-fuzz-,$(FUZZERS))

@@ -19,26 +19,6 @@ bool obj_import(struct import_scene *scene, struct files *files, const unsigned 
 /* Neutral File Format of the Standard Procedural Databases. */
 bool nff_import(struct import_scene *scene, const unsigned char *bytes, size_t size_bytes);
 
-/* Equirectangular image, HDR or EXR, as the scene's environment. */
-bool environment_import(struct import_scene *scene, const char *file, const unsigned char *bytes,
-                        size_t size_bytes);
-
-/* One image to decode. */
-struct texture_job {
-    const unsigned char *bytes; /* the encoded file; not owned */
-    size_t size_bytes;
-    bool srgb; /* texels are wanted sRGB-encoded: matters for float images only, which are linear */
-    /* Result. */
-    unsigned char *texels; /* malloc'd, 4 bytes each, rows from the top; NULL: `reason` says why */
-    uint32_t width, height;
-    bool has_alpha;
-    char reason[200];
-};
-/* Decodes all, with two threads if there are several. Never fails as a whole. */
-void texture_decode(struct texture_job *jobs, size_t count);
-/* What stands for an image that cannot be had: 2x2 texels, magenta and black. NULL: out of memory. */
-unsigned char *texture_marker(void);
-
 #ifdef __cplusplus
 }
 #endif

@@ -2,6 +2,7 @@
 // Materials and textures. Every material is gone through twice by the same code: first to learn which images are
 // wanted and how, so that they can be decoded side by side, then to be added.
 #include "gltf.hpp"
+#include "texture.h"
 
 #include <algorithm>
 #include <cmath>

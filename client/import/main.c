@@ -7,6 +7,7 @@
 #include "import.h"
 #include "helper/sandbox.h"
 #include "send.h"
+#include "texture.h"
 #include "protocol/common/clock.h"
 #include "protocol/version.h"
 
@@ -143,6 +144,26 @@ static bool has_ending(const char *path, const char *ending)
     return path_length > length && strcasecmp(path + path_length - length, ending) == 0;
 }
 
+static bool is_gltf(const char *name, const unsigned char *bytes, size_t size_bytes)
+{
+    return has_ending(name, ".gltf") || has_ending(name, ".glb") ||
+           (size_bytes >= 4 && memcmp(bytes, "glTF", 4) == 0);
+}
+
+static bool contains(const unsigned char *bytes, size_t size_bytes, const char *text)
+{
+    return memmem(bytes, size_bytes, text, strlen(text)) != NULL;
+}
+
+/* By the bytes alone, for nothing may be parsed yet. JSON can write the letters of "images" as \u0069 and so on.
+ */
+static bool may_name_images(const char *name, const unsigned char *bytes, size_t size_bytes)
+{
+    if (is_gltf(name, bytes, size_bytes))
+        return contains(bytes, size_bytes, "images") || contains(bytes, size_bytes, "\\u00");
+    return has_ending(name, ".obj") && contains(bytes, size_bytes, "mtllib");
+}
+
 static bool parse_model(struct import_scene *scene, struct files *files, const char *path,
                         const unsigned char *bytes, size_t size_bytes)
 {
@@ -151,8 +172,7 @@ static bool parse_model(struct import_scene *scene, struct files *files, const c
 
     if (size_bytes == 0)
         return import_fail(scene, NULL, "the file is empty");
-    if (has_ending(name, ".gltf") || has_ending(name, ".glb") ||
-        (size_bytes >= 4 && memcmp(bytes, "glTF", 4) == 0))
+    if (is_gltf(name, bytes, size_bytes))
         return gltf_import(scene, files, bytes, size_bytes);
     if (has_ending(name, ".obj"))
         return obj_import(scene, files, bytes, size_bytes);
@@ -162,32 +182,66 @@ static bool parse_model(struct import_scene *scene, struct files *files, const c
                        dot ? dot : "(no ending)");
 }
 
-static bool import_all(struct import_scene *scene, struct files *files, struct sender *sender,
-                       const struct options *options)
+static bool import_environment(struct import_scene *scene, struct files *files, const char *file)
 {
+    struct message_set_environment environment = {.colour = {1, 1, 1}};
+    struct texture_job job = {0};
+    char reason[FILES_REASON_BYTES] = "";
+    unsigned char *bytes = files_read_descriptor(files, files->environment, &job.size_bytes, reason);
+
+    if (!bytes)
+        return import_fail(scene, file, "%s", reason);
+    job.bytes = bytes;
+    texture_decode_environment(&job);
+    free(bytes);
+    if (!job.texels)
+        return import_fail(scene, file, "the environment cannot be read: %s", job.reason);
+    if (job.width != 2 * job.height)
+        import_note(scene, PROTOCOL_SEVERITY_INFO, file,
+                    "is %u x %u; an equirectangular image is twice as wide as high", job.width, job.height);
+    environment.width = job.width;
+    environment.height = job.height;
+    import_set_environment(scene, &environment,
+                           import_add_blob(scene, job.texels, (uint64_t)job.width * job.height * 8));
+    return !scene->failed;
+}
+
+static bool import_all(struct import_scene *scene, struct files *files, struct sender *sender,
+                       const struct options *options, const unsigned char *bytes, size_t size_bytes)
+{
+    bool imported = true;
+
+    if (options->model) {
+        imported = sender_progress(sender, size_bytes, 0, "parsing") &&
+                   parse_model(scene, files, options->model, bytes, size_bytes);
+        if (imported && scene->edit_count == 0)
+            import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
+    }
+    if (imported && options->environment)
+        imported = import_environment(scene, files, file_part(options->environment));
+    return imported && !scene->failed;
+}
+
+/* The model is read before the sandbox is entered and parsed within it: whether the module of images is needed
+ * shows in the bytes, and loading it opens more files than the sandbox allows. */
+static bool read_and_import(struct import_scene *scene, struct files *files, struct sender *sender,
+                            const struct options *options)
+{
+    char reason[FILES_REASON_BYTES] = "";
     unsigned char *bytes = NULL;
     size_t size_bytes = 0;
-    char reason[FILES_REASON_BYTES] = "";
-    bool imported = true;
+    bool imported;
 
     if (options->model) {
         bytes = files_read_descriptor(files, files->model, &size_bytes, reason);
         if (!bytes)
             return import_fail(scene, NULL, "%s", reason);
-        imported = sender_progress(sender, size_bytes, 0, "parsing") &&
-                   parse_model(scene, files, options->model, bytes, size_bytes);
-        free(bytes);
-        if (imported && scene->edit_count == 0)
-            import_note(scene, PROTOCOL_SEVERITY_WARNING, NULL, "it contains nothing that can be shown");
     }
-    if (imported && options->environment) {
-        bytes = files_read_descriptor(files, files->environment, &size_bytes, reason);
-        if (!bytes)
-            return import_fail(scene, file_part(options->environment), "%s", reason);
-        imported = environment_import(scene, file_part(options->environment), bytes, size_bytes);
-        free(bytes);
-    }
-    return imported && !scene->failed;
+    if (options->environment || (bytes && may_name_images(file_part(options->model), bytes, size_bytes)))
+        texture_load();
+    imported = enter_sandbox(scene, options) && import_all(scene, files, sender, options, bytes, size_bytes);
+    free(bytes);
+    return imported;
 }
 
 static bool run(struct import_scene *scene, struct sender *sender, const struct options *options,
@@ -207,7 +261,7 @@ static bool run(struct import_scene *scene, struct sender *sender, const struct 
     }
     begin_ns = monotonic_now_ns();
     silence_libraries();
-    imported = enter_sandbox(scene, options) && import_all(scene, &files, sender, options);
+    imported = read_and_import(scene, &files, sender, options);
     parsed_ns = monotonic_now_ns();
     files_finish(&files);
     if (!imported || !sender_notes(sender) || !sender_progress(sender, 0, scene->blob_bytes, "hashing"))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // MTL: Phong's terms of 1995, and the later ones for physically based shading, to metallic-roughness.
 #include "obj.hpp"
+#include "texture.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Images through OpenImageIO: the reader is named by the first bytes and not guessed by the library, it reads from
-// memory, and what the header claims is checked before a pixel is asked for.
-#include "formats.h"
+// memory, and what the header claims is checked before a pixel is asked for. A module of its own, for OpenImageIO
+// takes longer to load than most models to import.
+#include "texture.h"
 #include "protocol/common/srgb.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -208,13 +209,13 @@ bool decode(texture_job &job, std::string &reason)
                                                  : decode_bytes(image, job, texels, reason);
 }
 
-void decode_one(texture_job &job) noexcept
+void run(texture_job &job, bool (*decoder)(texture_job &, std::string &)) noexcept
 {
     bool decoded = false;
     std::string reason;
 
     try {
-        decoded = decode(job, reason);
+        decoded = decoder(job, reason);
         // A library's message may have several lines and end in one.
         std::replace(reason.begin(), reason.end(), '\n', ' ');
         while (!reason.empty() && reason.back() == ' ')
@@ -237,7 +238,7 @@ void decode_one(texture_job &job) noexcept
 void decode_next(texture_job *jobs, size_t count, std::atomic<size_t> &next) noexcept
 {
     for (size_t i; (i = next.fetch_add(1)) < count;)
-        decode_one(jobs[i]);
+        run(jobs[i], decode);
 }
 
 // IEEE 754 binary16, rounded to nearest even; finite, non-negative, at most half_max.
@@ -254,42 +255,40 @@ uint16_t half_of(float value)
     return uint16_t(std::min((bits - 0x38000000u) >> 13, 0x7bffu));
 }
 
-bool environment_decode(import_scene *scene, const char *file, const unsigned char *bytes, size_t size_bytes)
+bool decode_halves(texture_job &job, std::string &reason)
 {
-    const char *reader = reader_of(bytes, size_bytes);
-    std::string reason;
+    const char *reader = reader_of(job.bytes, job.size_bytes);
 
-    if (!reader)
-        return import_fail(scene, file, "the environment is not an image of a known format");
-    opened_image image(bytes, size_bytes);
+    if (!reader) {
+        reason = "is not an image of a known format";
+        return false;
+    }
+    opened_image image(job.bytes, job.size_bytes);
     if (!image.open(reader, reason))
-        return import_fail(scene, file, "the environment cannot be read: %s", reason.c_str());
+        return false;
     const int channels = std::min(image.spec.nchannels, 3);
     const size_t texels = size_t(image.spec.width) * size_t(image.spec.height);
     std::vector<float> pixels(texels * size_t(channels));
-    if (!image.input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, pixels.data()))
-        return import_fail(scene, file, "the environment cannot be read: %s", image.input->geterror().c_str());
+    if (!image.input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, pixels.data())) {
+        reason = image.input->geterror();
+        return false;
+    }
     uint16_t *halves = static_cast<uint16_t *>(calloc(texels, 4 * sizeof(uint16_t)));
-    if (!halves)
-        return import_fail(scene, file, "out of memory");
+    if (!halves) {
+        reason = "out of memory";
+        return false;
+    }
     for (size_t i = 0; i < texels; i++)
         for (size_t c = 0; c < 3; c++)
             halves[i * 4 + c] = half_of(pixels[i * size_t(channels) + (channels == 3 ? c : 0)]);
-    if (image.spec.width != 2 * image.spec.height)
-        import_note(scene, PROTOCOL_SEVERITY_INFO, file,
-                    "is %d x %d; an equirectangular image is twice as wide as high", image.spec.width,
-                    image.spec.height);
-    message_set_environment environment = {};
-    environment.colour[0] = environment.colour[1] = environment.colour[2] = 1;
-    environment.width = uint32_t(image.spec.width);
-    environment.height = uint32_t(image.spec.height);
-    const uint32_t blob = import_add_blob(scene, halves, texels * 8);
-    import_set_environment(scene, &environment, blob);
-    return !scene->failed;
+    job.texels = reinterpret_cast<unsigned char *>(halves);
+    job.width = uint32_t(image.spec.width);
+    job.height = uint32_t(image.spec.height);
+    return true;
 }
 } // namespace
 
-extern "C" void texture_decode(struct texture_job *jobs, size_t count)
+static void decode_all(struct texture_job *jobs, size_t count)
 {
     std::atomic<size_t> next{0};
     std::thread helper;
@@ -307,25 +306,10 @@ extern "C" void texture_decode(struct texture_job *jobs, size_t count)
         helper.join();
 }
 
-extern "C" unsigned char *texture_marker(void)
+static void decode_environment(struct texture_job *job)
 {
-    static const unsigned char texels[16] = {255, 0, 255, 255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 0, 255, 255};
-    unsigned char *copy = static_cast<unsigned char *>(malloc(sizeof(texels)));
-
-    if (copy)
-        memcpy(copy, texels, sizeof(texels));
-    return copy;
+    OIIO::attribute("threads", 1);
+    run(*job, decode_halves);
 }
 
-extern "C" bool environment_import(struct import_scene *scene, const char *file, const unsigned char *bytes,
-                                   size_t size_bytes)
-{
-    try {
-        OIIO::attribute("threads", 1);
-        return environment_decode(scene, file, bytes, size_bytes);
-    } catch (const std::exception &exception) {
-        return import_fail(scene, file, "the environment cannot be read: %s", exception.what());
-    } catch (...) {
-        return import_fail(scene, file, "the environment cannot be read");
-    }
-}
+const struct texture_reader texture_reader = {decode_all, decode_environment};

@@ -21,6 +21,7 @@ import json
 import os
 import resource
 import select
+import shutil
 import socket
 import struct
 import subprocess
@@ -28,6 +29,7 @@ import tempfile
 import threading
 import time
 import unittest
+import unittest.mock
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 BIN = os.environ.get("FARLIGHT_BIN") or os.path.join(ROOT, "build", "release")
@@ -622,6 +624,8 @@ class Peers(unittest.TestCase):
         self.assertIn("nowhere.glb", result.errors()[0][1])
 
 
+# 1x1 texel of linear 0.5 in all channels.
+HDR = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x80\x80\x80"
 TRIANGLE = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)
 
 
@@ -775,6 +779,30 @@ class Written(unittest.TestCase):
         self.assertEqual(sorted(t["format"] for t in result.of(SET_TEXTURE)), [0, 1], "colour and data")
         self.assertEqual(result.data(result.of(SET_TEXTURE)[0]["arrays"][0])[:4], b"\xff\x00\xff\xff")
         self.assertTrue(any("nowhere.png" in text for _, _, text in result.notes), result.notes)
+
+    def textured(self):
+        """The text of a model with one image, which is HDR."""
+        return json.dumps(gltf({
+            "nodes": [{"mesh": 0}], "textures": [{"source": 0}],
+            "images": [{"uri": "data:image/vnd.radiance;base64," + base64.b64encode(HDR).decode("ascii")}],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}]}))
+
+    def test_gltf_images_are_found_however_their_name_is_spelt(self):
+        for text in (self.textured(), self.textured().replace('"images"', '"im\\u0061ges"')):
+            result = self.run_text("model.gltf", text)
+            self.assertNotIn("image", result.text())
+            texel, = set(result.data(result.of(SET_TEXTURE)[0]["arrays"][0])[:3])
+            self.assertAlmostEqual(texel, 188, delta=1, msg="sRGB of 0.5")
+
+    def test_without_its_module_the_importer_reads_models_but_no_images(self):
+        alone = shutil.copy(IMPORTER, self.folder.name)
+        with unittest.mock.patch.dict(globals(), IMPORTER=alone):
+            plain = self.run_text("model.nff", "v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 45\nhither 1\nresolution 8 8\ns 0 0 0 1\n")
+            self.assertNotIn("farlight-textures", plain.text())
+            result = self.run_text("model.gltf", self.textured())
+            self.assertIn("farlight-textures.so", result.text())
+            self.assertEqual(result.data(result.of(SET_TEXTURE)[0]["arrays"][0])[:4], b"\xff\x00\xff\xff")
 
     def test_gltf_broken_references_are_named(self):
         mesh = [{"primitives": [{"attributes": {"POSITION": 0}}]}]

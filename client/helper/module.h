@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: MIT */
+/* The part of a helper program that needs hundreds of libraries: a shared object, loaded only by the runs that use
+ * it. */
+#ifndef FARLIGHT_CLIENT_HELPER_MODULE_H
+#define FARLIGHT_CLIENT_HELPER_MODULE_H
+
+#include <stddef.h>
+
+/* Loads the module `file` from where the program's run path says (beside the program, or ../lib/farlight) and
+ * returns the address of `symbol` in it; it stays loaded. To be called before the sandbox is entered. NULL:
+ * `reason` says why. */
+void *module_load(const char *file, const char *symbol, char *reason, size_t reason_bytes);
+
+#endif

@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: MIT */
+/* Images to texels. What decodes them is a module (texture.cpp), because loading OpenImageIO with its libraries
+ * takes longer than importing most models; it is loaded before the sandbox is entered, by the imports that may
+ * need it. */
+#ifndef FARLIGHT_IMPORT_TEXTURE_H
+#define FARLIGHT_IMPORT_TEXTURE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* One image to decode. */
+struct texture_job {
+    const unsigned char *bytes; /* the encoded file; not owned */
+    size_t size_bytes;
+    bool srgb; /* texels are wanted sRGB-encoded: matters for float images only, which are linear */
+    /* Result. */
+    unsigned char *texels; /* malloc'd, 4 bytes each, rows from the top; NULL: `reason` says why */
+    uint32_t width, height;
+    bool has_alpha;
+    char reason[200];
+};
+
+/* What the module exports, under the name `texture_reader`. */
+struct texture_reader {
+    /* Decodes all, with two threads if there are several. Never fails as a whole. */
+    void (*decode)(struct texture_job *jobs, size_t count);
+    /* Texels of 4 half floats, linear light; alpha is 0. */
+    void (*decode_environment)(struct texture_job *job);
+};
+extern const struct texture_reader texture_reader __attribute__((visibility("default")));
+
+/* Loads the module. Where it cannot be loaded, or was not, that is the reason of every image. */
+void texture_load(void);
+
+/* As the module's. */
+void texture_decode(struct texture_job *jobs, size_t count);
+void texture_decode_environment(struct texture_job *job);
+/* What stands for an image that cannot be had: 2x2 texels, magenta and black. NULL: out of memory. */
+unsigned char *texture_marker(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
